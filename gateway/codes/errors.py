@@ -201,6 +201,13 @@ ERRORS: Final = (
         "Name the file as the rig's calibration (calibration: FILE), or fit it with fewer stops.",
     ),
     Explanation(
+        "E407",
+        "a recording that stays",
+        "The recording is kept, is the rig's reference, or is being recorded; it was not deleted.",
+        "recordings keep, recordings reference, or a recording under way.",
+        "recordings keep N --no, recordings reference --none, or record off; then delete it.",
+    ),
+    Explanation(
         "E421",
         "not a ladder to fit",
         "The table can be read, but a calibration must not be made from it; the message says what was seen.",

@@ -9,6 +9,8 @@ Decisions
 - No numpy here: the control process needs none of it to record.
 """
 
+import contextlib
+import fcntl
 import json
 import os
 import struct
@@ -44,6 +46,10 @@ class Recorder:
         directory.mkdir(parents=True, exist_ok=True, mode=0o700)
         self.number, self.path, descriptor = _create_next(directory)
         self._descriptor: int | None = descriptor
+        with contextlib.suppress(OSError):  # some file systems have no locks
+            fcntl.flock(
+                descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB
+            )  # until it is closed: whoever deletes recordings looks
         self._length = 0
         facts = {"format": _FORMAT, "number": self.number, "started_utc": _utc_now()} | dict(header)
         self._write(header_bytes(json.dumps(facts | {"columns": list(columns)}).encode()))
@@ -116,8 +122,9 @@ class Recorder:
 
 
 def _create_next(directory: Path) -> tuple[int, Path, int]:
-    """Number, path and descriptor of a file that nobody else has: O_EXCL settles who gets a number."""
-    number = 1 + max((int(path.stem) for path in directory.glob(f"*{SUFFIX}") if path.stem.isdigit()), default=0)
+    """Number, path and descriptor of a file that nobody else has: O_EXCL settles who gets a number. None is used twice, also
+    where its recording was deleted: then there is a mark."""
+    number = 1 + max((int(path.stem) for path in directory.iterdir() if path.stem.isdigit()), default=0)
     while True:
         path = directory / f"{number:04d}{SUFFIX}"
         try:

@@ -85,14 +85,26 @@ class Chart:
 
     def svg(self) -> str:
         """Return the chart as HTML, without its legend."""
+        room = f"padding:{TOP}px {RIGHT}px {BOTTOM}px {self._left()}px"
+        label = f'role="img" aria-label="{escape(self.title)}"'
+        return f'<div class="plot" style="{room}"><svg {label} height="{self.height}">{self._inside()}</svg></div>'
+
+    def svg_at(self, left_px: float, down_px: float, width_px: float) -> str:
+        """Return the chart as part of another SVG, of a fixed size; its names stand to the right above it."""
+        place = f'x="{left_px}" y="{down_px}" width="{width_px}" height="{self.height}" style="width: {width_px}px"'
+        names = "".join(
+            f'<text class="end" x="100%" y="-12" dx="{-150 * at}">{escape(name)}</text>'
+            f'<path class="line {style}" d="M{width_px - 150 * at - 75} -16h-30"/>'
+            for at, (name, _, style) in enumerate(self._legend)
+        )
+        return f"<svg {place}>{self._inside()}{names}</svg>"
+
+    def _inside(self) -> str:
         drawing = (
             f'<svg class="drawing" viewBox="0 0 {self.width} {self.height}" preserveAspectRatio="none" '
             f'width="100%" height="{self.height}">{"".join(self._parts)}</svg>'
         )
-        inside = self._axes() + drawing + "".join(self._marks)
-        room = f"padding:{TOP}px {RIGHT}px {BOTTOM}px {self._left()}px"
-        label = f'role="img" aria-label="{escape(self.title)}"'
-        return f'<div class="plot" style="{room}"><svg {label} height="{self.height}">{inside}</svg></div>'
+        return self._axes() + drawing + "".join(self._marks)
 
     @property
     def key(self) -> str:

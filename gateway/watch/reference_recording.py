@@ -13,8 +13,6 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from gateway.numbered_documents.selection import read_selection
 from gateway.processes.durable_file import lock_directory, make_directory, remove_if_possible, write_durably
 from gateway.recording import RecordingError, read_table
@@ -143,6 +141,8 @@ def why_no_reference(path: Path) -> str:
 
 
 def _why_it_says_little(recording: Recording) -> str:
+    import numpy as np
+
     columns = recording.columns
     time_s, command_v = (columns.get(name, np.zeros(0)) for name in ("time_s", "command_v"))
     if command_v.size < 2 or time_s[-1] - time_s[0] < _LEAST_S:

@@ -27,7 +27,7 @@ Definition = Function | ast.ClassDef
 VERBS = frozenset(
     """Abort Accept Act Add Admit Advance Allow Announce Answer Append Apply Ask Begin Bend Build Calculate Calibrate
     Call Cancel Change Check Choose Clear Climb Close Collect Combine Come Compare Compensate Compile Compose
-    Compute Continue Convert Copy Count Create Cut Decide Decode Delay Derive Descend Diagnose Draw Drop Enable
+    Compute Continue Convert Copy Count Create Cut Decide Decode Delay Delete Derive Descend Diagnose Draw Drop Enable
     Encode End Ensure Estimate Evaluate Exclude Execute Expect Explain Export Extend Fade Fetch Fill Find Finish Fit
     Fold Follow Forget Fork Format Give Go Greet Group Guard Hand Handle Have Hold Import Include Index Insert
     Install Interpolate Join Judge Keep Kill Label Latch Learn Leave Lend Let Limit List Listen Load Log Look Make

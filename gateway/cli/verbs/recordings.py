@@ -1,4 +1,5 @@
-"""`recordings`: what has been recorded, getting it out as CSV or Parquet, and which one is the rig's reference."""
+"""`recordings`: what has been recorded and what happened in it, a picture of it, getting it out as CSV or Parquet, which ones
+stay and go, and which one is the rig's reference."""
 
 import json
 import sys
@@ -8,66 +9,143 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gateway.cli.errors import already_exists
+from gateway.cli.command_line.completion_words import complete_recording_numbers
+from gateway.cli.command_line.listed_number import ListedNumber
+from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
+from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
-    from gateway.recording import RecordingEntry
     from gateway.watch.reference_recording import ReferenceRecording
 
 
-EXAMPLES = ("recordings list", "recordings export 1 --csv -o run.csv")
+EXAMPLES = (
+    "recordings list",
+    "recordings show 1",
+    "recordings plot 1 -o run.svg",
+    "recordings keep 1",
+    "recordings export 1 --csv -o run.csv",
+    "recordings prune --dry-run --days 30",
+)
+_number = click.argument(
+    "number", metavar="N", type=ListedNumber("recordings"), shell_complete=complete_recording_numbers
+)
+_yes = click.option("--yes", is_flag=True, help="Do not ask.")
 
 
 @click.group(name="recordings")
 def command() -> None:
-    """List and export recordings, and choose the reference."""
+    """List, show, plot, keep, delete and export recordings, and choose the reference."""
 
 
 @command.command(name="list")
 @state_options
 @json_option
 def list_command(*, state: StateChoice, as_json: bool) -> None:
-    """List the recordings of a state directory."""
-    from gateway.recording import list_recordings
+    """List the recordings of a state directory, and what happened in each."""
+    from gateway.cli.diagnosis.progress_line import show_progress
+    from gateway.cli.recordings.listing import facts_of, lines_of, marks_of, reference_name
+    from gateway.recording.care.summaries import list_summaries
 
     directory = state.directory
-    entries = list_recordings(directory)
+    with show_progress("list"):
+        summaries, reference = list_summaries(directory), reference_name(directory)
+    marked = [(one, marks_of(Path(one["path"]), reference)) for one in summaries]
     if as_json:
-        click.echo(json.dumps([_facts(entry) for entry in entries], indent=2))
+        click.echo(json.dumps([facts_of(*one) for one in marked], indent=2))
         return
-    if not entries:
+    if not marked:
         click.echo(f"no recordings in {directory / 'recordings'}; force-gateway record on, or run --record, makes one")
         return
-    click.echo("  ID  started (UTC)             rig              duration      rows       size")
-    for entry in entries:
-        click.echo(_line(entry))
+    click.echo("\n".join(line for one in marked for line in lines_of(*one)))
 
 
-def _facts(entry: "RecordingEntry") -> dict[str, object]:
-    return {
-        "id": entry.number,
-        "path": str(entry.path),
-        "started_utc": entry.header.get("started_utc"),
-        "rig": entry.header.get("rig"),
-        "calibration": entry.header.get("calibration"),
-        "plant": (entry.header.get("plant_in_use") or {}).get("number"),
-        "rows": entry.rows,
-        "duration_s": round(entry.duration_s, 6),
-        "size_bytes": entry.size_bytes,
-        "truncated": entry.truncated,
-        "fault": entry.fault or None,
-    }
+@command.command(name="show")
+@_number
+@state_options
+@json_option
+def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
+    """Show recording N: what it is called, what happened in it, what it was made with."""
+    from gateway.cli.recordings.listing import describe, facts_of, marks_of, reference_name
+    from gateway.recording import find_recording
+    from gateway.recording.care.summaries import summary_of
+
+    path = find_recording(state.directory, number)
+    summary = {"path": str(path), **summary_of(path)}
+    marks = marks_of(path, reference_name(state.directory))
+    if as_json:
+        click.echo(json.dumps(facts_of(summary, marks), indent=2))
+        return
+    click.echo("\n".join(describe(summary, marks)))
 
 
-def _line(entry: "RecordingEntry") -> str:
-    if entry.fault:
-        return f"{entry.number:>4}  unreadable: {entry.fault}"
-    torn = "  torn tail dropped" if entry.truncated else ""
-    return (
-        f"{entry.number:>4}  {entry.header.get('started_utc', ''):<24}  {entry.header.get('rig', ''):<14} "
-        f"{entry.duration_s:>8.1f} s {entry.rows:>9} {entry.size_bytes / 1e3:>7.1f} kB{torn}"
-    )
+@command.command(name="plot")
+@_number
+@click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), help="FILE.html or FILE.svg.")
+@click.option("--force", is_flag=True, help="Overwrite the file.")
+@state_options
+def plot_command(*, number: int, output: Path | None, force: bool, state: StateChoice) -> None:
+    """Draw recording N: forces and the command against time."""
+    from gateway.cli.diagnosis.outputs import write_all
+    from gateway.recording import find_recording, read_recording
+    from gateway.reports.recording_plot import LEAST_ROWS, recording_page, recording_svg
+
+    path = find_recording(state.directory, number)
+    target = output or Path(f"recording-{number:04d}.html")
+    draw = {".html": recording_page, ".svg": recording_svg}.get(target.suffix.lower())
+    if draw is None:
+        raise click.UsageError(f"{target}: a plot is FILE.html or FILE.svg")
+    if target.exists() and not force:
+        raise already_exists(target)
+    recording = read_recording(path)
+    if recording.rows < LEAST_ROWS:
+        raise CliError(f"E403 recording {number} has {recording.rows} rows: nothing to draw", exit_codes.DATA)
+    write_all({target: draw(recording)})
+    click.echo(f"wrote {target}", err=True)
+
+
+@command.command(name="keep")
+@_number
+@click.option("--no", "lets_go", is_flag=True, help="Keep it no longer.")
+@state_options
+def keep_command(*, number: int, lets_go: bool, state: StateChoice) -> None:
+    """Keep recording N: neither `delete` nor the retention takes it."""
+    from gateway.recording import find_recording
+    from gateway.recording.care.keeping import keep_recording, let_recording_go
+
+    path = find_recording(state.directory, number)
+    (let_recording_go if lets_go else keep_recording)(path)
+    click.echo(f"recording {number} is kept{' no longer' if lets_go else ''}")
+
+
+@command.command(name="delete")
+@_number
+@_yes
+@state_options
+def delete_command(*, number: int, yes: bool, state: StateChoice) -> None:
+    """Delete recording N; not one that is kept, the reference, or one that is being recorded."""
+    from gateway.cli.recordings.removal import delete
+
+    click.echo(f"deleted {delete(state.directory, number, asks=not yes)}")
+
+
+@command.command(name="prune")
+@click.option("--dry-run", is_flag=True, help="Only say what would go.")
+@click.option(
+    "--days", type=click.FloatRange(min=0, min_open=True), help="Delete older ones  [default: as the rig says]"
+)
+@click.option("--bytes", "most_bytes", type=click.IntRange(min=0), help="Of all together  [default: as the rig says]")
+@_yes
+@state_options
+def prune_command(*, dry_run: bool, yes: bool, state: StateChoice, days: float | None, most_bytes: int | None) -> None:
+    """Delete the oldest recordings, as the rig's `recordings: retention` says; the gateway does so every hour."""
+    from gateway.cli.recordings.removal import prune, retention_of
+
+    gone = prune(state.directory, retention_of(state, days, most_bytes), dry_run=dry_run, asks=not yes)
+    for one in gone:
+        click.echo(f"{'would delete' if dry_run else 'deleted'} {one.path}: {one.why}")
+    if not gone:
+        click.echo("nothing to delete")
 
 
 @command.command(name="export")
@@ -125,8 +203,6 @@ def reference_command(*, recording: str | None, no_reference: bool, state: State
 def _keep_reference(state: StateChoice, name: str) -> None:
     """Make this recording the reference. CliError (65) for one that cannot describe a machine."""
     from gateway.cli.diagnosis.inputs import recording_path
-    from gateway.cli.errors import CliError
-    from gateway.processes import exit_codes
     from gateway.watch import reference_recording as reference
 
     path = recording_path(name, state.rig, state.path)

@@ -20,12 +20,13 @@ from gateway.control.settings import (
 from gateway.devices import DeviceProfile
 from gateway.devices.profile import ADDRESS
 from gateway.profiles.find import display, shipped_profiles_folder
-from gateway.profiles.http_sections import Web, http_sections_of, without_secrets
+from gateway.profiles.http_sections import Web, without_secrets
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
 from gateway.profiles.kinds.registers import read_registers
 from gateway.profiles.load import load_plant, open_profile, read_named, refer_at, refer_to
+from gateway.profiles.recordings_section import service_sections_of
 from gateway.profiles.rigs import (
     checks,
     face_checks,
@@ -281,7 +282,7 @@ def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: 
         network=file.network,
         fieldbus=tuple(face for face in parts.fieldbus if face),
         residual_watch=file.residual_watch,
-        **http_sections_of(file),
+        **service_sections_of(file),
         supported_bits=_supported_bits(file),
         accept_no_device_watchdog=file.accept_no_device_watchdog,
         texts=_texts(findings),

@@ -1,7 +1,7 @@
 """A rig, read and checked: everything that the service needs to wire one cell, frozen."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
@@ -17,6 +17,7 @@ from gateway.devices import DeviceProfile, SerialSettings
 from gateway.extras import is_installed, missing_note
 from gateway.profiles.http_sections import Metrics, Web
 from gateway.profiles.kinds.plants import PlantProfile
+from gateway.profiles.recordings_section import Retention
 from gateway.profiles.rigs.compensated_effects import in_simulation
 from gateway.profiles.rigs.faces import Face, RtuFace
 from gateway.profiles.rigs.rig_file import Network, ResidualWatch
@@ -104,6 +105,7 @@ class Rig:
     fingerprint: str
     notes: tuple[str, ...] = ()
     web: Web | None = None
+    retention: Retention = field(default_factory=Retention)
     metrics: Metrics | None = None
     mqtt: Mqtt | None = None
     valve: ValveLine | None = None

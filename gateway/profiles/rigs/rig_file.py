@@ -24,6 +24,7 @@ from gateway.defaults import STRICT
 from gateway.devices.checksum import ChecksumName
 from gateway.devices.line_settings import Baud
 from gateway.profiles.http_sections import Metrics, Web
+from gateway.profiles.recordings_section import RecordingsSection
 from gateway.profiles.rigs.addresses import Address, Network4Or6, Owner
 from gateway.profiles.rigs.faces import Face
 from gateway.profiles.telemetry_sections import Mqtt
@@ -149,6 +150,7 @@ class RigFile:
     network: Network = field(default_factory=Network)
     fieldbus: tuple[Face, ...] = ()  # faces beside plain Modbus TCP: serial ports with Modbus RTU, Modbus TCP by TLS
     residual_watch: ResidualWatch = field(default_factory=ResidualWatch)
+    recordings: RecordingsSection = field(default_factory=RecordingsSection)
     web: Web | None = None  # the page in the browser; null: there is none, unless `run --web` asks for it
     metrics: Metrics | None = None  # figures for Prometheus; null: there are none, unless `run --metrics` asks for them
     mqtt: Mqtt | None = None  # figures for an MQTT broker; null: none

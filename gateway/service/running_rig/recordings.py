@@ -10,6 +10,7 @@ from gateway.processes.event_log import EventLog
 from gateway.profiles import Rig
 from gateway.recording import Recorder
 from gateway.recording.label import NO_LABEL, RecordingLabel
+from gateway.service.recording_retention import RecordingRetention
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
 
@@ -22,6 +23,7 @@ class Recordings:
         self._rig = rig
         self._log = log
         self._current: RunRecording | None = None
+        self._retention = RecordingRetention(directory.parent, rig.retention, log)
         self._label = NO_LABEL
         self._for_s = 0.0
         self._ends_s: float | None = None
@@ -78,6 +80,11 @@ class Recordings:
         ended.recorder.close()
         return {"recording": None, "written": str(ended.recorder.path), "rows": ended.rows}
 
+    def close(self) -> None:
+        """End the recording, if there is one, for good."""
+        self.stop()
+        self._retention.close()
+
     def status(self) -> dict[str, Any]:
         """Return where the current recording is and how many rows it has."""
         if not self._current:
@@ -91,7 +98,8 @@ class Recordings:
 
     def flush(self, now_s: float) -> None:
         """Write what waits, once a tick. A recorder that has stopped (disk full) is logged once and dropped; one whose time is
-        over ends."""
+        over ends. What there is no room for goes."""
+        self._retention.tick(now_s)
         if self._current:
             recorder = self._current.recorder
             recorder.flush(now_s)

@@ -266,7 +266,7 @@ class RunningRig:
             await self._ports.write_last(self._last_frame)
         await self._faces.close()
         await self._control_socket.close()
-        self._recordings.stop()
+        self._recordings.close()
         self._calibration_runs.close()
         await self._audit.close()
         self._ports.close()

@@ -1,31 +1,21 @@
 """The recordings of a state directory for the page: the list, whole files in other forms, and a picture.
 
-Everything here reads from the disk and runs in worker threads. An entry is read again only when its file has changed.
+Everything here reads from the disk and runs in worker threads.
 """
 
 import threading
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from gateway.codes.faults import FaultCode
-from gateway.recording import Recording, find_recording, read_entry, read_recording, recording_paths
+from gateway.recording import Recording, find_recording, read_recording
+from gateway.recording.care.keeping import is_kept
+from gateway.recording.care.summaries import list_summaries
 from gateway.recording.errors import RecordingError
 from gateway.web.tabs.answers import NOT_FOUND, TabRefusedError
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from gateway.reports.svg_chart import Chart
-
-_LEAST_ROWS: Final = 2  # to say something of
 FORMS: Final = ("csv", "parquet")
-_DRAWN: Final = 700
-"""Places along a curve; each shows the lowest and the highest value there."""
 
 
 def recording_path(state: Path, number: int) -> Path:
@@ -38,65 +28,7 @@ def recording_path(state: Path, number: int) -> Path:
 
 def recording_facts(state: Path) -> list[dict[str, Any]]:
     """Return every recording, the newest first."""
-    rows = []
-    for path in reversed(recording_paths(state)):
-        status = path.stat()
-        rows.append(_facts(path, status.st_mtime_ns, status.st_size))
-    return rows
-
-
-@lru_cache(maxsize=4096)
-def _facts(path: Path, changed_ns: int, size_bytes: int) -> dict[str, Any]:
-    """Return what the list says of one file, as it was when it was changed last and had this size."""
-    entry = read_entry(path)
-    header = entry.header
-    return {
-        "number": entry.number,
-        "file": entry.path.name,
-        "started_utc": header.get("started_utc"),
-        "calibration": header.get("calibration"),
-        "happened": "" if entry.fault or entry.rows < _LEAST_ROWS else _happened(entry.path),
-        "rows": entry.rows,
-        "duration_s": entry.duration_s,
-        "size_bytes": entry.size_bytes,
-        "truncated": entry.truncated,
-        "fault": entry.fault,
-    }
-
-
-def _happened(path: Path) -> str:
-    """Return in a few words what a recording holds: what was run, how often it was asked for another force, what was measured,
-    and which faults there were."""
-    import numpy as np
-
-    recording = read_recording(path)
-    columns, words = recording.columns, [_what_ran(recording.header)]
-    known = {name: values[np.isfinite(values)] for name, values in columns.items()}
-    setpoints = known.get("setpoint_n", np.empty(0))
-    changes = int((np.diff(setpoints) != 0.0).sum())
-    if changes:
-        words.append(f"{changes} {'change' if changes == 1 else 'changes'} of setpoint, up to {setpoints.max():.4g} N")
-    force_n = known.get("force_n", np.empty(0))
-    if len(force_n):
-        words.append(f"{force_n.min():.1f} to {force_n.max():.1f} N measured")
-    faults = sorted({int(code) for code in known.get("fault_code", ()) if code})
-    words += [f"fault {_name_of_fault(code)}" for code in faults]
-    return ", ".join(words)
-
-
-def _what_ran(header: dict[str, Any]) -> str:
-    if ladder := header.get("ladder"):
-        return f"calibration ladder of {ladder.get('groups', '?')} × {ladder.get('step_v', 0.0):g} V stairs"
-    if experiment := header.get("experiment"):
-        return f"experiment {experiment.get('name', '')}".strip()
-    return "run"
-
-
-def _name_of_fault(code: int) -> str:
-    try:
-        return FaultCode(code).explanation.code
-    except ValueError:
-        return str(code)
+    return [{**facts, "kept": is_kept(Path(facts["path"]))} for facts in reversed(list_summaries(state))]
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,64 +61,13 @@ def export_recording(state: Path, number: int, form: str) -> ExportedFile:
 
 def draw_recording(state: Path, number: int) -> str:
     """Return a page with two drawings: forces and the voltage against time."""
-    from gateway.reports import frame
-    from gateway.reports.figures import drawing, figure
+    from gateway.reports.recording_plot import LEAST_ROWS, recording_page
 
     with _one_at_a_time:
         recording = _read(recording_path(state, number))
-    if recording.rows < _LEAST_ROWS:
+    if recording.rows < LEAST_ROWS:
         raise TabRefusedError(f"recording {number} has {recording.rows} rows: nothing to draw")
-    charts = [(title, _chart(recording, title, label, names)) for title, label, names in _PANELS]
-    figures = "".join(figure(title, drawing(chart), "", "full") for title, chart in charts if chart)
-    header, time_s = recording.header, recording.columns["time_s"]
-    head = frame.Head(
-        kind="Recording",
-        answer=f"Recording {number}: {time_s[-1] - time_s[0]:.1f}\u00a0s, {recording.rows}\u00a0rows",
-        facts=(f"rig {header.get('rig')}", f"started {header.get('started_utc')}", *recording.notes),
-    )
-    return frame.page(head, [figures], {"recording": recording.path.name, "calibration": header.get("calibration")})
-
-
-def _chart(recording: Recording, title: str, label: str, names: "Sequence[tuple[str, str, str]]") -> "Chart | None":
-    """Return the curves of a panel; None where no value is known."""
-    from gateway.reports.axis import Axis, spread
-    from gateway.reports.svg_chart import Chart
-
-    time_s = recording.columns["time_s"]
-    known = [
-        (_thinned(time_s, recording.columns[name]), style, words)
-        for name, style, words in names
-        if name in recording.columns
-    ]
-    values = [value for (_, ys), _, _ in known for value in ys]
-    if not values:
-        return None
-    across = Axis(float(time_s[0]), max(float(time_s[-1]), float(time_s[0]) + 1e-3), "time (s)")
-    chart = Chart(across, Axis(*spread(values), label), title, width=1200)
-    for (xs, ys), style, words in known:
-        if xs:
-            chart.line(xs, ys, style, words)
-    return chart
-
-
-_PANELS: Final = (
-    ("Force", "force (N)", (("setpoint_n", "before", "setpoint"), ("force_n", "after", "measured"))),
-    ("Command", "command (V)", (("command_v", "bsfm", "command"),)),
-)
-
-
-def _thinned(time_s: "NDArray[np.float64]", values: "NDArray[np.float64]") -> tuple[list[float], list[float]]:
-    """Return a curve in few points that looks the same: of each stretch its lowest and its highest value, in order of time."""
-    import numpy as np
-
-    known = np.flatnonzero(np.isfinite(values))
-    if len(known) <= 2 * _DRAWN:
-        return time_s[known].tolist(), values[known].tolist()
-    kept: list[int] = []
-    for part in np.array_split(known, _DRAWN):
-        low, high = int(part[values[part].argmin()]), int(part[values[part].argmax()])
-        kept += [low, high] if low < high else [high, low]
-    return time_s[kept].tolist(), values[kept].tolist()
+    return recording_page(recording)
 
 
 def _read(path: Path) -> Recording:

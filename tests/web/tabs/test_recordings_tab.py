@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gateway.recording import read_recording, read_table
-from gateway.web.tabs.recording_files import _thinned
+from gateway.reports.recording_plot import _thinned
 from tests.web.tabs.conftest import ROWS, record
 
 

@@ -84,5 +84,6 @@ class RecordingsTab {
 function words(one) {
   const torn = one.truncated ? ", torn tail dropped" : "";
   const calibration = one.calibration === undefined || one.calibration === null ? "" : `, with calibration ${one.calibration}`;
-  return `${one.happened || "no rows yet"}${calibration}${torn}`;
+  const said = [one.name, one.note].filter(Boolean).map((text) => `${text}: `).join("");
+  return `${said}${one.happened || "no rows yet"}${calibration}${torn}${one.kept ? ", kept" : ""}`;
 }

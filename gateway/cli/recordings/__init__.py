@@ -1,0 +1,1 @@
+"""What the verb `recordings` tells, and what it does to the files."""

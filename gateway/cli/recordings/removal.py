@@ -1,0 +1,65 @@
+"""Recordings that go: one that somebody names, and those that the rig has no room for."""
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from gateway.cli.errors import CliError
+from gateway.cli.options import StateChoice, count_of
+from gateway.cli.recordings.listing import reference_name
+from gateway.processes import exit_codes
+
+if TYPE_CHECKING:
+    from gateway.profiles.recordings_section import Retention
+    from gateway.recording.care.keeping import Prunable
+
+
+def delete(state: Path, number: int, *, asks: bool) -> Path:
+    """Delete one recording. CliError (65) where it must stay, or somebody says no."""
+    from gateway.recording import find_recording
+    from gateway.recording.care.keeping import delete_recording, why_protected
+
+    path, reference = find_recording(state, number), reference_name(state)
+    why = why_protected(path, reference)
+    if not why and asks and not click.confirm(f"delete recording {number} ({path})?", err=True):
+        raise CliError("nothing was deleted")
+    if why := why or delete_recording(path, reference):
+        raise CliError(f"E407 recording {number} was not deleted: {why}{_cure(why, number)}", exit_codes.DATA)
+    return path
+
+
+def _cure(why: str, number: int) -> str:
+    if "kept" in why:
+        return f"; force-gateway recordings keep {number} --no lets it go"
+    return "; force-gateway record off ends it" if "being recorded" in why else ""
+
+
+def retention_of(state: StateChoice, days: float | None, most_bytes: int | None) -> "Retention":
+    """Return what the options say, else the rig. CliError (78) where neither limits anything."""
+    from gateway.profiles import load_rig
+    from gateway.profiles.recordings_section import Retention
+
+    given = Retention(days=days, bytes=most_bytes)
+    retention = load_rig(state.rig).retention if given.is_unlimited else given
+    if retention.is_unlimited:
+        raise CliError(
+            f"rig {state.rig} retains everything: give --days or --bytes, or have "
+            "`recordings: {retention: {days: 30}}` in its file"
+        )
+    return retention
+
+
+def prune(state: Path, retention: "Retention", *, dry_run: bool, asks: bool) -> list["Prunable"]:
+    """Delete what there is no room for, or only say what it would be; return it."""
+    from gateway.recording import recording_paths
+    from gateway.recording.care.keeping import choose_prunable, prune_recordings
+
+    reference = reference_name(state)
+    chosen = choose_prunable(recording_paths(state), retention, reference, time.time())
+    if dry_run or not chosen:
+        return chosen
+    if asks and not click.confirm(f"delete {count_of(chosen, 'recording')}?", err=True):
+        raise CliError("nothing was deleted")
+    return prune_recordings(state, retention, reference)

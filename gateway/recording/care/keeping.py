@@ -1,0 +1,113 @@
+"""Which recordings may go: not one that somebody keeps, nor the rig's reference, nor one that is being recorded.
+
+Whoever records holds a lock on the file; the kernel ends it with the process. What is kept has a file NNNN.keep beside it.
+"""
+
+import fcntl
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from gateway.processes.durable_file import lock_directory, remove_if_possible, write_durably
+from gateway.profiles.recordings_section import Retention
+from gateway.recording.reader import recording_paths
+
+_MARK: Final = ".keep"
+_GONE: Final = ".gone"  # of the highest number that was deleted: it is not used again
+_CLOSED_S: Final = 5.0  # rows come ten times a second: what was written later than this is being recorded, lock or not
+
+
+def keep_recording(path: Path) -> None:
+    """Have a recording kept, whatever becomes of others. OSError where the disk refuses."""
+    with lock_directory(path.parent) as descriptor:
+        write_durably(descriptor, path.with_suffix(_MARK).name, b"")
+
+
+def let_recording_go(path: Path) -> None:
+    """Have a recording kept no longer."""
+    path.with_suffix(_MARK).unlink(missing_ok=True)
+
+
+def is_kept(path: Path) -> bool:
+    """Decide whether somebody keeps this recording."""
+    return path.with_suffix(_MARK).exists()
+
+
+def is_being_recorded(path: Path) -> bool:
+    """Decide whether somebody holds the lock of this recording. FileNotFoundError where there is none."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
+
+
+def why_protected(path: Path, reference: str) -> str:
+    """Return why a recording must stay, as the end of a sentence; empty where it may go. reference: the rig's, by its file's
+    name. FileNotFoundError where there is no such recording."""
+    if is_being_recorded(path):
+        return "it is being recorded"
+    if is_kept(path):
+        return "it is kept"
+    return "it is the rig's reference" if path.name == reference else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Prunable:
+    """A recording that goes, and why."""
+
+    path: Path
+    size_bytes: int
+    why: str
+
+
+def choose_prunable(paths: list[Path], retention: Retention, reference: str, now_s: float) -> list[Prunable]:
+    """Return the recordings that the limits have no room for, the oldest first. now_s: of the epoch."""
+    statuses = sorted(((path.stat(), path) for path in paths), key=lambda pair: (pair[0].st_mtime, pair[1].name))
+    total, chosen = sum(status.st_size for status, _ in statuses), []
+    for status, path in statuses:
+        why = _why_it_goes(now_s - status.st_mtime, total, retention)
+        if why and now_s - status.st_mtime > _CLOSED_S and not why_protected(path, reference):
+            chosen.append(Prunable(path, status.st_size, why))
+            total -= status.st_size
+    return chosen
+
+
+def _why_it_goes(age_s: float, total_bytes: int, retention: Retention) -> str:
+    if retention.days is not None and age_s > retention.days * 86400.0:
+        return f"older than {retention.days:g} days"
+    if retention.bytes is not None and total_bytes > retention.bytes:
+        return f"all have more than {retention.bytes} bytes"
+    return ""
+
+
+def delete_recording(path: Path, reference: str) -> str:
+    """Remove a recording; return why it had to stay, empty where it is gone. OSError where the disk refuses."""
+    if why := why_protected(path, reference):
+        return why
+    with lock_directory(path.parent) as descriptor:
+        write_durably(descriptor, path.with_suffix(_GONE).name, b"")
+        path.unlink()
+        _keep_highest_mark(path.parent, descriptor)
+        remove_if_possible(descriptor, path.with_suffix(_MARK).name)
+        os.fsync(descriptor)
+    return ""
+
+
+def _keep_highest_mark(folder: Path, descriptor: int) -> None:
+    *lower, _ = sorted(
+        (mark for mark in folder.glob(f"*{_GONE}") if mark.stem.isdigit()), key=lambda mark: int(mark.stem)
+    )
+    for mark in lower:
+        remove_if_possible(descriptor, mark.name)
+
+
+def prune_recordings(state: Path, retention: Retention, reference: str) -> list[Prunable]:
+    """Remove what the limits have no room for; return what has gone."""
+    chosen = choose_prunable(recording_paths(state), retention, reference, time.time())
+    return [one for one in chosen if not delete_recording(one.path, reference)]

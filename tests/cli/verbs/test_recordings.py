@@ -1,0 +1,115 @@
+"""`recordings`: list, show, plot, keep, delete, prune on a state directory."""
+
+import json
+import os
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from gateway.recording import Recorder
+from gateway.watch.reference_recording import keep_reference_recording
+from tests.recording.test_care import record
+
+
+@pytest.fixture
+def state(tmp_path: Path) -> Path:
+    record(
+        tmp_path, name="before repair", note="new seals tomorrow", rig="demo", started_utc="2026-01-02T03:04:05.000Z"
+    )
+    record(tmp_path, rig="a-cell-with-a-rather-long-name-such-as-people-give", ladder={"groups": 3, "step_v": 0.5})
+    return tmp_path
+
+
+def words_of(text: str) -> str:
+    return " ".join(text.split())
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_a_list_is_whole_on_a_narrow_terminal(width: int, state: Path, call, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    answer = call("recordings", "list", "--state", state)
+    assert max(map(len, answer.output.splitlines())) < width
+    told = words_of(answer.output)
+    assert "1 2026-01-02 03:04:05 UTC demo 0.9 s 10 rows" in told
+    assert "before repair: new seals tomorrow run, 1 change of setpoint, up to 20 N, 20.0 to 29.0 N measured" in told
+    assert "a-cell-with-a-rather-long-name-such-as-people-give" in told
+    assert "calibration ladder of 3 × 0.5 V stairs" in told
+
+
+def test_show_says_everything_that_is_known(state: Path, call) -> None:
+    told = words_of(call("recordings", "show", "1", "--state", state).output)
+    assert "name: before repair note: new seals tomorrow" in told
+    assert "residual 3 N" in told
+    facts = json.loads(call("recordings", "show", "1", "--state", state, "--json").output)
+    assert (facts["id"], facts["kept"], facts["setpoint_changes"]) == (1, False, 1)
+
+
+def test_what_is_kept_is_not_deleted_until_it_is_let_go(state: Path, call) -> None:
+    assert call("recordings", "keep", "1", "--state", state).exit_code == 0
+    assert "kept" in call("recordings", "list", "--state", state).output.splitlines()[0]
+    refused = call("recordings", "delete", "1", "--yes", "--state", state)
+    assert (refused.exit_code, refused.stderr.split(":")[0]) == (65, "E407 recording 1 was not deleted")
+    assert "recordings keep 1 --no" in refused.stderr
+    call("recordings", "keep", "1", "--no", "--state", state)
+    assert call("recordings", "delete", "1", "--yes", "--state", state).exit_code == 0
+    assert [one["id"] for one in json.loads(call("recordings", "list", "--json", "--state", state).output)] == [2]
+
+
+def test_delete_asks_and_a_no_deletes_nothing(state: Path, call) -> None:
+    answer = call("recordings", "delete", "1", "--state", state)  # nobody answers
+    assert answer.exit_code == 1
+    assert (state / "recordings" / "0001.fgr").exists()
+
+
+def test_neither_the_reference_nor_the_one_under_way_is_deleted(state: Path, call) -> None:
+    keep_reference_recording(state, state / "recordings" / "0001.fgr")
+    running = Recorder(state / "recordings", {}, ("time_s",))
+    refusals = [call("recordings", "delete", number, "--yes", "--state", state).stderr for number in ("1", "3")]
+    running.close()
+    assert "reference" in refusals[0]
+    assert "record off" in refusals[1]
+    assert len(list((state / "recordings").glob("*.fgr"))) == 3
+
+
+def test_a_plot_is_a_page_or_one_svg_that_parses(state: Path, call, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(state)
+    assert call("recordings", "plot", "1", "-o", "run.svg", "--state", state).exit_code == 0
+    picture = ET.parse(state / "run.svg").getroot()
+    lines = picture.iter("{http://www.w3.org/2000/svg}polyline")
+    assert len(list(lines)) == 2  # setpoint and measured
+    assert "before repair" in "".join(picture.itertext())
+    assert call("recordings", "plot", "1", "--state", state).exit_code == 0
+    assert "new seals tomorrow" in (state / "recording-0001.html").read_text(encoding="utf-8")
+    assert call("recordings", "plot", "1", "--state", state).stderr.startswith("E405 ")
+    assert call("recordings", "plot", "1", "-o", "run.png", "--state", state).exit_code == 2
+
+
+def test_prune_says_what_would_go_before_it_goes(state: Path, call) -> None:
+    os.utime(state / "recordings" / "0002.fgr")
+    os.utime(state / "recordings" / "0001.fgr", (0.0, 0.0))
+    would = call("recordings", "prune", "--dry-run", "--days", "30", "--state", state)
+    assert words_of(would.output).endswith("0001.fgr: older than 30 days")
+    assert (state / "recordings" / "0001.fgr").exists()
+    assert call("recordings", "prune", "--yes", "--days", "30", "--state", state).exit_code == 0
+    assert not (state / "recordings" / "0001.fgr").exists()
+    assert "nothing to delete" in call("recordings", "prune", "--days", "30", "--state", state).output
+
+
+def test_prune_takes_the_rigs_own_limits_and_says_where_there_are_none(
+    state: Path, call, tmp_path: Path, rig_file_with_retention: Path
+) -> None:
+    os.utime(state / "recordings" / "0001.fgr", (0.0, 0.0))
+    assert "retains everything" in call("recordings", "prune", "--rig", "demo", "--state", state).stderr
+    told = call("recordings", "prune", "--dry-run", "--rig", rig_file_with_retention, "--state", state)
+    assert "older than 7 days" in told.output
+
+
+@pytest.fixture
+def rig_file_with_retention(tmp_path: Path) -> Path:
+    from gateway.profiles import shipped_profiles_folder
+
+    text = next(shipped_profiles_folder().rglob("rigs/demo.yaml")).read_text(encoding="utf-8")
+    path = tmp_path / "own.yaml"
+    path.write_text(f"{text}\nrecordings: {{retention: {{days: 7}}}}\n", encoding="utf-8")
+    return path

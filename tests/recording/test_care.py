@@ -1,0 +1,146 @@
+"""Care for recordings: summaries are read once, and what must stay stays, whatever the limits say."""
+
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.profiles.recordings_section import Retention
+from gateway.recording import Recorder, recording_paths
+from gateway.recording.care import summaries
+from gateway.recording.care.keeping import (
+    choose_prunable,
+    delete_recording,
+    is_being_recorded,
+    keep_recording,
+    let_recording_go,
+    prune_recordings,
+    why_protected,
+)
+from gateway.recording.care.summaries import list_summaries
+
+NOW_S = 1_700_000_000.0
+COLUMNS = ("time_s", "force_n", "setpoint_n", "applied_n", "model_residual_n", "fault_code")
+
+
+def record(state: Path, *, days_ago: float = 0.0, force_n: float = 20.0, **header: Any) -> Path:
+    """Write a recording of 10 rows that ended so long before NOW_S."""
+    recorder = Recorder(state / "recordings", header, COLUMNS)
+    for row in range(10):
+        is_asked = row >= 5
+        recorder.append((row * 0.1, force_n + row, 20.0 * is_asked, 20.0 * is_asked, 3.0 if is_asked else 99.0, 0.0))
+    recorder.close()
+    ended_s = NOW_S - days_ago * 86400.0
+    os.utime(recorder.path, (ended_s, ended_s))
+    return recorder.path
+
+
+def numbers(state: Path) -> list[int]:
+    return [int(path.stem) for path in recording_paths(state)]
+
+
+def test_a_summary_says_what_happened_by_name_and_number(tmp_path: Path) -> None:
+    record(tmp_path, name="before repair", note="new seals", rig="demo")
+    (summary,) = list_summaries(tmp_path)
+    assert (summary["name"], summary["note"], summary["rig"]) == ("before repair", "new seals", "demo")
+    assert summary["happened"] == "run, 1 change of setpoint, up to 20 N, 20.0 to 29.0 N measured, residual 3 N"
+    assert summary["facts"]["force_range_n"] == [20.0, 29.0]
+    assert summary["facts"]["residual_rms_n"] == pytest.approx(3.0)
+
+
+def test_a_plan_is_named_and_faults_by_their_codes(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "recordings", {"experiment": {"name": "creep"}}, ("time_s", "fault_code"))
+    for row in range(3):
+        recorder.append((float(row), 1.0 * row))
+    recorder.close()
+    (summary,) = list_summaries(tmp_path)
+    assert summary["happened"].startswith("experiment creep, fault A")
+    assert len(summary["facts"]["faults"]) == 2
+
+
+def test_a_thousand_recordings_are_not_read_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = record(tmp_path).read_bytes()
+    for number in range(2, 1001):
+        (tmp_path / "recordings" / f"{number:04d}.fgr").write_bytes(source)
+    before = list_summaries(tmp_path)
+    monkeypatch.setattr(summaries, "summary_of", lambda path: pytest.fail(f"{path} was read again"))
+    began_s = time.process_time()
+    assert list_summaries(tmp_path) == before
+    assert time.process_time() - began_s < 1.0
+    assert len(before) == 1000
+
+
+@pytest.mark.parametrize("damage", [b"", b"no JSON", b"[]", b'{"format": 99, "recordings": {}}'])
+def test_a_damaged_cache_costs_time_only(tmp_path: Path, damage: bytes) -> None:
+    record(tmp_path)
+    before = list_summaries(tmp_path)
+    (tmp_path / "recordings" / ".summaries.json").write_bytes(damage)
+    assert list_summaries(tmp_path) == before
+
+
+def test_who_records_holds_the_file_until_it_is_closed(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "recordings", {}, COLUMNS)
+    assert is_being_recorded(recorder.path)
+    assert delete_recording(recorder.path, "") == "it is being recorded"
+    recorder.close()
+    assert not is_being_recorded(recorder.path)
+    assert delete_recording(recorder.path, "") == ""
+    assert not recorder.path.exists()
+
+
+def test_what_is_kept_or_the_reference_is_not_deleted(tmp_path: Path) -> None:
+    path = record(tmp_path)
+    keep_recording(path)
+    assert delete_recording(path, "") == "it is kept"
+    let_recording_go(path)
+    assert delete_recording(path, path.name) == "it is the rig's reference"
+    assert why_protected(path, "") == ""
+    assert path.exists()
+
+
+def test_days_take_the_older_ones_and_no_protected_one(tmp_path: Path) -> None:
+    kept, reference, old, young = (record(tmp_path, days_ago=days) for days in (40, 39, 38, 2))
+    keep_recording(kept)
+    running = Recorder(tmp_path / "recordings", {}, COLUMNS)
+    os.utime(running.path, (0.0, 0.0))
+    chosen = choose_prunable(recording_paths(tmp_path), Retention(days=30.0), reference.name, NOW_S)
+    running.close()
+    assert [one.path for one in chosen] == [old]
+    assert "30 days" in chosen[0].why
+    assert young.exists()
+
+
+def test_bytes_take_the_oldest_first_and_only_as_many_as_it_needs(tmp_path: Path) -> None:
+    for days_ago in (1, 4, 3, 2):
+        record(tmp_path, days_ago=days_ago)
+    keep_recording(tmp_path / "recordings" / "0002.fgr")
+    size = (tmp_path / "recordings" / "0001.fgr").stat().st_size
+    limit = Retention(bytes=3 * size)
+    assert [one.path.stem for one in choose_prunable(recording_paths(tmp_path), limit, "", NOW_S)] == ["0003"]
+    gone = prune_recordings(tmp_path, Retention(bytes=2 * size), "")
+    assert [one.path.stem for one in gone] == ["0003", "0004"]
+    assert numbers(tmp_path) == [1, 2]
+
+
+def test_without_a_limit_everything_stays(tmp_path: Path) -> None:
+    record(tmp_path, days_ago=10_000)
+    assert prune_recordings(tmp_path, Retention(), "") == []
+    assert numbers(tmp_path) == [1]
+
+
+def test_a_number_whose_recording_was_kept_and_deleted_is_not_kept_again(tmp_path: Path) -> None:
+    path = record(tmp_path)
+    keep_recording(path)
+    path.unlink()  # by hand; the mark stays behind
+    again = record(tmp_path)
+    assert why_protected(again, "") == ""
+
+
+def test_the_number_of_a_deleted_recording_is_not_used_again(tmp_path: Path) -> None:
+    paths = [record(tmp_path) for _ in range(3)]
+    for path in (paths[2], paths[0], paths[1]):
+        assert delete_recording(path, "") == ""
+    assert record(tmp_path).stem == "0004"
+    assert sorted(path.name for path in (tmp_path / "recordings").iterdir()) == ["0003.gone", "0004.fgr"]

@@ -1,0 +1,73 @@
+"""The gateway prunes at its start and every hour, in a thread of its own, and says what has gone."""
+
+import asyncio
+import threading
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles.recordings_section import Retention
+from gateway.recording import recording_paths
+from gateway.recording.care import keeping
+from gateway.service import recording_retention
+from gateway.service.recording_retention import RecordingRetention
+from tests.recording.test_care import record
+
+
+class Said:
+    """A log that can be waited for."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.heard = asyncio.Event()
+
+    def __call__(self, cause: str, sentence: str) -> None:
+        self.lines.append(sentence)
+        self.heard.set()
+
+
+async def prune_at(state: Path, *times_s: float) -> list[str]:
+    said = Said()
+    retention = RecordingRetention(state, Retention(days=30.0), said)
+    for now_s in times_s:
+        record(state, days_ago=25_000)
+        said.heard.clear()
+        retention.tick(now_s)
+        await asyncio.wait_for(said.heard.wait(), 10)
+    retention.close()
+    return said.lines
+
+
+def test_it_prunes_at_the_start_and_again_an_hour_later(tmp_path: Path) -> None:
+    lines = asyncio.run(prune_at(tmp_path, 50.0, 3650.0))
+    assert [line.split(" (")[0] for line in lines] == ["pruned 1 recordings"] * 2
+    assert "older than 30 days" in lines[0]
+    assert recording_paths(tmp_path) == []
+
+
+def test_within_the_hour_and_without_a_limit_nothing_is_looked_at(tmp_path: Path) -> None:
+    async def run() -> int:
+        looks: list[object] = []
+        for retention, ticks in ((Retention(days=1.0), 3), (Retention(), 3)):
+            pruning = RecordingRetention(tmp_path, retention, Said())
+            pruning._worker.close()
+            pruning._worker = lambda work, done: looks.append(work)
+            for tick in range(ticks):
+                pruning.tick(10.0 + 1000.0 * tick)
+        return len(looks)
+
+    assert asyncio.run(run()) == 1
+
+
+def test_a_disk_that_refuses_is_told_and_is_not_the_loops_business(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    threads: list[str] = []
+
+    def refuse(*given: object) -> list[keeping.Prunable]:
+        threads.append(threading.current_thread().name)
+        raise OSError("read-only file system")
+
+    monkeypatch.setattr(recording_retention, "prune_recordings", refuse)
+    assert asyncio.run(prune_at(tmp_path, 1.0)) == ["recordings were not pruned: read-only file system"]
+    assert threads != [threading.main_thread().name]
