@@ -1,4 +1,4 @@
-"""What a rig file says of the faces for people and their tools that speak HTTP: the page (`web`) and its metrics (`metrics`).
+"""What a rig file says of the faces for people and their tools: the page (`web`), its metrics (`metrics`), OPC UA (`opcua`).
 
 A token must not travel with recordings, which carry the rig's texts, nor be shown: `without_secrets` blanks it there.
 """
@@ -36,6 +36,14 @@ def split_listen(text: str) -> tuple[str, int]:
 
 
 Listen = Annotated[str, AfterValidator(_check_listen)]
+
+
+def _check_fixed_port(listen: str) -> str:
+    if split_listen(listen)[1] == 0:
+        raise ValueError(f'"{listen}" has no port that a client could know; 4840 is usual')
+    return listen
+
+
 Token = Annotated[str, MinLen(16), MaxLen(200)]
 
 
@@ -60,6 +68,16 @@ class Metrics:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpcUa:
+    """The gateway's figures for clients of OPC UA, read only."""
+
+    __pydantic_config__ = STRICT
+    listen: Annotated[Listen, AfterValidator(_check_fixed_port)] = (
+        f"{defaults.HOST}:4840"  # HOST:PORT of opc.tcp://HOST:PORT/
+    )
+
+
 class HttpSections(Protocol):
     """A rig file, as far as this page is concerned."""
 
@@ -75,10 +93,14 @@ class HttpSections(Protocol):
     def mqtt(self) -> Mqtt | None:
         """Section `mqtt`."""
 
+    @property
+    def opcua(self) -> OpcUa | None:
+        """Section `opcua`."""
+
 
 def http_sections_of(file: HttpSections) -> dict[str, Any]:
     """Return the sections of a rig file by their names in a Rig."""
-    return {"web": file.web, "metrics": file.metrics, "mqtt": file.mqtt}
+    return {"web": file.web, "metrics": file.metrics, "mqtt": file.mqtt, "opcua": file.opcua}
 
 
 def without_secrets(text: str) -> str:

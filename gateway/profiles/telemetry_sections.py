@@ -1,4 +1,4 @@
-"""What a rig file says of telemetry that it brings itself: MQTT (`mqtt`) and OPC UA (`opcua`)."""
+"""What a rig file says of telemetry that it sends by itself: MQTT (`mqtt`)."""
 
 from dataclasses import dataclass
 from typing import Annotated

@@ -79,6 +79,8 @@ def optional_children(rig: Rig, ring: SampleRing | None, addresses: dict[str, Ad
         children["watch"] = {"simulated": rig.simulated, "window_s": watch.window_s, "every_s": watch.every_s}
     if rig.mqtt:
         children["mqtt"] = {"simulated": rig.simulated}
+    if rig.opcua:
+        children["opcua"] = {"settings": {"listen": rig.opcua.listen, "name": rig.name}}
     for name, (host, port) in addresses.items():
         children[name] = {"simulated": rig.simulated, "settings": {"host": host, "port": port}}
     return children

@@ -15,7 +15,7 @@ from gateway.control.inputs import CalibrationInUse
 from gateway.control.settings import ControlSettings
 from gateway.devices import DeviceProfile, SerialSettings
 from gateway.extras import is_installed, missing_note
-from gateway.profiles.http_sections import Metrics, Web
+from gateway.profiles.http_sections import Metrics, OpcUa, Web
 from gateway.profiles.kinds.plants import PlantProfile
 from gateway.profiles.recordings_section import Retention
 from gateway.profiles.rigs.compensated_effects import in_simulation
@@ -108,6 +108,7 @@ class Rig:
     retention: Retention = field(default_factory=Retention)
     metrics: Metrics | None = None
     mqtt: Mqtt | None = None
+    opcua: OpcUa | None = None
     valve: ValveLine | None = None
     pull_calibration: Calibration | None = None  # measured pulling, None: derived from the one of pushing
     compensation: Compensation = NO_COMPENSATION

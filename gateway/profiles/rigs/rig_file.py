@@ -23,7 +23,7 @@ from gateway.control.settings import (
 from gateway.defaults import STRICT
 from gateway.devices.checksum import ChecksumName
 from gateway.devices.line_settings import Baud
-from gateway.profiles.http_sections import Metrics, Web
+from gateway.profiles.http_sections import Metrics, OpcUa, Web
 from gateway.profiles.recordings_section import RecordingsSection
 from gateway.profiles.rigs.addresses import Address, Network4Or6, Owner
 from gateway.profiles.rigs.faces import Face
@@ -154,4 +154,5 @@ class RigFile:
     web: Web | None = None  # the page in the browser; null: there is none, unless `run --web` asks for it
     metrics: Metrics | None = None  # figures for Prometheus; null: there are none, unless `run --metrics` asks for them
     mqtt: Mqtt | None = None  # figures for an MQTT broker; null: none
+    opcua: OpcUa | None = None  # an OPC UA server, read only; null: none
     accept_no_device_watchdog: bool = False  # true: enable although the output device has no watchdog of its own
