@@ -128,7 +128,10 @@ def client(control: FakeControl, tmp_path: Path, port: int) -> Iterator["subproc
     """The MQTT process, without a guardian; the broker is not there yet."""
     rig = tmp_path / "rig.yaml"
     text = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
-    rig.write_text(f"{text}mqtt: {{host: 127.0.0.1, port: {port}, sparkplug: {{group: plant}}}}\n", encoding="utf-8")
+    rig.write_text(
+        f"{text}mqtt: {{host: 127.0.0.1, port: {port}, commands: true, sparkplug: {{group: plant}}}}\n",
+        encoding="utf-8",
+    )
     guardian, link = socket.socketpair()
     os.set_inheritable(link.fileno(), True)
     options = json.dumps({"rig": str(rig), "state": str(tmp_path), "simulated": True})
@@ -178,6 +181,25 @@ def test_birth_data_rebirth_death_and_a_broker_that_dies_and_returns(
         kill(client)
         assert values(listener.wait("NDEATH")[-1]) == {"bdSeq": values(back)["bdSeq"]}
         until(lambda: listener.of("online")[-1:] == [b"false"], "offline by the will")
+    finally:
+        listener.close()
+        kill(broker)
+
+
+def test_a_command_of_yesterday_that_the_broker_kept_is_not_carried_out(
+    client: "subprocess.Popen[bytes]", tmp_path: Path, port: int
+) -> None:
+    client.send_signal(signal.SIGSTOP)  # so that the command is there first
+    broker = start_broker(tmp_path, port)
+    listener = Listener(port)
+    try:
+        listener.client.publish("force-gateway/demo/command", b'{"control_word": 1}', qos=1, retain=True)
+        listener.wait("demo/command")
+        client.send_signal(signal.SIGCONT)
+        listener.wait("demo/force", 3)
+        listener.client.publish("force-gateway/demo/command", b'{"no_such_register": 1}', qos=1)
+        (result,) = listener.wait("command/result")
+        assert "no_such_register" in json.loads(result)["error"]
     finally:
         listener.close()
         kill(broker)
