@@ -37,6 +37,7 @@ VERBS: Final = (
     "upload",
     "record",
     "recordings",
+    "replay",
     "metrics",
     "diagnose",
     "fleet",

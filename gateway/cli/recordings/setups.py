@@ -1,0 +1,64 @@
+"""The set-ups of a replay: the rig and calibration that a recording was made with, and another one to compare with."""
+
+from pathlib import Path
+
+from gateway.cli.errors import CliError
+from gateway.cli.options import StateChoice
+from gateway.processes import exit_codes
+from gateway.profiles import Rig, list_shipped, load_calibration, load_rig
+from gateway.recording import Recording
+from gateway.service.replayed_control import ReplaySetup
+
+
+def own_setup(recording: Recording, state: StateChoice) -> tuple[ReplaySetup, list[str]]:
+    """Return the set-up that a recording was made with, as far as it is here, and what differs. CliError (65) where its rig is
+    not known."""
+    from gateway.service.fitting.recorded_rig import rig_of
+
+    rig = rig_of(recording)
+    if rig is None:
+        named = recording.header.get("rig")
+        what = f"its rig {named} is not known here" if named else "it names no rig"
+        raise CliError(f"E403 {recording.path} cannot be replayed: {what}", exit_codes.DATA)
+    notes = []
+    if recording.header.get("rig_fingerprint") not in (None, rig.fingerprint):
+        notes.append(f"the files of rig {rig.name} have changed since it was recorded, or were not read from here")
+    if number := (recording.header.get("plant_in_use") or {}).get("number"):
+        notes.append(f"plant {number} was in use; what was compensated of it is not replayed")
+    return _with_calibration(rig, recording.header.get("calibration"), state, notes), notes
+
+
+def _with_calibration(rig: Rig, number: object, state: StateChoice, notes: list[str]) -> ReplaySetup:
+    from gateway.cli.calibration.store_access import find_calibration, open_store
+
+    calibration = rig.calibration
+    if isinstance(number, int) and number and number != calibration.number:
+        try:
+            calibration = find_calibration(open_store(state.directory, rig.name), str(number))
+        except CliError:
+            notes.append(f"calibration {number}, with which it was made, is not stored here: the rig's own is taken")
+    return ReplaySetup(f"rig {rig.name}, calibration {calibration.number} {calibration.name}", rig, calibration)
+
+
+def other_setup(which: str, own: ReplaySetup, state: StateChoice) -> ReplaySetup:
+    """Return the set-up that --against means: another rig, or the same rig with another calibration (its number, or a file).
+    A shipped name that both have is the rig's."""
+    from gateway.cli.calibration.store_access import find_calibration, open_store
+
+    if which.isdecimal():
+        calibration = find_calibration(open_store(state.directory, own.rig.name), which)
+    elif _is_rig(which):
+        rig = load_rig(which)
+        return ReplaySetup(
+            f"rig {rig.name}, calibration {rig.calibration.number} {rig.calibration.name}", rig, rig.calibration
+        )
+    else:
+        calibration = load_calibration(which)
+    name = f"rig {own.rig.name}, calibration {calibration.number} {calibration.name}"
+    return ReplaySetup(name, own.rig, calibration)
+
+
+def _is_rig(which: str) -> bool:
+    from gateway.profiles import check_file
+
+    return which in list_shipped("rig") or (Path(which).is_file() and check_file(which).kind == "rig")

@@ -1,0 +1,59 @@
+"""`replay` on a recording of the gateway: against itself, another calibration, and what cannot be replayed."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from gateway.calibrations.store import CalibrationStore
+from gateway.profiles import load_calibration
+from tests.service.test_replayed_control import record_work, scaled
+
+
+@pytest.fixture(scope="module")
+def state(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One recording, and calibration 2 with forces that are a tenth larger."""
+    state = tmp_path_factory.mktemp("state")
+    record_work(state)
+    own = load_calibration("demo")
+    store = CalibrationStore(state, own)
+    store.add(own)
+    store.add(scaled(own, 1.1))
+    return state
+
+
+def differences(call, state: Path, *words: str) -> dict[str, dict[str, object]]:
+    answer = call("replay", "1", "--json", "--state", state, "--rig", "demo", *words)
+    assert answer.exit_code == 0, answer.output
+    return {one["signal"]: one for one in json.loads(answer.stdout)["differences"]}
+
+
+def test_the_same_rig_gives_zero(state: Path, call) -> None:
+    found = differences(call, state, "--against", "demo")
+    assert set(found) >= {"command_v", "feedforward_v", "trim_v", "state", "fault_code"}
+    assert all(one["rows"] == 0 for one in found.values())
+    told = call("replay", "1", "--against", "demo", "--state", state, "--rig", "demo").output
+    assert told.rstrip().endswith("no difference")
+
+
+def test_another_calibration_is_told_by_signal(state: Path, call) -> None:
+    number = max(int(path.stem) for path in (state / "calibrations").glob("*.yaml") if path.stem.isdecimal())
+    found = differences(call, state, "--against", str(number))
+    assert found["applied_n"]["rows"] == 0
+    assert found["command_v"]["rms"] > 0.05
+    told = call("replay", "1", "--against", number, "--state", state, "--rig", "demo").output
+    assert f"calibration {number} " in told
+    assert "no difference" not in told
+    assert max(len(line) for line in told.splitlines() if "recordings" not in line) <= 60
+
+
+def test_alone_it_is_compared_with_what_was_recorded(state: Path, call) -> None:
+    assert differences(call, state)["applied_n"]["rms"] < 1e-6
+
+
+@pytest.mark.parametrize(("words", "code", "why"), [(("7",), 65, "E403"), (("1", "--against", "nothing-such"), 78, "")])
+def test_what_is_not_there_is_one_sentence(words: tuple[str, ...], code: int, why: str, state: Path, call) -> None:
+    answer = call("replay", *words, "--state", state, "--rig", "demo")
+    assert answer.exit_code == code, answer.output
+    assert why in answer.stderr
+    assert "Traceback" not in answer.stderr

@@ -1,0 +1,107 @@
+"""A recording through the control code again: the same set-up decides the same, another one is told by signal."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gateway.bsfm.model import Calibration
+from gateway.recording import Recording, RecordingError, list_recordings, read_recording
+from gateway.registers.words import State
+from gateway.service.replayed_control import ReplaySetup, SignalDifference, compare_decisions, replay_control
+from gateway.service.running_rig.recordings import Recordings
+from tests.service.wired import ENABLE, Wired
+
+
+def record_work(state: Path) -> Recording:
+    """Record three levels of force, from OFF to OFF."""
+    wired = Wired().ready()
+    recordings = Recordings(state / "recordings", wired.rig, lambda cause, sentence: None)
+    recordings.start()
+    wired.loop.recordings = recordings
+    wired.run(0.2)
+    for level_n in (20, 35, 10):
+        wired.write(0, ENABLE, level_n * 100)
+        wired.run(1.0)
+    wired.write(0, 0, 0)
+    wired.run(0.2)
+    recordings.flush(1e9)
+    recordings.stop()
+    return read_recording(list_recordings(state)[-1].path)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return record_work(tmp_path_factory.mktemp("replay"))
+
+
+@pytest.fixture(scope="module")
+def own() -> ReplaySetup:
+    rig = Wired().rig
+    return ReplaySetup("own", rig, rig.calibration)
+
+
+def by_signal(differences: list[SignalDifference]) -> dict[str, SignalDifference]:
+    return {one.signal: one for one in differences}
+
+
+def scaled(calibration: Calibration, share: float) -> Calibration:
+    """A calibration whose forces are that much larger."""
+    rising, falling = (
+        tuple(share * one for one in handles)
+        for handles in (calibration.rising_handles_n, calibration.falling_handles_n)
+    )
+    return replace(calibration, rising_handles_n=rising, falling_handles_n=falling)
+
+
+def test_the_same_setup_gives_no_difference_at_all(recording: Recording, own: ReplaySetup) -> None:
+    one, other = replay_control(recording, own), replay_control(recording, own)
+    differences = compare_decisions(recording.columns["time_s"], one, other)
+    assert len(differences) == 8
+    assert not [one for one in differences if one.rows]
+
+
+def test_the_replay_decides_as_the_gateway_did(recording: Recording, own: ReplaySetup) -> None:
+    """Up to what a recording does not hold: when between two rows a setting went out."""
+    found = by_signal(compare_decisions(recording.columns["time_s"], recording.columns, replay_control(recording, own)))
+    assert found["applied_n"].rms < 1e-6
+    assert found["fault_code"].rows == 0
+    assert found["state"].rows <= 6
+    assert found["command_v"].rms < 0.15
+    assert np.ptp(recording.columns["command_v"]) > 4.0
+
+
+def test_another_calibration_differs_in_what_it_decides_and_not_in_what_it_was_asked(
+    recording: Recording, own: ReplaySetup
+) -> None:
+    other = replace(own, calibration=scaled(own.calibration, 1.1))
+    decided = [replay_control(recording, setup) for setup in (own, other)]
+    found = by_signal(compare_decisions(recording.columns["time_s"], *decided))
+    assert found["applied_n"].rows == 0
+    assert found["feedforward_v"].rms > 0.1
+    assert abs(found["command_v"].largest) > 0.2
+    assert found["model_residual_n"].rms > 0.5
+
+
+def test_a_recording_of_a_run_is_refused(recording: Recording, own: ReplaySetup) -> None:
+    columns = recording.columns | {"state": np.full(recording.rows, float(State.CALIBRATING))}
+    with pytest.raises(RecordingError, match="ladder, a plan or a self-test"):
+        replay_control(replace(recording, columns=columns), own)
+
+
+def test_a_table_without_the_gateways_columns_is_refused(recording: Recording, own: ReplaySetup) -> None:
+    columns = {name: recording.columns[name] for name in ("time_s", "force_n", "command_v")}
+    with pytest.raises(RecordingError, match="has no column setpoint_n, state"):
+        replay_control(replace(recording, columns=columns), own)
+
+
+def test_the_largest_difference_is_told_with_its_sign_and_time() -> None:
+    time_s = np.array([5.0, 5.1, 5.2])
+    one = {"command_v": np.array([1.0, 2.0, 3.0]), "state": np.array([0.0, 1.0, 1.0])}
+    other = {"command_v": np.array([1.0, 1.0, 3.5]), "state": np.array([0.0, 1.0, 4.0])}
+    found = by_signal(compare_decisions(time_s, one, other))
+    assert found["command_v"].largest == -1.0
+    assert found["command_v"].at_s == pytest.approx(0.1)
+    assert found["command_v"].rms == pytest.approx(np.sqrt(1.25 / 3))
+    assert (found["state"].rows, found["state"].at_s) == (1, pytest.approx(0.2))
