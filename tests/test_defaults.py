@@ -1,6 +1,7 @@
 """A default stands once: what other rooms state of it is taken from gateway.defaults."""
 
 import ast
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -20,22 +21,31 @@ UNMISTAKABLE = {
 
 @cache
 def constants() -> list[tuple[str, object]]:
-    """Where in the product which constant or tuple of constants is written, docstrings apart."""
+    """Where in the product which constant or tuple of constants is written; docstrings and examples of commands apart."""
     found: list[tuple[str, object]] = []
     for path in sorted(ROOT.rglob("*.py")):
         if path.name == "defaults.py":
             continue
         nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
-        docstrings = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+        apart = {id(node.value) for node in nodes if isinstance(node, ast.Expr)} | set(_of_examples(nodes))
         for node in nodes:
             if isinstance(node, ast.Tuple) and all(isinstance(each, ast.Constant) for each in node.elts):
                 value: object = tuple(each.value for each in node.elts if isinstance(each, ast.Constant))
-            elif isinstance(node, ast.Constant) and id(node) not in docstrings:
+            elif isinstance(node, ast.Constant) and id(node) not in apart:
                 value = node.value
             else:
                 continue
             found.append((str(path.relative_to(ROOT)), value))
     return found
+
+
+def _of_examples(nodes: Iterable[ast.AST]) -> Iterator[int]:
+    """What the EXAMPLES of a verb say is typed by a user, who writes values out."""
+    for node in nodes:
+        if isinstance(node, ast.Assign) and any(
+            isinstance(each, ast.Name) and each.id == "EXAMPLES" for each in node.targets
+        ):
+            yield from map(id, ast.walk(node.value))
 
 
 def files_with(value: object) -> set[str]:

@@ -20,6 +20,7 @@ from typing import Any, Final
 
 from gateway import VERSION
 from gateway.cli.errors import CliError
+from gateway.defaults import HOST
 
 EVENT_LINES: Final = 2000
 _LIBRARIES: Final = ("numpy", "scipy", "pymodbus", "pyserial", "pydantic", "uvloop", "numba", "pyarrow", "starlette")
@@ -29,7 +30,7 @@ _SECRET_KEY: Final = re.compile(
 )
 _PEM: Final = re.compile(r"-----BEGIN [^-]+-----.*?(?:-----END [^-]+-----|\Z)", re.S)
 _IPV4: Final = re.compile(r"(?<![\d.])(?:\d{1,3}\.){3}\d{1,3}(?![\d.])")
-_OURS: Final = frozenset({"127.0.0.1", "0.0.0.0"})
+_OURS: Final = frozenset({HOST, "0.0.0.0"})
 
 
 class Redaction:

@@ -193,8 +193,9 @@ def _select_column(source: ColumnSource, names: Sequence[str], file: str, header
     quantity = quantity_of(source.name)
     if quantity is None:
         return SelectedColumn(index, source.name, *source.scale)
-    written = headers.headers[index].unit_for(source.name) if names[index] != source.name else None
-    if source.unit is None and written is None:
+    is_named_so = names[index] == source.name
+    written = None if is_named_so else headers.headers[index].unit_for(source.name)
+    if source.unit is None and written is None and not is_named_so:
         _refuse_other_unit(source, headers.headers[index], file)
     unit = source.unit or written or quantity[1]
     picked = _converted(index, source.name, unit.removeprefix("-"))

@@ -153,7 +153,7 @@ def test_completion_offers_the_verbs(tmp_path: Path) -> None:
         check=False,
     )
     offered = {line.split(",")[1] for line in done.stdout.splitlines()}
-    assert offered == {"read", "registers", "record", "recordings", "report", "restore"}
+    assert offered == {"read", "registers", "record", "recordings", "replay", "report", "restore"}
 
 
 def test_version_names_what_a_report_needs(call) -> None:
