@@ -77,6 +77,9 @@ def _cut_stretch(measurement: Measurement, most_rows: int) -> Measurement:
         pressure_pa=_cut_column(measurement.pressure_pa, rows),
         position_m=_cut_column(measurement.position_m, rows),
         covariates={name: column[rows] for name, column in measurement.covariates.items()},
+        sent=None
+        if measurement.sent is None
+        else replace(measurement.sent, times_s=measurement.sent.times_s - start_s),
         notes=(*measurement.notes, note),
     )
 

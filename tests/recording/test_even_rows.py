@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gateway.diagnosis import Measurement
+from gateway.diagnosis.excerpt import take_excerpt
 from gateway.recording.tables.even_rows import resample_evenly
 
 RNG = np.random.default_rng(1)
@@ -61,6 +62,14 @@ def test_a_command_is_the_mean_of_what_stood_on_the_wire() -> None:
     kept = np.isin(np.round(SETTINGS_S, 9), np.round((TIME_S - seen[1])[np.isfinite(seen[1])], 9))
     assert kept.mean() > 0.75, "two settings between two rows leave one"
     assert np.mean(found.command_v[rows]) == pytest.approx(np.mean(stood[fine_s < 28.5]), abs=0.03)
+
+
+def test_the_settings_themselves_stay_with_the_rows_and_with_a_part_of_them() -> None:
+    found = resample_evenly(MEASUREMENT, *sent(TIME_S))
+    for rows in (found, take_excerpt(found, 1000)):
+        assert rows.sent is not None
+        means_v = rows.sent.interval_means(np.append(rows.time_s, rows.time_s[-1] + rows.even_s))
+        assert means_v == pytest.approx(rows.command_v)
 
 
 def test_noise_is_not_shared_between_neighbours() -> None:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gateway.diagnosis.measurement import Floats, Measurement
+from gateway.diagnosis.measurement import Floats, Measurement, Settings
 
 _CLOSEST_S: Final = 8.0e-3  # readings that come faster are taken together: a regulator's lag is tens of milliseconds
 _FEWEST: Final = 3
@@ -29,43 +29,37 @@ def resample_evenly(measurement: Measurement, sent_v: Floats, sent_age_s: Floats
     sent_v, sent_age_s: of each row, NaN where nothing had been sent. Returns the measurement itself where these do not
     tell its command.
     """
-    times_s, volts = _distinct_settings(measurement.time_s - sent_age_s, sent_v)
-    if measurement.command_v is None or not volts.size or measurement.rows < _FEWEST:
+    sent = _distinct_settings(measurement.time_s - sent_age_s, sent_v)
+    if measurement.command_v is None or not sent.volts.size or measurement.rows < _FEWEST:
         return measurement
     if not float(np.nanmedian(np.abs(sent_v - measurement.command_v))) < _SAME_V:
         return measurement  # columns of an exported table were renamed: which of them is the command is not ours to say
     clock = _EvenClock(measurement.time_s)
-    command_v = _interval_means(times_s, volts, np.append(clock.rows_s, clock.rows_s[-1] + clock.row_s))
+    sent = replace(sent, times_s=sent.times_s - clock.rows_s[0])
+    time_s = clock.rows_s - clock.rows_s[0]
     position_m, pressure_pa = measurement.position_m, measurement.pressure_pa
     return replace(
         measurement,
-        time_s=clock.rows_s - clock.rows_s[0],
+        time_s=time_s,
         force_n=clock.mean(measurement.force_n, measurement.usable),
         usable=clock.count(measurement.usable) > 0,
         repeated=clock.count(measurement.repeated) > 0,
-        command_v=command_v,
+        command_v=sent.interval_means(np.append(time_s, time_s[-1] + clock.row_s)),
         pressure_pa=None if pressure_pa is None else clock.mean(pressure_pa),
         position_m=None if position_m is None else clock.mean(position_m),
         covariates={name: clock.mean(column) for name, column in measurement.covariates.items()},
         even_s=clock.row_s,
         jitter_s=clock.jitter_s,
+        sent=sent,
     )
 
 
-def _distinct_settings(times_s: Floats, volts: Floats) -> tuple[Floats, Floats]:
+def _distinct_settings(times_s: Floats, volts: Floats) -> Settings:
     """Return what was sent and when, each setting once."""
     known = np.isfinite(times_s) & np.isfinite(volts)
     times_s, volts = times_s[known], volts[known]
     new = np.append(True, np.diff(times_s) > 1.0e-6)[: times_s.size]
-    return times_s[new], volts[new]
-
-
-def _interval_means(times_s: Floats, values: Floats, edges_s: Floats) -> Floats:
-    """Mean between each edge and the next of what holds from each time on; before the first time the first value."""
-    knots_s = np.concatenate([[min(edges_s[0], times_s[0]) - 1.0], times_s, [max(edges_s[-1], times_s[-1]) + 1.0]])
-    held = np.concatenate([values[:1], values])
-    integral = np.concatenate([[0.0], np.cumsum(held * np.diff(knots_s))])
-    return np.asarray(np.diff(np.interp(edges_s, knots_s, integral)) / np.diff(edges_s))
+    return Settings(times_s[new], volts[new])
 
 
 class _EvenClock:
