@@ -1,15 +1,12 @@
 """Recordings on the terminal, folded at its width: nothing is cut."""
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from textwrap import wrap
 from typing import Any
 
+from gateway.cli.command_line.folding import fold, fold_entry
 from gateway.recording.care.keeping import is_being_recorded, is_kept
 from gateway.recording.care.summaries import Summary
-
-_INDENT = " " * 6
 
 
 def marks_of(path: Path, reference: str) -> dict[str, bool]:
@@ -45,17 +42,11 @@ def facts_of(summary: Summary, marks: dict[str, bool]) -> dict[str, Any]:
 
 def lines_of(summary: Summary, marks: dict[str, bool]) -> list[str]:
     """Return the lines of a list for one recording."""
-    width = shutil.get_terminal_size().columns - 1
-    head, *rest = list(_sentences(summary, marks))
-    lines = wrap(f"{summary['number']:>4}  {head}", width, subsequent_indent=_INDENT, break_on_hyphens=False)
-    for sentence in rest:
-        lines += wrap(sentence, width, initial_indent=_INDENT, subsequent_indent=_INDENT, break_on_hyphens=False)
-    return lines
+    return fold_entry(summary["number"], _sentences(summary, marks))
 
 
 def describe(summary: Summary, marks: dict[str, bool]) -> list[str]:
     """Return everything that is known of one recording, a line for each fact."""
-    width = shutil.get_terminal_size().columns - 1
     told = {
         "name": summary["name"],
         "note": summary["note"],
@@ -72,7 +63,7 @@ def describe(summary: Summary, marks: dict[str, bool]) -> list[str]:
     lines = []
     for key, value in told.items():
         if value not in ("", None):
-            lines += wrap(f"{key + ':':<15}{value}", width, subsequent_indent=" " * 15, break_on_hyphens=False)
+            lines += fold(f"{key + ':':<15}{value}", 15)
     return lines
 
 

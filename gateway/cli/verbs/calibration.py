@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway.cli.command_line.completion_words import complete_calibration_numbers, complete_calibrations
+from gateway.cli.command_line.folding import fold_entry
 from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
@@ -35,6 +36,7 @@ def command() -> None:
 @json_option
 def list_command(*, state: StateChoice, as_json: bool) -> None:
     """List the calibrations of a state directory; * is in use, x was rejected."""
+    from gateway.cli.calibration.listing import describe_calibration
     from gateway.cli.calibration.store_access import open_store
     from gateway.numbered_documents.selection import OWN
 
@@ -51,17 +53,19 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
         return
     for note in selected.notes:
         click.echo(note, err=True)
-    click.echo("  NUMBER  made        model     reversal        forces              rms N   max N  slots  name")
+    lines = []
     if store.built_in:
         mark = "*" if selected.selection.number is None else " "
-        click.echo(f"{mark} {store.built_in.number:<8}{_line(store.built_in, _slots(selected, OWN))} (the rig's own)")
+        description = describe_calibration(store.built_in, _slots(selected, OWN), is_own=True)
+        lines += fold_entry(store.built_in.number, description, mark)
     for entry in entries:
         is_rejected = entry.document is not None and bool(entry.document.rejected)
         mark = "*" if selected.selection.number == entry.number else "x" if is_rejected else " "
-        description = (
-            _line(entry.document, _slots(selected, entry.number)) if entry.document else f"unusable: {entry.fault}"
+        slots, unusable = _slots(selected, entry.number), [f"unusable: {entry.fault}"]
+        lines += fold_entry(
+            entry.number, describe_calibration(entry.document, slots) if entry.document else unusable, mark
         )
-        click.echo(f"{mark} {entry.number:<8}{description}")
+    click.echo("\n".join(lines))
 
 
 @command.command(name="show")
@@ -211,20 +215,6 @@ def _facts(entry: "StoredDocument[Calibration]", selected: "SelectedDocument[Cal
 def _slots(selected: "SelectedDocument[Calibration]", number: int) -> list[int]:
     """Return the slots that hold this calibration."""
     return [slot for slot, number_there in enumerate(selected.pointer.slots) if number_there == number]
-
-
-def _line(calibration: "Calibration", slots: list[int]) -> str:
-    low_n, high_n = calibration.allowed_n
-    forces = f"{low_n:.1f} .. {high_n:.1f} N"
-    rms, worst = (f"{error_n:.3f}" if error_n >= 0.0 else "-" for error_n in (calibration.rms_n, calibration.max_n))
-    return (
-        f"{calibration.date_utc:<12}{calibration.kind:<10}{calibration.reversal_kind:<16}{forces:<18}{rms:>7} {worst:>7}"
-        f"  {','.join(map(str, slots)):<5}  {calibration.name} · {calibration.source}{_describe_rejection(calibration)}"
-    )
-
-
-def _describe_rejection(calibration: "Calibration") -> str:
-    return f" · rejected, not offered: {calibration.rejected}" if calibration.rejected else ""
 
 
 def _tell_change(answer: dict[str, Any], *, as_json: bool) -> None:

@@ -7,6 +7,7 @@ from difflib import get_close_matches
 import click
 
 from gateway.cli.command_line.completion_words import complete_codes
+from gateway.cli.command_line.folding import fold
 from gateway.cli.options import json_option
 
 EXAMPLES = ("explain W204", "explain over_force")
@@ -44,7 +45,8 @@ def _explain_code(code: str, *, as_json: bool) -> None:
     for entry in entries:
         click.echo(f"{entry.code}  {entry.title}")
         for heading, text in (("seen", entry.seen), ("probably", entry.probably), ("do", entry.do)):
-            click.echo(click.wrap_text(text, width=100, initial_indent=f"  {heading:<10}", subsequent_indent=" " * 12))
+            for line in fold(f"  {heading:<10}{text}", 12, widest=100):
+                click.echo(line)
 
 
 def _describe_unknown_code(code: str) -> str:

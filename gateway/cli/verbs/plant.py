@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway.cli.command_line.completion_words import complete_plant_numbers, complete_recordings
+from gateway.cli.command_line.folding import fold_entry
 from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.options import StateChoice, json_option, state_options
 
@@ -45,19 +46,18 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
         return
     for note in selected.notes:
         click.echo(note, err=True)
-    click.echo("  NUMBER  made                  verdict     causes and recordings")
-    click.echo(f"{'*' if active == 0 else ' '} 0       the rig's own")
-    for entry in entries:
-        click.echo(f"{'*' if entry.number == active else ' '} {entry.number:<8}{_line(entry)}")
+    for number, description in [(0, ["the rig's own"]), *((entry.number, _describe(entry)) for entry in entries)]:
+        for line in fold_entry(number, description, "*" if number == active else " "):
+            click.echo(line)
 
 
-def _line(entry: "StoredDocument[NumberedPlant]") -> str:
+def _describe(entry: "StoredDocument[NumberedPlant]") -> list[str]:
     if entry.document is None:
-        return f"unusable: {entry.fault}"
+        return [f"unusable: {entry.fault}"]
     provenance = entry.document.provenance
     causes = ", ".join(cause.name for cause in provenance.causes) or "no cause"
     source = provenance.file or ", ".join(each.name for each in provenance.recordings)
-    return f"{provenance.made_utc:<22}{provenance.verdict or 'added':<12}{causes} · from {source}"
+    return [f"{provenance.made_utc}  {provenance.verdict or 'added'}: {causes}", f"from {source}"]
 
 
 @command.command(name="show")

@@ -26,14 +26,38 @@ def active(state: Path) -> int | None:
     return CalibrationStore(state, load_calibration("demo")).find_selected().selection.number
 
 
+def entries(output: str) -> list[list[str]]:
+    """The lines of each entry of the list, the later ones without what they hang behind."""
+    found: list[list[str]] = []
+    for line in output.splitlines():
+        if line.startswith(" " * 6):
+            found[-1].append(line.strip())
+        elif line[:4].strip(" *x").isdigit():
+            found.append([line])
+    return found
+
+
+@pytest.mark.parametrize("columns", [44, 60, 80])
+def test_no_line_of_the_list_is_wider_than_the_terminal(state, call, columns, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    CalibrationStore(state, load_calibration("demo")).add(
+        calibration(32, rejected="0.600 N RMS on all 59 measured points")
+    )
+    output = call("calibration", "list", "--state", state).output
+    assert max(map(len, output.splitlines())) < columns
+    assert "measured" in output and "points" in output
+
+
 def test_list_shows_all_and_which_one_is_used(state, call):
     done = call("calibration", "list", "--state", state)
     assert done.exit_code == 0
-    lines = done.output.splitlines()
-    assert [line[:10].split() for line in lines[1:]] == [["1"], ["2"], ["*", "3"]]
-    assert "the rig's own" in lines[1]
-    assert "0.0 .. 52.0 N       0.125   0.500         mark 16 · a test, mark 16" in lines[2]
-    assert "0.0 .. 53.0 N           -       -  4      mark 24" in lines[3]
+    own, second, third = entries(done.output)
+    assert own[0].startswith("   1  ") and own[0].endswith("(the rig's own)")
+    assert second[0] == "   2  mark 16"
+    assert second[1].endswith("0.0 .. 52.0 N")
+    assert second[2:] == ["rms 0.125 N, max 0.500 N", "a test, mark 16"]
+    assert third[0] == "*  3  mark 24"
+    assert third[2] == "in slot 4"  # and no error, which is not known
     facts = json.loads(call("calibration", "list", "--state", state, "--json").output)
     assert facts["active"] == 3
     assert [(entry["number"], entry["active"], entry["slots"]) for entry in facts["calibrations"]] == [
@@ -44,8 +68,9 @@ def test_list_shows_all_and_which_one_is_used(state, call):
 
 def test_the_rigs_own_shows_the_slots_that_hold_it(state, call):
     CalibrationStore(state, load_calibration("demo")).use(None, 6)
-    line = call("calibration", "list", "--state", state).output.splitlines()[1]
-    assert line.startswith("* 1 ") and "0.131   0.401  6      demo" in line
+    own = entries(call("calibration", "list", "--state", state).output)[0]
+    assert own[0] == "*  1  demo (the rig's own)"
+    assert own[2:4] == ["rms 0.131 N, max 0.401 N", "in slot 6"]
     facts = json.loads(call("calibration", "list", "--state", state, "--json").output)
     own = {
         "number": 1,
@@ -60,7 +85,7 @@ def test_the_rigs_own_shows_the_slots_that_hold_it(state, call):
 
 def test_an_empty_state_has_the_rigs_own(tmp_path, call):
     done = call("calibration", "list", "--state", tmp_path / "nothing")
-    assert done.output.splitlines()[1].startswith("* 1 ")
+    assert done.output.startswith("*  1  ")
     assert not (tmp_path / "nothing").exists()
     shown = call("calibration", "show", "--state", tmp_path / "nothing")
     assert 'name: "demo"' in shown.output
@@ -70,9 +95,9 @@ def test_a_damaged_calibration_is_listed_with_its_fault(state, call):
     (state / "calibrations" / "0003.yaml").write_bytes(b"number: 3\n")
     done = call("calibration", "list", "--state", state)
     assert done.exit_code == 0
-    assert "3       unusable: E432 " in done.output
+    assert "3 unusable: E432 " in " ".join(done.output.split())
     assert done.stderr.startswith("E432 ")
-    assert done.output.count("* 2 ") == 1
+    assert done.output.count("*  2  ") == 1
 
 
 def test_use_and_rollback_without_a_gateway_act_at_the_next_start(state, call):
@@ -169,15 +194,15 @@ def test_export_as_c_writes_a_header_and_a_source(state, call, tmp_path):
 
 def test_a_state_of_a_rig_that_cannot_be_read_works_without_its_own_calibration(state, call):
     done = call("calibration", "list", "--state", state, "--rig", "no-such-rig")
-    assert [line[:10].split() for line in done.output.splitlines()[1:]] == [["2"], ["*", "3"]]
+    assert [head[:4].split() for head, *_ in entries(done.output)] == [["2"], ["*", "3"]]
 
 
 def test_a_rejected_one_is_listed_as_such_and_used_only_by_force(state, call):
     store = CalibrationStore(state, load_calibration("demo"))
     number = store.add(calibration(32, rejected="0.600 N RMS on all 59 measured points"))
-    listed = call("calibration", "list", "--state", state).output.splitlines()[-1]
-    assert listed.startswith(f"x {number} ")
-    assert listed.endswith("rejected, not offered: 0.600 N RMS on all 59 measured points")
+    listed = entries(call("calibration", "list", "--state", state).output)[-1]
+    assert listed[0].startswith(f"x  {number}  ")
+    assert listed[-1].endswith("rejected, not offered: 0.600 N RMS on all 59 measured points")
     refused = call("calibration", "use", number, "--state", state)
     assert refused.exit_code == 65
     assert refused.stderr.startswith(f"E436 calibration {number} was rejected: 0.600 N RMS on all 59")
@@ -188,7 +213,7 @@ def test_a_rejected_one_is_listed_as_such_and_used_only_by_force(state, call):
 
 def test_the_users_name_stands_in_the_list_and_in_the_comparison(state, call):
     number = CalibrationStore(state, load_calibration("demo")).add(calibration(40, name="left cell, new seals"))
-    assert "  left cell, new seals · " in call("calibration", "list", "--state", state).output
+    assert f"   {number}  left cell, new seals\n" in call("calibration", "list", "--state", state).output
     assert (
         f"B  calibration {number} (left cell, new seals, "
         in call("calibration", "compare", "1", str(number), "--state", state).output
