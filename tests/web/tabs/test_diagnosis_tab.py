@@ -1,16 +1,19 @@
 """A diagnosis of the page: one at a time, cancelled without a trace, and ended with the page's process."""
 
 import json
+import re
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
 from gateway import progress
+from gateway.diagnosis.result import Verdict
 from gateway.web.tabs.diagnosis_process import ProgressTeller
 from tests.web.tabs.conftest import record
 from tests.web.tabs.served_tabs import serve
@@ -119,3 +122,9 @@ def test_a_full_link_does_not_stop_the_search() -> None:
         for stage in range(20_000):
             teller.tell(progress.Progress(f"stage {stage}"))
         assert b'"stage 0"' in ours.recv(1000)
+
+
+def test_the_page_has_words_for_each_verdict() -> None:
+    script = files("gateway.web").joinpath("static/tabs/diagnosis.js").read_text("utf-8")
+    (words,) = re.findall(r"const VERDICTS = \{(.*?)\};", script)
+    assert set(re.findall(r'"?([\w-]+)"?: "', words)) == {verdict.value for verdict in Verdict}

@@ -2,7 +2,7 @@
 
 import { Told, button, duration, h, moment, prepare, report, showOnce, table, whileShown } from "./dom.js";
 
-const VERDICTS = { identified: "identified", partial: "part of it found", unknown: "cause unknown", "nothing-found": "as simulated" };
+const VERDICTS = { confirmed: "cause confirmed", partial: "part of it found", unknown: "cause unknown", "nothing-found": "as simulated" };
 
 /** Builds the tab. api: get(path), post(path, body). */
 export function mount(element, api) {
