@@ -52,6 +52,8 @@ VERBS: Final = (
     "version",
 )
 """In the order in which a newcomer meets them; each is a module of gateway.cli.verbs with its `command`."""
+ALIASES: Final = {"install-service": ("service", "install")}
+"""Other names of subcommands, on which programs rely; the help does not list them."""
 HELP: Final = """Modbus gateway that holds a constant contact force, and says why the force is off.
 
 Begin with: force-gateway run demo --sim"""
@@ -72,6 +74,9 @@ class VerbGroup(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a verb's module only when it is called."""
+        if alias := ALIASES.get(cmd_name):
+            group = self.get_command(ctx, alias[0])
+            return group.get_command(ctx, alias[1]) if isinstance(group, click.Group) else None
         if cmd_name not in VERBS:
             return None
         module = import_module(f"gateway.cli.verbs.{cmd_name.replace('-', '_')}")
@@ -84,7 +89,7 @@ class VerbGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the verb, and name the nearest one where there is none of this name."""
         word = args[0]
-        if word not in VERBS and not word.startswith("-") and not ctx.resilient_parsing:
+        if word not in VERBS and word not in ALIASES and not word.startswith("-") and not ctx.resilient_parsing:
             near = get_close_matches(word, VERBS, n=1)
             meant = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(VERBS)}"
             ctx.fail(f"{word} is not a verb{meant}")

@@ -23,7 +23,7 @@ _GO_ON: Final = "; force-gateway calibrate --resume goes on"
 _STAIRS: Final = ("step_v", "v_max_v")  # what all groups of one ladder share
 
 
-EXAMPLES = ("calibrate --quick --yes", 'calibrate --groups 3 --step 0.25 --name "new seals"')
+EXAMPLES = ("calibrate --quick --yes", 'calibrate --groups 3 --step 0.25 --name "new seals" --yes')
 
 
 @click.command()

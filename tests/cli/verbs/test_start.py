@@ -159,3 +159,10 @@ def test_completion_offers_the_verbs(tmp_path: Path) -> None:
 def test_version_names_what_a_report_needs(call) -> None:
     facts = json.loads(call("version", "--json").output)
     assert set(facts) == {"force-gateway", "python", "system", "executable"}
+
+
+def test_an_alias_is_the_subcommand_and_no_verb_of_the_help(call) -> None:
+    alias, meant = call("install-service", "--help"), call("service", "install", "--help")
+    assert alias.exit_code == 0
+    assert alias.output.split("[OPTIONS]")[1] == meant.output.split("[OPTIONS]")[1]
+    assert "install-service" not in call("--help").output
