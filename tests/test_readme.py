@@ -1,52 +1,82 @@
-"""README's generated part and its promises are those of the code."""
+"""What README and the pages beside the rooms have from the code is what the code says, and what they name is there."""
 
-import itertools
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from gateway.cli.main import command
 from gateway.profiles import load_register_map
-from gateway.profiles.device_table import render_devices, render_wires
-from gateway.registers import render_block
+from gateway.profiles.device_table import render_devices
+from gateway.registers import render_block, render_most_used
 from gateway.registers.roles import render_roles
-from tests.profile_files import load_device
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text()
+PAGES = [
+    ROOT / "README.md",
+    *(page for room in ("gateway", "profiles", "tools") for page in (ROOT / room).rglob("*.md")),
+]
 
 
-def test_the_command_block_is_the_map_s():
-    table = README.split("<!-- command block", 1)[1].split("-->\n", 1)[1].split("<!-- end -->", 1)[0]
-    assert table == render_block(load_register_map("force-v1"), "command"), "run tools/readme"
+def id_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
 
 
-def test_the_tables_of_devices_are_what_the_files_say():
-    for page, table in ((README, render_devices()), ((ROOT / "profiles/README.md").read_text(), render_wires())):
-        assert table in page.split("<!-- devices", 1)[1].split("<!-- end -->", 1)[0], "run tools/readme"
+def part(page: str, name: str) -> str:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return text.split(f"<!-- {name}", 1)[1].split("-->\n", 1)[1].split("<!-- end -->", 1)[0]
+
+
+def test_the_tables_of_registers_are_the_map_s():
+    registers = load_register_map("force-v1")
+    assert part("README.md", "map") == render_most_used(registers), "run tools/readme"
+    assert part("gateway/registers/README.md", "command block") == render_block(registers, "command"), (
+        "run tools/readme"
+    )
+
+
+def test_the_table_of_devices_is_what_the_files_say():
+    assert part("profiles/README.md", "devices") == render_devices(), "run tools/readme"
 
 
 def test_the_table_of_roles_is_the_one_that_is_asked():
-    table = README.split("<!-- roles", 1)[1].split("-->\n", 1)[1].split("<!-- end -->", 1)[0]
-    assert table == render_roles(load_register_map("force-v1")), "run tools/readme"
-
-
-def test_the_device_of_ones_own_is_one(tmp_path: Path):
-    lines = itertools.takewhile(
-        lambda line: line.startswith("    "), README.partition("    name: my-dac")[2].splitlines()[1:]
+    assert part("gateway/registers/README.md", "roles") == render_roles(load_register_map("force-v1")), (
+        "run tools/readme"
     )
-    (tmp_path / "my-dac.yaml").write_text("\n".join(["name: my-dac", *(line[4:] for line in lines)]))
-    assert load_device(tmp_path / "my-dac.yaml").serial.baud == 57600
 
 
-@pytest.mark.parametrize("verb", sorted(set(re.findall(r"(?:bin/)?force-gateway ([a-z-]+)(?= |`|\n)", README))))
-def test_every_verb_that_readme_names_exists(verb):
-    assert verb in command.list_commands(None)
+@pytest.mark.parametrize("page", PAGES, ids=id_of)
+def test_every_verb_that_a_page_names_exists(page: Path):
+    named = set(re.findall(r"(?:bin/)?force-gateway ([a-z-]+)(?= |`|\n)", page.read_text(encoding="utf-8")))
+    assert named <= set(command.list_commands(None)) | {"stands", "is", "s"}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=id_of)
+def test_every_file_that_a_page_links_to_exists(page: Path):
+    for target in links(page):
+        path, _, heading = target.partition("#")
+        linked = (page.parent / path).resolve() if path else page
+        assert linked.exists(), target
+        assert not heading or heading in headings(linked), target
+
+
+def links(page: Path) -> Iterator[str]:
+    """Yield the targets of a page's links and pictures that are no addresses of the web."""
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        if not target.startswith("http"):
+            yield target
+
+
+def headings(page: Path) -> set[str]:
+    """Return the anchors of a page's headings, as forges make them."""
+    titles = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), flags=re.M)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
 @pytest.mark.parametrize(
-    "path", sorted(set(re.findall(r"(?<![-\w])(?:tools|profiles|tests|gateway)/[\w./-]*\w", README)))
+    "path",
+    sorted(set(re.findall(r"(?<![-\w])(?:tools|profiles|tests|gateway)/[\w./-]*\w", (ROOT / "README.md").read_text()))),
 )
 def test_every_file_that_readme_names_exists(path):
     assert (ROOT / path).exists()

@@ -1,4 +1,4 @@
-"""The tables of shipped devices in README.md and profiles/README.md, as the files say it."""
+"""The table of shipped devices in profiles/README.md, as the files say it."""
 
 from gateway.devices import DeviceProfile, DeviceRole
 from gateway.profiles.find import list_shipped
@@ -6,13 +6,7 @@ from gateway.profiles.load import load_device
 
 
 def render_devices() -> str:
-    """Return the short table: device, role, certainty."""
-    rows = [f"| `{one.name}` | {one.role} | {one.certainty}, {one.hardware} |" for one in _shipped()]
-    return "\n".join(["| device profile | role | certainty |", "|---|---|---|", *rows]) + "\n"
-
-
-def render_wires() -> str:
-    """Return the long table: what each device is, how it is wired, and whether it has a watchdog and an identity."""
+    """Return the table: what each device is, how it is wired, and whether it has a watchdog and an identity."""
     head = [
         "| file | what it is | role | wire | watchdog | says what it is | certainty |",
         "|---|---|---|---|---|---|---|",

@@ -6,7 +6,7 @@ profiles/registers.
 
 from gateway.registers.bank import RegisterBank
 from gateway.registers.command import Command, Status
-from gateway.registers.map.document import FORMATS, render_block, render_registers
+from gateway.registers.map.document import FORMATS, render_block, render_most_used, render_registers
 from gateway.registers.map.map_reader import MapError
 from gateway.registers.map.register_map import Block, Register, RegisterMap, UnknownRegister
 from gateway.registers.refusal import Refusal
@@ -27,5 +27,6 @@ __all__ = [
     "UnknownRegister",
     "WordOrder",
     "render_block",
+    "render_most_used",
     "render_registers",
 ]

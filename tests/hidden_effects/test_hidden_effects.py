@@ -2,8 +2,8 @@
 
 The push gate asks thirteen, drawn from a printed seed (another: HIDDEN_EFFECTS_SEED); --long asks for every effect twenty
 times, 300 nulls, and twos and threes, and leaves its lines in HIDDEN_EFFECTS_RESULTS (else beside the test's own files).
-Anybody gets the same answers from `tools/hidden_effects --gate`. The bars of a sample are wider than those of README's
-table, which --long holds.
+Anybody gets the same answers from `tools/hidden_effects --gate`. The bars of a sample are wider than those of
+gateway/diagnosis/RATES.md, which --long holds.
 """
 
 import fcntl
@@ -127,7 +127,7 @@ def test_the_tool_with_two_processes_writes_the_rows_of_one(tmp_path: Path) -> N
 
 @pytest.mark.long
 def test_rates_over_every_effect_hold_the_page_s_bars(tmp_path: Path) -> None:
-    """Hours. The table that it prints is what README quotes."""
+    """Hours. The table that it prints is what gateway/diagnosis/RATES.md quotes."""
     results = Path(os.environ.get("HIDDEN_EFFECTS_RESULTS", str(tmp_path / "long.jsonl")))
     rows = run(results, "--long", "--table")
     assert [row for row in rows if "failed" in row] == []

@@ -1,4 +1,4 @@
-"""The shipped plant against the paper (README, "Compared with the paper"), and the demo calibration against the plant.
+"""The shipped plant against the paper (tools/paper/README.md), and the demo calibration against the plant.
 
 A step of Fig. 8 starts from no load: here the pad stands half a millimetre off the workpiece. That is what spoils 5 N: the
 approach has loaded the friction forward, while on the ladder, which never leaves the workpiece, it is still turning round.

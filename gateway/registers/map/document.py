@@ -20,6 +20,19 @@ MOST_READ, MOST_WRITTEN = 125, 123
 ACTING: Final = ("commit", "slot_select")
 """Registers that do something when they are written, and are written alone therefore."""
 FORMATS: Final = ("markdown", "csv", "json")
+MOST_BITS: Final = 16
+MOST_USED: Final = (
+    "control_word",
+    "force_setpoint",
+    "heartbeat",
+    "status_word",
+    "state",
+    "force_measured",
+    "output_voltage",
+    "fault_code",
+    "refusal_address",
+    "refusal_reason",
+)
 _HEADINGS: Final = ("4xxxx/3xxxx", "address", "hex", "R/W", "name", "type", "scale", "unit", "range", "text")
 
 
@@ -39,6 +52,25 @@ def render_block(register_map: RegisterMap, name: str) -> str:
     rows = [_HEADINGS, ("---",) * len(_HEADINGS)]
     rows += [_row(register) for register in register_map.registers_of(register_map.block(name).name)]
     return "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |\n" for row in rows)
+
+
+def render_most_used(register_map: RegisterMap) -> str:
+    """Return the registers that a first program needs as a short table in Markdown. LookupError where the map lacks one."""
+    rows = [("4xxxx", "address", "name", "unit of one count", "what"), ("---",) * 5]
+    for name in MOST_USED:
+        register = register_map.find(name)
+        unit = f"{register.scale:g} {register.unit}" if register.unit else ""
+        rows.append((f"4{register.address + 1:04d}", str(register.address), name, unit, _describe_briefly(register)))
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def _describe_briefly(register: Register) -> str:
+    """Return what its bits or its few values are called, else the first sentence of its text."""
+    names = register.bits or register.values
+    if not names or len(names) > MOST_BITS:
+        return register.text.partition(". ")[0].rstrip(".")
+    kind = "bit " if register.bits else ""
+    return ", ".join(f"{kind}{number} {name}" for number, name in names.items())
 
 
 def _markdown(register_map: RegisterMap) -> str:

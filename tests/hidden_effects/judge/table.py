@@ -1,4 +1,4 @@
-"""Rates with Wilson 95 % intervals, and the rates that must hold beside them, as Markdown that README can quote."""
+"""Rates with Wilson 95 % intervals, and the rates that must hold beside them, as the Markdown of gateway/diagnosis/RATES.md."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import sqrt

@@ -159,7 +159,7 @@ def test_the_same_machine_unchanged_is_neither_better_nor_worse(tmp_path):
 
 @pytest.mark.long
 def test_recorded_diagnosed_used_and_run_again_it_gains(tmp_path):
-    """README, "Close the loop": the diagnosis finds the hidden effect in the gateway's own recording by itself."""
+    """gateway/diagnosis/README.md, "Close the loop": the diagnosis finds the effect hidden in the gateway's own recording."""
     machine = Machine(tmp_path, {"regulator__command_bow": BOW})
     machine.record(None, rounds=5)
     told = CliRunner().invoke(command, ["diagnose", "1", "--save", "--state", str(tmp_path)])

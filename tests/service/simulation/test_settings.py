@@ -15,7 +15,7 @@ from gateway.service.simulation.settings import SimulationSettings
 from gateway.service.socket_requests import SimulationRequest
 from tests.service.rigs import demo
 
-README = Path(__file__).parents[3] / "README.md"
+PAGE = Path(__file__).parents[3] / "gateway" / "service" / "simulation" / "README.md"
 
 
 def setting(**values: object) -> SimulationSettings:
@@ -110,8 +110,8 @@ def test_what_is_kept_holds_for_one_run_of_the_gateway(tmp_path) -> None:
     assert KeptSettings(tmp_path, "first").read() == SimulationSettings()
 
 
-def test_what_readme_sets_can_be_set() -> None:
-    lines = re.findall(r"^    force-gateway sim set ([^#\n]*)", README.read_text(encoding="utf-8"), flags=re.M)
+def test_what_the_page_sets_can_be_set() -> None:
+    lines = re.findall(r"^    force-gateway sim set ([^#\n]*)", PAGE.read_text(encoding="utf-8"), flags=re.M)
     assigned = dict(word.split("=") for line in lines for word in line.split() if "=" in word)
     assert len(assigned) > 8
     settings = SimulationSettings().changed(SimulationRequest(set=assigned))
