@@ -144,6 +144,11 @@ def exception_pdu(function: int, code: int) -> bytes:
     return bytes((function | 0x80, code))
 
 
+def is_exception(pdu: bytes) -> bool:
+    """Return whether an answer refuses its request (section 7: function code + 0x80)."""
+    return pdu[0] & 0x80 != 0
+
+
 def _parse_many(pdu: bytes) -> tuple[int, int, bytes]:
     """address, quantity, data of FC15 and FC16, when the byte count is that of the data."""
     if len(pdu) < _MANY.size:

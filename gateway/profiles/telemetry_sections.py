@@ -23,12 +23,23 @@ class SparkplugNode:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class BrokerTls:
+    """By which certificates the broker is known, and the gateway to it; whole paths of PEM files."""
+
+    __pydantic_config__ = STRICT
+    ca: AbsolutePath  # who signed the broker's certificate
+    certificate: AbsolutePath | None = None  # the gateway's own, where the broker asks for one
+    key: AbsolutePath | None = None  # of that certificate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Mqtt:
     """Figures for an MQTT broker."""
 
     __pydantic_config__ = STRICT
     host: Annotated[str, MinLen(1)]  # name or address of the broker
-    port: Annotated[int, Ge(1), Le(65535)] = 1883
+    port: Annotated[int, Ge(1), Le(65535)] = 1883  # with tls usually 8883
+    tls: BrokerTls | None = None  # null: no TLS
     username: Annotated[str, MinLen(1)] | None = None
     password_file: AbsolutePath | None = None  # whole path of a file that holds the password and nothing else
     base_topic: Topic | None = None  # of the JSON topics; null: force-gateway/NAME of the rig

@@ -20,6 +20,7 @@ from gateway.codes.warning_bits import WarningBit
 from gateway.control.inputs import Output
 from gateway.live import live_state as live
 from gateway.modbus import Peer
+from gateway.modbus.pdu import is_exception
 from gateway.modbus.server import answer, refuse_unit
 from gateway.profiles import Rig
 from gateway.service.running_rig.bank_rules import plain_role
@@ -76,7 +77,8 @@ class LiveAnswers:
         self._role = plain_role(rig)
 
     def modbus(self, request: Answer) -> Answer:
-        """Answer one PDU: {"via": "web", "unit": 1, "pdu": hex} gives {"pdu": hex}. ValueError for no hex."""
+        """Answer one PDU: {"via": "web", "unit": 1, "pdu": hex} gives {"pdu": hex}, of an exception with the sentence that says
+        why: {"pdu": hex, "refusal": sentence}. ValueError for no hex."""
         asked = parse_request(ModbusRequest, request)
         pdu = bytes.fromhex(asked.pdu)
         if not 1 <= len(pdu) <= _LONGEST_PDU:
@@ -84,7 +86,8 @@ class LiveAnswers:
         bank, peer = self._parts.loop.bank, Peer(asked.via, role=self._role)
         units = self._rig.network.units
         given = answer(pdu, bank, peer) if asked.unit in units else refuse_unit((asked.unit, pdu), units, bank, peer)
-        return {"pdu": given.hex()}
+        refusal = bank.last_refusal if is_exception(given) else None
+        return {"pdu": given.hex()} | ({"refusal": refusal.sentence} if refusal else {})
 
     def state(self, request: Answer) -> Answer:
         """Answer how everything is, as LiveState has it."""

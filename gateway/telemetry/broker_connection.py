@@ -14,12 +14,15 @@ _KEEPALIVE_S: Final = 10
 
 @dataclass(frozen=True, slots=True)
 class Broker:
-    """Where it is, and who we are there."""
+    """Where it is, who we are there, and by which certificates it is known: paths of PEM files; no ca: no TLS."""
 
     host: str
     port: int
     username: str | None = None
     password: str | None = field(default=None, repr=False)
+    ca: str | None = None
+    certificate: str | None = None
+    key: str | None = None
 
 
 async def keep_connected(
@@ -34,7 +37,7 @@ async def keep_connected(
     while True:
         will = session.begin()
         try:
-            async with _client(aiomqtt, broker, will) as client:
+            async with _client(aiomqtt, broker, session.name, will) as client:
                 if is_away:
                     say(f"the MQTT broker {broker.host}:{broker.port} is back")
                 is_away = False
@@ -50,10 +53,12 @@ async def keep_connected(
         await asyncio.sleep(again_s)
 
 
-def _client(aiomqtt: Any, broker: Broker, will: BrokerMessage) -> Any:
+def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage) -> Any:
     return aiomqtt.Client(
         broker.host,
         broker.port,
+        identifier=f"force-gateway {name}",  # a second gateway of this name takes its place, and is not mixed with it
+        tls_params=aiomqtt.TLSParameters(broker.ca, broker.certificate, broker.key) if broker.ca else None,
         username=broker.username,
         password=broker.password,
         keepalive=_KEEPALIVE_S,

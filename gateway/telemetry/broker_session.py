@@ -24,6 +24,10 @@ class BrokerSession(Protocol):
     ready: asyncio.Event
 
     @property
+    def name(self) -> str:
+        """What it is at the broker, the same after a restart."""
+
+    @property
     def subscriptions(self) -> Sequence[str]:
         """Topics that it listens to."""
 

@@ -1,14 +1,14 @@
 """A Sparkplug B edge node: births, data, the death that is left with the broker as a will, rebirth, store and forward.
 
 What changes is kept until it is sent, at most ROOM sets of changes: while the broker is away the oldest go first, and what
-is left is sent after the next birth, in order, marked as historical. bdSeq counts connections, so that a host can tell to which
-birth a death belongs; seq counts messages since the birth, 0 .. 255 and round.
+is left is sent after the next birth, in order, marked as historical. bdSeq counts connections, over restarts too, so that a
+host can tell to which birth a death belongs; seq counts messages since the birth, 0 .. 255 and round.
 """
 
 import asyncio
 import time
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -34,11 +34,13 @@ class KeptChange:
 
 
 class EdgeNode:
-    """group, node: as Sparkplug's topics name it; room: sets of changes that are kept."""
+    """group, node: as Sparkplug's topics name it; next_bd_seq: gives each connection its number, 0 .. 255; room: sets of
+    changes that are kept."""
 
-    def __init__(self, group: str, node: str, room: int = ROOM) -> None:
+    def __init__(self, group: str, node: str, next_bd_seq: Callable[[], int], room: int = ROOM) -> None:
         self.ready = asyncio.Event()
         self._group, self._node = group, node
+        self._next_bd_seq, self._bd_seq = next_bd_seq, 0
         self._kept: deque[KeptChange] = deque(maxlen=room)
         self._values: dict[str, Value] = values_of(None)
         self._time_ms = int(time.time() * 1000)
@@ -46,6 +48,11 @@ class EdgeNode:
         self._current: int | None = None
         self._seq = 0
         self._offered: KeptChange | None = None
+
+    @property
+    def name(self) -> str:
+        """Group and node: what it is at the broker, under which no other edge node may be there."""
+        return f"{self._group}/{self._node}"
 
     @property
     def subscriptions(self) -> Sequence[str]:
@@ -59,7 +66,8 @@ class EdgeNode:
     def begin(self) -> BrokerMessage:
         """Count the connection; its will is the death that belongs to the birth to come."""
         self._connections += 1
-        death = encode_payload(int(time.time() * 1000), [self._bd_seq(self._time_ms)], None)
+        self._bd_seq = self._next_bd_seq()
+        death = encode_payload(int(time.time() * 1000), [self._bd_seq_at(self._time_ms)], None)
         return BrokerMessage(self.topic("NDEATH"), death, qos=1)
 
     def greet(self) -> Sequence[BrokerMessage]:
@@ -106,14 +114,14 @@ class EdgeNode:
     def _birth(self) -> BrokerMessage:
         self._seq = 0
         metrics = [
-            self._bd_seq(self._time_ms),
+            self._bd_seq_at(self._time_ms),
             SparkplugMetric(REBIRTH, DataType.BOOLEAN, False, self._time_ms),
             *_metrics(self._values, self._time_ms, is_historical=False),
         ]
         return BrokerMessage(self.topic("NBIRTH"), encode_payload(self._time_ms, metrics, self._seq))
 
-    def _bd_seq(self, time_ms: int) -> SparkplugMetric:
-        return SparkplugMetric(BD_SEQ, DataType.UINT64, (self._connections - 1) % _ROUND, time_ms)
+    def _bd_seq_at(self, time_ms: int) -> SparkplugMetric:
+        return SparkplugMetric(BD_SEQ, DataType.UINT64, self._bd_seq, time_ms)
 
 
 def _metrics(values: dict[str, Value], time_ms: int, *, is_historical: bool) -> Iterable[SparkplugMetric]:

@@ -46,6 +46,11 @@ class JsonTopics:
         self._told_s = 0.0
 
     @property
+    def name(self) -> str:
+        """The base topic, which no other gateway may have at the broker."""
+        return self._base
+
+    @property
     def subscriptions(self) -> Sequence[str]:
         """The command topic, where commands are heard."""
         return (f"{self._base}/command",) if self._command else ()

@@ -10,6 +10,7 @@ import json
 import socket
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -22,6 +23,7 @@ from gateway.telemetry.broker_connection import Broker, keep_connected
 from gateway.telemetry.broker_session import BrokerSession
 from gateway.telemetry.edge_node import EdgeNode
 from gateway.telemetry.json_topics import JsonTopics
+from gateway.telemetry.kept_bd_seq import KeptBdSeq
 from gateway.telemetry.register_commands import RegisterCommands
 
 if TYPE_CHECKING:
@@ -29,14 +31,14 @@ if TYPE_CHECKING:
 LOOK_S: Final = 0.2
 
 
-def make_sessions(rig: "Rig", link: ControlLink) -> list[BrokerSession]:
-    """Return what the rig wants to be told."""
+def make_sessions(rig: "Rig", link: ControlLink, state: Path) -> list[BrokerSession]:
+    """Return what the rig wants to be told. state: its directory."""
     mqtt = rig.mqtt
     assert mqtt is not None  # or nobody had started us
     command = RegisterCommands(rig.register_map, link, rig.network.units[0]).carry_out if mqtt.commands else None
     sessions: list[BrokerSession] = [JsonTopics(mqtt.base_topic or f"force-gateway/{rig.name}", command)]
     if mqtt.sparkplug:
-        sessions.append(EdgeNode(mqtt.sparkplug.group, mqtt.sparkplug.node or rig.name))
+        sessions.append(EdgeNode(mqtt.sparkplug.group, mqtt.sparkplug.node or rig.name, KeptBdSeq(state).next))
     return sessions
 
 
@@ -53,6 +55,19 @@ async def look_forever(link: ControlLink, sessions: list[BrokerSession]) -> None
         await asyncio.sleep(max(0.0, LOOK_S - (time.monotonic() - began_s)))
 
 
+class Announcer:
+    """Says once what several connections to one broker have to say."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say, self._last = say, ""
+
+    def say(self, text: str) -> None:
+        """Say it, unless it has just been said."""
+        if text != self._last:
+            self._say(text)
+        self._last = text
+
+
 def _say(text: str) -> None:
     sys.stderr.write(f"{text}\n")
 
@@ -64,13 +79,16 @@ async def publish(options: dict[str, Any]) -> None:
     rig = load_rig(options["rig"], simulated=options["simulated"])
     assert rig.mqtt is not None
     password = Path(rig.mqtt.password_file).read_text().strip() if rig.mqtt.password_file else None
-    broker = Broker(rig.mqtt.host, rig.mqtt.port, rig.mqtt.username, password)
-    link = ControlLink(Path(options["state"]))
-    sessions = make_sessions(rig, link)
+    tls = rig.mqtt.tls
+    certificates = (tls.ca, tls.certificate, tls.key) if tls else ()
+    broker = Broker(rig.mqtt.host, rig.mqtt.port, rig.mqtt.username, password, *certificates)
+    state = Path(options["state"])
+    link = ControlLink(state)
+    sessions, announcer = make_sessions(rig, link, state), Announcer(_say)
     async with asyncio.TaskGroup() as group:
         group.create_task(look_forever(link, sessions))
         for session in sessions:
-            group.create_task(keep_connected(broker, session, _say))
+            group.create_task(keep_connected(broker, session, announcer.say))
 
 
 def main(arguments: list[str]) -> int:

@@ -5,13 +5,15 @@ a command; the answer says what was written. A rig with a lease wants `heartbeat
 """
 
 import json
+from math import isfinite
 from typing import Any, Final
 
 from gateway.live.control_link import ControlLink
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.map.register_map import RegisterMap
 
-_IS_EXCEPTION: Final = 0x80
+_LONGEST: Final = 16_384
+"""Bytes of a command: far beyond one that names every register, and too few to nest deeply."""
 
 
 class RegisterCommands:
@@ -35,16 +37,22 @@ class RegisterCommands:
         register = self._map.find(name)
         request = P.write_registers_request(register.address, register.encode(value))
         answer = await self._link.ask({"do": "modbus", "via": "mqtt", "unit": self._unit, "pdu": request.hex()})
-        if bytes.fromhex(answer["pdu"])[0] & _IS_EXCEPTION:
-            told = await self._link.ask({"do": "last-refusal"})
-            raise ValueError(f"{name}: {told['sentence'] or 'refused'}")
+        if P.is_exception(bytes.fromhex(answer["pdu"])):
+            raise ValueError(f"{name}: {answer.get('refusal') or 'refused'}")
 
 
 def _registers(payload: bytes) -> dict[str, float]:
-    content = json.loads(payload)
+    if len(payload) > _LONGEST:
+        raise ValueError(f"{len(payload)} bytes: a command has {_LONGEST} at most")
+    try:
+        content = json.loads(payload)
+    except RecursionError:
+        raise ValueError("nested too deeply for a command") from None
     if not isinstance(content, dict) or not content:
         raise ValueError('a command is JSON such as {"force_setpoint": 12.0, "control_word": 1}')
     for name, value in content.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise ValueError(f"{name} is no number")
+        if not isfinite(value):
+            raise ValueError(f"{name} = {value}: a finite number is wanted")
     return content

@@ -179,11 +179,11 @@ class Commands:
     async def _send(self, pdu: bytes) -> bytes:
         unit = self._context.profile.network.units[0]
         request: dict[str, Any] = {"do": "modbus", "via": "web", "unit": unit, "pdu": pdu.hex()}
-        answer = bytes.fromhex((await self._context.control.ask(request))["pdu"])
-        if answer[0] & 0x80:
-            told = await self._context.control.ask({"do": "last-refusal"})
-            raise RefusedCommand(str(told["sentence"]) or f"refused with exception {answer[1]:02d}")
-        return answer
+        answer = await self._context.control.ask(request)
+        pdu = bytes.fromhex(answer["pdu"])
+        if P.is_exception(pdu):
+            raise RefusedCommand(str(answer.get("refusal") or f"refused with exception {pdu[1]:02d}"))
+        return pdu
 
     # -- the lease
 

@@ -1,7 +1,9 @@
 """The Sparkplug edge node without a broker, its payloads read by Google's protobuf."""
 
 import asyncio
+import itertools
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from gateway.live.live_state import LiveState
 from gateway.telemetry.broker_session import BrokerMessage
 from gateway.telemetry.edge_node import REBIRTH, EdgeNode
+from gateway.telemetry.kept_bd_seq import KeptBdSeq
 from gateway.telemetry.sparkplug_metrics import TYPES
 from gateway.telemetry.sparkplug_payload import DataType, SparkplugMetric, decode_values, encode_payload
 from tests.telemetry.readings import holding
@@ -36,7 +39,7 @@ def forces(messages: list[BrokerMessage]) -> list[float]:
 
 
 def test_a_birth_names_all_with_types_and_its_death_has_its_bd_seq() -> None:
-    node = EdgeNode("plant", NODE_NAME)
+    node = EdgeNode("plant", NODE_NAME, itertools.count().__next__)
     for bd_seq in range(3):
         node.offer(holding(), 1000.0)
         will = node.begin()
@@ -54,7 +57,7 @@ def test_a_birth_names_all_with_types_and_its_death_has_its_bd_seq() -> None:
 
 
 def test_data_tells_what_changed_and_seq_goes_round() -> None:
-    node = EdgeNode("plant", NODE_NAME)
+    node = EdgeNode("plant", NODE_NAME, itertools.count().__next__)
     node.begin()
     node.greet()
     node.offer(at(0.0), 0.0)
@@ -70,7 +73,7 @@ def test_data_tells_what_changed_and_seq_goes_round() -> None:
 
 
 def test_what_came_while_the_broker_was_away_follows_the_birth_in_order_as_historical() -> None:
-    node = EdgeNode("plant", NODE_NAME, room=5)
+    node = EdgeNode("plant", NODE_NAME, itertools.count().__next__, room=5)
     node.begin()
     node.greet()
     node.offer(at(0.0), 0.0)
@@ -92,7 +95,7 @@ def test_what_came_while_the_broker_was_away_follows_the_birth_in_order_as_histo
 
 
 def test_a_full_store_loses_the_oldest_and_never_one_that_was_not_sent() -> None:
-    node = EdgeNode("plant", NODE_NAME, room=3)
+    node = EdgeNode("plant", NODE_NAME, itertools.count().__next__, room=3)
     for number in range(10):
         node.offer(at(float(number)), float(number))
     node.next_message()
@@ -102,7 +105,7 @@ def test_a_full_store_loses_the_oldest_and_never_one_that_was_not_sent() -> None
 
 
 def test_only_a_rebirth_that_is_asked_for_is_answered() -> None:
-    node = EdgeNode("plant", NODE_NAME)
+    node = EdgeNode("plant", NODE_NAME, itertools.count().__next__)
     node.begin()
     node.greet()
 
@@ -120,7 +123,7 @@ def test_only_a_rebirth_that_is_asked_for_is_answered() -> None:
 
 
 def test_where_control_does_not_answer_nothing_old_is_told() -> None:
-    node = EdgeNode("plant", NODE_NAME)
+    node = EdgeNode("plant", NODE_NAME, itertools.count().__next__)
     node.offer(holding(), 1.0)
     node.offer(None, 2.0)
     node.begin()
@@ -155,3 +158,13 @@ def test_bytes_of_strangers_are_read_or_refused(payload: bytes) -> None:
     except ValueError:
         return
     assert isinstance(told, dict)
+
+
+def test_bd_seq_goes_on_where_the_process_before_has_ended(tmp_path: Path) -> None:
+    first = KeptBdSeq(tmp_path)
+    assert [first.next() for _ in range(300)] == [*range(256), *range(44)]
+    assert KeptBdSeq(tmp_path).next() == 44
+    for damage in ("", "[", "[" * 100_000, '{"bdSeq": null}', '{"bdSeq": 1e999}', '{"other": 1}'):
+        (tmp_path / "sparkplug.json").write_text(damage)
+        assert KeptBdSeq(tmp_path).next() == 0
+    assert [KeptBdSeq(tmp_path / "nowhere").next() for _ in range(2)] == [0, 0], "no disk: counts in memory only"

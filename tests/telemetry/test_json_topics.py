@@ -13,6 +13,7 @@ from gateway.processes.json_socket import JsonLineServer
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.telemetry.broker_session import BrokerMessage
 from gateway.telemetry.json_topics import JsonTopics
+from gateway.telemetry.mqtt_process import Announcer
 from gateway.telemetry.register_commands import RegisterCommands
 from tests.telemetry.readings import holding
 
@@ -102,6 +103,12 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
         (b"{", None, []),
         (b'{"force_setpoint": true}', None, []),
         (b'{"no_such": 1}', None, []),
+        (b"[" * 100_000, None, []),
+        (b"[" * 10_000, None, []),
+        (b'{"force_setpoint": NaN}', None, []),
+        (b'{"force_setpoint": -Infinity}', None, []),
+        (b'{"force_setpoint": 1e999}', None, []),
+        (b'{"force_setpoint": 1' + b"0" * 400 + b"}", None, []),
     ],
 )
 def test_a_command_is_written_in_order_until_the_first_refusal(
@@ -111,11 +118,12 @@ def test_a_command_is_written_in_order_until_the_first_refusal(
 
     def modbus(request: dict[str, Any]) -> dict[str, Any]:
         asked.append(request)
-        return {"pdu": "9003" if request["pdu"].startswith("100002") else request["pdu"][:10]}
+        if request["pdu"].startswith("100002"):
+            return {"pdu": "9003", "refusal": "E999 not now"}
+        return {"pdu": request["pdu"][:10]}
 
     async def scene() -> dict[str, Any]:
-        handlers = {"modbus": modbus, "last-refusal": lambda _: {"sentence": "E999 not now"}}
-        control, link = JsonLineServer(tmp_path / "control.sock", handlers), ControlLink(tmp_path)
+        control, link = JsonLineServer(tmp_path / "control.sock", {"modbus": modbus}), ControlLink(tmp_path)
         await control.start()
         told = await RegisterCommands(load_rig("demo").register_map, link, 1).carry_out(payload)
         await link.close()
@@ -126,3 +134,11 @@ def test_a_command_is_written_in_order_until_the_first_refusal(
     assert answer == result if result else answer["ok"] is False and answer["written"] == [] and answer["error"]
     assert [request["pdu"] for request in asked] == pdus
     assert {request["via"] for request in asked} <= {"mqtt"}
+
+
+def test_two_connections_to_one_broker_say_once_that_it_is_away() -> None:
+    said: list[str] = []
+    announcer = Announcer(said.append)
+    for text in ("away", "away", "back", "back", "away"):
+        announcer.say(text)
+    assert said == ["away", "back", "away"]

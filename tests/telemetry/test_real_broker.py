@@ -10,12 +10,15 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import paho.mqtt.client as paho
 import pytest
+from click.testing import CliRunner
 
+from gateway.cli.main import command
 from gateway.profiles import shipped_profiles_folder
 from tests.telemetry.readings import holding
 from tests.telemetry.sparkplug_schema import Payload, decoded, values
@@ -91,9 +94,9 @@ def until(condition: Callable[[], bool], what: str, within_s: float = 15.0) -> N
         time.sleep(0.01)
 
 
-def start_broker(folder: Path, port: int) -> "subprocess.Popen[bytes]":
+def start_broker(folder: Path, port: int, *settings: str) -> "subprocess.Popen[bytes]":
     file = folder / "mosquitto.conf"
-    file.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
+    file.write_text("\n".join([f"listener {port} 127.0.0.1", "allow_anonymous true", *settings, ""]))
     broker = subprocess.Popen([MOSQUITTO, "-c", str(file)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     until(lambda: answers(port), "mosquitto listens")
     return broker
@@ -126,12 +129,17 @@ def control(tmp_path: Path) -> Iterator[FakeControl]:
 @pytest.fixture
 def client(control: FakeControl, tmp_path: Path, port: int) -> Iterator["subprocess.Popen[bytes]"]:
     """The MQTT process, without a guardian; the broker is not there yet."""
+    with run_client(
+        tmp_path, f"{{host: 127.0.0.1, port: {port}, commands: true, sparkplug: {{group: plant}}}}"
+    ) as process:
+        yield process
+
+
+@contextmanager
+def run_client(tmp_path: Path, section: str) -> Iterator["subprocess.Popen[bytes]"]:
     rig = tmp_path / "rig.yaml"
     text = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
-    rig.write_text(
-        f"{text}mqtt: {{host: 127.0.0.1, port: {port}, commands: true, sparkplug: {{group: plant}}}}\n",
-        encoding="utf-8",
-    )
+    rig.write_text(f"{text}mqtt: {section}\n", encoding="utf-8")
     guardian, link = socket.socketpair()
     os.set_inheritable(link.fileno(), True)
     options = json.dumps({"rig": str(rig), "state": str(tmp_path), "simulated": True})
@@ -202,6 +210,51 @@ def test_a_command_of_yesterday_that_the_broker_kept_is_not_carried_out(
         assert "no_such_register" in json.loads(result)["error"]
     finally:
         listener.close()
+        kill(broker)
+
+
+def test_tls_with_certificates_on_both_sides_and_none_to_a_stranger(
+    control: FakeControl, tmp_path: Path, port: int
+) -> None:
+    ours, strange = tmp_path / "ours", tmp_path / "strange"
+    for folder in (ours, strange):
+        assert (
+            CliRunner()
+            .invoke(command, ["certs", str(folder), "--host", "127.0.0.1", "--client", "cell:monitor"])
+            .exit_code
+            == 0
+        )
+    named = ours / "gateway.crt", ours / "gateway.key"
+    broker = start_broker(
+        tmp_path,
+        port,
+        f"cafile {ours}/ca.crt",
+        f"certfile {named[0]}",
+        f"keyfile {named[1]}",
+        "require_certificate true",
+        "use_identity_as_username true",
+        f"log_dest file {tmp_path}/broker.log",
+        "user root",
+    )
+
+    def tls(ca: Path, client: Path) -> str:
+        files = f"{{ca: {ca}/ca.crt, certificate: {client}/cell.crt, key: {client}/cell.key}}"
+        return f"{{host: 127.0.0.1, port: {port}, tls: {files}}}"
+
+    def log() -> str:
+        path = tmp_path / "broker.log"
+        return path.read_text() if path.exists() else ""
+
+    try:
+        with run_client(tmp_path, tls(strange, strange)):
+            until(
+                lambda: "unknown ca" in log().lower() or "certificate verify failed" in log().lower(),
+                "a refused handshake",
+            )
+        assert "force-gateway" not in log()
+        with run_client(tmp_path, tls(ours, ours)):
+            until(lambda: "as force-gateway force-gateway/demo" in log(), "the gateway is let in")
+    finally:
         kill(broker)
 
 

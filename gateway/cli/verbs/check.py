@@ -103,7 +103,16 @@ def _print(file: str, checked: "Checked") -> None:
 
 
 def _notes(rig: "Rig") -> list[str]:
-    return [*rig.notes, *([rig.why_unwatched] if rig.why_unwatched else [])]
+    return [*rig.notes, *([rig.why_unwatched] if rig.why_unwatched else []), *_missing_extras(rig)]
+
+
+def _missing_extras(rig: "Rig") -> "Iterator[str]":
+    """Yield what the rig asks for and this machine cannot do for want of a library: the gateway runs without it."""
+    from gateway.extras import is_installed, missing_note
+
+    for section, library in (("metrics", "prometheus_client"), ("mqtt", "aiomqtt"), ("opcua", "asyncua")):
+        if getattr(rig, section) is not None and not is_installed(library):
+            yield missing_note(library, section)
 
 
 def _document(checked: "Checked") -> dict[str, Any]:

@@ -1,0 +1,37 @@
+"""bdSeq of the Sparkplug edge node, kept in the state directory, so that it goes on where the process before has ended.
+
+A host tells by it to which birth a death belongs: one that began at 0 again after each start could take the death of the
+process before, which the broker tells late, for that of the new one (Sparkplug 3.0, section 6.4.5, "bdSeq").
+"""
+
+import contextlib
+import json
+from pathlib import Path
+from typing import Final
+
+_FILE: Final = "sparkplug.json"
+_ROUND: Final = 256
+
+
+class KeptBdSeq:
+    """state: the gateway's state directory."""
+
+    def __init__(self, state: Path) -> None:
+        self._path = state / _FILE
+        self._last = self._read()
+
+    def next(self) -> int:
+        """Return the number of a new connection, 0 .. 255 and round; it counts also where the disk does not take it."""
+        self._last = (self._last + 1) % _ROUND
+        beside = self._path.with_suffix(".new")
+        with contextlib.suppress(OSError):
+            beside.write_text(json.dumps({"bdSeq": self._last}), encoding="ascii")
+            beside.replace(self._path)
+        return self._last
+
+    def _read(self) -> int:
+        try:
+            last = json.loads(self._path.read_text(encoding="ascii"))["bdSeq"]
+            return int(last) % _ROUND
+        except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
+            return _ROUND - 1
