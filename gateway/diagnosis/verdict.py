@@ -14,6 +14,7 @@ from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.catalogue.effect import Effect, Parameter
 from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.bench.parameters import STARTS
+from gateway.diagnosis.confidence import bound_confidences
 from gateway.diagnosis.experiments.identifiability import find_invisible_effects
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
 from gateway.diagnosis.model_fit.normal_equations import covariance, held_out_errors
@@ -109,21 +110,28 @@ def compose_diagnosis(
     found, reported, dropped = drop_doubtful_effects(bench, findings.found)
     noise = _noise_floor(bench, found, reported, (given_floor_n, calibration_noise_n))
     reaches = noise.is_reached(reported.held_out.rms_n)
-    causes = _causes(bench, found, reported, noise.floor_n)
+    named_causes = _causes(bench, found, reported, noise.floor_n)
+    causes = bound_confidences(named_causes, 0.0 if reaches else reported.held_out.rms_n**2 - noise.floor_n**2)
+    is_doubted = any(
+        now.confidence < min(_SURE, each.confidence) for now, each in zip(causes, named_causes, strict=True)
+    )
     causes += _direct_causes(bench, reported, findings.evidence, noise.floor_n)
     causes.sort(key=lambda cause: cause.gain.held_out_rms_after_n**2 - cause.gain.held_out_rms_before_n**2)
     unseen = _unseen(findings, found, causes)
-    named = {*_names_in_groups(causes), *(each.name for each in causes), *(each.name for each in unseen)}
+    told = {*_names_in_groups(causes), *(each.name for each in causes), *(each.name for each in unseen)}
     duration_s = sum(each.duration_s for each in bench.measurements)
     return Diagnosis(
         verdict=_decide_verdict(
-            causes, left, reached=reaches and noise.confirms(causes), unexplained=noise.asks_for_a_cause
+            causes,
+            left,
+            reached=reaches and noise.confirms(causes) and not is_doubted,
+            unexplained=noise.asks_for_a_cause,
         ),
         baseline=Baseline(noise.rms_n, noise.floor_n, int(bench.judged.sum()), duration_s, noise.source),
         causes=tuple(causes),
         leftover=tuple(left),
         not_identifiable=unseen,
-        rejected=_rejected_effects(bench, found, noise.rms_n, named, dropped),
+        rejected=_rejected_effects(bench, found, noise.rms_n, told, dropped),
         extended=Extended(reported.held_out.rms_n, reaches),
         base=_plant_of(reported.base),
         plant=_extended_plant(reported, causes),
