@@ -25,7 +25,7 @@ class BrokerSession(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is at the broker, the same after a restart."""
+        """Name at the broker, the same after a restart."""
 
     @property
     def subscriptions(self) -> Sequence[str]:

@@ -51,7 +51,7 @@ class EdgeNode:
 
     @property
     def name(self) -> str:
-        """Group and node: what it is at the broker, under which no other edge node may be there."""
+        """Group and node, under which no other edge node may be at the broker."""
         return f"{self._group}/{self._node}"
 
     @property
