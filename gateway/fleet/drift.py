@@ -1,43 +1,35 @@
 """Which cells drift, and why: the trend of each cell over its days, against what chance would show somewhere in the fleet.
 
 A cell's quantity is each row's `value_n`: of a diagnosis what the simulation gets wrong beyond the noise, of a fit the force at
-the middle of the voltages. Its slope is that of least squares over the days, with the interval and the chance by Student's t;
-among many cells the smallest of many chances is small, so chances are judged by Holm's step-down procedure (Holm 1979), which
-keeps the chance of even one false alarm in the whole fleet at `ALPHA`. A drift that nobody would mind is none: over the days
-that were seen it must reach `LEAST_N`.
-Why: the effect whose part of the excess has grown most in that cell, by the same slope.
+the middle of the voltages. Slope, interval and chance are those of `trend`; among many cells the smallest of many
+chances is small, so chances are judged by Holm's step-down procedure (Holm 1979), which keeps the chance of even one false
+alarm in the whole fleet at `ALPHA`. A drift that nobody would mind is none: over the days that were seen it must reach
+`LEAST_N`.
+Why: the effect whose part of the excess has changed most in that cell, the way of the drift, by the same slope: a name that
+stands on one or two days moves no median. What no day that names it can tell from it is named beside it.
 """
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
-from math import isfinite, sqrt
+from math import isfinite
 from typing import Final
 
 import numpy as np
 
 from gateway.fleet.tasks import Row
+from gateway.fleet.trend import Trend, fit_trend
 
 ALPHA: Final = 0.01
-LEAST_DAYS: Final = 4  # a line through three has one degree of freedom: nothing is small enough
 LEAST_N: Final = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class Trend:
-    """Slope in N per day with its 95 % interval, and the chance of one as steep without a trend."""
-
-    slope_n_per_day: float
-    low: float
-    high: float
-    chance: float
 
 
 @dataclass(frozen=True, slots=True)
 class CellDrift:
     """days: since the cell's first one; values_n: of each day's recordings, the median; change_n: over all days, by the
-    slope; cause: the effect that has grown most, empty for none; cause_n: by how much."""
+    slope; cause: the effect that has changed most, empty for none; cause_n: by how much; group: effects that no day tells apart
+    from it, itself among them."""
 
     cell: str
     first_day: str
@@ -48,6 +40,7 @@ class CellDrift:
     drifts: bool
     cause: str
     cause_n: float
+    group: tuple[str, ...]
     errors: int
 
 
@@ -63,23 +56,6 @@ def find_drifts(rows: Iterable[Row]) -> list[CellDrift]:
     return sorted(judged, key=lambda one: (not one.drifts, -abs(one.change_n), one.cell))
 
 
-def fit_trend(days: Sequence[float], values: Sequence[float]) -> Trend | None:
-    """Return the line's slope; None where too few days are known."""
-    from scipy.special import stdtr, stdtrit
-
-    x, y = np.asarray(days, float), np.asarray(values, float)
-    if len(set(days)) < LEAST_DAYS:
-        return None
-    freedom = len(x) - 2
-    centred = x - x.mean()
-    slope = float(centred @ y / (centred @ centred))
-    left = y - y.mean() - slope * centred
-    error = sqrt(float(left @ left) / freedom / float(centred @ centred))
-    half = float(stdtrit(freedom, 0.975)) * error
-    chance = float(2.0 * stdtr(freedom, -abs(slope) / error)) if error > 0.0 else float(slope == 0.0)
-    return Trend(slope, slope - half, slope + half, chance)
-
-
 def _of_cell(cell: str, rows: Sequence[Row]) -> CellDrift:
     good = [row for row in rows if not row["error_code"] and _day(row["date"]) is not None]
     days = sorted({row["date"] for row in good})
@@ -88,21 +64,29 @@ def _of_cell(cell: str, rows: Sequence[Row]) -> CellDrift:
     values = tuple(float(np.median([row["value_n"] for row in good if row["date"] == day])) for day in days)
     trend = fit_trend(since, values)
     change_n = trend.slope_n_per_day * (since[-1] - since[0]) if trend else 0.0
-    cause, cause_n = _grown(good, days, since) if trend else ("", 0.0)
+    cause, cause_n = _grown(good, days, since, change_n) if trend else ("", 0.0)
     errors = sum(bool(row["error_code"]) for row in rows)
-    return CellDrift(cell, days[0] if days else "", since, values, trend, change_n, False, cause, cause_n, errors)
+    first_day, group = days[0] if days else "", _group_of(cause, good)
+    return CellDrift(cell, first_day, since, values, trend, change_n, False, cause, cause_n, group, errors)
 
 
 def _judge(one: CellDrift, *, is_proven: bool) -> CellDrift:
     return replace(one, drifts=is_proven and abs(one.change_n) >= LEAST_N)
 
 
-def _grown(rows: Sequence[Row], days: Sequence[str], since: Sequence[float]) -> tuple[str, float]:
-    """The effect whose gain has changed most over the days; a day on which it is not named has 0 of it."""
+def _grown(rows: Sequence[Row], days: Sequence[str], since: Sequence[float], change_n: float) -> tuple[str, float]:
+    """The effect whose gain has changed most the way of change_n; a day on which it is not named has 0 of it."""
     names = {cause["name"] for row in rows for cause in row["causes"]}
     changes = {name: _change_of(name, rows, days, since) for name in sorted(names)}
-    best = max(changes, key=lambda name: abs(changes[name]), default="")
-    return (best, changes[best]) if best else ("", 0.0)
+    best = max(changes, key=lambda name: changes[name] * change_n, default="")
+    return (best, changes[best]) if best and changes[best] * change_n > 0.0 else ("", 0.0)
+
+
+def _group_of(name: str, rows: Sequence[Row]) -> tuple[str, ...]:
+    """The effects that stand beside this one on every day that names it, itself first."""
+    groups = [cause["group"] for row in rows for cause in row["causes"] if cause["name"] == name]
+    others = set.intersection(*map(set, groups)) - {name} if groups else set()
+    return (name, *sorted(others)) if name else ()
 
 
 def _change_of(name: str, rows: Sequence[Row], days: Sequence[str], since: Sequence[float]) -> float:

@@ -101,4 +101,10 @@ def _run_on_cluster(address: str, compute: Compute, tasks: Sequence[Task]) -> It
         }
         for future in distributed.as_completed(list(of_future), loop=client.loop):
             task = of_future[future]
-            yield task, error_row(task, KILLED) if future.exception() else future.result()
+            failure = future.exception()
+            yield task, error_row(task, _reason(failure)) if failure else future.result()
+
+
+def _reason(failure: BaseException) -> BaseException | str:
+    """Only a death is one: a worker of another version, say, fails without having computed anything."""
+    return KILLED if type(failure).__name__ == "KilledWorker" else failure

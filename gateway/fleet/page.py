@@ -6,8 +6,10 @@ from functools import partial
 from html import escape
 from typing import Final
 
-from gateway.fleet.drift import ALPHA, LEAST_DAYS, LEAST_N, CellDrift
+from gateway.fleet.drift import ALPHA, LEAST_N, CellDrift
 from gateway.fleet.tasks import Row
+from gateway.fleet.trend import LEAST_DAYS, level_of
+from gateway.progress import few
 from gateway.reports.axis import Axis, spread
 from gateway.reports.figures import NOTHING, Drawing, Panel, drawing, grid
 from gateway.reports.frame import Head, notes, page, section, table, tiles
@@ -35,8 +37,14 @@ def headline(cells: Sequence[CellDrift]) -> str:
 
 def describe_drift(one: CellDrift) -> str:
     """Return a cell's drift in words: `cell 7 (leak, +0.82 N in 5 days)`."""
-    why = f"{one.cause}, " if one.cause else ""
+    why = f"{cause_in_words(one)}, " if one.cause else ""
     return f"cell {one.cell or 'without a name'} ({why}{one.change_n:+.2f} N in {one.days[-1] - one.days[0]:.0f} days)"
+
+
+def cause_in_words(one: CellDrift) -> str:
+    """Return the cause, and those that its recordings do not tell from it: `leak or creep, warm-up`."""
+    others = f" or {few(one.group[1:])}" if one.group[1:] else ""
+    return one.cause + others
 
 
 def fleet_page(rows: Sequence[Row], cells: Sequence[CellDrift], verb: str) -> str:
@@ -53,10 +61,7 @@ def fleet_page(rows: Sequence[Row], cells: Sequence[CellDrift], verb: str) -> st
             ("not read", str(len(failed)), "recordings"),
         ),
         section("Cells", table(_HEADS, map(_cell_cells, cells), "numbers")),
-        section(
-            "Day by day",
-            grid(*(Panel(_title(one), partial(_draw, one, _axis(cells, verb))) for one in cells[:_MOST_DRAWN])),
-        ),
+        section("Day by day", _day_by_day(cells, _axis(cells, verb))),
         section(
             "Causes that were named",
             table(("cause", "recordings"), ((escape(name), str(count)) for name, count in named.most_common()))
@@ -77,7 +82,7 @@ def fleet_page(rows: Sequence[Row], cells: Sequence[CellDrift], verb: str) -> st
     return page(head, parts, {"rows": len(rows)})
 
 
-_HEADS: Final = ("cell", "days", "change (N)", "N per day", "95 % of it", "by chance", "cause that grew")
+_HEADS: Final = ("cell", "days", "change (N)", "N per day", "95 % of it", "by chance", "cause that changed")
 
 
 def _cell_cells(one: CellDrift) -> tuple[str, ...]:
@@ -85,7 +90,7 @@ def _cell_cells(one: CellDrift) -> tuple[str, ...]:
     if trend is None:
         return (name, str(len(one.days)), "-", "-", "-", "-", "")
     word = " <span class='badge warn'>drift</span>" if one.drifts else ""
-    cause = f"{escape(one.cause)} {one.cause_n:+.2f} N" if one.cause else ""
+    cause = f"{escape(cause_in_words(one))} {one.cause_n:+.2f} N" if one.cause else ""
     return (
         name + word,
         str(len(one.days)),
@@ -108,7 +113,9 @@ def _day_by_day(cells: Sequence[CellDrift], axis: Axis) -> str:
 def _axis(cells: Sequence[CellDrift], verb: str) -> Axis:
     """One for all cells, so that they can be compared: of a diagnosis from 0 to where a drift would begin, at least."""
     values = [value for one in cells for value in one.values_n]
-    return Axis(*spread([0.0, 1.5 * LEAST_N, *values] if verb == "diagnose" else values), _VALUE[verb])
+    if verb == "diagnose" or not values:
+        values += [0.0, 1.5 * LEAST_N]
+    return Axis(*spread(values), _VALUE[verb])
 
 
 def _draw(one: CellDrift, axis: Axis, *, wide: bool) -> Drawing:
@@ -117,9 +124,8 @@ def _draw(one: CellDrift, axis: Axis, *, wide: bool) -> Drawing:
     days = Axis(0.0, max(one.days[-1], 1.0), f"days since {one.first_day}")
     chart = Chart(days, axis, f"Cell {one.cell}: {axis.label} by day", height=170)
     if one.trend:
-        middle = sum(one.days) / len(one.days)
-        level = sum(one.values_n) / len(one.values_n)
-        ends = [level + one.trend.slope_n_per_day * (day - middle) for day in (one.days[0], one.days[-1])]
+        level_n = level_of(one.trend, one.days, one.values_n)
+        ends = [level_n + one.trend.slope_n_per_day * day for day in (one.days[0], one.days[-1])]
         chart.line((one.days[0], one.days[-1]), ends, "walk", "trend")
     chart.points(one.days, one.values_n, "rising", "median of a day")
     return drawing(chart)
@@ -132,11 +138,11 @@ def _facts(rows: Sequence[Row], cells: Sequence[CellDrift]) -> str:
 
 
 def _caveats(cells: Sequence[CellDrift]) -> list[str]:
-    few = [one.cell for one in cells if one.trend is None]
-    law = f"less than {100 * ALPHA:g} % of fleets (Student's t, Holm over all cells)"
+    unjudged = [one.cell for one in cells if one.trend is None]
+    law = f"less than {100 * ALPHA:g} % of fleets (Kendall's test and Student's t, Holm over all cells)"
     said = [f"Drift: a slope as steep comes by chance in {law}, and the change is {LEAST_N:g} N or more."]
-    if few:
-        said.append(f"{len(few)} cells have fewer than {LEAST_DAYS} days or no dates: their trend is not judged.")
+    if unjudged:
+        said.append(f"{len(unjudged)} cells have fewer than {LEAST_DAYS} days or no dates: their trend is not judged.")
     if len(cells) > _MOST_DRAWN:
         said.append(f"{_MOST_DRAWN} of {len(cells)} cells are drawn; cells.parquet has all.")
     return said

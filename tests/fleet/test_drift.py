@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from gateway.fleet.drift import ALPHA, find_drifts, fit_trend
+from gateway.fleet.drift import ALPHA, find_drifts
 from gateway.fleet.page import fleet_page, headline
 from gateway.fleet.tasks import Row
+from gateway.fleet.trend import fit_trend, level_of
 
 
 def row(cell: str, day: int, value_n: float, *causes: tuple[str, float], error: str = "") -> Row:
@@ -15,7 +16,7 @@ def row(cell: str, day: int, value_n: float, *causes: tuple[str, float], error: 
         "date": f"2026-11-{day + 1:02d}",
         "sha256": "",
         "value_n": None if error else value_n,
-        "causes": [] if error else [{"name": name, "gain_n": gain_n} for name, gain_n in causes],
+        "causes": [] if error else [{"name": name, "gain_n": gain_n, "group": [name]} for name, gain_n in causes],
         "error_code": error,
         "error": "broken" if error else "",
     }
@@ -64,17 +65,53 @@ def test_three_days_tell_no_trend_and_errors_are_counted_only() -> None:
     assert "No cell has 4 days" in headline([cell])
 
 
-def test_the_slope_and_its_interval_are_those_of_scipy() -> None:
-    from scipy.stats import linregress, t
+@pytest.mark.parametrize("days", [5, 6, 10, 14])
+def test_the_chance_is_small_no_more_often_than_it_says_and_the_interval_holds_the_slope(days: int) -> None:
+    rng, runs = np.random.default_rng(3), 600
+    trends = [fit_trend(list(range(days)), rng.standard_t(3, days).tolist()) for _ in range(runs)]
+    found = [each for each in trends if each is not None]
+    for level in (0.05, 0.01):
+        assert sum(each.chance <= level for each in found) <= runs * level * 1.3 + 3
+    assert sum(each.low <= 0.0 <= each.high for each in found) >= 0.93 * runs
+
+
+def test_slope_and_interval_of_many_days_are_those_of_scipy_and_the_line_halves_them() -> None:
+    from scipy.stats import theilslopes
 
     rng = np.random.default_rng(3)
-    days = [0.0, 1.0, 2.0, 4.0, 7.0, 9.0]
+    days = [0.0, 1.0, 2.0, 4.0, 7.0, 9.0, 10.0, 12.0, 13.0, 15.0, 16.0, 20.0]
     values = [0.2 * day + float(rng.normal()) for day in days]
-    trend, expected = fit_trend(days, values), linregress(days, values)
-    assert trend is not None
-    assert trend.slope_n_per_day == pytest.approx(expected.slope)
-    assert trend.chance == pytest.approx(expected.pvalue)
-    assert trend.high - trend.slope_n_per_day == pytest.approx(float(t.ppf(0.975, 4)) * expected.stderr)
+    trend, expected = fit_trend(days, values), theilslopes(values, days)
+    assert trend is not None and trend.slope_n_per_day == pytest.approx(expected.slope)
+    assert trend.low <= expected.low_slope and trend.high >= expected.high_slope
+    assert trend.high - trend.low < 1.5 * (expected.high_slope - expected.low_slope)
+    level = level_of(trend, days, values)
+    assert sum(value > level + trend.slope_n_per_day * day for day, value in zip(days, values, strict=True)) == 6
+
+
+def test_a_bad_day_makes_no_drift_and_in_two_weeks_hides_none() -> None:
+    steady, drifting = (fleet(np.random.default_rng(4), 20, 14, slope_n=slope_n) for slope_n in (0.0, 0.1))
+    for rows in (steady, drifting):
+        rows[13]["value_n"] += 1.0 * (rows is steady)  # cell 0, its last day
+        rows[4]["value_n"] += 2.0 * (rows is drifting)
+    assert not any(one.drifts for one in find_drifts(steady))
+    assert [one.cell for one in find_drifts(drifting) if one.drifts] == ["0"]
+
+
+def test_a_name_that_stands_on_two_late_days_is_not_why_a_cell_has_drifted_for_ten() -> None:
+    rows = [row("a", day, 0.06 * day, ("leak", 0.05 * day)) for day in range(7)]
+    rows += [
+        row("a", 7, 0.39, ("backlash", 0.86)),
+        row("a", 8, 0.49, ("leak", 0.45)),
+        row("a", 9, 0.57, ("backlash", 0.5)),
+    ]
+    rows[2]["causes"][0]["group"] = ["leak", "creep"]
+    (cell,) = find_drifts(rows)
+    assert cell.drifts and (cell.cause, cell.group) == ("leak", ("leak",))
+    for each in rows:
+        for cause in each["causes"]:
+            cause["group"] = [cause["name"], "warm-up"]
+    assert headline(find_drifts(rows)).startswith("1 of 1 cells drifts: cell a (leak or warm-up, +0.")
 
 
 def test_the_page_answers_first_and_hides_no_name_of_a_file() -> None:

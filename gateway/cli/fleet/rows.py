@@ -30,7 +30,7 @@ class Question:
 
 def diagnose_row(question: Question, task: Task) -> Row:
     """Return the diagnosis of one recording. RecordingError and its kin for one that cannot be read."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     from gateway.cli.diagnosis.inputs import read_sources
     from gateway.diagnosis import Options, diagnose
     from gateway.side_by_side import one_after_another
@@ -63,7 +63,7 @@ def diagnose_row(question: Question, task: Task) -> Row:
 
 def fit_row(question: Question, task: Task) -> Row:
     """Return the fit of one ladder. LadderError where its data must not be fitted."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     from pathlib import Path
 
     from gateway.bsfm.fit.evaluation import FitRequest

@@ -68,6 +68,7 @@ def diagnose_command(**options: Any) -> None:
     Cell and date come from folders such as cell=7/date=2026-11-23. Quote the pattern: the shell need not expand it. What is
     finished is kept as it comes, and taken over by the next call. Exit code 65 where a recording could not be read.
     """
+    _use_one_thread()
     from gateway.cli.fleet.rows import DIAGNOSE_COLUMNS, Question, diagnose_row
     from gateway.extras import require
 
@@ -83,10 +84,16 @@ def fit_command(**options: Any) -> None:
 
     As `fleet diagnose`; what is watched is the fitted force at the middle of the voltages.
     """
+    _use_one_thread()
     from gateway.cli.fleet.rows import FIT_COLUMNS, Question, fit_row
 
     question = Question(_absolute(options["rig"]), _absolute(options["columns"]))
     _work("fit", partial(fit_row, question), FIT_COLUMNS, options)
+
+
+def _use_one_thread() -> None:
+    """Before numpy is loaded: two threads add in another order than one, and rows would differ from those of workers."""
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 
 def _absolute(name: str | None) -> str | None:
@@ -113,9 +120,7 @@ def _work(verb: str, compute: "Callable[[Task], Row]", columns: Sequence[str], o
         (folder / KEPT).unlink(missing_ok=True)
     with show_progress(f"fleet {verb}"):
         rows, taken_over = _compute(tasks, engine, KeptRows(folder / KEPT, _question(verb, options)))
-    rows = [dict.fromkeys(("file", "cell", "date", "sha256", *columns, "error_code", "error")) | row for row in rows]
-    for row in rows:
-        row["causes"] = row["causes"] or []
+    rows = [_with_all(columns, row) for row in rows]
     cells = find_drifts(rows)
     files = write_files(folder, rows, cells, verb)
     failed = [row for row in rows if row["error_code"]]
@@ -125,9 +130,19 @@ def _work(verb: str, compute: "Callable[[Task], Row]", columns: Sequence[str], o
         facts = {"recordings": len(rows), "errors": len(failed), "taken_over": taken_over, "answer": headline(cells)}
         click.echo(json.dumps(facts | {"cells": [cell_row(one) for one in cells], "files": list(map(str, files))}))
     else:
-        _tell(rows, failed, taken_over, headline(cells), files)
+        from gateway.cli.fleet.cell_table import print_cells
+
+        click.echo(headline(cells))
+        print_cells(cells)
+        _tell(rows, failed, taken_over, files)
     if failed:
         raise click.exceptions.Exit(exit_codes.DATA)
+
+
+def _with_all(columns: Sequence[str], row: "Row") -> "Row":
+    """A row of an error has every column, too."""
+    whole = dict.fromkeys(("file", "cell", "date", "sha256", *columns, "error_code", "error")) | row
+    return whole | {"causes": whole["causes"] or []}
 
 
 def _compute(
@@ -145,7 +160,10 @@ def _compute(
             for task, row in engine(missing):
                 kept.keep(row)
                 rows[task] = row
-                progress.advance(len(rows), len(tasks))
+                progress.report("recordings", len(rows), len(tasks))  # serially a recording has told of its own stages
+    except KeyboardInterrupt:
+        click.echo(f"\n{len(rows)} of {len(tasks)} rows are kept; the same command goes on from there", err=True)
+        raise
     except EngineError as error:
         raise CliError(str(error), exit_codes.DEVICE) from None
     return [rows[task] for task in tasks], taken_over
@@ -176,8 +194,7 @@ def _engine_of(name: str, workers: int) -> "Engine":
     raise click.UsageError(f"--scheduler {name}: serial, processes or tcp://HOST:PORT of a Dask scheduler")
 
 
-def _tell(rows: "list[Row]", failed: "list[Row]", taken_over: int, answer: str, files: list[Path]) -> None:
-    click.echo(answer)
+def _tell(rows: "list[Row]", failed: "list[Row]", taken_over: int, files: list[Path]) -> None:
     before = f", {taken_over} of them kept from before" if taken_over else ""
     click.echo(f"{count_of(rows, 'recording')}{before}; {len(failed)} could not be read")
     for row in failed[:5]:
