@@ -81,6 +81,7 @@ CONTACT: Final = (
             ),
         ),
         group=shared.LIMITS,
+        rarity=4.0,  # a soft one that stands before the first position is a slope along the way
     ),
     entry(
         name="pad-wear",
@@ -115,7 +116,7 @@ CONTACT: Final = (
         recipe=effect.Recipe(parts=(effect.PartName.TOUCHES, effect.PartName.REVERSALS)),
         treatments=(effect.Treatment(by=effect.By.MODEL, fields=("contact.backlash_n", "contact.lost_n")),),
         forms=(
-            effect.EffectForm(parameters=(LOST,), probes=effect.fixed_starts((0.5,), (2.0,))),
+            effect.EffectForm(parameters=(LOST,), probes=effect.fixed_starts((0.5,), (2.0,)), like_a_held_start=True),
         ),  # the other play is friction's: one cannot tell
         group=("sign-loss", "asymmetric-friction"),
         rarity=4.0,

@@ -68,7 +68,8 @@ class EffectForm:
     proportional: the response is proportional to the sizes together, whatever their signs; quadrature: the first size is
     an amplitude and the last parameter a phase, so a start means two columns, a quarter turn apart; exact: a start is
     right as it stands or not at all, like the teeth of a saw; everywhere: it acts at all times, so what shows in a few
-    moments only is something else; least: of the first parameter, as of the effect.
+    moments only is something else; least: of the first parameter, as of the effect; like_a_held_start: shows nothing in a
+    rest at the beginning, as if friction held a force there.
     """
 
     parameters: tuple[Parameter, ...]
@@ -79,6 +80,7 @@ class EffectForm:
     exact: bool = False
     everywhere: bool = False
     least: float = 0.0
+    like_a_held_start: bool = False
 
 
 class PartName(StrEnum):

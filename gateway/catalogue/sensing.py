@@ -262,6 +262,7 @@ SENSING: Final = (
                 parameters=(SIGN_LOST, ZERO),
                 probes=effect.fixed_starts((1.0, 0.0), (1.0, -0.3), (1.0, -1.0)),
                 exact=True,
+                like_a_held_start=True,
             ),
         ),
         group=("backlash",),

@@ -4,7 +4,7 @@ All starts in one wave, the best few refined jointly with the model, then compar
 winner's name stands only if it wins nearly always; otherwise the group of those that win sometimes is the answer.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -31,6 +31,7 @@ from gateway.diagnosis.search.candidates import (
 
 MOST_REFINED: Final = 6  # effects; a wave of simulations serves all of them
 _MORE_BESIDE_A_HELD_START: Final = 4  # effects: beside a force that friction holds at first, promises mislead
+_LEAST_AHEAD: Final = 0.1  # of what it promises beside a rest, that an effect may be behind such a force
 _RESAMPLES: Final = 500  # draws of blocks: a share of 95 % is then uncertain by 1 %
 _SURE_SHARE: Final = 0.95  # a name that wins this often stands alone
 _SMALL_SHARE: Final = 0.03  # rarer winners do not belong to a group
@@ -143,10 +144,12 @@ def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors,
     found = competitors.columns or simulate_candidates(bench, fitted, competitors.effects, hints)
     promised = score_candidates(found, fitted, whiten)
     starts = _count_starts(found, hints)
-    is_held = with_known_rests(bench, FitProblem(fitted.parameters, fitted.free)) is not None
-    most = competitors.most + (_MORE_BESIDE_A_HELD_START if is_held else 0)
+    at_rest = with_known_rests(bench, FitProblem(fitted.parameters, fitted.free))
+    most = competitors.most + (_MORE_BESIDE_A_HELD_START if at_rest else 0)
     best = best_scores(promised, most) if any(_is_hopeful(each, starts) for each in promised) else []
     problems = [FitProblem(each.parameters, joined_parameters(bench, fitted, each.candidate.form)) for each in best]
+    for score, problem in _beside_known_rests(bench, fitted, at_rest, competitors, whiten):
+        best, problems = [*best, score], [*problems, problem]
     if best:
         progress.report(f"refining {progress.few([each.candidate.effect.name for each in best])}")
     contest = Contest(incumbent.fitted.chi2) if incumbent else Contest()
@@ -158,6 +161,21 @@ def compare_effects(bench: Bench, fitted: FittedModel, competitors: Competitors,
     ranked += [replace(incumbent, incumbent_bonus=_incumbent_bonus(bench, incumbent))] if incumbent else []
     ranked.sort(key=lambda each: -each.penalised_gain)
     return ModelComparison(fitted, tuple(ranked), _winning_shares(ranked), hints, starts, tuple(promised))
+
+
+def _beside_known_rests(
+    bench: Bench, held: FittedModel, at_rest: FitProblem | None, competitors: Competitors, whiten: Whitener
+) -> Iterator[tuple[CandidateScore, FitProblem]]:
+    """Yield the effects that look like a force that friction holds at first, where such a force is in the model: begun beside
+    the same model at rest, for beside the force they promise nothing."""
+    effects = [each for each in competitors.effects if any(form.like_a_held_start for form in each.forms)]
+    if at_rest is None or not effects:
+        return
+    (known,) = refine(bench, [at_rest], whiten, _WAVES)
+    scores = score_candidates(simulate_candidates(bench, known, effects, competitors.hints), known, whiten)
+    for score in best_scores(scores, len(effects)):
+        if known.chi2 - score.gain < held.chi2 + _LEAST_AHEAD * score.gain:
+            yield score, FitProblem(score.parameters, joined_parameters(bench, known, score.candidate.form))
 
 
 def _refine_from_rests_too(
