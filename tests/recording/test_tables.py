@@ -252,6 +252,14 @@ def test_our_own_format_takes_a_mapping_too(gateway_file: Path) -> None:
     same(read_table(gateway_file).columns)
 
 
+def test_a_parquet_file_whose_names_are_no_text_is_a_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "table.parquet"
+    pq.write_table(pa.table({"time_s": [0.0, 0.1], "force_n": [1.0, 2.0]}), path, store_schema=False)
+    path.write_bytes(path.read_bytes().replace(b"force_n", b"\xffo\xeece_n"))
+    with pytest.raises(RecordingError, match="damaged Parquet"):
+        read_table(path)
+
+
 def test_parquet_of_others_is_read_by_what_its_columns_are(tmp_path: Path) -> None:
     path = tmp_path / "table.parquet"
     stamps = np.array([1_700_000_000_000_000, 1_700_000_000_005_000], dtype="datetime64[us]")

@@ -43,13 +43,13 @@ def read_parquet(path: Path, mapping: ColumnMapping | None = None) -> Recording:
     from pyarrow import parquet
 
     try:
-        with parquet.ParquetFile(path) as file:
+        with pa.OSFile(str(path)) as source, parquet.ParquetFile(source) as file:  # a damaged one leaves no file open
             names = file.schema_arrow.names
             headers = TableHeaders.of(names, stamps=_stamps(file.schema_arrow))
             chosen = select_columns(names, mapping, str(path), headers)
             refuse_too_large(path, file.metadata.num_rows, len(chosen))
             table = file.read(columns=list({names[pick.index]: None for pick in chosen}))
-    except (pa.ArrowException, OSError) as error:
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:  # the last: names of columns that are no text
         raise RecordingError(f"{path} is a damaged Parquet file: {str(error).splitlines()[0]}") from error
     columns, words = _columns(path, table, chosen, names)
     facts = _facts(table.schema.metadata or {}) | unit_facts(headers, chosen, mapping)

@@ -1,0 +1,119 @@
+"""Any upload and any JSON: what is refused leaves the active set, the registers and the master as they were."""
+
+import json
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gateway.modbus import ModbusError
+from gateway.profiles import load_register_map
+from gateway.registers import Refusal
+from gateway.registers.upload.coefficients import CoefficientSet
+from gateway.registers.words import CommitStatus
+from gateway.telemetry.register_commands import RegisterCommands
+from tests.calibrations.coefficients import calibration, requests_of, staged
+from tests.calibrations.upload_bench import PEER, Bench
+from tests.fuzz.conftest import Examples
+from tests.fuzz.damage import damaged, held_bytes
+
+MAP = load_register_map("force-v1")
+COMMIT = 1145
+
+
+def test_no_upload_puts_half_a_set_to_use(tmp_path: Path, examples: Callable[..., Examples]) -> None:
+    """Sets that were damaged, cut, stretched and staged in any order: what is in use stays, until one is committed whole."""
+    count, chance = examples("staging writes")
+    bench = Bench(tmp_path, MAP)
+    active, good = (
+        bench.active_block,
+        [staged(CoefficientSet.of_calibration(calibration(k, number=k))) for k in (3, 5, 8)],
+    )
+    seen: dict[CommitStatus, int] = {}
+    bench.store.save = None  # type: ignore[assignment, method-assign]  # nothing that is damaged comes so far
+    while count > 0:
+        words = damaged(chance.choice(good), chance) if chance.random() < 0.8 else chance.randbytes(290)
+        for address, part in requests_of(words[: len(words) // 2 * 2], chance.choice((1, 7, 60, 123))):
+            count -= 1
+            try:
+                bench.bank.write_registers(address + chance.choice((0, 0, 0, 0, 0, 0, 0, 1)), part, PEER)
+            except ModbusError as refusal:
+                assert isinstance(refusal, Refusal) and refusal.code in (2, 3, 4, 6)
+        try:
+            bench.write(COMMIT, chance.choice((0, 2, 2, 2, 2, 4, 9, 65535)))
+        except Refusal as refusal:
+            assert refusal.code in (3, 6)
+        bench.run()
+        seen[bench.status] = seen.get(bench.status, 0) + 1
+        assert bench.active_block == active and bench.used == []
+    assert seen[CommitStatus.FAILED] > 20
+    assert held_bytes(bench.bank) < 80_000
+
+
+class Link:
+    """Control's socket: takes whatever is a request of its kind."""
+
+    def __init__(self) -> None:
+        self.asked: list[bytes] = []
+
+    async def ask(self, request: dict[str, object]) -> dict[str, object]:
+        assert set(request) == {"do", "via", "unit", "pdu"}
+        self.asked.append(bytes.fromhex(str(request["pdu"])))
+        return {"ok": True, "pdu": "10"}
+
+
+NAMES = (
+    "force_setpoint",
+    "control_word",
+    "force_setpoint@float_abcd",
+    "heartbeat",
+    "state",
+    "tilt_angle",
+    "nonsense",
+    "",
+    "@",
+)
+VALUES = (0, 1, 12.5, -3, 65535, 65536, 1e9, 1e300, -1e-30, 10**400, True, None, "1", [], {}, [1], 327.67, -180)
+TEXTS = (
+    b"",
+    b"[]",
+    b"{}",
+    b"null",
+    b'{"a":NaN}',
+    b'{"force_setpoint":Infinity}',
+    b"[" * 9000,
+    b'{"a":' * 3000,
+    b"\xff\xfe",
+    b"9" * 5000,
+)
+
+
+def run(coroutine: object) -> object:
+    """The answer of a coroutine that waits for nothing."""
+    with pytest.raises(StopIteration) as ended:
+        coroutine.send(None)
+    return ended.value.value
+
+
+def test_no_command_by_mqtt_ends_its_listener(examples: Callable[..., Examples]) -> None:
+    count, chance = examples("MQTT commands")
+    link = Link()
+    commands, taken = RegisterCommands(MAP, link, 1), 0
+    for _ in range(count):
+        link.asked.clear()
+        given = {chance.choice(NAMES): chance.choice(VALUES) for _ in range(chance.randint(1, 3))}
+        payload, way = json.dumps(given).encode(), chance.random()
+        if way < 0.4:
+            payload = damaged(payload, chance)
+        elif way < 0.45:
+            payload = chance.choice(TEXTS)
+        answer = run(commands.carry_out(payload))
+        assert json.loads(json.dumps(answer)) == answer
+        assert len(answer["written"]) == len(link.asked)
+        assert answer["ok"] or (isinstance(answer["error"], str) and answer["error"])
+        for pdu in link.asked:
+            function, address, words, size = struct.unpack(">BHHB", pdu[:6])
+            assert function == 16 and size == 2 * words == len(pdu) - 6 and address < 1700
+        taken += answer["ok"]
+    assert 0.02 < taken / count < 0.8

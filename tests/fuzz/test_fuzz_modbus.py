@@ -1,0 +1,229 @@
+"""Any bytes that a master may send: framing and bank do what references say that share no code with them."""
+
+import struct
+from collections.abc import Callable
+from random import Random
+
+from gateway.modbus import Peer, Role, server
+from gateway.modbus.fast import whole_answer
+from gateway.modbus.mbap import FramingLost, MbapFramer
+from gateway.modbus.rtu_receiver import MOST_BYTES
+from gateway.profiles import load_register_map
+from gateway.registers import BankRules, RegisterBank
+from gateway.registers.words import ControlBit
+from tests.fuzz.bank_model import BankModel
+from tests.fuzz.conftest import PER_PUSH, Examples
+from tests.fuzz.damage import damaged, held_bytes, pieces
+from tests.modbus.rtu_bus import SILENCE_S, Bus
+
+MAP = load_register_map("force-v1")
+PEERS = [Peer(f"10.0.0.{k}", 4000 + k, role=Role.CALIBRATION) for k in (1, 2, 3)]
+PLACES = (0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 10, 13, 15, 16, 99, 100, 116, 131, 200, 200, 201, 202, 210, 226, 230, 232, 295,
+          300, 300, 302, 310, 331, 400, 416, 416, 417, 431, 432, 999, 1000, 1145, 1199, 1500, 1699, 40001, 65535)  # fmt: skip
+WORDS = (
+    0,
+    0,
+    0,
+    0,
+    1,
+    1,
+    1,
+    2,
+    3,
+    4,
+    8,
+    9,
+    16,
+    32,
+    127,
+    1200,
+    6000,
+    6001,
+    0x4140,
+    0x7FC0,
+    0x8000,
+    0xFFFF,
+    0x449A,
+    0x5000,
+)
+FLOATS = (
+    0.0,
+    0.0,
+    0.0,
+    1.0,
+    1.0,
+    12.0,
+    59.99,
+    60.0,
+    60.01,
+    -1.0,
+    0.5,
+    9.0,
+    1e-4,
+    2.34e-41,
+    1234.5,
+    float("nan"),
+    float("inf"),
+)
+
+
+def test_the_examples_of_a_push_are_two_hundred_thousand() -> None:
+    assert sum(PER_PUSH.values()) >= 200_000
+
+
+# -- MBAP
+
+
+def reference(stream: bytes) -> tuple[list[tuple[int, int, bytes]], bool]:
+    """Frames, and whether the framing was lost."""
+    frames, at = [], 0
+    while True:
+        head = stream[at : at + 6]
+        if len(head) >= 4 and head[2:4] != b"\0\0":
+            return frames, True
+        if len(head) < 6:
+            return frames, False
+        size = head[4] * 256 + head[5]
+        if size < 2 or size > 254:
+            return frames, True
+        if len(stream) < at + 6 + size:
+            return frames, False
+        body = stream[at + 6 : at + 6 + size]
+        frames.append((head[0] * 256 + head[1], body[0], body[1:]))
+        at += 6 + size
+
+
+def test_a_stream_of_anything_is_read_as_the_reference_reads_it(examples: Callable[..., Examples]) -> None:
+    count, chance = examples("MBAP streams")
+    lost_ones = 0
+    while count > 0:
+        sent = [
+            struct.pack(">HHHB", k, 0, k % 9 + 2, 1) + chance.randbytes(k % 9 + 1) for k in range(chance.randint(1, 9))
+        ]
+        stream = damaged(b"".join(sent), chance) if chance.random() < 0.7 else b"".join(sent)
+        count -= len(sent)
+        framer, got, is_lost = MbapFramer(), [], False
+        for piece in pieces(stream, chance):
+            try:
+                got += framer.feed(piece)
+            except FramingLost as lost:
+                got, is_lost = [*got, *lost.frames], True
+                break
+            assert len(framer) < 260
+        assert ([tuple(one) for one in got], is_lost) == reference(stream), stream.hex()
+        lost_ones += is_lost
+    assert lost_ones > 100
+
+
+# -- the bank
+
+
+def request(chance: Random) -> bytes:
+    """A request PDU: most of them well made, some not at all."""
+    function = chance.choice((1, 2, 3, 4, 5, 6, 6, 15, 16, 16, 16, 16, 22, 23, 23))
+    address, way = chance.choice(PLACES), chance.random()
+    if way < 0.03:
+        return chance.randbytes(chance.randint(1, 30))
+    if function <= 4:
+        pdu = struct.pack(">BHH", function, address, chance.choice((1, 2, 13, 16, 32, 96, 125, 126, 2000, 2001, 0)))
+    elif function == 5:
+        pdu = struct.pack(
+            ">BHH", 5, chance.choice((0, 1, 2, 3, 3, 5, 15, 16, 100)), chance.choice((0, 0xFF00, 0xFF00, 1))
+        )
+    elif function == 6:
+        pdu = struct.pack(">BHH", 6, address, chance.choice(WORDS))
+    elif function == 15:
+        bits = chance.choice((1, 2, 4, 7, 16, 17))
+        pdu = struct.pack(">BHHB", 15, chance.choice((0, 0, 1, 3, 100)), bits, (bits + 7) // 8)
+        pdu += bytes(chance.choice((0, 1, 1, 3, 9, 16, 255)) for _ in range((bits + 7) // 8))
+    elif function == 22:
+        pdu = struct.pack(">BHHH", 22, address, chance.choice((0, 0xFFFF, 0xFFFE)), chance.choice(WORDS))
+    else:
+        data = payload(chance, address)
+        head = struct.pack(">HH", chance.choice(PLACES), chance.choice((1, 13, 32, 126))) if function == 23 else b""
+        pdu = bytes((function,)) + head + struct.pack(">HHB", address, len(data) // 2, len(data)) + data
+    return damaged(pdu, chance, 1) or b"\0" if way < 0.08 else pdu
+
+
+def payload(chance: Random, address: int) -> bytes:
+    if chance.random() < 0.6 and 200 <= address < 420:
+        numbers = [chance.choice(FLOATS) for _ in range(chance.choice((1, 1, 2, 2, 5, 13, 16)))]
+        packed = [struct.pack(">f", one) for one in numbers]
+        return b"".join(one if address < 300 or address > 400 else one[2:] + one[:2] for one in packed)
+    return struct.pack(">H", chance.choice(WORDS)) + b"".join(
+        struct.pack(">H", chance.choice(WORDS)) for _ in range(chance.choice((0, 0, 1, 1, 2, 3)))
+    ) + bytes(2 * chance.choice((0, 0, 0, 5, 10)))  # fmt: skip
+
+
+def test_the_bank_answers_any_request_as_the_reference_does(examples: Callable[..., Examples]) -> None:
+    count, chance = examples("bank requests")
+    rules = BankRules(rig_name="demo", force_max_n=60.0, supported_bits=ControlBit(15))
+    codes = [0] * 256
+    bank, model = RegisterBank(MAP, rules, now=lambda: 1.0), BankModel()
+    for number in range(count):
+        pdu, peer = request(chance), PEERS[chance.choice((0, 0, 0, 0, 1, 2))]
+        before = bytes(bank._image.data)
+        answer = server.answer(pdu, bank, peer)
+        code = answer[1] if answer[0] & 0x80 else 0
+        wanted = model.answer(pdu, peer.host)
+        assert wanted is None or code == wanted, f"{number}: {pdu.hex()} of {peer.host}: {code}, by the rules {wanted}"
+        assert len(answer) <= 253
+        codes[code] += 1
+        if code:
+            assert_nothing_changed(before, bank, pdu)
+        else:
+            for base, size in ((0, 16), (200, 32), (300, 32)):
+                assert bank.read_registers(base, size) == model.face(base), f"{number}: {pdu.hex()}"
+            assert bank.owner == model.owner
+    assert held_bytes(bank) < 80_000
+    assert all(codes[code] > count // 1000 for code in (0, 1, 2, 3, 6)), codes[:12]
+
+
+def assert_nothing_changed(before: bytes, bank: RegisterBank, pdu: bytes) -> None:
+    after = bytearray(bank._image.data)
+    if pdu[0] == 23 or after != before:
+        for first, size in ((118, 4), (268, 8), (368, 8)):  # the refusal registers, in three faces
+            after[2 * first : 2 * (first + size)] = before[2 * first : 2 * (first + size)]
+    assert after == before, pdu.hex()
+
+
+def test_the_short_way_answers_as_the_long_one() -> None:
+    chance = Random(3)
+    rules = BankRules(rig_name="demo", force_max_n=60.0)
+    one, two = (RegisterBank(MAP, rules, now=lambda: 1.0) for _ in range(2))
+    for k in range(1500):
+        pdu = request(chance)[:253]
+        frame = bytearray(struct.pack(">HHHB", k, 0, len(pdu) + 1, 1) + pdu)
+        fast = whole_answer(frame, len(frame), (1,), one, PEERS[0])
+        assert fast is not None and fast[7:] == server.answer(pdu, two, PEERS[0])
+
+
+# -- RTU
+
+
+def checksum(data: bytes) -> bytes:
+    """CRC-16 of Modbus, bit by bit."""
+    value = 0xFFFF
+    for byte in data:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ (0xA001 if value & 1 else 0)
+    return struct.pack("<H", value)
+
+
+def test_noise_on_a_bus_makes_no_request_and_costs_none(examples: Callable[..., Examples]) -> None:
+    """Whatever is heard was on the wire with its checksum; and behind a silence the next request is heard."""
+    count, chance = examples("RTU bursts")
+    bus = Bus()
+    for number in range(count):
+        pdu = struct.pack(">BHH", chance.choice((3, 4, 6)), chance.randrange(132), chance.randint(1, 100))
+        ours = bytes((1,)) + pdu
+        ours += checksum(ours)
+        burst = damaged(ours, chance) if chance.random() < 0.6 else chance.randbytes(chance.choice((1, 7, 40, 600)))
+        for piece in pieces(burst, chance):
+            bus.send(piece, pause_s=chance.choice((0.0, 0.0, 0.5 * SILENCE_S)))
+            assert held_bytes(bus.receiver) < 2 * MOST_BYTES
+        for heard in bus.requests():
+            frame = bytes((heard.unit,)) + heard.pdu
+            assert frame + checksum(frame) in burst, f"{number}: {burst.hex()} was heard as {heard}"
+        assert pdu in [heard.pdu for heard in bus.send(ours).requests()], f"{number}: after {burst.hex()}"
