@@ -47,6 +47,11 @@ class SecondOrder:
         return (0.5 * self.delay_s / self.damping) ** 2 if self.is_ringing else self.lag_s * self.second_lag_s
 
     @property
+    def decay_s(self) -> float:
+        """Time in which the slowest part of a distance from rest falls by a factor e, s."""
+        return 2.0 * self.bend_s2 / self.delay_s if self.is_ringing else max(self.lag_s, self.second_lag_s)
+
+    @property
     def natural_s(self) -> float:
         """Natural time, s."""
         return sqrt(self.bend_s2)

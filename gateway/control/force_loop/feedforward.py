@@ -7,7 +7,6 @@ whose noise would chatter; a vented tool starts where the calibration ladder sta
 rising branch, because it slides outwards.
 """
 
-from collections import deque
 from math import isfinite
 from typing import Final
 
@@ -15,6 +14,7 @@ from gateway.bsfm import RISING, Bsfm, InverseStatus
 from gateway.bsfm.slip.reversal import Memory
 from gateway.control.demand import Demand
 from gateway.control.force_loop.setpoint_trend import SetpointTrend
+from gateway.control.force_loop.transport_delay import TransportDelay
 from gateway.control.limits import TICK_S, RateBudget, is_below_usable, narrow_limits, ramp_limited
 from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
@@ -22,6 +22,7 @@ from gateway.registers.words import LimitedBy
 _CARRY_OVER_S: Final = 0.5  # time in which a swapped calibration's voltage difference fades
 AHEAD_N: Final = 4.0  # how far the aim may run ahead of the target, or what the lags' inverse needs on a fast ramp
 APPROACH_N: Final = 1.0  # above what friction keeps: a vented tool moves
+YIELDS_OVER_N: Final = 0.3  # a usual correction
 LEAST_SLOPE_N_PER_V: Final = 1.0  # a flatter model is a model's end, not a plant's
 _OK: Final = InverseStatus.OK
 _NONE: Final = LimitedBy.NONE
@@ -29,31 +30,6 @@ _NONE: Final = LimitedBy.NONE
 
 class ModelError(Exception):
     """The model gave no usable voltage for a finite force."""
-
-
-class TransportDelay:
-    """A value as it was a transport delay ago: what the force can have heard of it by now. delay_s 0: the value itself. Time
-    passes in `advance`, in steps of any size."""
-
-    def __init__(self, delay_s: float) -> None:
-        self.delay_s = delay_s
-        self.restart(0.0)
-
-    def restart(self, value: float) -> None:
-        """Fill the delay line with this value, as if it had stood for long."""
-        self._past: deque[tuple[float, float]] = deque()
-        self._now_s, self._value = 0.0, value
-
-    def advance(self, value: float, dt_s: float) -> float:
-        """Advance by dt_s, take the value that holds from now on, and return the value of delay_s ago."""
-        if self.delay_s <= 0.0:
-            return value
-        self._now_s += dt_s
-        past, entered_s = self._past, self._now_s - self.delay_s
-        past.append((self._now_s, value))
-        while past and past[0][0] <= entered_s:
-            self._value = past.popleft()[1]
-        return self._value
 
 
 class Approach:
@@ -190,6 +166,18 @@ class Feedforward:
             return 0.0
         corrected_v, _ = self.model.voltage_v(self._slid_n, self.model.reversal.branch_share(self._slide))
         return corrected_v - self.model.voltage_v(self.aimed_n - gravity_n, self.branch_share)[0]
+
+    def yielded_share(self, coming_n: float) -> float:
+        """Return how much force a further newton of thrust makes, 0 .. 1, of this sign, where the slide is now: along a
+        branch all of it; behind a turn friction takes most of it first."""
+        if self.applied_n <= 0.0 or coming_n == 0.0:
+            return 1.0
+        to_n = self._slid_n + (YIELDS_OVER_N if coming_n > 0.0 else -YIELDS_OVER_N)
+        model, share = self.model, self.model.reversal.branch_share
+        before, after = share(self._slide), share(model.memory_after(self._slide, self._slid_n, to_n))
+        from_v, along_v = model.voltage_v(self._slid_n, before)[0], model.voltage_v(to_n, before)[0]
+        turned_v = model.voltage_v(to_n, after)[0]
+        return (along_v - from_v) / (turned_v - from_v) if turned_v != from_v else 1.0
 
     def fall_back(self, goal_n: float) -> None:
         """Drop to the goal at once when contact is lost, and stay on the rising branch for the next contact."""

@@ -5,7 +5,7 @@ A run of calibration drives the same limiter (`drive_run`), and the force that t
 
 When the trim may learn: in contact, on a new usable sample, in force mode, with no other limit acting, and with the target
 less than QUIET_N ahead of where the plant can be (not ramping fast). With a measured response: with less than NEAR_N of
-thrust on its way, which is counted as come.
+thrust on its way, whose force is counted as come.
 """
 
 from typing import Final, TypeAlias
@@ -14,10 +14,12 @@ from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
 from gateway.control.compensation.compensation import TimingCompensation
 from gateway.control.demand import Demand
-from gateway.control.force_loop.feedforward import Approach, Feedforward, ModelError, TransportDelay
+from gateway.control.force_loop.coming_thrust import ComingThrust
+from gateway.control.force_loop.feedforward import Approach, Feedforward, ModelError
 from gateway.control.force_loop.lag_inverse import LinearizedLagInverse
 from gateway.control.force_loop.lead_compensator import LeadCompensator
 from gateway.control.force_loop.measured_trim import MeasuredTrim
+from gateway.control.force_loop.transient_estimate import TransientEstimate
 from gateway.control.force_loop.trim import TrimIntegral
 from gateway.control.inputs import LineStatus, LoopInputs
 from gateway.control.limits import TICK_S, NotFiniteError, VoltageLimiter, strongest
@@ -42,7 +44,7 @@ class ForceLoop:
 
     def __init__(self, settings: ControlSettings, model: Bsfm, timing: TimingCompensation | None = None) -> None:
         self._timing, self._is_retimed = timing, False
-        self._arrived, self._near_s = TransportDelay(0.0), 0.0
+        self._coming, self._transient = ComingThrust(), TransientEstimate()
         self._lead: LeadCompensator | LinearizedLagInverse
         self._trim: TrimIntegral | MeasuredTrim = TrimIntegral(settings.trim)
         self._tune(settings, model)
@@ -93,9 +95,9 @@ class ForceLoop:
             self._lead, self._trim = LeadCompensator(settings.lead, settings.limits), TrimIntegral(settings.trim)
 
     def _tune_measured_trim(self, settings: Trim, timing: LoopTiming) -> None:
-        """One that there is goes on with its correction, and with the cell's noise: a new one would follow it for a second."""
-        if self._arrived.delay_s != timing.dead_time_s:
-            self._arrived, self._near_s = TransportDelay(timing.dead_time_s), 0.0
+        """A trim goes on with its correction, and with the cell's noise: a new one would follow it for a second."""
+        self._coming.retime(timing.dead_time_s)
+        self._transient.lag_s = timing.lags.decay_s
         if isinstance(self._trim, MeasuredTrim):
             self._trim.retime(settings, timing)
         else:
@@ -264,22 +266,22 @@ class ForceLoop:
             trim.integrate(law.reference_n - inputs.reading.contact_n, inputs.reading.interval_s)
 
     def _learn_measured(self, trim: MeasuredTrim, inputs: LoopInputs, given_n: float) -> None:
-        """The force that will come is the measured one and what is still on its way: thrust that has not passed dead time and
-        lags, the trim's own included. So the trim learns as soon as that is little, without waiting for it to arrive."""
+        """The force that will come is the measured one and what the thrust on its way makes of it, the trim's own included. So
+        the trim learns as soon as that is little, without waiting for it to arrive; but not from what goes away by itself."""
         law, reading, lead = self.feedforward, inputs.reading, self._lead
         assert isinstance(lead, LinearizedLagInverse)
-        away_n = lead.away_n(0.0)
-        arrived_n = self._arrived.advance(-away_n, inputs.dt_s)
+        coming_n = self._coming.advance(lead, self._wanted_v, inputs.dt_s)
         if not reading.is_new:
             return
-        coming_n = lead.away_n(self._wanted_v) - away_n - arrived_n
-        is_near = abs(coming_n) < NEAR_N and abs(law.applied_n - law.aimed_n) < STILL_N
-        self._near_s = self._near_s + reading.interval_s if is_near else 0.0
-        if self._near_s <= 0.0:
+        if abs(coming_n) >= NEAR_N or abs(law.applied_n - law.aimed_n) >= STILL_N:
+            self._transient.push(coming_n)
             trim.rest()
         elif self._may_learn(inputs):
-            error_n = law.applied_n - reading.contact_n - coming_n
-            trim.integrate(error_n, law.slope_n_per_v(given_n), reading.interval_s)
+            error_n = law.applied_n - reading.contact_n - coming_n * law.yielded_share(coming_n)
+            self._transient.observe(error_n, trim.noise_n, reading.interval_s)
+            before_n, left_n = trim.value_n, error_n - self._transient.transient_n
+            trim.integrate(left_n, law.slope_n_per_v(given_n), reading.interval_s)
+            self._transient.correct(trim.value_n - before_n)
 
     def _may_learn(self, inputs: LoopInputs) -> bool:
         free = self.limited_by is _NONE or self.limited_by is _TRIM_RANGE  # of the step before
@@ -295,5 +297,4 @@ class ForceLoop:
 
 def _fault_of(error: ModelError | NotFiniteError) -> StopCause:
     """The fault that a movement could not be computed."""
-    is_of_model = isinstance(error, ModelError)
-    return stop_cause(FaultCode.MODEL_INVALID if is_of_model else FaultCode.NOT_FINITE, str(error))
+    return stop_cause(FaultCode.MODEL_INVALID if isinstance(error, ModelError) else FaultCode.NOT_FINITE, str(error))

@@ -64,6 +64,11 @@ class MeasuredTrim:
         """Decide whether the trim has turned round too often."""
         return self._turns >= MOST_TURNS
 
+    @property
+    def noise_n(self) -> float:
+        """Noise of one sample as it has shown so far, N."""
+        return sqrt(self._noise_n2)
+
     def reset(self) -> None:
         """Forget the correction and what was smoothed."""
         self.value_n = self.value_v = 0.0

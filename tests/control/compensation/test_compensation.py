@@ -18,7 +18,7 @@ from gateway.control import (
     TimingCompensation,
     apply_command_map,
 )
-from gateway.control.force_loop.feedforward import TransportDelay
+from gateway.control.force_loop.transport_delay import TransportDelay
 from tests.control.bench import Bench, bsfm, settings
 
 FORCES_N = (0.0, 5.0, 18.0, 40.0, 22.0, 30.0, 9.0, 0.0)
