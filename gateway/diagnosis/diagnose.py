@@ -32,6 +32,7 @@ from gateway.diagnosis.result import Baseline, Diagnosis, Extended, Trace, Verdi
 from gateway.diagnosis.search.direct_evidence import DirectEvidence, find_outliers, find_quantisation, find_repeats
 from gateway.diagnosis.search.search import search_effects
 from gateway.diagnosis.verdict import SearchFindings, compose_diagnosis
+from gateway.one_blas_thread import one_blas_thread
 from gateway.twin.plant import Plant, with_value
 
 _LEAST_CHANCE_S, _MOST_CHANCE_S = 1.0e-3, 9.0e-3
@@ -66,6 +67,7 @@ class SearchStart:
     effects: tuple[Effect, ...]
 
 
+@one_blas_thread()
 def diagnose(
     measurements: Sequence[Measurement], plant: Plant | None = None, options: Options | None = None
 ) -> Diagnosis:

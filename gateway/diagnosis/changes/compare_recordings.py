@@ -23,6 +23,7 @@ from gateway.diagnosis.residuals.leftovers import is_same_form
 from gateway.diagnosis.result import Cause, Diagnosis, Leftover, Machine, Trace, Verdict
 from gateway.diagnosis.search.search import SearchResult, search_effects
 from gateway.diagnosis.verdict import SearchFindings, compose_diagnosis
+from gateway.one_blas_thread import one_blas_thread
 from gateway.twin.plant import Plant
 
 _MORE_THAN_BEFORE: Final = (
@@ -31,6 +32,7 @@ _MORE_THAN_BEFORE: Final = (
 _LEAST_SHARE_OF_LEFT: Final = 0.05  # of the squared error that is left anyway; a quiet day showed 0.02
 
 
+@one_blas_thread()
 def find_changes(
     new: Sequence[Measurement],
     old: Sequence[Measurement],
@@ -54,6 +56,7 @@ def find_changes(
     return replace(result, suspects=suspected)
 
 
+@one_blas_thread()
 def compare_with_machine(
     new: Sequence[Measurement], machine: MachineModel, given: Plant, options: Options
 ) -> Diagnosis:

@@ -25,6 +25,7 @@ from gateway.diagnosis.result import OwnEffect
 from gateway.diagnosis.search.model_comparison import is_significant
 from gateway.diagnosis.search.search import SearchResult, compare_under_noise, search_effects
 from gateway.diagnosis.verdict import estimates_of
+from gateway.one_blas_thread import one_blas_thread
 from gateway.twin.plant import Plant
 
 _MOST_EFFECTS: Final = 8  # of a machine; a foreign rig asked for four to six
@@ -61,6 +62,7 @@ class JointModel:
     error_n: Floats
 
 
+@one_blas_thread()
 def describe_machine(old: Sequence[Measurement], given: Plant, options: Options) -> MachineModel:
     """Return the machine that these recordings show, with as many effects as they ask for. given: the plant to start from."""
     start = prepare_search(old, given, options)

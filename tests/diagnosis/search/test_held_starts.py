@@ -13,14 +13,14 @@ from gateway.diagnosis.search.hints import search_hints
 from gateway.diagnosis.search.model_comparison import Competitors, compare_effects
 from tests.diagnosis.machine import MACHINE, command_v, measurement, readings_n, times_s
 
-LOST = replace(MACHINE, cell=replace(MACHINE.cell, zero_n=-0.5, sign_lost=1.0))
+LOST = replace(MACHINE, cell=replace(MACHINE.cell, zero_n=-0.25, sign_lost=1.0))
 
 
 def test_a_lost_sign_is_asked_beside_a_rest_where_the_base_model_holds_a_force() -> None:
     """It promises nothing beside the held force; begun there only, it was never tried, and another name took its work."""
     time_s = times_s(30.0)
     volts = command_v(time_s)
-    noise_n = np.random.default_rng(4).normal(0.0, 0.05, time_s.size)
+    noise_n = np.random.default_rng(4).normal(0.0, 0.02, time_s.size)
     recording = measurement(time_s, volts, readings_n(LOST, time_s, volts, {}) + noise_n, {})
     start = prepare_search([recording], DEFAULT_PLANT, Options())
     assert with_known_rests(start.bench, FitProblem(start.base.parameters, start.base.free)), "a force is held"
@@ -30,4 +30,4 @@ def test_a_lost_sign_is_asked_beside_a_rest_where_the_base_model_holds_a_force()
     assert found.winner.effect.name == "sign-loss"
     assert found.winner.gain > 10.0
     assert found.winner.fitted.parameters.plant.cell.zero_n == 0.0
-    assert abs(found.winner.fitted.parameters.offsets_n[0] + 0.5) < 0.05
+    assert abs(found.winner.fitted.parameters.offsets_n[0] + 0.25) < 0.05
