@@ -2,8 +2,9 @@
 the loop waits for neither.
 
 A paused terminal blocks its writer, and so may a disk; each has a queue and a thread of its own. At most 10 lines a
-second per cause: a flooding client cannot fill a disk, and the number of lines left out is said. Causes carry addresses,
-so that they are without number; only those of the last second are kept. A disk that takes no events is said once, on
+second per cause, and 1 while a flood goes on from second to second: a client that sends garbage makes less than 1 MB of log and
+events a minute, and the number of lines left out is said. Causes carry addresses,
+so that they are without number; only those of the last two seconds are kept. A disk that takes no events is said once, on
 stderr (E150): nothing else depends on it.
 """
 
@@ -22,6 +23,8 @@ from gateway.processes.event_file import EventFile
 from gateway.processes.systemd.journal import journal_writer
 
 LINES_PER_S: Final = 10
+FLOODED_LINES_PER_S: Final = 1
+_FLOOD_ENDS_S: Final = 2.0  # from the beginning of its last full second
 _LONGEST_QUEUE: Final = 1000
 _MOST_CAUSES: Final = 1000
 _END_BOUND_S: Final = 1.0
@@ -88,10 +91,10 @@ class EventLog:
                 if window is None and len(self._windows) >= _MOST_CAUSES:
                     self._forget_old(now_s)
                 self._put_left_out(cause, window)
-                self._windows[cause] = window = _RateWindow(now_s, source)
+                self._windows[cause] = window = _RateWindow(now_s, source, _lines_after(window, now_s))
             window.count += 1
             window.sentence = sentence
-        if window.count <= LINES_PER_S:
+        if window.count <= window.lines:
             self._put(self._event(cause, sentence, source))
 
     def _tell_left_out(self, *, at_the_end: bool = False) -> None:
@@ -100,13 +103,16 @@ class EventLog:
         with self._lock:
             for cause, window in tuple(self._windows.items()):
                 if at_the_end or now_s - window.began_s >= 1.0:
-                    self._put_left_out(cause, self._windows.pop(cause))
+                    self._put_left_out(cause, window)
+                if now_s - window.began_s >= _FLOOD_ENDS_S:
+                    del self._windows[cause]
 
     def _put_left_out(self, cause: str, window: "_RateWindow | None") -> None:
         """With the code of what is left out, so that it is found where that is looked for."""
-        if window is not None and window.count > LINES_PER_S:
+        if window is not None and window.count > window.lines and not window.is_told:
+            window.is_told = True
             code = self._event(cause, window.sentence).code
-            sentence = f"{window.count - LINES_PER_S} more lines of {cause!r} left out"
+            sentence = f"{window.count - window.lines} more lines of {cause!r} left out"
             self._put(self._event(cause, f"{code} {sentence}" if code else sentence, window.source))
 
     def _forget_old(self, now_s: float) -> None:
@@ -123,12 +129,20 @@ class EventLog:
 
 @dataclass(slots=True)
 class _RateWindow:
-    """One second of one cause: how many lines it had, and the last of them."""
+    """One second of one cause: how many lines it may have and had, and the last of them."""
 
     began_s: float
     source: str
+    lines: int = LINES_PER_S
     count: int = 0
     sentence: str = ""
+    is_told: bool = False
+
+
+def _lines_after(before: _RateWindow | None, now_s: float) -> int:
+    """Return how many lines the next second of a cause may have: few where the one just before had too many."""
+    is_flooded = before is not None and before.count > before.lines and now_s - before.began_s < _FLOOD_ENDS_S
+    return FLOODED_LINES_PER_S if is_flooded else LINES_PER_S
 
 
 class QueuedWriter:

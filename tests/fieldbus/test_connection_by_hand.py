@@ -131,9 +131,21 @@ def test_connections_of_one_address_share_its_rate(stand: Any, deliver: Any) -> 
 
 
 def test_loopback_has_no_rate(stand: Any, deliver: Any) -> None:
-    connection, far = stand(requests_per_s=1.0).connect("127.0.0.1")
+    made = stand(requests_per_s=1.0)
+    connection, far = made.connect("127.0.0.1")
     deliver(connection, far, reads(80))
-    assert len(answered(far)) == 80
+    made.clock.advance(0.0)
+    assert answered(far) == list(range(80))
+
+
+def test_after_sixteen_requests_the_others_have_their_turn(stand: Any, deliver: Any) -> None:
+    """A turn of 85 refused writes took milliseconds, and 32 peers took it one after the other."""
+    made = stand()
+    connection, far = made.connect("127.0.0.1")
+    deliver(connection, far, reads(80))
+    assert len(answered(far)) == 16 and not far.reading
+    made.clock.advance(0.0)
+    assert answered(far) == list(range(80)) and far.reading
 
 
 def test_a_flood_gives_way_after_each_buffer_and_loses_nothing(stand: Any, deliver: Any) -> None:

@@ -76,6 +76,19 @@ def test_ten_lines_a_second_of_a_cause_and_the_rest_is_counted() -> None:
     assert lines[10:] == ["W204 490 more lines of 'flood x' left out", "W204 after"]
 
 
+def test_a_flood_that_goes_on_has_one_line_a_second_until_it_has_been_calm() -> None:
+    flood = [(0.01 * index, "flood", "x") for index in range(600)]
+    lines = texts(said(Clock(), *flood, *((7.5 + 0.01 * index, "flood", "y") for index in range(12))))
+    told = [line for line in lines if "left out" in line]
+    assert told == [
+        "90 more lines of 'flood' left out",
+        *["99 more lines of 'flood' left out"] * 5,
+        "2 more lines of 'flood' left out",
+    ]
+    assert lines.count("x") == 10 + 5
+    assert lines.count("y") == 10
+
+
 def test_a_flood_that_has_ended_is_counted_too() -> None:
     assert texts(said(Clock(), *((0.0, "flood", "x") for _ in range(25))))[10:] == ["15 more lines of 'flood' left out"]
 
