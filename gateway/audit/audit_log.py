@@ -55,7 +55,7 @@ class AuditLog:
         loop = asyncio.get_running_loop()
         end_s, self._not_before_s = loop.time() + _LAST_WORDS_S, 0.0
         self.flush()
-        while (self._in_flight or self._waiting) and not self._has_failed and loop.time() < end_s:
+        while (self._in_flight or (self._waiting and not self._has_failed)) and loop.time() < end_s:
             await asyncio.sleep(0.002)
             self.flush()
         if not self._in_flight:

@@ -133,7 +133,7 @@ class FailingFile:
     """Takes records while `is_full` is not set."""
 
     def __init__(self) -> None:
-        self.is_full = False
+        self.is_full = self.is_closed = False
         self.taken: list[dict[str, Any]] = []
 
     def append(self, records: Iterable[dict[str, Any]]) -> None:
@@ -142,7 +142,7 @@ class FailingFile:
         self.taken.extend(records)
 
     def close(self) -> None:
-        pass
+        self.is_closed = True
 
 
 def audit_log(file: Any, said: list[str], now: Callable[[], float]) -> AuditLog:
@@ -177,6 +177,35 @@ def test_a_full_disk_is_an_alarm_and_nothing_is_lost_that_memory_holds() -> None
     assert (lost["what"], lost["count"]) == ("lost", 300)
     assert [record["k"] for record in kept] == list(range(300, MOST_WAITING + 300))
     assert said[-1].startswith("A351 the audit is stored again")
+
+
+def test_what_a_full_disk_kept_back_is_written_at_the_end_where_it_is_free_again() -> None:
+    """Found by tests/simulation: the file stayed open, and what came after the failure was lost."""
+
+    async def run() -> FailingFile:
+        file = FailingFile()
+        log = audit_log(file, [], lambda: 0.0)
+
+        def later(work: Callable[[], Any], done: Callable[[Any], None]) -> None:
+            at_once = asyncio.get_running_loop().call_later
+            try:
+                at_once(0.01, done, work())
+            except OSError as error:
+                at_once(0.01, done, error)
+
+        log.run_in_background = later
+        file.is_full = True
+        log.put({"k": 1})
+        log.flush()
+        await asyncio.sleep(0.02)
+        log.put({"k": 2})
+        file.is_full = False
+        await log.close()
+        return file
+
+    file = asyncio.run(run())
+    assert [record["k"] for record in file.taken] == [1, 2]
+    assert file.is_closed
 
 
 def test_what_waits_at_the_end_is_written(tmp_path: Path) -> None:

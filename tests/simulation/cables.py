@@ -1,0 +1,163 @@
+"""Serial lines without a kernel: a cable whose bytes take the time of its baud rate, and the port at the host's end of it.
+
+`SimulatedPort` stands where `gateway.ports.SerialPort` stands, with the same promises: a loss is told in the loop's next turn,
+it is opened again with a growing pause, and nothing that was written before a loss is sent after it.
+"""
+
+import asyncio
+from collections.abc import Callable
+
+from gateway.devices import PacedWire, SerialSettings
+from gateway.ports import PortError, PortEvents
+from tests.simulation.virtual_time import VirtualLoop
+
+
+class Cable:
+    """One line. on_device: bytes that have reached the device; outside: the loop of the world."""
+
+    def __init__(
+        self, outside: VirtualLoop, settings: SerialSettings, on_device: Callable[[bytes, float], None]
+    ) -> None:
+        self._outside, self._settings, self._on_device = outside, settings, on_device
+        self.port: SimulatedPort | None = None
+        self.is_plugged = True
+        self.cut()
+
+    def cut(self) -> None:
+        """What was on the wire is lost."""
+        baud, bits = self._settings.baud, self._settings.bits_per_character
+        self._to_device, self._to_host = PacedWire(baud, bits), PacedWire(baud, bits)
+
+    @property
+    def backlog_s(self) -> float:
+        """Time until the device's last byte is through."""
+        last_s = self._to_host.last_through_s
+        return 0.0 if last_s is None else max(0.0, last_s - self._outside.time())
+
+    @property
+    def through_s(self) -> float:
+        """When the host's last byte will have arrived."""
+        last_s = self._to_device.last_through_s
+        return self._outside.time() if last_s is None else last_s + 2e-9
+
+    def send_to_device(self, data: bytes) -> None:
+        """Put a host's bytes on the wire."""
+        self._put(self._to_device, data, self._arrive)
+
+    def send_to_host(self, data: bytes) -> None:
+        """Put a device's bytes on the wire."""
+        if self.is_plugged:
+            self._put(self._to_host, data, self._reach_host)
+
+    def pull(self) -> None:
+        """Pull the plug."""
+        self.is_plugged = False
+        self.cut()
+        if self.port:
+            self.port.notice_loss()
+
+    def push(self) -> None:
+        """Put it back; whoever looks for the port finds it."""
+        self.is_plugged = True
+
+    def _put(self, wire: PacedWire, data: bytes, take: Callable[[PacedWire], None]) -> None:
+        wire.send(data, self._outside.time())
+        if wire.last_through_s is not None:
+            self._outside.call_at(wire.last_through_s + 1e-9, take, wire)
+
+    def _arrive(self, wire: PacedWire) -> None:
+        if wire is self._to_device and (chunk := wire.bytes_through(self._outside.time())):
+            self._on_device(chunk, self._outside.time())
+
+    def _reach_host(self, wire: PacedWire) -> None:
+        if wire is self._to_host and (chunk := wire.bytes_through(self._outside.time())) and self.port:
+            self.port.hear(chunk)
+
+
+CABLES: dict[str, Cable] = {}
+"""By path, of the one simulation that runs."""
+
+
+class SimulatedPort:
+    """The host's end. Its kernel's buffer outlives a stall of the process, as a real one does."""
+
+    def __init__(self, path: str, settings: SerialSettings, events: PortEvents, *, is_simulated: bool = False) -> None:
+        self.path, self.warning = path, ""
+        self._settings, self._events = settings, events
+        self._cable = CABLES[path]
+        self._loop = asyncio.get_running_loop()
+        self._buffer = bytearray()
+        self._backoff_s = 0.1
+        self._reopening: asyncio.TimerHandle | None = None
+        self.is_open = self._is_wanted = False
+
+    async def open(self) -> None:
+        if not self._cable.is_plugged:
+            raise PortError("E102", f"{self.path} is not there")
+        self._is_wanted = True
+        self._open()
+
+    def begin_lost(self, failure: PortError) -> None:
+        self._is_wanted = True
+        self._reopening = self._loop.call_later(self._backoff_s, self._reopen)
+        self._events.on_lost(failure)
+
+    def move(self, path: str) -> None:
+        raise AssertionError("simulated lines do not move")
+
+    def write(self, data: bytes) -> bool:
+        if self.is_open:
+            self._cable.send_to_device(data)
+        return self.is_open
+
+    def flush_input(self) -> int:
+        dropped = len(self._buffer)
+        self._buffer.clear()
+        return dropped
+
+    async def write_last(self, data: bytes, deadline_s: float = 0.5) -> None:
+        if not self.write(data):
+            raise PortError("E102", f"{self.path} is not open")
+        await asyncio.sleep(len(data) * self._settings.character_s + 1e-3)
+
+    def close(self) -> None:
+        self.is_open = self._is_wanted = False
+        if self._reopening:
+            self._reopening.cancel()
+        if self._cable.port is self:
+            self._cable.port = None
+
+    # -- the kernel's side
+
+    def hear(self, chunk: bytes) -> None:
+        self._buffer += chunk
+        self._loop.call_soon(self._read)
+
+    def notice_loss(self) -> None:
+        self._loop.call_soon(self._lose)
+
+    def _open(self) -> None:
+        self._cable.port, self.is_open, self._backoff_s = self, True, 0.1
+        self._events.on_open(-1)
+
+    def _read(self) -> None:
+        if self.is_open and self._buffer:
+            chunk = bytes(self._buffer)
+            self._buffer.clear()
+            self._events.on_bytes(chunk, self._loop.time())
+
+    def _lose(self) -> None:
+        if self.is_open:
+            self.is_open = False
+            self._buffer.clear()
+            self._reopening = self._loop.call_later(self._backoff_s, self._reopen)
+            self._events.on_lost(PortError("A317", f"A317 {self.path} is disconnected"))
+
+    def _reopen(self) -> None:
+        if not self._is_wanted:
+            return
+        if self._cable.is_plugged:
+            self._open()
+        else:
+            self._backoff_s = min(2.0 * self._backoff_s, 2.0)
+            self._reopening = self._loop.call_later(self._backoff_s, self._reopen)

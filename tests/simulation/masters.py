@@ -1,0 +1,178 @@
+"""Masters of every kind on the simulated network: one that works, one that does not know what it does, one that wants harm.
+
+They spell frames themselves. Each checks its own answers: the right transaction, in order, each once (I8).
+"""
+
+import struct
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tests.simulation.network import Line
+from tests.simulation.virtual_time import VirtualLoop
+
+ENABLE, RESET, TAKE = 1, 2, 8
+BEAT_S = 0.05
+WRITES = frozenset((5, 6, 15, 16, 22, 23))
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A request that waits for its answer. control: the control word that it writes, None for none."""
+
+    transaction: int
+    pdu: bytes
+    control: int | None
+
+
+def write_pdu(address: int, *words: int) -> bytes:
+    """FC16."""
+    return struct.pack(
+        f">BHHB{len(words)}H", 16, address, len(words), 2 * len(words), *(word & 0xFFFF for word in words)
+    )
+
+
+def read_pdu(address: int, count: int) -> bytes:
+    """FC03."""
+    return struct.pack(">BHH", 3, address, count)
+
+
+def control_of(pdu: bytes) -> int | None:
+    """The control word that a write would set, None where it is not among what it writes; -1 where it changes single bits."""
+    if len(pdu) < 5 or pdu[0] not in WRITES:
+        return None
+    address = struct.unpack_from(">H", pdu, 5 if pdu[0] == 23 else 1)[0]
+    if pdu[0] in (5, 15, 22):
+        return -1 if address < 16 else None
+    data = {6: pdu[3:5], 16: pdu[6:], 23: pdu[10:]}[pdu[0]]
+    in_floats = address in (200, 300)
+    return struct.unpack_from(">H", data)[0] if address == 0 and len(data) >= 2 else -1 if in_floats else None
+
+
+class Master:
+    """One program on one address. on_accepted(control word or None, pdu): a write was taken; complaints: broken answers."""
+
+    def __init__(
+        self,
+        name: str,
+        outside: VirtualLoop,
+        inside: Callable[[], VirtualLoop | None],
+        on_accepted: Callable[[int | None, bytes], None],
+    ) -> None:
+        self.name, self._outside, self._inside, self._on_accepted = name, outside, inside, on_accepted
+        self.complaints: list[str] = []
+        self.heard: list[tuple[float, bytes]] = []
+        self._line: Line | None = None
+        self._waiting: deque[Asked] = deque()
+        self._stream = b""
+        self._transaction = self._beat = self._port = 0
+        self._force_n = 0.0
+        self._control = 0
+        self._beating = 0
+        self._is_framed = True
+
+    # -- connection
+
+    def connect(self) -> bool:
+        """Connect where nobody is connected; False where nobody listens."""
+        inside = self._inside()
+        if self._line is None and inside is not None and inside.servers:
+            self._port += 1
+            self._stream, self._is_framed = b"", True
+            self._waiting.clear()
+            line: Line | None = None
+
+            def hear(data: bytes) -> None:
+                if self._line is line:
+                    self._hear(data)
+
+            line = self._line = Line(inside, self._outside, (self.name, 40000 + self._port), hear)
+        return self._line is not None
+
+    def lose(self) -> None:
+        """The other end has died."""
+        self._line = None
+        self._waiting.clear()
+
+    def disconnect(self) -> None:
+        if self._line:
+            self._line.close()
+        self.lose()
+
+    # -- requests
+
+    def ask(self, pdu: bytes, unit: int = 1) -> None:
+        if self.connect():
+            assert self._line
+            self._transaction = (self._transaction + 1) & 0xFFFF
+            self._waiting.append(Asked(self._transaction, pdu, control_of(pdu)))
+            self._line.send(struct.pack(">HHHB", self._transaction, 0, len(pdu) + 1, unit) + pdu)
+
+    def send_raw(self, data: bytes) -> None:
+        """Bytes that are no request, perhaps: answers are not counted from now on."""
+        if self.connect():
+            assert self._line
+            self._is_framed = False
+            self._line.send(data)
+
+    # -- one that works
+
+    def hold(self, force_n: float, control: int = ENABLE) -> None:
+        """Command this force, and beat from now on."""
+        self._force_n, self._control = force_n, control
+        self._beating += 1
+        self._keep_beating(self._beating)
+
+    def let_go(self) -> None:
+        """Disable in words."""
+        self._beating += 1
+        self._beat += 1
+        self.ask(write_pdu(0, 0, 0, 0, 0, self._beat))
+
+    def fall_silent(self) -> None:
+        """Die without a word: the connection stays."""
+        self._beating += 1
+
+    def reset(self, take: bool = False) -> None:
+        """Reset faults, with a heartbeat of its own; take over, if asked."""
+        self._beat += 1
+        self.ask(write_pdu(0, TAKE if take else 0, 0, 0, 0, self._beat))
+        self._beat += 1
+        self.ask(write_pdu(0, RESET, 0, 0, 0, self._beat))
+
+    def _keep_beating(self, number: int) -> None:
+        if number == self._beating:
+            self._beat += 1
+            self.ask(write_pdu(0, self._control, round(100 * self._force_n), 0, 0, self._beat))
+            self._outside.call_later(BEAT_S, self._keep_beating, number)
+
+    # -- answers
+
+    def _hear(self, data: bytes) -> None:
+        if not data:
+            self.lose()
+            return
+        self._stream += data
+        while len(self._stream) >= 8:
+            transaction, protocol, length = struct.unpack_from(">HHH", self._stream)
+            if len(self._stream) < 6 + length:
+                return
+            pdu, self._stream = self._stream[7 : 6 + length], self._stream[6 + length :]
+            self._take(transaction, protocol, pdu)
+
+    def _take(self, transaction: int, protocol: int, pdu: bytes) -> None:
+        if not self._is_framed:
+            return
+        if not self._waiting or protocol != 0:
+            self.complaints.append(f"I8: {self.name} was answered {pdu.hex()} without having asked")
+            return
+        asked = self._waiting.popleft()
+        if asked.transaction != transaction or pdu[0] & 0x7F != asked.pdu[0]:
+            self.complaints.append(
+                f"I8: {self.name} asked {asked.transaction} {asked.pdu.hex()}, was answered {transaction} {pdu.hex()}"
+            )
+            return
+        self.heard.append((self._outside.time(), pdu))
+        del self.heard[:-64]
+        if pdu[0] in WRITES:
+            self._on_accepted(asked.control, asked.pdu)

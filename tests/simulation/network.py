@@ -1,0 +1,138 @@
+"""Modbus TCP without a kernel: connections between two loops, whose bytes arrive after a delay, in pieces, in order."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from tests.simulation.virtual_time import VirtualLoop
+
+DELAY_S = 0.0002
+
+
+class MemoryServer:
+    """What `create_server` gives: enough of asyncio.Server for who listens."""
+
+    def __init__(self, make: Callable[[], Any], port: int, loop: VirtualLoop) -> None:
+        self.make, self.port, self._loop = make, port, loop
+        self.sockets = (self,)
+
+    def getsockname(self) -> tuple[str, int]:
+        return "127.0.0.1", self.port
+
+    def close(self) -> None:
+        self._loop.servers.pop(self.port, None)
+
+    async def wait_closed(self) -> None:
+        return
+
+
+def serve_in_memory(loop: VirtualLoop) -> None:
+    """Have this loop's `create_server` make a server that only `connect` reaches."""
+
+    async def create_server(make: Callable[[], Any], host: str, port: int, **_: Any) -> MemoryServer:
+        loop.servers[port] = MemoryServer(make, port, loop)
+        return loop.servers[port]  # type: ignore[no-any-return]
+
+    loop.create_server = create_server  # type: ignore[method-assign,assignment]
+
+
+class Delay:
+    """Calls what it is given after DELAY_S, in order: of timers that are due at one time asyncio keeps none."""
+
+    def __init__(self, loop: VirtualLoop) -> None:
+        self._loop = loop
+        self._waiting: deque[tuple[Callable[..., Any], tuple[Any, ...]]] = deque()
+
+    def __call__(self, what: Callable[..., Any], *arguments: Any) -> None:
+        self._waiting.append((what, arguments))
+        self._loop.call_later(DELAY_S, self._do_next)
+
+    def _do_next(self) -> None:
+        what, arguments = self._waiting.popleft()
+        what(*arguments)
+
+
+class MemoryTransport(asyncio.Transport):
+    """The server's end of one connection."""
+
+    def __init__(
+        self, inside: VirtualLoop, outside: VirtualLoop, peer: tuple[str, int], hear: Callable[[bytes], None]
+    ) -> None:
+        super().__init__({"peername": peer})
+        self._inside, self._after_delay, self._hear = inside, Delay(outside), hear
+        self._protocol: Any = None
+        self._is_closing = self._is_paused = False
+        self._waiting = bytearray()
+
+    def attach(self, protocol: Any) -> None:
+        self._protocol = protocol
+        protocol.connection_made(self)
+
+    def feed(self, data: bytes) -> None:
+        """Bytes from the other end, in the server's loop."""
+        self._waiting += data
+        self._deliver()
+
+    def end(self) -> None:
+        """The other end has closed."""
+        if not self._is_closing:
+            self._protocol.eof_received()
+            self.close()
+
+    def write(self, data: Any) -> None:
+        if not self._is_closing:
+            self._after_delay(self._hear, bytes(data))
+
+    def get_write_buffer_size(self) -> int:
+        return 0
+
+    def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None: ...
+
+    def is_closing(self) -> bool:
+        return self._is_closing
+
+    def close(self) -> None:
+        if not self._is_closing:
+            self._is_closing = True
+            self._inside.call_soon(self._protocol.connection_lost, None)
+            self._after_delay(self._hear, b"")
+
+    def abort(self) -> None:
+        self.close()
+
+    def pause_reading(self) -> None:
+        self._is_paused = True
+
+    def resume_reading(self) -> None:
+        self._is_paused = False
+        self._inside.call_soon(self._deliver)
+
+    def is_reading(self) -> bool:
+        return not self._is_paused
+
+    def _deliver(self) -> None:
+        while self._waiting and not self._is_paused and not self._is_closing:
+            room = self._protocol.get_buffer(-1)
+            piece = self._waiting[: len(room)]
+            room[: len(piece)] = piece
+            del self._waiting[: len(piece)]
+            self._protocol.buffer_updated(len(piece))
+
+
+class Line:
+    """A master's end of one connection. hear(b"") tells that the other end has closed."""
+
+    def __init__(
+        self, inside: VirtualLoop, outside: VirtualLoop, peer: tuple[str, int], hear: Callable[[bytes], None]
+    ) -> None:
+        self._inside, self._after_delay = inside, Delay(outside)
+        self._transport = MemoryTransport(inside, outside, peer, hear)
+        (server,) = inside.servers.values()
+        inside.call_soon(lambda: self._transport.attach(server.make()))
+
+    def send(self, data: bytes) -> None:
+        self._after_delay(self._inside.call_soon, self._transport.feed, data)
+
+    def close(self) -> None:
+        self._after_delay(self._inside.call_soon, self._transport.end)

@@ -1,0 +1,139 @@
+"""An observer beside the gateway, which shares no code with it: it hears the bytes on the output's wire, knows what was done to
+the world, and reads the status registers as any master could. What it finds broken is a line of `broken`.
+
+I1 range, I2 slew, I3 the safe voltage in time after the loss of cell, master or control, I4 none without an enable, I5 faults
+latch, I6 the safe voltage first, I7 whole sentences, I11 one first cause; I8 is told by the masters, I13 by the schedule.
+"""
+
+import re
+import struct
+from dataclasses import dataclass, field
+
+COUNT_V = 10.0 / 1023
+FAULT = 4
+STATUS_FIRST, STATUS_WORDS = 100, 11
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What the rig's file says, and what the wire takes (`GRACE_S`: one tick, two sentences of 9600 baud, the loop's grid)."""
+
+    voltage_max_v: float
+    slew_v_per_s: float
+    sample_timeout_s: float
+    stall_s: float
+    lease_s: float
+
+
+GRACE_S = 0.06
+
+
+@dataclass
+class Observer:
+    bounds: Bounds
+    broken: list[str] = field(default_factory=list)
+    settings: list[tuple[float, float]] = field(default_factory=list)
+    cell_lost_s: float | None = None
+    output_lost_s: float | None = None
+    control_lost_s: float | None = None
+    write_s: float = 0.0
+    disabled_s: float | None = 0.0
+    _line: bytes = b""
+    _is_cut: bool = True
+    _must_be_safe: bool = True
+    _begun_s: float = 0.0
+    _fault: int | None = None
+    _reset_s: float = -1.0
+
+    @property
+    def voltage_v(self) -> float:
+        return self.settings[-1][1] if self.settings else 0.0
+
+    # -- the wire
+
+    def hear(self, chunk: bytes, now_s: float) -> None:
+        """Bytes that have reached the output device."""
+        *lines, self._line = (self._line + chunk).split(b"\r\n")
+        for line in lines:
+            if found := re.fullmatch(rb"(.*)SET (\d+)", line) if self._is_cut else re.fullmatch(rb"()SET (\d+)", line):
+                self._note_setting(int(found[2]) * COUNT_V, now_s)
+            elif line != b"MON" and not self._is_cut:
+                self._complain("I7", f"{line!r} is no sentence", now_s)
+            self._is_cut = False
+
+    def note_cut(self, until_s: float) -> None:
+        """The sender was cut off, or the plug pulled: half a sentence may stand before the next, and the first that is begun
+        now must be safe. until_s: what is on the wire already is through by then."""
+        self._is_cut = self._must_be_safe = True
+        self._begun_s = until_s
+
+    def _note_setting(self, voltage_v: float, now_s: float) -> None:
+        if not -1e-9 <= voltage_v <= self.bounds.voltage_max_v + COUNT_V:
+            self._complain("I1", f"{voltage_v:.3f} V", now_s)
+        if self._must_be_safe and now_s > self._begun_s:
+            if voltage_v > 0.0:
+                self._complain("I6", f"{voltage_v:.3f} V comes first", now_s)
+            self._must_be_safe = False
+        if self.settings:
+            before_s, before_v = self.settings[-1]
+            allowed_v = self.bounds.slew_v_per_s * (now_s - before_s + 0.02) + COUNT_V
+            if voltage_v - before_v > allowed_v + 1e-9:
+                self._complain("I2", f"{before_v:.3f} -> {voltage_v:.3f} V in {now_s - before_s:.4f} s", now_s)
+        self.settings.append((now_s, voltage_v))
+
+    # -- what is known of the world and of masters
+
+    def note_accepted(self, control: int | None, now_s: float) -> None:
+        """A write was taken. control: the control word in it; -1: bits of it were changed in a way that is not followed."""
+        self.write_s = now_s
+        if control is None:
+            return
+        if control == -1 or control & 1:
+            self.disabled_s = None
+        elif self.disabled_s is None:
+            self.disabled_s = now_s
+        if control == -1 or control & 2:
+            self._reset_s = now_s
+
+    def note_status(self, pdu: bytes, now_s: float) -> None:
+        """The status block, as a master has read it."""
+        if len(pdu) != 2 + 2 * STATUS_WORDS:
+            return
+        words = struct.unpack(f">{STATUS_WORDS}H", pdu[2:])
+        state, fault = words[1], words[10]
+        if state == FAULT and not fault:
+            self._complain("I11", "a fault without a cause", now_s)
+        if self._fault and now_s - self._reset_s > 0.2:
+            if state != FAULT:
+                self._complain("I5", f"fault {self._fault} is gone without a reset", now_s)
+            elif fault != self._fault:
+                self._complain("I11", f"fault {self._fault} became {fault}", now_s)
+        self._fault = fault if state == FAULT else None  # in OFF it says why control was started again
+
+    def note_death(self, now_s: float, until_s: float) -> None:
+        """Control has died: the next one begins in OFF, and shows why it was started. until_s: as in `note_cut`."""
+        self._fault = None
+        if self.disabled_s is None:
+            self.disabled_s = now_s
+        self.note_cut(until_s)
+
+    def look(self, now_s: float) -> None:
+        """Judge the voltage that stands now."""
+        if self.voltage_v <= 0.0 or self.output_lost_s is not None:
+            return
+        standing_s = now_s - self.settings[-1][0]
+        limits = (
+            ("I3 cell", self.cell_lost_s, self.bounds.sample_timeout_s),
+            ("I3 control", self.control_lost_s, self.bounds.stall_s),
+            ("I3 master", self.write_s, self.bounds.lease_s),
+            ("I4", self.disabled_s, 0.0),
+        )
+        for law, since_s, bound_s in limits:
+            if since_s is not None and now_s - since_s > bound_s + GRACE_S:
+                self._complain(
+                    law, f"{self.voltage_v:.3f} V for {standing_s:.3f} s, {now_s - since_s:.3f} s after", now_s
+                )
+
+    def _complain(self, law: str, words: str, now_s: float) -> None:
+        if len(self.broken) < 20:
+            self.broken.append(f"{law} at {now_s:.4f}: {words}")

@@ -1,0 +1,329 @@
+"""One schedule: what masters, people and fate do to a gateway, drawn from a seed, run in virtual time, judged and shrunk.
+
+A schedule is a list of events, each whole by itself, so that any of them can be left out: the shortest list that still breaks
+a law is what a failing seed is told by.
+"""
+
+import struct
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from gateway.service.simulation.world import SimulatedRig
+from tests.service.rigs import strict, with_supervision
+from tests.simulation.cables import CABLES
+from tests.simulation.masters import ENABLE, TAKE, Master, read_pdu, write_pdu
+from tests.simulation.observer import STATUS_FIRST, STATUS_WORDS, Bounds, Observer
+from tests.simulation.processes import Log, SimulatedDisk, SimulatedGuardian, lay_cables, simulated_edges
+from tests.simulation.virtual_time import BEGIN_S, VirtualClock, VirtualLoop, run_all
+
+FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "cell-frozen", "output-cut")
+LEASE_S, STALL_S = 0.2, 0.1
+HELD_N = 12.0
+IN_BAND_N = 1.0
+HEAL_S = 2.0
+
+
+@dataclass(frozen=True)
+class Event:
+    """At at_s after READY, `what` happens to `whom`, with these numbers."""
+
+    at_s: float
+    whom: str
+    what: str
+    numbers: tuple[float, ...] = ()
+    data: bytes = b""
+
+
+def draw_events(seed: int, duration_s: float) -> list[Event]:
+    """What happens: a little more than two events a second."""
+    chance, at_s, events = Random(seed), 0.0, []
+    while (at_s := at_s + chance.expovariate(2.2)) < duration_s:
+        events.append(_draw(chance, round(at_s, 4)))
+    return events
+
+
+def _draw(chance: Random, at_s: float) -> Event:
+    draw, master = chance.random(), chance.choice(("worker", "worker", "rival"))
+    if draw < 0.34:
+        return Event(
+            at_s, master, chance.choice(("hold", "hold", "hold", "take")), (round(chance.uniform(0.0, 66.0), 2),)
+        )
+    if draw < 0.46:
+        return Event(at_s, master, chance.choice(("reset", "let_go", "fall_silent", "disconnect")))
+    if draw < 0.62:
+        return Event(at_s, chance.choice(("worker", "rival", "fool")), "ask", data=_stupid(chance))
+    if draw < 0.68:
+        return Event(at_s, "villain", "send_raw", data=_hostile(chance))
+    if draw < 0.86:
+        return Event(at_s, "world", chance.choice(FAULTS), (float(chance.random() < 0.5),))
+    if draw < 0.92:
+        return Event(at_s, chance.choice(("output", "load_cell")), chance.choice(("pull", "push")))
+    what = chance.choice(("kill", "stop", "disk_full", "disk_free", "clock_jump"))
+    return Event(at_s, "machine", what, (round(chance.uniform(0.005, 0.3), 4), chance.uniform(-1e6, 1e6)))
+
+
+def _stupid(chance: Random) -> bytes:
+    """A request that may be refused: any register, any value, any function."""
+    address = chance.choice(
+        (0, 0, 0, 1, 4, chance.randrange(0, 16), chance.randrange(100, 130), 200, 300, 416, 1000, 1147, 1500)
+    )
+    count = chance.choice((1, 1, 2, 5, 13, chance.randrange(1, 124)))
+    words = [chance.choice((0, 1, 2, 9, 33, 65535, chance.randrange(65536))) for _ in range(count)]
+    if address == 0 and words:
+        words[0] &= ~0x60  # runs of their own (bits 5 and 6) move without a master's lease, by right
+    function = chance.choice((3, 4, 1, 2, 5, 6, 15, 16, 16, 16, 22, 23, 43, 99))
+    if function == 16:
+        return write_pdu(address, *words)
+    if function == 6:
+        return struct.pack(">BHH", 6, address, words[0])
+    if function == 5:
+        return struct.pack(">BHH", 5, chance.choice((0, 1, 2, 3, 4)), chance.choice((0, 0xFF00, 0x1234)))
+    if function == 22:
+        return struct.pack(">BHHH", 22, address, 0xFF9F, chance.randrange(65536) & ~0x60 & 0xFFFF)
+    if function in (1, 2, 3, 4):
+        return struct.pack(">BHH", function, address, chance.choice((0, 1, 10, 125, 126, 65535)))
+    return bytes((function,)) + chance.randbytes(chance.randrange(0, 40))
+
+
+def _hostile(chance: Random) -> bytes:
+    whole = struct.pack(">HHHB", 7, 0, 6, 1) + read_pdu(100, 10)
+    return chance.choice(
+        (
+            chance.randbytes(chance.randrange(1, 400)),
+            whole[: chance.randrange(1, len(whole))],
+            whole * chance.randrange(2, 60),
+            struct.pack(">HHHB", 1, 0, 65535, 1),
+            struct.pack(">HHHB", 1, 9, 6, 1) + whole[7:],
+        )
+    )
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was broken, and a fingerprint of everything that was on the output's wire."""
+
+    broken: tuple[str, ...]
+    fingerprint: str
+    settings: int
+    largest_v: float
+
+
+class Simulation:
+    """A gateway, its world and its masters."""
+
+    def __init__(self, seed: int, folder: Path) -> None:
+        rig = replace(with_supervision(strict(), lease_s=LEASE_S, stall_s=STALL_S), seed=seed)
+        self.clock, self.chance = VirtualClock(), Random(~seed)
+        supervision, limits = rig.control.supervision, rig.control.limits
+        bounds = Bounds(
+            limits.voltage_max_v,
+            limits.voltage_slew_v_per_s,
+            supervision.sample_timeout_s,
+            supervision.stall_s,
+            LEASE_S,
+        )
+        self.observer = Observer(bounds)
+        self.outside = VirtualLoop(self.clock)
+        self.loops = [self.outside]
+        self.log = Log(self.clock)
+        self.world = SimulatedRig(
+            rig,
+            send_output=lambda data: CABLES["output"].send_to_host(data),
+            send_cell=lambda data: CABLES["load_cell"].send_to_host(data),
+            now_s=self.clock.now_s,
+        )
+        lay_cables(self.outside, rig, self._on_output, self.world.on_cell_bytes)
+        SimulatedDisk.is_full = False
+        SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(0.001, 0.08))
+        self.guardian = SimulatedGuardian(rig, folder, self.outside, self.loops, self.log, self.clock)
+        self.guardian.on_death = self._on_death
+        self.masters = {
+            name: Master(f"10.0.0.{place}", self.outside, lambda: self.guardian.inside, self._on_accepted)
+            for place, name in enumerate(("worker", "rival", "fool", "villain", "healer"), start=1)
+        }
+        self.reader = Master("10.0.0.9", self.outside, lambda: self.guardian.inside, lambda *_: None)
+        self.outside.call_later(0.003, self._stream)
+        self.outside.call_later(0.01, self._look)
+        self.outside.call_later(0.05, self._read_status)
+
+    def run(self, events: Sequence[Event], duration_s: float) -> Outcome:
+        """Run the events, then heal everything, reset, and see the force come back."""
+        self._run_for(1.0)
+        for event in events:
+            self.outside.call_at(BEGIN_S + 1.0 + event.at_s, self._happen, event)
+        self._run_for(duration_s)
+        self._heal()
+        for master in (*self.masters.values(), self.reader):
+            self.observer.broken += master.complaints
+        told = "".join(f"{time_s:.6f} {voltage_v:.4f}\n" for time_s, voltage_v in self.observer.settings)
+        voltages = [voltage_v for _, voltage_v in self.observer.settings]
+        fingerprint = sha256((told + "\n".join(self.observer.broken)).encode()).hexdigest()
+        return Outcome(tuple(self.observer.broken), fingerprint, len(voltages), max(voltages, default=0.0))
+
+    def close(self) -> None:
+        self.guardian.close()
+        self.outside.close()
+
+    # -- what happens
+
+    def _happen(self, event: Event) -> None:
+        if event.whom in self.masters:
+            self._command(self.masters[event.whom], event)
+        elif event.whom == "world":
+            self._set_fault(event.what, on=bool(event.numbers[0]))
+        elif event.whom == "machine":
+            self._shake(event)
+        elif event.what == "pull":
+            self._pull(event.whom)
+        else:
+            self._push(event.whom)
+
+    def _command(self, master: Master, event: Event) -> None:
+        if event.what in ("hold", "take"):
+            master.hold(event.numbers[0], ENABLE if event.what == "hold" else ENABLE | TAKE)
+        elif event.data:
+            getattr(master, event.what)(event.data)
+        else:
+            getattr(master, event.what)()
+
+    def _shake(self, event: Event) -> None:
+        if event.what == "kill":
+            self.guardian.kill()
+        elif event.what == "stop":
+            self.guardian.stop(event.numbers[0])
+            if event.numbers[0] > self.observer.bounds.stall_s:
+                self._lose_control()
+        elif event.what == "clock_jump":
+            self.clock.jump_s += event.numbers[1]
+        else:
+            SimulatedDisk.is_full = event.what == "disk_full"
+
+    def _set_fault(self, name: str, *, on: bool) -> None:
+        self.world.fault({"do": "fault", "name": name, "on": on})
+        if name == "cell-cut":
+            self._judge_cell(is_cut=on)
+
+    def _pull(self, line: str) -> None:
+        CABLES[line].pull()
+        if line == "output":
+            self.observer.note_cut(self.clock.now_s)
+            self.observer.output_lost_s = self.clock.now_s
+        else:
+            self._judge_cell(is_cut=None)
+
+    def _push(self, line: str) -> None:
+        CABLES[line].push()
+        if line == "load_cell":
+            self._judge_cell(is_cut=None)
+
+    _is_cell_cut = False
+
+    def _judge_cell(self, *, is_cut: bool | None) -> None:
+        self._is_cell_cut = self._is_cell_cut if is_cut is None else is_cut
+        is_heard = not self._is_cell_cut and CABLES["load_cell"].is_plugged
+        lost_s = self.observer.cell_lost_s
+        self.observer.cell_lost_s = None if is_heard else self.clock.now_s if lost_s is None else lost_s
+
+    # -- what goes on
+
+    def _on_output(self, chunk: bytes, now_s: float) -> None:
+        self.observer.hear(chunk, now_s)
+        self.observer.output_lost_s = None
+        self.world.on_output_bytes(chunk, now_s)
+
+    def _on_accepted(self, control: int | None, pdu: bytes) -> None:
+        self.observer.note_accepted(control, self.clock.now_s)
+
+    def _on_death(self) -> None:
+        self.observer.note_death(self.clock.now_s, CABLES["output"].through_s)
+        self._lose_control()
+        for master in (*self.masters.values(), self.reader):
+            master.lose()
+        self.reader.heard.clear()
+
+    def _lose_control(self) -> None:
+        if self.observer.control_lost_s is None:
+            self.observer.control_lost_s = self.clock.now_s
+
+    def _stream(self) -> None:
+        if CABLES["load_cell"].backlog_s < 0.01:
+            self.world.stream(self.clock.now_s)
+        self.outside.call_later(0.01, self._stream)
+
+    def _look(self) -> None:
+        if self.guardian.is_serving and self.guardian.inside in self.loops:
+            self.observer.control_lost_s = None
+        self.observer.look(self.clock.now_s)
+        self.outside.call_later(0.01, self._look)
+
+    def _read_status(self) -> None:
+        for at_s, pdu in self.reader.heard:
+            if pdu[0] == 3:
+                self.observer.note_status(pdu, at_s)
+        self.reader.heard.clear()
+        self.reader.ask(read_pdu(STATUS_FIRST, STATUS_WORDS))
+        self.outside.call_later(0.05, self._read_status)
+
+    def _run_for(self, duration_s: float) -> None:
+        run_all(self.clock, self.loops, self.clock.now_s + duration_s)
+
+    # -- healing (I13)
+
+    def _heal(self) -> None:
+        for name in FAULTS:
+            self._set_fault(name, on=False)
+        for line in ("output", "load_cell"):
+            self._push(line)
+        SimulatedDisk.is_full = False
+        for master in self.masters.values():
+            master.fall_silent()
+            master.disconnect()
+        self._run_for(4.0)  # what is plugged in is looked for every 2 s at the most; the force comes down
+        healer = self.masters["healer"]
+        healer.reset(take=True)
+        self._run_for(0.1)
+        healer.hold(HELD_N)
+        self._run_for(HEAL_S)
+        error_n = self._read_force_n() - HELD_N
+        if abs(error_n) > IN_BAND_N:
+            self.observer.broken.append(f"I13: {error_n:+.2f} N off {HEAL_S:g} s after healing; {self.log.lines[-4:]}")
+
+    def _read_force_n(self) -> float:
+        self.reader.heard.clear()
+        self.reader.ask(read_pdu(102, 1))
+        self._run_for(0.02)
+        (word,) = struct.unpack(">h", self.reader.heard[-1][1][2:4])
+        return float(word) * 0.01
+
+
+def run_schedule(seed: int, events: Sequence[Event], duration_s: float) -> Outcome:
+    """Run one schedule by itself, in a directory of its own."""
+    base: Any = "/dev/shm" if Path("/dev/shm").is_dir() else None
+    with tempfile.TemporaryDirectory(dir=base) as folder, simulated_edges():
+        simulation = Simulation(seed, Path(folder))
+        with simulation.clock.as_the_kernels():
+            try:
+                return simulation.run(events, duration_s)
+            finally:
+                simulation.close()
+
+
+def shrink(events: Sequence[Event], is_broken: Callable[[Sequence[Event]], bool]) -> list[Event]:
+    """Return a shorter list that is still broken: halves, quarters ... down to single events are left out (ddmin)."""
+    kept, size = list(events), max(1, len(events) // 2)
+    while True:
+        at = 0
+        while at < len(kept):
+            shorter = kept[:at] + kept[at + size :]
+            if is_broken(shorter):
+                kept = shorter
+            else:
+                at += size
+        if size == 1:
+            return kept
+        size = max(1, size // 2)
