@@ -24,7 +24,7 @@ from gateway.processes import exit_codes
 from gateway.processes.beside_control import exit_with_guardian, yield_to_others
 from gateway.recording.ring import RingReader
 from gateway.side_by_side import one_after_another
-from gateway.watch.memory import resident_mb, return_memory
+from gateway.watch.memory import give_large_arrays_back_at_once, resident_mb, return_memory
 from gateway.watch.processor_budget import ProcessorBudget
 
 if TYPE_CHECKING:
@@ -107,6 +107,7 @@ def work_gently() -> Iterator[None]:
     it."""
     from gateway.twin.replay.cache import room_for_series
 
+    give_large_arrays_back_at_once()
     with progress.listen(_return_memory_between_stages), one_after_another(), room_for_series(_ROOM_BYTES):
         yield
     return_memory()

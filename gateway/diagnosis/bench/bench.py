@@ -25,7 +25,7 @@ from gateway.twin.replay.drive import Motion
 from gateway.twin.replay.replay import Replay
 from gateway.twin.surroundings import COLUMNS
 
-_AT_ONCE: Final = 64  # plants of a replay: a search tries hundreds, and what is between them and the readings is large
+_AT_ONCE: Final = 24  # plants of a replay: a search tries hundreds, and what is between them and the readings is large
 BLOCKS: Final = 20  # per recording, for held-out errors and resampling
 SURROUNDINGS: Final = COLUMNS  # what a drive takes of a recording's covariates, and of its position
 NOMINAL_AREA_M2: Final = 1.0e-4  # turns a measured pressure into newtons

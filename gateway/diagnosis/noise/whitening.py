@@ -172,13 +172,12 @@ def coloured_whitener(bench: Bench, remainder_n: Floats, basis: Floats, weights:
     They took most at the slow end, where trends and steps live: each line of the periodogram is divided by the share
     that they left there, or the noise would look too small just where false causes are likeliest.
     """
-    basis = np.vstack([basis, bench.nuisance.T])
     noises = []
     for channel in bench.channels:
         part, usable = remainder_n[channel.rows] * weights[channel.rows], bench.usable[channel.rows]
         length = fast_length(part.size)
         taken = np.zeros(length // 2 + 1)
-        for column in basis:  # one at a time: there are hundreds
+        for column in (*basis, *bench.nuisance.T):  # one at a time: there are hundreds
             taken += np.abs(np.fft.rfft(column[channel.rows], length)) ** 2 / part.size
         noises.append(_fit_noise(part, np.clip(1.0 - taken, _LEAST_LEFT, 1.0) * max(float(np.mean(usable)), 0.05)))
     return Whitener(bench.channels, tuple(noises), weights)

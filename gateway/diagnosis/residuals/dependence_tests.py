@@ -31,7 +31,7 @@ _OWN_POWER: Final = 1.0e-6  # of a column's power that the model must leave: rou
 _OWN_POWER_IN_DOUBT: Final = (
     0.01  # ... and where times are in doubt: of the rate, a fitted delay leaves the corners only
 )
-_REGRESSORS_AT_ONCE: Final = 60  # questions
+_REGRESSORS_AT_ONCE: Final = 16  # questions
 _MOST_DEPENDENCES: Final = 6
 MOST_LEFTOVERS: Final = 3  # that are told
 

@@ -198,6 +198,7 @@ def unexplained_residual(found: CandidateColumns, fitted: FittedModel) -> tuple[
     normal_matrix = rows @ rows.T
     sizes, vectors = np.linalg.eigh(normal_matrix)
     kept = sizes > _INDEPENDENT
-    basis = (vectors[:, kept].T @ rows) / np.sqrt(sizes[kept])[:, None]
+    basis = vectors[:, kept].T @ rows
+    basis /= np.sqrt(sizes[kept])[:, None]
     residual = fitted.residual_n
     return residual - (residual @ basis.T) @ basis, basis

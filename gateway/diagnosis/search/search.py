@@ -8,7 +8,7 @@ What pays is in acceptance.py. Besides:
       would be done, and its name taken, by another one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -52,6 +52,7 @@ _DISCREPANT_CHI2_PER_ROW: Final = 3.0  # chi-square per row of the winner
 _MOST_RIVALS: Final = 2  # looked at beside the winner
 _COMPANIONS: Final = 2  # looked at closely for each
 _LEAST_RIVAL_SHARE: Final = 0.05  # share from which a rival is looked at
+_UNDISPUTED_SHARE: Final = 0.8  # of a winner that stands where such a rival falls
 _NEXT_TO: Final = 0.01  # of the force's standard deviation
 _WAVES_AGAIN: Final = 2  # of a model that other rows or another noise have hardly moved ...
 _WAVES_WIDENED: Final = 3  # ... that gains a parameter ...
@@ -84,12 +85,12 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
         winner, saved = None, 0.0
         is_seen = bench.rms_n(fitted.residual_n) >= RESOLUTION_N
         if is_seen and comparison.ranked and is_significant(comparison.winner, comparison.starts):
-            winner, saved = comparison.winner, saved_share(bench, fitted, comparison.winner, whiten, explained)
-            if saves_enough(winner, saved):  # the name of a trifle is not worth foresight
-                winner = _pick_with_companions(bench, comparison, not_accepted(effects, accepted), whiten)
-                saved = saved if winner is comparison.winner else saved_share(bench, fitted, winner, whiten, explained)
-            saved *= is_more_than_a_wrong_form(winner, saved, explained)
-            saved *= saved > 0.0 and stands_in_its_own_noise(bench, fitted, winner, comparison.starts, whiten)
+            for winner in _worth_a_look(
+                bench, comparison, not_accepted(effects, accepted), (fitted, explained), whiten
+            ):
+                saved = _saved_if_sound(bench, comparison, winner, (fitted, explained), whiten)
+                if saved > 0.0:
+                    break
         counted = len(accepted)
         progress.report("looking for what no effect explains")
         dependence = strongest_dependence(bench, fitted, whiten, unnamed, outside=True)
@@ -114,6 +115,38 @@ def search_effects(bench: Bench, base: FittedModel, effects: Sequence[Effect], w
     if len(accepted) > 1:
         return _exchange_effects(found, effects, len(accepted) - is_newest_settled)
     return found
+
+
+def _worth_a_look(
+    bench: Bench,
+    comparison: ModelComparison,
+    effects: Sequence[Effect],
+    model: tuple[FittedModel, float],
+    whiten: Whitener,
+) -> Iterator[RefinedEffect]:
+    """Yield a rival that, with a companion, explains clearly more than the winner, then a winner by far: a rival that turns
+    out to be no finding does not take its place. model: the present one, and what its causes explain."""
+    winner = comparison.winner
+    if saves_enough(
+        winner, saved_share(bench, model[0], winner, whiten, model[1])
+    ):  # a trifle's name needs no foresight
+        best = _pick_with_companions(bench, comparison, effects, whiten)
+        if best is not winner:
+            yield best
+            if comparison.shares.get(winner.effect.name, 0.0) < _UNDISPUTED_SHARE:
+                return
+    yield winner
+
+
+def _saved_if_sound(
+    bench: Bench, comparison: ModelComparison, winner: RefinedEffect, model: tuple[FittedModel, float], whiten: Whitener
+) -> float:
+    """Share of the held-out squared error that an effect saves; 0 where it may be the work of a wrong form, or of noise."""
+    fitted, explained = model
+    saved = saved_share(bench, fitted, winner, whiten, explained)
+    if not (saved > 0.0 and is_more_than_a_wrong_form(winner, saved, explained)):
+        return 0.0
+    return saved if stands_in_its_own_noise(bench, fitted, winner, comparison.starts, whiten) else 0.0
 
 
 def _is_finding(winner: RefinedEffect, before: FittedModel, comparison: ModelComparison) -> bool:
