@@ -1,5 +1,6 @@
 """The five field shapes, both ways, and what they refuse."""
 
+import re
 from math import inf, nan
 
 import pytest
@@ -8,6 +9,16 @@ from hypothesis import strategies as st
 
 from gateway.devices import TemplateError, ValueRefused
 from gateway.devices.checksum import add_checksum, strip_checksum
+from gateway.devices.fields import (
+    _LONGEST_NUMBER,
+    Choice,
+    Decimals,
+    HexNumber,
+    RegisterNumber,
+    Text,
+    WholeNumber,
+    field_from,
+)
 from gateway.devices.template import compile_template
 
 
@@ -66,6 +77,71 @@ def test_text_that_would_not_come_back_is_refused(template: str, values: dict[st
         encoded = compiled.encode(values)
         if compiled.decode(encoded) != values:
             raise ValueRefused(encoded)
+
+
+SHAPES = {
+    "d": WholeNumber("x", "", "", 0),
+    "+d": WholeNumber("x", "+", "", 0),
+    "04d": WholeNumber("x", "", "0", 4),
+    "+012d": WholeNumber("x", "+", "0", 12),
+    "7d": WholeNumber("x", "", "", 7),
+    "02X": HexNumber("x", 2),
+    ".3f": Decimals("x", "", "", 0, 3),
+    "+07.2f": Decimals("x", "+", "0", 7, 2),
+    "9.1f": Decimals("x", "", "", 9, 1),
+    "s": Text("x", 0),
+    "8s": Text("x", 8),
+    "int32": RegisterNumber("x", "int32", False),
+    "float32-cdab": RegisterNumber("x", "float32", True),
+    "uint16": RegisterNumber("x", "uint16", False),
+    "ST|US": Choice("x", ("ST", "US")),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_each_shape_is_read_to_its_last_letter(shape: str) -> None:
+    assert field_from("x", shape) == SHAPES[shape]
+
+
+@pytest.mark.parametrize(
+    ("shape", "value", "sentence"),
+    [
+        ("03d", 1000, "x = 1000: does not fit in 3 characters"),
+        ("d", 10**30, "too large"),
+        ("d", 0.5, "x = 0.5: not a whole number"),
+        ("02X", 256, "x = 100: does not fit in 2 characters"),
+        ("02X", -1, "x = -1: not a whole number from 0"),
+        (".3f", 1e30, "x = 1e+30: too large"),
+        ("+07.3f", 100.0, "x = +100.000: does not fit in 7 characters"),
+        ("3s", "four", "x = four: does not fit in 3 characters"),
+        ("s", "a ", "x = 'a ': not printable text"),
+        ("ST|US", "OL", "x = OL: not one of ST, US"),
+        ("int32", 0.5, "x = 0.5: not a whole number"),
+        ("uint16", -1, "x = -1: does not fit into uint16"),
+        ("uint16", 65536, "x = 65536: does not fit into uint16"),
+        ("float32", 1e39, "x = 1e+39: does not fit into float32"),
+        ("d", nan, "x = nan: not a finite number"),
+        ("d", "5", "x = 5: not a number"),
+    ],
+)
+def test_a_refused_value_is_told_with_its_name_and_why(shape: str, value: float | str, sentence: str) -> None:
+    with pytest.raises(ValueRefused, match=re.escape(sentence)):
+        field_from("x", shape).encode(value)
+
+
+def test_the_longest_numbers_are_still_told() -> None:
+    longest = 10.0**_LONGEST_NUMBER
+    for shape in ("d", ".1f"):
+        field_from("x", shape).encode(longest - 2.0)
+        with pytest.raises(ValueRefused, match="too large"):
+            field_from("x", shape).encode(longest)
+
+
+def test_registers_are_read_in_their_own_order() -> None:
+    assert field_from("x", "int32").encode(0x12345678) == "12345678"
+    assert field_from("x", "int32-cdab").encode(0x12345678) == "56781234"
+    assert field_from("x", "int32-cdab").decode("56781234") == 0x12345678
+    assert field_from("x", "float32").decode("7FC00000") is None
 
 
 def test_a_missing_decimal_point_is_no_number() -> None:

@@ -48,6 +48,19 @@ def test_following_more_follows_gives_every_object_of_the_category(identity: dic
     assert walked(identity, code) == {number: value for number, value in identity.items() if number <= last}
 
 
+def test_an_object_that_fills_an_answer_is_whole_and_a_longer_one_is_cut() -> None:
+    room = 253 - 7 - 2  # of the PDU, less its head, number and length
+    whole, cut = SHORT | {3: bytes(room)}, SHORT | {3: bytes(room + 1)}
+    for identity in (whole, cut):
+        first = identification_answer(identification_request(REGULAR, 0), identity)
+        assert parse_identification(first[1:]) == (SHORT, 3)
+        second = identification_answer(identification_request(REGULAR, 3), identity)
+        assert len(second) == 253
+        assert parse_identification(second[1:]) == ({3: bytes(room)}, None)
+        alone = identification_answer(identification_request(INDIVIDUAL, 3), identity)
+        assert parse_identification(alone[1:]) == ({3: bytes(room)}, None)
+
+
 def test_one_object_can_be_asked_for() -> None:
     reply = identification_answer(identification_request(INDIVIDUAL, 1), SHORT)
     assert parse_identification(reply[1:]) == ({1: b"Product"}, None)

@@ -3,6 +3,7 @@
 import pytest
 
 from gateway.codes.refusals import RefusalReason
+from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import ControlBit
 from gateway.registers.writes.ownership import NOT_IPV4, ip_number
 
@@ -49,6 +50,39 @@ def test_anybody_may_stop_and_nothing_else_is_taken(bank, master, other, command
     assert (commands[-1].heartbeat, commands[-1].force_ramp_n_per_s) == (7, 30.0)
     assert bank.owner is None
     assert bank.read_registers(116, 2) == bytes(4)
+
+
+@pytest.mark.parametrize(("stands", "written", "left"), [(32, 0, 0), (33, 1, 1), (32, 2, 0), (32, 4, 0)])
+def test_anybody_may_end_a_run_and_nothing_else_is_taken(make_bank, master_of, stands, written, left):
+    """Clearing bit 5 is no request for more, whatever stands beside it; an enable is one."""
+    bank = make_bank(supported_bits=BASIC_BITS | ControlBit.START_CALIBRATION)
+    owner, other = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
+    owner.write(0, stands, 0, 50)
+    other.write(0, written, 1300, 70)
+    assert (bank.command.control_word, bank.command.force_setpoint_n, bank.command.force_ramp_n_per_s) == (
+        left,
+        0.0,
+        5.0,
+    )
+    assert other.word(0) == left
+    owner.write(0, 32)
+    assert other.refusal(other.write, 0, 1).reason is RefusalReason.NOT_OWNER
+
+
+def test_a_takeover_lasts_when_its_command_rests(bank, master, other):
+    master.write(0, 1, 1200)
+    other.write(0, 1 | 8)
+    other.bank.clear_command()
+    assert bank.owner == "10.0.0.2"
+    assert master.refusal(master.write, 1, 100).reason is RefusalReason.NOT_OWNER
+
+
+def test_the_audit_hears_who_wrote_what_before_and_who_owned(bank, master):
+    heard = []
+    bank.on_write = lambda *given: heard.append(given)
+    master.write(0, 1, 1200)
+    ((peer, before, admitted, owners),) = heard
+    assert (peer, before[1], admitted.values[1], owners) == (master.peer, 0.0, 12.0, (None, "10.0.0.1"))
 
 
 def test_a_stop_when_nothing_runs_is_no_error_and_no_command(master, other, commands):

@@ -239,6 +239,33 @@ def test_a_wrong_map_is_told_where_and_why(change, sentence):
         read_map(document)
 
 
+@pytest.mark.parametrize(
+    ("base", "is_fitting"), [(198, False), (199, False), (200, True), (264, True), (265, False), ("200", False)]
+)
+def test_a_float_block_repeats_what_fits_into_it_to_the_last_word(document, base, is_fitting):
+    changed = deepcopy(document)
+    changed["blocks"]["float_abcd"]["repeats"] = {"command": base}
+    if is_fitting:
+        assert read_map(changed).block("float_abcd").repeats == {"command": base}
+        return
+    with pytest.raises(MapError) as caught:
+        read_map(changed)
+    assert [sentence for _, sentence, *_ in caught.value.faults] == [
+        f"{base} .. does not fit in float_abcd, 200 .. 295"
+    ]
+
+
+def test_limits_that_a_register_cannot_carry_are_refused_at_the_edge(document):
+    changed = deepcopy(document)
+    ramp = changed["blocks"]["command"]["registers"][2]
+    ramp["max"] = 3276.8  # 32768 counts of 0.1 N/s
+    with pytest.raises(MapError) as caught:
+        read_map(changed)
+    assert [sentence for _, sentence, *_ in caught.value.faults] == ["3276.8 does not fit in int16 with scale 0.1"]
+    ramp["max"] = 3276.7
+    assert read_map(changed).find("force_ramp").maximum == 3276.7
+
+
 def test_every_fault_is_told_at_once_with_its_place():
     document = small() | {"version": 0}
     document["blocks"]["only"]["registers"][0]["access"] = "W"

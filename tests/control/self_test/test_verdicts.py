@@ -1,0 +1,104 @@
+"""At which number a verdict changes, and the bounds that it names to people."""
+
+from dataclasses import replace
+
+import pytest
+
+from gateway.control.inputs import WireCounts
+from gateway.control.self_test.items import FAILED, NOT_TESTED, PASSED, WARNED
+from gateway.control.self_test.judgement import (
+    Known,
+    judge_leak,
+    judge_noise,
+    judge_output_line,
+    judge_resolution,
+    judge_response,
+    judge_scale,
+    judge_zero,
+)
+from gateway.control.self_test.measurements import Slope
+from gateway.control.settings import SelfTestSettings
+from tests.control.bench import bsfm, settings
+
+RIG = Known(replace(settings(), self_test=SelfTestSettings()), bsfm())
+MEASURED = replace(RIG, noise_n=0.05)
+BOUNDS = {
+    "zero": (lambda x: judge_zero(x, RIG), 0.5, 1.0, "allowed 0.50 N, fails above 1.00 N"),
+    "zero below": (lambda x: judge_zero(-x, RIG), 0.5, 1.0, "allowed 0.50 N, fails above 1.00 N"),
+    "noise": (lambda x: judge_noise(x, RIG), 0.25, 0.5, "allowed 0.250 N, fails above 0.500 N (in_band_tolerance_n 1 N)"),
+    "noise, calibrated": (lambda x: judge_noise(x, MEASURED), 0.1, 0.2,
+                          "allowed 0.100 N, fails above 0.200 N (0.050 N when it was calibrated)"),
+    "resolution": (lambda x: judge_resolution(x, 200, RIG), 0.2, 0.5, "allowed 0.200 N, fails above 0.500 N"),
+    "response": (lambda x: judge_response(x, RIG), 0.29, 0.53,
+                 "allowed 290 ms, fails above 530 ms (120 ms supervision.response_lag_s)"),
+    "leak": (lambda x: judge_leak(Slope(-x, 0.0), 10.0, 4.0), 0.1, 0.4, "over 4 s, allowed 0.100 N/s, fails above 0.400 N/s"),
+    "leak, unsure": (lambda x: judge_leak(Slope(-x, 0.01), 10.0, 4.0), 0.13, 0.43, "allowed 0.130 N/s, fails above 0.430 N/s"),
+    "pressure": (lambda x: judge_leak(Slope(0.0, 0.0), 10.0, 4.0, x), 0.013, 0.043, "% per second lost, allowed 1 %"),
+    "slow answers": (lambda x: judge_output_line(WireCounts(100, 100, 0), x, RIG), 0.05, 0.1,
+                     "of 100 ms, allowed 2 % lost, fails above 10 %"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_a_verdict_changes_at_its_bound_and_nowhere_else(name: str) -> None:
+    judge, warns, fails, words = BOUNDS[name]
+    found = [judge(share) for share in (0.1 * warns, 0.99 * warns, 1.01 * warns, 0.99 * fails, 1.01 * fails)]
+    assert [one.verdict for one in found] == [PASSED, PASSED, WARNED, WARNED, FAILED]
+    assert all(words in one.text for one in found)
+
+
+def test_what_is_pressed_at_rest_is_told_with_a_cure() -> None:
+    assert judge_zero(0.49, RIG).text == "+0.49 N at rest, allowed 0.50 N, fails above 1.00 N"
+    assert judge_zero(-0.51, RIG).text.endswith(
+        "-0.51 N at rest, allowed 0.50 N, fails above 1.00 N; lift the tool and tare"
+    )
+
+
+@pytest.mark.parametrize(
+    ("change_n", "verdict", "words"),
+    [
+        (10.0, PASSED, "100% of the change that the calibration expects (10.0 N), allowed 80% .. 120%, fails outside 30%"),
+        (8.05, PASSED, "80% of"),
+        (7.95, WARNED, "; calibrate again"),
+        (12.05, WARNED, "; calibrate again"),
+        (3.05, WARNED, "; calibrate again"),
+        (2.95, FAILED, ": span or unit of the amplifier, or another slide than was calibrated"),
+        (29.5, WARNED, "; calibrate again"),
+        (30.5, FAILED, ": span or unit of the amplifier, or another slide than was calibrated"),
+    ],
+)  # fmt: skip
+def test_the_scale_is_judged_by_its_share(change_n: float, verdict: object, words: str) -> None:
+    found = judge_scale(change_n, 10.0, 0.0, 0.0)
+    assert found.verdict is verdict and words in found.text
+    assert ("calibrate again" in found.text) == (verdict is WARNED)
+
+
+def test_where_friction_leaves_no_room_the_scale_is_not_judged() -> None:
+    found = judge_scale(1.0, 1.0, 0.0, 4.0)
+    assert found.verdict is NOT_TESTED
+    assert found.text.endswith("; a friction of 4.0 N leaves too little room: raise self_test.force_n")
+    assert judge_scale(10.0, 10.0, 0.5, 1.0).text.endswith("allowed 63% .. 137%, fails outside 30% .. 300%")
+
+
+@pytest.mark.parametrize(
+    ("counts", "verdict", "words"),
+    [
+        (None, NOT_TESTED, "no exchange was counted"),
+        (WireCounts(0, 0, 0), NOT_TESTED, "no exchange was counted"),
+        (
+            WireCounts(100, 99, 0),
+            PASSED,
+            "0 of 100 questions without an answer, 0 answers unreadable",
+        ),
+        (WireCounts(100, 96, 0), WARNED, "3 of 100 questions"),
+        (WireCounts(100, 100, 3), WARNED, "0 of 100 questions without an answer, 3 answers unreadable"),
+        (WireCounts(100, 85, 0), FAILED, "14 of 100 questions"),
+    ],
+)
+def test_lost_answers_are_counted(counts: WireCounts | None, verdict: object, words: str) -> None:
+    found = judge_output_line(counts, 0.02, RIG)
+    assert found.verdict is verdict and found.text.startswith(words)
+
+
+def test_counts_are_taken_from_each_other() -> None:
+    assert WireCounts(10, 8, 3).since(WireCounts(4, 5, 1)) == WireCounts(6, 3, 2)
