@@ -109,10 +109,11 @@ def fit_usable(
     raise ValueError(f"no usable {free.form.model} of order {order}: " + "; ".join(free.verdicts.sentences))
 
 
-def is_moderate(branches: Branches) -> bool:
-    """Return whether no handle is far beyond the forces of the ends: a handle of 1500 N with a weight of 0.002 describes a
-    curve of 50 N as well as any, but no cell's range allows it."""
-    most_n = HANDLES_SHARE * _most_n(branches)
+def is_moderate(branches: Branches, measured_n: float | None = None) -> bool:
+    """Return whether no handle is far beyond the largest force: a handle of 1500 N with a weight of 0.002 describes a curve of
+    50 N as well as any, but no cell's range allows it. measured_n: that force, None for the largest of the branches' ends,
+    which are measured where no slip stops keep a branch from its end."""
+    most_n = HANDLES_SHARE * (_most_n(branches) if measured_n is None else measured_n)
     return all(
         abs(handle) <= most_n + 1.0e-9 for curve in (branches.rising, branches.falling) for handle in curve.handles
     )

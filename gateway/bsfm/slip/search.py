@@ -21,6 +21,7 @@ PENALTY_GRID: Final = 33
 END_PLACES: Final = np.geomspace(1.0e-4, 0.02, 8)  # of the range: beside the end at which the branches meet
 OPEN_AT: Final = 0.25  # of the range: the gap between the branches may be closing up to there
 GAP_N: Final = 0.1  # between the branches, of a margin of 1
+MOST_SHARE: Final = 1.45  # of the largest force: handles beyond 1.5 are refused (gateway.bsfm.fit.usable_fit)
 STEPS_MAX: Final = 200
 CLOSE: Final = 1.0e-5  # relative gain of a step that is the last
 REFUSED_N: Final = 1.0e3  # residual of branches that are no model
@@ -39,6 +40,7 @@ class SlipSearch:
         self._open, self._gap_n = np.minimum(1.0, places / OPEN_AT), GAP_N * margin
         self._slope = problem.system(start).slope
         self._log_weights = 2 * start.rising.order
+        self._most_n = MOST_SHARE * float(np.abs(problem.force_n).max())
 
     def best(self) -> Branches:
         """Return the branches at the minimum."""
@@ -47,8 +49,8 @@ class SlipSearch:
         return branches_of(minimum.x, self._start)
 
     def residuals(self, numbers: Floats) -> Floats:
-        """Return weighted errors, penalties, ridge: (rows + 3 grid + log weights,)."""
-        refused = np.full(len(self._slope) + 3 * len(self._grid_v) + self._log_weights, REFUSED_N)
+        """Return weighted errors, penalties, handles too large, ridge: (rows + 3 grid + numbers,)."""
+        refused = np.full(len(self._slope) + 3 * len(self._grid_v) + len(numbers), REFUSED_N)
         try:
             trial = branches_of(numbers, self._start)
         except ValueError:  # weights beyond a double
@@ -57,15 +59,18 @@ class SlipSearch:
             return refused
         problem, system = self._problem, self._problem.system(trial, self._slope)
         error_n = problem.weight * (system.matrix @ problem.best_shares(system) - system.target)
-        return np.concatenate([error_n, self._penalties(trial), RIDGE * numbers[-self._log_weights :]])
+        handles_n, log_weights = np.split(numbers, [-self._log_weights])
+        too_large_n = PENALTY * np.maximum(0.0, np.abs(handles_n) - self._most_n)
+        return np.concatenate([error_n, self._penalties(trial), too_large_n, RIDGE * log_weights])
 
     def jacobian(self, numbers: Floats) -> Floats:
-        """Return the derivatives of residuals where they are no refusal: (rows + 3 grid + log weights, numbers)."""
+        """Return the derivatives of residuals where they are no refusal: (rows + 3 grid + numbers, numbers)."""
         trial = branches_of(numbers, self._start)
         penalties = PENALTY * penalties_by_numbers(trial, self._grid_v, self._wanted_n_per_v, (self._open, self._gap_n))
-        ridge = np.zeros((self._log_weights, len(numbers)))
-        ridge[:, -self._log_weights :] = RIDGE * np.eye(self._log_weights)
-        return np.concatenate([self._errors_by_numbers(trial), penalties, ridge])
+        own = np.full(len(numbers), RIDGE)
+        handles_n = numbers[: -self._log_weights]
+        own[: len(handles_n)] = PENALTY * np.sign(handles_n) * (np.abs(handles_n) > self._most_n)
+        return np.concatenate([self._errors_by_numbers(trial), penalties, np.diag(own)])
 
     def _penalties(self, branches: Branches) -> Floats:
         """What a plant would not bear: slopes below the wanted one in N/V, the falling branch below the rising one in N."""

@@ -105,13 +105,14 @@ def fit_joint(branches: Branches, walks: Sequence[Walk], highest_order: int = HI
 
 def _usable_joint(start: Branches, walks: Sequence[Walk]) -> SlipFit | None:
     """With the smallest margin that leads to what may drive a plant."""
+    measured_n = max(float(np.abs(walk.force_n).max()) for walk in walks)
     for margin in MARGINS:
         problem = SlipProblem(list(walks), _radii_v(start))
         trust, branches = problem.weight, start
         for _ in range(2):
             branches = SlipSearch(problem, branches, margin).best()
             problem.weight = trust * _huber(problem, problem.errors_n(branches))
-        if verdicts_of(branches, SLOPE_FLOOR_N_PER_V).usable and is_moderate(branches):
+        if verdicts_of(branches, SLOPE_FLOOR_N_PER_V).usable and is_moderate(branches, measured_n):
             return _result(problem, branches, joint=True)
     return None
 

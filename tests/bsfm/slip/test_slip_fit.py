@@ -90,11 +90,14 @@ def test_the_joint_fit_finds_branches_that_no_staircase_shows() -> None:
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
-def test_the_searchs_gradient_is_that_of_its_residuals(order) -> None:
-    """Kaufman's Jacobian leaves out only what is orthogonal to the residuals."""
+@pytest.mark.parametrize("top", [1.0, 2.0])
+def test_the_searchs_gradient_is_that_of_its_residuals(order, top) -> None:
+    """Kaufman's Jacobian leaves out only what is orthogonal to the residuals. top: of the falling branch, beyond what its
+    handles may be as well."""
     problem = SlipProblem([walk_of(ladder()), walk(TURNS_V, 1)], np.geomspace(0.3, 2.0, 6))
     search = SlipSearch(problem, fit(ladder(), "bsfm", order, "tied").branches)
     at = free_numbers(search._start) * 1.01
+    at[2] *= top
     gradient = search.jacobian(at).T @ search.residuals(at)
 
     def half_square(numbers: Floats) -> float:

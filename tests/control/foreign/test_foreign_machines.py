@@ -19,21 +19,14 @@ from tests.control.foreign.machine import Machine, drawn
 from tests.control.foreign.stand import Calibrated, Stand, calibrated, settings
 
 FAST = (1, 5, 9, 18, 46)
-MENDED = (
-    29,
-    43,
-    46,
-    72,
-    80,
-    92,
-    100,
-    203,
-    205,
-)  # drawn after the tuning: a short second lag, a map that flattens, a dead
-# start that a push to 0 V runs into, friction that keeps what a push went beyond its wish
+# drawn after the tuning: a short second lag, a map that flattens, a dead start that a push to 0 V runs into, friction that
+# keeps what a push went beyond its wish
+MENDED = (29, 43, 46, 72, 80, 92, 100, 203)
 SEEDS = tuple(seed if seed in FAST else pytest.param(seed, marks=pytest.mark.long) for seed in (*range(20), *MENDED))
 NEVER_WORSE_N = 0.03  # of a difference of two RMS of nine steps
-STILL_WORSE_N = 0.07  # of a single force: half of the trim's dead zone
+STILL_WORSE_N = (
+    0.08  # of a single force: half of the dead zone of 0.15 N, within which the trim leaves what it remembers
+)
 MEDIAN_OF_BOUND = 1.5  # time to settle to 0.5 N, over what the plant's physics allows
 
 
@@ -113,6 +106,14 @@ def test_the_kept_calibrations_are_what_a_run_gives(seed):
             assert again.calibration.model().force_n(volts, way) == pytest.approx(
                 before.calibration.model().force_n(volts, way), abs=0.2
             )
+
+
+@pytest.mark.long
+def test_a_falling_branch_whose_top_nobody_saw_is_no_calibration_beyond_the_cell():
+    """It was fitted up to 121 N on a machine of 45 N, and the whole run refused (E401)."""
+    one = calibrated(drawn(200), load_rig("demo").calibration.model())
+    assert max(one.calibration.falling_handles_n) < 1.5 * one.calibration.rising_handles_n[-1]
+    assert one.calibration.slip_radii_v, "nor are the stops given up"
 
 
 @pytest.mark.parametrize("seed", [5, 7, 9])
