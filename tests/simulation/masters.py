@@ -39,7 +39,7 @@ def read_pdu(address: int, count: int) -> bytes:
 
 def control_of(pdu: bytes) -> int | None:
     """The control word that a write would set, None where it is not among what it writes; -1 where it changes single bits."""
-    if len(pdu) < 5 or pdu[0] not in WRITES:
+    if pdu[0] not in WRITES or len(pdu) < (10 if pdu[0] == 23 else 5):
         return None
     address = struct.unpack_from(">H", pdu, 5 if pdu[0] == 23 else 1)[0]
     if pdu[0] in (5, 15, 22):

@@ -129,6 +129,7 @@ class Simulation:
         )
         self.observer = Observer(bounds)
         self.outside = VirtualLoop(self.clock)
+        self.outside.set_exception_handler(self._on_error)
         self.loops = [self.outside]
         self.log = Log(self.clock)
         self.world = SimulatedRig(
@@ -168,6 +169,10 @@ class Simulation:
     def close(self) -> None:
         self.guardian.close()
         self.outside.close()
+
+    def _on_error(self, loop: object, context: dict[str, Any]) -> None:
+        """A mistake of the simulation itself: nothing that it says counts then."""
+        self.observer.broken.append(f"simulation: {context.get('exception')!r}")
 
     # -- what happens
 
