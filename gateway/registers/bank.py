@@ -17,7 +17,6 @@ written; it proves the order of one host.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Final
 
 from gateway.bsfm.model import Calibration
@@ -37,7 +36,7 @@ from gateway.registers.self_test_words import SelfTestWords
 from gateway.registers.status_block import StatusBlock
 from gateway.registers.upload.staging_block import NO_SLOT, StagingBlock
 from gateway.registers.words import ControlBit, State, StatusBit
-from gateway.registers.writes.admission import ALL_BITS, EDGE_BITS, TAKE, Admission, AdmittedWrite, OnWrite, Write
+from gateway.registers.writes.admission import ALL_BITS, Admission, AdmittedWrite, OnWrite, Write, accepted_sentence
 from gateway.registers.writes.byte_order_echo import ByteOrderEcho
 from gateway.registers.writes.command_block import (
     CONTROL_WORD,
@@ -47,7 +46,7 @@ from gateway.registers.writes.command_block import (
     check_zeros,
 )
 from gateway.registers.writes.edge_questions import Decide
-from gateway.registers.writes.ownership import Ownership, ip_number
+from gateway.registers.writes.ownership import LastWriters, Ownership, ip_number
 
 BITS: Final = 16
 
@@ -56,8 +55,7 @@ class RegisterBank:
     """Implements gateway.modbus.DataBank. Single-threaded; callbacks run inside the write or read that causes them.
 
     on_command: each accepted command write; on_refusal: each refusal; on_accepted: a sentence for each write that changed
-    something besides heartbeat and sequence; on_write, on_refused_write: each, for the audit. last_writer:
-    register name ("staging" for its whole block) -> (peer, time in s). now: monotonic clock in s.
+    something besides heartbeat and sequence; on_write, on_refused_write: each, for the audit. now: monotonic clock in s.
     """
 
     def __init__(self, register_map: RegisterMap, rules: BankRules, *, now: Callable[[], float]) -> None:
@@ -67,7 +65,7 @@ class RegisterBank:
         self.on_accepted: Callable[[str, Peer], None] | None = None
         self.on_write: OnWrite | None = None
         self.on_refused_write: Callable[[Refusal, Peer], None] = lambda refusal, peer: None
-        self.last_writer: dict[str, tuple[Peer, float]] = {}
+        self._writers = LastWriters()
         self.last_refusal: Refusal | None = None
         self.identity: Mapping[int, bytes] = build_identity(register_map.name, rules.rig_name)
         self._now = now
@@ -75,6 +73,7 @@ class RegisterBank:
         self._image = RegisterImage(register_map)
         self._roles = write_roles(register_map.blocks)
         self._data, self._room = self._image.data, self._image.room
+        self._command_block, self._command_role = register_map.block("command"), self._roles["command"]
         self._commands = CommandBlock(register_map, rules, self._image)
         self._status = StatusBlock(register_map, self._image)
         self._unpacked: Status | None = None
@@ -100,7 +99,7 @@ class RegisterBank:
     @property
     def server_id(self) -> ServerId:
         """The identity for FC17. It runs unless a fault is latched: whether a force is held is in status_word."""
-        self._pack_status()
+        self._catch_up()
         is_fault = self._image.word(self._bits[1]) & StatusBit.FAULT
         return build_server_id(self.identity, is_running=not is_fault)
 
@@ -112,8 +111,8 @@ class RegisterBank:
         """Return big-endian words of one block. Refusal (02) for a range that no block holds."""
         if not 0 < count <= self._room[address]:
             raise self._note_refusal(no_such_address(self._blocks, address, count), peer)
-        if self._unpacked is not None:
-            self._pack_status()
+        if self._image.is_behind:
+            self._catch_up()
         return bytes(self._data[2 * address : 2 * (address + count)])
 
     def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
@@ -126,16 +125,25 @@ class RegisterBank:
             first = self._bit_word(address, count)
         except Refusal as refusal:
             raise self._note_refusal(refusal, peer) from None
-        self._pack_status()
+        self._catch_up()
         word = self._image.word(first)
         return pack_bits([bool(word >> (address - first + k) & 1) for k in range(count)])
 
     def write_registers(self, address: int, data: bytes, peer: Peer) -> None:
         """Write all or nothing. Refusal says why not; nothing but the last-refusal registers has changed then."""
         try:
-            self._write(address, data, peer)
+            if self._is_command(address, len(data) // 2, peer):
+                self._write_command(Write(self._command_block, address, data, peer.identity), peer)
+            else:
+                self._write(address, data, peer)
         except Refusal as refusal:
             raise self._note_refused_write(refusal, peer) from None
+
+    def _is_command(self, address: int, count: int, peer: Peer) -> bool:
+        """Whether `_write` would hand this to the command block: the commonest write, found out in one look."""
+        block = self._command_block
+        is_inside = block.first <= address <= block.last and 0 < count <= self._image.writable[address]
+        return is_inside and peer.role >= self._command_role
 
     def write_bits(self, address: int, values: Sequence[bool], peer: Peer) -> None:
         """Write coils 0-15: the control word is read, changed and written under the same checks as by register."""
@@ -145,6 +153,7 @@ class RegisterBank:
                 raise Refusal(
                     RefusalReason.READ_ONLY, address, f"bits {first} .. {first + BITS - 1} are status_word, read only"
                 )
+            self._catch_up()
             mask = sum(1 << (address - first + k) for k in range(len(values)))
             bits = sum(bool(value) << (address - first + k) for k, value in enumerate(values))
             self._write(first, (self._image.word(first) & ~mask | bits).to_bytes(2, "big"), peer, mask)
@@ -153,6 +162,7 @@ class RegisterBank:
 
     def mask_write(self, address: int, and_mask: int, or_mask: int, peer: Peer) -> None:
         """Write some bits of one word, under the same checks as any write."""
+        self._catch_up()
         word, touched = self._image.word(address) if self._room[address] else 0, ~and_mask & ALL_BITS
         try:
             self._write(address, (word & and_mask | or_mask & touched).to_bytes(2, "big"), peer, touched)
@@ -172,8 +182,12 @@ class RegisterBank:
         """Show what control and service know, from the next read on: most that is published, nobody reads."""
         self._admission.is_calibrating = status.state is State.CALIBRATING
         self._unpacked = status
+        self._image.is_behind = True
 
-    def _pack_status(self) -> None:
+    def _catch_up(self) -> None:
+        """Pack what has been accepted and published since the last read: most of it is never read."""
+        self._image.is_behind = False
+        self._commands.show()
         if self._unpacked is not None:
             self._status.publish(self._unpacked)
             self._unpacked = None
@@ -212,7 +226,7 @@ class RegisterBank:
     def _amend(self, **changes: float) -> None:
         """The command in use becomes another one without a write: same number, none of its edges again."""
         word = ControlBit(int(self._commands.values[CONTROL_WORD]))
-        self.command = replace(self.command, control_word=word, stops=False, **changes)  # type: ignore[arg-type]
+        self.command = self.command._replace(control_word=word, stops=False, **changes)  # type: ignore[arg-type]
 
     def _note_refusal(self, refusal: Refusal, peer: Peer) -> Refusal:
         self.last_refusal = refusal
@@ -229,8 +243,8 @@ class RegisterBank:
         for first in self._bits:
             if count > 0 and first <= address and address + count <= first + BITS:
                 return first
-        words = [Block("control_word", self._bits[0], self._bits[0] + BITS - 1)]
-        words.append(Block("status_word", self._bits[1], self._bits[1] + BITS - 1))
+        names = zip(("control_word", "status_word"), self._bits, strict=True)
+        words = [Block(name, first, first + BITS - 1) for name, first in names]
         raise no_such_address(words, address, count)
 
     def _write(self, address: int, data: bytes, peer: Peer, touched: int = ALL_BITS) -> None:
@@ -244,7 +258,7 @@ class RegisterBank:
             raise role_refusal(peer, block, needed, address)
         if block.name == "staging":
             self.staging.write(address, data, peer)
-            self.last_writer["staging"] = peer, self._now()
+            self._writers.note(("staging",), peer, self._now())
             return
         if (cut := self._image.cuts_value(address, count)) is not None:
             text = f"{cut.name}@{cut.block} is the registers {cut.address} and {cut.address + 1}: write both in one request"
@@ -269,7 +283,7 @@ class RegisterBank:
     def _write_echo(self, address: int, data: bytes, peer: Peer) -> None:
         order = self._echo.write(address, data, peer.identity)
         if order is not None:
-            self.last_writer["byte_order_echo"] = peer, self._now()
+            self._writers.note(("byte_order_echo",), peer, self._now())
             self._tell(f"byte_order_echo {order.upper()}: use block {'200' if order == 'abcd' else '300'}", peer)
 
     def _write_command(self, write: Write, peer: Peer) -> None:
@@ -280,27 +294,25 @@ class RegisterBank:
         before, owner = self._commands.values, self._ownership.owner
         self._commands.store(admitted.values, admitted.kept)
         self._admission.note_stored(admitted)
-        self._settle_owner(admitted, peer)
-        names = self._commands.names(write.block, write.address, len(write.data) // 2)
-        self.last_writer.update(dict.fromkeys(names, (peer, now_s)))
+        self._settle_owner(admitted, write.host, peer)
+        self._writers.note(self._commands.names(write.block, write.address, len(write.data) // 2), peer, now_s)
         self.command = admitted.command
         self.on_command(self.command)
         if self.on_write is not None:
             self.on_write(peer, before, admitted, (owner, self._ownership.owner))
         if self.on_accepted is not None:
-            self._tell(self._sentence(before, owner, admitted), peer)
+            changes = self._commands.differences(before, admitted.values)
+            self._tell(accepted_sentence(changes, admitted, (owner, self._ownership.owner)), peer)
 
-    def _settle_owner(self, admitted: AdmittedWrite, peer: Peer) -> None:
-        ownership, values, host = self._ownership, admitted.values, peer.identity
-        if admitted.is_taken_over:
-            ownership.take(host, explicitly=True)
-        elif admitted.is_stop:
-            ownership.release()
-        elif admitted.kept or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT]:
-            if ownership.admits(host):  # not who has only ended a run
-                ownership.take(host)
-        else:
-            ownership.rest()
+    @property
+    def last_writer(self) -> dict[str, tuple[Peer, float]]:
+        """Register name ("staging" for its whole block) -> (peer, time in s)."""
+        return self._writers.by_name()
+
+    def _settle_owner(self, admitted: AdmittedWrite, host: str, peer: Peer) -> None:
+        ownership, values = self._ownership, admitted.values
+        asks = bool(admitted.kept or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT])
+        ownership.settle(host, takes_over=admitted.is_taken_over, stops=admitted.is_stop, asks=asks)
         if ownership.owner == host:
             self._owner_peer = peer
         self._show_owner()
@@ -308,19 +320,9 @@ class RegisterBank:
     def _show_owner(self) -> None:
         if self._ownership.owner != self._shown_owner:
             self._shown_owner = self._ownership.owner
-            is_known = (
-                self._owner_peer.identity == self._shown_owner
-            )  # else the rig names it, and it has not yet commanded
+            # else the rig names it, and it has not yet commanded
+            is_known = self._owner_peer.identity == self._shown_owner
             self._status.show_owner(ip_number(self._owner_peer.host if is_known else self._shown_owner))
-
-    def _sentence(self, before: list[float], owner: str | None, admitted: AdmittedWrite) -> str:
-        """Return what an accepted write changed; empty when nothing that people want to know."""
-        changes = self._commands.differences(before, admitted.values)
-        edges = int(admitted.command.control_word) & EDGE_BITS & ~TAKE
-        edge_names = ", ".join(bit.name.lower() for bit in ControlBit if bit & edges and bit.name)
-        now_owner = self._ownership.owner
-        owners = f"owner {owner or 'nobody'} -> {now_owner or 'nobody'}" if owner != now_owner else ""
-        return ", ".join(part for part in (changes, edge_names, owners) if part)
 
     def _tell(self, sentence: str, peer: Peer) -> None:
         if self.on_accepted is not None and sentence:

@@ -13,10 +13,12 @@ ADDRESSES: Final = 0x10000
 
 
 class RegisterImage:
-    """`data[2 * address]` is the high byte of a word. room[address]: words from there to its block's end, 0 outside."""
+    """`data[2 * address]` is the high byte of a word. room[address]: words from there to its block's end, 0 outside.
+    is_behind: more has been accepted or published than is packed here: whoever reads has that done first."""
 
     def __init__(self, register_map: RegisterMap) -> None:
         last = max((block.last for block in register_map.blocks), default=-1)
+        self.is_behind = False
         self.data = bytearray(2 * (last + 1))
         self.room = array("H", bytes(2 * ADDRESSES))
         self.writable = array("H", bytes(2 * ADDRESSES))  # words from there on that are not read-only, inside the block

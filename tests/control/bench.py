@@ -125,8 +125,8 @@ class Bench:
         """A master's write of some registers, as the bank would pass it on, or keep to itself (`refused`)."""
         number = self.command.number + 1
         changed = {**changes, "number": number, "received_s": self.now_s, "peer": "10.0.0.5"}
-        stands = replace(self.command, control_word=self.command.control_word & ~MOMENTARY)
-        wanted = replace(stands, **changed)  # type: ignore[arg-type]
+        stands = self.command._replace(control_word=self.command.control_word & ~MOMENTARY)
+        wanted = stands._replace(**changed)  # type: ignore[arg-type]
         silent = {"control_word", "heartbeat", "command_sequence"}
         names = tuple(name for name in changes if name not in silent and changes[name] != getattr(stands, name))
         self.refused = self.controller.refusal_of(self.now_s, ProposedWrite(wanted, lambda: names), self.line)
@@ -161,14 +161,13 @@ class Bench:
         self.events.extend(output.events)
         self.releases += output.release_owner
         if output.clear_command and not self.ignores_clearing:
-            cleared = replace(
-                self.command,
+            cleared = self.command._replace(
                 control_word=ControlBit(0),
                 force_setpoint_n=0.0,
                 voltage_setpoint_v=0.0,
                 number=self.command.number + 1,
             )
-            self.command = replace(cleared, heartbeat=0) if self.clearing_zeroes_heartbeat else cleared
+            self.command = cleared._replace(heartbeat=0) if self.clearing_zeroes_heartbeat else cleared
         return output
 
     def run(self, seconds: float) -> Output:

@@ -3,7 +3,6 @@ control is handed is always finite, in range and the owner's."""
 
 import math
 import struct
-from dataclasses import astuple
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -106,10 +105,42 @@ def test_no_sequence_of_requests_breaks_the_bank(register_map, steps):
 
 def check(bank: RegisterBank, handed: list, seen: int, peer: Peer) -> None:
     command = bank.command
-    assert all(not isinstance(value, float) or math.isfinite(value) for value in astuple(command))
+    assert all(not isinstance(value, float) or math.isfinite(value) for value in command)
     assert 0.0 <= command.force_setpoint_n <= 60.0
     assert command.control_word & ControlBit.ENABLE or bank._commands.values[0] == 0
     if len(handed) > seen:
         assert len(handed) == seen + 1
         assert handed[-1].peer == peer.identity
         assert bank.owner in (None, peer.identity)
+
+
+CYCLES = st.lists(
+    st.tuples(
+        st.sampled_from((0, 0, 1, 4, 200, 300)),
+        st.lists(st.sampled_from((0, 1, 2, 3, 8, 9, 33, 100, 1200, 0x8001)), min_size=1, max_size=13),
+        st.sampled_from(PEERS[:2]),
+    ),
+    max_size=30,
+)
+
+
+@settings(deadline=None, max_examples=100)
+@given(writes=CYCLES)
+def test_the_short_way_of_a_plain_write_ends_where_the_long_one_does(register_map, writes):
+    rules = BankRules(rig_name="demo", force_max_n=60.0)
+    short, long = (RegisterBank(register_map, rules, now=lambda: 1.0) for _ in range(2))
+    long._admission._is_plain = lambda host, word: False
+    long._is_command = lambda address, count, peer: False
+    for address, words, peer in writes:
+        data = struct.pack(f">{len(words)}H", *words)
+        said = []
+        for bank in (short, long):
+            bank.on_asked = control_says
+            try:
+                bank.write_registers(address, data, peer)
+                said.append("")
+            except Refusal as refusal:
+                said.append(str(refusal))
+        assert said[0] == said[1]
+        assert memory(short) == memory(long)
+        assert (short.command, short.owner, short.last_writer) == (long.command, long.owner, long.last_writer)

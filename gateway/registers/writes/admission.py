@@ -9,7 +9,6 @@ alone keeps the output: then the bit takes enable's place.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 from gateway.codes.refusals import RefusalReason
@@ -37,6 +36,7 @@ ENABLE: Final = int(ControlBit.ENABLE)
 TAKE: Final = int(ControlBit.TAKE_OWNERSHIP)
 STARTS: Final = ENABLE | RUN_BITS
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
+RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
 ALL_BITS: Final = 0xFFFF
 _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
 
@@ -67,6 +67,15 @@ OnWrite = Callable[[Peer, Values, AdmittedWrite, tuple[str | None, str | None]],
 """on_write(peer, values before, what was admitted, owner before and after) of each accepted write."""
 
 
+def accepted_sentence(changes: str, admitted: AdmittedWrite, owners: tuple[str | None, str | None]) -> str:
+    """Return what an accepted write changed; empty when nothing that people want to know. owners: before and after."""
+    edges = int(admitted.command.control_word) & EDGE_BITS & ~TAKE
+    edge_names = ", ".join(bit.name.lower() for bit in ControlBit if bit & edges and bit.name)
+    before, after = owners
+    change_of_owner = f"owner {before or 'nobody'} -> {after or 'nobody'}" if before != after else ""
+    return ", ".join(part for part in (changes, edge_names, change_of_owner) if part)
+
+
 class _PermittedWrite(NamedTuple):
     """What a write asks for, as far as its host may ask for it. written: its control word; is_stop: the output goes off."""
 
@@ -92,7 +101,14 @@ class Admission:
     def admit(self, write: Write, number: int, now_s: float) -> AdmittedWrite | None:
         """Return what a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
         commands, before = self._commands, self._commands.values
-        permitted = self._permit(write)
+        values = commands.decode(write.block, write.address, write.data)
+        commands.check_known(values, write.block)
+        if values[CONTROL_WORD] == before[CONTROL_WORD] and self._is_plain(write.host, int(values[CONTROL_WORD])):
+            word = int(values[CONTROL_WORD])
+            command = commands.command(values, word, number, now_s, write.host)
+            self._ask(command, values, write)
+            return AdmittedWrite(values, word, command, False, False, 0)
+        permitted = self._permit(write, values)
         if permitted is None:
             return None
         values, written, is_stop = permitted
@@ -100,9 +116,9 @@ class Admission:
             values[FORCE_SETPOINT] = values[VOLTAGE_SETPOINT] = 0.0
         command = commands.command(values, written, number, now_s, write.host)
         if is_stop:
-            command = replace(command, stops=True)
+            command = command._replace(stops=True)
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write):
-            command = replace(command, lowered_from_n=self.lowered_from_n)
+            command = command._replace(lowered_from_n=self.lowered_from_n)
         word_at = commands.address(write.block, CONTROL_WORD)
         self._ask(command, values, write)
         rises = written & ~int(before[CONTROL_WORD])
@@ -116,13 +132,17 @@ class Admission:
         self._held = admitted.held
         self.lowered_from_n = admitted.command.lowered_from_n
 
+    def _is_plain(self, host: str, word: int) -> bool:
+        """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, none was held, nothing
+        was lowered, no run has the output. What the checks below would find is known."""
+        is_usual = not (self._held or self.lowered_from_n or self.is_calibrating or word & RUN_BITS_OR_EDGES)
+        return is_usual and self._ownership.admits(host)
+
     # -- what the write asks for
 
-    def _permit(self, write: Write) -> _PermittedWrite | None:
+    def _permit(self, write: Write, values: Values) -> _PermittedWrite | None:
         """Return what the owner may ask for, or anybody: a stop, the end of a run. None: nothing to stop. Raises Refusal."""
         commands = self._commands
-        values = commands.decode(write.block, write.address, write.data)
-        commands.check_known(values, write.block)
         written, before = int(values[CONTROL_WORD]), int(commands.values[CONTROL_WORD])
         falls = before & ~written
         is_stop = bool(falls & ENABLE and not written & ~before & RUN_BITS) or self._is_bare_stop(write, written)

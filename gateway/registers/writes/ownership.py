@@ -7,8 +7,11 @@ the certificate (`Peer.identity`), not the connection: a master that reconnects 
 face are one host, for a bus has no addresses of masters.
 """
 
+from collections.abc import Sequence
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Final
+
+from gateway.modbus.peer import Peer
 
 NOT_IPV4: Final = 0xFFFFFFFF
 """Shown in owner_ip for an owner without an IPv4 address (IPv6)."""
@@ -52,6 +55,17 @@ class Ownership:
             self.is_explicit = explicitly or (self.is_explicit and self.owner == host)
             self.owner = host
 
+    def settle(self, host: str, *, takes_over: bool, stops: bool, asks: bool) -> None:
+        """Follow a write that was accepted. asks: it leaves something commanded; else it commands nothing any more."""
+        if takes_over:
+            self.take(host, explicitly=True)
+        elif stops:
+            self.release()
+        elif not asks:
+            self.rest()
+        elif self.admits(host):  # not who has only ended a run
+            self.take(host)
+
     def rest(self) -> None:
         """Release the ownership of a host that commands nothing any more, unless it took over explicitly."""
         if not self.is_explicit:
@@ -61,6 +75,23 @@ class Ownership:
         """Make nobody the owner, after a disable or the lease's end, unless the rig configures one."""
         self.is_explicit = False
         self.owner = self._configured
+
+
+class LastWriters:
+    """Who has written a register last, kept write by write, the latest last: most writes come in cycles, and nobody asks
+    after each."""
+
+    def __init__(self) -> None:
+        self._writes: dict[Sequence[str], tuple[Peer, float]] = {}
+
+    def note(self, names: Sequence[str], peer: Peer, now_s: float) -> None:
+        """Note that these registers have been written."""
+        self._writes.pop(names, None)
+        self._writes[names] = peer, now_s
+
+    def by_name(self) -> dict[str, tuple[Peer, float]]:
+        """Return register name -> (peer, time in s)."""
+        return {name: written for names, written in self._writes.items() for name in names}
 
 
 def ip_number(host: str | None) -> int:

@@ -1,7 +1,7 @@
 """One run of the controller against the twin, in virtual time: ticks, samples of the cell and a master's writes, as the
 gateway has them, without processes and wires."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import nan, radians
 from typing import Final
 
@@ -90,8 +90,7 @@ class SimulatedLoop:
         enable = ControlBit.ENABLE if time_s > 0.0 and self._controller.state is not State.FAULT else ControlBit(0)
         wanted = (enable, force_n if enable else 0.0, tilt_rad)
         if wanted != (command.control_word, command.force_setpoint_n, command.tilt_angle_rad):
-            self._command = replace(
-                command,
+            self._command = command._replace(
                 control_word=enable,
                 force_setpoint_n=wanted[1],
                 tilt_angle_rad=tilt_rad,

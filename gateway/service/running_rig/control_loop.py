@@ -11,7 +11,7 @@ ours may leave the last voltage standing: `_decide` turns any into the safe volt
 
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, nan
 from typing import Final
 
@@ -278,7 +278,7 @@ class ControlLoop:
         known = BackgroundStatus(self.controller.calibration_id, stored, self.residual_cause, self.plant_id)
         status = status_of(decision, self.health, self.output.pressure_pa, known)
         if decision.warnings & WarningBit.RESTARTED and not decision.fault:
-            status = replace(status, fault_code=self.restart_cause)
+            status = status._replace(fault_code=self.restart_cause)
         self.bank.publish(status)
         if self.controller.active_run.self_test is not self._shown_self_test:
             self._show_self_test()

@@ -80,7 +80,7 @@ class Stand:
         return self.ms * 0.001
 
     def write(self, **changes: Any) -> None:
-        self.command = replace(self.command, number=self.command.number + 1, peer="m", **changes)
+        self.command = self.command._replace(number=self.command.number + 1, peer="m", **changes)
         self._step()
 
     def force(self, force_n: float) -> None:
@@ -96,8 +96,8 @@ class Stand:
         self.output, self.wanted_v = output, output.voltage_v
         self.events.extend(output.events)
         if output.clear_command:
-            self.command = replace(
-                self.command, control_word=ControlBit(0), force_setpoint_n=0.0, number=self.command.number + 1
+            self.command = self.command._replace(
+                control_word=ControlBit(0), force_setpoint_n=0.0, number=self.command.number + 1
             )
         self._send()
 

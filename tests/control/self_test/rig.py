@@ -68,7 +68,7 @@ class SelfTestRig:
         return self.ms * 0.001
 
     def write(self, word: ControlBit) -> None:
-        self.command = replace(self.command, number=self.command.number + 1, control_word=word, peer="m")
+        self.command = self.command._replace(number=self.command.number + 1, control_word=word, peer="m")
         self._step()
 
     def tested(self) -> SelfTestReport:
@@ -123,7 +123,7 @@ class SelfTestRig:
         self.output = self.controller.step(self.now_s, self.command, self.sample, line)
         self.events.extend(self.output.events)
         if self.output.clear_command:
-            self.command = replace(self.command, control_word=ControlBit(0), number=self.command.number + 1)
+            self.command = self.command._replace(control_word=ControlBit(0), number=self.command.number + 1)
         self._send(self.output.voltage_v)
 
     def _send(self, wanted_v: float) -> None:
