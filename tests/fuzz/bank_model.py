@@ -16,6 +16,14 @@ FIELDS = (
     (1, False, 0, 65535), (100, True, 0, 327.67), (1, True, 0, 32767),
 )  # fmt: skip
 PROOF_RESERVED = (401, 430, 431)
+STATUS_RESERVED = (
+    64,
+    65,
+    66,
+    67,
+    74,
+    75,
+)  # of a float face: owner_ip, and the second half of refusal_value, which none shows
 """Words between 400 and 431 that no register has: 0 may be written to them, as to all reserved words."""
 NAMED, FACES = len(FIELDS), {200: "abcd", 300: "cdab"}
 ENABLE, TAKE, KNOWN, MOMENTARY = 1, 8, 15, 2 | 4 | 8
@@ -70,13 +78,18 @@ class BankModel:
             self._write_proof(address, words)
             return
         base = 0 if address < 100 else address // 100 * 100
+        if base and address - base >= 32:
+            if any(words):
+                raise Refused(3)
+            return
         changed = self._values_of(base, address - base, words)
         covers = self._covers(base, address - base, len(words))
         self._admit(changed, covers, host)
 
     def _is_writable(self, address: int, count: int) -> bool:
         if 200 <= address <= 395:
-            return address % 100 + count <= 32
+            places = range(address % 100, address % 100 + count)
+            return all(place < 32 or place in STATUS_RESERVED for place in places)
         return all(at in (416, 417) or at in PROOF_RESERVED for at in range(address, address + count) if at >= 400)
 
     def _write_proof(self, address: int, words: Words) -> None:

@@ -11,6 +11,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.registers import BankRules, Command, RegisterBank
 from gateway.registers.words import ControlBit, Mode
+from tests.calibrations.coefficients import calibration
 
 
 def test_enable_and_setpoint_in_one_write_are_one_command(master, commands):
@@ -174,3 +175,46 @@ def test_the_command_is_handed_on_before_anybody_is_told(bank, master):
     bank.on_command = lambda command: order.append("commanded")
     master.write(1, 100)
     assert order == ["commanded", "told"]
+
+
+def test_values_at_their_limits_are_taken(make_bank, master_of):
+    master = master_of(make_bank(setpoint_min_n=2.0), "10.0.0.1")
+    for address, word in ((1, 6000), (1, 200), (6, -1800), (6, 1800), (2, 32767), (5, 10000), (7, 6000), (3, 1)):
+        master.write(address, word)
+        assert master.word(address) == word & 0xFFFF
+    assert "allowed 0 and 2 .. 60 N" in master.refusal(master.write, 1, 199).sentence
+
+
+def test_an_enumeration_is_told_by_its_name(bank, master):
+    told = []
+    bank.on_accepted = lambda sentence, peer: told.append(sentence)
+    master.write(3, 1)
+    assert told == ["mode 0 (force) -> 1 (voltage)"]
+
+
+@pytest.mark.parametrize(("bit", "name"), [(32, "start_calibration"), (64, "start_self_test")])
+def test_a_bit_that_was_held_beyond_its_run_begins_none_until_it_was_0(make_bank, master_of, bit, name):
+    """Held by its owner's cyclic writes; neither a write beside the control word nor another master's lets it go."""
+    bank = make_bank(supported_bits=ControlBit(127))
+    master, other = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
+    master.write(0, bit)
+    master.write(0, bit)
+    bank.clear_command()  # the run is over
+    master.write(4, 99)
+    other.write(4, 7)
+    refusal = master.refusal(master.write, 0, bit)
+    assert (refusal.code, refusal.reason) == (4, RefusalReason.CALIBRATION_HELD)
+    assert refusal.sentence.endswith(f"{name} was kept at 1 beyond the end of its run: write it as 0 once, then as 1")
+    master.write(0, 0)
+    master.write(0, bit)
+    assert master.word(0) == bit
+
+
+def test_a_setpoint_lowered_twice_is_told_as_it_was_asked_for_first(make_bank, master_of):
+    bank = make_bank()
+    master = master_of(bank, "10.0.0.1")
+    master.write(0, 1, 5000)
+    for high_n, left in ((40.0, 4000), (30.0, 3000)):
+        sentence = bank.set_active_model(calibration(force_limits_n=(0.0, high_n)))
+        assert f"to {left / 100:.2f} N" in sentence and master.word(1) == left
+        assert bank.command.force_requested_n == 50.0
