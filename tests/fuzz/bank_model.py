@@ -25,6 +25,7 @@ STATUS_RESERVED = (
     75,
 )  # of a float face: owner_ip, and the second half of refusal_value, which none shows
 """Words between 400 and 431 that no register has: 0 may be written to them, as to all reserved words."""
+ACTIVE_RESERVED = (1501, 1641, 1646, 1647, 1648, 1649, 1651)
 NAMED, FACES = len(FIELDS), {200: "abcd", 300: "cdab"}
 ENABLE, TAKE, KNOWN, MOMENTARY = 1, 8, 15, 2 | 4 | 8
 Words = list[int]
@@ -72,13 +73,13 @@ class BankModel:
     def write(self, address: int, words: Words, host: str) -> None:
         """Raises Refused, and has changed nothing then."""
         self.check_address(address, len(words))
-        if address >= 1500 or 100 <= address <= 131 or not self._is_writable(address, len(words)):
+        if not self._is_writable(address, len(words)):
             raise Refused(2)
         if 400 <= address <= 431:
             self._write_proof(address, words)
             return
         base = 0 if address < 100 else address // 100 * 100
-        if base and address - base >= 32:
+        if base not in (0, *FACES) or address - base >= 32:
             if any(words):
                 raise Refused(3)
             return
@@ -87,10 +88,12 @@ class BankModel:
         self._admit(changed, covers, host)
 
     def _is_writable(self, address: int, count: int) -> bool:
+        places = range(address, address + count)
         if 200 <= address <= 395:
-            places = range(address % 100, address % 100 + count)
-            return all(place < 32 or place in STATUS_RESERVED for place in places)
-        return all(at in (416, 417) or at in PROOF_RESERVED for at in range(address, address + count) if at >= 400)
+            return all(place % 100 < 32 or place % 100 in STATUS_RESERVED for place in places)
+        if address >= 1500:
+            return all(place in ACTIVE_RESERVED for place in places)
+        return address < 100 or all(place in (416, 417) or place in PROOF_RESERVED for place in places)
 
     def _write_proof(self, address: int, words: Words) -> None:
         given = dict(enumerate(words, address))
