@@ -1,0 +1,58 @@
+"""Amplifiers that speak in registers or raw bytes: what a status bit means, what is noise, where a value ends."""
+
+from dataclasses import replace
+
+import pytest
+
+from gateway.devices import DeviceProfile, cell_device, cell_host
+from gateway.devices.binary.weight_registers import RegisterBit
+from gateway.devices.messages import ForceSample, Garbage, Quality
+from tests.profile_files import load_device
+
+
+@pytest.fixture(scope="module")
+def moving() -> DeviceProfile:
+    """An amplifier whose status says in bits 9 and 12 that the weight is in motion."""
+    profile = load_device("laumas-tlb")
+    registers = profile.reading.modbus
+    assert registers
+    unstable = (RegisterBit(register=6, bit=9), RegisterBit(register=6, bit=12))
+    assert profile.read_force
+    return replace(profile, read_force=replace(profile.read_force, modbus=replace(registers, unstable=unstable)))
+
+
+@pytest.mark.parametrize("quality", [Quality.OK, Quality.UNSTABLE, Quality.OVERLOAD])
+def test_what_an_amplifier_says_of_its_weight_is_heard(moving: DeviceProfile, quality: Quality) -> None:
+    host, device = cell_host(moving), cell_device(moving)
+    host.poll()
+    (sample,) = host.receive(device.frame(-12.0, quality), 1.5)
+    assert isinstance(sample, ForceSample)
+    assert (sample.quality, sample.time_s) == (quality, 1.5)
+    if quality is not Quality.OVERLOAD:
+        assert sample.force_n == pytest.approx(-12.0, abs=host.resolution_n)
+
+
+def test_noise_between_values_is_counted_byte_for_byte() -> None:
+    profile = load_device("hbm-aed-binary")
+    unit = None if profile.reading.newton_per_unit else "N"
+    host, device = cell_host(profile, unit=unit), cell_device(profile, unit)
+    frame = device.frame(12.0)
+    heard = host.receive(frame + b"\x01\x02\x03" + frame, 0.0)
+    assert [type(one) for one in heard] == [ForceSample, Garbage, ForceSample]
+    assert [one.data for one in heard if isinstance(one, Garbage)] == [b"\x01\x02\x03"]
+    size = len(frame)
+    (alone,) = host.receive(b"\x07" * (size + 2), 0.0)
+    assert alone == Garbage(b"\x07" * 3), "the rest may be the beginning of a value"
+    host.forget()
+    assert [type(one) for one in host.receive(frame, 0.0)] == [ForceSample]
+
+
+def test_a_value_beyond_the_range_stands_at_its_end() -> None:
+    profile = load_device("hbm-aed-binary")
+    unit = None if profile.reading.newton_per_unit else "N"
+    host, device = cell_host(profile, unit=unit), cell_device(profile, unit)
+    for force_n in (1e12, -1e12):
+        (sample,) = host.receive(device.frame(force_n), 0.0)
+        assert isinstance(sample, ForceSample)
+        assert abs(sample.raw) >= profile.reading.largest_shown
+        assert (sample.raw > 0) == (force_n > 0)
