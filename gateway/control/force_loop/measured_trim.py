@@ -36,7 +36,7 @@ WIDER: Final = 1.5  # zone after each turn
 SLOWER: Final = 0.6  # pace after each turn
 MOST_TURNS: Final = 5
 NEW_TARGET_N: Final = 1.0
-SAME_WAY_N: Final = 5.0
+SAME_WAY_N: Final = 10.0  # steps the same way err alike: friction yields more to a fast slide than to a ladder's stairs
 OTHER_WAY_N: Final = 1.0
 
 

@@ -59,7 +59,7 @@ def test_what_was_learned_stays_for_chatter_fades_on_the_way_and_is_not_turned_o
     assert abs(one.value_n) < 0.06 * learned_n
     one.travel(3.0)
     assert one.value_n == pytest.approx(learned_n, abs=0.06 * learned_n)
-    one.travel(5.0)
+    one.travel(10.0)
     assert one.value_n < 0.4 * learned_n
 
 
@@ -72,7 +72,7 @@ def test_what_both_directions_agree_on_outlives_a_turn():
         way = -way
     one.travel(1.5 * way)
     assert one.value_n > 0.6
-    one.travel(20.0 * way)
+    one.travel(40.0 * way)
     assert abs(one.value_n) < 0.05
 
 
