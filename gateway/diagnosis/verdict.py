@@ -161,7 +161,7 @@ def _unseen(findings: SearchFindings, found: SearchResult, causes: Sequence[Caus
     """Effects that the recording cannot show: not those found, and not those that the base model has anyway."""
     fixed = frozenset(effect.name for effect in EFFECTS) - {effect.name for effect in findings.effects}
     names = frozenset(cause.name for cause in causes)
-    return find_invisible_effects(findings.bench, findings.effects, found.first.scores, names | fixed)
+    return find_invisible_effects(findings.bench, findings.effects, found.first, names | fixed)
 
 
 def _notes(bench: Bench, reported: ReportedModels, noise: _Noise, dropped: Sequence[DoubtfulEffect]) -> Iterator[str]:

@@ -9,28 +9,37 @@ from typing import Final
 
 from gateway.catalogue.effect import Effect
 from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.model_fit.initial_state import with_known_rests
+from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem
 from gateway.diagnosis.result import NotIdentifiable
-from gateway.diagnosis.search.candidates import CandidateScore
+from gateway.diagnosis.search.model_comparison import ModelComparison
 
 _VISIBLE: Final = 30.0  # chi-square that an effect must reach at a noticeable size
 
 
 def find_invisible_effects(
-    bench: Bench, effects: Sequence[Effect], scores: Sequence[CandidateScore], taken: frozenset[str]
+    bench: Bench, effects: Sequence[Effect], first: ModelComparison, taken: frozenset[str]
 ) -> tuple[NotIdentifiable, ...]:
-    """Return effects that this recording cannot show, with the reason; `taken` are part of the base model or found."""
+    """Return effects that this recording cannot show, with the reason; `taken` are part of the base model or found.
+
+    first: the comparison beside the base model alone.
+    """
+    is_held = with_known_rests(bench, FitProblem(first.beside.parameters, first.beside.free)) is not None
     strength: dict[str, float] = {}
     share: dict[str, float] = {}
-    for score in scores:
+    for score in first.scores:
         name = score.candidate.effect.name
         strength[name] = max(strength.get(name, 0.0), score.power)
         share[name] = max(share.get(name, 0.0), score.alone)
     answers = []
     columns = bench.columns()
     for effect in effects:
-        if effect.name in taken or effect.direct or strength.get(effect.name, 0.0) >= _VISIBLE:
+        is_hidden = is_held and any(form.like_a_held_start for form in effect.forms)
+        if effect.name in taken or effect.direct or (strength.get(effect.name, 0.0) >= _VISIBLE and not is_hidden):
             continue
         why = _why(effect, columns, strength.get(effect.name), share.get(effect.name, 0.0))
+        if is_hidden:
+            why = f"a force that friction holds at the first row says the same here; it needs {effect.excitation}"
         answers.append(NotIdentifiable(effect.name, why, effect.experiment))
     return tuple(answers)
 
