@@ -148,11 +148,16 @@ class Controller:
 
     def refusal_of(self, now_s: float, proposal: ProposedWrite, line: LineStatus) -> EdgeRefusal | None:
         """Return why a command cannot be taken now; None: the next step takes it. Nothing changes by asking."""
-        is_busy = self._machine.state is _RUNNING or self._machine.is_ramping_down or self._machine.is_stopping
-        asks_pull = self._valve is not None and proposal.command.control_word & _PULL
-        if not is_busy and not asks_pull and not self._commands.edges_of(proposal.command).rises:
-            return None  # most writes: a setpoint, a heartbeat
+        if self.takes_at_once(proposal):
+            return None
         return self._edge_check.refusal(proposal, self._situation(now_s, line))
+
+    def takes_at_once(self, proposal: ProposedWrite) -> bool:
+        """Decide whether nothing about a command has to be asked. Most writes are so: a setpoint, a heartbeat."""
+        if self._machine.state is _RUNNING or self._machine.is_ramping_down or self._machine.is_stopping:
+            return False
+        asks_pull = self._valve is not None and proposal.command.control_word & _PULL
+        return not asks_pull and not self._commands.edges_of(proposal.command).rises
 
     def refusal_of_run(self, now_s: float, plan: AnyPlan) -> str:
         """Return why a run that this machine wants cannot begin: a sentence, empty where it can; by the line as it last was."""

@@ -9,7 +9,7 @@ import contextlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from gateway.codes.explanation import BUSY_CURE
 from gateway.processes.exit_cause import EndCause, Ending
@@ -19,8 +19,7 @@ STOPPED_STATES: Final = "Tt"
 _CURE: Final = f": {BUSY_CURE}, or a longer stall_s in the rig"
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessorTime:
+class ProcessorTime(NamedTuple):
     """Processor time of a process until now, in seconds."""
 
     on_cpu_s: float = 0.0

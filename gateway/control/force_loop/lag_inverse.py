@@ -108,6 +108,8 @@ class LagInverse:
     def advance(self, voltage_v: float, dt_s: float) -> None:
         """Advance the model of the lags: voltage_v stood on the output for the last dt_s. Exact for a held voltage."""
         first_v, second_v = self.first_v - voltage_v, self.second_v - voltage_v
+        if not first_v and not second_v:
+            return  # at rest, as most of the time
         if not self._second_lag_s:
             self.first_v = self.second_v = voltage_v + exp(-dt_s / self._lag_s) * first_v
             return
@@ -214,6 +216,7 @@ class LinearizedLagInverse:
     def __init__(self, lags: SecondOrder, limits: Limits, model: Bsfm | None = None) -> None:
         self._limits = limits
         self._map = scale = DriveMap(model)
+        self._held = (0.0, scale.linear_v(0.0))  # the last voltage, as sent and linearized
         self._inverse = LagInverse(
             lags,
             replace(
@@ -253,7 +256,9 @@ class LinearizedLagInverse:
 
     def advance(self, voltage_v: float, dt_s: float) -> None:
         """Advance the model of the lags: voltage_v stood on the output for the last dt_s."""
-        self._inverse.advance(self._map.linear_v(voltage_v), dt_s)
+        if voltage_v != self._held[0]:
+            self._held = (voltage_v, self._map.linear_v(voltage_v))
+        self._inverse.advance(self._held[1], dt_s)
 
     def compensated_v(self, wanted_v: float, standing_v: float) -> float:
         """Return the voltage to ask for now, V. standing_v: on the output. A wish outside the range passes."""

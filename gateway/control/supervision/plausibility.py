@@ -56,7 +56,7 @@ class ExpectedForce:
 
     def advance(self, voltage_v: float, dt_s: float) -> None:
         """Advance the model: voltage_v stood on the output for the last dt_s."""
-        if dt_s > 0.0:
+        if dt_s > 0.0 and voltage_v != self._lagged_v:
             self._lagged_v += (voltage_v - self._lagged_v) * dt_s / (self._lag_s + dt_s)
             self._evaluate()
 

@@ -5,6 +5,7 @@ status word says: a display that shows nothing has no valid reading, and saturat
 """
 
 from math import isfinite, isnan, nan
+from typing import Final
 
 from gateway.devices.binary.rtu_framing import quiet_s
 from gateway.devices.device_checks.spelling import CheckSpelling
@@ -48,6 +49,9 @@ def _question(grammar: Grammar, reading: ForceReading) -> bytes:
     return b"".join(grammar.question_line(grammar.encode(text)) for text in texts)
 
 
+_MOST_KNOWN: Final = 64  # sentences
+
+
 class TemplateCellHost:
     """See roles.CellHost. sign -1: the wiring shows a push as negative. unit: only where frames leave it out."""
 
@@ -59,6 +63,7 @@ class TemplateCellHost:
         self._newton_per_unit = newton_per_unit(profile, unit)
         self._sign = sign
         self._lines = self._grammar.answers()
+        self._known: dict[bytes, dict[str, Value]] = {}  # a force at rest says the same few sentences
         self.resolution_n = self._reading.step * self._newton_per_unit
         self.gap_s = quiet_s(profile.serial.character_s) if profile.is_modbus else 0.0
 
@@ -75,7 +80,7 @@ class TemplateCellHost:
         return [self._sample(line, now_s) for line in self._lines.feed(chunk)]
 
     def _sample(self, line: Line, now_s: float) -> ForceSample | Garbage | RepeatedSample:
-        values = self._grammar.read(self._reading.frame, self._grammar.body(line), self._reading.may_be_blank)
+        values = self._known.get(line.data) or self._understand(line)
         if values is None:
             return Garbage(line.data)
         raw = self._raw(values)
@@ -83,6 +88,14 @@ class TemplateCellHost:
         if quality is Quality.REPEATED:
             return RepeatedSample()
         return ForceSample(raw, self._newtons(raw, values), quality, now_s)
+
+    def _understand(self, line: Line) -> dict[str, Value] | None:
+        values = self._grammar.read(self._reading.frame, self._grammar.body(line), self._reading.may_be_blank)
+        if values is not None:
+            if len(self._known) >= _MOST_KNOWN:
+                self._known.clear()
+            self._known[line.data] = values
+        return values
 
     def _raw(self, values: dict[str, Value]) -> float:
         """The number of the device, in its own unit."""

@@ -40,6 +40,8 @@ from gateway.service.running_rig.recorded_row import row_of
 from gateway.service.running_rig.recordings import Recordings
 
 _FRESH_PERIODS: Final = 1.05  # a tick decides nothing so soon after a sample or a command; more than 1: a cell's jitter
+_ENDING: Final = int(WarningBit.SERIAL_NOISE | WarningBit.SLOW_LOOP)
+_RESTARTED: Final = int(WarningBit.RESTARTED)
 _PULLING: Final = int(StatusBit.PULLING)
 _LONG_SILENCE_S: Final = 0.03  # a shorter one needs no explanation
 _LONGEST_SILENCE_S: Final = 10.0  # then it is no hiccup any more
@@ -108,6 +110,8 @@ class ControlLoop:
 
     def _on_asked(self, proposal: ProposedWrite) -> EdgeRefusal | None:
         """Before the bank stores a write: whether control can take it at this moment."""
+        if self.controller.takes_at_once(proposal):
+            return None
         now_s = self.clock()
         return self.controller.refusal_of(now_s, proposal, self._line(now_s))
 
@@ -180,6 +184,8 @@ class ControlLoop:
             self._log("rate", sentence)
 
     def _end_warnings(self, now_s: float) -> None:
+        if not int(self.warnings) & _ENDING:
+            return
         if self.warnings & WarningBit.SERIAL_NOISE:
             lasts = [line.lasts(now_s) for line in (self._cell_noise, self._output_noise)]
             if not any(lasts):
@@ -277,7 +283,7 @@ class ControlLoop:
         stored = self.calibration_runs.stored if self.calibration_runs else 0
         known = BackgroundStatus(self.controller.calibration_id, stored, self.residual_cause, self.plant_id)
         status = status_of(decision, self.health, self.output.pressure_pa, known)
-        if decision.warnings & WarningBit.RESTARTED and not decision.fault:
+        if int(decision.warnings) & _RESTARTED and not decision.fault:
             status = status._replace(fault_code=self.restart_cause)
         self.bank.publish(status)
         if self.controller.active_run.self_test is not self._shown_self_test:

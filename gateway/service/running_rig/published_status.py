@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from math import nan
+from typing import NamedTuple
 
 from gateway.control.inputs import Output
 from gateway.registers.command import Status
@@ -32,8 +33,7 @@ class LoopHealth:
         return 0
 
 
-@dataclass(frozen=True, slots=True)
-class BackgroundStatus:
+class BackgroundStatus(NamedTuple):
     """Status that the service knows beside the loop: calibrations and plant by number, and the residual watch's cause."""
 
     calibration_id: int

@@ -76,6 +76,7 @@ class RunningRig:
         }
         self.ring: SampleRing | None = None
         self.failed = asyncio.Event()
+        self._shown_watchdogs = -1
         asyncio.get_running_loop().set_exception_handler(self._on_internal_error)
         host = output_host(rig.output.device)
         self._safe_frame, self._last_frame = host.safe_frame(rig.control.limits.safe_voltage_v), host.last_frame
@@ -286,7 +287,9 @@ class RunningRig:
 
     def _on_tick(self, expirations: int, late_s: float) -> None:
         self.loop.on_tick(expirations, late_s)
-        self.bank.show_watchdogs(watchdog_word(self._rig, self._ports, self._line))
+        if (word := watchdog_word(self._rig, self._ports, self._line)) != self._shown_watchdogs:
+            self._shown_watchdogs = word
+            self.bank.show_watchdogs(word)
         now_s = time.monotonic()
         self._guardian.heartbeat(now_s)
         self._control_socket.live.alarm_times.follow(self.loop.decision)

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 
 import pytest
 
@@ -167,7 +166,7 @@ def test_the_loop_asks_the_kernel_what_the_time_since_the_last_tick_went_to() ->
 
     def used() -> ProcessorTime:
         """The process waits for 0.6 of all time."""
-        return replace(had, on_cpu_s=0.01 * wired.now_s, waited_s=0.6 * wired.now_s)
+        return had._replace(on_cpu_s=0.01 * wired.now_s, waited_s=0.6 * wired.now_s)
 
     wired.loop.processor_time = used
     wired.lateness = late_ticks(20)

@@ -15,8 +15,8 @@ sentence that nobody answers; a device whose watchdog has tripped obeys no setti
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import inf, nan
+from typing import NamedTuple
 
 from gateway.codes.faults import FaultCode
 from gateway.control.inputs import WireCounts
@@ -40,8 +40,7 @@ _POLL_PERIOD_S = 0.1
 _AFTER_SIGN_OF_LIFE_S = 0.005  # nothing tells when the device is through with a sentence that it does not answer
 
 
-@dataclass(frozen=True, slots=True)
-class LineState:
+class LineState(NamedTuple):
     """What a recording keeps of the line. pressure_pa: last measured; sent_v: the last voltage that was written to the wire,
     and when, sent_s; nan before the first."""
 

@@ -7,16 +7,20 @@ from gateway.registers.words import WatchdogBit
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 
+# plain integers, for it is asked at every tick
+_GUARDIAN_WATCHES, _DEVICE_ARMED = int(WatchdogBit.GUARDIAN_WATCHES), int(WatchdogBit.DEVICE_ARMED)
+_DEVICE_HAS_NONE, _DEVICE_TRIPPED = int(WatchdogBit.DEVICE_HAS_NONE), int(WatchdogBit.DEVICE_TRIPPED)
+
 
 def watchdog_word(rig: Rig, ports: RigPorts, line: OutputExchange) -> int:
     """Return the register `watchdogs`."""
-    word = WatchdogBit.GUARDIAN_WATCHES if ports.is_guarded else WatchdogBit(0)
+    word = _GUARDIAN_WATCHES if ports.is_guarded else 0
     checks = line.checks
     if not checks.has_watchdog:
-        return int(word | (WatchdogBit.DEVICE_HAS_NONE if rig.accept_no_device_watchdog else WatchdogBit(0)))
+        return word | (_DEVICE_HAS_NONE if rig.accept_no_device_watchdog else 0)
     if checks.is_tripped:
-        word |= WatchdogBit.DEVICE_TRIPPED
-    return int(word | (WatchdogBit.DEVICE_ARMED if checks.is_armed else WatchdogBit(0)))
+        word |= _DEVICE_TRIPPED
+    return word | (_DEVICE_ARMED if checks.is_armed else 0)
 
 
 def device_fault_note(line: OutputExchange) -> str:
