@@ -8,8 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
 
-KILLED: Final = (1, 3, 24, 152, 36, -24)
-"""Exit codes of mutmut that mean seen: a failing test, an internal error of pytest, an endless loop."""
+KILLED: Final = (1, 3)
+"""Exit codes of mutmut that mean seen: a failing test, an internal error of pytest."""
+TIMED_OUT: Final = (24, 36, 152, 255, -24)
+"""Exit codes of mutmut: more time than the tests may need."""
 UNASKED: Final = 33
 """Exit code of mutmut: no test calls this function."""
 
