@@ -22,17 +22,19 @@ LAST_WORD_S = 0.06 + 0.02 + 0.04
 
 
 def pressing(moment_ms: int) -> Wired:
+    """Return a gateway that holds 20 N, so many milliseconds into it."""
     wired = Wired(strict(), seed=moment_ms).pressing(20.0)
     wired.run(moment_ms / 1e3)
     return wired
 
 
 def until_safe(wired: Wired) -> float:
+    """Return the seconds until the safe voltage has passed the wire."""
     return wired.voltage_reaches_safe(3.0)
 
 
 def heartbeat_stops(moment_ms: int) -> float:
-    """Counted from the last new heartbeat; reads, and the same heartbeat again, flow on."""
+    """Measure from the last new heartbeat; reads, and the same heartbeat again, flow on."""
     wired = Wired(with_supervision(strict(), lease_s=LEASE_S), seed=moment_ms).ready()
     wired.write(0, ENABLE, 1500, 0, 0, 1)
     for beat in range(2, 40):
@@ -48,7 +50,7 @@ def heartbeat_stops(moment_ms: int) -> float:
 
 
 def named(name: str) -> Callable[[int], float]:
-    """A fault of the simulated world, from its beginning."""
+    """Return what measures a fault of the simulated world, from its beginning."""
 
     def measure(moment_ms: int) -> float:
         wired = pressing(moment_ms)
@@ -59,7 +61,7 @@ def named(name: str) -> Callable[[int], float]:
 
 
 def frozen(moment_ms: int) -> float:
-    """Once a few seconds have shown how much the cell's noise moves it."""
+    """Measure a cell that freezes, once a few seconds have shown how much its noise moves it."""
     wired = pressing(moment_ms)
     wired.run(3.0)
     wired.fault("cell-frozen")
@@ -67,13 +69,14 @@ def frozen(moment_ms: int) -> float:
 
 
 def over_force(moment_ms: int) -> float:
-    """The workpiece pushes back with 70 N at once."""
+    """Let the workpiece push back with 70 N at once."""
     wired = pressing(moment_ms)
     wired.twin.set_disturbance(70.0)
     return until_safe(wired)
 
 
 def disabled(moment_ms: int) -> float:
+    """Clear enable, as a master does."""
     wired = pressing(moment_ms)
     wired.write(0, 0)
     return until_safe(wired)
@@ -90,6 +93,7 @@ ROWS: tuple[tuple[str, float, Callable[[int], float]], ...] = (
 
 
 def main() -> int:
+    """Print the table; return 1 where a bound is missed."""
     kept = True
     print(f"{'what happens at 20 N':<44}{'median':>9}{'longest':>9}{'bound':>9}")
     for name, bound_s, measure in ROWS:

@@ -42,15 +42,18 @@ class Scene:
         self.gateway: RunningGateway = start(Path(self._folder.name) / "state", rig=str(self.devices.rig))
 
     def close(self) -> None:
+        """Stop the gateway, then its devices."""
         stop_quietly(self.gateway)
         self.devices.__exit__()
         self._folder.cleanup()
 
     def press(self) -> None:
+        """Hold 4 V."""
         assert not self.gateway.write(0, 1, 0, 0, 1, 0, 4000).isError()
         self.gateway.wait_until(lambda status: status["state"] == 3)
 
     def reconnect(self) -> None:
+        """Wait until a new control process answers, in OFF."""
         self.gateway.next_ready()
         self.gateway.client.close()
         while not self.gateway.client.connect():
@@ -59,12 +62,13 @@ class Scene:
 
 
 def stop_quietly(gateway: RunningGateway) -> None:
+    """Stop it without its log."""
     with contextlib.redirect_stdout(io.StringIO()):  # it prints the log, for tests
         stop(gateway)
 
 
 def kill_control(scene: Scene, number: int) -> tuple[float, float]:
-    """(until safe, until another control answers) after this signal to control, s."""
+    """Return (until safe, until another control answers) after this signal to control, s."""
     scene.press()
     began_s = time.monotonic()
     os.kill(scene.gateway.ready["pids"]["control"], number)
@@ -74,7 +78,7 @@ def kill_control(scene: Scene, number: int) -> tuple[float, float]:
 
 
 def pull_plug(scene: Scene) -> tuple[float, float]:
-    """(0, until the safe voltage is the first word to what is plugged in) after the plug is back, s."""
+    """Return (0, until the safe voltage is the first word to what is plugged in) after the plug is back, s."""
     scene.press()
     scene.devices.pull_output()
     scene.gateway.wait_until(lambda status: status["state"] == 4)
@@ -88,6 +92,7 @@ def pull_plug(scene: Scene) -> tuple[float, float]:
 
 
 def run(rounds: int, act: Callable[[Scene], tuple[float, float]], per_gateway: int) -> list[tuple[float, float]]:
+    """Return what act measured, so many times, on a new gateway after every few."""
     figures: list[tuple[float, float]] = []
     while len(figures) < rounds:
         scene = Scene()
@@ -102,6 +107,7 @@ def run(rounds: int, act: Callable[[Scene], tuple[float, float]], per_gateway: i
 
 
 def row(name: str, bound_s: float | None, values_s: list[float]) -> str:
+    """Return a line of the table."""
     values_s = sorted(values_s)
     p99_s = values_s[min(len(values_s) - 1, int(0.99 * len(values_s)))]
     kept = "" if bound_s is None else f"{bound_s * 1e3:.0f} ms: {'kept' if p99_s <= bound_s else 'MISSED'}"
@@ -111,7 +117,7 @@ def row(name: str, bound_s: float | None, values_s: list[float]) -> str:
 
 
 def bare_pty(rounds: int = 300) -> list[float]:
-    """How long one byte takes from one end of a pty to the other on this machine, s."""
+    """Measure how long one byte takes from one end of a pty to the other on this machine, s."""
     device, client = pty.openpty()
     tty.setraw(device)
     tty.setraw(client)
@@ -127,6 +133,7 @@ def bare_pty(rounds: int = 300) -> list[float]:
 
 
 def main() -> None:
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=50, help="of each row")
     rounds = parser.parse_args().rounds
