@@ -97,7 +97,8 @@ DEFECTS = (
            "if not 0 < count <= self._room[address] + 1:\n            raise self._note_refusal(no_such",
            ("registers/test_bank_reading.py", "registers/test_bank_refusals.py")),
     Defect("control is not asked", "registers/writes/admission.py",
-           "        self._ask(command, values, write)\n", "", ("service/edge_table", *_BANK)),
+           "refused = self.decide(ProposedWrite(command, lambda: self._changes(values)))", "refused = None",
+           ("service/edge_table", *_BANK)),
     Defect("the byte order need not be proven", "registers/writes/admission.py",
            "if self._rules.require_byte_order_echo and not", "if False and not", _BANK),
     # -- the wire to masters
