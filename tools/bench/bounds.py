@@ -84,7 +84,7 @@ def disabled(moment_ms: int) -> float:
 
 ROWS: tuple[tuple[str, float, Callable[[int], float]], ...] = (
     ("the master clears enable", LAST_WORD_S, disabled),
-    ("the owner's heartbeat stops (lease 200 ms)", LEASE_S + 0.01 + LAST_WORD_S, heartbeat_stops),
+    ("the owner's heartbeat stops (lease 200 ms)", LEASE_S + 0.02, heartbeat_stops),
     ("the load cell falls silent (50 ms)", 0.05 + LAST_WORD_S, named("cell-cut")),
     ("over-force, three samples of 10 ms", 0.03 + LAST_WORD_S, over_force),
     ("the load cell's sign turns", 1.0 + LAST_WORD_S, named("sign-inverted")),
