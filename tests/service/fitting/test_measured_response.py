@@ -52,8 +52,12 @@ def test_the_shipped_response_is_that_of_the_twin_and_the_wires() -> None:
 
 
 def test_by_the_measured_response_steps_settle_no_later_than_by_the_rig_file() -> None:
+    """Over three machines: one step in ten ends so near the band's edge that noise takes it over once more."""
     rig = demo()
-    by_file = Wired(replace(rig, control=replace(rig.control, response=ResponseSource.RIG)))
-    measured, filed = settled_s(Wired(rig)), settled_s(by_file)
-    assert max(measured) < 0.35
-    assert sum(measured) <= sum(filed)
+    by_file = replace(rig, control=replace(rig.control, response=ResponseSource.RIG))
+    measured, filed = (
+        [step for seed in (7, 8, 9) for step in settled_s(Wired(one, seed=seed))] for one in (rig, by_file)
+    )
+    assert max(measured) < 0.45
+    assert sum(step > 0.3 for step in measured) <= 2
+    assert sum(measured) <= 0.85 * sum(filed)
