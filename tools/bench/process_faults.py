@@ -49,6 +49,7 @@ class Scene:
 
     def press(self) -> None:
         """Hold 4 V."""
+        self.gateway.wait_until(lambda status: bool(status["status_word"] & 2))  # an enable would be accepted
         assert not self.gateway.write(0, 1, 0, 0, 1, 0, 4000).isError()
         self.gateway.wait_until(lambda status: status["state"] == 3)
 
