@@ -148,7 +148,8 @@ class LiveWriter:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveState:
     """The whole answer. state: off, ready, ramping, holding, fault or calibrating; mode: force or voltage; status: names of the
-    bits that are set in status_word; enable_block: why an enable would be refused now, empty where it would not."""
+    bits that are set in status_word; enable_block: why an enable would be refused now, empty where it would not; refusals:
+    requests that were refused since the start."""
 
     rig: str
     simulated: bool
@@ -160,6 +161,7 @@ class LiveState:
     owner: str | None = None
     enable_block: str = ""
     last_refusal: str = ""
+    refusals: int = 0
     faults: tuple[LiveAlarm, ...] = ()
     warnings: tuple[LiveAlarm, ...] = ()
     force: LiveForce = field(default_factory=LiveForce)

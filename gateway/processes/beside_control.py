@@ -1,16 +1,22 @@
-"""What every process beside control does first: go behind whatever serves the wire, and end with the guardian.
+"""What every process beside control does first: go behind whatever serves the wire, and end with the guardian."""
 
-Standard library only.
-"""
-
+import asyncio
 import contextlib
+import json
 import os
 import socket
 import threading
+from collections.abc import Callable, Coroutine
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from gateway.processes import priority
+from gateway.extras import MissingExtraError
+from gateway.processes import exit_codes, priority
+from gateway.processes.event_file import EventFile
+from gateway.processes.event_log import EventLog
+
+Serve = Callable[[dict[str, Any], EventLog], Coroutine[Any, Any, None]]
+"""Serves until the process ends; its first argument: the options that the guardian gives, `state` among them."""
 
 _FIRST_AMONG_THE_KILLED: Final = "900"
 _LAST_NICE: Final = 19
@@ -44,3 +50,25 @@ def exit_with_guardian(link: socket.socket) -> None:
         os._exit(0)
 
     threading.Thread(target=wait, daemon=True).start()
+
+
+def serve_until_guardian_ends(source: str, arguments: list[str], serve: Serve) -> int:
+    """Run what people or machines wait for behind control; return the exit code. What goes wrong is an event of its own.
+
+    arguments: descriptor of the link to the guardian, options as JSON.
+    """
+    serve_behind_control()
+    exit_with_guardian(socket.socket(fileno=int(arguments[0])))
+    options = json.loads(arguments[1])
+    with EventLog(source=source, file=EventFile(Path(options["state"]))) as log:
+        try:
+            asyncio.run(serve(options, log))
+        except* (MissingExtraError, OSError) as failed:
+            log("start", str(_first_of(failed)))
+    return exit_codes.DEVICE
+
+
+def _first_of(error: BaseException) -> BaseException:
+    while isinstance(error, BaseExceptionGroup):
+        error = error.exceptions[0]
+    return error

@@ -31,8 +31,8 @@ _UNPRINTABLE: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud80
 
 
 class EventRecord(NamedTuple):
-    """time: ISO 8601, UTC, milliseconds; code: None where the sentence has none; source: control, guardian, watch or,
-    of a simulated rig, rig."""
+    """time: ISO 8601, UTC, milliseconds; code: None where the sentence has none; source: control, guardian, watch, mqtt,
+    opcua, metrics, web or, of a simulated rig, rig."""
 
     time: str
     severity: str

@@ -3,10 +3,9 @@ refused.
 
 Checks run in this order: address (02), role (01, gateway.registers.roles), whole values (03), values (03), owner (06), then
 what the state allows. Everything is checked before anything is stored; a refusal leaves no trace but the last-refusal
-registers. One accepted
-write is one Command, handed on inside the write, so that a setpoint acts before its answer is sent. The Command carries
-the edge bits as written, each write with a new number; in the registers they read back as 0. Whether an edge can be taken
-now control says, asked before anything is stored (`on_asked`): what is accepted here is done there.
+registers. One accepted write is one Command, handed on inside the write, so that a setpoint acts before its answer is
+sent. The Command carries the edge bits as written, each write with a new number; in the registers they read back as 0.
+Whether an edge can be taken now control says, asked before anything is stored: what is accepted here is done there.
 
 Decisions: a write to a read-only register is 02, as to an address that cannot be written. Refused reads are noted like
 refused writes, so that a newcomer's 40001 can be explained. Clearing enable also clears control_word, force_setpoint
@@ -67,6 +66,7 @@ class RegisterBank:
         self.on_refused_write: Callable[[Refusal, Peer], None] = lambda refusal, peer: None
         self._writers = LastWriters()
         self.last_refusal: Refusal | None = None
+        self.refusals = 0  # since the start
         self.identity: Mapping[int, bytes] = build_identity(register_map.name, rules.rig_name)
         self._now = now
         self._blocks = register_map.blocks
@@ -230,6 +230,7 @@ class RegisterBank:
 
     def _note_refusal(self, refusal: Refusal, peer: Peer) -> Refusal:
         self.last_refusal = refusal
+        self.refusals += 1
         self._status.show_refusal(refusal)
         self.on_refusal(refusal, peer)
         return refusal

@@ -107,6 +107,7 @@ class LiveAnswers:
             owner=loop.bank.owner,
             enable_block="" if block is RefusalReason.NONE else f"{block.code} {block.explanation.sentence}",
             last_refusal=refusal.sentence if refusal else "",
+            refusals=loop.bank.refusals,
             faults=self._alarms(alarm for alarm in _standing(decision) if isinstance(alarm, FaultCode)),
             warnings=self._alarms(alarm for alarm in _standing(decision) if isinstance(alarm, WarningBit)),
             force=_force(decision, loop.output.pressure_pa),

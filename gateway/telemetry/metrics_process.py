@@ -4,19 +4,17 @@ It asks control when it is asked itself, keeps nothing, and so has no old values
 `force_gateway_up` is 0 and stands alone. Its priority is below control's; it ends with the guardian.
 """
 
-import asyncio
-import json
 import socket
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gateway.extras import MissingExtraError, import_library
+from gateway.extras import import_library
 from gateway.live.control_link import ControlLink
 from gateway.live.live_state import LiveState
-from gateway.processes import exit_codes
-from gateway.processes.beside_control import exit_with_guardian, serve_behind_control
+from gateway.processes.beside_control import serve_until_guardian_ends
+from gateway.processes.event_log import EventLog
 from gateway.telemetry.series import GatewayReading, samples_of
 
 if TYPE_CHECKING:
@@ -71,7 +69,7 @@ def make_metrics_app(state_directory: Path) -> "Starlette":
     return Starlette(routes=[Route("/metrics", metrics)])
 
 
-async def serve(options: dict[str, Any]) -> None:
+async def serve(options: dict[str, Any], _: EventLog) -> None:
     """Serve until the process ends. options: as the guardian gives them."""
     app = make_metrics_app(Path(options["state"]))
     import uvicorn
@@ -84,13 +82,7 @@ async def serve(options: dict[str, Any]) -> None:
 
 def main(arguments: list[str]) -> int:
     """Serve until the guardian ends. arguments: descriptor of the link, options as JSON."""
-    serve_behind_control()
-    exit_with_guardian(socket.socket(fileno=int(arguments[0])))
-    try:
-        asyncio.run(serve(json.loads(arguments[1])))
-    except MissingExtraError as missing:
-        sys.stderr.write(f"{missing}\n")
-    return exit_codes.DEVICE
+    return serve_until_guardian_ends("metrics", arguments, serve)
 
 
 if __name__ == "__main__":

@@ -6,19 +6,16 @@ broker then tells the wills.
 """
 
 import asyncio
-import json
-import socket
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from gateway.extras import MissingExtraError
 from gateway.live.control_link import ControlLink
 from gateway.live.live_state import LiveState
-from gateway.processes import exit_codes
-from gateway.processes.beside_control import exit_with_guardian, serve_behind_control
+from gateway.processes.beside_control import serve_until_guardian_ends
+from gateway.processes.event_log import EventLog
 from gateway.telemetry.broker_connection import Broker, keep_connected
 from gateway.telemetry.broker_session import BrokerSession
 from gateway.telemetry.edge_node import EdgeNode
@@ -68,11 +65,7 @@ class Announcer:
         self._last = text
 
 
-def _say(text: str) -> None:
-    sys.stderr.write(f"{text}\n")
-
-
-async def publish(options: dict[str, Any]) -> None:
+async def publish(options: dict[str, Any], log: EventLog) -> None:
     """Publish until the process ends. options: as the guardian gives them."""
     from gateway.profiles import load_rig
 
@@ -84,7 +77,7 @@ async def publish(options: dict[str, Any]) -> None:
     broker = Broker(rig.mqtt.host, rig.mqtt.port, rig.mqtt.username, password, *certificates)
     state = Path(options["state"])
     link = ControlLink(state)
-    sessions, announcer = make_sessions(rig, link, state), Announcer(_say)
+    sessions, announcer = make_sessions(rig, link, state), Announcer(lambda text: log("broker", text))
     async with asyncio.TaskGroup() as group:
         group.create_task(look_forever(link, sessions))
         for session in sessions:
@@ -92,16 +85,8 @@ async def publish(options: dict[str, Any]) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Publish until the guardian ends. arguments: descriptor of the link, options as JSON."""
-    serve_behind_control()
-    exit_with_guardian(socket.socket(fileno=int(arguments[0])))
-    try:
-        asyncio.run(publish(json.loads(arguments[1])))
-    except* MissingExtraError as missing:
-        sys.stderr.write(f"{missing.exceptions[0]}\n")
-    except* OSError as error:
-        sys.stderr.write(f"{error.exceptions[0]}\n")
-    return exit_codes.DEVICE
+    """Serve until the guardian ends. arguments: descriptor of the link, options as JSON."""
+    return serve_until_guardian_ends("mqtt", arguments, publish)
 
 
 if __name__ == "__main__":

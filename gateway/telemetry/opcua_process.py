@@ -6,20 +6,18 @@ with the guardian.
 """
 
 import asyncio
-import json
 import logging
-import socket
 import sys
 import time
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.extras import MissingExtraError, import_library
+from gateway.extras import import_library
 from gateway.live.control_link import ControlLink
 from gateway.live.live_state import LiveState
-from gateway.processes import exit_codes
-from gateway.processes.beside_control import exit_with_guardian, serve_behind_control
+from gateway.processes.beside_control import serve_until_guardian_ends
+from gateway.processes.event_log import EventLog
 from gateway.telemetry.sparkplug_metrics import NODE_METRICS, values_of
 from gateway.telemetry.sparkplug_payload import DataType, Value
 
@@ -77,7 +75,7 @@ class GatewayNodes:
         )
 
 
-async def serve(options: dict[str, Any]) -> None:
+async def serve(options: dict[str, Any], log: EventLog) -> None:
     """Serve until the process ends. options: as the guardian gives them; settings: rig's name and where to listen."""
     asyncua = import_library("asyncua")
     logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # its log is for its developers
@@ -91,11 +89,18 @@ async def serve(options: dict[str, Any]) -> None:
     await nodes.add(settings["name"])
     link = ControlLink(Path(options["state"]))
     await nodes.show(await _look(link))
-    async with server:
-        while True:
-            began_s = time.monotonic()
-            await nodes.show(await _look(link))
-            await asyncio.sleep(max(0.0, LOOK_S - (time.monotonic() - began_s)))
+    try:
+        async with server:
+            await _show_forever(nodes, link)
+    except OSError as error:
+        log("start", f"E127 opcua.listen: {error.strerror or error}")
+
+
+async def _show_forever(nodes: GatewayNodes, link: ControlLink) -> None:
+    while True:
+        began_s = time.monotonic()
+        await nodes.show(await _look(link))
+        await asyncio.sleep(max(0.0, LOOK_S - (time.monotonic() - began_s)))
 
 
 async def _look(link: ControlLink) -> LiveState | None:
@@ -107,15 +112,7 @@ async def _look(link: ControlLink) -> LiveState | None:
 
 def main(arguments: list[str]) -> int:
     """Serve until the guardian ends. arguments: descriptor of the link, options as JSON."""
-    serve_behind_control()
-    exit_with_guardian(socket.socket(fileno=int(arguments[0])))
-    try:
-        asyncio.run(serve(json.loads(arguments[1])))
-    except MissingExtraError as missing:
-        sys.stderr.write(f"{missing}\n")
-    except OSError as error:
-        sys.stderr.write(f"E127 opcua.listen: {error.strerror or error}\n")
-    return exit_codes.DEVICE
+    return serve_until_guardian_ends("opcua", arguments, serve)
 
 
 if __name__ == "__main__":

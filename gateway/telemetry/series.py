@@ -93,6 +93,10 @@ def _info(reading: GatewayReading) -> Iterator[Sample]:
     yield {"rig": state.rig, "version": state.version, "simulated": str(state.simulated).lower()}, 1.0
 
 
+def _refusals(reading: GatewayReading) -> Iterator[Sample]:
+    yield {}, float(reading.state.refusals)
+
+
 def _states(reading: GatewayReading) -> Iterator[Sample]:
     return (({"state": name}, float(reading.state.state == name)) for name in STATES)
 
@@ -118,6 +122,7 @@ _STATE: Final = (
     _alarms("warning", "1 for each warning that stands; nothing without one.", lambda s: s.warnings),
     _gauge("faults", "", "Faults that stand.", lambda s: len(s.faults)),
     _gauge("warnings", "", "Warnings that stand.", lambda s: len(s.warnings)),
+    Series(PREFIX + "refusals_total", "counter", "", "Requests of masters that were refused.", _refusals),
     _gauge("clients", "", "Connected masters.", lambda s: len(s.peers)),
     _gauge("owned", "", "1 while a master owns the gateway.", lambda s: s.owner is not None),
     _gauge("recording", "", "1 while a recording is under way.", lambda s: s.recording.on),

@@ -46,6 +46,7 @@ NODE_METRICS: Final = (
     NodeMetric("Calibration/Number", _COUNT, lambda state: state.calibration.number),
     NodeMetric("Calibration/Name", _TEXT, lambda state: state.calibration.name),
     NodeMetric("Loop/Missed Ticks", _COUNT, lambda state: state.loop.missed),
+    NodeMetric("Refusals", _COUNT, lambda state: state.refusals),
     NodeMetric("Clients", _COUNT, lambda state: len(state.peers)),
     NodeMetric("Recording", _FLAG, lambda state: state.recording.on),
     NodeMetric("Residual/Effect", _TEXT, lambda state: state.residual.effect),

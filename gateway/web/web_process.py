@@ -5,21 +5,18 @@ tenth of that loop. Its priority is below control's; it ends with the guardian, 
 listening socket, which the guardian keeps.
 """
 
-import asyncio
 import contextlib
-import json
 import socket
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from gateway.extras import MissingExtraError
-from gateway.processes import exit_codes
-from gateway.processes.beside_control import exit_with_guardian, serve_behind_control
+from gateway.processes.beside_control import serve_until_guardian_ends
+from gateway.processes.event_log import EventLog
 
 
-async def serve(options: dict[str, Any]) -> None:
+async def serve(options: dict[str, Any], _: EventLog) -> None:
     """Serve the page until the process ends. options: as the guardian gives them."""
     import uvicorn
 
@@ -56,13 +53,7 @@ async def serve(options: dict[str, Any]) -> None:
 
 def main(arguments: list[str]) -> int:
     """Serve until the guardian ends. arguments: descriptor of the link, options as JSON."""
-    serve_behind_control()
-    exit_with_guardian(socket.socket(fileno=int(arguments[0])))
-    try:
-        asyncio.run(serve(json.loads(arguments[1])))
-    except MissingExtraError as missing:
-        sys.stderr.write(f"{missing}\n")
-    return exit_codes.DEVICE
+    return serve_until_guardian_ends("web", arguments, serve)
 
 
 if __name__ == "__main__":

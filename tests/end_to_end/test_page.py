@@ -157,7 +157,7 @@ def test_every_tab_in_both_themes(gateway: RunningGateway, browser: Any, tab: st
 @pytest.mark.long
 def test_twenty_viewers_leave_no_trace_in_the_loop() -> None:
     """On a machine that is busy with something else ticks are missed without them, too: those do not count."""
-    bench = Path(__file__).parents[2] / "tools" / "bench" / "page_viewers.py"
+    bench = Path(__file__).parents[2] / "tools" / "bench" / "missed_ticks.py"
     told = subprocess.run([sys.executable, bench], capture_output=True, text=True, check=True).stdout.splitlines()
     alone, watched = (float(line.partition("missed_percent ")[2].split()[0]) for line in told)
     assert watched < max(0.1, alone), told

@@ -20,6 +20,7 @@ def holding() -> LiveState:
         calibration=live.LiveCalibration(number=3, name="ladder", age_s=60.0),
         output=live.LiveLine(port="/dev/a", asked=20, heard=19, garbled=1, age_s=0.01),
         load_cell=live.LiveLine(port="/dev/b", heard=80, age_s=0.02),
+        refusals=2,
         warnings=(live.LiveAlarm(code="W301", title='a "quoted" title', cure="look", since_unix_s=990.0),),
     )
 

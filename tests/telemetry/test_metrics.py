@@ -66,6 +66,7 @@ def test_without_a_gateway_the_scrape_says_down(tmp_path: Path) -> None:
         ("serial_errors_total", {"line": "load_cell"}, 0.0),
         ("loop_late_p99_seconds", {}, 0.001024),
         ("calibration_age_seconds", {}, 60.0),
+        ("refusals_total", {}, 2.0),
     ],
 )
 def test_a_series_has_its_value_in_base_units(name: str, labels: dict[str, str], value: float) -> None:
