@@ -61,16 +61,9 @@ class RunFollower:
         self._seen_s = self._clock()
         if self.is_following:
             return self._last | {"mine": True}
-        run = (await ask_once(self._state, {"do": "state"}))["run"]
-        if run["running"]:
-            return {
-                "mine": False,
-                "running": True,
-                "phase": run["phase"],
-                "progress": run["share"],
-                "eta_s": run["eta_s"],
-            }
-        return await self._ask({}) | {"mine": False}
+        state = await ask_once(self._state, {"do": "state"})
+        shown = _run_shown_in(state) if state["run"]["running"] else await self._ask({})
+        return shown | {"mine": False}
 
     async def _follow(self) -> None:
         began_s = self._clock()
@@ -84,3 +77,16 @@ class RunFollower:
 
     async def _ask(self, request: Status) -> Status:
         return await ask_once(self._state, {"do": "calibrate"} | request)
+
+
+def _run_shown_in(state: Status) -> Status:
+    """Return what `calibrate` would answer of a run, from what `state` answers, which keeps no run alive."""
+    run, force = state["run"], state["force"]
+    return {
+        "running": True,
+        "phase": run["phase"],
+        "progress": run["share"],
+        "eta_s": run["eta_s"],
+        "force_n": force["measured_n"],
+        "voltage_v": force["voltage_v"],
+    }

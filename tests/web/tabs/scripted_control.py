@@ -9,8 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from gateway.live.live_state import LiveRun, LiveState
+from gateway.live.live_state import LiveForce, LiveRun, LiveState
 
+PRESSING = LiveForce(measured_n=12.5, voltage_v=1.6)
 IDLE = {
     "running": False, "phase": "idle", "progress": 0.0, "eta_s": 0.0, "stair": 0, "stairs": 0, "group": 0, "groups": 0,
     "voltage_v": 0.0, "force_n": 0.0, "recording": None, "ended": "", "result": {},
@@ -39,7 +40,7 @@ class ScriptedControl:
             return self._record(request)
         if request["do"] == "state":
             run = LiveRun(running=self.status["running"], phase=self.status["phase"], share=self.status["progress"])
-            live = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="off")
+            live = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="off", force=PRESSING)
             return replace(live, run=run).to_json()
         return self._calibrate(request)
 

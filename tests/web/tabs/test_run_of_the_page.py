@@ -49,6 +49,7 @@ def test_a_look_at_anothers_run_does_not_keep_it_alive(page, control) -> None:
     control.status = IDLE | {"running": True, "phase": "ladder", "progress": 0.4}
     status = page.get("/api/v1/calibrate").json
     assert (status["mine"], status["running"], status["progress"]) == (False, True, 0.4)
+    assert (status["force_n"], status["voltage_v"]) == (12.5, 1.6)
     assert control.count("calibrate") == 0
 
 

@@ -21,7 +21,7 @@ class DiagnosisTab {
     prepare(
       element,
       h("h2", {}, "Diagnosis"),
-      h("p", { class: "lead" }, "Says what the simulation gets wrong on a recording, why, by how much, and what helps. It runs behind everything else and may take minutes."),
+      h("p", { class: "lead" }, "Says what the simulation gets wrong on a recording, why, by how much, and what helps. It runs behind everything else: some seconds, a minute for a long recording on a slow machine."),
       this.told.element, this.start, this.job, this.shown, this.kept,
     );
     this.look = whileShown(element, () => (this.wasRunning ? 400 : 2000), () => this.refresh(), this.told);
