@@ -3,7 +3,8 @@
 Lines are only ever added. A full file is left as it is and the next one begun, and the chain goes on in it; of files beyond
 those that are kept the oldest goes, and a line says which lines went and what their last hash was. After each batch, once it is
 on the disk, `audit/head` is replaced: number and hash of the last line. So lines that were cut off at the end are missed, and
-a power cut, after which the files may hold more than the head says but never less, is told apart from that.
+a power cut, after which the files may hold more than the head says but never less, is told apart from that. A new audit
+begins with a head of no line, and a new file's name is on the disk before its first line is.
 
 What a killed writer has left of a line is cut off at the next start, and the first line after it quotes it. Everything
 here waits for the disk: it runs in a thread beside the loop.
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.audit.chain import NO_HASH, BrokenLine, ChainEnd, open_line, seal_line
-from gateway.processes.durable_file import make_directory
+from gateway.processes.durable_file import make_directory, sync_path
 
 FOLDER: Final = "audit"
 HEAD: Final = "head"
@@ -56,7 +57,7 @@ class AuditFile:
         self._end = ChainEnd()
         self._descriptor = -1
         self._good_bytes = 0
-        self._is_open = False
+        self._is_open = self._is_torn = False
 
     def append(self, records: Iterable[Fields]) -> None:
         """Put these records at the end, durably, all or none. OSError when the disk does not take them."""
@@ -86,7 +87,11 @@ class AuditFile:
             )
             found.append({"what": "chain broken", "text": text})
             self._end = head  # number and hash that were there: verify finds the gap
-        self._open(self._path_of_next() if not files else files[-1])
+        if not files and head is None:
+            self._write_head()
+            sync_path(self._folder)
+        goes_on = files and (files[-1].stat().st_size or first_number(files[-1]) == self._end.number + 1)
+        self._open(files[-1] if goes_on else self._path_of_next())
         self._is_open = True
         if found:
             self._add(found)
@@ -120,15 +125,20 @@ class AuditFile:
             line, end = seal_line(fields, end)
             lines.append(line)
         data = b"".join(lines)
+        if self._is_torn:
+            os.ftruncate(self._descriptor, self._good_bytes)
+        self._is_torn = True  # until all of it is written
         try:
             written = 0
             while written < len(data):
                 written += os.write(self._descriptor, data[written:])
             os.fsync(self._descriptor)
         except OSError:
-            with contextlib.suppress(OSError):  # else the next start cuts it off
+            with contextlib.suppress(OSError):  # else the next batch, or the next start, cuts it off
                 os.ftruncate(self._descriptor, self._good_bytes)
+                self._is_torn = False
             raise
+        self._is_torn = False
         self._good_bytes += len(data)
         self._end = end
         with contextlib.suppress(OSError):  # an old head is no fault: it promises less than there is
@@ -151,7 +161,8 @@ class AuditFile:
             self._drop_oldest()
 
     def _drop_oldest(self) -> None:
-        files = audit_files(self._folder)
+        *full, newest = audit_files(self._folder)
+        files = [path for path in full if path.stat().st_size] + [newest]  # none that was begun only, and could not go
         for path in files[: max(0, len(files) - self._kept)]:
             try:
                 _, end = open_line(path.read_bytes().rstrip(b"\n").rpartition(b"\n")[2])
@@ -167,7 +178,16 @@ class AuditFile:
         return self._folder / f"{self._end.number + 1:012d}.jsonl"
 
     def _open(self, path: Path) -> None:
+        is_new = not path.exists()
         flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
         descriptor = os.open(path, flags, 0o600)
+        try:
+            if is_new:
+                sync_path(self._folder)
+        except OSError:
+            os.close(descriptor)
+            with contextlib.suppress(OSError):
+                path.unlink()
+            raise
         self.close()
         self._descriptor, self._good_bytes = descriptor, os.fstat(descriptor).st_size

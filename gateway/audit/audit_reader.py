@@ -64,7 +64,7 @@ class _ChainWalk:
         self.count, self.end = 0, ChainEnd()
         self.file, self.line = "", 0
         self.notes: list[str] = []
-        self._head, self._is_head_met = head, False
+        self._head, self._is_head_met = head, head is not None and head.number == 0
         self._begins_after: ChainEnd | None = None
         self._dropped: set[ChainEnd] = set()
 

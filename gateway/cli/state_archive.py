@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway import VERSION
+from gateway.processes.durable_file import sync_path
 
 _MANIFEST: Final = "backup.json"
 _TOP: Final = "state"
@@ -46,6 +47,7 @@ def pack(state: Path, target: Path) -> list[str]:
             stream.flush()
             os.fsync(stream.fileno())
             beside.replace(target)
+            sync_path(target.parent)
         finally:
             beside.unlink(missing_ok=True)
     return [str(path.relative_to(state)) for path in files if not path.is_dir()]
@@ -53,14 +55,12 @@ def pack(state: Path, target: Path) -> list[str]:
 
 def names_in(source: Path) -> list[str]:
     """Return the files of an archive, after every check that `unpack` makes; ArchiveError with the reason."""
-    try:
+    with _damage_told(source):
         _read_to_the_end(source)
         with tarfile.open(source, "r:gz") as archive:
             members = archive.getmembers()
             _check(archive, members)
             return [member.name.removeprefix(f"{_TOP}/") for member in members if member.isfile()][1:]
-    except (tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError) as error:
-        raise ArchiveError(f"{source} is damaged, or no archive of `force-gateway backup` (tar.gz): {error}") from None
 
 
 def unpack(source: Path, state: Path) -> Path | None:
@@ -69,16 +69,45 @@ def unpack(source: Path, state: Path) -> Path | None:
     state.parent.mkdir(parents=True, exist_ok=True)
     beside = Path(tempfile.mkdtemp(dir=state.parent, prefix=f".{state.name}."))
     try:
-        with tarfile.open(source, "r:gz") as archive:
+        with _damage_told(source), tarfile.open(source, "r:gz") as archive:
             archive.extractall(beside, filter="data")
         fresh = beside / _TOP
         fresh.mkdir(exist_ok=True)
         fresh.chmod(0o700)
-        previous = _set_aside(state)
-        fresh.rename(state)
+        _sync_all(fresh)
+        return _put_in_place(fresh, state)
     finally:
-        shutil.rmtree(beside)
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+def _sync_all(folder: Path) -> None:
+    """Have what was extracted on the disk before it stands where the state was."""
+    for path in (*_files(folder), folder):
+        sync_path(path)
+
+
+def _put_in_place(fresh: Path, state: Path) -> Path | None:
+    """Exchange the two; OSError, and what was there is there again, where the disk refuses."""
+    previous = _set_aside(state)
+    try:
+        fresh.rename(state)
+    except OSError as error:
+        if previous:
+            try:
+                previous.rename(state)
+            except OSError:
+                raise OSError(error.errno, f"{error.strerror}; what was there is in {previous}", str(state)) from None
+        raise
+    sync_path(state.parent)
     return previous
+
+
+@contextlib.contextmanager
+def _damage_told(source: Path) -> Iterator[None]:
+    try:
+        yield
+    except (tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError) as error:
+        raise ArchiveError(f"{source} is damaged, or no archive of `force-gateway backup` (tar.gz): {error}") from None
 
 
 def _read_to_the_end(source: Path) -> None:

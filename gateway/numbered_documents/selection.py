@@ -69,15 +69,21 @@ class SelectionState:
         return replace(self, active=selection, previous=previous, slots=tuple(slots))
 
 
-def read_selection(directory: Path, noun: str) -> tuple[SelectionState, tuple[str, ...]]:
+def read_selection(directory: Path, noun: str, *, is_to_change: bool = False) -> tuple[SelectionState, tuple[str, ...]]:
     """Return the newest whole generation, and a sentence for each newer one that is not. Nothing stored is generation 0.
-    noun: what the documents are, for the sentences."""
+    noun: what the documents are, for the sentences. is_to_change: a generation that the disk does not give is an OSError, for
+    it may be whole, and what followed the one before it would undo it."""
     damaged: list[str] = []
     for generation, name in reversed(_generations(directory)):
         try:
             pointer = _parse_state((directory / name).read_bytes(), generation)
-        except (OSError, ValueError) as error:
-            damaged.append(f"{directory / name} {_words(error)}")
+        except OSError as error:
+            if is_to_change:
+                raise
+            damaged.append(f"{directory / name} cannot be read: {error.strerror}")
+            continue
+        except ValueError as error:
+            damaged.append(f"{directory / name} {error}")
             continue
         consequence = f"the generation before it is used ({generation})"
         return pointer, tuple(f"E432 {sentence}; {consequence}" for sentence in damaged)
@@ -124,7 +130,3 @@ def _parse_state(data: bytes, generation: int) -> SelectionState:
 
 def _selection(facts: dict[str, Any]) -> Selection:
     return Selection(facts["number"], facts["slot"])
-
-
-def _words(error: Exception) -> str:
-    return f"cannot be read: {error.strerror}" if isinstance(error, OSError) else str(error)

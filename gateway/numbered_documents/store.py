@@ -26,11 +26,13 @@ _LAST: Final = 9999
 
 
 class StoreError(Exception):
-    """A document cannot be stored, read or used; what was in use stays. str: the sentence, which begins with its code."""
+    """A document cannot be stored, read or used; what was in use stays. str: the sentence, which begins with its code.
+    is_unread: the disk did not give it, and it may be whole."""
 
-    def __init__(self, code: str, sentence: str) -> None:
+    def __init__(self, code: str, sentence: str, *, is_unread: bool = False) -> None:
         super().__init__(f"{code} {sentence}")
         self.code = code
+        self.is_unread = is_unread
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +107,7 @@ class NumberedStore(ABC, Generic[Document]):
         except FileNotFoundError:
             return self._built_in(number)
         except OSError as error:
-            raise StoreError("E432", f"{path} cannot be read: {error.strerror}") from None
+            raise StoreError("E432", f"{path} cannot be read: {error.strerror}", is_unread=True) from None
         if self.number_of(document) != number:
             raise StoreError("E432", f"{path} says that it is {self.noun} {self.number_of(document)}")
         return document
@@ -141,8 +143,8 @@ class NumberedStore(ABC, Generic[Document]):
         return self._change(Selection(number, slot))
 
     def previous(self) -> Selection:
-        """Return what a rollback brings back. StoreError where nothing was ever changed."""
-        pointer, _ = self._pointer()
+        """Return what a rollback brings back. StoreError where nothing was ever changed, or it cannot be known now."""
+        pointer, _ = self._pointer(is_to_change=True)
         if pointer.generation == 0:
             raise StoreError("E433", f"no {self.noun} was in use before this one: there is nothing to go back to")
         previous = pointer.previous
@@ -153,7 +155,7 @@ class NumberedStore(ABC, Generic[Document]):
         try:
             make_directory(self.directory)
             with lock_directory(self.directory) as descriptor:
-                pointer, _ = read_selection(self.directory, self.noun)
+                pointer, _ = read_selection(self.directory, self.noun, is_to_change=True)
                 changed = pointer.with_active(selection, self._to_go_back_to(pointer, selection))
                 return write_selection(self.directory, descriptor, changed)
         except OSError as error:
@@ -162,17 +164,28 @@ class NumberedStore(ABC, Generic[Document]):
     def _to_go_back_to(self, pointer: SelectionState, selection: Selection) -> Selection:
         """Return what is in use now, unless it is damaged or is chosen again: then what could be gone back to stays."""
         active = pointer.active
-        if active.number == selection.number or (active.number is not None and self._entry(active.number).fault):
+        if active.number == selection.number or (active.number is not None and self._is_damaged(active.number)):
             return pointer.previous
         return active
 
-    def _pointer(self) -> tuple[SelectionState, tuple[str, ...]]:
+    def _is_damaged(self, number: int) -> bool:
+        try:
+            self.load(number)
+        except StoreError as error:
+            return not error.is_unread
+        return False
+
+    def _pointer(self, *, is_to_change: bool = False) -> tuple[SelectionState, tuple[str, ...]]:
         try:
             with lock_directory(self.directory, shared=True):
-                return read_selection(self.directory, self.noun)
+                return read_selection(self.directory, self.noun, is_to_change=is_to_change)
         except FileNotFoundError:
             return SelectionState(), ()
         except OSError as error:
+            if is_to_change:
+                raise StoreError(
+                    "E432", f"{error.filename or self.directory} cannot be read: {error.strerror}"
+                ) from None
             return SelectionState(), (
                 f"E432 {self.directory} cannot be read: {error.strerror}; built-in {self.noun} used",
             )
@@ -195,7 +208,7 @@ class NumberedStore(ABC, Generic[Document]):
         return sorted(int(match[1]) for name in names if (match := _NAME.fullmatch(name)))
 
     def _next_number(self) -> int:
-        selected, _ = read_selection(self.directory, self.noun)
+        selected, _ = read_selection(self.directory, self.noun, is_to_change=True)
         number = 1 + max(0, *self.numbers(), *selected.numbers, self.number_of(self.built_in) if self.built_in else 0)
         if number > _LAST:
             raise StoreError(

@@ -5,7 +5,6 @@ real run of this rig, made before: the newest recording in which a force was com
 """
 
 import json
-import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
@@ -13,7 +12,7 @@ from typing import Final
 from gateway.control.compensation.cell_map import CellMap
 from gateway.diagnosis.force_error import FEWEST_BLOCKS, ErrorBlock
 from gateway.plants.recorded_force import read_recorded_force
-from gateway.processes.durable_file import make_directory
+from gateway.processes.durable_file import lock_directory, make_directory, replace_durably
 from gateway.recording import Recording, RecordingError, list_recordings, read_recording
 
 _FILE: Final = "reference.json"
@@ -56,12 +55,8 @@ def keep_reference(state: Path, reference: ForceReference | None) -> None:
         path.unlink(missing_ok=True)
         return
     make_directory(path.parent)
-    beside = path.with_name(f".{_FILE}.{os.getpid()}")
-    try:
-        beside.write_text(json.dumps(asdict(reference)), encoding="utf-8")
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    with lock_directory(path.parent) as descriptor:
+        replace_durably(descriptor, _FILE, json.dumps(asdict(reference)).encode())
 
 
 def read_reference(state: Path, plant: int) -> ForceReference | None:

@@ -26,6 +26,10 @@ class DiskWorker:
 
         self._threads.submit(work).add_done_callback(come_back)
 
+    def begin(self, work: Callable[[], object]) -> None:
+        """Begin this, too: nobody waits for it, and it minds its own failures. Also outside of a loop."""
+        self._threads.submit(work)
+
     def close(self) -> None:
         """Take nothing more; what runs comes to its end, and the process waits for it."""
         self._threads.shutdown(wait=False)

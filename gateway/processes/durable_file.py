@@ -1,8 +1,9 @@
 """Small files that are there whole or not at all, also after kill -9, a power cut or a full disk.
 
 A new file is written beside its name, fsynced, renamed, and its directory is fsynced; only then is it said to be there.
-Names are never used twice (they carry a number that grows), so that taking a failed write back is one unlink, and
-nothing is ever overwritten: writing in place tore 193 of 300 files in a trial. The first line of a file holds the CRC-32
+Names are used once where they carry a number that grows, so that taking a failed write back is one unlink; where a file has
+a name of its own (`replace_durably`) the one before stays until the rename, and a failed write never takes it away. Nothing
+is ever written in place: that tore 193 of 300 files in a trial. The first line of a numbered file holds the CRC-32
 of the rest. An open descriptor of the directory is both its lock (flock, between threads and processes alike) and what
 its fsync needs.
 """
@@ -39,7 +40,7 @@ def make_directory(directory: Path) -> None:
     except FileExistsError:
         return
     try:
-        _sync(directory.parent)
+        sync_path(directory.parent)
     except OSError:
         with contextlib.suppress(OSError):
             directory.rmdir()
@@ -47,14 +48,24 @@ def make_directory(directory: Path) -> None:
 
 
 def write_durably(directory: int, name: str, data: bytes) -> None:
-    """Write a new file durably: `name` in this directory holds `data`. OSError, and it is not there, when that fails."""
+    """Write a new file durably: `name` in this directory holds `data`. OSError, and it is not there, when that fails: not for
+    a name that may be there already."""
+    try:
+        replace_durably(directory, name, data)
+    except OSError:
+        remove_if_possible(directory, name)
+        raise
+
+
+def replace_durably(directory: int, name: str, data: bytes) -> None:
+    """Write a file durably in place of the one that may be there. OSError when that fails: it holds the old data then, or,
+    where only the directory's fsync was refused, the new ones."""
     try:
         _write(directory, name + _FRESH, data)
         os.rename(name + _FRESH, name, src_dir_fd=directory, dst_dir_fd=directory)
         os.fsync(directory)
     except OSError:
-        for left in (name, name + _FRESH):
-            remove_if_possible(directory, left)
+        remove_if_possible(directory, name + _FRESH)
         raise
 
 
@@ -95,8 +106,9 @@ def _write(directory: int, name: str, data: bytes) -> None:
         os.close(descriptor)
 
 
-def _sync(directory: Path) -> None:
-    descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+def sync_path(path: Path) -> None:
+    """Have a file's data, or a directory's names, put on the disk. OSError where it refuses."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
         os.fsync(descriptor)
     finally:

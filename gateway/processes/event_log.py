@@ -220,5 +220,6 @@ class _EventFileWriter:
                 self._alarm(self._event("events", sentence))
             return
         if self._lost:
-            lost, self._lost = self._lost, 0
-            self._file.append(encode_event(self._event("events", f"E150 {lost} events were not kept before this one")))
+            sentence = f"E150 {self._lost} events were not kept before this one"
+            self._file.append(encode_event(self._event("events", sentence)))  # where this fails it is told later
+            self._lost = 0

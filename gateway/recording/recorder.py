@@ -3,13 +3,15 @@
 Decisions
 - Rows go into one buffer that is reused; a batch is complete, with its CRC, before its single write. A kill -9 at any
   moment leaves whole batches and at most one torn one.
-- No fsync: the kernel keeps what was written when the process dies; a power cut may cost the last seconds. SQLite and
-  Parquet were rejected for the same reason and because a torn Parquet file has no footer and so no data at all.
-- A full disk ends the recording, with a sentence, never the control loop.
+- No fsync here: the kernel keeps what was written when the process dies; a power cut may cost the last half minute. Whoever
+  records has `sync_recording` called in a thread, once it has begun (without its header a file is nothing) and once it has
+  ended. SQLite and Parquet were rejected, for they sync as they go, and a torn Parquet file has no footer and so no data.
+- A full disk ends the recording, with a sentence, never the control loop. One that takes no header has no recording.
 - No numpy here: the control process needs none of it to record.
 """
 
 import contextlib
+import errno
 import fcntl
 import json
 import os
@@ -19,6 +21,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.processes.durable_file import sync_path
 from gateway.recording.layout import BATCH_PREFIX, MARK, SUFFIX, batch_crc, header_bytes
 
 _FLUSH_S: Final = 0.1
@@ -30,7 +33,7 @@ class Recorder:
     """One open recording. failure: None while it records, else the sentence that says why it stopped."""
 
     def __init__(self, directory: Path, header: Mapping[str, Any], columns: tuple[str, ...]) -> None:
-        """Create the next numbered file in `directory` (made if absent); OSError when that cannot be done.
+        """Create the next numbered file in `directory` (made if absent); OSError, and there is none, when that cannot be done.
 
         header: what a reader needs to understand the rows: rig, rig_fingerprint, rig_texts, calibration, seed ...;
         `format`, `number`, `columns` and, if absent, `started_utc` are added.
@@ -50,14 +53,18 @@ class Recorder:
             fcntl.flock(
                 descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB
             )  # until it is closed: whoever deletes recordings looks
-        self._length = 0
         facts = {"format": _FORMAT, "number": self.number, "started_utc": _utc_now()} | dict(header)
-        self._write(header_bytes(json.dumps(facts | {"columns": list(columns)}).encode()))
+        self._length = self._write_header(header_bytes(json.dumps(facts | {"columns": list(columns)}).encode()))
 
     @property
     def is_open(self) -> bool:
         """Decide whether rows are still written."""
         return self._descriptor is not None
+
+    @property
+    def size_bytes(self) -> int:
+        """Return how long the file is."""
+        return self._length
 
     def append(self, values: tuple[float, ...]) -> None:
         """Add one row, in the order of the columns; struct.error when their number differs. Nothing once it stopped."""
@@ -81,6 +88,19 @@ class Recorder:
         if self._rows:
             self._write_batch()
         self._release()
+
+    def _write_header(self, data: bytes) -> int:
+        """Return its length. A file without one could not be read: it goes."""
+        assert self._descriptor is not None
+        try:
+            if os.write(self._descriptor, data) < len(data):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
+        except OSError:
+            self._release()
+            with contextlib.suppress(OSError):
+                self.path.unlink()
+            raise
+        return len(data)
 
     def _write_batch(self) -> None:
         end = BATCH_PREFIX.size + self._rows * self._row.size
@@ -119,6 +139,12 @@ class Recorder:
         if self._descriptor is not None:
             descriptor, self._descriptor = self._descriptor, None
             os.close(descriptor)
+
+
+def sync_recording(path: Path) -> None:
+    """Have what is written of a recording, and its name, put on the disk: not in a loop. OSError where it refuses."""
+    sync_path(path)
+    sync_path(path.parent)
 
 
 def _create_next(directory: Path) -> tuple[int, Path, int]:

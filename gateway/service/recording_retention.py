@@ -1,4 +1,5 @@
-"""Removes the recordings that the rig has no room for, at the start and every hour, in a thread beside the control loop."""
+"""Removes the recordings that the rig has no room for, at the start, every hour, and whenever
+one has become as long as one may be, in a thread beside the control loop."""
 
 from math import inf
 from pathlib import Path
@@ -27,6 +28,11 @@ class RecordingRetention:
         if now_s >= self._due_s:
             self._due_s = now_s + _EVERY_S
             self._worker(self._prune, self._tell)
+
+    def hasten(self) -> None:
+        """Have it begin with the next tick, if there is a limit: a recording has ended by its length."""
+        if self._due_s < inf:
+            self._due_s = -inf
 
     def close(self) -> None:
         """Begin nothing more."""

@@ -18,7 +18,7 @@ from gateway.diagnosis.diagnose import Options
 from gateway.diagnosis.excerpt import take_excerpt
 from gateway.diagnosis.measurement import Measurement
 from gateway.plants.recorded_number import header_in_use
-from gateway.processes.durable_file import add_checksum, lock_directory, verify_checksum, write_durably
+from gateway.processes.durable_file import add_checksum, lock_directory, replace_durably, verify_checksum
 from gateway.recording import read_table
 from gateway.recording.measurement import measurement_of
 from gateway.twin.plant import Plant, values
@@ -44,7 +44,7 @@ def described_machine(state: Path, reference: ReferenceRecording, plant: Plant) 
         pass  # nothing kept, or nothing that can be read
     document = machine_document(describe_machine([old], plant, Options(is_own=True)))
     with suppress(OSError), lock_directory(folder) as descriptor:  # a full disk: it is described again the next time
-        write_durably(descriptor, _FILE, add_checksum(json.dumps({"key": key, "machine": document})))
+        replace_durably(descriptor, _FILE, add_checksum(json.dumps({"key": key, "machine": document})))
     return read_machine(document, [old])  # without what the description has kept in memory
 
 

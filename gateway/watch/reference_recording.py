@@ -14,7 +14,13 @@ from pathlib import Path
 from typing import Final
 
 from gateway.numbered_documents.selection import read_selection
-from gateway.processes.durable_file import lock_directory, make_directory, remove_if_possible, write_durably
+from gateway.processes.durable_file import (
+    lock_directory,
+    make_directory,
+    remove_if_possible,
+    replace_durably,
+    sync_path,
+)
 from gateway.recording import RecordingError, read_table
 from gateway.recording.reader import Recording, recording_paths
 
@@ -71,10 +77,12 @@ def keep_reference_recording(state: Path, recording: Path, calibration: int | No
         beside = folder / f".{kept.file}"
         try:
             shutil.copyfile(recording, beside)
+            sync_path(beside)
             beside.replace(folder / kept.file)
+            sync_path(folder)
         finally:
             beside.unlink(missing_ok=True)
-        write_durably(descriptor, _FACTS, json.dumps(asdict(kept)).encode())
+        replace_durably(descriptor, _FACTS, json.dumps(asdict(kept)).encode())
         _remove_all_but(folder, descriptor, kept.file)
     return kept
 

@@ -35,6 +35,9 @@ class SimulatedDisk:
     def __call__(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
         asyncio.get_running_loop().call_later(type(self).delay_s(), done, self._result(work))
 
+    def begin(self, work: Callable[[], Any]) -> None:
+        self._result(work)
+
     def _result(self, work: Callable[[], Any]) -> Any:
         if type(self).is_full:
             return OSError(28, os.strerror(28))
@@ -136,6 +139,7 @@ def simulated_edges() -> Any:
             "gateway.service.running_rig.rig_plants",
             "gateway.audit.audit_log",
             "gateway.service.recording_retention",
+            "gateway.service.recording_sync",
         ):
             patch.setattr(f"{user}.DiskWorker", SimulatedDisk)
         yield

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from gateway.processes.durable_file import lock_directory, remove_if_possible, write_durably
+from gateway.processes.durable_file import lock_directory, remove_if_possible, replace_durably
 from gateway.profiles.recordings_section import Retention
 from gateway.recording.reader import recording_paths
 
@@ -22,7 +22,7 @@ _CLOSED_S: Final = 5.0  # rows come ten times a second: what was written later t
 def keep_recording(path: Path) -> None:
     """Have a recording kept, whatever becomes of others. OSError where the disk refuses."""
     with lock_directory(path.parent) as descriptor:
-        write_durably(descriptor, path.with_suffix(_MARK).name, b"")
+        replace_durably(descriptor, path.with_suffix(_MARK).name, b"")
 
 
 def let_recording_go(path: Path) -> None:
@@ -87,16 +87,27 @@ def _why_it_goes(age_s: float, total_bytes: int, retention: Retention) -> str:
 
 
 def delete_recording(path: Path, reference: str) -> str:
-    """Remove a recording; return why it had to stay, empty where it is gone. OSError where the disk refuses."""
+    """Remove a recording; return why it had to stay, empty where it is gone. OSError where the disk refuses.
+
+    Its number is marked first where it is the highest, for that one would be given again. The mark of any other one is not
+    needed, and so what is deleted on a full disk needs no room.
+    """
     if why := why_protected(path, reference):
         return why
     with lock_directory(path.parent) as descriptor:
-        write_durably(descriptor, path.with_suffix(_GONE).name, b"")
+        is_highest = int(path.stem) == max(_numbers(path.parent))
+        if is_highest:
+            replace_durably(descriptor, path.with_suffix(_GONE).name, b"")
         path.unlink()
-        _keep_highest_mark(path.parent, descriptor)
         remove_if_possible(descriptor, path.with_suffix(_MARK).name)
         os.fsync(descriptor)
+        if is_highest:
+            _keep_highest_mark(path.parent, descriptor)
     return ""
+
+
+def _numbers(folder: Path) -> list[int]:
+    return [int(path.stem) for path in folder.iterdir() if path.stem.isdigit()]
 
 
 def _keep_highest_mark(folder: Path, descriptor: int) -> None:
@@ -108,6 +119,15 @@ def _keep_highest_mark(folder: Path, descriptor: int) -> None:
 
 
 def prune_recordings(state: Path, retention: Retention, reference: str) -> list[Prunable]:
-    """Remove what the limits have no room for; return what has gone."""
-    chosen = choose_prunable(recording_paths(state), retention, reference, time.time())
-    return [one for one in chosen if not delete_recording(one.path, reference)]
+    """Remove what the limits have no room for; return what has gone. One that the disk does not let go keeps no other one;
+    OSError where it lets none go."""
+    gone, refusals = [], []
+    for one in choose_prunable(recording_paths(state), retention, reference, time.time()):
+        try:
+            if not delete_recording(one.path, reference):
+                gone.append(one)
+        except OSError as error:
+            refusals.append(error)
+    if refusals and not gone:
+        raise refusals[0]
+    return gone

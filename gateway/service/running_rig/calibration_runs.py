@@ -1,7 +1,8 @@
 """Keeps a calibration run or experiment: starts it for this machine, records it, and has a ladder fitted when it is done.
 
 The recording is one of its own, beside whatever else is recorded, with the plan in its header and, of a ladder, the stair in
-each row; it stays whatever becomes of the run. One more row after the last stair says that this one was finished, too. A run
+each row; it stays whatever becomes of the run. A disk that does not take it ends the run: a ladder without data is wear for
+nothing. One more row after the last stair says that this one was finished, too. A run
 that a person at this machine has started is stopped when nobody has asked for its status for FOLLOWED_S: a closed terminal
 must not leave a tool climbing stairs.
 """
@@ -22,6 +23,7 @@ from gateway.profiles import Rig
 from gateway.profiles.kinds.plans import plan_document, plan_of
 from gateway.recording import Recorder
 from gateway.registers.words import CalibrationPhase
+from gateway.service.recording_sync import RecordingSync
 from gateway.service.running_rig.fit_launcher import FitLauncher, Result
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
@@ -45,6 +47,7 @@ class CalibrationRuns:
         self._state = state
         self._clock = clock
         self._log = log
+        self._sync = RecordingSync(log)
         self._continues: tuple[int, ...] = ()
         self._name = ""
         self._stairs = 0
@@ -147,6 +150,8 @@ class CalibrationRuns:
                 self._close_ladder()
         elif self._recording is not None and not calibrating.running:
             self._end(decision)
+        elif self._recording is not None and (failure := self._recording.recorder.failure):
+            calibrating.ask_stop(f"A330 calibration stopped: {failure}")
         elif calibrating.running and calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
             calibrating.ask_stop("A330 calibration stopped: nobody at this machine follows it any more")
 
@@ -179,11 +184,12 @@ class CalibrationRuns:
         """Close the recording and the line to a fit under way."""
         if self._recording:
             self._recording.recorder.close()
+            self._sync(self._recording.recorder.path)
         if self._child:
             self._child.close()
+        self._sync.close()
 
     def _begin(self) -> None:
-        """A disk that takes no recording ends the run: a ladder without data is wear for nothing."""
         run, rig = self._calibrating.recorded, self._rig
         assert run
         header = {
@@ -206,6 +212,7 @@ class CalibrationRuns:
             self._calibrating.ask_stop(f"A330 calibration stopped: the recording cannot be written: {error.strerror}")
             return
         self._recording, self._path = RunRecording(recorder), recorder.path
+        self._sync(recorder.path)
         self._continues, self._name = (), ""
 
     def _end(self, decision: Output) -> None:
@@ -216,6 +223,7 @@ class CalibrationRuns:
             return
         recorder, self._recording = self._recording.recorder, None
         recorder.close()
+        self._sync(recorder.path)
         self._ended = decision.events[0] if decision.events else ""
         if recorder.failure:
             self._ended = recorder.failure
@@ -228,6 +236,7 @@ class CalibrationRuns:
         assert self._recording
         recorder, self._recording, self._closing_s = self._recording.recorder, None, None
         recorder.close()
+        self._sync(recorder.path)
         if recorder.failure:
             self._ended = recorder.failure
             self._calibrating.phase = CalibrationPhase.STOPPED

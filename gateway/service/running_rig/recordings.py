@@ -1,7 +1,11 @@
-"""The running gateway's recording: at most one, started and stopped on command; a full disk ends it, not the control."""
+"""The running gateway's recording: at most one, started and stopped on command; a full disk ends it, not the control.
+
+One that goes on for ever goes on in another file after a day, or when it is as long as one may be, so that whoever prunes
+recordings has something to prune, and no file is too long to be read.
+"""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample
@@ -11,8 +15,14 @@ from gateway.profiles import Rig
 from gateway.recording import Recorder
 from gateway.recording.label import NO_LABEL, RecordingLabel
 from gateway.service.recording_retention import RecordingRetention
+from gateway.service.recording_sync import RecordingSync
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
+
+LONGEST_BYTES: Final = 256 << 20
+LONGEST_S: Final = 86400.0
+_SHARES: Final = 8
+"""How many files there are at least in what a rig's limits have room for."""
 
 
 class Recordings:
@@ -24,6 +34,11 @@ class Recordings:
         self._log = log
         self._current: RunRecording | None = None
         self._retention = RecordingRetention(directory.parent, rig.retention, log)
+        self._sync = RecordingSync(log)
+        days, most = rig.retention.days, rig.retention.bytes
+        self._longest_bytes = LONGEST_BYTES if most is None else min(LONGEST_BYTES, most // _SHARES)
+        self._longest_s = LONGEST_S if days is None else min(LONGEST_S, days * 86400.0 / _SHARES)
+        self._began_s: float | None = None
         self._label = NO_LABEL
         self._for_s = 0.0
         self._ends_s: float | None = None
@@ -48,7 +63,8 @@ class Recordings:
             "seed": rig.seed,
         }
         self._current = RunRecording(Recorder(self._directory, header, COLUMNS))
-        self._label, self._for_s, self._ends_s = label, for_s, None
+        self._label, self._for_s, self._ends_s, self._began_s = label, for_s, None, None
+        self._sync(self._current.recorder.path)
         return self.status()
 
     def use_plant(self, rig: Rig) -> None:
@@ -56,13 +72,16 @@ class Recordings:
         how they were read."""
         self.plant_in_use = in_use_facts(rig)
         if self._current:
-            ended, label, for_s, ends_s = self.stop(), self._label, self._for_s, self._ends_s
-            try:
-                goes_on = self.start(label, for_s)["recording"]
-                self._ends_s = ends_s
-                self._log("recording", f"{ended['written']} ends with the plant in use, {goes_on} goes on")
-            except OSError as error:
-                self._log("recording", f"{ended['written']} ends with the plant in use, not recording: {error}")
+            self._go_on_in_another("with the plant in use")
+
+    def _go_on_in_another(self, why: str) -> None:
+        ended, label, for_s, ends_s = self.stop(), self._label, self._for_s, self._ends_s
+        try:
+            goes_on = self.start(label, for_s)["recording"]
+            self._ends_s = ends_s
+            self._log("recording", f"{ended['written']} ends {why}, {goes_on} goes on")
+        except OSError as error:
+            self._log("recording", f"E402 {ended['written']} ends {why}, not recording: {error}; control goes on")
 
     def try_start(self) -> tuple[str, ...]:
         """Begin a recording; a sentence where the disk takes none, which is no reason not to control."""
@@ -78,12 +97,14 @@ class Recordings:
             return {"recording": None}
         ended, self._current = self._current, None
         ended.recorder.close()
+        self._sync(ended.recorder.path)
         return {"recording": None, "written": str(ended.recorder.path), "rows": ended.rows}
 
     def close(self) -> None:
         """End the recording, if there is one, for good."""
         self.stop()
         self._retention.close()
+        self._sync.close()
 
     def status(self) -> dict[str, Any]:
         """Return where the current recording is and how many rows it has."""
@@ -109,6 +130,14 @@ class Recordings:
             elif self._is_over(now_s):
                 ended = self.stop()
                 self._log("recording", f"{ended['written']} ends after {self._for_s:g} s, {ended['rows']} rows")
+            elif self._is_long(recorder.size_bytes, now_s):
+                self._go_on_in_another("as long as one may be")
+                self._retention.hasten()
+
+    def _is_long(self, size_bytes: int, now_s: float) -> bool:
+        if self._began_s is None:
+            self._began_s = now_s
+        return size_bytes >= self._longest_bytes or now_s - self._began_s >= self._longest_s
 
     def _is_over(self, now_s: float) -> bool:
         if self._for_s and self._ends_s is None:

@@ -1,5 +1,6 @@
 """A calibration that somebody at this machine asked for, in virtual time: it lasts as long as somebody follows it."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -73,3 +74,19 @@ def test_without_a_fresh_sample_or_while_pressing_no_run_begins(tmp_path: Path) 
     with pytest.raises(ValueError, match="W305 calibration refused: state HOLDING, it begins from OFF"):
         runs.answer({"plan": PLAN})
     assert not runs.status()["running"]
+
+
+def test_a_disk_that_takes_no_more_ends_the_run_for_its_stairs_would_be_wear_for_nothing(tmp_path: Path) -> None:
+    wired = Wired().ready()
+    runs = kept(wired, tmp_path)
+    runs.answer({"plan": PLAN})
+    wired.run(1.0)
+    runs.flush(0.0)
+    with open("/dev/full", "wb", buffering=0) as full:  # noqa: PTH123
+        assert runs._recording and runs._recording.recorder._descriptor
+        os.dup2(full.fileno(), runs._recording.recorder._descriptor)
+    runs.flush(1.0)
+    wired.until(lambda: not runs.answer({})["running"], FOLLOWED_S)
+    assert "E402" in runs.status()["ended"] and "No space left" in runs.status()["ended"]
+    assert wired.word("calibration_phase") == CalibrationPhase.STOPPED
+    wired.until(lambda: wired.value("output_voltage") == 0.0, 5.0)

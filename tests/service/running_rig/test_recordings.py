@@ -1,12 +1,13 @@
 """Recordings of a running rig: what a user says of one stands in it, and one with a time ends by itself."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from gateway.recording import list_recordings
 from gateway.recording.label import RecordingLabel, label_of
-from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.recordings import LONGEST_S, Recordings
 from tests.service.rigs import demo
 
 
@@ -60,4 +61,28 @@ def test_the_next_recording_has_no_end_of_the_one_before(recordings: Recordings)
     recordings.start()
     recordings.flush(50.0)
     assert recordings.status()["recording"]
+    recordings.stop()
+
+
+def test_one_that_goes_on_for_days_goes_on_in_another_file(recordings: Recordings, tmp_path: Path) -> None:
+    recordings.start(RecordingLabel("for ever"))
+    for day in range(4):
+        for later_s in (0.0, 0.01):
+            recordings.flush(1.0 + 1.01 * day * LONGEST_S + later_s)
+    assert recordings.status()["recording"].endswith("0004.fgr")
+    assert {label_of(entry.header).name for entry in list_recordings(tmp_path)} == {"for ever"}
+    assert len([line for line in recordings._log if "as long as one may be" in line]) == 3
+    recordings.stop()
+
+
+def test_a_disk_that_takes_no_header_has_no_recording_and_says_so(
+    recordings: Recordings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "write", lambda descriptor, data: 3)
+    with pytest.raises(OSError, match="No space left"):
+        recordings.start()
+    monkeypatch.undo()
+    assert recordings.status() == {"recording": None}
+    assert list_recordings(tmp_path) == []
+    assert recordings.start()["recording"].endswith("0001.fgr")
     recordings.stop()

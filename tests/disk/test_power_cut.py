@@ -1,0 +1,54 @@
+"""The power is cut behind any write: whoever reads the directory afterwards finds the old or the new, and all that was told."""
+
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from tests.disk.acts import ACTS, Act
+from tests.disk.power_cut import JournaledDisk
+from tests.disk.test_failing_calls import try_once
+from tests.disk.watched_disk import watching
+
+CUTS = 4
+SEEDS = 5
+"""In the push gate so many cuts of each act; with --long all of them, each with so many mixtures of what was not synced."""
+
+
+def journal(act: Act) -> JournaledDisk:
+    """What the act does to the disk."""
+    act.prepare()
+    disk = JournaledDisk(act.state)
+    with watching(disk):
+        act.run(disk.say)
+    assert disk.said and disk.changes
+    return disk
+
+
+@pytest.mark.parametrize("kind_of_act", [act for act in ACTS if act.is_synced])
+def test_after_a_power_cut_it_is_the_old_or_the_new_and_what_was_said_stays(
+    fast_folder: Path, kind_of_act: type[Act], budget: int
+) -> None:
+    state = fast_folder / "state"
+    state.mkdir()
+    disk = journal(kind_of_act(state))
+    every = range(len(disk.changes) + 1)
+    cuts = every if budget > 1 else sorted(Random(1).sample(every, min(CUTS, len(every))))
+    count = 0
+    for seed in range(SEEDS if budget > 1 else 1):
+        for cut in cuts:
+            for mode, tree in disk.states(cut, seed):
+                count += 1
+                after = kind_of_act(fast_folder / f"{seed}-{cut}-{mode}")
+                tree.write_to(after.state)
+                said = disk.said_before(cut)
+                try:
+                    after.check(said)
+                    again: list[object] = []
+                    assert try_once(after, again) is None, "cannot go on"
+                    after.check(again)
+                except Exception as error:
+                    place = disk.changes[cut - 1] if cut else "before all"
+                    raise AssertionError(f"cut behind change {cut} ({place}), {mode}, {said} were told") from error
+    print(f"{count} states after cuts behind {len(disk.changes)} changes")
+    assert count >= len(cuts)
