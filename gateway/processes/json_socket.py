@@ -10,6 +10,7 @@ A gateway works without it, so a place where no socket can be made is a sentence
 """
 
 import asyncio
+import contextlib
 import json
 import os
 import socket
@@ -91,7 +92,8 @@ class JsonLineServer:
             if timer:
                 timer.cancel()
         self._queue.clear()
-        self._path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            self._path.unlink(missing_ok=True)
 
     # -- one thing at a time
 

@@ -1,5 +1,9 @@
-"""Did the last run end cleanly? A file that exists only while a gateway runs."""
+"""Did the last run end cleanly? A file that exists only while a gateway runs.
 
+A disk that does not take it is no reason not to control: then the next start does not know of this run.
+"""
+
+import contextlib
 from pathlib import Path
 
 
@@ -10,11 +14,16 @@ class CleanShutdownMarker:
         self._path = state / "running"
 
     def mark_running(self) -> bool:
-        """Mark this run as begun; True when the one before never lowered its flag."""
-        was_unclean = self._path.exists()
-        self._path.touch(mode=0o600)
+        """Mark this run as begun; True when the one before never lowered its flag, or when that cannot be known."""
+        try:
+            was_unclean = self._path.exists()
+        except OSError:
+            was_unclean = True
+        with contextlib.suppress(OSError):
+            self._path.touch(mode=0o600)
         return was_unclean
 
     def clear(self) -> None:
         """Remove the file: this run ended cleanly."""
-        self._path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            self._path.unlink(missing_ok=True)

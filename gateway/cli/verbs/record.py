@@ -104,5 +104,6 @@ def _sentence(answer: dict[str, Any]) -> str:
     if answer.get("written"):
         stopped = "stopped; " if answer.get("stopped") else ""
         length = f" ({answer['duration_s']:.1f} s)" if "duration_s" in answer else ""
-        return f"{stopped}recorded {answer.get('rows', 0)} rows{length} to {answer['written']}"
+        fault = f"; {answer['fault']}" if answer.get("fault") else ""
+        return f"{stopped}recorded {answer.get('rows', 0)} rows{length} to {answer['written']}{fault}"
     return "not recording"

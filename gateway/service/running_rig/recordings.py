@@ -92,13 +92,18 @@ class Recordings:
         return ()
 
     def stop(self) -> dict[str, Any]:
-        """End the recording, if there is one; return where it is and how many rows it has."""
+        """End the recording, if there is one; return where it is and how many rows the disk has taken, and as `fault` why not
+        all of them."""
         if not self._current:
             return {"recording": None}
-        ended, self._current = self._current, None
-        ended.recorder.close()
-        self._sync(ended.recorder.path)
-        return {"recording": None, "written": str(ended.recorder.path), "rows": ended.rows}
+        recorder, self._current = self._current.recorder, None
+        recorder.close()
+        self._sync(recorder.path)
+        answer = {"recording": None, "written": str(recorder.path), "rows": recorder.rows_written}
+        if recorder.failure:
+            self._log("recording", recorder.failure)
+            answer["fault"] = recorder.failure
+        return answer
 
     def close(self) -> None:
         """End the recording, if there is one, for good."""

@@ -97,7 +97,7 @@ class RunningRig:
             self._valve_line = ValveExchange(ValveHost(valve), self._ports.write_valve, valve.reply_timeout_s)
         self._tick = ClockTick(1.0 / rig.loop_hz, self._on_tick)
         self._recordings = Recordings(state / "recordings", rig, log)
-        self._audit = RigAudit(state, log)
+        self._audit = RigAudit(state, log, time.monotonic)
 
     def _wire(self, cause: FaultCode) -> None:
         """Make bank, controller and the loop between them, and who serves both."""

@@ -1,0 +1,121 @@
+"""The whole control process in virtual time, with a force held, while it is asked for all that is stored: on any disk."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from gateway.calibrations.store import CalibrationStore
+from gateway.plants.store import PlantStore
+from gateway.profiles import load_calibration
+from gateway.service.running_rig.running_rig import RunningRig
+from tests.disk.watched_disk import WatchedDisk, watching
+from tests.plants.test_plant_store import numbered
+from tests.simulation.processes import SimulatedDisk, simulated_edges
+from tests.simulation.schedule import HELD_N, Simulation
+
+STEP_S = 0.2
+ASKED: tuple[dict[str, Any], ...] = (
+    {"do": "record", "on": True, "name": "a day"},
+    {"do": "calibration", "use": 1001},
+    {"do": "record", "on": False},
+    {"do": "record", "on": True},
+    {"do": "calibration", "use": 1002},
+    {"do": "calibration", "rollback": True},
+    {"do": "plant", "use": 1},
+    {"do": "record", "on": False},
+)
+
+
+def prepare(state: Path) -> None:
+    """Two calibrations and a plant that can be taken into use."""
+    demo = load_calibration("demo")
+    store = CalibrationStore(state, replace(demo, number=1000))
+    for share in (1.01, 1.02):
+        low_n, middle_n, high_n = demo.rising_handles_n
+        store.add(replace(demo, rising_handles_n=(low_n, share * middle_n, high_n)))
+    PlantStore(state).add(numbered())
+
+
+class Day:
+    """One day of a gateway on a state directory. answers: what was said to each request, "error" where it was refused."""
+
+    def __init__(self, state: Path, seed: int = 5) -> None:
+        self.state = state
+        self.simulation = Simulation(seed, state)
+        SimulatedDisk.delay_s = staticmethod(lambda: 0.005)
+        self._holder = "worker"
+        self.answers: list[dict[str, Any]] = []
+        self.outcomes: list[dict[str, Any]] = []
+
+    @property
+    def running(self) -> RunningRig:
+        return self.simulation.guardian._kept[-1][1]
+
+    @property
+    def said(self) -> list[str]:
+        """All that it has told people."""
+        return [text for _, text in self.simulation.log.lines]
+
+    def ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        """As the control socket does it."""
+        handler = self.running._control_socket._handlers[request["do"]]
+        inside = self.simulation.guardian.inside
+        assert inside is not None
+        answers: list[dict[str, Any]] = []
+
+        def answer() -> None:
+            try:
+                answers.append(handler({key: value for key, value in request.items() if key != "do"}))
+            except (ValueError, OSError) as error:
+                answers.append({"error": str(error)})
+
+        inside.call_soon(answer)
+        self.simulation._run_for(STEP_S)
+        return answers[0]
+
+    def begin(self) -> None:
+        """Start, and hold a force."""
+        self.simulation._run_for(1.5)
+        self.simulation.masters["worker"].hold(HELD_N)
+        self.simulation._run_for(1.0)
+
+    def work(self) -> None:
+        """Ask for one thing after the other."""
+        for request in ASKED:
+            if request["do"] == "plant":  # a change of it waits until nothing presses
+                self.simulation.masters[self._holder].let_go()
+                self.simulation._run_for(1.5)
+            self.answers.append(self.ask(request))
+            self.outcomes.append(self.ask({"do": request["do"]}))
+
+    def end(self) -> list[str]:
+        """Hold a force once more, and say what was broken."""
+        self.simulation._heal()
+        self._holder = "healer"
+        guardian, log = self.simulation.guardian, self.simulation.log
+        broken = [*self.simulation.observer.broken, *self.simulation.masters["worker"].complaints]
+        broken += [f"{len(guardian.deaths_s)} deaths of control"] if guardian.deaths_s else []
+        broken += [f"complaint: {text}" for text in guardian.complaints]
+        return broken + [text for _, text in log.lines if "A499" in text]
+
+
+@contextmanager
+def a_day(state: Path, disk: WatchedDisk, *, from_the_start: bool) -> Iterator[Day]:
+    """A day on this disk; from_the_start: it is so already when control starts, else from the first request on."""
+    with simulated_edges():
+        day = Day(state)
+        with day.simulation.clock.as_the_kernels():
+            try:
+                if from_the_start:
+                    with watching(disk):
+                        day.begin()
+                        day.work()
+                else:
+                    day.begin()
+                    with watching(disk):
+                        day.work()
+                yield day
+            finally:
+                day.simulation.close()
