@@ -94,5 +94,3 @@ def judge_recording(day: Day, path: Path, rows: int) -> None:
         kept = 0
     stopped: list[Any] = [text for text in day.said if "E402" in text and str(path) in text]
     assert kept == rows or stopped, f"{path.name}: {kept} rows, {rows} were told"
-
-

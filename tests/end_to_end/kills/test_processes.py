@@ -44,6 +44,23 @@ def test_killing_control_drops_the_force_and_restarts_in_off(shared):
     pressing(shared)
 
 
+def test_a_stopped_guardian_is_not_felt(shared):
+    """Control says itself what is due; the guardian goes on where it was."""
+    pressing(shared)
+    control = shared.ready["pids"]["control"]
+    shared.process.send_signal(signal.SIGSTOP)
+    end_s = time.monotonic() + 0.3
+    try:
+        while time.monotonic() < end_s:
+            assert shared.status()["state"] in (2, 3), "ramping or holding"
+            time.sleep(0.02)
+    finally:
+        shared.process.send_signal(signal.SIGCONT)
+    time.sleep(0.15)  # longer than a heartbeat may be away
+    assert shared.status()["state"] in (2, 3)
+    assert psutil.Process(control).is_running()
+
+
 def test_a_stopped_control_process_is_killed_and_replaced(shared):
     pressing(shared)
     os.kill(shared.ready["pids"]["control"], signal.SIGSTOP)
