@@ -122,7 +122,7 @@ def fault_control(scene: Scene, number: int) -> Times:
 
 
 def fault_recording(scene: Scene, number: int) -> Times:
-    """Do the same to one that records: the recording, too, ends where control did."""
+    """Send it to one that records: the recording, too, ends where control did."""
     state = scene.gateway.state
     scene.press()
     path = Path(ask(state, {"do": "record", "on": True})["recording"])
