@@ -7,6 +7,7 @@ commit. Registers are asked for by name; a map of the user's own that lacks one 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from struct import unpack
 from typing import Final
 
 from gateway import VERSION
@@ -14,6 +15,8 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers.map.register_map import Register, RegisterMap, UnknownRegister
+from gateway.registers.values import WordOrder, pack_number
+from gateway.registers.writes.byte_order_echo import PROOF
 
 TEXT_LENGTH: Final = 80
 """Characters of a RAPID string, the shortest that a language allows."""
@@ -26,7 +29,8 @@ STAGING: Final = (
     "order falling_b_0 blend_span length crc32 target_slot commit commit_status failing_index failing_reason slip_stops"
 ).split()
 ACTIVE: Final = ("order", "falling_b_0", "blend_span", "crc32", "slip_stops")
-NEEDED: Final = {"command": COMMAND, "status": STATUS, "staging": STAGING, "active": ACTIVE}
+PROOF_BLOCK: Final = ("byte_order_echo",)
+NEEDED: Final = {"command": COMMAND, "status": STATUS, "staging": STAGING, "active": ACTIVE, "proof": PROOF_BLOCK}
 """Block -> registers that the clients name."""
 
 CONTROL_BITS: Final = ("enable", "reset_fault", "tare", "take_ownership", "valve_pull")
@@ -175,9 +179,22 @@ class ExchangeTable:
             "force_min": f"{force.minimum or 0.0:.2f}",
             "force_max": f"{force.maximum:.2f}",
             "force_counts": force.counts_per_unit,
+            **self._echo_values(),
             **self._upload_values(),
             **self._offsets(),
             **self._masks(),
+        }
+
+    def _echo_values(self) -> dict[str, object]:
+        """Return the place of byte_order_echo and the two words of its number, high word first, as all floats of a client."""
+        high, low = unpack(">HH", pack_number("float32", WordOrder.ABCD, PROOF))
+        return {
+            "echo_first": self.at("byte_order_echo", "proof").address,
+            "echo_number": f"{PROOF:g}",
+            "echo_high": high,
+            "echo_low": low,
+            "echo_high_hex": f"{high:04X}",
+            "echo_low_hex": f"{low:04X}",
         }
 
     def _upload_values(self) -> dict[str, object]:

@@ -15,6 +15,8 @@ from gateway.registers.upload.staging import StagedFault, check_staged
 from gateway.registers.words import CommitStatus, ControlBit, State, StatusBit
 from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
 
+ECHO_AT = struct.pack(">H", 416)
+
 
 class Unplugged(Exception):  # noqa: N818
     """The wire is cut."""
@@ -23,8 +25,9 @@ class Unplugged(Exception):  # noqa: N818
 class GatewayAtHand:
     """requests: every PDU that was asked, exceptions: what was refused, as (function, code)."""
 
-    def __init__(self, register_map: RegisterMap, force_max_n: float = 60.0) -> None:
-        rules = BankRules(rig_name="test", force_max_n=force_max_n, supported_bits=BASIC_BITS | ControlBit.VALVE_PULL)
+    def __init__(self, register_map: RegisterMap, *, wants_echo: bool = False) -> None:
+        bits = BASIC_BITS | ControlBit.VALVE_PULL
+        rules = BankRules(rig_name="test", force_max_n=60.0, supported_bits=bits, require_byte_order_echo=wants_echo)
         self.bank = RegisterBank(register_map, rules, now=lambda: 0.0)
         self.bank.on_command = self.obey
         self.bank.on_asked = self.decide
@@ -115,6 +118,11 @@ class GatewayAtHand:
             elif request[0] == 6 and first < 16:
                 found.append((first, (second,)))
         return found
+
+    @property
+    def echoes(self) -> int:
+        """How often byte_order_echo was written."""
+        return sum(request[0] == 16 and request[1:3] == ECHO_AT for request in self.requests)
 
     @property
     def words(self) -> list[tuple[int, ...]]:

@@ -12,6 +12,7 @@ import pytest
 from gateway.clients import render_client
 from gateway.codes.faults import FaultCode
 from gateway.registers import Status
+from tests.clients.conftest import CONTROLLERS
 from tests.clients.controllers import S7, Codesys, Irc5, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.scenes import MAP, TEXTS, WHERE, command, commands, cycles
@@ -246,10 +247,39 @@ def test_whole_frames_are_those_that_the_python_client_makes(
     cycles(client, 3)
     client.disable()
     cycles(client, 2)
-    assert len(client.sent) == 5
-    for number, frame in enumerate(client.sent, start=1):
+    assert len(client.sent) == 6
+    assert client.sent[0] == python["write_frame"](1, 1, 416, struct.unpack(">2H", struct.pack(">f", 1234.5)))
+    for number, frame in enumerate(client.sent[1:], start=2):
         if frame[7] == 3:
             assert frame == python["read_frame"](number, 1, 100, 32)
         else:
-            address, words = gateway.writes[number - 1]
+            address, words = gateway.writes[number - 2]
             assert frame == python["exchange_frame"](number, 1, address, words)
+
+
+def test_a_rig_that_wants_the_byte_order_first_is_enabled_and_shown_it_once_a_connection(language: str) -> None:
+    gateway = GatewayAtHand(MAP, wants_echo=True)
+    client = CONTROLLERS[language](TEXTS[language], gateway)
+    cycles(client)
+    assert gateway.echoes == 0, "who only watches writes nothing"
+    client.enable(12.0)
+    cycles(client, 12)
+    assert client.enabled and gateway.exceptions == []
+    assert gateway.echoes == 1
+    gateway.is_cut = True
+    cycles(client)
+    gateway.is_cut = False
+    cycles(client, 12)
+    client.cycle(10.0)
+    client.enable(12.0)
+    for _ in range(12):
+        client.cycle(1.0)
+    assert client.enabled and gateway.echoes == 2
+
+
+def test_a_refused_echo_leaves_the_reason_to_the_command(language: str) -> None:
+    gateway = GatewayAtHand(MAP)
+    client = CONTROLLERS[language](TEXTS[language].replace("20480", "20481").replace("16#5000", "16#5001"), gateway)
+    client.enable(12.0)
+    cycles(client, 12)
+    assert client.enabled and gateway.exceptions == [(16, 3)] and gateway.echoes == 1

@@ -44,7 +44,7 @@ static int run(fg_client *g, int until_held) {
 int main(int argc, char **argv) {
     fg_client g;
     fg_model model;
-    uint16_t words[FG_SET_WORDS], again[FG_SET_WORDS];
+    uint16_t words[FG_SET_WORDS], again[FG_SET_WORDS], echo[2] = {0x5000, 0x449A};
     uint8_t frame[260];
     int result;
     if (argc < 2) return 9;
@@ -55,8 +55,11 @@ int main(int argc, char **argv) {
     show("exchange", frame, fg_frame_exchange(frame, 258, 1, FG_COMMAND_FIRST, FG_COMMAND_WORDS, g.want));
     show("read", frame, fg_frame_read(frame, 258, 1, FG_STATUS_FIRST, FG_STATUS_WORDS));
     show("write", frame, fg_frame_write(frame, 258, 1, 0, 2, g.want));
+    fg_write(&g, 416, 2, echo);
     result = run(&g, 1);
     printf("held %d %.0f %u\n", result, (double)g.status.force_requested, g.status.enabled);
+    fg_read(&g, 416, 2, echo);
+    printf("echo %04X%04X\n", echo[0], echo[1]);
     printf("range %d\n", fg_force(&g, 400.0f));
     fg_force(&g, 65.0f);
     result = run(&g, 0);
@@ -86,6 +89,7 @@ int main(int argc, char **argv) {
 """
 SAID = """crc CBF43926
 held 0 12 1
+echo 449A5000
 range 3
 refused 1 refused: W204 value out of range (exception 3, address 1, value 65)
 still 0 12 1 0
@@ -136,8 +140,10 @@ def test_the_python_client_does_all_of_it(rested: Any, tmp_path: Path) -> None:
     assert client.exchange()["state"] == 0
     with pytest.raises(ValueError, match="allowed 0"):
         client.enable(400.0)
+    client.write(416, (0x5000, 0x449A))
     client.enable(12.0)
     rested.wait_until(lambda _: client.exchange()["in_band"] and client.status["state"] == 3)
+    assert client.read(416, 2) == (0x449A, 0x5000), "the client's own order, shown before its first command"
     assert client.status["force_requested"] == 12.0
     client.force(65.0)
     with pytest.raises(module.Refused, match=r"W204 value out of range .*address 1, value 65"):

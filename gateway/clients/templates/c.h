@@ -101,6 +101,7 @@ typedef struct fg_client {
     uint16_t once;              /* edges of the next write: reset, tare, take ownership */
     uint16_t heartbeat;
     int off_pending, pulls;
+    int proven;                 /* byte_order_echo was written over this connection */
     uint8_t ended, exception;   /* exception: of the last refused request, 0 none */
     fg_status status;
     uint16_t words[FG_STATUS_WORDS];
@@ -291,6 +292,7 @@ static int fg_connect(fg_client *client) {
     }
     client->socket = fg_connect_address(found, fg_now_ms() + client->timeout_ms);
     freeaddrinfo(found);
+    client->proven = 0;
     if (client->socket >= 0) return FG_OK;
     fg_drop(client, "not accepted in time");
     return FG_LOST;
@@ -434,6 +436,18 @@ static int fg_has_changed(const fg_client *client) {
     return client->off_pending || client->once || memcmp(client->want, client->good, sizeof client->want) != 0;
 }
 
+/* Writes ${echo_number} to byte_order_echo, once a connection: a rig may want it before the first enable. Where it is refused and that
+   matters, the command is refused with its reason. */
+static int fg_prove_byte_order(fg_client *client) {
+    static const uint16_t echo[2] = {${echo_high}, ${echo_low}};
+    uint8_t frame[FG_FRAME];
+    if (client->proven) return FG_OK;
+    if (fg_ask(client, frame, fg_frame_write(frame, ++client->transaction, client->unit, ${echo_first}, 2, echo)) == FG_LOST)
+        return FG_LOST;
+    client->proven = 1;
+    return FG_OK;
+}
+
 int fg_exchange(fg_client *client) {
     uint8_t frame[FG_FRAME];
     uint16_t command[FG_COMMAND_WORDS];
@@ -441,6 +455,7 @@ int fg_exchange(fg_client *client) {
     size_t length;
     if (result != FG_OK) return result;
     if (!changed && client->want[FG_CONTROL_WORD] == 0) return fg_refresh(client);
+    if ((result = fg_prove_byte_order(client)) != FG_OK) return result;
     memcpy(command, client->want, sizeof command);
     command[FG_CONTROL_WORD] |= client->once;
     command[FG_HEARTBEAT] = ++client->heartbeat;

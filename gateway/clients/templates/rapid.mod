@@ -133,6 +133,8 @@ ${crc_table}];
   LOCAL VAR num nException:=0;
   LOCAL VAR num nOnce:=0;
   LOCAL VAR bool bOffPending:=FALSE;
+  ! byte_order_echo was written over this connection
+  LOCAL VAR bool bProven:=FALSE;
   LOCAL VAR num nWant{${command_words}};
   LOCAL VAR num nGood{${command_words}};
   LOCAL VAR num nWords{${status_words}};
@@ -271,6 +273,7 @@ ${crc_table}];
 
   ! Words nFrom .. nTo of the command, counted from 1
   LOCAL PROC FgWriteAndRead(num nFrom,num nTo)
+    IF NOT bProven FgProveByteOrder;
     nHeartbeat:=(nHeartbeat+1) MOD 65536;
     FgFrameExchange nFrom,nTo;
     FgAsk 23;
@@ -285,6 +288,19 @@ ${crc_table}];
     nGood:=nWant;
     nOnce:=0;
     FgFollow;
+  ENDPROC
+
+  ! ${echo_number}, which a rig may want before the first enable; where a
+  ! refusal of it matters, the command is refused with its reason
+  LOCAL PROC FgProveByteOrder()
+    FgBegin 16,10;
+    FgPutWord ${echo_first};
+    FgPutWord 2;
+    FgPutByte 4;
+    FgPutWord ${echo_high};
+    FgPutWord ${echo_low};
+    FgAsk 16;
+    bProven:=TRUE;
   ENDPROC
 
   LOCAL PROC FgReadStatus()
@@ -372,6 +388,7 @@ ${status_decoding}
 
   LOCAL PROC FgConnect()
     SocketClose sdGateway;
+    bProven:=FALSE;
     SocketCreate sdGateway;
     SocketConnect sdGateway,FG_HOST,FG_PORT\Time:=FG_TIMEOUT;
     fgConnected:=TRUE;

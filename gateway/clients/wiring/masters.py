@@ -58,7 +58,7 @@ def _network(rig: Rig, table: ExchangeTable) -> Section:
         echo = table.map.find("byte_order_echo").address
         sentences.append(
             f"Before the first enable write 1234.5 to byte_order_echo: words 16#449A, 16#5000 to address {echo} "
-            f"(4{echo + 1:04d}); the generated clients do not do it by themselves."
+            f"(4{echo + 1:04d}); the generated clients do it by themselves."
         )
     allowed = ", ".join(map(str, network.allow)) or "nobody but this machine"
     rows = (
@@ -106,6 +106,7 @@ def _requests(table: ExchangeTable) -> Iterator[tuple[str, bool, int, int]]:
     first, length = table.at("order", "staging").address, table.at("length", "staging").address
     tail = table.at("target_slot", "staging").address - length + 1
     yield "status", False, status, status_words
+    yield "byte_order_echo, 1234.5 once a connection", True, table.at("byte_order_echo", "proof").address, 2
     yield "command, when something has changed", True, command, words
     yield "heartbeat alone", True, table.at("heartbeat", "command").address, 1
     yield "model: order, rising branch", True, first, part_a

@@ -14,8 +14,8 @@ from gateway.registers.refusal import Refusal
 from gateway.registers.values import WordOrder, pack_number, unpack_number
 from gateway.registers.writes.command_block import check_zeros
 
-_PROOF: Final = 1234.5
-_ORDERS: Final = {pack_number("float32", order, _PROOF): order for order in WordOrder}
+PROOF: Final = 1234.5
+_ORDERS: Final = {pack_number("float32", order, PROOF): order for order in WordOrder}
 _MOST_HOSTS: Final = 64  # memory stays bounded whoever writes
 
 
