@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from math import inf
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 from gateway.processes import exit_codes, message_link, priority
 from gateway.processes.event_file import EventFile
@@ -42,7 +42,7 @@ def run(options: RunOptions) -> int:
     """Run one rig until it is told to stop; the process's exit code."""
     state = options.state_directory
     state.mkdir(parents=True, exist_ok=True, mode=0o700)
-    with (state / "lock").open("a") as lock:
+    with _open_lock(state / "lock") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -54,6 +54,16 @@ def run(options: RunOptions) -> int:
         with EventLog(source="guardian", file=EventFile(state)) as log, SignalPipe() as signals:
             starter = ChildStarter(options.rig, simulate=options.simulate, state=state, say=partial(log, "children"))
             return Guardian(options, state, starter, signals, log, manager=service_manager()).watch()
+
+
+def _open_lock(path: Path) -> IO[str]:
+    """Open the file that says who runs here. A disk that has become read-only still has it, and is no reason not to control."""
+    try:
+        return path.open("a")
+    except OSError:
+        if not path.exists():
+            raise
+        return path.open()
 
 
 @dataclass
