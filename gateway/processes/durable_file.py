@@ -69,6 +69,19 @@ def replace_durably(directory: int, name: str, data: bytes) -> None:
         raise
 
 
+def replace_text(target: Path, text: str) -> None:
+    """Write a file of people's durably in place of the one that may be there. OSError, and what was there stays."""
+    beside = target.with_name(f".{target.name}.{os.getpid()}")
+    try:
+        beside.write_text(text, encoding="utf-8")
+        sync_path(beside)
+        beside.replace(target)
+        sync_path(target.parent)
+    finally:
+        with contextlib.suppress(OSError):
+            beside.unlink(missing_ok=True)
+
+
 def remove_if_possible(directory: int, name: str) -> None:
     """Remove a file that means nothing; if it cannot be removed it stays."""
     with contextlib.suppress(OSError):

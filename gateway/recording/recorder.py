@@ -142,9 +142,9 @@ class Recorder:
 
 
 def sync_recording(path: Path) -> None:
-    """Have what is written of a recording, and its name, put on the disk: not in a loop. OSError where it refuses."""
-    sync_path(path)
-    sync_path(path.parent)
+    """Put what is written of a recording, its name and its folder's on the disk: not in a loop. OSError where it refuses."""
+    for each in (path, path.parent, path.parent.parent):
+        sync_path(each)
 
 
 def _create_next(directory: Path) -> tuple[int, Path, int]:

@@ -9,6 +9,8 @@ import json
 from pathlib import Path
 from typing import Final
 
+from gateway.processes.durable_file import lock_directory, replace_durably
+
 _FILE: Final = "sparkplug.json"
 _ROUND: Final = 256
 
@@ -23,10 +25,8 @@ class KeptBdSeq:
     def next(self) -> int:
         """Return the number of a new connection, 0 .. 255 and round; it counts also where the disk does not take it."""
         self._last = (self._last + 1) % _ROUND
-        beside = self._path.with_suffix(".new")
-        with contextlib.suppress(OSError):
-            beside.write_text(json.dumps({"bdSeq": self._last}), encoding="ascii")
-            beside.replace(self._path)
+        with contextlib.suppress(OSError), lock_directory(self._path.parent) as descriptor:
+            replace_durably(descriptor, _FILE, json.dumps({"bdSeq": self._last}).encode())
         return self._last
 
     def _read(self) -> int:

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from tests.disk.acts import ACTS, Act
+from tests.disk.acts import Act
+from tests.disk.all_acts import REFUSED
 from tests.disk.failing_disks import FailingDisk, describe
 from tests.disk.watched_disk import watching
 
@@ -36,7 +37,7 @@ def try_once(act: Act, said: list[Any]) -> Exception | None:
 
 
 @pytest.mark.parametrize("kind", FailingDisk.KINDS)
-@pytest.mark.parametrize("kind_of_act", ACTS)
+@pytest.mark.parametrize("kind_of_act", REFUSED)
 def test_whatever_call_fails_nothing_is_half_and_what_was_said_stays(
     fast_folder: Path, kind_of_act: type[Act], kind: str, budget: int
 ) -> None:

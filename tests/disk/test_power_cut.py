@@ -5,12 +5,13 @@ from random import Random
 
 import pytest
 
-from tests.disk.acts import ACTS, Act
+from tests.disk.acts import Act
+from tests.disk.all_acts import SYNCED
 from tests.disk.power_cut import JournaledDisk
 from tests.disk.test_failing_calls import try_once
 from tests.disk.watched_disk import watching
 
-CUTS = 4
+CUTS = 3
 SEEDS = 5
 """In the push gate so many cuts of each act; with --long all of them, each with so many mixtures of what was not synced."""
 
@@ -25,7 +26,7 @@ def journal(act: Act) -> JournaledDisk:
     return disk
 
 
-@pytest.mark.parametrize("kind_of_act", [act for act in ACTS if act.is_synced])
+@pytest.mark.parametrize("kind_of_act", SYNCED)
 def test_after_a_power_cut_it_is_the_old_or_the_new_and_what_was_said_stays(
     fast_folder: Path, kind_of_act: type[Act], budget: int
 ) -> None:

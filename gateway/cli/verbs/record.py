@@ -106,4 +106,4 @@ def _sentence(answer: dict[str, Any]) -> str:
         length = f" ({answer['duration_s']:.1f} s)" if "duration_s" in answer else ""
         fault = f"; {answer['fault']}" if answer.get("fault") else ""
         return f"{stopped}recorded {answer.get('rows', 0)} rows{length} to {answer['written']}{fault}"
-    return "not recording"
+    return f"not recording: {answer['waits']}; it begins again by itself" if answer.get("waits") else "not recording"

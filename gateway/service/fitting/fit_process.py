@@ -60,13 +60,14 @@ def _describe_result(
     fit: "LadderFit", store: "CalibrationStore", number: int, *, is_new: bool = False
 ) -> dict[str, Any]:
     """What the calibration of this number is called, and whether it is offered. is_new: its report is still to be written."""
-    from gateway.service.fitting.ladder_fit import write_report, write_whole
+    from gateway.processes.durable_file import replace_text
+    from gateway.service.fitting.ladder_fit import write_report
 
     report, document = (store.directory / f"{number:04d}.{suffix}" for suffix in ("html", "json"))
     if is_new or not document.exists():
         fit.document.update(calibration=number, report=str(report))
         write_report(fit, report)
-        write_whole(document, json.dumps(fit.document, indent=1))
+        replace_text(document, json.dumps(fit.document, indent=1))
     paths = {"report": str(report), "document": str(document)}
     rejected = store.load(number).rejected
     if rejected:

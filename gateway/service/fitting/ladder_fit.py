@@ -4,7 +4,6 @@ Everything is worked out before anything is written; the report is written besid
 as the store does it. So a refused ladder, a full disk or a kill leaves no half of either.
 """
 
-import os
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -16,6 +15,7 @@ from gateway.bsfm.fit.evaluation import Evaluation, FitRequest, evaluate
 from gateway.bsfm.ladder.check import CheckedLadder
 from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.bsfm.response.identification import MeasuredResponse
+from gateway.processes.durable_file import replace_text
 from gateway.recording import Recording
 from gateway.reports.fit.document import Document, fit_document
 from gateway.reports.fit.page import fit_page
@@ -104,17 +104,7 @@ def _source(fit: LadderFit) -> str:
 def write_report(fit: LadderFit, target: Path) -> None:
     """Write the HTML report, whole or not at all."""
     raw = raw_ladder(fit.recording.columns, fit.recording.header)
-    write_whole(target, fit_page(fit.evaluation, fit.document, raw))
-
-
-def write_whole(target: Path, text: str) -> None:
-    """Write the text beside its name, then rename it. OSError, and what was there before stays."""
-    beside = target.with_name(f".{target.name}.{os.getpid()}")
-    try:
-        beside.write_text(text, encoding="utf-8")
-        beside.replace(target)
-    finally:
-        beside.unlink(missing_ok=True)
+    replace_text(target, fit_page(fit.evaluation, fit.document, raw))
 
 
 def data_sha256(joined: CheckedLadder) -> str:

@@ -1,9 +1,11 @@
-"""The running gateway's recording: at most one, started and stopped on command; a full disk ends it, not the control.
+"""The running gateway's recording: at most one, started and stopped on command; a full disk ends it, not the control, and it
+goes on by itself when there is room (recording_again.py).
 
 One that goes on for ever goes on in another file after a day, or when it is as long as one may be, so that whoever prunes
 recordings has something to prune, and no file is too long to be read.
 """
 
+import contextlib
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +20,7 @@ from gateway.service.recording_retention import RecordingRetention
 from gateway.service.recording_sync import RecordingSync
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
+from gateway.service.running_rig.recording_again import RecordingAgain
 
 LONGEST_BYTES: Final = 256 << 20
 LONGEST_S: Final = 86400.0
@@ -35,6 +38,7 @@ class Recordings:
         self._current: RunRecording | None = None
         self._retention = RecordingRetention(directory.parent, rig.retention, log)
         self._sync = RecordingSync(log)
+        self._again = RecordingAgain()
         days, most = rig.retention.days, rig.retention.bytes
         self._longest_bytes = LONGEST_BYTES if most is None else min(LONGEST_BYTES, most // _SHARES)
         self._longest_s = LONGEST_S if days is None else min(LONGEST_S, days * 86400.0 / _SHARES)
@@ -50,7 +54,13 @@ class Recordings:
         not."""
         if self._current:
             raise ValueError(f"already recording to {self._current.recorder.path}")
-        rig = self._rig
+        self._again.forget()
+        self._label, self._for_s, self._ends_s, self._began_s = label, for_s, None, None
+        self._begin()
+        return self.status()
+
+    def _begin(self) -> None:
+        rig, label = self._rig, self._label
         header = {
             **label.as_header(),
             "rig": rig.name,
@@ -62,10 +72,8 @@ class Recordings:
             "simulated": rig.simulated,
             "seed": rig.seed,
         }
-        self._current = RunRecording(Recorder(self._directory, header, COLUMNS))
-        self._label, self._for_s, self._ends_s, self._began_s = label, for_s, None, None
+        self._current, self._began_s = RunRecording(Recorder(self._directory, header, COLUMNS)), None
         self._sync(self._current.recorder.path)
-        return self.status()
 
     def use_plant(self, rig: Rig) -> None:
         """Note the plant that is in use from now on. A recording that runs goes on in another file: it says of all its rows
@@ -75,12 +83,12 @@ class Recordings:
             self._go_on_in_another("with the plant in use")
 
     def _go_on_in_another(self, why: str) -> None:
-        ended, label, for_s, ends_s = self.stop(), self._label, self._for_s, self._ends_s
+        ended = self.stop()
         try:
-            goes_on = self.start(label, for_s)["recording"]
-            self._ends_s = ends_s
-            self._log("recording", f"{ended['written']} ends {why}, {goes_on} goes on")
+            self._begin()
+            self._log("recording", f"{ended['written']} ends {why}, {self.status()['recording']} goes on")
         except OSError as error:
+            self._again.ask(str(error))
             self._log("recording", f"E402 {ended['written']} ends {why}, not recording: {error}; control goes on")
 
     def try_start(self) -> tuple[str, ...]:
@@ -88,12 +96,14 @@ class Recordings:
         try:
             self.start()
         except OSError as error:
+            self._again.ask(str(error))
             return (f"not recording: {error}",)
         return ()
 
     def stop(self) -> dict[str, Any]:
         """End the recording, if there is one; return where it is and how many rows the disk has taken, and as `fault` why not
         all of them."""
+        self._again.forget()
         if not self._current:
             return {"recording": None}
         recorder, self._current = self._current.recorder, None
@@ -112,9 +122,9 @@ class Recordings:
         self._sync.close()
 
     def status(self) -> dict[str, Any]:
-        """Return where the current recording is and how many rows it has."""
+        """Return where the current recording is and how many rows it has; `waits`: why there is none until there is room."""
         if not self._current:
-            return {"recording": None}
+            return {"recording": None, "waits": self._again.why} if self._again.why else {"recording": None}
         return {"recording": str(self._current.recorder.path), "rows": self._current.rows}
 
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
@@ -130,14 +140,36 @@ class Recordings:
             recorder = self._current.recorder
             recorder.flush(now_s)
             if recorder.failure:
-                self._log("recording", recorder.failure)
-                self._current = None
+                self._end_failed(recorder, now_s)
             elif self._is_over(now_s):
                 ended = self.stop()
                 self._log("recording", f"{ended['written']} ends after {self._for_s:g} s, {ended['rows']} rows")
             elif self._is_long(recorder.size_bytes, now_s):
                 self._go_on_in_another("as long as one may be")
                 self._retention.hasten()
+        elif self._again.is_due(now_s):
+            self._try_again(now_s)
+
+    def _end_failed(self, recorder: Recorder, now_s: float) -> None:
+        self._log("recording", recorder.failure or "")
+        self._current = None
+        if not recorder.rows_written:
+            with contextlib.suppress(OSError):
+                recorder.path.unlink()
+        self._again.note_lasting(now_s - (now_s if self._began_s is None else self._began_s))
+        self._again.ask(recorder.failure or "")
+
+    def _try_again(self, now_s: float) -> None:
+        if self._is_over(now_s):
+            self._again.forget()
+            return
+        try:
+            self._begin()
+        except OSError as error:
+            self._again.ask(str(error))
+            return
+        self._again.forget()
+        self._log("recording", f"there is room again: recording to {self.status()['recording']}")
 
     def _is_long(self, size_bytes: int, now_s: float) -> bool:
         if self._began_s is None:

@@ -7,6 +7,7 @@ import pytest
 
 from gateway.recording import list_recordings
 from gateway.recording.label import RecordingLabel, label_of
+from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.running_rig.recordings import LONGEST_S, Recordings
 from tests.service.rigs import demo
 
@@ -86,3 +87,42 @@ def test_a_disk_that_takes_no_header_has_no_recording_and_says_so(
     assert list_recordings(tmp_path) == []
     assert recordings.start()["recording"].endswith("0001.fgr")
     recordings.stop()
+
+
+def test_one_that_a_full_disk_has_ended_goes_on_when_there_is_room(
+    recordings: Recordings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half a minute later, then after a minute, two ...; its name and its end are those of before."""
+    recordings.start(RecordingLabel("long one"), for_s=7200.0)
+    recordings.flush(0.0)
+    real_write, is_full = os.write, [True]
+    monkeypatch.setattr(os, "write", lambda descriptor, data: real_write(descriptor, data[:3] if is_full[0] else data))
+    begin, tries = recordings._begin, []
+    monkeypatch.setattr(recordings, "_begin", lambda: (tries.append(now_s), begin()))
+    recordings._current.recorder.append((0.0,) * len(COLUMNS))
+    for now_s in range(300):
+        recordings.flush(float(now_s))
+    assert tries == [32, 93, 214]
+    assert "E402" in recordings._log[0]
+    assert recordings.status()["waits"], "said to whoever asks"
+    assert list_recordings(tmp_path) == [], "no file for each try"
+    is_full[0] = False
+    for now_s in range(300, 600):
+        recordings.flush(float(now_s))
+    assert recordings.status()["recording"]
+    assert "there is room again" in recordings._log[-1]
+    recordings.flush(7201.0)
+    assert recordings.status() == {"recording": None}
+    assert [label_of(entry.header).name for entry in list_recordings(tmp_path)] == ["long one"]
+
+
+def test_whoever_ends_one_that_waits_for_room_has_ended_it(
+    recordings: Recordings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", lambda descriptor, data: 3)
+        assert "No space left" in recordings.try_start()[0]
+        recordings.flush(0.0)
+    assert recordings.stop() == {"recording": None}
+    recordings.flush(1000.0)
+    assert recordings.status() == {"recording": None}
