@@ -60,45 +60,46 @@ class SampleRing:
 
 
 class RingReader:
-    """A reader's end, read only. Nothing is there before control has laid it out: `is_ready`."""
+    """A reader's end, read only. Nothing is there before control has laid it out: `is_ready`.
+
+    Of the ring only the head is mapped, rows are copied with pread: all of it would count as memory of every process beside
+    control.
+    """
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
         self.columns: tuple[str, ...] = ()
         self._capacity = 0
-        self._map: mmap.mmap | None = None
+        self._head: mmap.mmap | None = None
 
     @property
     def is_ready(self) -> bool:
         """Decide whether there is a ring to read."""
-        return self._map is not None or self._open()
+        return self._head is not None or self._open()
 
     @property
     def rows_written(self) -> int:
         """Rows since the beginning; 0 before there is a ring."""
-        if not self.is_ready or self._map is None:
+        if not self.is_ready or self._head is None:
             return 0
-        (count,) = _WRITTEN.unpack_from(self._map, _WRITTEN_AT)
+        (count,) = _WRITTEN.unpack_from(self._head, _WRITTEN_AT)
         return int(count)
 
     def newest(self, rows: int) -> bytes:
         """Return at most this many of the newest rows, oldest first, each len(columns) float64, little-endian."""
         end = self.rows_written - 1  # the newest one is left alone: its count may be seen before it on some processors
         first = max(0, end - min(rows, self._capacity - 1), 0)
-        if self._map is None or end <= first:
+        if end <= first:
             return b""
-        data = b"".join(self._map[start:stop] for start, stop in self._places(first, end))
+        data = b"".join(os.pread(self._descriptor, size, start) for start, size in self._places(first, end))
         lost = max(0, self.rows_written + 1 - self._capacity - first)  # overwritten while we copied
         return data[lost * len(self.columns) * _ITEM :]
 
     def _places(self, first: int, end: int) -> list[tuple[int, int]]:
-        """Return where the rows first .. end - 1 lie: one piece, or two around the seam."""
+        """Return (place, bytes) of the rows first .. end - 1: one piece, or two around the seam."""
         size, seam = len(self.columns) * _ITEM, (end // self._capacity) * self._capacity
         pieces = [(first, end)] if first >= seam or end == seam else [(first, seam), (seam, end)]
-        return [
-            (_ROWS_AT + start % self._capacity * size, _ROWS_AT + start % self._capacity * size + (stop - start) * size)
-            for start, stop in pieces
-        ]
+        return [(_ROWS_AT + start % self._capacity * size, (stop - start) * size) for start, stop in pieces]
 
     def _open(self) -> bool:
         head = os.pread(self._descriptor, _ROWS_AT, 0)
@@ -106,13 +107,13 @@ class RingReader:
             return False
         _, length, self._capacity = _FIXED.unpack_from(head)
         self.columns = tuple(json.loads(head[_NAMES_AT : _NAMES_AT + length]))
-        self._map = mmap.mmap(self._descriptor, 0, prot=mmap.PROT_READ)
+        self._head = mmap.mmap(self._descriptor, _ROWS_AT, prot=mmap.PROT_READ)
         return True
 
     def close(self) -> None:
         """Close the memory."""
-        if self._map is not None:
-            self._map.close()
+        if self._head is not None:
+            self._head.close()
 
 
 def _header(columns: tuple[str, ...], capacity: int) -> bytes:

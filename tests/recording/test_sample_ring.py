@@ -72,7 +72,7 @@ def test_a_reader_cannot_write(descriptor):
     reader = RingReader(descriptor)
     assert reader.is_ready
     with pytest.raises(TypeError):
-        reader._map[0] = 0
+        reader._head[0] = 0
 
 
 def test_a_reader_beside_a_fast_writer_gets_no_torn_row(descriptor):

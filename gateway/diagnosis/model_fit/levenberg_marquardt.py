@@ -17,9 +17,9 @@ from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.bench.parameters import ModelParameters
 from gateway.diagnosis.measurement import Floats
 from gateway.diagnosis.noise.whitening import Whitener
+from gateway.twin.replay.cache import numbers_at_once
 
 _DAMPINGS: Final = (0.0, 1.0, 30.0)  # tried side by side: Gauss-Newton, and two steps as careful as that goes wrong
-_SIMULATED_AT_ONCE: Final = 1_500_000  # rows of all simulations together: 12 MB each time that they are held
 _SECANT_SHARE: Final = 0.02  # of a size that is there: large against the twin's steps, small against its bends
 _LEAST_PROGRESS: Final = 0.02  # a gain in chi-square below this share of one row's is no progress ...
 _LEAST_GAIN: Final = 1.0e-5  # ... nor one below this share of chi-square itself
@@ -102,7 +102,7 @@ def _step_all(bench: Bench, fitted: list[FittedModel], active: Sequence[int], wh
 
 def linearise(bench: Bench, problems: Sequence[FitProblem], whiten: Whitener) -> list[FittedModel]:
     """Return the residual and derivatives of each problem where it stands; one wave."""
-    most = max(1, _SIMULATED_AT_ONCE // bench.rows)
+    most = max(1, numbers_at_once() // bench.rows)
     result: list[FittedModel] = []
     some: list[FitProblem] = []
     for problem in problems:

@@ -32,6 +32,7 @@ from gateway.diagnosis.search.command_loops import (
 from gateway.side_by_side import side_by_side
 from gateway.twin.elementwise import Real, smaller
 from gateway.twin.plant import Plant
+from gateway.twin.replay.cache import numbers_at_once
 
 _SMALLEST_STEP_V: Final = 0.0125
 _USUAL_STEPS_V: Final = (10.0 / 1023.0, 10.0 / 511.0, 10.0 / 255.0, 5.0 / 1023.0, 5.0 / 255.0)
@@ -44,7 +45,6 @@ _MOST_ANSWERS: Final = 3
 _LEAST_WHOLE_STEP: Final = 0.35  # a step that explains best when shrunk below this share of itself is not the step
 _FINE_POINTS: Final = ("presliding_m", "stribeck_n", "dwell_stiction_n", "viscous_n_s_per_m", "asymmetry_n_s_per_m")
 _BUNCH_SHARE_OF_LAG: Final = 0.25  # of the lag
-_MOST_NUMBERS_AT_ONCE: Final = 1_000_000  # numbers of one kind in memory; three times as many are no faster
 
 
 def likely_steps_v(bench: Bench, fitted: FittedModel, whiten: Whitener) -> tuple[float, ...]:
@@ -137,7 +137,7 @@ class _Target:
 
 def _column_parts(columns: int, rows: int) -> Iterator[slice]:
     """Some columns at a time: a long recording has many rows."""
-    many = max(_MOST_NUMBERS_AT_ONCE // rows, 1)
+    many = max(numbers_at_once() // rows, 1)
     yield from (slice(first, first + many) for first in range(0, columns, many))
 
 

@@ -30,6 +30,11 @@ def room_bytes_now() -> int:
     return _room.get() or ROOM_BYTES
 
 
+def numbers_at_once() -> int:
+    """Return how many float64 of one kind a calculation of many series holds at a time: one stage's room."""
+    return room_bytes_now() // 8
+
+
 class Cache:
     """Series by what they depend on."""
 
