@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 from gateway.bsfm import Bsfm
-from gateway.control.demand import Demand, demand_of
+from gateway.control.demand import Demand, Manner, demand_of, is_same_manner, manner_of
 from gateway.control.limits import NotFiniteError, narrow_limits
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.lease import Lease
@@ -31,6 +31,7 @@ class CommandTracker:
 
     def __init__(self, settings: ControlSettings) -> None:
         self.command = Command()
+        self._manner: Manner | None = None  # of the command, where that is known
         self.demand: Demand = demand_of(self.command, settings)
         self.not_finite = ""
         self._word = 0
@@ -71,6 +72,8 @@ class CommandTracker:
             return NO_EDGES
         edges = self.edges_of(command)
         self._word = 0 if edges.stops else int(command.control_word) & ~_MOMENTARY
+        if self._manner is not None and not is_same_manner(command, self.command):
+            self._manner = None
         self.command = command
         if self._adopt_heartbeat:
             self._adopt_heartbeat = False
@@ -86,9 +89,10 @@ class CommandTracker:
 
     def _update_demand(self) -> None:
         try:
-            demand = demand_of(self.command, self._settings)
+            demand = demand_of(self.command, self._settings, self._manner)
+            self._manner = self._manner or manner_of(self.command, self._settings.defaults)
             if self._direction < 0.0:
-                demand = replace(demand, gravity_n=-demand.gravity_n)
+                demand = demand._replace(gravity_n=-demand.gravity_n)
             self.demand, self.not_finite = demand, ""
         except NotFiniteError as error:
             self.not_finite = str(error)

@@ -76,6 +76,7 @@ class Controller:
         self._reading = NO_READING
         self._last_s: float | None = None
         self._line = LineStatus()
+        self._moved_by: LoopInputs | None = None  # what the force loop has just moved by
         parts = ControllerParts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)
         self._machine = Transitions(parts, is_restarted=unclean_restart)
         self._readiness = Readiness(parts, self._machine)
@@ -113,10 +114,8 @@ class Controller:
 
     def _use_model(self) -> None:
         """Calculate with the calibration in use: its own model, or that of pulling."""
-        model, timed = (
-            self._turning.model_of(self._calibration),
-            timing_of(self._calibration.response, self._rig_settings),
-        )
+        model = self._turning.model_of(self._calibration)
+        timed = timing_of(self._calibration.response, self._rig_settings)
         self._loop.use(model, self._given_n, timed)
         self._commands.use(model)
 
@@ -165,23 +164,37 @@ class Controller:
         return f"W305 {refused.text}" if refused else ""
 
     def safe_output(self, fault: FaultCode) -> Output:
-        """Return what to write when `step` raised."""
+        """Return what is written while nothing has been decided."""
         return safe_output(fault, self._settings.limits.safe_voltage_v)
 
+    def fail_internally(self, now_s: float) -> Output:
+        """Return what to write when `decide` or `explain` raised, which is an internal error: INTERNAL is latched."""
+        self._machine.fail_internally(now_s)
+        return self.safe_output(FaultCode.INTERNAL)
+
     def step(self, now_s: float, command: Command, sample: ForceSample | None, line: LineStatus) -> Output:
-        """Decide what to write now. An exception is an internal error: INTERNAL is latched before it goes on, and the caller
-        writes `safe_output`."""
+        """Decide what to write now, and why. An exception is an internal error: INTERNAL is latched before it goes on."""
         try:
-            return self._step(now_s, command, sample, line)
+            self.decide(now_s, command, sample, line)
+            return self.explain(now_s)
         except Exception:
-            self._machine.fail_internally(now_s)
+            self.fail_internally(now_s)
             raise
+
+    def explain(self, now_s: float) -> Output:
+        """Return what has just been decided, with its reasons. An exception: as in `decide`."""
+        if self._moved_by is not None:
+            measured_n = self._faults.measured_n + self._commands.gravity_n
+            self._machine.tell(*self._one_shot.movement_events(self._loop, measured_n, self._moved_by))
+        return self._composer.compose(now_s, self._reading, self._line, self._contact.touching, self._outside_n)
 
     # -- the order of a step
 
-    def _step(self, now_s: float, command: Command, sample: ForceSample | None, line: LineStatus) -> Output:
+    def decide(self, now_s: float, command: Command, sample: ForceSample | None, line: LineStatus) -> float:
+        """Return the voltage that must be written now; `explain` is to follow, once it is on its way. An exception is an
+        internal error, and the caller asks `fail_internally`."""
         dt_s = 0.0 if self._last_s is None else max(0.0, now_s - self._last_s)
-        self._last_s, self._line = now_s, line
+        self._last_s, self._line, self._moved_by = now_s, line, None
         self._machine.begin_step()
         self._loop.elapse(dt_s, line)
         edges = self._commands.take(now_s, command)
@@ -194,7 +207,7 @@ class Controller:
             self._supervise(now_s, line)
         if self._machine.is_enabled:
             self._move(now_s, dt_s)
-        return self._composer.compose(now_s, self._reading, line, self._contact.touching, self._outside_n)
+        return self._loop.voltage_v
 
     @property
     def _given_n(self) -> float:
@@ -285,12 +298,10 @@ class Controller:
             if not self.active_run.running or self._step_run(now_s, self._line):
                 self._follow(now_s, self._loop.descend(self._target(), dt_s, self._given_n))
             return
-        inputs = self._inputs(now_s, dt_s)
+        expected_n, held_back = self._loop.expected_n + self._given_n, self._faults.is_first_rise_too_high
+        sensed = self._reading, self._contact.touching
+        inputs = self._moved_by = LoopInputs(now_s, dt_s, *sensed, expected_n, held_back, self._outside_n)
         self._follow(now_s, self._loop.step(self._target(), inputs))
-        measured_n = self._faults.measured_n + self._commands.gravity_n
-        self._machine.tell(
-            self._one_shot.unreachable_event(self._loop, measured_n, inputs), self._one_shot.hunting_event(self._loop)
-        )
 
     def _step_run(self, now_s: float, line: LineStatus) -> bool:
         """One step of the run; True when it has just ended, and the ramp down begins."""
@@ -308,11 +319,6 @@ class Controller:
             self._machine.tell(self._faults.slow_words)
             return True
         return False
-
-    def _inputs(self, now_s: float, dt_s: float) -> LoopInputs:
-        expected_n = self._loop.expected_n + self._given_n
-        held_back, touching = self._faults.is_first_rise_too_high, self._contact.touching
-        return LoopInputs(now_s, dt_s, self._reading, touching, expected_n, held_back, self._outside_n)
 
     def _follow(self, now_s: float, event: Moved) -> None:
         """The state goes along with what has moved, or could not; a ramp down ends at 0 N."""

@@ -6,9 +6,8 @@ it pulls back. The load cell sits between slide and payload, so it does not feel
 The setpoint and the published measured force are contact forces; the model (calibrated on the cell) speaks cell force.
 """
 
-from dataclasses import dataclass, replace
 from math import cos
-from typing import Final
+from typing import Final, NamedTuple
 
 from gateway.control.limits import finite, force_limited
 from gateway.control.settings import ControlSettings, Defaults
@@ -19,8 +18,18 @@ from gateway.units import STANDARD_GRAVITY_M_PER_S2
 STOP_S: Final = 4.0  # a ramp down takes at most this long (the guardian waits 5 s)
 
 
-@dataclass(frozen=True, slots=True)
-class Demand:
+class Manner(NamedTuple):
+    """How a force is gone for, complete: what a master sets once, while setpoints come and go."""
+
+    ramp_n_per_s: float
+    precontact_n: float
+    contact_ramp_s: float
+    gravity_n: float
+    tolerance_n: float
+    in_band_time_s: float
+
+
+class Demand(NamedTuple):
     """One command, complete: no field means "default" any more. force_n is the accepted contact force."""
 
     mode: Mode
@@ -40,21 +49,36 @@ def gravity_n(payload_kg: float, tilt_rad: float) -> float:
     return finite(payload_kg, "payload_kg") * STANDARD_GRAVITY_M_PER_S2 * cos(finite(tilt_rad, "tilt_angle_rad"))
 
 
-def demand_of(command: Command, settings: ControlSettings) -> Demand:
-    """Return what the command demands. NotFiniteError if any number that matters is NaN or infinite."""
-    defaults = settings.defaults
+def demand_of(command: Command, settings: ControlSettings, manner: Manner | None = None) -> Demand:
+    """Return what the command demands. NotFiniteError if any number that matters is NaN or infinite.
+    manner: of this command, where it is known."""
     force_n, limited_by = force_limited(command.force_setpoint_n, settings.limits)
-    return Demand(
-        mode=command.mode,
-        force_n=force_n,
-        force_limited_by=limited_by,
-        voltage_v=finite(command.voltage_setpoint_v, "voltage_setpoint_v"),
+    voltage_v = finite(command.voltage_setpoint_v, "voltage_setpoint_v")
+    return Demand(command.mode, force_n, limited_by, voltage_v, *(manner or manner_of(command, settings.defaults)))
+
+
+def manner_of(command: Command, defaults: Defaults) -> Manner:
+    """Return how the command wants its force to be gone for. NotFiniteError as `demand_of`."""
+    return Manner(
         ramp_n_per_s=_or_default(command.force_ramp_n_per_s, defaults.force_ramp_n_per_s, "force_ramp_n_per_s"),
         precontact_n=_or_default(command.precontact_force_n, defaults.precontact_force_n, "precontact_force_n"),
         contact_ramp_s=_or_default(command.contact_ramp_s, defaults.contact_ramp_s, "contact_ramp_s"),
         gravity_n=_gravity_of(command, defaults),
         tolerance_n=_or_default(command.in_band_tolerance_n, defaults.in_band_tolerance_n, "in_band_tolerance_n"),
         in_band_time_s=_or_default(command.in_band_time_s, defaults.in_band_time_s, "in_band_time_s"),
+    )
+
+
+def is_same_manner(one: Command, other: Command) -> bool:
+    """Decide whether two commands say the same of how a force is gone for."""
+    return (
+        one.force_ramp_n_per_s == other.force_ramp_n_per_s
+        and one.tilt_angle_rad == other.tilt_angle_rad
+        and one.precontact_force_n == other.precontact_force_n
+        and one.contact_ramp_s == other.contact_ramp_s
+        and one.payload_kg == other.payload_kg
+        and one.in_band_tolerance_n == other.in_band_tolerance_n
+        and one.in_band_time_s == other.in_band_time_s
     )
 
 
@@ -70,4 +94,4 @@ def _or_default(value: float, default: float, name: str) -> float:
 def ramp_down_demand(demand: Demand, settings: ControlSettings) -> Demand:
     """Return the same on the way to 0 N, within STOP_S whatever the force is."""
     rate_n_per_s = max(settings.defaults.force_ramp_n_per_s, settings.limits.force_max_n / STOP_S)
-    return replace(demand, mode=Mode.FORCE, force_n=0.0, force_limited_by=LimitedBy.NONE, ramp_n_per_s=rate_n_per_s)
+    return demand._replace(mode=Mode.FORCE, force_n=0.0, force_limited_by=LimitedBy.NONE, ramp_n_per_s=rate_n_per_s)

@@ -55,8 +55,13 @@ class Scale:
     def on_grid(self, number: float, decimals: int) -> float:
         """Return the nearest number with so many decimals that lies within the range, where one does."""
         per_unit: int = 10**decimals
-        lowest, highest = ceil(self.device[0] * per_unit - _GRAIN), floor(self.device[1] * per_unit + _GRAIN)
+        lowest, highest = self.grid(decimals)
         return float(min(highest, max(lowest, round(number * per_unit)))) / per_unit
+
+    def grid(self, decimals: int) -> tuple[int, int]:
+        """Return the first and the last number with so many decimals within the range, in units of the last one."""
+        per_unit: int = 10**decimals
+        return ceil(self.device[0] * per_unit - _GRAIN), floor(self.device[1] * per_unit + _GRAIN)
 
 
 def _scale(device: Span, physical: Span) -> Scale:

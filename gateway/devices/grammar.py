@@ -1,7 +1,6 @@
 """A profile's templates at work: numbers into whole lines and back, for both ends of a wire."""
 
 from dataclasses import dataclass, field
-from math import isfinite
 
 from gateway.devices.binary.rtu_framing import RtuSplitter, answers, requests, rtu_frame
 from gateway.devices.checksum import add_checksum, strip_checksum
@@ -41,8 +40,8 @@ class Grammar:
             raise ValueRefused(f"{self.profile.name} has no words for {type(message).__name__}")
         return exchange
 
-    def _number_in(self, template: str) -> tuple[Field | None, int]:
-        """The field that carries a template's number, and its decimals."""
+    def number_in(self, template: str) -> tuple[Field | None, int]:
+        """Return the field that carries a template's number, and its decimals."""
         if template not in self._numbers:
             self._numbers[template] = self.profile.number_in(template), self.profile.decimals_in(template)
         return self._numbers[template]
@@ -65,6 +64,11 @@ class Grammar:
         """Return a sentence to the device with its checksum and terminator."""
         return self._framed(body, self.profile.question_terminator_bytes)
 
+    @property
+    def is_bare(self) -> bool:
+        """Decide whether a sentence is followed by its terminator, and has neither checksum nor frame."""
+        return not self.profile.is_modbus and self.profile.checksum == "none"
+
     def _framed(self, body: bytes, terminator: bytes) -> bytes:
         if self.profile.is_modbus:
             return rtu_frame(self.profile.unit_id, body)
@@ -76,13 +80,17 @@ class Grammar:
 
     def number_body(self, template: str, number: float) -> bytes:
         """Return the sentence with this number in it, nearest on the template's own grid; others in it are 0."""
-        if template not in self._around:
-            self._around[template] = _fill(template) | dict(self.profile.constants)
-        values = self._around[template]
-        number_field, decimals = self._number_in(template)
+        values = self.fill(template)
+        number_field, decimals = self.number_in(template)
         if number_field is not None:
             values = {**values, number_field.name: round(number, decimals)}
         return compile_template(template).encode(values)
+
+    def fill(self, template: str) -> dict[str, Value]:
+        """Return the values of all fields that nobody asks about: the profile's constants, else 0; of words the first."""
+        if template not in self._around:
+            self._around[template] = _fill(template) | dict(self.profile.constants)
+        return self._around[template]
 
     def number_line(self, template: str, number: float) -> bytes:
         """Return the device's line with this number in it."""
@@ -107,9 +115,7 @@ class Grammar:
 
     def answer_line(self, exchange: Exchange, value: float) -> bytes:
         """Return the answer with this physical value in it; a sensor or a setting stops at the ends of its range."""
-        number = exchange.range.scale.on_grid(
-            exchange.range.scale.to_number(value), self._number_in(exchange.answer)[1]
-        )
+        number = exchange.range.scale.on_grid(exchange.range.scale.to_number(value), self.number_in(exchange.answer)[1])
         return self.number_line(exchange.answer, number)
 
     def read(self, template: str, body: bytes | None, may_be_blank: str = "") -> dict[str, Value] | None:
@@ -122,23 +128,13 @@ class Grammar:
 
     def number(self, template: str, values: dict[str, Value]) -> float | None:
         """Return the number among the values, None when the template carries none."""
-        number_field, _ = self._number_in(template)
+        number_field, _ = self.number_in(template)
         return float(values[number_field.name]) if number_field else None
-
-    def setting(self, voltage_v: float) -> float:
-        """Return the device's number for a voltage, on its grid. ValueRefused for nan, inf, and outside its range."""
-        exchange = self.set_voltage
-        scale, number = exchange.range.scale, exchange.range.scale.to_number(voltage_v)
-        decimals = self._number_in(exchange.ask)[1]
-        if not isfinite(number) or not scale.carries(round(number, decimals), self.half_step(exchange.ask)):
-            low_v, high_v = exchange.range.voltage_v
-            raise ValueRefused(f"{voltage_v} V, {self.profile.name} takes {low_v:g} .. {high_v:g} V")
-        return scale.on_grid(number, decimals)
 
     def half_step(self, template: str) -> float:
         """Return half of what the template's number counts in: a reading beyond its range by less than that was only
         rounded."""
-        return 0.5 * float(10.0 ** -self._number_in(template)[1])
+        return 0.5 * float(10.0 ** -self.number_in(template)[1])
 
 
 def _fill(template: str) -> dict[str, Value]:

@@ -39,6 +39,15 @@ class Template:
             raise ValueRefused(f"{text!r} could not be read back as {self.text!r}")
         return data
 
+    def around(self, field: Field, values: Mapping[str, Value]) -> tuple[str, str]:
+        """Return what stands before and behind one of the fields, all others spelled out with these values."""
+        at = self.pieces.index(field)
+        before, behind = (
+            "".join(piece if isinstance(piece, str) else _encode_field(piece, values, "") for piece in part)
+            for part in (self.pieces[:at], self.pieces[at + 1 :])
+        )
+        return before, behind
+
     def decode(self, data: bytes, may_be_blank: str = "") -> dict[str, Value] | None:
         """Return the values by field name, None when these bytes are not this sentence."""
         match = self.pattern.fullmatch(data)

@@ -296,9 +296,9 @@ class RegisterBank:
         self._commands.store(admitted.values, admitted.kept)
         self._admission.note_stored(admitted)
         self._settle_owner(admitted, write.host, peer)
-        self._writers.note(self._commands.names(write.block, write.address, len(write.data) // 2), peer, now_s)
         self.command = admitted.command
         self.on_command(self.command)
+        self._writers.note(self._commands.names(write.block, write.address, len(write.data) // 2), peer, now_s)
         if self.on_write is not None:
             self.on_write(peer, before, admitted, (owner, self._ownership.owner))
         if self.on_accepted is not None:
@@ -313,7 +313,8 @@ class RegisterBank:
     def _settle_owner(self, admitted: AdmittedWrite, host: str, peer: Peer) -> None:
         ownership, values = self._ownership, admitted.values
         asks = bool(admitted.kept or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT])
-        ownership.settle(host, takes_over=admitted.is_taken_over, stops=admitted.is_stop, asks=asks)
+        if not asks or ownership.owner != host or admitted.is_stop or admitted.is_taken_over:  # else it stays
+            ownership.settle(host, takes_over=admitted.is_taken_over, stops=admitted.is_stop, asks=asks)
         if ownership.owner == host:
             self._owner_peer = peer
         self._show_owner()
@@ -321,8 +322,7 @@ class RegisterBank:
     def _show_owner(self) -> None:
         if self._ownership.owner != self._shown_owner:
             self._shown_owner = self._ownership.owner
-            # else the rig names it, and it has not yet commanded
-            is_known = self._owner_peer.identity == self._shown_owner
+            is_known = self._owner_peer.identity == self._shown_owner  # else the rig names it, and it has not commanded
             self._status.show_owner(ip_number(self._owner_peer.host if is_known else self._shown_owner))
 
     def _tell(self, sentence: str, peer: Peer) -> None:

@@ -1,15 +1,20 @@
 """Direct voltage, tare, stop, bands and warnings, as a master sees them."""
 
 from dataclasses import replace
-from math import isnan
+from math import isnan, nan
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import LeaseAction, LineStatus
+from gateway.control.command_edges import CommandTracker
+from gateway.control.demand import demand_of
 from gateway.devices.messages import Quality
+from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, LimitedBy, State, StatusBit
 from tests.control.bench import Bench, settings
 
@@ -234,3 +239,34 @@ def test_without_a_lease_a_closed_connection_changes_nothing():
     bench.run(1.0)
     bench.line = bench.line._replace(owner_connected=False)
     assert bench.run(1.0).state is State.HOLDING
+
+
+FIELDS = st.sampled_from((0.0, 0.5, 3.0))
+
+
+@given(st.lists(st.tuples(FIELDS, FIELDS, FIELDS, FIELDS, FIELDS), max_size=8), st.booleans())
+def test_a_demand_is_that_of_its_own_command_whatever_came_before(writes, pulls):
+    tracker = CommandTracker(settings())
+    if pulls:
+        tracker.turn(-1.0)
+    for number, (force_n, ramp_n_per_s, payload_kg, tilt_rad, tolerance_n) in enumerate(writes, 1):
+        command = Command(
+            number=number,
+            force_setpoint_n=force_n,
+            force_ramp_n_per_s=ramp_n_per_s,
+            payload_kg=payload_kg,
+            tilt_angle_rad=tilt_rad,
+            in_band_tolerance_n=tolerance_n,
+        )
+        tracker.take(0.1 * number, command)
+        alone = demand_of(command, settings())
+        assert tracker.demand == (alone._replace(gravity_n=-alone.gravity_n) if pulls else alone)
+
+
+def test_a_number_that_is_none_is_named_and_the_next_command_is_whole_again():
+    tracker = CommandTracker(settings())
+    tracker.take(0.1, Command(number=1, force_setpoint_n=5.0, payload_kg=nan))
+    assert tracker.not_finite.startswith("payload_kg")
+    tracker.take(0.2, Command(number=2, force_setpoint_n=6.0))
+    assert not tracker.not_finite
+    assert tracker.demand == demand_of(Command(number=2, force_setpoint_n=6.0), settings())

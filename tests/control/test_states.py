@@ -228,7 +228,7 @@ def test_a_defect_of_ours_latches_and_the_caller_gets_the_safe_voltage():
     bench.run(0.5)
     with pytest.raises(AttributeError):
         bench.controller.step(bench.now_s, bench.command, bench.sample, None)  # type: ignore[arg-type]
-    answer = bench.controller.safe_output(FaultCode.INTERNAL)
+    answer = bench.controller.fail_internally(bench.now_s)
     assert (answer.voltage_v, answer.state, answer.fault) == (0.0, State.FAULT, FaultCode.INTERNAL)
     output = bench.step()
     assert (output.voltage_v, output.state, output.fault) == (0.0, State.FAULT, FaultCode.INTERNAL)

@@ -39,6 +39,10 @@ class OneShotEvents:
         """Take over the pressure that the output device measures."""
         self._pressure_pa, self._profile_pa_per_v = line.pressure_pa, line.pressure_pa_per_v
 
+    def movement_events(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> tuple[str, str]:
+        """Return what a step in force or voltage mode is the first to show. measured_n: contact force, smoothed."""
+        return self.unreachable_event(loop, measured_n, inputs), self.hunting_event(loop)
+
     def unreachable_event(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> str:
         """Return a sentence where the target has just become unreachable, else nothing. Ask after each step in force or
         voltage mode. measured_n: contact force, smoothed."""

@@ -30,6 +30,7 @@ from gateway.devices.messages import (
     WatchdogTripped,
 )
 from gateway.devices.profile import DeviceProfile
+from gateway.devices.template_codecs.voltage_sentence import VoltageSentence
 
 _ROUNDING: Final = 0.6  # of a step: half of it is the device's rounding, the rest its arithmetic
 
@@ -51,7 +52,9 @@ class TemplateOutputHost:
         self.gap_s = quiet_s(profile.serial.character_s) if profile.is_modbus else 0.0
         self._safe_v = profile.voltage_range_v[0]
         self._confirmation = profile.confirmation
-        self._is_read_back = self._confirmation is not self._grammar.set_voltage
+        self._setting = VoltageSentence(grammar)
+        self._is_read_back = self._confirmation is not grammar.set_voltage
+        self._questions: dict[str, bytes] = {}  # by template: they carry no number
         self.idle_question = _idle_question(profile)
         self.resolution_v = self._step_v(self._grammar.set_voltage, self._grammar.set_voltage.ask)
         self._tolerance_v: dict[type, float] = {SetVoltage: _ROUNDING * self._steps_between(self._confirmation)}
@@ -99,12 +102,14 @@ class TemplateOutputHost:
         if isinstance(message, AskDevice):
             return self._grammar.question_line(self._checks.ask(message.step))
         if not isinstance(message, SetVoltage):
-            return self._question(self._grammar.exchange(message).ask, 0.0)
-        setting = self._question(self._grammar.set_voltage.ask, self._grammar.setting(message.voltage_v))
-        return setting + (self._question(self._confirmation.ask, 0.0) if self._is_read_back else b"")
+            return self._question(self._grammar.exchange(message).ask)
+        setting = self._setting.spell(message.voltage_v)
+        return setting + self._question(self._confirmation.ask) if self._is_read_back else setting
 
-    def _question(self, template: str, number: float) -> bytes:
-        return self._grammar.question_line(self._grammar.number_body(template, number))
+    def _question(self, template: str) -> bytes:
+        if template not in self._questions:
+            self._questions[template] = self._grammar.question_line(self._grammar.number_body(template, 0.0))
+        return self._questions[template]
 
     def _step_v(self, exchange: VoltageExchange, template: str) -> float:
         """What one count of the number in this template means, V; 0 where it carries none."""

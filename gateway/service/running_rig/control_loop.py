@@ -229,45 +229,57 @@ class ControlLoop:
             return NOT_HELD
         return self._lateness.since(since_s, now_s, _waited_s(self.processor_time()))
 
-    def _waited_since_tick(self, late_s: float) -> float | None:
+    def _waited_since_tick(self) -> float | None:
         """Asked of the kernel only where the step is late: a decision has no time for it."""
-        return _waited_s(self._used_since_tick()) if late_s >= _LONG_SILENCE_S else None
+        return _waited_s(self._used_since_tick())
 
     def _line(self, now_s: float) -> LineStatus:
-        late_s = self._late_s(now_s)
+        late_s, output = self._late_s(now_s), self.output
         return LineStatus(
-            acknowledged_v=self.output.confirmed_v,
-            unanswered_since_s=self.output.unanswered_since_s,
-            fault=self.output_lost or self.output.fault or self._cell.identity.fault,
-            said=self.output.said or self._cell.identity.said,
+            acknowledged_v=output.confirmed_v,
+            unanswered_since_s=output.unanswered_since_s,
+            fault=self.output_lost or output.fault or self._cell.identity.fault,
+            said=output.said or self._cell.identity.said,
             cell_lost=self.cell_lost,
-            pressure_pa=self.output.pressure_pa,
+            pressure_pa=output.pressure_pa,
             pressure_pa_per_v=self.pressure_pa_per_v,
             owner_connected=self.owner_connected,
             late_s=late_s,
-            waited_s=self._waited_since_tick(late_s),  # so much of the lateness the machine is to blame for
+            waited_s=self._waited_since_tick()
+            if late_s >= _LONG_SILENCE_S
+            else None,  # for which the machine is to blame
             warnings=self.warnings,
-            sent_v=self.output.sent_v,
-            wire_s=self.output.round_trip_s,
+            sent_v=output.sent_v,
+            wire_s=output.round_trip_s,
             cell_held=self._processor_held(self.sample.time_s if self.sample else None, now_s),
-            output_held=self._processor_held(self.output.unanswered_since_s, now_s),
-            output_counts=self.output.counts,
+            output_held=self._processor_held(output.unanswered_since_s, now_s),
+            output_counts=output.counts,
             cell_counts=self.cell_counts,
             valve=self.valve.status if self.valve else None,
         )
 
     def _decide(self, now_s: float) -> Output:
+        """The wire first: the reasons of a voltage are put together while it is on its way."""
         try:
-            return self.controller.step(now_s, self.bank.command, self.sample, self._line(now_s))
+            voltage_v = self.controller.decide(now_s, self.bank.command, self.sample, self._line(now_s))
         except Exception:
-            self._log(
-                "internal", "A499 internal error, please report it; safe voltage written:\n" + traceback.format_exc()
-            )
-            return self.controller.safe_output(FaultCode.INTERNAL)
+            return self._make_safe(now_s)
+        self.output.set_voltage(voltage_v, now_s)
+        try:
+            return self.controller.explain(now_s)
+        except Exception:
+            return self._make_safe(now_s)
+
+    def _make_safe(self, now_s: float) -> Output:
+        """An exception of ours is being handled: the safe voltage, and a sentence."""
+        sentence = "A499 internal error, please report it; safe voltage written:\n"
+        self._log("internal", sentence + traceback.format_exc())
+        decision = self.controller.fail_internally(now_s)
+        self.output.set_voltage(decision.voltage_v, now_s)
+        return decision
 
     def _step(self, now_s: float) -> None:
         decision = self._decide(now_s)
-        self.output.set_voltage(decision.voltage_v, now_s)
         if self.valve:
             self.valve.set_direction(decision.valve, now_s)
         self.decision = decision

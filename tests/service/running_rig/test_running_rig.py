@@ -183,7 +183,7 @@ def test_a_defect_in_the_step_is_a_fault_and_no_end(devices: OwnDevices, monkeyp
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         await pressing(rig, devices)
         with monkeypatch.context() as patched:
-            patched.setattr(rig.controller, "_step", lambda *arguments: 1 // 0)
+            patched.setattr(rig.controller, "decide", lambda *arguments: 1 // 0)
             while devices.setting_v > 0.0:
                 await asyncio.sleep(0.005)
         while rig.loop.decision is None or rig.loop.decision.fault is not FaultCode.INTERNAL:

@@ -176,9 +176,20 @@ def test_a_defect_of_ours_is_the_safe_voltage_a_latched_fault_and_a_sentence(mon
     assert_heals_after_reset(wired)
 
 
+def test_a_defect_in_the_reasons_of_a_decision_is_the_safe_voltage_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    wired = at_twenty()
+    with monkeypatch.context() as patched:
+        patched.setattr(wired.controller._composer, "compose", lambda *arguments: 1 / 0)
+        wired.write(1, 2500)
+        assert wired.voltage_reaches_safe(2 * WIRE_S) <= 2 * WIRE_S, "behind the setting that went out first"
+    assert wired.fault_code is FaultCode.INTERNAL
+    assert "ZeroDivisionError" in wired.said("A499")[0]
+    assert_heals_after_reset(wired)
+
+
 def test_a_defect_inside_a_masters_write_is_the_safe_voltage_too(monkeypatch: pytest.MonkeyPatch) -> None:
     wired = at_twenty()
-    monkeypatch.setattr(wired.controller, "_step", lambda *arguments: 1 / 0)
+    monkeypatch.setattr(wired.controller, "decide", lambda *arguments: 1 / 0)
     wired.write(1, 2500)
     assert wired.value("output_voltage") == 0.0
     assert wired.fault_code is FaultCode.INTERNAL

@@ -258,12 +258,25 @@ def test_a_release_goes_along_its_ramp_in_volts() -> None:
     assert 0.06 < half_s < 0.25
 
 
+def test_a_setting_is_on_the_wire_before_its_reasons_are_put_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    wired = Wired(without_trim(demo())).pressing(10.0)
+    order, explain, write = [], wired.controller.explain, wired.exchange._write
+    monkeypatch.setattr(wired.controller, "explain", lambda now_s: (order.append("reasons"), explain(now_s))[1])
+    monkeypatch.setattr(wired.exchange, "_write", lambda data: (order.append(data[:3].decode()), write(data))[1])
+    wired.until(lambda: wired.exchange._in_flight is None, 1.0)
+    order.clear()
+    wired.write(1, 2000)
+    assert order == ["SET", "reasons"]
+
+
 def test_a_tick_decides_nothing_anew_behind_a_sample_and_everything_without_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     wired = Wired().ready()
-    decided, step = [], wired.loop.controller.step
-    monkeypatch.setattr(wired.loop.controller, "step", lambda *given: (decided.append(wired.now_s), step(*given))[1])
+    decided, decide = [], wired.loop.controller.decide
+    monkeypatch.setattr(
+        wired.loop.controller, "decide", lambda *given: (decided.append(wired.now_s), decide(*given))[1]
+    )
     samples = wired.loop.samples
     wired.run(1.0)
     assert len(decided) == wired.loop.samples - samples >= 99, "none but by a sample"
