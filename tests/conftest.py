@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import hypothesis
 import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosis' matrices are small
@@ -18,9 +19,17 @@ def pytest_configure(config: pytest.Config) -> None:
     """A shell's background job inherits an ignored SIGINT, and so would every process under test."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     config.pluginmanager.register(GroupsStayTogether())
+    draw_examples(at_random=config.getoption("--long"))
     gc.disable()  # until all tests are collected, of which none is garbage
     if hasattr(config, "workerinput") and config.args_source is pytest.Config.ArgsSource.TESTPATHS:
         config.args = places_from_another_one_on(config.workerinput)
+
+
+def draw_examples(*, at_random: bool) -> None:
+    """The same examples in each push, new ones in a long run, which prints how to draw a failing one again. No example has a
+    bound in time: a busy machine is no fault."""
+    hypothesis.settings.register_profile("ours", derandomize=not at_random, deadline=None, print_blob=True)
+    hypothesis.settings.load_profile("ours")
 
 
 def places_from_another_one_on(worker: dict[str, Any]) -> list[str]:
