@@ -2,6 +2,7 @@
 
 import math
 import struct
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.registers import BankRules, Command, RegisterBank
+from gateway.registers.refusal import Refusal
 from gateway.registers.words import ControlBit, Mode
 from tests.calibrations.coefficients import calibration
 
@@ -218,3 +220,15 @@ def test_a_setpoint_lowered_twice_is_told_as_it_was_asked_for_first(make_bank, m
         sentence = bank.set_active_model(calibration(force_limits_n=(0.0, high_n)))
         assert f"to {left / 100:.2f} N" in sentence and master.word(1) == left
         assert bank.command.force_requested_n == 50.0
+
+
+def test_a_calibration_whose_force_begins_at_nothing_takes_the_smallest_setpoint(bank, master):
+    bank.set_active_model(replace(calibration(), force_limits_n=(0.0, 50.0)))
+    master.write(1, 1)
+    assert bank.command.force_setpoint_n == 0.01
+
+
+def test_a_write_of_nothing_is_refused(bank):
+    with pytest.raises(Refusal) as caught:
+        bank.write_registers(0, b"", Peer("10.0.0.1"))
+    assert caught.value.reason is RefusalReason.ADDRESS

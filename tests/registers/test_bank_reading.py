@@ -38,6 +38,7 @@ WRONG = [
     (65535, 1, "W203 address 65535 is what register 0 becomes"),
     (40001, 2, "W202 40001 is the name of address 0"),
     (40102, 2, "W202 40102 is the name of address 101"),
+    (49999, 1, "W202 49999 is the name of address 9998"),
     (30001, 1, "W202 30001 is the name of address 0"),
     (40000, 1, "W202 address 40000: 40001 is the name of address 0"),
 ]

@@ -227,6 +227,8 @@ LIES = [
     ({"bits": {16: "a"}}, "16: a is not a number 0 .. 15"),
     ({"address": True}, "True is not a whole number"),
     ({"text": 3}, "text is not text"),
+    ({"max": True}, "True is not a number"),
+    ({"max": float("nan")}, "nan is not a number"),
 ]
 
 

@@ -147,3 +147,11 @@ def test_nothing_staged_is_refused():
     assert fault_of(bytes(BLOCK_BYTES)).reason is UploadReason.LENGTH
     with pytest.raises(ValueError, match="400 are needed"):
         check_staged(bytes(10), LIMITS)
+
+
+def test_as_many_stops_as_the_registers_carry_are_taken_and_more_than_a_model_has_are_none():
+    radii = tuple(float32(0.2 * (k + 1)) for k in range(10))
+    full = replace(GOOD, stops=10, slip_radii_v=radii, slip_shares=(0.125,) * 6 + (0.0625,) * 4)
+    assert not isinstance(check_staged(staged(full), LIMITS), StagedFault)
+    fault = fault_of(staged(replace(full, stops=17)))
+    assert (fault.reason, fault.text) == (CoefficientReason.SLIP_STOPS, "17 slip stops: 0 .. 10 is allowed")

@@ -25,7 +25,7 @@ class ByteOrderEcho:
     def __init__(self, register: Register, image: RegisterImage) -> None:
         self._register = register
         self._image = image
-        self._proven: dict[str, WordOrder] = {}
+        self._proven: dict[str, None] = {}  # in the order of their proofs
 
     def is_proven_by(self, host: str) -> bool:
         """Return whether this host has shown its word order."""
@@ -44,12 +44,12 @@ class ByteOrderEcho:
         if (order := _ORDERS.get(echo)) is None:
             raise self._refusal(float(unpack_number("float32", WordOrder.ABCD, echo)))
         self._image.write(self._register.address, echo)
-        self._remember(host, order)
+        self._remember(host)
         return order
 
-    def _remember(self, host: str, order: WordOrder) -> None:
+    def _remember(self, host: str) -> None:
         self._proven.pop(host, None)
-        self._proven[host] = order
+        self._proven[host] = None
         if len(self._proven) > _MOST_HOSTS:
             del self._proven[next(iter(self._proven))]
 

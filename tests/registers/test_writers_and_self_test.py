@@ -1,0 +1,51 @@
+"""Whose write stands last, who a serial face is, and the last self-test in its words."""
+
+import pytest
+
+from gateway.modbus import Peer
+from gateway.registers.image import RegisterImage
+from gateway.registers.self_test_words import SelfTestWords
+from gateway.registers.words import SelfTestResult, SelfTestVerdict
+from gateway.registers.writes.ownership import LastWriters, serial_place
+
+
+def test_who_wrote_the_same_registers_again_wrote_them_last():
+    writers, robot, panel = LastWriters(), Peer("10.0.0.1"), Peer("10.0.0.2")
+    writers.note(("mode", "heartbeat"), robot, 1.0)
+    writers.note(("heartbeat",), panel, 2.0)
+    assert writers.by_name() == {"mode": (robot, 1.0), "heartbeat": (panel, 2.0)}
+    writers.note(("mode", "heartbeat"), robot, 3.0)
+    assert writers.by_name() == {"mode": (robot, 3.0), "heartbeat": (robot, 3.0)}
+
+
+@pytest.mark.parametrize(
+    ("host", "place"),
+    [
+        ("serial:1", 1),
+        ("serial:255", 255),
+        ("serial:256", None),
+        ("serial:0", None),
+        ("serial:01", None),
+        ("serial:", None),
+        ("serial:x", None),
+        ("7", None),
+        ("10.0.0.1", None),
+    ],
+)
+def test_a_serial_face_is_known_by_its_place(host, place):
+    assert serial_place(host) == place
+
+
+def test_a_self_test_is_shown_with_its_result_its_count_and_what_was_not_tested(register_map):
+    image = RegisterImage(register_map)
+    words = SelfTestWords(register_map, image)
+    words.show(65537, SelfTestResult.PASSED, {"noise": SelfTestVerdict.PASSED})
+    shown = {
+        one.name: image.word(one.address)
+        for one in register_map.registers_of("proof")
+        if one.name.startswith("self_test_")
+    }
+    assert shown.pop("self_test_result") == SelfTestResult.PASSED
+    assert shown.pop("self_test_count") == 1
+    assert shown.pop("self_test_noise") == SelfTestVerdict.PASSED
+    assert set(shown.values()) == {SelfTestVerdict.NOT_TESTED} and len(shown) > 3
