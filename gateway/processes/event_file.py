@@ -3,8 +3,8 @@
 Guardian and control process write the same file: each line is one `write` to a descriptor opened with O_APPEND, which the
 kernel does not mix with another's. Whoever finds the file full renames it (`events.jsonl.1` is the newest of the old
 ones), under a lock of the very file that is renamed; the other notices that its file has another name and opens anew, so
-no line is lost. Nothing is ever synced: a power cut may cost the last seconds, a killed process costs nothing. Whoever opens
-a file that ends in a piece of a line, as a power cut leaves it, begins a new one.
+no line is lost. Nothing is ever synced: a power cut may cost the last seconds, a killed process costs nothing. A
+file that ends in a piece of a line, as a power cut leaves it, costs that line: the reader finds the one behind it.
 Standard library only: the guardian imports this.
 """
 
@@ -53,14 +53,9 @@ class EventFile:
     def _current(self) -> int:
         if self._descriptor < 0 or not self._is_named():
             self.close()
-            flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
+            flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
             self._descriptor = os.open(self._path, flags, 0o600)
-            self._is_torn = self._is_torn or self._ends_torn()
         return self._descriptor
-
-    def _ends_torn(self) -> bool:
-        size = os.fstat(self._descriptor).st_size
-        return size > 0 and os.pread(self._descriptor, 1, size - 1) != b"\n"
 
     def _is_named(self) -> bool:
         """Return whether the path still leads to the file that we have open."""

@@ -7,14 +7,16 @@ from typing import Any, Final
 
 from tests.disk.watched_disk import CHANGING, Call, WatchedDisk
 
+_FAILED_CALLS: Final = {"once": 1, "for a while": 3}
 GROWING: Final = frozenset(("create", "write", "mkdir"))
 
 
 class FailingDisk(WatchedDisk):
-    """kind: "once" (EIO of one call, whatever it is), "broken" (EIO of all from there on), "full" (ENOSPC of whatever needs
-    room from there on, half of the first write still fits), "read-only" (EROFS of every change from there on)."""
+    """kind: "once" (EIO of one call, whatever it is), "for a while" (of three calls, where the first is a write after half of
+    it), "broken" (of all from there on), "full" (ENOSPC of whatever needs room from there on, half of the first write fits),
+    "read-only" (EROFS of every change from there on)."""
 
-    KINDS: Final = ("once", "full", "read-only", "broken")
+    KINDS: Final = ("once", "for a while", "full", "read-only", "broken")
 
     def __init__(self, folder: Path, kind: str, fail_at: int) -> None:
         super().__init__(folder)
@@ -34,7 +36,8 @@ class FailingDisk(WatchedDisk):
             raise OSError(number, os.strerror(number), call.path)
 
     def length_of(self, call: Call) -> int:
-        if self.kind == "full" and len(self.calls) >= self._fail_at and not self._is_half_written:
+        begins = len(self.calls) >= self._fail_at if self.kind == "full" else len(self.calls) == self._fail_at
+        if self.kind in ("full", "for a while") and begins and not self._is_half_written:
             self._is_half_written = True
             return len(call.data) // 2
         return len(call.data)
@@ -42,10 +45,12 @@ class FailingDisk(WatchedDisk):
     def _error(self, call: Call, count: int) -> int:
         if count < self._fail_at:
             return 0
-        if self.kind == "once":
-            return errno.EIO if count == self._fail_at else 0
+        first_write = call.what == "write" and not self._is_half_written and len(call.data) > 1
+        if self.kind == "for a while" and count == self._fail_at and first_write:
+            return 0
+        if self.kind in _FAILED_CALLS:
+            return errno.EIO if count < self._fail_at + _FAILED_CALLS[self.kind] else 0
         if self.kind == "full":
-            first_write = call.what == "write" and not self._is_half_written and len(call.data) > 1
             return errno.ENOSPC if _needs_room(call) and not first_write else 0
         if self.kind == "read-only":
             return errno.EROFS if call.what in CHANGING - {"fsync"} else 0

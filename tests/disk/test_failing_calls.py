@@ -10,6 +10,7 @@ import pytest
 from tests.disk.acts import Act
 from tests.disk.all_acts import REFUSED
 from tests.disk.failing_disks import FailingDisk, describe
+from tests.disk.file_acts import Restored
 from tests.disk.watched_disk import watching
 
 STRIDE = 11
@@ -57,3 +58,15 @@ def test_whatever_call_fails_nothing_is_half_and_what_was_said_stays(
             raise AssertionError(f"{describe(disk)}; {said} were acknowledged") from error
     print(f"{len(disk.calls)} calls, {refused} refusals")
     assert refused or budget == 1
+
+
+def test_a_restore_that_one_call_has_failed_leaves_the_state_where_it_was(fast_folder: Path) -> None:
+    """Also where it has been set aside already: one call alone does not take it away."""
+    refused = 0
+    for state, disk in disks(fast_folder, "once", 1):
+        act = Restored(state)
+        act.prepare()
+        with watching(disk):
+            refused += try_once(act, []) is not None
+        assert (state / "cell").is_dir(), describe(disk)
+    assert refused > 20

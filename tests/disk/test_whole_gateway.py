@@ -17,7 +17,7 @@ from tests.disk.working_day import Day, a_day, prepare
 
 IN_THE_GATE = {"once": (90,), "full": (40,), "read-only": (1,)}
 """Which calls fail there, half a second of a processor each; with --long each of them does, of each kind."""
-LONG_STRIDE = {"once": 1, "full": 3, "read-only": 3, "broken": 3}
+LONG_STRIDE = {"once": 1, "for a while": 2, "full": 3, "read-only": 3, "broken": 3}
 
 
 @pytest.mark.long
@@ -28,7 +28,9 @@ def test_an_ordinary_day_is_acknowledged_as_a_whole(fast_folder: Path) -> None:
     assert {"record", "calibration in use", "plant in use"} <= {record["what"] for record in read_audit(day.state)}
 
 
-@pytest.mark.parametrize("kind", [*IN_THE_GATE, pytest.param("broken", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "kind", [*IN_THE_GATE, *(pytest.param(kind, marks=pytest.mark.long) for kind in ("for a while", "broken"))]
+)
 def test_control_feels_no_call_that_fails(fast_folder: Path, kind: str, budget: int) -> None:
     failed = 0
     for n in count(1, LONG_STRIDE[kind]) if budget > 1 else IN_THE_GATE[kind]:

@@ -4,6 +4,7 @@ Shares no code with the gateway. The regulator answers at once; the cell presses
 100 readings a second. A port's name is a link, so that another device can come back behind it.
 """
 
+import contextlib
 import os
 import pty
 import re
@@ -55,6 +56,7 @@ class Line:
         self.device, self.client = pty.openpty()
         for end in (self.device, self.client):
             tty.setraw(end)
+        os.set_blocking(self.device, False)  # a device does not wait for anybody who reads: what finds no room is lost
         self.link.symlink_to(os.ttyname(self.client))
 
     def pull(self) -> None:
@@ -134,7 +136,8 @@ class OwnDevices:
             heard = Heard(time.monotonic(), line)
             self.heard.append(heard)
             if not self.is_silent:
-                os.write(self.output.device, self._reply(heard) + b"\r\n")
+                with contextlib.suppress(BlockingIOError):
+                    os.write(self.output.device, self._reply(heard) + b"\r\n")
         return pending
 
     def _reply(self, heard: Heard) -> bytes:
@@ -145,4 +148,5 @@ class OwnDevices:
 
     def _stream(self) -> None:
         self.force_n += (NEWTON_PER_VOLT * self.setting_v - self.force_n) * PERIOD_S / (LAG_S + PERIOD_S)
-        os.write(self.cell.device, b"ST,GS,%+08.2fkg\r\n" % (self.force_n / 9.80665))
+        with contextlib.suppress(BlockingIOError):
+            os.write(self.cell.device, b"ST,GS,%+08.2fkg\r\n" % (self.force_n / 9.80665))

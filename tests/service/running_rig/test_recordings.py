@@ -126,3 +126,14 @@ def test_whoever_ends_one_that_waits_for_room_has_ended_it(
     assert recordings.stop() == {"recording": None}
     recordings.flush(1000.0)
     assert recordings.status() == {"recording": None}
+
+
+def test_what_the_last_batch_has_cost_is_said_to_whoever_ends_it(
+    recordings: Recordings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recordings.start()
+    recordings._current.recorder.append((0.0,) * len(COLUMNS))
+    monkeypatch.setattr(os, "write", lambda descriptor, data: 3)
+    ended = recordings.stop()
+    assert ended["rows"] == 0
+    assert ended["fault"].startswith("E402") and recordings._log == [ended["fault"]]
