@@ -34,7 +34,7 @@ from gateway.control.valve.valve_switch import ValveSwitch
 from gateway.devices.messages import ForceSample
 from gateway.registers.command import Command
 from gateway.registers.words import RUN_BITS, ControlBit, State
-from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
+from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
 _CALIBRATE, _SELF_TEST = int(ControlBit.START_CALIBRATION), int(ControlBit.START_SELF_TEST)

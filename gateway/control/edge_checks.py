@@ -24,7 +24,7 @@ from gateway.control.transitions import ControllerParts, Transitions
 from gateway.control.valve.valve_switch import ValveSwitch
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
-from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
+from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
 _TAKE = int(ControlBit.TAKE_OWNERSHIP)

@@ -44,8 +44,8 @@ from gateway.registers.writes.command_block import (
     CommandBlock,
     check_zeros,
 )
-from gateway.registers.writes.edge_questions import Decide
 from gateway.registers.writes.ownership import LastWriters, Ownership, ip_number
+from gateway.registers.writes.proposed_write import Decide
 
 BITS: Final = 16
 

@@ -13,7 +13,7 @@ from gateway.registers import BankRules, Command, RegisterBank, RegisterMap, Sta
 from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.upload.staging import StagedFault, check_staged
 from gateway.registers.words import CommitStatus, ControlBit, State, StatusBit
-from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
+from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 
 ECHO_AT = struct.pack(">H", 416)
 

@@ -17,7 +17,7 @@ from gateway.control import CalibrationInUse, Controller, ControlSettings, Limit
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, Mode
-from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
+from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 
 STEP_S = 0.001
 MOMENTARY = ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP

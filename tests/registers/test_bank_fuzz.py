@@ -11,7 +11,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.modbus import ModbusError, Peer, Role
 from gateway.registers import BankRules, Refusal, RegisterBank, Status
 from gateway.registers.words import ControlBit, State
-from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
+from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 
 PEERS = [Peer("10.0.0.1", 1, role=Role.CALIBRATION), Peer("10.0.0.2", 2), Peer("fe80::1", 3, "press", Role.ADMIN)]
 ADDRESSES = st.one_of(

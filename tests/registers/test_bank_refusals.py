@@ -6,7 +6,7 @@ import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.registers.words import ControlBit
-from gateway.registers.writes.edge_questions import EdgeRefusal
+from gateway.registers.writes.proposed_write import EdgeRefusal
 
 R = RefusalReason
 NAN = math.nan

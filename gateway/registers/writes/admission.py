@@ -29,8 +29,8 @@ from gateway.registers.writes.command_block import (
     CommandBlock,
     Values,
 )
-from gateway.registers.writes.edge_questions import Decide, ProposedWrite, decide_nothing
 from gateway.registers.writes.ownership import Ownership
+from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
 
 ENABLE: Final = int(ControlBit.ENABLE)
 TAKE: Final = int(ControlBit.TAKE_OWNERSHIP)

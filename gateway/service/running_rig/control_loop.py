@@ -28,7 +28,7 @@ from gateway.registers import RegisterBank
 from gateway.registers.command import Command
 from gateway.registers.residual_cause import ResidualCause
 from gateway.registers.words import StatusBit
-from gateway.registers.writes.edge_questions import EdgeRefusal, ProposedWrite
+from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.lines.load_cell_line import CellExchange

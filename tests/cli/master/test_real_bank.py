@@ -11,7 +11,7 @@ from gateway.profiles import load_calibration
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.command import Status
 from gateway.registers.words import ControlBit, State
-from gateway.registers.writes.edge_questions import EdgeRefusal
+from gateway.registers.writes.proposed_write import EdgeRefusal
 
 
 @pytest.fixture

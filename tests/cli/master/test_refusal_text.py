@@ -11,7 +11,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.devices.line_settings import SerialSettings
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.words import ControlBit
-from gateway.registers.writes.edge_questions import EdgeRefusal
+from gateway.registers.writes.proposed_write import EdgeRefusal
 
 OWN = "tare refused: 1.56 V are out: disable the output or set the force to 0 first"
 
