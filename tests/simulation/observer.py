@@ -23,9 +23,10 @@ class Bounds:
     sample_timeout_s: float
     stall_s: float
     lease_s: float
+    period_s: float
 
 
-GRACE_S = 0.06
+GRACE_S = 0.05  # and one period
 
 
 @dataclass
@@ -129,7 +130,7 @@ class Observer:
             ("I4", self.disabled_s, 0.0),
         )
         for law, since_s, bound_s in limits:
-            if since_s is not None and now_s - since_s > bound_s + GRACE_S:
+            if since_s is not None and now_s - since_s > bound_s + GRACE_S + self.bounds.period_s:
                 self._complain(
                     law, f"{self.voltage_v:.3f} V for {standing_s:.3f} s, {now_s - since_s:.3f} s after", now_s
                 )

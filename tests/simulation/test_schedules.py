@@ -10,7 +10,7 @@ import pytest
 
 from tests.simulation.schedule import Event, Outcome, draw_events, run_schedule, shrink
 
-PUSH_SEEDS, LONG_SEEDS = 16, 2000
+PUSH_SEEDS, LONG_SEEDS = 48, 6000
 SHARDS = 16
 SECONDS = float(os.environ.get("SIMULATION_SECONDS", "10"))
 KEPT: list[tuple[int, list[Event]]] = []
