@@ -27,6 +27,11 @@ class LineSplitter:
         self._buffer = b""
         self._is_skipping = False
 
+    @property
+    def is_between_lines(self) -> bool:
+        """Decide whether nothing is kept: what comes next begins a line."""
+        return not self._buffer and not self._is_skipping
+
     def forget(self) -> int:
         """Drop the unfinished line; how many bytes that was."""
         dropped, self._buffer, self._is_skipping = len(self._buffer), b"", False

@@ -11,8 +11,7 @@ Decisions: a write to a read-only register is 02, as to an address that cannot b
 refused writes, so that a newcomer's 40001 can be explained. Clearing enable also clears control_word, force_setpoint
 and voltage_setpoint (an old voltage must not wait for the next enable), releases the ownership, and is granted to any
 peer, as is clearing start_calibration: then nothing else of its write is taken. A takeover in the write that disables
-holds. byte_order_echo takes 1234.5 in both word orders and reads back as
-written; it proves the order of one host.
+holds. byte_order_echo takes 1234.5 in both word orders and reads back as written; it proves the order of one host.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -64,11 +63,9 @@ class RegisterBank:
         self.on_accepted: Callable[[str, Peer], None] | None = None
         self.on_write: OnWrite | None = None
         self.on_refused_write: Callable[[Refusal, Peer], None] = lambda refusal, peer: None
-        self._writers = LastWriters()
+        self._writers, self._now, self.refusals = LastWriters(), now, 0  # refused since the start
         self.last_refusal: Refusal | None = None
-        self.refusals = 0  # since the start
         self.identity: Mapping[int, bytes] = build_identity(register_map.name, rules.rig_name)
-        self._now = now
         self._blocks = register_map.blocks
         self._image = RegisterImage(register_map)
         self._roles = write_roles(register_map.blocks)
@@ -76,7 +73,7 @@ class RegisterBank:
         self._command_block, self._command_role = register_map.block("command"), self._roles["command"]
         self._commands = CommandBlock(register_map, rules, self._image)
         self._status = StatusBlock(register_map, self._image)
-        self._unpacked: Status | None = None
+        self._tell_status: Callable[[], Status] | None = None
         self.self_test = SelfTestWords(register_map, self._image)
         self._ownership = Ownership(rules.owner)
         self._echo = ByteOrderEcho(register_map.find("byte_order_echo"), self._image)
@@ -179,18 +176,22 @@ class RegisterBank:
         self._admission.decide = decide
 
     def publish(self, status: Status) -> None:
-        """Show what control and service know, from the next read on: most that is published, nobody reads."""
-        self._admission.is_calibrating = status.state is State.CALIBRATING
-        self._unpacked = status
+        """Show what control and service know."""
+        self.publish_when_read(status.state, lambda: status)
+
+    def publish_when_read(self, state: State, tell: Callable[[], Status]) -> None:
+        """Show what `tell` says when somebody reads next: most that is published, nobody reads. state: of control."""
+        self._admission.is_calibrating = state is State.CALIBRATING
+        self._tell_status = tell
         self._image.is_behind = True
 
     def _catch_up(self) -> None:
         """Pack what has been accepted and published since the last read: most of it is never read."""
         self._image.is_behind = False
         self._commands.show()
-        if self._unpacked is not None:
-            self._status.publish(self._unpacked)
-            self._unpacked = None
+        if self._tell_status is not None:
+            self._status.publish(self._tell_status())
+            self._tell_status = None
 
     def clear_command(self) -> None:
         """Clear control_word and the setpoints, because control has switched the output off. The Command keeps its number."""
@@ -282,8 +283,7 @@ class RegisterBank:
             self._image.put(self._watchdogs, word)
 
     def _write_echo(self, address: int, data: bytes, peer: Peer) -> None:
-        order = self._echo.write(address, data, peer.identity)
-        if order is not None:
+        if (order := self._echo.write(address, data, peer.identity)) is not None:
             self._writers.note(("byte_order_echo",), peer, self._now())
             self._tell(f"byte_order_echo {order.upper()}: use block {'200' if order == 'abcd' else '300'}", peer)
 

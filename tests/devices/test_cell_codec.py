@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from gateway.devices import DeviceProfile, TemplateError, cell_device, cell_host, output_host
 from gateway.devices.exchange import ForceReading
+from gateway.devices.framing import LONGEST_LINE_BYTES
 from gateway.devices.messages import ForceSample, Garbage, Quality
 
 FORCES = st.floats(-900.0, 900.0)
@@ -39,6 +40,25 @@ def test_cutting_the_stream_elsewhere_changes_nothing(
     whole, parted = cell_host(indicator), cell_host(indicator)
     pieces = [parted.receive(stream[start:end], 0.0) for start, end in pairwise(places)]
     assert [found for piece in pieces for found in piece] == whole.receive(stream, 0.0)
+
+
+def test_a_sentence_that_is_known_by_heart_is_read_as_when_it_was_new(indicator: DeviceProfile) -> None:
+    host, frame = cell_host(indicator), cell_device(indicator).frame(12.0)
+    (first,) = host.receive(frame, 1.0)
+    (again,) = host.receive(frame, 2.0)
+    assert isinstance(first, ForceSample)
+    assert again == replace(first, time_s=2.0)
+    assert host.receive(frame + frame[:5], 3.0) == [replace(first, time_s=3.0)]
+    assert host.receive(frame[5:], 4.0) == [replace(first, time_s=4.0)], "its first half waited"
+
+
+def test_a_known_sentence_at_the_end_of_an_endless_line_is_no_reading(indicator: DeviceProfile) -> None:
+    host, frame = cell_host(indicator), cell_device(indicator).frame(12.0)
+    assert isinstance(host.receive(frame, 1.0)[0], ForceSample)
+    rest_of_it = host.receive(b"#" * LONGEST_LINE_BYTES + frame, 2.0)
+    assert rest_of_it == [Garbage(b"#" * LONGEST_LINE_BYTES), Garbage(frame)]
+    host.receive(b"##", 3.0)
+    assert host.receive(frame, 4.0) == [Garbage(b"##" + frame)]
 
 
 @given(st.integers(1, 16), FORCES)

@@ -72,6 +72,20 @@ def test_every_published_quantity_is_where_the_map_says(bank, register_map):
     assert shown(bank, register_map, "force_measured@float_abcd") == pytest.approx(12.344)
 
 
+def test_a_status_is_put_together_once_by_the_read_that_asks_for_it(bank, register_map):
+    asked = []
+
+    def tell(force_n: float) -> Status:
+        asked.append(force_n)
+        return Status(force_measured_n=force_n)
+
+    bank.publish_when_read(State.OFF, lambda: tell(1.0))
+    bank.publish_when_read(State.OFF, lambda: tell(2.0))
+    assert not asked, "nobody has read"
+    assert [shown(bank, register_map, "force_measured") for _ in range(3)] == [2.0, 2.0, 2.0]
+    assert asked == [2.0]
+
+
 def test_before_the_first_publish_nothing_is_claimed(bank, register_map):
     for name in ("force_measured", "output_voltage", "sample_age", "pressure", "model_residual"):
         assert math.isnan(shown(bank, register_map, name)), name

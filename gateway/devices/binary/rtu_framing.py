@@ -60,6 +60,11 @@ class RtuSplitter:
         self._buffer = b""
         self._dropped = b""
 
+    @property
+    def is_between_lines(self) -> bool:
+        """Decide whether nothing is kept: what comes next begins a frame."""
+        return not self._buffer and not self._dropped
+
     def forget(self) -> int:
         """Drop the unfinished frame; how many bytes that was."""
         count = len(self._buffer) + len(self._dropped)

@@ -5,7 +5,7 @@ status word says: a display that shows nothing has no valid reading, and saturat
 """
 
 from math import isfinite, isnan, nan
-from typing import Final
+from typing import Final, NamedTuple
 
 from gateway.devices.binary.rtu_framing import quiet_s
 from gateway.devices.device_checks.spelling import CheckSpelling
@@ -52,6 +52,19 @@ def _question(grammar: Grammar, reading: ForceReading) -> bytes:
 _MOST_KNOWN: Final = 64  # sentences
 
 
+class _KnownReading(NamedTuple):
+    """What a sentence says, whenever it comes."""
+
+    raw: float
+    force_n: float
+    quality: Quality
+
+    def at(self, now_s: float) -> ForceSample | RepeatedSample:
+        if self.quality is Quality.REPEATED:
+            return RepeatedSample()
+        return ForceSample(self.raw, self.force_n, self.quality, now_s)
+
+
 class TemplateCellHost:
     """See roles.CellHost. sign -1: the wiring shows a push as negative. unit: only where frames leave it out."""
 
@@ -63,7 +76,7 @@ class TemplateCellHost:
         self._newton_per_unit = newton_per_unit(profile, unit)
         self._sign = sign
         self._lines = self._grammar.answers()
-        self._known: dict[bytes, dict[str, Value]] = {}  # a force at rest says the same few sentences
+        self._known: dict[bytes, _KnownReading] = {}  # a force at rest says the same few sentences
         self.resolution_n = self._reading.step * self._newton_per_unit
         self.gap_s = quiet_s(profile.serial.character_s) if profile.is_modbus else 0.0
 
@@ -77,25 +90,26 @@ class TemplateCellHost:
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
         """Return the samples and the garbage that these bytes complete. now_s: time of their arrival."""
+        known = self._known.get(chunk)
+        if known is not None and self._lines.is_between_lines:
+            return [known.at(now_s)]  # one whole sentence, and one of the few
         return [self._sample(line, now_s) for line in self._lines.feed(chunk)]
 
     def _sample(self, line: Line, now_s: float) -> ForceSample | Garbage | RepeatedSample:
-        values = self._known.get(line.data) or self._understand(line)
-        if values is None:
+        if not line.is_whole:
             return Garbage(line.data)
-        raw = self._raw(values)
-        quality = self._quality(raw, values)
-        if quality is Quality.REPEATED:
-            return RepeatedSample()
-        return ForceSample(raw, self._newtons(raw, values), quality, now_s)
+        meaning = self._known.get(line.data) or self._understand(line)
+        return Garbage(line.data) if meaning is None else meaning.at(now_s)
 
-    def _understand(self, line: Line) -> dict[str, Value] | None:
+    def _understand(self, line: Line) -> _KnownReading | None:
         values = self._grammar.read(self._reading.frame, self._grammar.body(line), self._reading.may_be_blank)
-        if values is not None:
-            if len(self._known) >= _MOST_KNOWN:
-                self._known.clear()
-            self._known[line.data] = values
-        return values
+        if values is None:
+            return None
+        if len(self._known) >= _MOST_KNOWN:
+            self._known.clear()
+        raw = self._raw(values)
+        self._known[line.data] = meaning = _KnownReading(raw, self._newtons(raw, values), self._quality(raw, values))
+        return meaning
 
     def _raw(self, values: dict[str, Value]) -> float:
         """The number of the device, in its own unit."""

@@ -25,7 +25,7 @@ from gateway.devices.messages import ForceSample, Garbage
 from gateway.processes.scheduler_counters import ProcessorTime, time_between
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
-from gateway.registers.command import Command
+from gateway.registers.command import Command, Status
 from gateway.registers.residual_cause import ResidualCause
 from gateway.registers.words import StatusBit
 from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
@@ -86,7 +86,7 @@ class ControlLoop:
         self.sample: ForceSample | None = None
         self.samples = self.cell_garbage_bytes = 0
         self.cell_counts = WireCounts()
-        self.pressure_pa_per_v = nan  # of the output device, by its profile
+        self.pressure_pa_per_v = self._pressure_pa = nan  # of the output device: by its profile; at the last decision
         self.output_lost = FaultCode.NONE
         self.valve: ValveExchange | None = None
         self.cell_lost = False
@@ -261,7 +261,9 @@ class ControlLoop:
     def _decide(self, now_s: float) -> Output:
         """The wire first: the reasons of a voltage are put together while it is on its way."""
         try:
-            voltage_v = self.controller.decide(now_s, self.bank.command, self.sample, self._line(now_s))
+            line = self._line(now_s)
+            self._pressure_pa = line.pressure_pa
+            voltage_v = self.controller.decide(now_s, self.bank.command, self.sample, line)
         except Exception:
             return self._make_safe(now_s)
         self.output.set_voltage(voltage_v, now_s)
@@ -292,16 +294,20 @@ class ControlLoop:
         if decision.resets_device:
             self.output.clear_faults()
         self.health.loop_time_s = self.clock() - now_s
-        stored = self.calibration_runs.stored if self.calibration_runs else 0
-        known = BackgroundStatus(self.controller.calibration_id, stored, self.residual_cause, self.plant_id)
-        status = status_of(decision, self.health, self.output.pressure_pa, known)
-        if int(decision.warnings) & _RESTARTED and not decision.fault:
-            status = status._replace(fault_code=self.restart_cause)
-        self.bank.publish(status)
+        self.bank.publish_when_read(decision.state, self._status)
         if self.controller.active_run.self_test is not self._shown_self_test:
             self._show_self_test()
         for event in decision.events:
             self._log("control", event)
+
+    def _status(self) -> Status:
+        """What the registers show of the last decision, put together by the read that asks for it."""
+        decision = self.decision or self.controller.safe_output(FaultCode.NONE)
+        stored = self.calibration_runs.stored if self.calibration_runs else 0
+        known = BackgroundStatus(self.controller.calibration_id, stored, self.residual_cause, self.plant_id)
+        status = status_of(decision, self.health, self._pressure_pa, known)
+        is_restart = int(decision.warnings) & _RESTARTED and not decision.fault
+        return status._replace(fault_code=self.restart_cause) if is_restart else status
 
     def _show_self_test(self) -> None:
         self._shown_self_test = report = self.controller.active_run.self_test

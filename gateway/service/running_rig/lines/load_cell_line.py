@@ -43,6 +43,8 @@ class CellExchange:
         if self.identity.is_due:
             return self._receive_identity(chunk, now_s)
         messages = self._host.receive(chunk, now_s)
+        if not self._question:
+            return messages  # a stream
         if any(not isinstance(one, Garbage) for one in messages):
             self._next_s = max(self._next_s, now_s + self._host.gap_s)
             if self._is_overdue:
