@@ -126,7 +126,8 @@ class OwnDevices:
                     due_s += PERIOD_S
                     self._stream()
             wait_s = max(0.0, min(PERIOD_S, due_s - time.monotonic()))
-            select.select([self.output.device] if self.output.device >= 0 else [], [], [], wait_s)
+            with contextlib.suppress(OSError):  # pulled meanwhile
+                select.select([self.output.device] if self.output.device >= 0 else [], [], [], wait_s)
 
     def _answer(self, pending: bytes) -> bytes:
         if self.output.device < 0 or not select.select([self.output.device], [], [], 0)[0]:

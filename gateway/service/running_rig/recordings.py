@@ -50,13 +50,16 @@ class Recordings:
         self.plant_in_use = in_use_facts(rig)
 
     def start(self, label: RecordingLabel = NO_LABEL, for_s: float = 0.0) -> dict[str, Any]:
-        """Begin a recording; ValueError when one is running. for_s: it ends by itself so long after the next tick, 0: it does
-        not."""
+        """Begin a recording; ValueError when one is running, OSError where the disk takes none: one that waits for room goes on
+        waiting. for_s: it ends by itself so long after the next tick, 0: it does not."""
         if self._current:
             raise ValueError(f"already recording to {self._current.recorder.path}")
-        self._again.forget()
         self._label, self._for_s, self._ends_s, self._began_s = label, for_s, None, None
-        self._begin()
+        try:
+            self._begin()
+        except OSError as error:
+            raise OSError(f"{self._directory}: {error.strerror or error}") from error
+        self._again.forget()
         return self.status()
 
     def _begin(self) -> None:

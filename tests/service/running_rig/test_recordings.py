@@ -137,3 +137,17 @@ def test_what_the_last_batch_has_cost_is_said_to_whoever_ends_it(
     ended = recordings.stop()
     assert ended["rows"] == 0
     assert ended["fault"].startswith("E402") and recordings._log == [ended["fault"]]
+
+
+def test_whoever_begins_one_in_vain_leaves_it_waiting_for_room(
+    recordings: Recordings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", lambda descriptor, data: 3)
+        recordings.try_start()
+        with pytest.raises(OSError, match=r"recordings: No space left on device$"):
+            recordings.start()
+        recordings.flush(0.0)
+    recordings.flush(1000.0)
+    assert recordings.status()["recording"]
+    recordings.stop()
