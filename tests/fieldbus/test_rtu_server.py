@@ -185,3 +185,15 @@ def test_pymodbus_is_served_on_a_port_and_on_the_face_s_own_terminal() -> None:
             await asyncio.to_thread(ask, face.server.path, face.bank)
 
     play(scene())
+
+
+def test_what_the_port_warns_of_is_told(monkeypatch: Any) -> None:
+    monkeypatch.setattr("gateway.ports.serial_port.set_low_latency", lambda *_: "W112 an adapter that waits")
+
+    async def scene() -> None:
+        line = Pty()
+        async with Face().serving(line.path) as face:
+            assert face.log == ["W112 an adapter that waits"]
+        line.close()
+
+    play(scene())

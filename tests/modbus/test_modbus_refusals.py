@@ -277,3 +277,10 @@ def test_the_host_notices_an_echo_that_differs() -> None:
 def test_the_host_does_not_build_what_no_device_may_accept(build: object) -> None:
     with pytest.raises(ValueError, match="values in one request"):
         build()  # type: ignore[operator]
+
+
+def test_a_read_and_write_whose_bytes_do_not_fit_names_where_it_would_have_written() -> None:
+    bank = ListeningBank()
+    cut = P.read_write_request(3, 2, 7, bytes(4))[:-1]
+    assert answer(cut, bank, PEER) == bytes((23 | 0x80, 3))
+    assert bank.heard == [(RequestFault.QUANTITY, 3, 7, PEER)]

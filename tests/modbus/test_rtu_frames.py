@@ -74,3 +74,14 @@ def test_the_length_of_an_unknown_function_is_unknown() -> None:
 
 def test_a_length_beyond_the_longest_frame_is_no_length() -> None:
     assert answer_length(b"\x01\x03\xff") is None
+
+
+def test_the_longest_frame_is_one_and_a_longer_one_is_none() -> None:
+    longest = encode_adu(1, bytes(253))
+    assert decode_adu(longest) == (1, bytes(253)) and len(longest) == 256
+    with pytest.raises(RtuFault, match="257 bytes"):
+        decode_adu(longest + b"\0")
+
+
+def test_a_refusal_is_known_by_its_second_byte() -> None:
+    assert [answer_length(bytes.fromhex(seen)) for seen in ("01", "0183", "018302")] == [None, 5, 5]

@@ -86,6 +86,13 @@ def test_an_older_request_is_executed_but_only_the_last_is_answered() -> None:
     assert Bus().send(COMMAND + encode_adu(7, READ)).requests() == [RtuRequest(1, WRITE, False)]
 
 
+def test_behind_a_stray_byte_whole_frames_are_heard_however_many_follow() -> None:
+    """All of them are frames to the end of the burst: so the first is no chance."""
+    for behind in (1, 2, 3):
+        assert Bus().send(b"\x55" + COMMAND + behind * encode_adu(7, WRITE)).requests() == [RtuRequest(1, WRITE, False)]
+        assert Bus().send(b"\x55" + COMMAND + behind * encode_adu(7, WRITE) + b"\x55").requests() == []
+
+
 FOREIGN = {
     "a read": encode_adu(7, READ) + registers_answer(7, bytes(24)),
     "a short answer": encode_adu(7, P.read_request(3, 1, 1)) + registers_answer(7, b"\x01\x06"),
