@@ -9,6 +9,9 @@ wire costs nothing. Prints
 - what the control process takes of a core and of memory at 100 Hz while nobody asks;
 - loop lateness and missed ticks at 250 Hz while masters ask 2000 times a second.
 
+Beside latency and idle cost stands an empty loop of the same wake-ups (`empty_loop.py`): what is left above it is the gateway's
+own work, what it takes itself no Python program on this machine gets below.
+
 Goals: p99 at most 250 us above that of a bare pty hop into the same process in the same run; missed ticks at most 0.5 %.
 """
 
@@ -26,6 +29,7 @@ import tempfile
 import time
 import tty
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -125,6 +129,32 @@ def gateway_on_devices(loop_hz: int) -> Iterator[tuple[Devices, RunningGateway]]
             yield devices, gateway
 
 
+@dataclass(frozen=True)
+class EmptyLoop:
+    """A loop of the gateway's wake-ups with nothing in them: its devices, where it listens, its process."""
+
+    devices: Devices
+    address: tuple[str, int]
+    pid: int
+
+
+@contextlib.contextmanager
+def empty_loop(loop_hz: int) -> Iterator[EmptyLoop]:
+    """Run one until the block ends."""
+    script = Path(__file__).parent / "empty_loop.py"
+    with contextlib.closing(Devices()) as devices:
+        process = subprocess.Popen(
+            [sys.executable, str(script), *devices.paths, str(loop_hz)], stdout=subprocess.PIPE, text=True
+        )
+        assert process.stdout
+        try:
+            yield EmptyLoop(devices, ("127.0.0.1", int(process.stdout.readline())), process.pid)
+        finally:
+            process.kill()
+            process.wait()
+            process.stdout.close()
+
+
 def write_request(address: int, *words: int) -> bytes:
     """Return one FC16 as it goes over TCP."""
     pdu = struct.pack(f">BHHB{len(words)}H", 16, address, len(words), 2 * len(words), *words)
@@ -137,15 +167,18 @@ def ask(master: socket.socket, request: bytes) -> bytes:
     return master.recv(512)
 
 
-def latencies(devices: Devices, bare: Devices, address: tuple[str, int], count: int) -> tuple[list[float], list[float]]:
+def latencies(
+    devices: Devices, empty: EmptyLoop, bare: Devices, address: tuple[str, int], count: int
+) -> tuple[list[float], list[float], list[float]]:
     """Return the seconds to the wire of voltage mode steps up and down, one every 50 ms: each moves the output by many
-    counts at once; and, in turn with them, those of bare hops: from a write on a pty until its far end sees it, what the
-    machine itself takes at this moment.
+    counts at once; and, in turn with them, those of an empty loop, and of bare hops: from a write on a pty until its far end
+    sees it, what the machine itself takes at this moment.
     """
-    seconds, hops = [], []
+    seconds, empties, hops = [], [], []
     line = os.open(bare.paths[0], os.O_RDWR | os.O_NOCTTY)
-    with socket.create_connection(address) as master:
-        master.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    with socket.create_connection(address) as master, socket.create_connection(empty.address) as other:
+        for connection in (master, other):
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         ask(master, write_request(0, 1, 0, 0, 1, 0, 2000))
         for number in range(count):
             time.sleep(0.05)  # idle line: the last setting has been answered long ago
@@ -153,9 +186,12 @@ def latencies(devices: Devices, bare: Devices, address: tuple[str, int], count: 
             seconds += first_byte_after(devices, partial(master.sendall, request))
             master.recv(512)
             hops += first_byte_after(bare, partial(os.write, line, b"SET 512\r\n"))
+            time.sleep(0.05)
+            empties += first_byte_after(empty.devices, partial(other.sendall, request))
+            other.recv(512)
         ask(master, write_request(0, 0, 0))
     os.close(line)
-    return seconds, hops
+    return seconds, empties, hops
 
 
 def first_byte_after(devices: Devices, send: Callable[[], object]) -> list[float]:
@@ -198,16 +234,19 @@ def quantile(values: list[float], share: float) -> float:
 
 def bench_latency(loop_hz: int, count: int) -> None:
     """Print how long a setpoint takes to the wire."""
-    with gateway_on_devices(loop_hz) as (devices, gateway), contextlib.closing(Devices()) as bare:
-        seconds, hops = latencies(devices, bare, (gateway.host, gateway.port), count)
+    with (
+        gateway_on_devices(loop_hz) as (devices, gateway),
+        empty_loop(loop_hz) as empty,
+        contextlib.closing(Devices()) as bare,
+    ):
+        seconds, empties, hops = latencies(devices, empty, bare, (gateway.host, gateway.port), count)
     p50, p99 = quantile(seconds, 0.5), quantile(seconds, 0.99)
     goal_s = quantile(hops, 0.99) + GOAL_ABOVE_HOP_S
     verdict = "reached" if p99 <= goal_s else "MISSED"
     print(f"setpoint to first byte, idle unpaced pty, {len(seconds)} of {count} setpoints:")
     print(f"  p50 {p50 * 1e6:.0f} us, p99 {p99 * 1e6:.0f} us, max {max(seconds) * 1e6:.0f} us")
-    print(
-        f"  a bare pty hop, beside it: p50 {quantile(hops, 0.5) * 1e6:.0f} us, p99 {quantile(hops, 0.99) * 1e6:.0f} us"
-    )
+    for name, peer in (("an empty loop, beside it", empties), ("a bare pty hop, beside it", hops)):
+        print(f"  {name}: p50 {quantile(peer, 0.5) * 1e6:.0f} us, p99 {quantile(peer, 0.99) * 1e6:.0f} us")
     print(f"  goal p99 <= hop's p99 + 250 us = {goal_s * 1e6:.0f} us: {verdict}; ratio to the goal {p99 / goal_s:.2f}")
 
 
@@ -226,21 +265,28 @@ def bench_load(loop_hz: int, seconds: float) -> None:
     )
 
 
+def used_s(process: psutil.Process) -> float:
+    """Return the processor time that a process has had, s."""
+    times = process.cpu_times()
+    return float(times.user + times.system)
+
+
 def bench_idle(loop_hz: int, seconds: float) -> None:
     """Print what the control process takes while nobody asks anything."""
-    with gateway_on_devices(loop_hz) as (_, gateway):
-        process = psutil.Process(gateway.control_pid)
+    with gateway_on_devices(loop_hz) as (_, gateway), empty_loop(loop_hz) as empty:
+        process, peer = psutil.Process(gateway.control_pid), psutil.Process(empty.pid)
         time.sleep(2.0)  # the start is over
-        before, began_s = process.cpu_times(), time.perf_counter()
+        before_s, began_s = (used_s(process), used_s(peer)), time.perf_counter()
         time.sleep(seconds)
-        after, lasted_s = process.cpu_times(), time.perf_counter() - began_s
-        share = (after.user + after.system - before.user - before.system) / lasted_s
+        after_s, lasted_s = (used_s(process), used_s(peer)), time.perf_counter() - began_s
+        share, empty_share = ((after - before) / lasted_s for before, after in zip(before_s, after_s, strict=True))
         used_bytes = process.memory_full_info().uss
     verdict = "reached" if share <= GOAL_IDLE_SHARE and used_bytes <= GOAL_IDLE_BYTES else "MISSED"
     print(
         f"control process, {loop_hz} Hz, idle for {seconds:g} s: {100 * share:.1f} % of a core, "
         f"{used_bytes / 1e6:.0f} MB of its own"
     )
+    print(f"  an empty loop of the same wake-ups, beside it: {100 * empty_share:.1f} %")
     print(f"  goal <= {100 * GOAL_IDLE_SHARE:g} % and {GOAL_IDLE_BYTES / 1e6:.0f} MB: {verdict}")
 
 
