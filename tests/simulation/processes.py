@@ -181,7 +181,8 @@ class SimulatedGuardian:
         if inside is None:
             return
         self.deaths_s.append(self._clock.now_s)
-        self._loops.remove(inside)
+        if inside in self._loops:  # else it is stopped
+            self._loops.remove(inside)
         for cable in CABLES.values():
             cable.port = None
         self.on_death()
