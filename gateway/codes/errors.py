@@ -168,9 +168,9 @@ ERRORS: Final = (
     Explanation(
         "E402",
         "recording stopped",
-        "The disk did not take a batch of the recording. Control goes on, rows before that are whole.",
-        "The disk is full, or it was removed.",
-        "Free space (df -h on the state directory), then force-gateway record on.",
+        "The disk did not take a batch of the recording, or a sync of it. Control goes on, rows before that are whole.",
+        "The disk is full, read-only or broken, or it was removed.",
+        "Free space (df -h on the state directory): it goes on by itself within an hour, by force-gateway record on at once.",
     ),
     Explanation(
         "E403",
