@@ -1,10 +1,13 @@
-"""Whose write stands last, who a serial face is, and the last self-test in its words."""
+"""Whose write stands last, who a serial face is, how numbers are told, and the last self-test in its words."""
 
 import pytest
 
 from gateway.modbus import Peer
 from gateway.registers.image import RegisterImage
+from gateway.registers.refusal import quantity
+from gateway.registers.residual_cause import ResidualCause
 from gateway.registers.self_test_words import SelfTestWords
+from gateway.registers.values import decimal, float32
 from gateway.registers.words import SelfTestResult, SelfTestVerdict
 from gateway.registers.writes.ownership import LastWriters, serial_place
 
@@ -49,3 +52,38 @@ def test_a_self_test_is_shown_with_its_result_its_count_and_what_was_not_tested(
     assert shown.pop("self_test_count") == 1
     assert shown.pop("self_test_noise") == SelfTestVerdict.PASSED
     assert set(shown.values()) == {SelfTestVerdict.NOT_TESTED} and len(shown) > 3
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        (0.0, "0.00 N"),
+        (0.5, "0.50 N"),
+        (0.001, "0.00 N"),
+        (0.0009, "0.0009 N"),
+        (-12.0, "-12.00 N"),
+        (1.0e7, "1e+07 N"),
+    ],
+)
+def test_a_number_is_told_by_its_decimals_unless_they_hide_or_swell_it(value, told):
+    assert quantity(value, 2, "N") == told
+
+
+@pytest.mark.parametrize("number", [25.3, 0.1, 30.23067, 2.672501, 51.0, 1.0e-3])
+def test_a_float32_is_told_by_the_shortest_decimal_that_it_stands_for(number):
+    assert decimal(float32(number)) == number
+
+
+def test_an_effect_that_nobody_knows_is_unknown():
+    assert ResidualCause.of_effect("creep") is ResidualCause.CREEP
+    assert ResidualCause.of_effect("no-such-effect") is ResidualCause.UNKNOWN
+
+
+def test_repeated_floats_keep_the_word_order_of_their_block(register_map):
+    orders = {
+        block: {one.word_order for one in register_map.registers_of(block)} for block in ("float_abcd", "float_cdab")
+    }
+    assert {block: {str(order).lower() for order in found} for block, found in orders.items()} == {
+        "float_abcd": {"abcd"},
+        "float_cdab": {"cdab"},
+    }
