@@ -72,7 +72,7 @@ def is_beyond_taking_back(disk: FailingDisk) -> bool:
     refused, until the next change."""
     first = disk.refused[0] if disk.refused else None
     is_store = first is not None and Path(first.path).name in ("calibrations", "plants")
-    return disk.kind == "broken" and first is not None and first.what == "fsync" and is_store
+    return disk.kind in ("broken", "for a while") and first is not None and first.what == "fsync" and is_store
 
 
 def judge(day: Day) -> None:
