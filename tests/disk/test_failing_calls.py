@@ -13,7 +13,7 @@ from tests.disk.failing_disks import FailingDisk, describe
 from tests.disk.file_acts import Restored
 from tests.disk.watched_disk import watching
 
-STRIDE = 11
+STRIDE = 19
 """In the push gate every so many n, of each kind of failure others; all of them with --long."""
 
 

@@ -11,7 +11,7 @@ from tests.disk.power_cut import JournaledDisk
 from tests.disk.test_failing_calls import try_once
 from tests.disk.watched_disk import watching
 
-CUTS = 3
+CUTS = 2
 SEEDS = 5
 """In the push gate so many cuts of each act; with --long all of them, each with so many mixtures of what was not synced."""
 
