@@ -167,10 +167,11 @@ def test_a_rig_may_demand_the_byte_order_proof_of_each_host(make_bank, master_of
     bank = make_bank(require_byte_order_echo=True)
     one, two = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
     refusal = one.refusal(one.write, 0, 1, 1200)
-    assert (refusal.code, refusal.reason) == (6, R.BYTE_ORDER_UNPROVEN)
+    assert (refusal.code, refusal.reason, refusal.value) == (6, R.BYTE_ORDER_UNPROVEN, 1.0)
     one.write_float(416, 1234.5)
     assert two.refusal(two.write, 0, 1).reason is R.BYTE_ORDER_UNPROVEN
     one.write(0, 1, 1200)
+    assert bank.refusals == 2
 
 
 def test_proofs_of_many_hosts_are_forgotten_oldest_first(make_bank, master_of):

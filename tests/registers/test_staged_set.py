@@ -12,6 +12,7 @@ from gateway.registers.upload.coefficients import BLOCK_BYTES, SET_BYTES, Coeffi
 from gateway.registers.upload.staging import StagedFault, check_staged
 from gateway.registers.values import float32
 from gateway.registers.words import UploadReason
+from tests.calibrations.coefficients import calibration
 
 LIMITS = CoefficientLimits(cell_range_n=100.0)
 GOOD = CoefficientSet(
@@ -155,3 +156,8 @@ def test_as_many_stops_as_the_registers_carry_are_taken_and_more_than_a_model_ha
     assert not isinstance(check_staged(staged(full), LIMITS), StagedFault)
     fault = fault_of(staged(replace(full, stops=17)))
     assert (fault.reason, fault.text) == (CoefficientReason.SLIP_STOPS, "17 slip stops: 0 .. 10 is allowed")
+
+
+def test_a_calibration_s_response_is_in_its_set():
+    measured = replace(calibration(), response=Response(dead_time_s=0.125, lag_s=0.25, second_lag_s=0.5, damping=0.75))
+    assert CoefficientSet.of_calibration(measured).response_s == (0.125, 0.25, 0.5, 0.75)

@@ -39,6 +39,12 @@ def test_a_serial_face_is_known_by_its_place(host, place):
     assert serial_place(host) == place
 
 
+def test_the_bank_shows_its_self_test_to_masters(bank, register_map):
+    bank.self_test.show(1, SelfTestResult.WARNED, {})
+    address = register_map.find("self_test_result").address
+    assert bank.read_registers(address, 1) == bytes((0, SelfTestResult.WARNED))
+
+
 def test_a_self_test_is_shown_with_its_result_its_count_and_what_was_not_tested(register_map):
     image = RegisterImage(register_map)
     words = SelfTestWords(register_map, image)
