@@ -20,6 +20,7 @@ NEED_RIG: Final = "n"  # control -> guardian: {"rig": name or path}: start the s
 READY: Final = (
     "r"  # control -> guardian: {"banner": text, "info": {...}, "stall_s": s, "optional": ..., "listening": ...}
 )
+SAFE: Final = "s"  # control -> guardian: the safe voltage has gone out as the last one; no loop beats any more
 FIRST_CAUSE: Final = "f"  # control -> guardian: {"text": ...}, kept for the next start
 BORN: Final = "b"  # a forked child -> guardian: {"pid": number}, before anything else
 ADOPTED: Final = "a"  # guardian -> a forked child: it is followed from now on, and may begin

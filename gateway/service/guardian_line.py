@@ -58,6 +58,10 @@ class GuardianLine:
         """Tell the guardian of an internal error, in words: this process is about to end."""
         self._tell(guardian_link.FIRST_CAUSE, {"text": cause})
 
+    def note_safe(self) -> None:
+        """Tell the guardian that the safe voltage has gone out as the last one: from now on no heartbeat is to be missed."""
+        self._tell(guardian_link.SAFE, {})
+
     def ready(self, announcement: dict[str, Any], stall_s: float, *listeners: int) -> None:
         """Tell the guardian that the rig runs. stall_s: silence that it has to act on; listeners: sockets for it to keep."""
         self._beat_every_s = stall_s / _BEATS_PER_STALL

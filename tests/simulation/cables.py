@@ -5,10 +5,12 @@ it is opened again with a growing pause, and nothing that was written before a l
 """
 
 import asyncio
+import os
 from collections.abc import Callable
 
 from gateway.devices import PacedWire, SerialSettings
 from gateway.ports import PortError, PortEvents
+from gateway.profiles import Rig
 from tests.simulation.virtual_time import VirtualLoop
 
 
@@ -87,6 +89,7 @@ class SimulatedPort:
         self._cable = CABLES[path]
         self._loop = asyncio.get_running_loop()
         self._buffer = bytearray()
+        self._descriptor = -1
         self._backoff_s = 0.1
         self._reopening: asyncio.TimerHandle | None = None
         self.is_open = self._is_wanted = False
@@ -121,6 +124,7 @@ class SimulatedPort:
         await asyncio.sleep(len(data) * self._settings.character_s + 1e-3)
 
     def close(self) -> None:
+        self._drop_descriptor()
         self.is_open = self._is_wanted = False
         if self._reopening:
             self._reopening.cancel()
@@ -138,7 +142,13 @@ class SimulatedPort:
 
     def _open(self) -> None:
         self._cable.port, self.is_open, self._backoff_s = self, True, 0.1
-        self._events.on_open(-1)
+        self._descriptor = os.open(os.devnull, os.O_RDWR)  # for the guardian, which gets a copy
+        self._events.on_open(self._descriptor)
+
+    def _drop_descriptor(self) -> None:
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
 
     def _read(self) -> None:
         if self.is_open and self._buffer:
@@ -149,6 +159,7 @@ class SimulatedPort:
     def _lose(self) -> None:
         if self.is_open:
             self.is_open = False
+            self._drop_descriptor()
             self._buffer.clear()
             self._reopening = self._loop.call_later(self._backoff_s, self._reopen)
             self._events.on_lost(PortError("A317", f"A317 {self.path} is disconnected"))
@@ -161,3 +172,12 @@ class SimulatedPort:
         else:
             self._backoff_s = min(2.0 * self._backoff_s, 2.0)
             self._reopening = self._loop.call_later(self._backoff_s, self._reopen)
+
+
+def lay_cables(
+    outside: VirtualLoop, rig: Rig, on_output: Callable[[bytes, float], None], on_cell: Callable[[bytes, float], None]
+) -> None:
+    """Connect the world to control."""
+    CABLES.clear()
+    CABLES["output"] = Cable(outside, rig.output.settings, on_output)
+    CABLES["load_cell"] = Cable(outside, rig.load_cell.settings, on_cell)

@@ -114,9 +114,13 @@ class Observer:
     def note_death(self, now_s: float, until_s: float) -> None:
         """Control has died: the next one begins in OFF, and shows why it was started. until_s: as in `note_cut`."""
         self._fault = None
+        self.note_disabled(now_s)
+        self.note_cut(until_s)
+
+    def note_disabled(self, now_s: float) -> None:
+        """Nobody may press from now on."""
         if self.disabled_s is None:
             self.disabled_s = now_s
-        self.note_cut(until_s)
 
     def look(self, now_s: float) -> None:
         """Judge the voltage that stands now."""

@@ -1,248 +1,282 @@
-"""The control process and its guardian in virtual time. Control is the real one (`RunningRig` with its bank, loop, lines,
-faces, stores); the guardian is a model of the real one's rules: silence kills, it puts the safe voltage on the wire, another
-starts.
+"""A gateway's processes in virtual time: the real guardian, and real control processes under it, on loops of their own.
+
+What is not real is between them and the kernel (edges.py, links.py, cables.py, network.py): here, how a process is started,
+stopped, killed and gone, and who starts the guardian again when it has ended, as systemd does.
 """
 
 import asyncio
-import os
+import signal
 from collections.abc import Callable
-from contextlib import ExitStack, contextmanager
+from math import inf
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes import exit_codes, message_link
+from gateway.ports import PortError
 from gateway.profiles import Rig
-from gateway.service.running_rig.running_rig import RunningRig
-from tests.simulation.cables import CABLES, Cable, SimulatedPort
+from gateway.service import control_process
+from gateway.service.supervisor.child_process import LOST, Child
+from gateway.service.supervisor.guardian import Guardian
+from gateway.service.running_rig.starting import StartError
+from gateway.service.supervisor.run_options import RunOptions
+from tests.simulation.cables import CABLES
+from tests.simulation.edges import Log
+from tests.simulation.links import LinkEnd, create_link, read_in_memory, readable_ends
 from tests.simulation.network import serve_in_memory
-from tests.simulation.virtual_time import VirtualClock, VirtualLoop, run_all
+from tests.simulation.virtual_time import VirtualClock, VirtualLoop
 
 PORT = 5020
 CLOSING_S = 3.0
-RESTART_S = 0.15
-"""From the end of one control process until the next one opens its ports."""
-_RIG = "gateway.service.running_rig.running_rig"
+BIRTH_S = 0.15
+"""From the guardian's wish until a control process does its first thing."""
+SERVICE_RESTART_S = 2.0
+"""Until a guardian that has ended or died is started again (RestartSec of the unit)."""
+_RIG_PID, _SIGNALS, _FIRST_PID = ((1 << 22) + number for number in range(3))  # above every process number of Linux
 
 
-class SimulatedDisk:
-    """Stands for `DiskWorker`: what it is given is done at once, and told a little later, by the chance of the schedule."""
+class SimulatedProcess(Child):
+    """A control process: its loop, the other end of its line, and its death."""
 
-    delay_s: Callable[[], float] = staticmethod(lambda: 0.005)
-    is_full = False
+    link: LinkEnd  # type: ignore[assignment]
 
-    def __call__(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
-        asyncio.get_running_loop().call_later(type(self).delay_s(), done, self._result(work))
+    def __init__(self, pid: int, clock: VirtualClock, on_death: Callable[["SimulatedProcess"], None]) -> None:
+        ours, self.theirs = create_link()
+        super().__init__(ours, pid, died=pid)  # type: ignore[arg-type]
+        self.loop = VirtualLoop(clock)
+        serve_in_memory(self.loop)
+        read_in_memory(self.loop)
+        self._on_death = on_death
+        self.exit_code: int | None = None
 
-    def begin(self, work: Callable[[], Any]) -> None:
-        self._result(work)
+    def leave(self, code: int) -> None:
+        """End, with the exit code that the kernel tells."""
+        if self.exit_code is None:
+            self.exit_code = code
+            self.loop.halt()
+            self._on_death(self)
+            self.theirs.close()
 
-    def _result(self, work: Callable[[], Any]) -> Any:
-        if type(self).is_full:
-            return OSError(28, os.strerror(28))
-        try:
-            return work()
-        except Exception as error:
-            return error
+    def kill(self) -> None:
+        self.leave(-signal.SIGKILL)
 
-    def close(self) -> None: ...
+    def wait(self, bound_s: float = 0.0) -> int:
+        return LOST if self.exit_code is None else self.exit_code
 
-
-class SimulatedTick:
-    """Stands for `ClockTick`: on time by the loop's clock; after a stall it tells how many were missed."""
-
-    is_fallback = False
-
-    def __init__(self, period_s: float, on_tick: Callable[[int, float], None]) -> None:
-        self.period_s, self._on_tick = period_s, on_tick
-        self._timer: asyncio.TimerHandle | None = None
-
-    def start(self) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._due_s = self._loop.time() + self.period_s
-        self._timer = self._loop.call_at(self._due_s, self._fire)
+    def end(self) -> None:
+        self.leave(-signal.SIGTERM)
+        self.close()
 
     def close(self) -> None:
-        if self._timer:
-            self._timer.cancel()
-
-    def _fire(self) -> None:
-        late_s = self._loop.time() - self._due_s
-        expirations = 1 + int(late_s / self.period_s + 1e-9)
-        self._due_s += expirations * self.period_s
-        self._timer = self._loop.call_at(self._due_s, self._fire)
-        self._on_tick(expirations, max(0.0, late_s - (expirations - 1) * self.period_s))
+        self.link.close()
+        self.died = -1
 
 
-class NoCounters:
-    """Stands for `SchedulerCounters`: a machine that is never busy."""
+class SimulatedRigProcess(Child):
+    """The process of the simulated rig, which is the world here: it tells its ports, and stays."""
 
-    def __init__(self, pid: int) -> None: ...
+    def __init__(self, pid: int) -> None:
+        ours, self.theirs = create_link()
+        super().__init__(ours, pid, died=pid)  # type: ignore[arg-type]
+        message_link.send(self.theirs, message_link.PTYS, {"ptys": {name: name for name in CABLES}, "pid": pid})  # type: ignore[arg-type]
 
-    def read(self) -> None:
-        return None
+    def kill(self) -> None:
+        self.theirs.close()
 
-    def waited_s(self) -> float:
-        return 0.0
+    def wait(self, bound_s: float = 0.0) -> int:
+        return exit_codes.OK
 
-    def close(self) -> None: ...
+    def end(self) -> None:
+        self.kill()
+        self.close()
 
-
-class Log:
-    """Stands for `EventLog`: keeps what was said."""
-
-    def __init__(self, clock: VirtualClock) -> None:
-        self._clock = clock
-        self.lines: list[tuple[float, str]] = []
-
-    def __call__(self, cause: str, sentence: str) -> None:
-        self.lines.append((self._clock.now_s, sentence))
-
-    def speaking_for(self, source: str) -> Callable[[str, str], None]:
-        return self
-
-    note = __call__
+    def close(self) -> None:
+        self.link.close()
+        self.died = -1
 
 
-class GuardianEnd:
-    """Control's end of the guardian's line, without a line."""
+class SimulatedStarter:
+    """Stands for `ChildStarter`, whose children are all new processes: control and the rig."""
 
-    def __init__(self, guardian: "SimulatedGuardian") -> None:
-        self._guardian = guardian
-        self.on_ports: Callable[[dict[str, str]], None] = lambda ports: None
-        self.rig_pid: int | None = None
-        self.is_gone = False
+    sources: tuple[int, ...] = ()
+    due_s = inf
+    server_pid = None
+    start_timeout_s = inf
 
-    def heartbeat(self, now_s: float) -> None:
-        self._guardian.beat_s = now_s
+    def __init__(self, control: Callable[[dict[str, Any]], SimulatedProcess]) -> None:
+        self.control = control
 
-    def hand_over(self, descriptor: int, safe_frame: bytes, safe_reply: bytes) -> None:
-        self._guardian.safe_frame = safe_frame
+    def rig(self, *, prepared: bool) -> SimulatedRigProcess:
+        return SimulatedRigProcess(_RIG_PID)
 
-    def first_cause(self, cause: str) -> None:
-        self._guardian.complaints.append(cause)
+    def open(self) -> None: ...
 
-    def close(self) -> None: ...
+    def end(self) -> None: ...
 
-
-@contextmanager
-def simulated_edges() -> Any:
-    """Everything of control that reaches for the kernel, replaced."""
-    with pytest.MonkeyPatch.context() as patch, ExitStack():
-        patch.setattr("gateway.service.running_rig.lines.rig_ports.SerialPort", SimulatedPort)
-        patch.setattr(f"{_RIG}.ClockTick", SimulatedTick)
-        patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
-        patch.setattr(f"{_RIG}.explain_silent_device", _explain)
-        for user in (
-            "gateway.calibrations.upload",
-            "gateway.service.running_rig.rig_plants",
-            "gateway.audit.audit_log",
-            "gateway.service.recording_retention",
-            "gateway.service.recording_sync",
-        ):
-            patch.setattr(f"{user}.DiskWorker", SimulatedDisk)
-        yield
+    def poll_child(self, readable: set[int], now_s: float) -> None: ...
 
 
-async def _explain(line: Any, path: str) -> str:
-    return f"E111 {path}: silent"
+class SimulatedSignals:
+    """Stands for `SignalPipe`."""
+
+    descriptor = _SIGNALS
+    count = 0
+
+    def take(self) -> int:
+        count, self.count = self.count, 0
+        return count
 
 
-class SimulatedGuardian:
-    """Keeps one control process alive. loops: those that are run; a control that has died is not among them any more."""
+class SimulatedService:
+    """A gateway that is kept alive: its guardian, which keeps control alive, and systemd, which keeps the guardian.
 
-    def __init__(
-        self, rig: Rig, state: Path, outside: VirtualLoop, loops: list[VirtualLoop], log: Log, clock: VirtualClock
-    ) -> None:
-        self._rig, self._state, self._outside, self._loops = rig, state, outside, loops
-        self._log, self._clock = log, clock
-        self.inside: VirtualLoop | None = None
-        self.safe_frame = b""
-        self.beat_s = 0.0
-        self.complaints: list[str] = []
-        self.starts_s: list[float] = []
-        self.deaths_s: list[float] = []
-        self.stopped_until_s = 0.0
+    on_death: control is gone; restarts: how many guardians came after the first.
+    """
+
+    def __init__(self, rig: Rig, state: Path, outside: VirtualLoop, log: Log, clock: VirtualClock) -> None:
+        self._rig, self._state, self._outside, self._log, self._clock = rig, state, outside, log, clock
+        self._processes: list[SimulatedProcess] = []
+        self._guardian: Guardian | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._is_awake = False
+        self.restarts = -1
         self.on_death: Callable[[], None] = lambda: None
-        self._kept: list[
-            tuple[VirtualLoop, RunningRig]
-        ] = []  # the dead, too: they must not be collected, and act, meanwhile
-        self._start(None)
-        self._outside.call_later(0.01, self._look)
+        self._start()
+
+    @property
+    def inside(self) -> VirtualLoop | None:
+        """The loop of the control process that lives, None between two."""
+        process = self._processes[-1]
+        return process.loop if process.exit_code is None else None
 
     @property
     def is_serving(self) -> bool:
-        return self.inside is not None and bool(self.inside.servers)
+        return self.inside is not None and bool(self.inside.servers) and not self.inside.is_halted
 
-    def kill(self, cause: EndCause = EndCause.DIED) -> None:
-        """SIGKILL: the process does nothing any more. The guardian puts the safe voltage out, and starts another."""
-        inside, self.inside = self.inside, None
-        if inside is None:
-            return
-        self.deaths_s.append(self._clock.now_s)
-        if inside in self._loops:  # else it is stopped
-            self._loops.remove(inside)
-        for cable in CABLES.values():
-            cable.port = None
-        self.on_death()
-        self._outside.call_later(0.002, self._send_safe)
-        self._outside.call_later(RESTART_S, self._start, Ending(cause, "killed"))
+    @property
+    def is_guarded(self) -> bool:
+        return self._guardian is not None
 
-    def stop(self, duration_s: float) -> None:
+    # -- what happens to it
+
+    def kill_control(self) -> None:
+        """SIGKILL."""
+        if self.inside:
+            self._processes[-1].kill()
+
+    def stop_control(self, duration_s: float) -> None:
         """SIGSTOP, or a machine that lets it wait: it does nothing for so long, or until the guardian has enough."""
-        if self.inside in self._loops:
-            self._loops.remove(self.inside)
-            self._outside.call_later(duration_s, self._go_on, self.inside)
+        process = self._processes[-1]
+        if self.inside and not process.loop.is_halted:
+            process.loop.halt()
+            self._outside.call_later(duration_s, lambda: process.exit_code is None and process.loop.go_on())
+
+    def kill_guardian(self) -> None:
+        """SIGKILL: the kernel closes its lines, which is how control learns of it."""
+        guardian, self._guardian = self._guardian, None
+        if guardian:
+            guardian.control._drop_line()
+            if guardian.control.process:
+                guardian.control.process.close()
+            self._outside.call_later(SERVICE_RESTART_S, self._start)
+
+    def terminate(self) -> None:
+        """SIGTERM to the guardian: the force is ramped down first. Somebody starts it again."""
+        if self._guardian:
+            self._signals.count += 1
+            self._wake()
 
     def close(self) -> None:
         """End every control process that there ever was, so that its descriptors are closed; nothing of it is judged."""
-        for loop in dict.fromkeys(loop for loop, _ in self._kept):
-            for task in asyncio.all_tasks(loop):
+        if self._timer:
+            self._timer.cancel()
+        self._outside.halt()
+        self.on_death = lambda: None
+        for process in self._processes:
+            process.loop.halt()
+        for process in self._processes:
+            for task in asyncio.all_tasks(process.loop):
                 task.cancel()
-            run_all(self._clock, [loop], self._clock.now_s)
-            endings = [loop.create_task(running.close()) for of_loop, running in self._kept if of_loop is loop]
-            run_all(self._clock, [loop], self._clock.now_s + CLOSING_S)
-            for task in endings:
-                task.exception()  # of one that was killed before it had begun
-            loop.close()
+            process.loop.go_on()
+            self._clock.run_until(self._clock.now_s + CLOSING_S)
+            process.end()
+            process.loop.close()
+        if self._guardian:
+            self._guardian.control._drop_line()
 
-    def _start(self, ending: Ending | None) -> None:
-        loop = self.inside = VirtualLoop(self._clock)
-        serve_in_memory(loop)
-        self._loops.append(loop)
-        self.beat_s = self._clock.now_s
-        self.starts_s.append(self._clock.now_s)
-        loop.create_task(self._run(loop, ending))
+    # -- the guardian's turns
 
-    async def _run(self, loop: VirtualLoop, ending: Ending | None) -> None:
-        running = RunningRig(self._rig, {name: name for name in CABLES}, self._state, GuardianEnd(self), self._log)  # type: ignore[arg-type]
-        self._kept.append((loop, running))
-        await running.start(["127.0.0.1", PORT], record=False, restarted=ending)
-        await running.failed.wait()
-        self.kill(EndCause.DEFECT)
+    def _start(self) -> None:
+        self.restarts += 1
+        self._signals = SimulatedSignals()
+        self._guardian = guardian = Guardian(
+            RunOptions(bind=("127.0.0.1", PORT)),
+            self._state,
+            SimulatedStarter(self._spawn),  # type: ignore[arg-type]
+            self._signals,  # type: ignore[arg-type]
+            self._log,  # type: ignore[arg-type]
+            clock=self._clock.monotonic,
+            wait=self._readable,
+        )
+        guardian._start_control()
+        self._wake()
 
-    def _go_on(self, inside: VirtualLoop) -> None:
-        if inside is self.inside:
-            self._loops.append(inside)
+    def _wake(self) -> None:
+        """Let the guardian look, as soon as what happens now has happened."""
+        if not self._is_awake:
+            self._is_awake = True
+            self._outside.call_soon(self._take_turns)
 
-    def _look(self) -> None:
-        if self.is_serving and self._clock.now_s - self.beat_s > self._rig.control.supervision.stall_s:
-            if self.inside not in self._loops:
-                self._loops.append(self.inside)  # type: ignore[arg-type]
-            self.kill(EndCause.STALLED)
-        self._outside.call_later(0.01, self._look)
+    def _take_turns(self) -> None:
+        """Let the guardian do all that is to be done now, and wake it when the next thing is due."""
+        self._is_awake = False
+        if self._timer:
+            self._timer.cancel()
+        guardian = self._guardian
+        while guardian:
+            if guardian._step() is not None:
+                self._end_guardian(guardian)
+                return
+            if not self._readable(guardian._sources(), 0.0) and (patience_s := guardian._patience_s()) > 0.0:
+                self._timer = self._outside.call_later(min(patience_s, 60.0), self._wake)
+                return
 
-    def _send_safe(self) -> None:
-        output = CABLES["output"]
-        if self.safe_frame and output.is_plugged:
-            output.send_to_device(self.safe_frame)
+    def _end_guardian(self, guardian: Guardian) -> None:
+        guardian._close()
+        self._guardian = None
+        self._outside.call_later(SERVICE_RESTART_S, self._start)  # by systemd after a failure, else by somebody
 
+    def _readable(self, numbers: list[int], timeout_s: float) -> set[int]:
+        """Stands for `wait_readable`: nobody waits here."""
+        dead = {process.died for process in self._processes[-2:] if process.exit_code is not None}
+        asked = {self._signals.descriptor} if self._signals.count else set()
+        return readable_ends(numbers) | (dead | asked) & set(numbers)
 
-def lay_cables(
-    outside: VirtualLoop, rig: Rig, on_output: Callable[[bytes, float], None], on_cell: Callable[[bytes, float], None]
-) -> None:
-    """Connect the world to control."""
-    CABLES.clear()
-    CABLES["output"] = Cable(outside, rig.output.settings, on_output)
-    CABLES["load_cell"] = Cable(outside, rig.load_cell.settings, on_cell)
+    # -- control
+
+    def _spawn(self, arguments: dict[str, Any]) -> SimulatedProcess:
+        process = SimulatedProcess(_FIRST_PID + len(self._processes), self._clock, self._on_death)
+        self._processes.append(process)
+        process.link.on_readable = self._wake
+        self._outside.call_later(BIRTH_S, self._begin, process, arguments)
+        return process
+
+    def _begin(self, process: SimulatedProcess, arguments: dict[str, Any]) -> None:
+        if process.exit_code is None:
+            process.loop.create_task(self._run(process, arguments))
+
+    async def _run(self, process: SimulatedProcess, arguments: dict[str, Any]) -> None:
+        """Do as `control_process.main` does."""
+        try:
+            process.leave(await control_process.run(self._rig, arguments, process.theirs, self._log, ()))  # type: ignore[arg-type]
+        except (StartError, PortError) as error:
+            self._log("start", str(error))
+            process.leave(error.exit_code)
+        except Exception as error:
+            self._log("start", f"A499 control process ended: {error!r}")
+            process.leave(exit_codes.FAILED)
+
+    def _on_death(self, process: SimulatedProcess) -> None:
+        for cable in CABLES.values():
+            cable.port = None
+        self.on_death()
+        self._wake()

@@ -1,13 +1,15 @@
 """Virtual time for asyncio: loops that never wait, all on one clock, which leaps from one event to the next.
 
-The loops are asyncio's own; only their clock and their selector are ours. Real descriptors (a unix socket that listens) still
-work, and are looked at now and then; nothing here depends on how fast the machine is.
+Tasks, futures and handles are asyncio's own. What is to be done stands in one queue for all loops, in the order of its time,
+and of its asking where the time is the same; so nothing here depends on how fast the machine is, and a turn costs a few
+microseconds. Nothing comes from real descriptors: they can be opened and closed (a unix socket that listens), and stay quiet.
 """
 
 import asyncio
+import contextvars
 import heapq
-import selectors
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,15 +17,17 @@ import pytest
 
 BEGIN_S = 1000.0
 EPOCH_S = 1.7e9
-TURNS_UNASKED = 64
 
 
 class VirtualClock:
-    """Stands for the kernel's clocks. jump_s: what an operator has set the wall clock by."""
+    """Stands for the kernel's clocks, and runs what is due by them. jump_s: what an operator has set the wall clock by."""
 
     def __init__(self) -> None:
         self.now_s = BEGIN_S
         self.jump_s = 0.0
+        self._ready: deque[asyncio.Handle] = deque()
+        self._timers: list[tuple[float, int, asyncio.Handle]] = []
+        self._asked = 0
 
     def monotonic(self) -> float:
         return self.now_s
@@ -39,60 +43,86 @@ class VirtualClock:
             patch.setattr("time.time", self.wall)
             yield
 
+    def add(self, handle: asyncio.Handle) -> None:
+        """Have this done as soon as everything is done that was asked for before."""
+        self._ready.append(handle)
 
-class _PollingSelector(selectors.DefaultSelector):
-    """Asks the kernel now and then only: nearly nothing here comes through it."""
+    def add_timer(self, when_s: float, handle: asyncio.Handle) -> None:
+        """Have this done at this time."""
+        self._asked += 1
+        heapq.heappush(self._timers, (when_s, self._asked, handle))
 
-    turns = 0
-
-    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        self.turns += 1
-        return super().select(0) if self.turns % TURNS_UNASKED == 0 else []
-
-
-class VirtualLoop(asyncio.SelectorEventLoop):
-    """One process's loop. servers: those that listen, by port."""
-
-    def __init__(self, clock: VirtualClock) -> None:
-        super().__init__(_PollingSelector())
-        self._virtual_clock = clock
-        self.servers: dict[int, Any] = {}
-
-    def time(self) -> float:
-        return self._virtual_clock.now_s
-
-    @property
-    def is_busy(self) -> bool:
-        """Something can be done now. (The queue and the heap of timers are asyncio's own: it shows them nowhere.)"""
-        return bool(self._ready) or self.due_s <= self.time()  # type: ignore[attr-defined]
-
-    @property
-    def due_s(self) -> float:
-        """When its next timer is due."""
-        timers: list[asyncio.TimerHandle] = self._scheduled  # type: ignore[attr-defined]
-        while timers and timers[0].cancelled():
-            heapq.heappop(timers)._scheduled = False  # type: ignore[attr-defined]
-            self._timer_cancelled_count -= 1  # type: ignore[attr-defined]
-        return timers[0].when() if timers else float("inf")
-
-    def turn(self) -> None:
-        """Do what can be done now, once. `run_forever` makes all ready for a long run each time, a third of the whole."""
-        asyncio._set_running_loop(self)
+    def run_until(self, end_s: float) -> None:
+        """Do everything that is due until then, and let the clock show end_s."""
+        ready, timers = self._ready, self._timers
         try:
-            self._run_once()  # type: ignore[attr-defined]
+            while True:
+                while ready:
+                    _do(ready.popleft())
+                if not timers or timers[0][0] > end_s:
+                    self.now_s = max(self.now_s, end_s)
+                    return
+                when_s, _, handle = heapq.heappop(timers)
+                self.now_s = max(self.now_s, when_s)
+                _do(handle)
         finally:
             asyncio._set_running_loop(None)
 
 
-def run_all(clock: VirtualClock, loops: list[VirtualLoop], end_s: float) -> None:
-    """Run these loops until the clock shows end_s. The list may change meanwhile: a process dies, another is started."""
-    while True:
-        while busy := [loop for loop in loops if loop.is_busy]:
-            for loop in busy:
-                if loop in loops:
-                    loop.turn()
-        due_s = min(loop.due_s for loop in loops)
-        if due_s > end_s:
-            clock.now_s = end_s
-            return
-        clock.now_s = max(clock.now_s, due_s)
+def _do(handle: asyncio.Handle) -> None:
+    """Call what is to be called; of a halted loop, when it goes on. (asyncio shows a handle's loop and context nowhere.)"""
+    loop: VirtualLoop = handle._loop  # type: ignore[attr-defined]
+    if loop.is_halted:
+        loop.waiting.append(handle)
+    elif not handle.cancelled():
+        asyncio._set_running_loop(loop)
+        handle._run()
+
+
+class VirtualLoop(asyncio.SelectorEventLoop):
+    """One process's loop. servers: those that listen, by port; is_halted: it does nothing, what becomes due waits."""
+
+    def __init__(self, clock: VirtualClock) -> None:
+        super().__init__()
+        self._virtual_clock = clock
+        self.servers: dict[int, Any] = {}
+        self.is_halted = False
+        self.waiting: list[asyncio.Handle] = []
+
+    def time(self) -> float:
+        return self._virtual_clock.now_s
+
+    def halt(self) -> None:
+        """Stop as SIGSTOP stops a process, or SIGKILL."""
+        self.is_halted = True
+
+    def go_on(self) -> None:
+        """Do what has become due meanwhile, in its order, and go on."""
+        self.is_halted = False
+        for handle in self.waiting:
+            self._virtual_clock.add(handle)
+        self.waiting.clear()
+
+    def call_soon(
+        self, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
+    ) -> asyncio.Handle:
+        handle = asyncio.Handle(callback, args, self, context)
+        self._virtual_clock.add(handle)
+        return handle
+
+    call_soon_threadsafe = call_soon  # there are no threads
+
+    def call_later(
+        self, delay: float, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
+    ) -> asyncio.TimerHandle:
+        return self.call_at(self.time() + delay, callback, *args, context=context)
+
+    def call_at(
+        self, when: float, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
+    ) -> asyncio.TimerHandle:
+        handle = asyncio.TimerHandle(when, callback, args, self, context)
+        self._virtual_clock.add_timer(when, handle)
+        return handle
+
+    def _timer_handle_cancelled(self, handle: asyncio.TimerHandle) -> None:
+        """A cancelled timer is passed over when it is due."""

@@ -262,6 +262,7 @@ class RunningRig:
         """Send the safe voltage, then close everything; the clean-shutdown marker goes last."""
         self._tick.close()
         await self._ports.write_last(self._safe_frame)
+        self._guardian.note_safe()
         if self._last_frame:  # once the safe voltage is answered: on a bus of two wires both would talk at once
             await asyncio.sleep(self._rig.output.device.reply_timeout_s)
             await self._ports.write_last(self._last_frame)

@@ -37,6 +37,7 @@ class ControlChild:
     safe_line: SafeLine | None = None  # stays after a death until the safe voltage has gone through it
     reported_cause: Ending | None = None  # what control gave as its own first cause
     is_link_ended: bool = False
+    is_safe: bool = False  # it has sent the safe voltage as its last one, and no loop beats any more
     asked_s: float = 0.0  # when the process was asked for, or is to be
 
     @property
@@ -58,7 +59,7 @@ class ControlChild:
 
     def start(self, arguments: dict[str, Any]) -> None:
         """Start a process. OSError where the machine has none to give."""
-        self.reported_cause, self.is_link_ended, self.asked_s = None, False, self.clock()
+        self.reported_cause, self.is_link_ended, self.is_safe, self.asked_s = None, False, False, self.clock()
         self.process = self.starter.control(arguments)
 
     def tell(self, tag: str, body: dict[str, Any] | None = None) -> None:
@@ -125,6 +126,8 @@ class ControlChild:
             self._take_line(message)
         elif message.tag == message_link.NEED_RIG:
             self.on_rig_needed()
+        elif message.tag == message_link.SAFE:
+            self.is_safe = True
         elif message.tag == message_link.FIRST_CAUSE:
             self.reported_cause = Ending(EndCause.DEFECT, str(message.body["text"]))
         elif message.tag == message_link.READY:

@@ -137,8 +137,12 @@ class Guardian:
         return max(0.0, min(deadlines) - self.clock())
 
     def _deadline_s(self) -> float:
-        """Return when control is overdue, or to be started; never while a killed one is still there."""
-        return inf if self.leaving and self.control.process is None else self.control.due_s
+        """Return when control is overdue, or to be started; never while a killed one is still there. Once we are told to stop
+        nothing is started, and the loop beats until the safe voltage has gone out."""
+        control = self.control
+        if self.stop_deadline_s is not None:
+            return control.due_s if control.heartbeat.is_up and not control.is_safe else inf
+        return inf if self.leaving and control.process is None else control.due_s
 
     def _poll_others(self, readable: set[int]) -> None:
         if self.leaving and self.leaving.died in readable:
@@ -200,8 +204,8 @@ class Guardian:
 
     def _on_deadline(self) -> int | None:
         now_s = self.clock()
-        if self.stop_deadline_s is not None:
-            return self._on_death(Ending(EndCause.DIED, "stopped")) if now_s >= self.stop_deadline_s else None
+        if self.stop_deadline_s is not None and now_s >= self.stop_deadline_s:
+            return self._on_death(Ending(EndCause.DIED, "it did not end in time"))
         if now_s < self._deadline_s():
             return None
         process, heartbeat = self.control.process, self.control.heartbeat
@@ -237,7 +241,7 @@ class Guardian:
             self.leaving = control
         reap_orphans(set(self._pids().values()))
         if self.stop_deadline_s is not None:
-            self.log.note("stop", f"stopped as asked: safe voltage {words.describe_acknowledgement(acknowledged)}")
+            self.log.note("stop", words.stop_sentence(acknowledged, None if code == exit_codes.OK else ending))
             return exit_codes.OK
         if code in _REFUSED or (code == exit_codes.DEVICE and not self.announced):
             return code  # it told the user why

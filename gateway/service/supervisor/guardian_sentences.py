@@ -37,6 +37,12 @@ def restart_sentence(ending: Ending, how: str, acknowledged: bool | None) -> str
     return f"A401 {ending.sentence}; {how}; safe voltage {describe_acknowledgement(acknowledged)}: restarted in OFF"
 
 
+def stop_sentence(acknowledged: bool | None, ending: Ending | None) -> str:
+    """Return what the log says of a stop that was asked for. ending: of a control process that did not end by itself."""
+    how = f"; {ending.sentence}" if ending else ""
+    return f"stopped as asked: safe voltage {describe_acknowledgement(acknowledged)}{how}"
+
+
 def leaving_sentence(pid: int) -> str:
     """Return what the log says of a killed process that does not end."""
     return (

@@ -170,16 +170,16 @@ class FakeSignals:
 
 
 class FakeLog:
-    """Keeps what is said to people; notes are for the file."""
+    """Keeps what is said to people, and by itself what is noted in the file."""
 
-    def __init__(self, said: list[str]) -> None:
-        self._said = said
+    def __init__(self, said: list[str], noted: list[str]) -> None:
+        self._said, self._noted = said, noted
 
     def __call__(self, cause: str, sentence: str) -> None:
         self._said.append(sentence)
 
     def note(self, cause: str, sentence: str) -> None:
-        pass
+        self._noted.append(sentence)
 
 
 class Scene:
@@ -188,6 +188,7 @@ class Scene:
     def __init__(self, tmp_path: Path, starter: FakeStarter) -> None:
         self.now_s = 100.0
         self.said: list[str] = []
+        self.noted: list[str] = []
         self.starter = starter
         self.signals = FakeSignals()
         self.code: int | None = None
@@ -196,7 +197,7 @@ class Scene:
             tmp_path,
             starter,  # type: ignore[arg-type]
             self.signals,  # type: ignore[arg-type]
-            FakeLog(self.said),  # type: ignore[arg-type]
+            FakeLog(self.said, self.noted),  # type: ignore[arg-type]
             clock=lambda: self.now_s,
             wait=self.wait,
         )

@@ -120,6 +120,38 @@ def test_a_stop_before_there_is_a_line_waits_for_nothing(scene, port):
     assert one.now_s == began_s
 
 
+def test_a_loop_that_falls_silent_while_it_ramps_down_is_not_waited_for(scene, port):
+    """Its bound is that of any silence, 0.1 s here, and not the time that a ramp may take."""
+    one = scene(lives(port))
+    assert_comes_up(one)
+    one.signals.send()
+    assert one.run() == 0
+    assert one.now_s == pytest.approx(100.1)
+    assert port.wrote() == SAFE_FRAME
+    assert any("stopped as asked" in line and "without a tick" in line for line in one.noted), one.noted
+
+
+def test_a_loop_that_has_sent_the_safe_voltage_may_take_its_time_to_close(scene, port):
+    one = scene(lives(port))
+    assert_comes_up(one)
+    one.signals.send()
+    one.child.say(message_link.SAFE)
+    one.run(steps=3, until=lambda: one.guardian.control.is_safe)
+    assert one.guardian._patience_s() == pytest.approx(5.0, abs=0.2)
+    one.child.dies(0)
+    assert one.run() == 0
+    assert one.now_s < 100.1
+
+
+def test_a_loop_that_does_not_end_after_the_safe_voltage_is_ended(scene, port):
+    one = scene(lives(port))
+    assert_comes_up(one)
+    one.signals.send()
+    one.child.say(message_link.SAFE)
+    assert one.run() == 0
+    assert one.now_s == pytest.approx(105.0, abs=0.2)
+
+
 def test_whatever_ends_the_guardian_the_safe_voltage_goes_first(scene, port, monkeypatch):
     one = scene(lives(port))
     assert_comes_up(one)

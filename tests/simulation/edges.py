@@ -1,0 +1,144 @@
+"""What of control and guardian reaches for the kernel, replaced: disk, clock, ports, counters, the last write."""
+
+import asyncio
+import os
+from collections.abc import Callable
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from tests.simulation.cables import CABLES, SimulatedPort
+from tests.simulation.virtual_time import VirtualClock
+
+TWIN_STEP_S = 4e-3
+"""The twin's own step is 1 ms, and a third of the processor's time: no law hangs on what the machine does between two."""
+_RIG = "gateway.service.running_rig.running_rig"
+_SUPERVISOR = "gateway.service.supervisor"
+
+
+class SimulatedDisk:
+    """Stands for `DiskWorker`: what it is given is done at once, and told a little later, by the chance of the schedule."""
+
+    delay_s: Callable[[], float] = staticmethod(lambda: 0.005)
+    is_full = False
+
+    def __call__(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
+        asyncio.get_running_loop().call_later(type(self).delay_s(), done, self._result(work))
+
+    def begin(self, work: Callable[[], Any]) -> None:
+        self._result(work)
+
+    def _result(self, work: Callable[[], Any]) -> Any:
+        if type(self).is_full:
+            return OSError(28, os.strerror(28))
+        try:
+            return work()
+        except Exception as error:
+            return error
+
+    def close(self) -> None: ...
+
+
+class SimulatedTick:
+    """Stands for `ClockTick`: on time by the loop's clock; after a stall it tells how many were missed."""
+
+    is_fallback = False
+
+    def __init__(self, period_s: float, on_tick: Callable[[int, float], None]) -> None:
+        self.period_s, self._on_tick = period_s, on_tick
+        self._timer: asyncio.TimerHandle | None = None
+
+    def start(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._due_s = self._loop.time() + self.period_s
+        self._timer = self._loop.call_at(self._due_s, self._fire)
+
+    def close(self) -> None:
+        if self._timer:
+            self._timer.cancel()
+
+    def _fire(self) -> None:
+        late_s = self._loop.time() - self._due_s
+        expirations = 1 + int(late_s / self.period_s + 1e-9)
+        self._due_s += expirations * self.period_s
+        self._timer = self._loop.call_at(self._due_s, self._fire)
+        self._on_tick(expirations, max(0.0, late_s - (expirations - 1) * self.period_s))
+
+
+class NoCounters:
+    """Stands for `SchedulerCounters`: a machine that is never busy."""
+
+    def __init__(self, pid: int) -> None: ...
+
+
+    def read(self) -> None:
+        return None
+
+    def waited_s(self) -> float:
+        return 0.0
+
+    def close(self) -> None: ...
+
+
+class SimulatedSafeLine:
+    """Stands for `SafeLine`: the guardian's last write goes out behind what is on the wire; who is plugged in answers."""
+
+    def __init__(self, descriptor: int, frame: bytes, reply: bytes) -> None:
+        self._descriptor, self._frame = descriptor, frame
+
+    def close(self) -> None:
+        os.close(self._descriptor)
+
+    def write_safe(self) -> bool:
+        output = CABLES["output"]
+        if output.is_plugged:
+            output.send_to_device(self._frame)
+        return output.is_plugged
+
+
+class Log:
+    """Stands for `EventLog`: keeps what was said."""
+
+    def __init__(self, clock: VirtualClock) -> None:
+        self._clock = clock
+        self.lines: list[tuple[float, str]] = []
+
+    def __call__(self, cause: str, sentence: str) -> None:
+        self.lines.append((self._clock.now_s, sentence))
+
+    def speaking_for(self, source: str) -> Callable[[str, str], None]:
+        return self
+
+    note = __call__
+
+
+async def _explain(line: Any, path: str) -> str:
+    return f"E111 {path}: silent"
+
+
+@contextmanager
+def simulated_edges() -> Any:
+    """Everything that reaches for the kernel, replaced."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("gateway.twin.simulation.STEP_S", TWIN_STEP_S)
+        patch.setattr("gateway.service.running_rig.lines.rig_ports.SerialPort", SimulatedPort)
+        patch.setattr(f"{_RIG}.ClockTick", SimulatedTick)
+        patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
+        patch.setattr(f"{_RIG}.explain_silent_device", _explain)
+        for user in (
+            "gateway.calibrations.upload",
+            "gateway.service.running_rig.rig_plants",
+            "gateway.audit.audit_log",
+            "gateway.service.recording_retention",
+            "gateway.service.recording_sync",
+        ):
+            patch.setattr(f"{user}.DiskWorker", SimulatedDisk)
+        collector = SimpleNamespace(collect=lambda: None, freeze=lambda: None)
+        patch.setattr("gateway.service.control_process.gc", collector)
+        patch.setattr(f"{_SUPERVISOR}.control_child.SafeLine", SimulatedSafeLine)
+        patch.setattr(f"{_SUPERVISOR}.heartbeat.load_of_machine", lambda: "a machine without load")
+        patch.setattr(f"{_SUPERVISOR}.guardian.reap_orphans", lambda known: None)
+        patch.setattr(f"{_SUPERVISOR}.guardian.words.print_ready", lambda what: None)
+        yield
