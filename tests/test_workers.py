@@ -24,18 +24,20 @@ def test_what_waits_for_minutes_is_the_second_group() -> None:
 
 
 def test_each_recording_of_the_sample_is_a_group_and_the_laws_over_them_are_one() -> None:
-    file = SPREAD.partition("::")[0]
-    assert len({group_of(f"tests/{SPREAD}{number}]") for number in range(19)}) == 19
+    for prefix in SPREAD:
+        assert len({group_of(f"tests/{prefix}{number}]") for number in range(19)}) == 19
+    file = SPREAD[0].partition("::")[0]
     assert group_of(f"tests/{file}::test_nothing_is_found_in_nothing") == file
 
 
 def test_slow_files_begin_before_others() -> None:
     ranks = [begun_at(f"tests/{file}::test_a") for file in (*SLOW, "twin/test_any.py")]
     assert ranks == sorted(set(ranks))
-    assert begun_at(f"tests/{SPREAD}3]") < ranks[0]
+    assert all(begun_at(f"tests/{prefix}3]") < ranks[0] for prefix in SPREAD)
 
 
 def test_every_place_that_the_lists_name_is_there() -> None:
-    file, _, name = SPREAD.partition("::")
     assert all((TESTS / place).exists() for place in (*REAL_TIME, *LONG_WAITS, *SLOW))
-    assert f"def {name.removesuffix('[')}(" in (TESTS / file).read_text(encoding="utf-8")
+    for prefix in SPREAD:
+        file, _, name = prefix.partition("::")
+        assert f"def {name.removesuffix('[')}(" in (TESTS / file).read_text(encoding="utf-8")

@@ -2,18 +2,20 @@
 
 import asyncio
 import os
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Awaitable, Callable
 from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from gateway.service.running_rig.running_rig import RunningRig
 from tests.simulation.cables import CABLES, SimulatedPort
 from tests.simulation.virtual_time import VirtualClock
 
-TWIN_STEP_S = 4e-3
-"""The twin's own step is 1 ms, and a third of the processor's time: no law hangs on what the machine does between two."""
+TWIN_STEP_S = 5e-3
+"""At its own step of 1 ms the twin takes a third of the processor's time; no law hangs on what happens between two periods."""
 _RIG = "gateway.service.running_rig.running_rig"
 _SUPERVISOR = "gateway.service.supervisor"
 
@@ -72,7 +74,6 @@ class NoCounters:
 
     def __init__(self, pid: int) -> None: ...
 
-
     def read(self) -> None:
         return None
 
@@ -99,14 +100,17 @@ class SimulatedSafeLine:
 
 
 class Log:
-    """Stands for `EventLog`: keeps what was said."""
+    """Stands for `EventLog`: keeps what was said last, and every internal error."""
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock
-        self.lines: list[tuple[float, str]] = []
+        self.lines: deque[tuple[float, str]] = deque(maxlen=100)
+        self.internal_errors: list[str] = []
 
     def __call__(self, cause: str, sentence: str) -> None:
         self.lines.append((self._clock.now_s, sentence))
+        if "A499" in sentence:
+            self.internal_errors.append(f"internal: {sentence}")
 
     def speaking_for(self, source: str) -> Callable[[str, str], None]:
         return self
@@ -118,6 +122,15 @@ async def _explain(line: Any, path: str) -> str:
     return f"E111 {path}: silent"
 
 
+def _uninterrupted(close: Callable[[Any], Awaitable[None]]) -> Callable[[Any], Awaitable[None]]:
+    """A process that is killed while it closes has a kernel that closes the rest: here it does so itself, in the end."""
+
+    async def close_all(running: Any) -> None:
+        await asyncio.shield(close(running))
+
+    return close_all
+
+
 @contextmanager
 def simulated_edges() -> Any:
     """Everything that reaches for the kernel, replaced."""
@@ -125,6 +138,7 @@ def simulated_edges() -> Any:
         patch.setattr("gateway.twin.simulation.STEP_S", TWIN_STEP_S)
         patch.setattr("gateway.service.running_rig.lines.rig_ports.SerialPort", SimulatedPort)
         patch.setattr(f"{_RIG}.ClockTick", SimulatedTick)
+        patch.setattr(f"{_RIG}.RunningRig.close", _uninterrupted(RunningRig.close))
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
         patch.setattr(f"{_RIG}.explain_silent_device", _explain)
         for user in (

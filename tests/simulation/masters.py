@@ -12,7 +12,8 @@ from tests.simulation.network import Line
 from tests.simulation.virtual_time import VirtualLoop
 
 ENABLE, RESET, TAKE = 1, 2, 8
-BEAT_S = 0.05
+BEATS_S = (0.05, 0.08, 0.1)
+"""Time between two heartbeats of one that works: more than once within a lease of 0.2 s."""
 WRITES = frozenset((5, 6, 15, 16, 22, 23))
 
 
@@ -58,6 +59,7 @@ class Master:
         outside: VirtualLoop,
         inside: Callable[[], VirtualLoop | None],
         on_accepted: Callable[[int | None, bytes], None],
+        beat_s: float = BEATS_S[0],
     ) -> None:
         self.name, self._outside, self._inside, self._on_accepted = name, outside, inside, on_accepted
         self.complaints: list[str] = []
@@ -70,6 +72,7 @@ class Master:
         self._control = 0
         self._beating = 0
         self._is_framed = True
+        self._beat_s = beat_s
 
     # -- connection
 
@@ -144,7 +147,7 @@ class Master:
         if number == self._beating:
             self._beat += 1
             self.ask(write_pdu(0, self._control, round(100 * self._force_n), 0, 0, self._beat))
-            self._outside.call_later(BEAT_S, self._keep_beating, number)
+            self._outside.call_later(self._beat_s, self._keep_beating, number)
 
     # -- answers
 

@@ -8,6 +8,8 @@ latch, I6 the safe voltage first, I7 whole sentences, I11 one first cause; I8 is
 import re
 import struct
 from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import Any
 
 COUNT_V = 10.0 / 1023
 FAULT = 4
@@ -31,9 +33,15 @@ GRACE_S = 0.05  # and one period
 
 @dataclass
 class Observer:
+    """settings: how many there were; the last came at setting_s; fingerprint: a digest of all of them."""
+
     bounds: Bounds
     broken: list[str] = field(default_factory=list)
-    settings: list[tuple[float, float]] = field(default_factory=list)
+    settings: int = 0
+    setting_s: float = 0.0
+    voltage_v: float = 0.0
+    largest_v: float = 0.0
+    fingerprint: Any = field(default_factory=sha256)
     cell_lost_s: float | None = None
     output_lost_s: float | None = None
     control_lost_s: float | None = None
@@ -45,10 +53,6 @@ class Observer:
     _begun_s: float = 0.0
     _fault: int | None = None
     _reset_s: float = -1.0
-
-    @property
-    def voltage_v(self) -> float:
-        return self.settings[-1][1] if self.settings else 0.0
 
     # -- the wire
 
@@ -75,12 +79,13 @@ class Observer:
             if voltage_v > 0.0:
                 self._complain("I6", f"{voltage_v:.3f} V comes first", now_s)
             self._must_be_safe = False
-        if self.settings:
-            before_s, before_v = self.settings[-1]
-            allowed_v = self.bounds.slew_v_per_s * (now_s - before_s + 0.02) + COUNT_V
-            if voltage_v - before_v > allowed_v + 1e-9:
-                self._complain("I2", f"{before_v:.3f} -> {voltage_v:.3f} V in {now_s - before_s:.4f} s", now_s)
-        self.settings.append((now_s, voltage_v))
+        before_s, before_v = self.setting_s, self.voltage_v
+        allowed_v = self.bounds.slew_v_per_s * (now_s - before_s + 0.02) + COUNT_V
+        if self.settings and voltage_v - before_v > allowed_v + 1e-9:
+            self._complain("I2", f"{before_v:.3f} -> {voltage_v:.3f} V in {now_s - before_s:.4f} s", now_s)
+        self.setting_s, self.voltage_v, self.largest_v = now_s, voltage_v, max(self.largest_v, voltage_v)
+        self.settings += 1
+        self.fingerprint.update(f"{now_s:.6f} {voltage_v:.4f}\n".encode())
 
     # -- what is known of the world and of masters
 
@@ -126,7 +131,7 @@ class Observer:
         """Judge the voltage that stands now."""
         if self.voltage_v <= 0.0 or self.output_lost_s is not None:
             return
-        standing_s = now_s - self.settings[-1][0]
+        standing_s = now_s - self.setting_s
         limits = (
             ("I3 cell", self.cell_lost_s, self.bounds.sample_timeout_s),
             ("I3 control", self.control_lost_s, self.bounds.stall_s),

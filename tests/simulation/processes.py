@@ -11,13 +11,13 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from gateway.processes import exit_codes, message_link
 from gateway.ports import PortError
+from gateway.processes import exit_codes, message_link
 from gateway.profiles import Rig
 from gateway.service import control_process
+from gateway.service.running_rig.starting import StartError
 from gateway.service.supervisor.child_process import LOST, Child
 from gateway.service.supervisor.guardian import Guardian
-from gateway.service.running_rig.starting import StartError
 from gateway.service.supervisor.run_options import RunOptions
 from tests.simulation.cables import CABLES
 from tests.simulation.edges import Log
@@ -47,6 +47,7 @@ class SimulatedProcess(Child):
         read_in_memory(self.loop)
         self._on_death = on_death
         self.exit_code: int | None = None
+        self.task: asyncio.Task[None] | None = None
 
     def leave(self, code: int) -> None:
         """End, with the exit code that the kernel tells."""
@@ -149,6 +150,11 @@ class SimulatedService:
         return process.loop if process.exit_code is None else None
 
     @property
+    def births(self) -> int:
+        """How many control processes there have been."""
+        return len(self._processes)
+
+    @property
     def is_serving(self) -> bool:
         return self.inside is not None and bool(self.inside.servers) and not self.inside.is_halted
 
@@ -194,8 +200,8 @@ class SimulatedService:
         for process in self._processes:
             process.loop.halt()
         for process in self._processes:
-            for task in asyncio.all_tasks(process.loop):
-                task.cancel()
+            if process.task:
+                process.task.cancel()
             process.loop.go_on()
             self._clock.run_until(self._clock.now_s + CLOSING_S)
             process.end()
@@ -262,7 +268,7 @@ class SimulatedService:
 
     def _begin(self, process: SimulatedProcess, arguments: dict[str, Any]) -> None:
         if process.exit_code is None:
-            process.loop.create_task(self._run(process, arguments))
+            process.task = process.loop.create_task(self._run(process, arguments))
 
     async def _run(self, process: SimulatedProcess, arguments: dict[str, Any]) -> None:
         """Do as `control_process.main` does."""

@@ -53,30 +53,30 @@ class VirtualClock:
         heapq.heappush(self._timers, (when_s, self._asked, handle))
 
     def run_until(self, end_s: float) -> None:
-        """Do everything that is due until then, and let the clock show end_s."""
+        """Do everything that is due until then, and let the clock show end_s. What a halted loop has to do waits until it goes
+        on. (asyncio shows a handle's loop nowhere.)"""
         ready, timers = self._ready, self._timers
+        running: VirtualLoop | None = None
         try:
             while True:
-                while ready:
-                    _do(ready.popleft())
-                if not timers or timers[0][0] > end_s:
+                if ready:
+                    handle = ready.popleft()
+                elif timers and timers[0][0] <= end_s:
+                    when_s, _, handle = heapq.heappop(timers)
+                    self.now_s = max(self.now_s, when_s)
+                else:
                     self.now_s = max(self.now_s, end_s)
                     return
-                when_s, _, handle = heapq.heappop(timers)
-                self.now_s = max(self.now_s, when_s)
-                _do(handle)
+                loop: VirtualLoop = handle._loop  # type: ignore[attr-defined]
+                if loop.is_halted:
+                    loop.waiting.append(handle)
+                elif not handle.cancelled():
+                    if loop is not running:
+                        running = loop
+                        asyncio._set_running_loop(loop)
+                    handle._run()
         finally:
             asyncio._set_running_loop(None)
-
-
-def _do(handle: asyncio.Handle) -> None:
-    """Call what is to be called; of a halted loop, when it goes on. (asyncio shows a handle's loop and context nowhere.)"""
-    loop: VirtualLoop = handle._loop  # type: ignore[attr-defined]
-    if loop.is_halted:
-        loop.waiting.append(handle)
-    elif not handle.cancelled():
-        asyncio._set_running_loop(loop)
-        handle._run()
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):

@@ -271,11 +271,8 @@ class RunningRig:
         self._recordings.close()
         self._calibration_runs.close()
         await self._audit.close()
-        self._ports.close()
-        self._upload.close()
-        self._plants.close()
-        self._counters.close()
-        self._lateness.close()
+        for part in (self._ports, self._upload, self._plants, self._counters, self._lateness):
+            part.close()
         self._shutdown_marker.clear()
 
     def _on_internal_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
