@@ -157,6 +157,24 @@ def test_what_ctrl_c_ramps_a_second_one_cuts(real, devices):
     assert devices.heard[-1].voltage_v == 0.0
 
 
+def test_control_that_stands_still_on_the_last_ramp_is_answered_as_at_any_time(real, devices):
+    """The ramp may take seconds; standing still may not."""
+    assert not real.write(0, 1, 3000, 0, 0, 0, 0).isError()
+    real.wait_until(lambda status: status["force_measured"] > 2700, within_s=8.0)
+    began_s = time.monotonic()
+    real.process.send_signal(signal.SIGTERM)
+    while len({heard.voltage_v for heard in devices.settings_since(began_s)}) < 5:
+        assert time.monotonic() - began_s < 2.0, "no ramp"
+        time.sleep(0.005)
+    stopped_s = time.monotonic()
+    os.kill(real.ready["pids"]["control"], signal.SIGSTOP)
+    assert devices.until_safe(stopped_s) < 1.0, "140 ms; a busy machine may be late, but not the 5 s of a stop"
+    assert real.process.wait(3) == 0
+    with EventReader(real.state) as reader:
+        (stop_words,) = [event.text for event in reader.read_stored() if "stopped as asked" in event.text]
+    assert "without a tick" in stop_words
+
+
 def test_five_restarts_in_a_minute_end_the_gateway_with_the_safe_voltage_held(tmp_path: Path):
     with OwnDevices(tmp_path) as devices:
         gateway = start(tmp_path / "state", rig=str(devices.rig))
