@@ -137,11 +137,11 @@ class Master:
         self._beating += 1
 
     def reset(self, take: bool = False) -> None:
-        """Reset faults, with a heartbeat of its own; take over, if asked."""
-        self._beat += 1
-        self.ask(write_pdu(0, TAKE if take else 0, 0, 0, 0, self._beat))
-        self._beat += 1
-        self.ask(write_pdu(0, RESET, 0, 0, 0, self._beat))
+        """Reset faults, with a heartbeat of its own, and whatever somebody else has left in the other words of the block; take
+        over, if asked."""
+        for control in (TAKE if take else 0, RESET):
+            self._beat += 1
+            self.ask(write_pdu(0, control, 0, 0, 0, self._beat, *[0] * 8))
 
     def _keep_beating(self, number: int) -> None:
         if number == self._beating:

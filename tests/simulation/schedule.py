@@ -345,13 +345,10 @@ class Simulation:
 
     def _read_force_n(self) -> float:
         """The force that the gateway shows, N; not a number where nobody answers."""
-        self.reader.heard.clear()
-        self.reader.ask(read_pdu(102, 1))
+        self.masters["healer"].ask(read_pdu(102, 1))
         self._run_for(0.02)
-        if not self.reader.heard:
-            return nan
-        (word,) = struct.unpack(">h", self.reader.heard[-1][1][2:4])
-        return float(word) * 0.01
+        answers = [pdu for _, pdu in self.masters["healer"].heard if pdu[:2] == b"\x03\x02"]
+        return float(struct.unpack(">h", answers[-1][2:4])[0]) * 0.01 if answers else nan
 
 
 def run_schedule(seed: int, events: Sequence[Event], duration_s: float) -> Outcome:
