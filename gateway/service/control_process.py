@@ -20,6 +20,7 @@ from gateway.processes import exit_codes, priority
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import Ending
+from gateway.processes.heartbeat_memory import HeartbeatMemory
 from gateway.processes.priority import use_realtime
 from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording.ring import SampleRing
@@ -83,6 +84,13 @@ def sample_ring(descriptor: int | None) -> SampleRing | None:
     return None
 
 
+def heartbeat_memory(descriptor: int | None) -> HeartbeatMemory | None:
+    """Return the memory that the guardian looks into; None without one: then each beat is a message."""
+    with contextlib.suppress(OSError):
+        return None if descriptor is None else HeartbeatMemory(descriptor)
+    return None
+
+
 def _loop_factory() -> Any:
     """uvloop where it is installed (the `fast` extra), else the standard loop."""
     with contextlib.suppress(ImportError):
@@ -94,7 +102,7 @@ def _loop_factory() -> Any:
 
 async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: EventLog, notes: tuple[str, ...]) -> int:
     """Run the rig from the first open port to the final safe-voltage write; return the exit code."""
-    guardian = GuardianLine(link)
+    guardian = GuardianLine(link, heartbeat_memory(options["beat"]))
     ports = await guardian.simulated_ports(options["rig"]) if rig.simulated else rig.ports()
     if ports is None:
         return exit_codes.DEVICE

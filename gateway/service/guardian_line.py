@@ -9,22 +9,24 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from gateway.processes import message_link as guardian_link
+from gateway.processes.heartbeat_memory import HeartbeatMemory
 
 _BEATS_PER_STALL: Final = 8  # at least so many fit into the silence that kills; each wakes the guardian
 
 
 class GuardianLine:
-    """Our end of the guardian's line. on_ports: the simulated rig has been started again, with these ptys; rig_pid: its
-    process, None for a real rig.
+    """Our end of the guardian's line. memory: where the loop beats; without it each beat is a message. on_ports: the simulated
+    rig has been started again, with these ptys; rig_pid: its process, None for a real rig.
 
     A guardian that does not read for a while misses heartbeats, which is what its silence deserves, but nothing else:
     what does not fit waits, in order, for the next heartbeat.
     """
 
-    def __init__(self, link: socket.socket) -> None:
+    def __init__(self, link: socket.socket, memory: HeartbeatMemory | None = None) -> None:
         self.on_ports: Callable[[dict[str, str]], None] = lambda ports: None
         self.rig_pid: int | None = None
         self._link = link
+        self._memory = memory
         self._waiting: deque[tuple[str, dict[str, Any], tuple[int, ...]]] = deque()
         self._rig: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
         self.told_to_stop = asyncio.Event()
@@ -40,9 +42,12 @@ class GuardianLine:
         return ptys
 
     def heartbeat(self, now_s: float) -> None:
-        """Send a heartbeat where one is due, and what the line could not take before. now_s: monotonic."""
+        """Beat, and send what the line could not take before. now_s: monotonic."""
         if self._waiting:
             self._send_waiting()
+        if self._memory is not None:
+            self._memory.beat(now_s)
+            return
         if now_s < self._next_beat_s:
             return
         self._next_beat_s = now_s + self._beat_every_s
@@ -74,6 +79,9 @@ class GuardianLine:
             self._forget_first()
         asyncio.get_running_loop().remove_reader(self._link.fileno())
         self._link.close()
+        if self._memory is not None:
+            self._memory.close()
+            self._memory = None
 
     def _tell(self, tag: str, body: dict[str, Any], *descriptors: int) -> None:
         with contextlib.suppress(OSError):  # a port that is lost already is handed over after its next opening

@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable
 from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
+from weakref import WeakSet
 
 import pytest
 
@@ -122,11 +123,15 @@ async def _explain(line: Any, path: str) -> str:
     return f"E111 {path}: silent"
 
 
-def _uninterrupted(close: Callable[[Any], Awaitable[None]]) -> Callable[[Any], Awaitable[None]]:
-    """A process that is killed while it closes has a kernel that closes the rest: here it does so itself, in the end."""
+CLOSING: WeakSet[asyncio.Task[Any]] = WeakSet()
+"""Those that close their process already: where one is killed meanwhile the kernel closes the rest, here it does so itself."""
 
+
+def _noted(close: Callable[[Any], Awaitable[None]]) -> Callable[[Any], Awaitable[None]]:
     async def close_all(running: Any) -> None:
-        await asyncio.shield(close(running))
+        if task := asyncio.current_task():
+            CLOSING.add(task)
+        await close(running)
 
     return close_all
 
@@ -138,7 +143,7 @@ def simulated_edges() -> Any:
         patch.setattr("gateway.twin.simulation.STEP_S", TWIN_STEP_S)
         patch.setattr("gateway.service.running_rig.lines.rig_ports.SerialPort", SimulatedPort)
         patch.setattr(f"{_RIG}.ClockTick", SimulatedTick)
-        patch.setattr(f"{_RIG}.RunningRig.close", _uninterrupted(RunningRig.close))
+        patch.setattr(f"{_RIG}.RunningRig.close", _noted(RunningRig.close))
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
         patch.setattr(f"{_RIG}.explain_silent_device", _explain)
         for user in (

@@ -5,6 +5,7 @@ stopped, killed and gone, and who starts the guardian again when it has ended, a
 """
 
 import asyncio
+import os
 import signal
 from collections.abc import Callable
 from math import inf
@@ -20,7 +21,7 @@ from gateway.service.supervisor.child_process import LOST, Child
 from gateway.service.supervisor.guardian import Guardian
 from gateway.service.supervisor.run_options import RunOptions
 from tests.simulation.cables import CABLES
-from tests.simulation.edges import Log
+from tests.simulation.edges import CLOSING, Log
 from tests.simulation.links import LinkEnd, create_link, read_in_memory, readable_ends
 from tests.simulation.network import serve_in_memory
 from tests.simulation.virtual_time import VirtualClock, VirtualLoop
@@ -48,6 +49,7 @@ class SimulatedProcess(Child):
         self._on_death = on_death
         self.exit_code: int | None = None
         self.task: asyncio.Task[None] | None = None
+        self.beat: int | None = None  # its own copy of the descriptor of that memory
 
     def leave(self, code: int) -> None:
         """End, with the exit code that the kernel tells."""
@@ -56,6 +58,7 @@ class SimulatedProcess(Child):
             self.loop.halt()
             self._on_death(self)
             self.theirs.close()
+            _close(self.beat)
 
     def kill(self) -> None:
         self.leave(-signal.SIGKILL)
@@ -180,7 +183,7 @@ class SimulatedService:
         """SIGKILL: the kernel closes its lines, which is how control learns of it."""
         guardian, self._guardian = self._guardian, None
         if guardian:
-            guardian.control._drop_line()
+            self._close_descriptors(guardian)
             if guardian.control.process:
                 guardian.control.process.close()
             self._outside.call_later(SERVICE_RESTART_S, self._start)
@@ -200,14 +203,21 @@ class SimulatedService:
         for process in self._processes:
             process.loop.halt()
         for process in self._processes:
-            if process.task:
+            if process.task and process.task not in CLOSING:
                 process.task.cancel()
             process.loop.go_on()
             self._clock.run_until(self._clock.now_s + CLOSING_S)
             process.end()
             process.loop.close()
         if self._guardian:
-            self._guardian.control._drop_line()
+            self._close_descriptors(self._guardian)
+
+    def _close_descriptors(self, guardian: Guardian) -> None:
+        """Do what the kernel does for a guardian that is dead."""
+        guardian.control._drop_line()
+        if guardian.control.memory:
+            guardian.control.memory.close()
+        _close(guardian.beat)
 
     # -- the guardian's turns
 
@@ -223,6 +233,9 @@ class SimulatedService:
             clock=self._clock.monotonic,
             wait=self._readable,
         )
+        guardian.share_memory()
+        _close(guardian.ring)  # nobody reads along here
+        guardian.ring = None
         guardian._start_control()
         self._wake()
 
@@ -261,6 +274,7 @@ class SimulatedService:
 
     def _spawn(self, arguments: dict[str, Any]) -> SimulatedProcess:
         process = SimulatedProcess(_FIRST_PID + len(self._processes), self._clock, self._on_death)
+        process.beat = arguments["beat"] = os.dup(arguments["beat"])
         self._processes.append(process)
         process.link.on_readable = self._wake
         self._outside.call_later(BIRTH_S, self._begin, process, arguments)
@@ -286,3 +300,8 @@ class SimulatedService:
             cable.port = None
         self.on_death()
         self._wake()
+
+
+def _close(descriptor: int | None) -> None:
+    if descriptor is not None:
+        os.close(descriptor)

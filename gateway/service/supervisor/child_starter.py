@@ -125,8 +125,7 @@ class ChildStarter:
             self._server = None
 
     def _child(self, module: str, arguments: dict[str, Any]) -> Child:
-        ring = arguments.get("ring")
-        shared = () if ring is None else (int(ring),)
+        shared = [arguments[name] for name in fork_server.SHARED if arguments.get(name) is not None]
         if self._server and not self._is_doubted:
             try:
                 return Child(fork_server.request_child(self._server.link, module, arguments, *shared))

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes.heartbeat_memory import HeartbeatMemory
 from gateway.service.supervisor.child_process import Child
 from gateway.service.supervisor.child_starter import ChildStarter
 from gateway.service.supervisor.heartbeat import Heartbeat
@@ -34,10 +35,12 @@ class ControlChild:
 
     process: Child | None = None  # None: between a death and the next start
     heartbeat: Heartbeat = field(default_factory=Heartbeat)
+    memory: HeartbeatMemory | None = None  # where its loop beats; without it each beat is a message
     safe_line: SafeLine | None = None  # stays after a death until the safe voltage has gone through it
     reported_cause: Ending | None = None  # what control gave as its own first cause
     is_link_ended: bool = False
     is_safe: bool = False  # it has sent the safe voltage as its last one, and no loop beats any more
+    _beat_s: float = 0.0  # what the memory said last
     asked_s: float = 0.0  # when the process was asked for, or is to be
 
     @property
@@ -60,7 +63,17 @@ class ControlChild:
     def start(self, arguments: dict[str, Any]) -> None:
         """Start a process. OSError where the machine has none to give."""
         self.reported_cause, self.is_link_ended, self.is_safe, self.asked_s = None, False, False, self.clock()
+        self._beat_s = self.memory.beat_s if self.memory else 0.0
         self.process = self.starter.control(arguments)
+
+    def hear_beat(self) -> None:
+        """Look whether the loop has beaten. A time that has not come yet counts as now, and once."""
+        if self.memory is None or self.process is None or not self.heartbeat.is_up:
+            return
+        beat_s = self.memory.beat_s
+        if beat_s != self._beat_s:
+            self._beat_s = beat_s
+            self.heartbeat.record_beat(self.process, min(beat_s, self.clock()))
 
     def tell(self, tag: str, body: dict[str, Any] | None = None) -> None:
         """Send a message, if there is somebody to read it."""

@@ -34,6 +34,8 @@ from gateway.processes import priority
 
 CONTROL: Final = "gateway.service.control_process"
 RIG: Final = "gateway.service.simulated_rig"
+SHARED: Final = ("ring", "beat")
+"""Arguments that are descriptors, in the order in which they are handed over."""
 _SUBREAPER: Final = 36
 _PARENT_POLL_S: Final = (
     0.0002  # how often a new child looks whether its first parent has ended, which takes microseconds
@@ -117,8 +119,8 @@ def _run_child(message: guardian_link.Message, parent: int) -> int:
     os.setsid()
     module, arguments = str(message.body["module"]), message.body["arguments"]
     theirs, *shared = message.descriptors
-    if shared:
-        arguments["ring"] = shared[0]
+    given = [name for name in SHARED if arguments.get(name) is not None]
+    arguments.update(zip(given, shared, strict=True))  # here they have other numbers
     words = [str(theirs), json.dumps(arguments)]
     show_command([sys.executable, "-m", module, *words])
     line = socket.socket(fileno=theirs)

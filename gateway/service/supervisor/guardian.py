@@ -8,6 +8,7 @@ voltage goes out first. Rejected: a thread inside the control process (dies with
 owners of one truth).
 """
 
+import contextlib
 import fcntl
 import os
 import time
@@ -22,6 +23,7 @@ from gateway.processes import exit_codes, message_link, priority
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes.heartbeat_memory import HeartbeatMemory
 from gateway.processes.systemd.service_manager import ServiceManager, service_manager
 from gateway.service.supervisor import guardian_sentences as words
 from gateway.service.supervisor.child_process import Child, create_shared_memory, describe_exit, reap_orphans
@@ -83,6 +85,7 @@ class Guardian:
     control: ControlChild = field(init=False)
     leaving: Child | None = None  # killed and not gone yet: until then no other is started, for there are never two
     others: OtherChildren = field(init=False)
+    beat: int | None = None  # memory where the control loop beats
     ring: int | None = None  # memory for the sample ring, which control writes and others read
     listeners: dict[str, tuple[int, list[Any]]] = field(default_factory=dict)  # by child: descriptor, [host, port]
     bound: tuple[str, int] | None = None
@@ -100,7 +103,7 @@ class Guardian:
 
     def watch(self) -> int:
         """Guard the rig until the end; return the exit code."""
-        self.ring = create_shared_memory()
+        self.share_memory()
         try:
             self.starter.open()
             code = self._start_control()
@@ -110,6 +113,12 @@ class Guardian:
         finally:
             self._close()
 
+    def share_memory(self) -> None:
+        """Make what control writes for us and for other processes; without it each beat is a message."""
+        self.ring, self.beat = create_shared_memory(), create_shared_memory()
+        with contextlib.suppress(OSError):
+            self.control.memory = None if self.beat is None else HeartbeatMemory(self.beat)
+
     def _step(self) -> int | None:
         readable = self.wait(self._sources(), self._patience_s())
         if self.signals.descriptor in readable and (count := self.signals.take()):
@@ -117,7 +126,6 @@ class Guardian:
         control = self.control
         if control.has_spoken(readable):
             control.read_messages()
-            self.manager.feed(control.heartbeat.heard_s)
             if control.is_link_ended and not (control.process and control.process.pid):
                 self.starter.on_not_born()
                 return self._on_death(Ending(EndCause.NOT_STARTED, "control process ended before its first word"))
@@ -203,6 +211,8 @@ class Guardian:
     # -- when control is silent or gone
 
     def _on_deadline(self) -> int | None:
+        self.control.hear_beat()
+        self.manager.feed(self.control.heartbeat.heard_s)
         now_s = self.clock()
         if self.stop_deadline_s is not None and now_s >= self.stop_deadline_s:
             return self._on_death(Ending(EndCause.DIED, "it did not end in time"))
@@ -280,6 +290,7 @@ class Guardian:
                     "realtime": self.options.realtime,
                     "restarted": self.next_start.to_json() if self.next_start else None,
                     "ring": self.ring,
+                    "beat": self.beat if self.control.memory else None,
                     "web": self.options.web,
                     "metrics": self.options.metrics,
                     "listening": {name: address for name, (_, address) in self.listeners.items()},
@@ -299,5 +310,8 @@ class Guardian:
         self._forget_leaving()
         for descriptor, _ in self.listeners.values():
             os.close(descriptor)
-        if self.ring is not None:
-            os.close(self.ring)
+        if self.control.memory:
+            self.control.memory.close()
+        for memory in (self.ring, self.beat):
+            if memory is not None:
+                os.close(memory)

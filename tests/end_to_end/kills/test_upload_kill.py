@@ -220,7 +220,7 @@ def test_a_commit_while_pressing_makes_no_bump(running: RunningGateway):
     def is_steady(status: dict[str, int]) -> bool:
         """Held, and the trim has done its work: what moves afterwards is the commit's doing."""
         nonlocal stands_mv, since_s
-        if abs(status["output_voltage"] - stands_mv) > 10:
+        if abs(status["output_voltage"] - stands_mv) > 15:
             stands_mv, since_s = status["output_voltage"], time.monotonic()
         return status["state"] == HOLDING and time.monotonic() - since_s >= 0.6
 

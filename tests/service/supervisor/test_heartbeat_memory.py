@@ -1,0 +1,85 @@
+"""A loop that beats in shared memory: the guardian looks when the next beat is overdue, and is woken by none."""
+
+import math
+import os
+from collections.abc import Iterator
+
+import pytest
+
+from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes.heartbeat_memory import HeartbeatMemory
+from tests.service.supervisor.guarded import Scene, port
+from tests.service.supervisor.scripted_children import assert_comes_up, lives, scene
+
+__all__ = ["port", "scene"]
+STALL_S = 0.1
+
+
+@pytest.fixture
+def beating(scene, port) -> Iterator[tuple[Scene, HeartbeatMemory]]:
+    """A guardian whose control is up, and control's end of the memory."""
+    one = scene(lives(port))
+    one.guardian.share_memory()
+    memory = HeartbeatMemory(one.guardian.beat)
+    assert_comes_up(one)
+    assert one.starter.arguments[0]["beat"] == one.guardian.beat
+    yield one, memory
+    memory.close()
+
+
+def test_a_beat_is_the_time_that_the_other_end_reads() -> None:
+    descriptor = os.memfd_create("beat")
+    ours, theirs = HeartbeatMemory(descriptor), HeartbeatMemory(descriptor)
+    assert theirs.beat_s == 0.0
+    ours.beat(12.5)
+    assert theirs.beat_s == 12.5
+    for end in (ours, theirs):
+        end.close()
+    os.close(descriptor)
+
+
+def beat_while_it_waits(one: Scene, memory: HeartbeatMemory, last_s: float) -> list[float]:
+    """Let the loop beat each 10 ms until last_s. Returns the times at which the guardian has looked, as it runs."""
+    looks: list[float] = []
+
+    def wait(descriptors: list[int], timeout_s: float) -> set[int]:
+        ready = one.wait(descriptors, timeout_s)
+        looks.append(one.now_s)
+        memory.beat(min(0.01 * math.floor(100.0 * one.now_s + 1e-6), last_s))
+        return ready
+
+    one.guardian.wait = wait
+    return looks
+
+
+def test_a_loop_that_beats_is_left_alone_and_looked_at_seldom(beating):
+    one, memory = beating
+    looks = beat_while_it_waits(one, memory, 200.0)
+    one.run(lambda: one.now_s > 101.0)
+    assert len(one.starter.started) == 1, one.said
+    assert 9 <= len(looks) <= 14, "about once in 0.1 s, however often it beats"
+
+
+def test_silence_counts_from_the_last_beat(beating):
+    one, memory = beating
+    beat_while_it_waits(one, memory, 100.07)
+    assert one.run(lambda: len(one.starter.started) == 2) is None
+    assert one.now_s == pytest.approx(100.07 + STALL_S)
+    assert Ending.from_json(one.starter.arguments[1]["restarted"]).cause is EndCause.STALLED
+
+
+def test_a_time_that_has_not_come_counts_as_now_and_once(beating):
+    one, memory = beating
+    memory.beat(1e9)
+    assert one.run(lambda: len(one.starter.started) == 2) is None
+    assert one.now_s <= 100.0 + 2 * STALL_S + 1e-6
+
+
+def test_what_a_dead_process_has_left_is_no_beat_of_the_next(beating):
+    one, memory = beating
+    memory.beat(100.05)
+    one.run(lambda: len(one.starter.started) == 2)
+    assert_comes_up(one)
+    ready_s = one.guardian.control.heartbeat.heard_s
+    assert one.run(lambda: len(one.starter.started) == 3) is None
+    assert one.now_s == pytest.approx(ready_s + STALL_S)
