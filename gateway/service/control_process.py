@@ -20,12 +20,12 @@ from gateway.processes import exit_codes, priority
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import Ending
-from gateway.processes.heartbeat_memory import HeartbeatMemory
 from gateway.processes.priority import use_realtime
 from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording.ring import SampleRing
 from gateway.service import banner
 from gateway.service.guardian_line import GuardianLine
+from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.faces import with_rtu_face
 from gateway.service.running_rig.recorded_row import COLUMNS

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from gateway.processes import message_link as guardian_link
-from gateway.processes.heartbeat_memory import HeartbeatMemory
+from gateway.service.heartbeat_memory import HeartbeatMemory
 
 _BEATS_PER_STALL: Final = 8  # at least so many fit into the silence that kills; each wakes the guardian
 
@@ -42,7 +42,7 @@ class GuardianLine:
         return ptys
 
     def heartbeat(self, now_s: float) -> None:
-        """Beat, and send what the line could not take before. now_s: monotonic."""
+        """Send what the line could not take before, and beat. now_s: monotonic."""
         if self._waiting:
             self._send_waiting()
         if self._memory is not None:

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.processes.heartbeat_memory import HeartbeatMemory
+from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.supervisor.child_process import Child
 from gateway.service.supervisor.child_starter import ChildStarter
 from gateway.service.supervisor.heartbeat import Heartbeat

@@ -23,8 +23,8 @@ from gateway.processes import exit_codes, message_link, priority
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.processes.heartbeat_memory import HeartbeatMemory
 from gateway.processes.systemd.service_manager import ServiceManager, service_manager
+from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.supervisor import guardian_sentences as words
 from gateway.service.supervisor.child_process import Child, create_shared_memory, describe_exit, reap_orphans
 from gateway.service.supervisor.child_starter import ChildStarter

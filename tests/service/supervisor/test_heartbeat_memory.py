@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.processes.heartbeat_memory import HeartbeatMemory
+from gateway.service.heartbeat_memory import HeartbeatMemory
 from tests.service.supervisor.guarded import Scene, port
 from tests.service.supervisor.scripted_children import assert_comes_up, lives, scene
 

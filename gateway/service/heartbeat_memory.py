@@ -28,10 +28,10 @@ class HeartbeatMemory:
         return self._time[0]
 
     def beat(self, now_s: float) -> None:
-        """Beat. now_s: monotonic."""
+        """Write the time of a beat. now_s: monotonic."""
         self._time[0] = now_s
 
     def close(self) -> None:
-        """Unmap the memory."""
+        """Close the memory."""
         self._time.release()
         self._map.close()
