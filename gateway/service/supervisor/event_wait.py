@@ -9,6 +9,17 @@ from types import TracebackType
 from typing import Final, Self
 
 _SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_STRAY: Final = (
+    signal.SIGUSR1,
+    signal.SIGUSR2,
+    signal.SIGALRM,
+    signal.SIGVTALRM,
+    signal.SIGPROF,
+    signal.SIGPOLL,
+    signal.SIGPWR,
+)
+"""Mean nothing to us, come from tools that rotate logs or ask other programs to reload, and would end who does not ignore them,
+without the safe voltage. Children inherit it."""
 _LONGEST_S: Final = 3600.0
 _MOST_SIGNALS: Final = 64
 
@@ -24,7 +35,7 @@ def wait_readable(descriptors: list[int], timeout_s: float) -> set[int]:
 
 
 class SignalPipe:
-    """SIGINT, SIGTERM and SIGHUP as readable bytes: nothing of ours runs inside a signal handler."""
+    """SIGINT, SIGTERM and SIGHUP as readable bytes: nothing of ours runs inside a signal handler. Stray signals are ignored."""
 
     def __init__(self) -> None:
         self._reader, self._writer = socket.socketpair()
@@ -45,6 +56,8 @@ class SignalPipe:
     def __enter__(self) -> Self:
         for number in _SIGNALS:
             signal.signal(number, lambda *_: None)
+        for number in _STRAY:
+            signal.signal(number, signal.SIG_IGN)
         signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
         return self
 
@@ -52,7 +65,7 @@ class SignalPipe:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         signal.set_wakeup_fd(-1)
-        for number in _SIGNALS:
+        for number in (*_SIGNALS, *_STRAY):
             signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
         self.close()
 
