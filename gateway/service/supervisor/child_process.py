@@ -19,6 +19,7 @@ from gateway.processes.scheduler_counters import SchedulerCounters
 
 _END_BOUND_S: Final = 1.0
 _REAP_BOUND_S: Final = 2.0  # a killed process is gone in milliseconds, unless a driver holds it
+_BLOCKED: Final = (signal.SIGHUP,)  # the guardian's to answer: a service manager sends it to every process
 LOST: Final = -1000
 """The exit code of a child that nobody could ask: it does not go, or somebody else has reaped it."""
 
@@ -118,7 +119,7 @@ def _spawn_process(command: list[str], passed: tuple[int, ...]) -> int:
         os.set_inheritable(descriptor, True)
     try:
         null = [(os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0)]
-        return os.posix_spawn(command[0], command, os.environ, file_actions=null, setsid=True, setsigmask=())
+        return os.posix_spawn(command[0], command, os.environ, file_actions=null, setsid=True, setsigmask=_BLOCKED)
     finally:
         for descriptor in passed:
             os.set_inheritable(descriptor, False)

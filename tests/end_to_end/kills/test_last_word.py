@@ -175,6 +175,23 @@ def test_control_that_stands_still_on_the_last_ramp_is_answered_as_at_any_time(r
     assert "without a tick" in stop_words
 
 
+def test_what_a_careless_hand_sends_to_a_process_does_not_drop_the_force(real, devices):
+    """`systemctl kill -s HUP`, `pkill -USR1`: as they come from log rotation and habit."""
+    pressing(real)
+    began_s, pids = time.monotonic(), real.ready["pids"]
+    assert len(pids) >= 3
+    for name, pid in pids.items():
+        os.kill(pid, signal.SIGUSR1)
+        if name != "guardian":
+            os.kill(pid, signal.SIGHUP)
+    assert real.status()["state"] == HOLDING
+    time.sleep(3 * STALL_S)  # a process that has died of it would be missed by now
+    assert real.status()["state"] == HOLDING
+    assert all(psutil.pid_exists(pid) for pid in pids.values())
+    assert {heard.voltage_v for heard in devices.settings_since(began_s)} <= {devices.setting_v}
+    assert devices.setting_v > 3.9
+
+
 def test_five_restarts_in_a_minute_end_the_gateway_with_the_safe_voltage_held(tmp_path: Path):
     with OwnDevices(tmp_path) as devices:
         gateway = start(tmp_path / "state", rig=str(devices.rig))
