@@ -12,7 +12,7 @@ from gateway.profiles import load_calibration
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.disk.watched_disk import WatchedDisk, watching
 from tests.plants.test_plant_store import numbered
-from tests.simulation.processes import SimulatedDisk, simulated_edges
+from tests.simulation.edges import NotedRunningRig, SimulatedDisk, simulated_edges
 from tests.simulation.schedule import HELD_N, Simulation
 
 STEP_S = 0.2
@@ -51,7 +51,7 @@ class Day:
 
     @property
     def running(self) -> RunningRig:
-        return self.simulation.guardian._kept[-1][1]
+        return NotedRunningRig.of[-1]
 
     @property
     def said(self) -> list[str]:
@@ -61,7 +61,7 @@ class Day:
     def ask(self, request: dict[str, Any]) -> dict[str, Any]:
         """As the control socket does it."""
         handler = self.running._control_socket._handlers[request["do"]]
-        inside = self.simulation.guardian.inside
+        inside = self.simulation.service.inside
         assert inside is not None
         answers: list[dict[str, Any]] = []
 
@@ -94,11 +94,10 @@ class Day:
         """Hold a force once more, and say what was broken."""
         self.simulation._heal()
         self._holder = "healer"
-        guardian, log = self.simulation.guardian, self.simulation.log
+        service = self.simulation.service
         broken = [*self.simulation.observer.broken, *self.simulation.masters["worker"].complaints]
-        broken += [f"{len(guardian.deaths_s)} deaths of control"] if guardian.deaths_s else []
-        broken += [f"complaint: {text}" for text in guardian.complaints]
-        return broken + [text for _, text in log.lines if "A499" in text]
+        broken += [f"{service.births - 1} deaths of control"] if service.births > 1 else []
+        return broken + self.simulation.log.internal_errors
 
 
 @contextmanager

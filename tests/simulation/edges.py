@@ -3,10 +3,10 @@
 import asyncio
 import os
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import contextmanager
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 from weakref import WeakSet
 
 import pytest
@@ -105,7 +105,7 @@ class Log:
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock
-        self.lines: deque[tuple[float, str]] = deque(maxlen=100)
+        self.lines: deque[tuple[float, str]] = deque(maxlen=1000)
         self.internal_errors: list[str] = []
 
     def __call__(self, cause: str, sentence: str) -> None:
@@ -123,17 +123,21 @@ async def _explain(line: Any, path: str) -> str:
     return f"E111 {path}: silent"
 
 
-CLOSING: WeakSet[asyncio.Task[Any]] = WeakSet()
-"""Those that close their process already: where one is killed meanwhile the kernel closes the rest, here it does so itself."""
+class NotedRunningRig(RunningRig):
+    """Control's own, and known here. of: those of this simulation, in their order; closing: tasks that close one already:
+    where one is killed meanwhile the kernel closes the rest, here it does so itself."""
 
+    of: ClassVar[list["NotedRunningRig"]] = []
+    closing: ClassVar[WeakSet[asyncio.Task[Any]]] = WeakSet()
 
-def _noted(close: Callable[[Any], Awaitable[None]]) -> Callable[[Any], Awaitable[None]]:
-    async def close_all(running: Any) -> None:
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.of.append(self)
+
+    async def close(self) -> None:
         if task := asyncio.current_task():
-            CLOSING.add(task)
-        await close(running)
-
-    return close_all
+            self.closing.add(task)
+        await super().close()
 
 
 @contextmanager
@@ -143,7 +147,8 @@ def simulated_edges() -> Any:
         patch.setattr("gateway.twin.simulation.STEP_S", TWIN_STEP_S)
         patch.setattr("gateway.service.running_rig.lines.rig_ports.SerialPort", SimulatedPort)
         patch.setattr(f"{_RIG}.ClockTick", SimulatedTick)
-        patch.setattr(f"{_RIG}.RunningRig.close", _noted(RunningRig.close))
+        patch.setattr("gateway.service.control_process.RunningRig", NotedRunningRig)
+        NotedRunningRig.of.clear()
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
         patch.setattr(f"{_RIG}.explain_silent_device", _explain)
         for user in (

@@ -21,7 +21,7 @@ from gateway.service.supervisor.child_process import LOST, Child
 from gateway.service.supervisor.guardian import Guardian
 from gateway.service.supervisor.run_options import RunOptions
 from tests.simulation.cables import CABLES
-from tests.simulation.edges import CLOSING, Log
+from tests.simulation.edges import Log, NotedRunningRig
 from tests.simulation.links import LinkEnd, create_link, read_in_memory, readable_ends
 from tests.simulation.network import serve_in_memory
 from tests.simulation.virtual_time import VirtualClock, VirtualLoop
@@ -203,7 +203,7 @@ class SimulatedService:
         for process in self._processes:
             process.loop.halt()
         for process in self._processes:
-            if process.task and process.task not in CLOSING:
+            if process.task and process.task not in NotedRunningRig.closing:
                 process.task.cancel()
             process.loop.go_on()
             self._clock.run_until(self._clock.now_s + CLOSING_S)
