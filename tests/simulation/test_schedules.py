@@ -12,7 +12,8 @@ from tests.simulation.schedule import Event, Outcome, draw_events, run_schedule,
 
 PUSH_SEEDS, LONG_SEEDS = 500, 50_000
 SHARDS = 20
-SECONDS = float(os.environ.get("SIMULATION_SECONDS", "30"))
+SECONDS = float(os.environ.get("SIMULATION_SECONDS", "24"))
+"""Of events; with its start and its healing a schedule is one of 30 s."""
 KEPT: list[tuple[int, list[Event]]] = []
 """Schedules that once broke a law: the seed of the machine, and what happened to it."""
 
