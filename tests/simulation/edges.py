@@ -15,8 +15,8 @@ from gateway.service.running_rig.running_rig import RunningRig
 from tests.simulation.cables import CABLES, SimulatedPort
 from tests.simulation.virtual_time import VirtualClock
 
-TWIN_STEP_S = 5e-3
-"""At its own step of 1 ms the twin takes a third of the processor's time; no law hangs on what happens between two periods."""
+TWIN_STEP_S = 10e-3
+"""The period of the fastest loop. At its own step of 1 ms the twin takes a third of the processor's time."""
 _RIG = "gateway.service.running_rig.running_rig"
 _SUPERVISOR = "gateway.service.supervisor"
 

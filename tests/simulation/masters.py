@@ -12,7 +12,7 @@ from tests.simulation.network import Line
 from tests.simulation.virtual_time import VirtualLoop
 
 ENABLE, RESET, TAKE = 1, 2, 8
-BEATS_S = (0.05, 0.08, 0.1)
+BEATS_S = (0.08, 0.1, 0.15)
 """Time between two heartbeats of one that works: more than once within a lease of 0.2 s."""
 WRITES = frozenset((5, 6, 15, 16, 22, 23))
 

@@ -28,7 +28,7 @@ class Bounds:
     period_s: float
 
 
-GRACE_S = 0.05  # and one period
+GRACE_S = 0.05  # and two periods: a tick decides nothing within one of a sample
 
 
 @dataclass
@@ -141,7 +141,7 @@ class Observer:
         for law, since_s, bound_s in limits:
             if self.control_lost_s is not None and law != "I3 control":
                 continue  # who stands still hears nothing: then it is the guardian's turn, within its own bound
-            if since_s is not None and now_s - since_s > bound_s + GRACE_S + self.bounds.period_s:
+            if since_s is not None and now_s - since_s > bound_s + GRACE_S + 2.0 * self.bounds.period_s:
                 self._complain(
                     law, f"{self.voltage_v:.3f} V for {standing_s:.3f} s, {now_s - since_s:.3f} s after", now_s
                 )

@@ -1,7 +1,6 @@
-"""One schedule: what masters, people and fate do to a gateway, drawn from a seed, run in virtual time, judged and shrunk.
+"""One schedule: what masters, people and fate do to a gateway (events.py), run in virtual time, judged and shrunk.
 
-A schedule is a list of events, each whole by itself, so that any of them can be left out: the shortest list that still breaks
-a law is what a failing seed is told by.
+The shortest list of events that still breaks a law is what a failing seed is told by.
 """
 
 import struct
@@ -18,12 +17,12 @@ from gateway.service.simulation.world import SimulatedRig
 from tests.service.rigs import strict, with_supervision
 from tests.simulation.cables import CABLES, lay_cables
 from tests.simulation.edges import Log, SimulatedDisk, simulated_edges
-from tests.simulation.masters import BEATS_S, ENABLE, TAKE, Master, read_pdu, write_pdu
+from tests.simulation.events import FAULTS, Event
+from tests.simulation.masters import BEATS_S, ENABLE, TAKE, Master, read_pdu
 from tests.simulation.observer import STATUS_FIRST, STATUS_WORDS, Bounds, Observer
 from tests.simulation.processes import SimulatedService
 from tests.simulation.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 
-FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "cell-frozen", "output-cut")
 LEASE_S, STALL_S = 0.2, 0.1
 RATES_HZ = (20,) * 6 + (25,) * 3 + (100,)
 """Of loop and load cell, drawn for each seed: at 20 Hz a schedule takes half of the time, and its laws are the same."""
@@ -32,80 +31,6 @@ IN_BAND_N = 1.0
 HEAL_S = 2.0
 LOOK_S = 0.02
 READ_S = 0.1
-
-
-@dataclass(frozen=True)
-class Event:
-    """At at_s after READY, `what` happens to `whom`, with these numbers."""
-
-    at_s: float
-    whom: str
-    what: str
-    numbers: tuple[float, ...] = ()
-    data: bytes = b""
-
-
-def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
-    """What happens, in its order: a little more than two events a second."""
-    chance, at_s = Random(seed), 0.0
-    while (at_s := at_s + chance.expovariate(2.2)) < duration_s:
-        yield _draw(chance, round(at_s, 4))
-
-
-def _draw(chance: Random, at_s: float) -> Event:
-    draw, master = chance.random(), chance.choice(("worker", "worker", "rival"))
-    if draw < 0.34:
-        return Event(
-            at_s, master, chance.choice(("hold", "hold", "hold", "take")), (round(chance.uniform(0.0, 66.0), 2),)
-        )
-    if draw < 0.46:
-        return Event(at_s, master, chance.choice(("reset", "let_go", "fall_silent", "disconnect")))
-    if draw < 0.62:
-        return Event(at_s, chance.choice(("worker", "rival", "fool")), "ask", data=_stupid(chance))
-    if draw < 0.68:
-        return Event(at_s, "villain", "send_raw", data=_hostile(chance))
-    if draw < 0.86:
-        return Event(at_s, "world", chance.choice(FAULTS), (float(chance.random() < 0.5),))
-    if draw < 0.92:
-        return Event(at_s, chance.choice(("output", "load_cell")), chance.choice(("pull", "push")))
-    what = chance.choice(("kill", "stop", "kill_guardian", "terminate", "disk_full", "disk_free", "clock_jump"))
-    return Event(at_s, "machine", what, (round(chance.uniform(0.005, 0.3), 4), chance.uniform(-1e6, 1e6)))
-
-
-def _stupid(chance: Random) -> bytes:
-    """A request that may be refused: any register, any value, any function."""
-    address = chance.choice(
-        (0, 0, 0, 1, 4, chance.randrange(0, 16), chance.randrange(100, 130), 200, 300, 416, 1000, 1147, 1500)
-    )
-    count = chance.choice((1, 1, 2, 5, 13, chance.randrange(1, 124)))
-    words = [chance.choice((0, 1, 2, 9, 33, 65535, chance.randrange(65536))) for _ in range(count)]
-    if address == 0 and words:
-        words[0] &= ~0x60  # runs of their own (bits 5 and 6) move without a master's lease, by right
-    function = chance.choice((3, 4, 1, 2, 5, 6, 15, 16, 16, 16, 22, 23, 43, 99))
-    if function == 16:
-        return write_pdu(address, *words)
-    if function == 6:
-        return struct.pack(">BHH", 6, address, words[0])
-    if function == 5:
-        return struct.pack(">BHH", 5, chance.choice((0, 1, 2, 3, 4)), chance.choice((0, 0xFF00, 0x1234)))
-    if function == 22:
-        return struct.pack(">BHHH", 22, address, 0xFF9F, chance.randrange(65536) & ~0x60 & 0xFFFF)
-    if function in (1, 2, 3, 4):
-        return struct.pack(">BHH", function, address, chance.choice((0, 1, 10, 125, 126, 65535)))
-    return bytes((function,)) + chance.randbytes(chance.randrange(0, 40))
-
-
-def _hostile(chance: Random) -> bytes:
-    whole = struct.pack(">HHHB", 7, 0, 6, 1) + read_pdu(100, 10)
-    return chance.choice(
-        (
-            chance.randbytes(chance.randrange(1, 400)),
-            whole[: chance.randrange(1, len(whole))],
-            whole * chance.randrange(2, 60),
-            struct.pack(">HHHB", 1, 0, 65535, 1),
-            struct.pack(">HHHB", 1, 9, 6, 1) + whole[7:],
-        )
-    )
 
 
 @dataclass(frozen=True)
@@ -124,7 +49,11 @@ def simulated_rig(seed: int) -> Rig:
     bounds = {"sample_timeout_s": max(0.05, 2.5 / loop_hz), "output_timeout_s": max(0.1, 3.0 / loop_hz)}
     rig = with_supervision(strict(), lease_s=LEASE_S, stall_s=STALL_S, **bounds)
     output, load_cell = replace(rig.output, port="output"), replace(rig.load_cell, port="load_cell")
-    return replace(rig, seed=seed, loop_hz=loop_hz, output=output, load_cell=load_cell)
+    assert rig.plant_profile
+    plant = rig.plant_profile.plant  # without inertia its steps may be of any length; it lies, so that it has no weight
+    still = replace(plant.contact, mass_kg=0.0, pad_damping_n_s_per_m=0.0)
+    profile = replace(rig.plant_profile, plant=replace(plant, contact=still))
+    return replace(rig, seed=seed, loop_hz=loop_hz, output=output, load_cell=load_cell, plant_profile=profile)
 
 
 class Simulation:

@@ -168,12 +168,12 @@ class ControlLoop:
         now_s = self.clock()
         self._begin(WarningBit.SLOW_LOOP, self._slow_loop.tick(now_s, expirations, late_s, self._used_since_tick))
         self._end_warnings(now_s)
-        self.output.tick(now_s)
+        if now_s - self._heard_s > self._fresh_s:
+            self._step(now_s)
+        self.output.tick(now_s)  # behind the decision: an idle question would hold up its voltage
         self._cell.tick(now_s)
         if self.valve:
             self.valve.tick(now_s)
-        if now_s - self._heard_s > self._fresh_s:
-            self._step(now_s)
         self._last_tick_s, self._last_processor_time = now_s, self.processor_time()
         if self._lateness:
             self._lateness.tick(now_s, _waited_s(self._last_processor_time))

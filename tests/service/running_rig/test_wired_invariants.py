@@ -1,5 +1,6 @@
 """Whatever happens to a gateway and its wires, in any order, an observer of the wire sees no law broken."""
 
+from math import inf
 from random import Random
 
 import pytest
@@ -82,3 +83,24 @@ def test_the_observer_sees_planted_violations(planted: bytes, invariant: str) ->
     observer.hear(planted, 0.1)
     with pytest.raises(AssertionError, match=invariant):
         observer.check(strict())
+
+
+def test_a_tick_asks_the_device_nothing_before_its_safe_voltage_is_out() -> None:
+    """An idle question that is due in the very tick would take 8 ms of the bound, at 9600 baud."""
+    wired = Wired(strict()).ready()
+    wired.write(0, ENABLE, 0, 0, 1, 0, 4000)
+    wired.run(2.0)
+    wired.exchange._next_poll_s = inf
+    wired.run(0.02)
+    assert wired.observer.settings[-1].voltage_v > 3.9
+    written: list[bytes] = []
+    write = wired.exchange._write
+    wired.exchange._write = lambda data: (written.append(data), write(data))  # type: ignore[assignment]
+    wired.is_cell_plugged = False
+    last_s = wired.loop.sample.time_s if wired.loop.sample else 0.0
+    while wired.state is not State.FAULT:
+        assert written == []
+        is_overdue = wired.now_s + 0.001 - last_s > wired.rig.control.supervision.sample_timeout_s
+        wired.exchange._next_poll_s = 0.0 if is_overdue else inf
+        wired.run(0.001)
+    assert written[0] == b"SET 0\r\n"

@@ -1,0 +1,86 @@
+"""What happens to a gateway, drawn from a seed: what masters of every kind ask, what fails in the world, what is done to the
+machine. Each event is whole by itself, so that any of them can be left out.
+"""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from random import Random
+
+from tests.simulation.masters import read_pdu, write_pdu
+
+FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "cell-frozen", "output-cut")
+
+
+@dataclass(frozen=True)
+class Event:
+    """At at_s after READY, `what` happens to `whom`, with these numbers."""
+
+    at_s: float
+    whom: str
+    what: str
+    numbers: tuple[float, ...] = ()
+    data: bytes = b""
+
+
+def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
+    """What happens, in its order: a little more than two events a second."""
+    chance, at_s = Random(seed), 0.0
+    while (at_s := at_s + chance.expovariate(2.2)) < duration_s:
+        yield _draw(chance, round(at_s, 4))
+
+
+def _draw(chance: Random, at_s: float) -> Event:
+    draw, master = chance.random(), chance.choice(("worker", "worker", "rival"))
+    if draw < 0.34:
+        return Event(
+            at_s, master, chance.choice(("hold", "hold", "hold", "take")), (round(chance.uniform(0.0, 66.0), 2),)
+        )
+    if draw < 0.46:
+        return Event(at_s, master, chance.choice(("reset", "let_go", "fall_silent", "disconnect")))
+    if draw < 0.62:
+        return Event(at_s, chance.choice(("worker", "rival", "fool")), "ask", data=_stupid(chance))
+    if draw < 0.68:
+        return Event(at_s, "villain", "send_raw", data=_hostile(chance))
+    if draw < 0.86:
+        return Event(at_s, "world", chance.choice(FAULTS), (float(chance.random() < 0.5),))
+    if draw < 0.92:
+        return Event(at_s, chance.choice(("output", "load_cell")), chance.choice(("pull", "push")))
+    what = chance.choice(("kill", "stop", "kill_guardian", "terminate", "disk_full", "disk_free", "clock_jump"))
+    return Event(at_s, "machine", what, (round(chance.uniform(0.005, 0.3), 4), chance.uniform(-1e6, 1e6)))
+
+
+def _stupid(chance: Random) -> bytes:
+    """A request that may be refused: any register, any value, any function."""
+    address = chance.choice(
+        (0, 0, 0, 1, 4, chance.randrange(0, 16), chance.randrange(100, 130), 200, 300, 416, 1000, 1147, 1500)
+    )
+    count = chance.choice((1, 1, 2, 5, 13, chance.randrange(1, 124)))
+    words = [chance.choice((0, 1, 2, 9, 33, 65535, chance.randrange(65536))) for _ in range(count)]
+    if address == 0 and words:
+        words[0] &= ~0x60  # runs of their own (bits 5 and 6) move without a master's lease, by right
+    function = chance.choice((3, 4, 1, 2, 5, 6, 15, 16, 16, 16, 22, 23, 43, 99))
+    if function == 16:
+        return write_pdu(address, *words)
+    if function == 6:
+        return struct.pack(">BHH", 6, address, words[0])
+    if function == 5:
+        return struct.pack(">BHH", 5, chance.choice((0, 1, 2, 3, 4)), chance.choice((0, 0xFF00, 0x1234)))
+    if function == 22:
+        return struct.pack(">BHHH", 22, address, 0xFF9F, chance.randrange(65536) & ~0x60 & 0xFFFF)
+    if function in (1, 2, 3, 4):
+        return struct.pack(">BHH", function, address, chance.choice((0, 1, 10, 125, 126, 65535)))
+    return bytes((function,)) + chance.randbytes(chance.randrange(0, 40))
+
+
+def _hostile(chance: Random) -> bytes:
+    whole = struct.pack(">HHHB", 7, 0, 6, 1) + read_pdu(100, 10)
+    return chance.choice(
+        (
+            chance.randbytes(chance.randrange(1, 400)),
+            whole[: chance.randrange(1, len(whole))],
+            whole * chance.randrange(2, 60),
+            struct.pack(">HHHB", 1, 0, 65535, 1),
+            struct.pack(">HHHB", 1, 9, 6, 1) + whole[7:],
+        )
+    )
