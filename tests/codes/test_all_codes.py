@@ -2,7 +2,6 @@
 
 import ast
 import re
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -29,12 +28,13 @@ def trees() -> tuple[tuple[str, ast.Module], ...]:
     return tuple((str(path.relative_to(ROOT)), ast.parse(path.read_text(encoding="utf-8"))) for path in paths)
 
 
-def texts_of(tree: ast.Module) -> Iterator[str]:
+@cache
+def texts_of(tree: ast.Module) -> tuple[str, ...]:
     """Strings that can reach somebody: no docstrings."""
-    comments = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in comments:
-            yield node.value
+    nodes = list(ast.walk(tree))
+    comments = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+    texts = [node for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    return tuple(str(node.value) for node in texts if id(node) not in comments)
 
 
 def raised_codes() -> set[str]:

@@ -24,7 +24,7 @@ from tests.simulation.processes import SimulatedService
 from tests.simulation.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 
 LEASE_S, STALL_S = 0.2, 0.1
-RATES_HZ = (20,) * 6 + (25,) * 3 + (100,)
+RATES_HZ = (20,) * 16 + (25,) * 3 + (100,)
 """Of loop and load cell, drawn for each seed: at 20 Hz a schedule takes half of the time, and its laws are the same."""
 HELD_N = 12.0
 IN_BAND_N = 1.0
