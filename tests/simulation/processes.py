@@ -32,6 +32,8 @@ BIRTH_S = 0.15
 """From the guardian's wish until a control process does its first thing."""
 SERVICE_RESTART_S = 2.0
 """Until a guardian that has ended or died is started again (RestartSec of the unit)."""
+MOST_TURNS = 100
+"""At one moment: a few things may happen at once."""
 _RIG_PID, _SIGNALS, _FIRST_PID = ((1 << 22) + number for number in range(3))  # above every process number of Linux
 
 
@@ -250,8 +252,10 @@ class SimulatedService:
         self._is_awake = False
         if self._timer:
             self._timer.cancel()
-        guardian = self._guardian
+        guardian, turns = self._guardian, 0
         while guardian:
+            turns += 1
+            assert turns <= MOST_TURNS, "the guardian spins: something is due, and it does nothing about it"
             if guardian._step() is not None:
                 self._end_guardian(guardian)
                 return

@@ -10,6 +10,7 @@ import contextlib
 import os
 import socket
 from collections.abc import Mapping, MutableMapping
+from math import inf
 from typing import Final
 
 _SHARE: Final = 3.0  # so many messages in the time after which systemd acts
@@ -26,6 +27,11 @@ class ServiceManager:
         self._watchdog_s = watchdog_s
         self._next_s = 0.0
 
+    @property
+    def feed_every_s(self) -> float:
+        """Time within which the next heartbeat is to be passed on, s; endless without a watchdog."""
+        return inf if self._watchdog_s is None else self._watchdog_s / _SHARE
+
     def ready(self, status: str) -> None:
         """Tell that the rig runs; from now on the loop's heartbeats are waited for."""
         self._say({"READY": "1", "STATUS": status} | self._bound(self._watchdog_s))
@@ -39,7 +45,7 @@ class ServiceManager:
         """Pass on a heartbeat of the loop, as often as the watchdog needs. heard_s: when it came, monotonic."""
         if self._watchdog_s is None or heard_s < self._next_s:
             return
-        self._next_s = heard_s + self._watchdog_s / _SHARE
+        self._next_s = heard_s + self.feed_every_s
         self._say({"WATCHDOG": "1"})
 
     def stopping(self) -> None:

@@ -142,7 +142,7 @@ class Guardian:
         deadlines = [self._deadline_s(), self.others.due_s]
         if self.stop_deadline_s is not None:
             deadlines.append(self.stop_deadline_s)
-        return max(0.0, min(deadlines) - self.clock())
+        return max(0.0, min(min(deadlines) - self.clock(), self.manager.feed_every_s))
 
     def _deadline_s(self) -> float:
         """Return when control is overdue, or to be started; never while a killed one is still there. Once we are told to stop
@@ -215,7 +215,7 @@ class Guardian:
         self.manager.feed(self.control.heartbeat.heard_s)
         now_s = self.clock()
         if self.stop_deadline_s is not None and now_s >= self.stop_deadline_s:
-            return self._on_death(Ending(EndCause.DIED, "it did not end in time"))
+            return self._on_death(Ending(EndCause.DIED, "control was not waited for any longer"))
         if now_s < self._deadline_s():
             return None
         process, heartbeat = self.control.process, self.control.heartbeat

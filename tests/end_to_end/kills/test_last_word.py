@@ -138,15 +138,21 @@ def test_an_unplugged_regulator_is_a_fault_and_its_successor_hears_the_safe_volt
     restarted(real)
 
 
-def test_what_ctrl_c_ramps_a_second_one_cuts(real, devices):
-    """15 N/s from 30 N would take two seconds."""
-    assert not real.write(0, 1, 3000, 0, 0, 0, 0).isError()
-    real.wait_until(lambda status: status["force_measured"] > 2700, within_s=8.0)
+def stopping(gateway: RunningGateway, devices: OwnDevices, signal_number: int) -> float:
+    """Press with 30 N, ask for a stop, and wait until the ramp has begun, which takes two seconds at 15 N/s. Returns when it
+    was asked for, s."""
+    assert not gateway.write(0, 1, 3000, 0, 0, 0, 0).isError()
+    gateway.wait_until(lambda status: status["force_measured"] > 2700, within_s=8.0)
     began_s = time.monotonic()
-    real.process.send_signal(signal.SIGINT)
+    gateway.process.send_signal(signal_number)
     while len({heard.voltage_v for heard in devices.settings_since(began_s)}) < 5:
         assert time.monotonic() - began_s < 2.0, "no ramp"
         time.sleep(0.005)
+    return began_s
+
+
+def test_what_ctrl_c_ramps_a_second_one_cuts(real, devices):
+    began_s = stopping(real, devices, signal.SIGINT)
     on_the_way = [heard.voltage_v for heard in devices.settings_since(began_s)]
     assert all(after <= before for before, after in pairwise(on_the_way))
     assert on_the_way[-1] > 0.5, "still on the ramp"
@@ -159,13 +165,7 @@ def test_what_ctrl_c_ramps_a_second_one_cuts(real, devices):
 
 def test_control_that_stands_still_on_the_last_ramp_is_answered_as_at_any_time(real, devices):
     """The ramp may take seconds; standing still may not."""
-    assert not real.write(0, 1, 3000, 0, 0, 0, 0).isError()
-    real.wait_until(lambda status: status["force_measured"] > 2700, within_s=8.0)
-    began_s = time.monotonic()
-    real.process.send_signal(signal.SIGTERM)
-    while len({heard.voltage_v for heard in devices.settings_since(began_s)}) < 5:
-        assert time.monotonic() - began_s < 2.0, "no ramp"
-        time.sleep(0.005)
+    stopping(real, devices, signal.SIGTERM)
     stopped_s = time.monotonic()
     os.kill(real.ready["pids"]["control"], signal.SIGSTOP)
     assert devices.until_safe(stopped_s) < 1.0, "140 ms; a busy machine may be late, but not the 5 s of a stop"

@@ -22,6 +22,8 @@ from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.profiles import load_rig
 from gateway.service.guardian_line import GuardianLine
+from gateway.service.running_rig.faces import Faces
+from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.end_to_end.own_devices import OwnDevices
 
@@ -87,6 +89,23 @@ def test_masters_do_not_wait_after_a_restart_for_a_device_that_is_silent(devices
     with_running_rig(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))
     assert time.monotonic() - began_s < 5.0, "a busy machine takes longer than the first moments, but not 6 s"
     assert devices.heard
+
+
+def test_the_guardian_is_told_that_the_last_safe_voltage_is_out_before_anything_else_is_closed(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From then on it misses no beat: the rest may take its time."""
+    done: list[str] = []
+
+    def note(name: str, owner: type, method: str) -> None:
+        was = getattr(owner, method)
+        monkeypatch.setattr(owner, method, lambda *arguments: (done.append(name), was(*arguments))[1])
+
+    note("safe voltage", RigPorts, "write_last")
+    note("told", GuardianLine, "note_safe")
+    note("faces closed", Faces, "close")
+    with_running_rig(devices, lambda rig, _: pressing(rig, devices))
+    assert done == ["safe voltage", "told", "faces closed"]
 
 
 def held(path: str) -> int:

@@ -3,10 +3,12 @@
 import math
 import os
 from collections.abc import Iterator
+from itertools import pairwise
 
 import pytest
 
 from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes.systemd.service_manager import ServiceManager
 from gateway.service.heartbeat_memory import HeartbeatMemory
 from tests.service.supervisor.guarded import Scene, port
 from tests.service.supervisor.scripted_children import assert_comes_up, lives, scene
@@ -58,6 +60,19 @@ def test_a_loop_that_beats_is_left_alone_and_looked_at_seldom(beating):
     one.run(lambda: one.now_s > 101.0)
     assert len(one.starter.started) == 1, one.said
     assert 9 <= len(looks) <= 14, "about once in 0.1 s, however often it beats"
+
+
+def test_a_service_manager_hears_of_the_loop_in_time_however_long_a_stall_may_last(beating):
+    one, memory = beating
+    one.guardian.control.heartbeat.stall_s = 20.0
+    one.guardian.manager = ServiceManager(watchdog_s=3.0)
+    fed: list[float] = []
+    one.guardian.manager._say = lambda words: fed.append(one.now_s)  # type: ignore[method-assign,assignment]
+    beat_while_it_waits(one, memory, 200.0)
+    one.run(lambda: one.now_s > 115.0)
+    assert len(one.starter.started) == 1, one.said
+    assert max(later - before for before, later in pairwise(fed)) < 3.0
+    assert len(fed) >= 5
 
 
 def test_silence_counts_from_the_last_beat(beating):
