@@ -96,6 +96,11 @@ def _role(extensions: bytes) -> str | None:
         for _, extension in _parts(listed):
             (_, kind), *rest = _parts(extension)
             if kind == _ROLE_OID_BYTES:
-                (tag, value), *_ = _parts(rest[-1][1])
-                return value.decode("utf-8") if tag == _UTF8 else ""
+                return _utf8_string(rest[-1][1])
     return None
+
+
+def _utf8_string(der: bytes) -> str:
+    """Empty for anything else: a role that cannot be read is none that is known, and the certificate still is one."""
+    is_one = len(der) >= 2 and der[0] == _UTF8 and der[1] == len(der) - 2
+    return der[2:].decode("utf-8", "backslashreplace") if is_one else ""

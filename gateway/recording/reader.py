@@ -134,10 +134,22 @@ def _header(data: memoryview, path: Path) -> tuple[dict[str, Any], int]:
         raise RecordingError(
             f"{path} has a damaged header (its CRC-32 differs): the rows cannot be understood without it"
         )
-    header = json.loads(bytes(document))
-    if header.get("format") != 1:
-        raise RecordingError(f"{path} is of format {header.get('format')}; this version reads format 1")
+    header = _said_by(bytes(document))
+    if header.get("format", 1) != 1:
+        raise RecordingError(f"{path} is of format {header['format']}; this version reads format 1")
+    names = header.get("columns")
+    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
+        raise RecordingError(f"{path} has a header without columns: zeros of a power cut, or another program's file")
     return header, start + length
+
+
+def _said_by(document: bytes) -> dict[str, Any]:
+    """Return what a header says; nothing, where it is none although its CRC-32 is right, as that of no bytes at all is."""
+    try:
+        said = json.loads(document)
+    except (ValueError, RecursionError):
+        return {}
+    return said if isinstance(said, dict) else {}
 
 
 def _all_batches(data: memoryview, offset: int, row_size: int) -> tuple[list[Batch], tuple[str, ...]]:

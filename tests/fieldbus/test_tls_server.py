@@ -15,7 +15,7 @@ from pymodbus.client import AsyncModbusTlsClient
 from gateway.fieldbus import ModbusTlsServer, ServerSettings, TlsSettings
 from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING
 from gateway.modbus import Peer, Role, pdu
-from gateway.modbus.certificate import read_certificate
+from gateway.modbus.certificate import ROLES, read_certificate
 from tests.certificates import Folder, serial_of, store_all
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
 from tests.fieldbus.conftest import NotingBank
@@ -220,6 +220,15 @@ def test_our_reading_of_a_certificate_is_that_of_openssl(folder: Folder) -> None
 
 def role_of(folder: Folder, name: str) -> str | None:
     return read_certificate(ssl.PEM_cert_to_DER_cert(Path(folder.crt(name)).read_text())).role
+
+
+@pytest.mark.parametrize("said", [b"\x0c\x08\xff\xfetpoint", b"\x0c\x03setpoint", b"\x13\x08setpoint"])
+def test_a_role_that_cannot_be_read_is_none_that_is_known(folder: Folder, said: bytes) -> None:
+    """No UTF-8, more than it says, another kind of string: it is a certificate all the same, refused for its role."""
+    der = ssl.PEM_cert_to_DER_cert(Path(folder.crt("setpoint")).read_text())
+    assert der.count(b"\x04\x0a\x0c\x08setpoint") == 1
+    shown = read_certificate(der.replace(b"\x04\x0a\x0c\x08setpoint", b"\x04\x0a" + said))
+    assert shown.role is not None and shown.role not in ROLES
 
 
 def test_no_bytes_break_the_reading(folder: Folder) -> None:

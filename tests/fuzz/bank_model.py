@@ -277,3 +277,11 @@ _ACTS = {
     6: BankModel.write_words, 15: BankModel.write_coils, 16: BankModel.write_words, 22: BankModel.mask,
     23: BankModel.read_write,
 }  # fmt: skip
+
+
+def assert_nothing_changed(before: bytes, now: bytes, pdu: bytes) -> None:
+    """Of the bank's image, but for the registers that tell of the refusal itself, in three faces."""
+    after = bytearray(now)
+    for first, size in ((118, 4), (268, 8), (368, 8)):
+        after[2 * first : 2 * (first + size)] = before[2 * first : 2 * (first + size)]
+    assert after == before, pdu.hex()

@@ -38,7 +38,7 @@ def noisy(chance: Random, frame: bytes, older: list[bytes]) -> bytes:
 
 @pytest.mark.parametrize("name", CELLS)
 def test_no_bytes_break_a_load_cell_or_its_host(name: str, examples: Callable[..., Examples]) -> None:
-    count, chance = examples("codec chunks", len(PROFILES), name)
+    count, chance = examples("codec chunks", len(CELLS) + len(OUTPUTS), name)
     profile, older = PROFILES[name], []
     host, device = cell_host(profile, unit=unit_of(profile)), cell_device(profile, unit_of(profile))
     held = held_bytes(host) + held_bytes(device)
@@ -69,7 +69,7 @@ def assert_next_counts(host: object, device: object, force_n: float) -> None:
 
 @pytest.mark.parametrize("name", OUTPUTS)
 def test_no_bytes_break_an_output_or_its_host(name: str, examples: Callable[..., Examples]) -> None:
-    count, chance = examples("codec chunks", len(PROFILES), name)
+    count, chance = examples("codec chunks", len(CELLS) + len(OUTPUTS), name)
     profile, asked, answered = PROFILES[name], [], []
     host, device = output_host(profile), output_device(profile)
     questions = [SetVoltage(5.0), *map(AskDevice, host.checks)]

@@ -11,9 +11,10 @@ from gateway.modbus.rtu_receiver import MOST_BYTES
 from gateway.profiles import load_register_map
 from gateway.registers import BankRules, RegisterBank
 from gateway.registers.words import ControlBit
-from tests.fuzz.bank_model import BankModel
+from tests.fuzz.bank_model import BankModel, assert_nothing_changed
 from tests.fuzz.conftest import PER_PUSH, Examples
 from tests.fuzz.damage import damaged, held_bytes, pieces
+from tests.fuzz.frame_model import crc, frames_of
 from tests.modbus.rtu_bus import SILENCE_S, Bus
 
 MAP = load_register_map("force-v1")
@@ -74,25 +75,6 @@ def test_the_examples_of_a_push_are_two_hundred_thousand() -> None:
 # -- MBAP
 
 
-def reference(stream: bytes) -> tuple[list[tuple[int, int, bytes]], bool]:
-    """Frames, and whether the framing was lost."""
-    frames, at = [], 0
-    while True:
-        head = stream[at : at + 6]
-        if len(head) >= 4 and head[2:4] != b"\0\0":
-            return frames, True
-        if len(head) < 6:
-            return frames, False
-        size = head[4] * 256 + head[5]
-        if size < 2 or size > 254:
-            return frames, True
-        if len(stream) < at + 6 + size:
-            return frames, False
-        body = stream[at + 6 : at + 6 + size]
-        frames.append((head[0] * 256 + head[1], body[0], body[1:]))
-        at += 6 + size
-
-
 def test_a_stream_of_anything_is_read_as_the_reference_reads_it(examples: Callable[..., Examples]) -> None:
     count, chance = examples("MBAP streams")
     lost_ones = 0
@@ -110,7 +92,7 @@ def test_a_stream_of_anything_is_read_as_the_reference_reads_it(examples: Callab
                 got, is_lost = [*got, *lost.frames], True
                 break
             assert len(framer) < 260
-        assert ([tuple(one) for one in got], is_lost) == reference(stream), stream.hex()
+        assert ([tuple(one) for one in got], is_lost) == frames_of(stream), stream.hex()
         lost_ones += is_lost
     assert lost_ones > 100
 
@@ -170,21 +152,13 @@ def test_the_bank_answers_any_request_as_the_reference_does(examples: Callable[.
         assert len(answer) <= 253
         codes[code] += 1
         if code:
-            assert_nothing_changed(before, bank, pdu)
+            assert_nothing_changed(before, bytes(bank._image.data), pdu)
         else:
             for base, size in ((0, 16), (200, 32), (300, 32)):
                 assert bank.read_registers(base, size) == model.face(base), f"{number}: {pdu.hex()}"
             assert bank.owner == model.owner
     assert held_bytes(bank) < 80_000
     assert all(codes[code] > count // 1000 for code in (0, 1, 2, 3, 6)), codes[:12]
-
-
-def assert_nothing_changed(before: bytes, bank: RegisterBank, pdu: bytes) -> None:
-    after = bytearray(bank._image.data)
-    if pdu[0] == 23 or after != before:
-        for first, size in ((118, 4), (268, 8), (368, 8)):  # the refusal registers, in three faces
-            after[2 * first : 2 * (first + size)] = before[2 * first : 2 * (first + size)]
-    assert after == before, pdu.hex()
 
 
 def test_the_short_way_answers_as_the_long_one() -> None:
@@ -201,16 +175,6 @@ def test_the_short_way_answers_as_the_long_one() -> None:
 # -- RTU
 
 
-def checksum(data: bytes) -> bytes:
-    """CRC-16 of Modbus, bit by bit."""
-    value = 0xFFFF
-    for byte in data:
-        value ^= byte
-        for _ in range(8):
-            value = value >> 1 ^ (0xA001 if value & 1 else 0)
-    return struct.pack("<H", value)
-
-
 def test_noise_on_a_bus_makes_no_request_and_costs_none(examples: Callable[..., Examples]) -> None:
     """Whatever is heard was on the wire with its checksum; and behind a silence the next request is heard."""
     count, chance = examples("RTU bursts")
@@ -218,12 +182,12 @@ def test_noise_on_a_bus_makes_no_request_and_costs_none(examples: Callable[..., 
     for number in range(count):
         pdu = struct.pack(">BHH", chance.choice((3, 4, 6)), chance.randrange(132), chance.randint(1, 100))
         ours = bytes((1,)) + pdu
-        ours += checksum(ours)
+        ours += crc(ours)
         burst = damaged(ours, chance) if chance.random() < 0.6 else chance.randbytes(chance.choice((1, 7, 40, 600)))
         for piece in pieces(burst, chance):
             bus.send(piece, pause_s=chance.choice((0.0, 0.0, 0.5 * SILENCE_S)))
             assert held_bytes(bus.receiver) < 2 * MOST_BYTES
         for heard in bus.requests():
             frame = bytes((heard.unit,)) + heard.pdu
-            assert frame + checksum(frame) in burst, f"{number}: {burst.hex()} was heard as {heard}"
+            assert frame + crc(frame) in burst, f"{number}: {burst.hex()} was heard as {heard}"
         assert pdu in [heard.pdu for heard in bus.send(ours).requests()], f"{number}: after {burst.hex()}"

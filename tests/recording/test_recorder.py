@@ -6,11 +6,13 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from zlib import crc32
 
 import numpy as np
 import pytest
 
 from gateway.recording import Recorder, RecordingError, list_recordings, read_recording
+from gateway.recording.layout import HEADER_PREFIX, MAGIC
 
 COLUMNS = ("time_s", "command_v", "force_n")
 HEADER = {"rig": "demo", "seed": 7, "rig_texts": {"demo.yaml": "name: demo\n# ü\n"}, "calibration": 3}
@@ -92,6 +94,19 @@ def test_a_damaged_header_is_refused_and_not_guessed(tmp_path: Path) -> None:
     path.write_bytes(data)
     with pytest.raises(RecordingError, match="damaged header"):
         read_recording(path)
+
+
+@pytest.mark.parametrize(
+    "document", [b"", b"[1]", b"nonsense", b'{"format":1}', b'{"format":1,"columns":[1]}', b"[" * 9000]
+)
+def test_a_header_that_says_nothing_is_refused_although_its_checksum_is_right(tmp_path: Path, document: bytes) -> None:
+    """Zeros behind the first block of a file, as a power cut may leave them, are such a header: the CRC-32 of nothing is 0."""
+    path = tmp_path / "recordings" / "0001.fgr"
+    path.parent.mkdir()
+    path.write_bytes(MAGIC + HEADER_PREFIX.pack(len(document), crc32(document)) + document + bytes(500))
+    with pytest.raises(RecordingError, match="a header without columns"):
+        read_recording(path)
+    assert "without columns" in list_recordings(tmp_path)[0].fault
 
 
 @pytest.mark.parametrize("content", [b"", b"time_s,force_n\n0,1\n", b"\x89FGR1\n\n", b"PAR1" * 20])
