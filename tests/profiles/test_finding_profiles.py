@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import gateway
-from gateway.profiles import ProfileError, check_report, find, list_shipped, load_rig
+from gateway.profiles import ProfileError, check_file, check_report, find, list_shipped, load_rig
 from tests.profile_files import load_device
 
 PROFILES = Path(__file__).parents[2] / "profiles"
@@ -96,3 +96,12 @@ def test_the_fingerprint_changes_with_every_text_that_was_read(tmp_path: Path) -
         seen.add(load_rig(rig).fingerprint)
     assert len(seen) == 1 + 1 + len(names)
     assert load_rig("demo").fingerprint == load_rig("demo").fingerprint
+
+
+def test_an_ending_that_none_has_is_told_readably(tmp_path: Path) -> None:
+    device = (PROFILES / "devices" / "hx711-line.yaml").read_text(encoding="utf-8")
+    changed = device.replace('terminator: "\\r\\n"', 'terminator: "\\n\\r"')
+    assert changed != device
+    (tmp_path / "any.yaml").write_text(changed, encoding="utf-8")
+    (fault,) = check_file(tmp_path / "any.yaml").faults
+    assert str(fault).endswith(r'terminator: "\n\r" is not one of "", "\r\n", "\r", "\n"')

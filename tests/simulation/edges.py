@@ -4,7 +4,8 @@ import asyncio
 import os
 from collections import deque
 from collections.abc import Callable
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar
 from weakref import WeakSet
@@ -12,32 +13,43 @@ from weakref import WeakSet
 import pytest
 
 from gateway.service.running_rig.running_rig import RunningRig
+from tests.disk.failing_disks import FailingDisk
+from tests.disk.watched_disk import watching
 from tests.simulation.cables import CABLES, SimulatedPort
 from tests.simulation.virtual_time import VirtualClock
 
 TWIN_STEP_S = 10e-3
 """The period of the fastest loop. At its own step of 1 ms the twin takes a third of the processor's time."""
+DISK_S = (0.001, 0.08)
+DONE_AT_ONCE_S = 0.04
 _RIG = "gateway.service.running_rig.running_rig"
 _SUPERVISOR = "gateway.service.supervisor"
 
 
 class SimulatedDisk:
-    """Stands for `DiskWorker`: what it is given is done at once, and told a little later, by the chance of the schedule."""
+    """Stands for `DiskWorker`: one thing after the other, which takes as long as the chance of the schedule says. Half of the
+    time it is done as it begins, else as it ends: where the process is killed in between it has happened, or not at all."""
 
     delay_s: Callable[[], float] = staticmethod(lambda: 0.005)
     is_full = False
+    folder = Path()
+    _free_s = 0.0
 
     def __call__(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
-        asyncio.get_running_loop().call_later(type(self).delay_s(), done, self._result(work))
+        loop, delay_s = asyncio.get_running_loop(), type(self).delay_s()
+        self._free_s = max(self._free_s, loop.time()) + delay_s
+        if delay_s < DONE_AT_ONCE_S:
+            loop.call_at(self._free_s, done, self._result(work))
+        else:
+            loop.call_at(self._free_s, lambda: done(self._result(work)))
 
     def begin(self, work: Callable[[], Any]) -> None:
         self._result(work)
 
     def _result(self, work: Callable[[], Any]) -> Any:
-        if type(self).is_full:
-            return OSError(28, os.strerror(28))
         try:
-            return work()
+            with watching(FailingDisk(self.folder, "full", 0)) if type(self).is_full else nullcontext():
+                return work()
         except Exception as error:
             return error
 

@@ -27,25 +27,33 @@ def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
     """What happens, in its order: a little more than two events a second."""
     chance, at_s = Random(seed), 0.0
     while (at_s := at_s + chance.expovariate(2.2)) < duration_s:
-        yield _draw(chance, round(at_s, 4))
+        event = _draw(chance, round(at_s, 4))
+        yield event
+        if event.what == "terminate" and chance.random() < 0.5:  # and it stands still on its way down
+            at_s = event.at_s + chance.uniform(0.0, 0.25)
+            yield Event(round(at_s, 4), "machine", "stop", (round(chance.uniform(0.05, 0.6), 4), 0.0))
 
 
 def _draw(chance: Random, at_s: float) -> Event:
     draw, master = chance.random(), chance.choice(("worker", "worker", "rival"))
-    if draw < 0.34:
+    if draw < 0.30:
         return Event(
             at_s, master, chance.choice(("hold", "hold", "hold", "take")), (round(chance.uniform(0.0, 66.0), 2),)
         )
-    if draw < 0.46:
-        return Event(at_s, master, chance.choice(("reset", "let_go", "fall_silent", "disconnect")))
-    if draw < 0.62:
+    if draw < 0.36:
+        return Event(at_s, master, chance.choice(("calibrate", "self_test", "self_test")))
+    if draw < 0.47:
+        return Event(at_s, master, chance.choice(("reset", "reset", "let_go", "fall_silent", "disconnect", "tare")))
+    if draw < 0.51:
+        return Event(at_s, "integrator", "upload", (float(chance.randrange(1, 500)),))
+    if draw < 0.64:
         return Event(at_s, chance.choice(("worker", "rival", "fool")), "ask", data=_stupid(chance))
-    if draw < 0.68:
+    if draw < 0.69:
         return Event(at_s, "villain", "send_raw", data=_hostile(chance))
     if draw < 0.86:
-        return Event(at_s, "world", chance.choice(FAULTS), (float(chance.random() < 0.5),))
+        return Event(at_s, "world", chance.choice(FAULTS), (float(chance.random() < 0.35),))
     if draw < 0.92:
-        return Event(at_s, chance.choice(("output", "load_cell")), chance.choice(("pull", "push")))
+        return Event(at_s, chance.choice(("output", "load_cell")), chance.choice(("pull", "push", "push")))
     what = chance.choice(("kill", "stop", "kill_guardian", "terminate", "disk_full", "disk_free", "clock_jump"))
     return Event(at_s, "machine", what, (round(chance.uniform(0.005, 0.3), 4), chance.uniform(-1e6, 1e6)))
 

@@ -11,9 +11,13 @@ from dataclasses import dataclass
 from tests.simulation.network import Line
 from tests.simulation.virtual_time import VirtualLoop
 
-ENABLE, RESET, TAKE = 1, 2, 8
+ENABLE, RESET, TARE, TAKE = 1, 2, 4, 8
+RUNS = {"calibrate": 32, "self_test": 64}
+"""Bits that start a run, which lasts while they stand."""
 BEATS_S = (0.08, 0.1, 0.15)
 """Time between two heartbeats of one that works: more than once within a lease of 0.2 s."""
+RESET_S = 0.3
+"""Until what a reset has changed is seen: some ticks."""
 WRITES = frozenset((5, 6, 15, 16, 22, 23))
 
 
@@ -126,9 +130,19 @@ class Master:
         self._beating += 1
         self._keep_beating(self._beating)
 
+    def run(self, name: str) -> None:
+        """Clear what is latched, start a run by its bit, and beat from now on."""
+        self.reset(take=True)
+        self._outside.call_later(RESET_S, self.hold, 0.0, RUNS[name])
+
+    def tare(self) -> None:
+        """Beside the bits that stand."""
+        self.ask(struct.pack(">BHH", 6, 0, self._control | TARE))
+
     def let_go(self) -> None:
         """Disable in words."""
         self._beating += 1
+        self._control = 0
         self._beat += 1
         self.ask(write_pdu(0, 0, 0, 0, 0, self._beat))
 
@@ -139,6 +153,7 @@ class Master:
     def reset(self, take: bool = False) -> None:
         """Reset faults, with a heartbeat of its own, and whatever somebody else has left in the other words of the block; take
         over, if asked."""
+        self._control = 0
         for control in (TAKE if take else 0, RESET):
             self._beat += 1
             self.ask(write_pdu(0, control, 0, 0, 0, self._beat, *[0] * 8))
@@ -179,3 +194,7 @@ class Master:
         del self.heard[:-64]
         if pdu[0] in WRITES:
             self._on_accepted(asked.control, asked.pdu)
+        self.note_answer(asked.pdu, pdu)
+
+    def note_answer(self, asked: bytes, answer: bytes) -> None:
+        """For those who want to know."""

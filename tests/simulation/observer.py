@@ -28,6 +28,8 @@ class Bounds:
     period_s: float
 
 
+RUN_BITS = 32 | 64
+DOWN_S = 4.0  # a run's end, whoever ends it, is a ramp down that needs no master; it takes this long at the most
 GRACE_S = 0.05  # and two periods: a tick decides nothing within one of a sample
 
 
@@ -47,6 +49,8 @@ class Observer:
     control_lost_s: float | None = None
     write_s: float = 0.0
     disabled_s: float | None = 0.0
+    is_run: bool = False
+    run_ended_s: float = -DOWN_S
     _line: bytes = b""
     _is_cut: bool = True
     _must_be_safe: bool = True
@@ -94,7 +98,11 @@ class Observer:
         self.write_s = now_s
         if control is None:
             return
-        if control == -1 or control & 1:
+        if control != -1:
+            if self.is_run and not control & RUN_BITS:
+                self.run_ended_s = now_s
+            self.is_run = bool(control & RUN_BITS)
+        if control == -1 or self.is_run or control & 1:
             self.disabled_s = None
         elif self.disabled_s is None:
             self.disabled_s = now_s
@@ -123,7 +131,8 @@ class Observer:
         self.note_cut(until_s)
 
     def note_disabled(self, now_s: float) -> None:
-        """Nobody may press from now on."""
+        """Nobody may press from now on, nor go down slowly."""
+        self.is_run, self.run_ended_s = False, now_s - DOWN_S
         if self.disabled_s is None:
             self.disabled_s = now_s
 
@@ -132,11 +141,12 @@ class Observer:
         if self.voltage_v <= 0.0 or self.output_lost_s is not None:
             return
         standing_s = now_s - self.setting_s
+        down_s = DOWN_S if self.is_run or now_s - self.run_ended_s < DOWN_S else 0.0
         limits = (
             ("I3 cell", self.cell_lost_s, self.bounds.sample_timeout_s),
             ("I3 control", self.control_lost_s, self.bounds.stall_s),
-            ("I3 master", self.write_s, self.bounds.lease_s),
-            ("I4", self.disabled_s, 0.0),
+            ("I3 master", self.write_s, self.bounds.lease_s + down_s),
+            ("I4", self.disabled_s, down_s),
         )
         for law, since_s, bound_s in limits:
             if self.control_lost_s is not None and law != "I3 control":

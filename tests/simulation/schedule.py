@@ -16,9 +16,10 @@ from gateway.profiles import Rig
 from gateway.service.simulation.world import SimulatedRig
 from tests.service.rigs import strict, with_supervision
 from tests.simulation.cables import CABLES, lay_cables
-from tests.simulation.edges import Log, SimulatedDisk, simulated_edges
+from tests.simulation.edges import DISK_S, Log, SimulatedDisk, simulated_edges
 from tests.simulation.events import FAULTS, Event
-from tests.simulation.masters import BEATS_S, ENABLE, TAKE, Master, read_pdu
+from tests.simulation.integrator import Integrator
+from tests.simulation.masters import BEATS_S, ENABLE, RUNS, TAKE, Master, read_pdu
 from tests.simulation.observer import STATUS_FIRST, STATUS_WORDS, Bounds, Observer
 from tests.simulation.processes import SimulatedService
 from tests.simulation.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
@@ -35,12 +36,13 @@ READ_S = 0.1
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was broken, and a fingerprint of everything that was on the output's wire."""
+    """What was broken, and a fingerprint of everything that was on the output's wire; commits: uploads that went through."""
 
     broken: tuple[str, ...]
     fingerprint: str
     settings: int
     largest_v: float
+    commits: int
 
 
 def simulated_rig(seed: int) -> Rig:
@@ -83,8 +85,8 @@ class Simulation:
             now_s=self.clock.now_s,
         )
         lay_cables(self.outside, rig, self._on_output, self.world.on_cell_bytes)
-        SimulatedDisk.is_full = False
-        SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(0.001, 0.08))
+        SimulatedDisk.is_full, SimulatedDisk.folder = False, folder
+        SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(*DISK_S))
         self.service = SimulatedService(rig, folder, self.outside, self.log, self.clock)
         self.service.on_death = self._on_death
         self.masters = {
@@ -98,9 +100,12 @@ class Simulation:
             for place, name in enumerate(("worker", "rival", "fool", "villain", "healer"), start=1)
         }
         self.reader = Master("10.0.0.9", self.outside, lambda: self.service.inside, lambda *_: None)
+        self.integrator = Integrator("10.0.0.8", self.outside, lambda: self.service.inside, lambda *_: None)
+        self.clients = (*self.masters.values(), self.reader, self.integrator)
         self.outside.call_later(0.3 * self.period_s, self._stream)
         self.outside.call_later(LOOK_S, self._look)
         self.outside.call_later(READ_S, self._read_status)
+        self.outside.call_later(READ_S, self.integrator.watch)
 
     def run(self, events: Iterable[Event], duration_s: float) -> Outcome:
         """Run the events, then heal everything, reset, and see the force come back."""
@@ -108,7 +113,7 @@ class Simulation:
         self._happen_next(iter(events))
         self._run_for(duration_s)
         self._heal()
-        for master in (*self.masters.values(), self.reader):
+        for master in self.clients:
             self.observer.broken += master.complaints
         self.observer.broken += self.log.internal_errors
         self.observer.fingerprint.update("\n".join(self.observer.broken).encode())
@@ -117,6 +122,7 @@ class Simulation:
             self.observer.fingerprint.hexdigest(),
             self.observer.settings,
             self.observer.largest_v,
+            self.integrator.committed,
         )
 
     def close(self) -> None:
@@ -140,6 +146,8 @@ class Simulation:
     def _happen(self, event: Event) -> None:
         if event.whom in self.masters:
             self._command(self.masters[event.whom], event)
+        elif event.whom == "integrator":
+            self.integrator.upload(event.numbers[0])
         elif event.whom == "world":
             self._set_fault(event.what, on=bool(event.numbers[0]))
         elif event.whom == "machine":
@@ -152,6 +160,8 @@ class Simulation:
     def _command(self, master: Master, event: Event) -> None:
         if event.what in ("hold", "take"):
             master.hold(event.numbers[0], ENABLE if event.what == "hold" else ENABLE | TAKE)
+        elif event.what in RUNS:
+            master.run(event.what)
         elif event.data:
             getattr(master, event.what)(event.data)
         else:
@@ -219,7 +229,7 @@ class Simulation:
     def _on_death(self) -> None:
         self.observer.note_death(self.clock.now_s, CABLES["output"].through_s)
         self._lose_control()
-        for master in (*self.masters.values(), self.reader):
+        for master in self.clients:
             master.lose()
         self.reader.heard.clear()
 

@@ -25,6 +25,8 @@ _SCALES: Final = (
 )
 _DECIMAL: Final = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
+_PLAIN: Final = re.compile(r"[\w.:/+ -]+")  # what reads well without quotes
+
 
 def _unit_start(key: str) -> int | None:
     """Index of the word where the unit begins that ends a key; None when it has none."""
@@ -163,11 +165,12 @@ def _kind_choice(value: Any, context: dict[str, Any], unit: str) -> str:
 
 def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
     choices = _choices(context["expected"])
-    value_text = value if isinstance(value, str) else quote_value(value)
+    value_text = value if isinstance(value, str) and _PLAIN.fullmatch(value) else quote_value(value)
     near = closest(value, choices) if isinstance(value, str) else _nearest(value, choices)
+    shown = [choice if _PLAIN.fullmatch(choice) else f'"{choice}"' for choice in choices]
     if len(choices) == 1:
-        return f"{value_text} is not {choices[0]}, the only choice"
-    return f"{value_text} is not one of {one_of(choices)}" + (f"; did you mean {near}?" if near else "")
+        return f"{value_text} is not {shown[0]}, the only choice"
+    return f"{value_text} is not one of {one_of(shown)}" + (f"; did you mean {near}?" if near else "")
 
 
 def _nearest(value: Any, choices: list[str]) -> str | None:

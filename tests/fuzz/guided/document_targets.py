@@ -31,7 +31,7 @@ def judge_profile(data: bytes) -> None:
     path = FOLDER / "any.yaml"
     path.write_bytes(data)
     checked = check_file(path)
-    assert all(fault.message and "\n" not in fault.message for fault in checked.faults)
+    assert all(fault.message and "\n" not in str(fault) for fault in checked.faults)
     assert checked.faults or checked.value is not None
 
 
