@@ -23,7 +23,7 @@ def main() -> None:
         for seed in target.seeds():
             (inputs / sha256(seed).hexdigest()[:16]).write_bytes(seed)
     found = f"-artifact_prefix={inputs.parent}/{name}-"
-    atheris.Setup([sys.argv[0], f"-max_len={target.longest}", found, *options, folder], target.judge)
+    atheris.Setup([sys.argv[0], f"-max_len={target.longest}", found, *options, folder], target.assert_lawful)
     atheris.Fuzz()
 
 

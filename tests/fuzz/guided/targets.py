@@ -7,9 +7,9 @@ from tests.fuzz.guided import coefficient_target, device_targets, document_targe
 
 
 class Target(NamedTuple):
-    """judge raises whatever it raises for an input that shows a defect; longest: bytes of an input that is tried."""
+    """assert_lawful: raises whatever it raises for an input that shows a defect; longest: bytes of an input that is tried."""
 
-    judge: Callable[[bytes], None]
+    assert_lawful: Callable[[bytes], None]
     seeds: Callable[[], list[bytes]]
     longest: int
 

@@ -26,15 +26,15 @@ def test_what_a_search_begins_with_breaks_no_law(name: str) -> None:
     target, chance = TARGETS[name], Random(f"15 {name}")
     seeds = target.seeds()
     for seed in seeds:
-        target.judge(seed)
+        target.assert_lawful(seed)
     for _ in range(TRIES.get(name, 150)):
-        target.judge(damaged(chance.choice(seeds), chance))
-    target.judge(b"")
+        target.assert_lawful(damaged(chance.choice(seeds), chance))
+    target.assert_lawful(b"")
 
 
 @pytest.mark.parametrize("name, found", FOUND)
 def test_what_a_search_has_found_stays_mended(name: str, found: str) -> None:
-    TARGETS[name].judge(bytes.fromhex(found))
+    TARGETS[name].assert_lawful(bytes.fromhex(found))
 
 
 def search(name: str, folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
