@@ -45,7 +45,7 @@ _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
 class Situation:
     """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; excuse: the
     machine, where that is the cause of it; line_fault: what the output line reports, with its code;
-    expected_n: force that the voltages of late still make, by the model;
+    expected_n: force that the voltages of late still make, by the model; repeats: that the load cell seems to be frozen;
     ramps_down: the force goes to 0, and then the output off."""
 
     now_s: float
@@ -58,6 +58,7 @@ class Situation:
     voltage_v: float
     applied_n: float
     expected_n: float
+    repeats: str
     ramps_down: bool
 
 
@@ -87,6 +88,7 @@ class Readiness:
             voltage_v=loop.voltage_v,
             applied_n=loop.applied_n,
             expected_n=loop.compute_expected_rise(),
+            repeats=self._parts.faults.repeats,
             ramps_down=machine.is_ramping_down or machine.is_stopping,
         )
 
@@ -215,6 +217,8 @@ class EdgeCheck:
             return f"{at.voltage_v:.2f} V are out: disable the output or set the force to 0 first"
         if not at.reading.is_fresh:
             return "no fresh load-cell sample"
+        if at.repeats:
+            return f"{at.reading.cell_n:.2f} N {at.repeats}: amplifier or cell is dead, its reading is no zero"
         if at.expected_n > self._conditioner.zero_spread_n:
             return f"about {at.expected_n:.1f} N are still on their way to 0: wait a moment"
         return self._conditioner.why_no_zero(self._commands.demand_by(command).gravity_n)

@@ -54,8 +54,8 @@ def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float) -
 def stuck_sentence(measured_n: float, limit_n: float) -> str:
     """Return W304: a force at the safe voltage."""
     return (
-        f"W304 {measured_n:.1f} N measured at the safe voltage, allowed {limit_n:.1f} N: stuck in contact, valve open or zero "
-        "moved; free the tool or tare"
+        f"W304 {measured_n:.1f} N measured at the safe voltage, allowed +-{limit_n:.1f} N: stuck in contact, valve open or "
+        "zero moved; free the tool or tare"
     )
 
 

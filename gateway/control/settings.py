@@ -104,7 +104,9 @@ class Supervision:
     frozen_equal_samples: Annotated[int, Ge(3)] | None = None  # where noise shows in every reading: so many equal ones
     unreachable_s: Annotated[float, Gt(0)] = 2.0  # held off the setpoint this long: target-unreachable
     response_lag_s: Annotated[float, Gt(0)] = 0.2  # voltage to force: delay and lags of the rig as one first-order lag
-    stuck_n: Annotated[float, Gt(0)] = 15.0  # measured at the safe voltage: stuck in contact, no enable
+    stuck_n: Annotated[float, Gt(0)] = (
+        15.0  # measured at the safe voltage, of either sign: stuck, or a wrong zero; no enable
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

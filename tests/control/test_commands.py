@@ -141,6 +141,22 @@ def test_a_tare_of_a_decaying_force_is_refused():
     assert bench.refused and "still on their way to 0" in bench.refused.text
 
 
+def test_a_tare_of_a_frozen_cell_is_refused():
+    """Its reading is no zero: once the cell lives again, every force would be wrong by it."""
+    bench = Bench(seed=3, noise_n=0.12)
+    bench.run(1.0)
+    bench.enable(12.0)
+    bench.run(6.0)
+    bench.cell_frozen = True
+    bench.disable()
+    bench.run(1.5)
+    bench.write(control_word=ControlBit.TARE)
+    assert bench.refused and "samples bit for bit" in bench.refused.text and "is no zero" in bench.refused.text
+    bench.cell_frozen = False
+    bench.run(1.0)
+    assert bench.write(control_word=ControlBit.TARE) and not bench.refused
+
+
 def test_stop_ramps_to_zero_within_the_time_and_ends_in_off():
     bench = enabled()
     bench.write(force_setpoint_n=40.0, force_ramp_n_per_s=5.0)
@@ -175,12 +191,14 @@ def test_stop_while_off_is_stopped_at_once():
     assert bench.controller.has_stopped
 
 
-def test_a_force_that_stays_at_the_safe_voltage_refuses_enable():
+@pytest.mark.parametrize("force_n", [22.0, -22.0])
+def test_a_force_that_stays_at_the_safe_voltage_refuses_enable(force_n: float):
+    """Below 0 the zero is wrong, and all that is pressed would be that much too much."""
     bench = Bench()
-    bench.alter_sample = lambda sample: replace(sample, force_n=22.0)
+    bench.alter_sample = lambda sample: replace(sample, force_n=force_n)
     output = bench.run(1.5)
     assert output.enable_block is RefusalReason.NOT_READY
-    assert sum(event.startswith("W304 22.0 N measured") for event in bench.events) == 1
+    assert sum(event.startswith(f"W304 {force_n} N measured") for event in bench.events) == 1
 
 
 def test_an_overloaded_cell_refuses_enable():

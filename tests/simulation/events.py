@@ -45,7 +45,7 @@ def _draw(chance: Random, at_s: float) -> Event:
     if draw < 0.47:
         return Event(at_s, master, chance.choice(("reset", "reset", "let_go", "fall_silent", "disconnect", "tare")))
     if draw < 0.51:
-        return Event(at_s, "integrator", "upload", (float(chance.randrange(1, 500)),))
+        return Event(at_s, "integrator", "upload")
     if draw < 0.64:
         return Event(at_s, chance.choice(("worker", "rival", "fool")), "ask", data=_stupid(chance))
     if draw < 0.69:

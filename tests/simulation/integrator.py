@@ -26,6 +26,7 @@ class Integrator(Master):
     committed = 0
     _first: bytes | None = None
     _sent: bytes | None = None
+    _mark = 0
 
     def watch(self) -> None:
         """Look at what is in use, from now on."""
@@ -33,11 +34,12 @@ class Integrator(Master):
         self._seen: list[bytes] = []
         self._look()
 
-    def upload(self, mark: float) -> None:
-        """Commit a set of which one number is another one than before."""
+    def upload(self) -> None:
+        """Commit a set of which one number is another one than ever before."""
         if self._first is None or self._sent is not None or not self.connect():
             return
-        words = with_mark(self._first, mark)
+        self._mark += 1
+        words = with_mark(self._first, self._mark)
         block = words[: 2 * HEAD_WORDS] + struct.pack(">H2xI", len(words) // 2, crc32(words)) + bytes(2)
         for address, part in ((0, block[:200]), (100, block[200:]), (TAIL_FROM, words[2 * HEAD_WORDS :])):
             self.ask(write_pdu(STAGING + address, *struct.unpack(f">{len(part) // 2}H", part)))

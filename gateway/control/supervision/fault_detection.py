@@ -101,14 +101,20 @@ class FaultDetector:
         self._response_fault = self._rise.judge(response, branch_share, touching, reading.interval_s)
 
     def observe_rest(self, reading: Reading) -> None:
-        """Measure how long a force stays at the safe voltage, while disabled."""
-        stuck = reading.is_usable and reading.contact_n > self._bounds.stuck_n
+        """Measure how long a force stays at the safe voltage, while disabled. Of either sign: behind a zero that was taken
+        under force the cell reads far below 0, and what is pressed then is that much too much."""
+        stuck = reading.is_usable and abs(reading.contact_n) > self._bounds.stuck_n
         self._stuck_s = self._stuck_s + reading.interval_s if stuck else 0.0
 
     @property
     def slow_words(self) -> str:
         """W234, empty where a frozen load cell is found soon."""
         return self._frozen.slow_words
+
+    @property
+    def repeats(self) -> str:
+        """Observation of a load cell that repeats itself for longer than a living one does; empty where it does not."""
+        return self._frozen.repeats
 
     @property
     def measured_n(self) -> float:

@@ -70,15 +70,22 @@ class StuckSensorCheck:
         must_have_moved = self._least_n - self._most_n > self._least_change_n + self._slack_n
         if self._same_s >= self._frozen_s and must_have_moved:
             return f"repeated for {self._same_s:.2f} s while the force must have changed"
-        if self._reported_limit is not None:
-            is_over = self._equal > self._reported_limit
-            return f"{self._repeats}, allowed {self._reported_limit} (frozen_equal_samples)" if is_over else ""
-        if self._equal >= self._noise.limit and self._equal_s >= self._frozen_s:
-            return f"{self._repeats}, while its noise has left at most {self._noise.longest} equal so far"
+        if self._reported_limit is not None or self._equal_s >= self._frozen_s:
+            return self.repeats
         return ""
 
     @property
-    def _repeats(self) -> str:
+    def repeats(self) -> str:
+        """Observation of more equal samples than a living cell gives, after however short a time; empty for fewer."""
+        if self._reported_limit is not None:
+            is_over = self._equal > self._reported_limit
+            return f"{self._counted}, allowed {self._reported_limit} (frozen_equal_samples)" if is_over else ""
+        if self._equal >= self._noise.limit:
+            return f"{self._counted}, while its noise has left at most {self._noise.longest} equal so far"
+        return ""
+
+    @property
+    def _counted(self) -> str:
         return f"repeated for {self._equal_s:.2f} s, {self._equal} samples bit for bit"
 
     @property
