@@ -61,6 +61,25 @@ def test_what_is_added_is_bounded() -> None:
     assert trend_after(lambda now_s: 49.0 * JUMP_N * now_s, 0.02, 0.5).ahead_n(1.0) == MOST_N
 
 
+@pytest.mark.parametrize("every_s", [0.0, 0.0002, 0.0015])
+def test_a_burst_of_values_is_no_path(every_s: float) -> None:
+    """As a network hands over what it has held back: 0.02 N to and fro in no time were continued by 4 N."""
+    trend = SetpointTrend()
+    for _ in range(50):
+        trend.advance(12.0, TICK_S)
+    added_n = [0.0]
+    for k in range(300):
+        trend.advance(12.0 + 0.01 * (k % 3), every_s)
+        added_n.append(abs(trend.ahead_n(AHEAD_S)))
+    assert max(added_n) <= 0.3
+
+
+@pytest.mark.parametrize("every_s", [0.01, 0.02, 0.05])
+def test_a_setpoint_that_flickers_is_hardly_continued(every_s: float) -> None:
+    trend = trend_after(lambda now_s: 12.0 + 0.01 * (round(now_s / every_s) % 2), every_s, 1.0)
+    assert abs(trend.ahead_n(AHEAD_S)) <= 0.15
+
+
 def test_a_restart_forgets_the_path() -> None:
     trend = trend_after(lambda now_s: 10.0 * now_s, 0.02, 1.0)
     trend.restart()
