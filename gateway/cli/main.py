@@ -113,8 +113,22 @@ def command(debug: bool) -> None:
     """Run one verb."""
 
 
+def _open_standard_streams() -> None:
+    """Open on nothing what we were started without (`>&-`). A lock, a port or the line to control would take that descriptor,
+    and what is printed, or a child's own stdout, would end up in it."""
+    for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest that is free
+            os.set_inheritable(descriptor, True)
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(descriptor, "w" if descriptor else "r", closefd=False))  # noqa: SIM115
+
+
 def main() -> None:
     """Run `force-gateway` or `python -m gateway`."""
+    _open_standard_streams()
     if "_FORCE_GATEWAY_COMPLETE" in os.environ:
         from gateway.cli.command_line.bash_completion import use_our_bash
 

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import logging
 import os
 import socket
 import threading
@@ -61,11 +62,22 @@ def serve_until_guardian_ends(source: str, arguments: list[str], serve: Serve) -
     exit_with_guardian(socket.socket(fileno=int(arguments[0])))
     options = json.loads(arguments[1])
     with EventLog(source=source, file=EventFile(Path(options["state"]))) as log:
+        _hear_libraries(log)
         try:
             asyncio.run(serve(options, log))
         except* (MissingExtraError, OSError) as failed:
             log("start", str(_first_of(failed)))
     return exit_codes.DEVICE
+
+
+def _hear_libraries(log: EventLog) -> None:
+    """Have what libraries log told as events, within the bounds of those: a server that is flooded says a line per caller."""
+
+    class Told(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            log("library", f"{record.name}: {self.format(record)}")
+
+    logging.basicConfig(handlers=[Told()], level=logging.WARNING, format="%(message)s", force=True)
 
 
 def _first_of(error: BaseException) -> BaseException:

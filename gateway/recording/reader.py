@@ -165,12 +165,21 @@ def _all_batches(data: memoryview, offset: int, row_size: int) -> tuple[list[Bat
 
 
 def _scan(data: memoryview, offset: int, row_size: int) -> Iterator[Batch | str]:
+    """Whole batches, each once and in their order: a number that is missing is said, unless its damaged bytes were."""
+    expected, is_told = 0, False
     while offset < len(data):
         batch = batch_at(data, offset, row_size)
         if batch is not None:
-            yield batch
-            offset = batch.end
+            if batch.number > expected and not is_told:
+                yield f"{batch.number - expected} batches before byte {offset} are missing: something was cut out"
+            if batch.number < expected:
+                yield f"batch {batch.number} at byte {offset} is there once more, or late, and was dropped"
+            else:
+                yield batch
+                expected = batch.number + 1
+            offset, is_told = batch.end, False
             continue
+        is_told = True
         following = _next_batch(data, offset, row_size)
         if following is None:
             yield f"torn tail: the last {len(data) - offset} bytes are not a whole batch and were dropped"

@@ -10,6 +10,7 @@ import logging
 import sys
 import time
 from datetime import UTC, datetime
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,6 +24,7 @@ from gateway.telemetry.sparkplug_payload import DataType, Value
 
 NAMESPACE: Final = "urn:force-gateway"
 LOOK_S: Final = 0.2
+_LONGEST_REQUEST: Final = 1 << 20  # bytes: a request for every variable has a hundredth of that
 _EMPTY: Final[dict[DataType, Value]] = {
     DataType.UINT64: 0,
     DataType.DOUBLE: 0.0,
@@ -75,10 +77,29 @@ class GatewayNodes:
         )
 
 
+def bound_requests(wire: Any) -> None:
+    """Have the library cut a client whose request is longer than any could be: it waits for as many bytes as a header says,
+    which may be 2 GB. wire: the module of its protocol."""
+
+    class BoundedProtocol(wire.OPCUAProtocol):  # type: ignore[misc]
+        _buffer: bytes
+
+        def data_received(self, data: bytes) -> None:
+            if len(self._buffer) + len(data) > _LONGEST_REQUEST:
+                self._buffer = b""
+                if self.transport is not None:
+                    self.transport.abort()
+                return
+            super().data_received(data)
+
+    wire.OPCUAProtocol = BoundedProtocol
+
+
 async def serve(options: dict[str, Any], log: EventLog) -> None:
     """Serve until the process ends. options: as the guardian gives them; settings: rig's name and where to listen."""
     asyncua = import_library("asyncua")
     logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # its log is for its developers
+    bound_requests(import_module("asyncua.server.binary_server_asyncio"))
     server = asyncua.Server()
     await server.init()
     settings = options["settings"]

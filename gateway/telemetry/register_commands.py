@@ -35,6 +35,7 @@ class RegisterCommands:
 
     async def _write(self, name: str, value: float) -> None:
         register = self._map.find(name)
+        register.check_meant(value)
         request = P.write_registers_request(register.address, register.encode(value))
         answer = await self._link.ask({"do": "modbus", "via": "mqtt", "unit": self._unit, "pdu": request.hex()})
         if P.is_exception(bytes.fromhex(answer["pdu"])):

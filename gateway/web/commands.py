@@ -99,10 +99,11 @@ class Commands:
         await self._set_bit(ControlBit.TAKE_OWNERSHIP)
 
     async def reset(self, viewer: str) -> None:
-        """Reset a latched fault: with setpoint 0, disabled, and another heartbeat, all in one write."""
+        """Reset a latched fault: with setpoint 0 and another heartbeat, all in one write. What stands in the control word
+        stays: in a fault nothing does, and where somebody presses again meanwhile this is refused, and stops nobody."""
         first, beat = self._find("control_word").address, self._find("heartbeat").address
         words = (await self.words("command"))[: beat + 1 - first]
-        words[0], words[self._find("force_setpoint").address - first] = int(ControlBit.RESET_FAULT), 0
+        words[0], words[self._find("force_setpoint").address - first] = words[0] | int(ControlBit.RESET_FAULT), 0
         words[-1] = self._number = words[-1] % 65535 + 1
         await self._send(P.write_registers_request(first, struct.pack(f">{len(words)}H", *words)))
         self._begin_to_beat(viewer)

@@ -139,12 +139,12 @@ def _api_routes(context: WebContext, commands: Commands, events: EventSource) ->
 def _command(context: WebContext, commands: Commands) -> Callable[[Request], Awaitable[Response]]:
     acts: dict[str, Act] = {
         "stop": lambda viewer, body: commands.stop(),
-        "enable": lambda viewer, body: commands.enable(viewer, float(body["force_n"])),
-        "setpoint": lambda viewer, body: commands.set_force(viewer, float(body["force_n"])),
+        "enable": lambda viewer, body: commands.enable(viewer, _number(body, "force_n")),
+        "setpoint": lambda viewer, body: commands.set_force(viewer, _number(body, "force_n")),
         "take-ownership": lambda viewer, body: commands.take_ownership(viewer),
         "reset": lambda viewer, body: commands.reset(viewer),
         "tare": lambda viewer, body: commands.tare(),
-        "record": lambda viewer, body: context.control.ask({"do": "record", "on": bool(body["on"])}),
+        "record": lambda viewer, body: context.control.ask({"do": "record", "on": _switch(body, "on")}),
     }
 
     async def command(request: Request) -> Response:
@@ -158,6 +158,21 @@ def _command(context: WebContext, commands: Commands) -> Callable[[Request], Awa
         return _answer({"ok": True} | (answer or {}))
 
     return command
+
+
+def _number(body: dict[str, Any], name: str) -> float:
+    value = body[name]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError(repr(name))
+    return float(value)
+
+
+def _switch(body: dict[str, Any], name: str) -> bool:
+    """Return true or false; "false" would count as true."""
+    value = body[name]
+    if not isinstance(value, bool):
+        raise TypeError(repr(name))
+    return value
 
 
 def _told(handler: Callable[[Request], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:

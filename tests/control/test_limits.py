@@ -1,5 +1,6 @@
 """Limits are named functions, refuse what is not finite, and hold for any pattern of calls."""
 
+from dataclasses import replace
 from math import inf, nan
 
 import pytest
@@ -92,3 +93,19 @@ def test_a_late_step_does_not_catch_up_in_one_jump():
     stage.earn(0.09)
     stage.drive(9.0)
     assert stage.voltage_v <= LIMITS.voltage_slew_v_per_s * 0.02 + 1e-9
+
+
+@pytest.mark.parametrize("safe_v", [0.0, 5.0])
+def test_the_safe_voltage_is_the_rigs_and_comes_at_once_from_either_side(safe_v):
+    """A tool that drops at 0 V has another one."""
+    stage = VoltageLimiter(replace(LIMITS, safe_voltage_v=safe_v))
+    assert stage.voltage_v == safe_v
+    stage.drive(0.0)
+    stage.make_safe()
+    assert stage.voltage_v == safe_v
+    for _ in range(100):
+        stage.earn(0.01)
+        stage.drive(9.0)
+    assert stage.voltage_v == 9.0
+    stage.make_safe()
+    assert stage.voltage_v == safe_v

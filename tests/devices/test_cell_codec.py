@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from gateway.devices import DeviceProfile, TemplateError, cell_device, cell_host, output_host
 from gateway.devices.exchange import ForceReading
 from gateway.devices.framing import LONGEST_LINE_BYTES
-from gateway.devices.messages import ForceSample, Garbage, Quality
+from gateway.devices.messages import ForceSample, Garbage, Quality, RepeatedSample
+from gateway.profiles import load_device
 
 FORCES = st.floats(-900.0, 900.0)
 
@@ -105,6 +106,27 @@ def test_the_rig_turns_the_sign(indicator: DeviceProfile) -> None:
     assert isinstance(turned, ForceSample)
     assert (as_wired.force_n, turned.force_n) == (9.80665, -9.80665)
     assert as_wired.raw == turned.raw == 1.0
+
+
+@pytest.mark.parametrize(("unit", "newtons"), [("kg", 98.0665), ("lb", 44.482216), ("g", 0.0980665), ("N", 10.0)])
+def test_the_unit_that_a_frame_says_counts_and_no_other(unit: str, newtons: float) -> None:
+    """Somebody has pressed the unit key of the indicator: 10 of whatever it says now are no 10 kg."""
+    (sample,) = cell_host(load_device("stream-st-gs")).receive(f"ST,GS,+0010.00{unit}\r\n".encode(), 1.0)
+    assert isinstance(sample, ForceSample) and sample.force_n == pytest.approx(newtons)
+
+
+def test_a_reading_that_the_device_calls_repeated_is_no_sample() -> None:
+    """It keeps a dead converter from looking alive."""
+    profile = load_device("stream-st-gs")
+    assert profile.stream
+    repeating = replace(
+        profile,
+        stream=replace(profile.stream, quality={"ST": Quality.OK, "US": Quality.REPEATED, "OL": Quality.OVERLOAD}),
+    )
+    host = cell_host(repeating)
+    assert host.receive(b"US,GS,+0010.00kg\r\n" * 2, 1.0) == [RepeatedSample()] * 2
+    assert isinstance(host.receive(b"ST,GS,+0010.00kg\r\n", 1.0)[0], ForceSample)
+    assert host.receive(b"US,GS,+0010.00kg\r\n", 2.0) == [RepeatedSample()], "known by heart, too"
 
 
 def test_one_count_of_the_display_in_newtons(indicator: DeviceProfile) -> None:

@@ -82,3 +82,11 @@ def test_a_registers_request_as_a_template(access: RegisterAccess, question: str
         assert access.question() == access.answer() == "060000{value:uint16}"
     else:
         assert (access.question(), access.answer()) == (question, answer)
+
+
+def test_a_frame_of_another_unit_is_none_of_ours() -> None:
+    """Two devices share a bus: what the other one measures is no force of ours."""
+    ours, other = rtu_frame(1, b"03021388"), rtu_frame(2, b"03020000")
+    lines = answers(1).feed(other + ours)
+    assert [line.is_whole for line in lines] == [False, True]
+    assert [line.data for line in lines] == [other, ours]

@@ -19,15 +19,39 @@ async def serve(options, log):
 sys.exit(serve_until_guardian_ends("mqtt", sys.argv[1:], serve))
 """
 
+FLOODED_LIBRARY = """
+import logging, sys
+from gateway.processes.beside_control import serve_until_guardian_ends
 
-def test_what_it_says_and_why_it_ends_are_events(tmp_path: Path) -> None:
+async def serve(options, log):
+    for _ in range(5000):
+        logging.getLogger("uvicorn.error").warning("Exceeded concurrency limit.")
+
+sys.exit(serve_until_guardian_ends("web", sys.argv[1:], serve))
+"""
+
+
+def say(tmp_path: Path, code: str) -> tuple[int, list[str]]:
+    """Exit code of such a process, and its lines on stderr."""
     guardian, link = socket.socketpair()
     with guardian, link:
-        options = json.dumps({"state": str(tmp_path)})
-        command = [sys.executable, "-c", BROKER_AWAY_THEN_END, str(link.fileno()), options]
+        command = [sys.executable, "-c", code, str(link.fileno()), json.dumps({"state": str(tmp_path)})]
         ended = subprocess.run(command, pass_fds=[link.fileno()], capture_output=True, text=True, check=False)
-    assert ended.returncode == exit_codes.DEVICE
-    away, why = ended.stderr.splitlines()
+    return ended.returncode, ended.stderr.splitlines()
+
+
+def test_a_library_that_logs_in_a_flood_fills_no_log(tmp_path: Path) -> None:
+    """A page that is asked for by more than it serves said a line for each of them, without time and without end."""
+    _, lines = say(tmp_path, FLOODED_LIBRARY)
+    assert 1 <= len(lines) <= 30
+    assert " info    library uvicorn.error: Exceeded concurrency limit." in lines[0]
+    assert "more lines" in lines[-1]
+
+
+def test_what_it_says_and_why_it_ends_are_events(tmp_path: Path) -> None:
+    code, lines = say(tmp_path, BROKER_AWAY_THEN_END)
+    assert code == exit_codes.DEVICE
+    away, why = lines
     assert " error   broker E181 the MQTT broker is away" in away and "Permission denied" in why
     kept = [json.loads(line) for line in (tmp_path / "events.jsonl").read_text().splitlines()]
     assert [(one["source"], one["cause"], one["code"]) for one in kept] == [

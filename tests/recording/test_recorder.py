@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from zlib import crc32
 
@@ -85,6 +86,24 @@ def test_a_flipped_bit_costs_its_own_batch_only(tmp_path: Path) -> None:
         assert recording.columns["force_n"].tolist() == [0, 1, 2, 6, 7, 8, 9, 10, 11]
         assert recording.truncated
         assert "damaged" in recording.notes[0]
+
+
+def test_batches_that_are_missing_repeated_or_moved_are_said(tmp_path: Path) -> None:
+    """Whole batches each, with a right CRC: their numbers tell, or a recording would jump in time and say nothing."""
+    path = record(tmp_path, batches=4)
+    data = path.read_bytes()
+    ends = batch_ends(data, len(COLUMNS))
+    head, batches = data[: ends[0]], [data[start:end] for start, end in pairwise(ends)]
+    for order, left, words in (
+        ((0, 1, 3), (0, 1, 3), "1 batches before byte"),
+        ((2, 3), (2, 3), "2 batches before byte"),
+        ((0, 1, 1, 2, 3), (0, 1, 2, 3), "batch 1 at byte"),
+        ((0, 2, 1, 3), (0, 2, 3), "batch 1 at byte"),
+    ):
+        path.write_bytes(head + b"".join(batches[number] for number in order))
+        recording = read_recording(path)
+        assert recording.columns["force_n"].tolist() == [3 * batch + row for batch in left for row in range(3)]
+        assert recording.truncated and any(words in note for note in recording.notes)
 
 
 def test_a_damaged_header_is_refused_and_not_guessed(tmp_path: Path) -> None:
@@ -228,6 +247,7 @@ def test_list_names_what_it_cannot_read(tmp_path: Path) -> None:
 
 _RECORDING_PROCESS = """
 import sys
+from itertools import pairwise
 from pathlib import Path
 from gateway.recording import Recorder
 recorder = Recorder(Path(sys.argv[1]), {"rig": "demo"}, ("time_s", "command_v", "force_n"))

@@ -78,6 +78,11 @@ def test_stop_ends_the_force_of_another_master_and_nothing_else_does(tmp_path: P
         wired.run(0.5)
         with pytest.raises(RefusedCommand, match=r"10\.0\.0\.5"):
             await commands.set_force("me", 20.0)
+        with pytest.raises(RefusedCommand, match=r"10\.0\.0\.5"):
+            await commands.reset("me")  # of a fault that another browser has reset, and the robot has enabled again
+        with pytest.raises(RefusedCommand, match=r"10\.0\.0\.5"):
+            await commands.tare()
+        wired.run(0.3)
         assert wired.state in (State.RAMPING, State.HOLDING)
         await commands.stop()
         wired.run(0.05)

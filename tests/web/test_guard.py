@@ -131,3 +131,19 @@ def test_a_page_without_its_gateway_says_so(app: Any) -> None:
     assert told.status == 503 and told.json["reason"] == "gone"
     assert answer(app, "POST", "/api/v1/command/explode", session_of(app)).status == 404
     assert answer(app, "POST", "/api/v1/command/enable", session_of(app), b'{"force_n": "x"}').status == 400
+
+
+@pytest.mark.parametrize(
+    ("name", "body"),
+    [
+        ("enable", b'{"force_n": true}'),
+        ("setpoint", b'{"force_n": "12"}'),
+        ("setpoint", b'{"force_n": null}'),
+        ("record", b'{"on": "false"}'),
+        ("record", b'{"on": 1}'),
+    ],
+)
+def test_a_value_of_another_kind_is_not_guessed_at(app: Any, name: str, body: bytes) -> None:
+    """`true` would press with 1 N, and "false" begin a recording."""
+    refused = answer(app, "POST", f"/api/v1/command/{name}", session_of(app), body)
+    assert refused.status == 400 and "of the wrong kind" in refused.json["error"]

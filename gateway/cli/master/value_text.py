@@ -14,11 +14,12 @@ from gateway.registers.writes.ownership import LARGEST_SERIAL_PLACE, serial_host
 def parse_value(register: Register, text: str) -> bytes:
     """Return the words for a value as typed; ValueError with a sentence."""
     if register.bits:
-        number: float = _bits(register, text)
+        number = _bits(register, text)
     elif register.values:
         number = _choice(register, text)
     else:
         number = _number(text, f"a number in {register.unit}" if register.unit else "a number")
+    register.check_meant(number)
     return encode_within(register, number)
 
 
@@ -74,7 +75,7 @@ def raw(reading: RegisterReading) -> str:
     return " ".join(f"{word:04X}" for word in reading.words)
 
 
-def _bits(register: Register, text: str) -> int:
+def _bits(register: Register, text: str) -> float:
     """Return a number, or names of bits joined by commas or plus signs."""
     bits = {_plain(name): bit for bit, name in register.bits.items()}
     number = 0
@@ -82,7 +83,9 @@ def _bits(register: Register, text: str) -> int:
         if _plain(word) in bits:
             number |= 1 << bits[_plain(word)]
         else:
-            number |= int(_number(word, f"a number or bits of {', '.join(register.bits.values())}", bits))
+            given = _number(word, f"a number or bits of {', '.join(register.bits.values())}", bits)
+            register.check_meant(given)
+            number |= int(given)
     return number
 
 

@@ -58,6 +58,13 @@ class Register:
         """1 / scale, a whole number: dividing by it rounds correctly where multiplying by 0.01 does not."""
         return round(1.0 / self.scale)
 
+    def check_meant(self, value: float) -> None:
+        """Check a value that a person or a program gives in place of words. ValueError where a bit, a choice or a count is
+        asked for by a fraction: rounded, 0.7 in control_word would enable and 1.5 reset."""
+        is_count = self.type != "float32" and self.scale == 1.0 and not self.unit
+        if (is_count or self.bits or self.values) and not float(value).is_integer():
+            raise ValueError(f"{self.name} = {value:g} is not a whole number")
+
     @property
     def decimals(self) -> int:
         """Digits after the point that people want to see of this quantity, the same in all blocks."""

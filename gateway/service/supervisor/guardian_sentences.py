@@ -5,6 +5,7 @@ import json
 import os
 import select
 import sys
+import threading
 from collections import Counter
 from typing import Any, Final
 
@@ -23,13 +24,21 @@ def print_error(sentence: str) -> None:
 
 
 def print_ready(what: str | dict[str, Any]) -> None:
-    """Print READY to stdout, for people or for a program. A reader that is gone (`| head -1`) is no reason to end."""
-    try:
-        sys.stdout.write((what if isinstance(what, str) else json.dumps(what)) + "\n")
-        sys.stdout.flush()
-    except (OSError, ValueError, AttributeError):
-        with contextlib.suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the flush at our own end fails as well
+    """Print READY to stdout, for people or for a program. A reader that is gone (`| head -1`) is no reason to end, and one that
+    reads nothing (a paused terminal, a full pipe) has it once it reads: until then a thread waits, and not the guardian."""
+    text = (what if isinstance(what, str) else json.dumps(what)) + "\n"
+    with contextlib.suppress(RuntimeError):  # no thread is to be had: nor is READY then
+        writer = threading.Thread(target=_write_out, args=(text.encode(errors="replace"),), daemon=True)
+        writer.start()
+        writer.join(_PATIENCE_S)
+
+
+def _write_out(data: bytes) -> None:
+    """Past Python's own buffer: what stayed in there would be flushed, and waited for, at the guardian's end."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        descriptor = sys.stdout.fileno()
+        while data:
+            data = data[os.write(descriptor, data) :]
 
 
 def restart_sentence(ending: Ending, how: str, acknowledged: bool | None) -> str:

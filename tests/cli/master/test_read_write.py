@@ -106,6 +106,9 @@ def test_values_are_written_as_people_say_them(text: str, words: tuple[int, tupl
         ("force_measured=1", "force_measured is read only"),
         ("mode=volts", "did you mean voltage?"),
         ("control_word=enabel", "did you mean enable?"),
+        ("control_word=1.5", "control_word = 1.5 is not a whole number"),
+        ("mode=0.6", "mode = 0.6 is not a whole number"),
+        ("heartbeat=0.5", "heartbeat = 0.5 is not a whole number"),
         ("force_setpoint=5000", "force_setpoint: 5000 N: allowed 0 .. 327.67 N"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import pi, sin
+from random import Random
 
 import pytest
 
@@ -59,6 +60,43 @@ def test_a_path_that_stops_is_followed_no_further_once_a_value_is_overdue() -> N
 
 def test_what_is_added_is_bounded() -> None:
     assert trend_after(lambda now_s: 49.0 * JUMP_N * now_s, 0.02, 0.5).ahead_n(1.0) == MOST_N
+
+
+@pytest.mark.parametrize("period", [3, 12])
+@pytest.mark.parametrize("every_s", [0.0, 0.0002, 0.0015])
+def test_a_burst_of_values_is_no_path(every_s: float, period: int) -> None:
+    """As a network hands over what it has held back: 0.02 N to and fro in no time were continued by 4 N."""
+    trend = SetpointTrend()
+    for _ in range(50):
+        trend.advance(12.0, TICK_S)
+    added_n = [0.0]
+    for k in range(300 if period == 3 else period):
+        trend.advance(12.0 + 0.01 * (k % period), every_s)
+        added_n.append(abs(trend.ahead_n(AHEAD_S)))
+    assert max(added_n) == 0.0
+
+
+@pytest.mark.parametrize("size_n", [0.01, 0.1, 1.0])
+@pytest.mark.parametrize("every_s", [0.01, 0.02, 0.05])
+def test_a_setpoint_that_goes_to_and_fro_is_not_continued(every_s: float, size_n: float) -> None:
+    """An analog input, or a master that regulates by itself: 12 and 13 N in turn, 20 times a second, made 15 N."""
+    for until_s in (1.0, 1.01, 1.02, 1.03):
+        trend = trend_after(lambda now_s: 12.0 + size_n * (round(now_s / every_s) % 2), every_s, until_s)
+        assert trend.ahead_n(AHEAD_S) == 0.0
+
+
+@pytest.mark.parametrize("every_s", [0.01, 0.02])
+@pytest.mark.parametrize("noise_n", [0.02, 0.1])
+def test_the_noise_of_a_setpoint_is_hardly_continued(every_s: float, noise_n: float) -> None:
+    """Of 0.1 N it made 4 N to and fro, and of a held force 1.6 N too little."""
+    rng = Random(5)
+    trend, added_n, written_n = SetpointTrend(), [], 12.0
+    for tick in range(2000):
+        if tick % round(every_s / TICK_S) == 0:
+            written_n = round(12.0 + rng.gauss(0.0, noise_n), 2)
+        trend.advance(written_n, TICK_S)
+        added_n.append(trend.ahead_n(AHEAD_S))
+    assert sum(one * one for one in added_n) / len(added_n) < (5.0 * noise_n) ** 2
 
 
 def test_a_restart_forgets_the_path() -> None:

@@ -202,3 +202,25 @@ def test_in_voltage_mode_it_is_switched_without_pressure_too() -> None:
     ((_, force_n, voltage_v),) = bench.switched
     assert voltage_v == 0.0 and force_n < 3.0
     assert bench.last.voltage_v == 3.0 and bench.last.force_measured_n < -5.0
+
+
+def test_a_disable_under_force_waits_until_the_force_has_left_before_it_dwells() -> None:
+    """The voltage is 0 at once then, and the pressure is not: 20 N leave in 0.4 s by the rig's lag."""
+    bench = ValveBench(dwell_s=0.3, safe=SafeDirection.PULL)
+    bench.run(1.0)
+    bench.enable(20.0)
+    bench.run(3.0)
+    bench.disable()
+    off_s = bench.now_s
+    bench.run(3.0)
+    at_s, _, voltage_v = bench.switched[-1]
+    assert bench.stands is PULL and voltage_v == 0.0
+    assert 0.3 + 0.4 <= at_s - off_s <= 1.0
+
+
+def test_under_pressure_nobody_is_told_to_move_the_valve() -> None:
+    bench = ValveBench()
+    bench.run(1.0)
+    bench.enable(12.0)
+    bench.run(2.0)
+    assert bench.last.voltage_v > 0.0 and bench.last.valve is None

@@ -256,3 +256,18 @@ def test_the_heartbeat_comes_from_the_loop_itself(devices: OwnDevices) -> None:
         guardian.setblocking(True)
 
     with_running_rig(devices, scene)
+
+
+def test_a_leaving_master_is_lost_if_it_is_the_owner_and_until_it_commands_again(devices: OwnDevices) -> None:
+    """A panel that closes its connection drops no force; a robot that connects anew in time has lost none."""
+
+    async def scene(rig: RunningRig, _: socket.socket) -> None:
+        await pressing(rig, devices)
+        rig._on_peer_closed(Peer("10.0.0.9", 40002))
+        assert rig.loop.owner_connected
+        rig._on_peer_closed(MASTER)
+        assert not rig.loop.owner_connected
+        rig.bank.write_registers(4, struct.pack(">H", 7), MASTER)
+        assert rig.loop.owner_connected
+
+    with_running_rig(devices, scene)

@@ -4,12 +4,16 @@ import math
 import os
 from collections.abc import Iterator
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.processes.systemd.service_manager import ServiceManager
 from gateway.service.heartbeat_memory import HeartbeatMemory
+from gateway.service.supervisor.child_process import Child
+from gateway.service.supervisor.heartbeat import Heartbeat
 from tests.service.supervisor.guarded import Scene, port
 from tests.service.supervisor.scripted_children import assert_comes_up, lives, scene
 
@@ -98,3 +102,15 @@ def test_what_a_dead_process_has_left_is_no_beat_of_the_next(beating):
     ready_s = one.guardian.control.heartbeat.heard_s
     assert one.run(lambda: len(one.starter.started) == 3) is None
     assert one.now_s == pytest.approx(ready_s + STALL_S)
+
+
+def test_a_guardian_that_wakes_late_waits_once_more_and_not_again() -> None:
+    """The machine stood still for both, or so it seems; a loop that is silent then is silent by itself."""
+    heartbeat, control = Heartbeat(), cast(Child, SimpleNamespace(counters=None))
+    heartbeat.stall_s = 0.1
+    heartbeat.record_beat(control, 10.0)
+    assert not heartbeat.is_overdue(10.09)
+    assert not heartbeat.is_overdue(10.5), "woken late"
+    assert heartbeat.is_overdue(10.9), "late again"
+    heartbeat.record_beat(control, 11.0)
+    assert not heartbeat.is_overdue(11.5), "after a beat it has that chance anew"

@@ -1,0 +1,51 @@
+"""What a sample means for control: new or not, fresh or not, too strong either way; and which samples a zero may be made of."""
+
+import pytest
+
+from gateway.control.sample_conditioning import SampleConditioner, at_time
+from gateway.control.settings import Supervision
+from gateway.devices.messages import ForceSample, Quality
+
+BOUNDS = Supervision(sample_timeout_s=0.05, saturation_n=96.0)
+
+
+def sample(force_n: float, time_s: float) -> ForceSample:
+    return ForceSample(force_n, force_n, Quality.OK, time_s)
+
+
+def test_a_sample_is_new_once_and_never_when_it_is_older_than_the_last() -> None:
+    """An interval below 0 would take back what supervision has counted."""
+    conditioner = SampleConditioner(BOUNDS)
+    conditioner.read(1.0, sample(5.0, 1.0), 0.0)
+    for time_s in (1.0, 0.99, 0.5):
+        again = conditioner.read(1.01, sample(5.0, time_s), 0.0)
+        assert not again.is_new and again.interval_s == 0.0
+    assert conditioner.read(1.02, sample(5.0, 1.02), 0.0).interval_s == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize("force_n", [96.0, -96.0])
+def test_a_saturated_cell_is_an_overload_pressed_or_pulled(force_n: float, direction: float) -> None:
+    conditioner = SampleConditioner(BOUNDS)
+    conditioner.direction = direction
+    reading = conditioner.read(1.0, sample(force_n, 1.0), 0.0)
+    assert reading.overload and not reading.is_usable
+    assert not conditioner.read(1.0, sample(0.99 * force_n, 1.01), 0.0).overload
+
+
+def test_a_reading_grows_old_between_two_steps_too() -> None:
+    """An edge that comes then is judged by the cell of then."""
+    reading = SampleConditioner(BOUNDS).read(1.04, sample(5.0, 1.0), 0.0)
+    assert reading.is_fresh and at_time(reading, 0.009, BOUNDS).is_fresh
+    later = at_time(reading, 0.02, BOUNDS)
+    assert not later.is_fresh and not later.is_new and later.age_s == pytest.approx(0.06)
+
+
+def test_a_zero_is_made_of_no_sample_from_before_a_gap() -> None:
+    conditioner = SampleConditioner(BOUNDS)
+    for k in range(20):
+        conditioner.read(1.0, sample(1.0, 1.0 + 0.01 * k), 0.0)
+    assert conditioner.why_no_zero(0.0) == ""
+    for k in range(3):
+        conditioner.read(9.0, sample(1.2, 9.0 + 0.01 * k), 0.0)
+    assert conditioner.why_no_zero(0.0).startswith("3 usable samples")
