@@ -106,6 +106,13 @@ NOTICES: Final = (
         "Make a new one with the same CA, put it into the rig file and start anew; clients keep theirs.",
     ),
     Explanation(
+        "W247",
+        "the rig's files have changed",
+        "Control was started again and goes on with the rig as the gateway was started with it; its files say something else.",
+        "Somebody has edited or removed them while the gateway ran.",
+        "force-gateway check RIG; end the gateway and start it again when the change is meant.",
+    ),
+    Explanation(
         "W304",
         "force at the safe voltage",
         "The output is at the safe voltage and the load cell still measures a force.",

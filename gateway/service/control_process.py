@@ -13,7 +13,7 @@ import socket
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from gateway.ports import PortError
 from gateway.processes import exit_codes, priority
@@ -45,6 +45,8 @@ def main(arguments: list[str]) -> int:
             if options["rtu"] is not None:
                 rig = with_rtu_face(rig, options["rtu"])
             notes = use_realtime() if options["realtime"] else ()
+            if changed := describe_change(rig, options):
+                log("start", changed)
             with asyncio.Runner(loop_factory=_loop_factory()) as runner:
                 return runner.run(run(rig, options, link, log, notes))
         except ProfileError as error:
@@ -67,12 +69,38 @@ def prepare(options: dict[str, Any]) -> None:
     """Prepare what takes long the first time: imports, and the types that the rig's files are checked against."""
     _loop_factory()
     with contextlib.suppress(ProfileError):  # told by the process that runs
-        load(options)
+        _read_at_start[_files_of(options)] = _read(options)
 
 
 def load(options: dict[str, Any]) -> Rig:
-    """Return the rig of these options. ProfileError with every fault of its files."""
+    """Return the rig of these options, as the gateway was started with it: what has become of its files meanwhile (an editor
+    that is half done, another limit) is for the next start. ProfileError with every fault of its files."""
+    return _read_at_start.get(_files_of(options)) or _read(options)
+
+
+def describe_change(rig: Rig, options: dict[str, Any]) -> str:
+    """Return W247 for a process that is started again when the rig's files are others by now; rig: what it uses."""
+    if options["restarted"] is None:
+        return ""
+    try:
+        if _read(options).fingerprint == rig.fingerprint:
+            return ""
+        now = "have changed"
+    except ProfileError as error:
+        now = f"have faults now ({error.faults[0]})"
+    return f"W247 the files of rig {rig.name} {now}: it goes on as it was started, a new start takes them"
+
+
+def _read(options: dict[str, Any]) -> Rig:
     return load_rig(options["rig"], simulated=options["simulate"])
+
+
+def _files_of(options: dict[str, Any]) -> tuple[str, bool]:
+    return options["rig"], options["simulate"]
+
+
+_read_at_start: Final[dict[tuple[str, bool], Rig]] = {}
+"""Filled in the process that control is forked from; empty in one that is started by itself."""
 
 
 def sample_ring(descriptor: int | None) -> SampleRing | None:

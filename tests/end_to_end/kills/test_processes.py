@@ -6,7 +6,8 @@ import time
 
 import psutil
 
-from tests.end_to_end.conftest import POLL_S
+from gateway.profiles import shipped_profiles_folder
+from tests.end_to_end.conftest import POLL_S, start, stop
 
 OFF = 0
 
@@ -81,3 +82,19 @@ def test_a_dead_guardian_takes_control_and_rig_with_it(running):
     running.process.kill()
     _, alive = psutil.wait_procs(children, timeout=5)
     assert not alive
+
+
+def test_a_rig_file_that_is_edited_meanwhile_is_for_the_next_start(tmp_path):
+    """Half done when control dies, as editors leave files: the gateway goes on as it was started, and says so."""
+    rig = tmp_path / "cell.yaml"
+    rig.write_text((shipped_profiles_folder() / "rigs" / "demo.yaml").read_text().replace("name: demo", "name: cell"))
+    gateway = start(tmp_path / "state", rig=str(rig))
+    try:
+        rig.write_text("name: cell\nlimits: {force_max_n: 6")
+        os.kill(gateway.ready["pids"]["control"], signal.SIGKILL)
+        assert reconnect(gateway)["state"] == OFF
+        assert "go" in gateway.said("W247 the files of rig cell have faults now")
+        gateway.next_ready()
+        pressing(gateway)
+    finally:
+        assert stop(gateway) == 0
