@@ -21,6 +21,7 @@ from gateway.profiles.strict_yaml.syntax import TooDeepError, syntax_sentence
 _PARSER: Final[Any] = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _LARGEST_BYTES: Final = 1 << 20
 _DEEPEST: Final = 32
+_NO_KEY: Final = "a key must be a word or a whole number"
 _TEXT_TAG: Final = "tag:yaml.org,2002:str"
 
 
@@ -182,15 +183,27 @@ class _Reader:
 
     def _key(self, event: Any, events: Iterator[Any], path: Path) -> str | int | None:
         """Return the key's value; None, with a fault noted, for one that no profile has."""
+        if isinstance(event, yaml.CollectionStartEvent):
+            _skip(events)  # of any depth: its keys may be such ones, too
+            self._fault(event, path, _NO_KEY)
+            return None
         known, mark = len(self.faults), self.marks[path]
         value = self._value(event, events, path, None)
         self.marks[path] = mark  # a key is no node of its own
         if isinstance(value, (str, int)) and not isinstance(value, bool) and len(self.faults) == known:
             return value
         if len(self.faults) == known:
-            self._fault(event, path, "a key must be a word or a whole number")
+            self._fault(event, path, _NO_KEY)
         return None
 
     def _fault(self, event: Any, path: Path, message: str) -> None:
         mark = event.start_mark
         self.faults.append(ProfileFault(self.file, mark.line + 1, mark.column + 1, path_text(path), message))
+
+
+def _skip(events: Iterator[Any]) -> None:
+    """Pass over the rest of a list or a mapping that has begun."""
+    depth = 1
+    while depth:
+        event = next(events)
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
