@@ -264,7 +264,7 @@ class ForceReading:
         """Number of digits behind the point of the cell's force, 0 for whole numbers."""
         number = self.template.field(FORCE)
         if self.modbus:
-            return self.modbus.decimals
+            return self.modbus.shown_decimals
         return number.decimals if isinstance(number, Decimals) else 0
 
     @property
