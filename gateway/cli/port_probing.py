@@ -60,6 +60,7 @@ def probe_line(line: "AnyLine") -> "PortReport":
     others = [one for one in known_profiles(line.device.role.value) if one.name != line.device.name]
     second = probe_path(line.port, others)
     second.heard = {**second.heard, **report.heard}
+    second.strangers = report.strangers + second.strangers
     return second
 
 
@@ -72,14 +73,23 @@ def _fits(line: "AnyLine", answer: "ProbeAnswer") -> bool:
     return answer.profile.name == line.device.name and answer.settings.baud == line.baud
 
 
-def tell_report(report: "PortReport", line: "AnyLine | None" = None) -> "Iterator[str]":
-    """Yield lines for people: what answered and how fast, or what was heard instead."""
+def tell_report(report: "PortReport", line: "AnyLine | None" = None, *, is_own_file: bool = False) -> "Iterator[str]":
+    """Yield lines for people: what answered and how fast, or what was heard instead. is_own_file: one device's file is asked
+    for, whose speed is then no rig's."""
     for answer in report.answers:
         yield from _tell_answer(answer)
+        if is_own_file and answer.settings != answer.profile.serial:
+            yield f"  the file says {answer.profile.serial}: correct it, or say `baud: {answer.settings.baud}` in the rig"
         if line and not _fits(line, answer):
             cure = f"write device: {answer.profile.name}, baud: {answer.settings.baud}, or exchange the ports"
             yield f"E113 the rig names {line.device.name} at {line.baud}: {cure}"
-    if not report.answers:
+    for other in () if report.answers else report.strangers:
+        known = ", ".join(map(str, other.profile.own_identity.models)) if other.profile.own_identity else ""
+        yield (
+            f"E113 {report.path}: a device answers {other.profile.name}'s question at {other.settings} and says that it is "
+            f"{other.said}, the profile knows {known}: another device, or a name to add to `models`"
+        )
+    if not report.answers and not report.strangers:
         yield f"E112 {report.path}: no known device answered; {_tell_heard(report)}"
     yield from _tell_latency(report)
 
@@ -152,6 +162,9 @@ def report_fields(report: "PortReport") -> dict[str, Any]:
                 "rate_hz": round(one.rate_hz, 2),
             }
             for one in report.answers
+        ],
+        "strangers": [
+            {"device": one.profile.name, "serial": str(one.settings), "said": one.said} for one in report.strangers
         ],
         "heard": {settings: len(data) for settings, data in report.heard.items()},
         "warning": report.warning,

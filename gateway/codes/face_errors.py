@@ -114,6 +114,13 @@ FACE_ERRORS: Final = (
         "openssl x509 -in FILE -noout -text, or openssl pkey -in FILE -noout, says what it is.",
     ),
     Explanation(
+        "E175",
+        "server certificate that no client would accept",
+        "The gateway's own certificate is not signed by the CA that the face names, or is made for a client.",
+        "Files of two runs of certs were mixed, or a client's .crt and .key stand where the gateway's belong.",
+        "Take gateway.crt and gateway.key that were made with this ca.crt; of two CAs, put both into one file as `ca`.",
+    ),
+    Explanation(
         "E176",
         "no TLS connection to the gateway",
         "The handshake failed, or the gateway closed the connection right after it.",

@@ -13,7 +13,7 @@ from annotated_types import Ge, Gt, Le, MinLen
 from gateway.defaults import STRICT
 from gateway.devices.binary.register_access import RegisterAccess, check_direction, templates_of
 from gateway.devices.binary.weight_registers import WeightRegisters
-from gateway.devices.fields import Choice, Decimals, RegisterNumber, TemplateError, WholeNumber
+from gateway.devices.fields import Choice, Decimals, HexNumber, RegisterNumber, TemplateError, WholeNumber
 from gateway.devices.messages import Quality
 from gateway.devices.template import Template, compile_template
 from gateway.units import NEWTON_PER_UNIT
@@ -264,7 +264,7 @@ class ForceReading:
         """Number of digits behind the point of the cell's force, 0 for whole numbers."""
         number = self.template.field(FORCE)
         if self.modbus:
-            return self.modbus.decimals
+            return self.modbus.shown_decimals
         return number.decimals if isinstance(number, Decimals) else 0
 
     @property
@@ -280,6 +280,8 @@ class ForceReading:
         if self.modbus:
             return self.modbus.largest_shown
         number = self.template.field(FORCE)
+        if isinstance(number, HexNumber):
+            return float(16**number.width - 1)
         width = number.width if isinstance(number, Decimals | WholeNumber) else 0
         if not width:
             return 999999.0
@@ -294,7 +296,7 @@ class ForceReading:
 
 def _check_reading(template: Template, reading: ForceReading) -> None:
     number = template.field(FORCE)
-    if not isinstance(number, Decimals | WholeNumber | RegisterNumber):
+    if not isinstance(number, Decimals | WholeNumber | HexNumber | RegisterNumber):
         raise TemplateError(f"{template.text!r} has no number {{force:...}}")
     if reading.blank_is_overload and (number.is_open or not isinstance(number, Decimals)):
         raise TemplateError(f"{template.text!r}: blank_is_overload needs decimals of fixed width")

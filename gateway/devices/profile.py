@@ -25,7 +25,7 @@ from gateway.devices.exchange import (
     Step,
     VoltageExchange,
 )
-from gateway.devices.fields import Choice, Decimals, Field, RegisterNumber, TemplateError, WholeNumber
+from gateway.devices.fields import Choice, Decimals, Field, HexNumber, RegisterNumber, TemplateError, WholeNumber
 from gateway.devices.line_settings import SerialSettings
 from gateway.devices.template import compile_template
 from gateway.devices.valve_profile import ValveReading, ValveSettings
@@ -35,6 +35,7 @@ TEMPLATE: Final = "template"
 ADDRESS: Final = "address"
 """Name of the constant that tells devices on one bus apart: of a Modbus device its unit."""
 
+_NUMBERS: Final = (WholeNumber, HexNumber, Decimals, RegisterNumber)
 _LONGEST_MODBUS_S: Final = 0.1  # later than this a Modbus answer is no use to a force loop
 _LARGEST_UNIT: Final = 255  # 247 by the specification; some devices take all that fit into a byte
 Terminator = Literal["", "\r\n", "\r", "\n"]
@@ -159,7 +160,7 @@ class DeviceProfile:
         fields = compile_template(template_text).fields
         numbers = [one for one in fields if one.name not in self.constants and not isinstance(one, Choice)]
         numbers = [one for one in numbers if one.name == VALUE] or numbers
-        if len(numbers) > 1 or any(not isinstance(one, WholeNumber | Decimals | RegisterNumber) for one in numbers):
+        if len(numbers) > 1 or any(not isinstance(one, _NUMBERS) for one in numbers):
             raise TemplateError(
                 f"{template_text!r} must carry one number beside constants and words; of several, call the one {{value:...}}"
             )

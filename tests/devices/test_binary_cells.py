@@ -5,7 +5,10 @@ from dataclasses import replace
 import pytest
 
 from gateway.devices import DeviceProfile, cell_device, cell_host
-from gateway.devices.binary.weight_registers import RegisterBit
+from gateway.devices.binary.register_access import WordOrder
+from gateway.devices.binary.rtu_framing import rtu_frame
+from gateway.devices.binary.weight_registers import RegisterBit, WeightRegisters
+from gateway.devices.exchange import ForceReading
 from gateway.devices.messages import ForceSample, Garbage, Quality
 from tests.profile_files import load_device
 
@@ -30,6 +33,28 @@ def test_what_an_amplifier_says_of_its_weight_is_heard(moving: DeviceProfile, qu
     assert (sample.quality, sample.time_s) == (quality, 1.5)
     if quality is not Quality.OVERLOAD:
         assert sample.force_n == pytest.approx(-12.0, abs=host.resolution_n)
+
+
+@pytest.mark.parametrize("order", ["abcd", "cdab"])
+def test_a_float_weight_is_not_rounded_to_whole_units(order: WordOrder) -> None:
+    """A float32 in kg with the point of its own: 1.25 kg, and a step of 1 mN or so, not of 9.81 N."""
+    profile = load_device("laumas-tlb")
+    registers = WeightRegisters(first=63, last=66, weight=63, type="float32", word_order=order)
+    reading = ForceReading(modbus=registers, unit="kg", rate_hz=100)
+    profile = replace(profile, read_force=reading)
+    host, device = cell_host(profile), cell_device(profile)
+    host.poll()
+    data = "3fa00000" if order == "abcd" else "00003fa0"
+    (sample,) = host.receive(rtu_frame(1, f"0308{data}00000000".upper().encode()), 0.0)
+    assert isinstance(sample, ForceSample)
+    assert sample.force_n == pytest.approx(1.25 * 9.80665)
+    assert host.resolution_n < 0.01
+    host.poll()
+    (sample,) = host.receive(device.frame(12.3), 1.0)
+    assert isinstance(sample, ForceSample)
+    assert sample.force_n == pytest.approx(12.3, abs=0.01)
+    with pytest.raises(ValueError, match="a float32 has its own point"):
+        replace(registers, decimals=2)
 
 
 def test_noise_between_values_is_counted_byte_for_byte() -> None:

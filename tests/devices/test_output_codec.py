@@ -1,5 +1,6 @@
 """Both ends of the regulator's wire against each other, and what a bad wire must not do."""
 
+from dataclasses import replace
 from math import inf, nan
 
 import pytest
@@ -7,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.devices import DeviceProfile, ValueRefused, output_device, output_host
+from gateway.devices.exchange import Refusals, VoltageExchange, VoltageRange
 from gateway.devices.messages import (
     Accepted,
     Garbage,
@@ -147,3 +149,28 @@ def test_a_pressure_beyond_the_sensor_reads_as_its_end(itv: DeviceProfile) -> No
     device = output_device(itv)
     assert device.reply(Pressure(2.0e6)) == b"1023\r\n"
     assert device.reply(Pressure(-1.0)) == b"0\r\n"
+
+
+def test_a_setting_in_hexadecimal_counts_is_spelled_and_read_back(itv: DeviceProfile) -> None:
+    """Bytes of Bronkhorst's ProPar ASCII protocol (manual 9.17.027): half of the setpoint's range, set and read."""
+    scale = VoltageRange(device=(0.0, 32000.0), voltage_v=(0.0, 10.0))
+    profile = replace(
+        itv,
+        constants={"address": 128},
+        set_voltage=VoltageExchange(
+            ask=":06{address:02X}010121{counts:04X}", answer=":04{address:02X}000005", range=scale
+        ),
+        read_voltage=VoltageExchange(
+            ask=":06{address:02X}0401210121", answer=":06{address:02X}020121{counts:04X}", range=scale
+        ),
+        read_pressure=None,
+        refusals=Refusals(),
+        steps=(),
+    )
+    host, device = output_host(profile), output_device(profile)
+    assert host.request(SetVoltage(5.0)) == b":06800101213E80\r\n"
+    assert device.receive(b":06800101213E80\r\n", 0.0) == [SetVoltage(5.0)]
+    assert host.receive(b":0480000005\r\n", 0.0) == [Accepted(5.0)]
+    assert host.request(ReadVoltage()) == b":06800401210121\r\n"
+    assert host.receive(b":06800201213E80\r\n", 0.0) == [Accepted(5.0)]
+    assert host.resolution_v == pytest.approx(10.0 / 32000.0)

@@ -25,7 +25,7 @@ def test_a_range_inside_one_block_is_read(bank, address, count):
 
 
 WRONG = [
-    (0, 18, "W202 addresses 0 .. 17 is not in one block"),
+    (0, 18, "W202 addresses 0 .. 17 are not in one block"),
     (0, 17, "W203 addresses 0 .. 16 ends one past its block"),
     (1, 16, "W203"),
     (16, 1, "W203"),

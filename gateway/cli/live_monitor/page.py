@@ -54,7 +54,8 @@ def _header(view: View) -> list[Text]:
         return flow_lines([StyledWords(" ".join(words), "bold white on red", is_sentence=True)], view.width)
     state = track.value("state")
     known = State(int(state)) if not isnan(state) and int(state) in set(State) else None
-    parts = [StyledWords(f" {known.name if known else '?'} ", _STATE_STYLE[known] if known else "")]
+    name, style = (known.name, _STATE_STYLE[known]) if known is not None else ("?", "")
+    parts = [StyledWords(f" {name} ", style)]
     if known is State.CALIBRATING:
         parts.append(StyledWords(_describe_run(track), "bold"))
     else:

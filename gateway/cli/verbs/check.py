@@ -59,7 +59,7 @@ def _probe(checked: "Checked", port: str | None, *, is_quiet: bool) -> tuple[boo
         click.echo(f"{'probe':<12} {probing.HARMLESS}")
     if checked.kind == "device" and port:
         report = probing.probe_path(port, [checked.value], probing.PATIENCE_S)
-        _tell("device", probing.tell_report(report), is_quiet=is_quiet)
+        _tell("device", probing.tell_report(report, is_own_file=True), is_quiet=is_quiet)
         return bool(report.answers), {"device": probing.report_fields(report)}
     if checked.kind != "rig":
         raise CliError(

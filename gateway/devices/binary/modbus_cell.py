@@ -44,7 +44,7 @@ class ModbusCellDevice(TemplateCellDevice):
 
     def _tell_registers(self, values: dict[str, Value], quality: Quality) -> None:
         registers, raw = self._registers, float(values[FORCE])
-        weight = round(raw * 10.0**registers.decimals) if not registers.type.startswith("float") else raw
+        weight = raw if registers.is_float else round(raw * 10.0**registers.decimals)
         if abs(raw) > registers.largest_shown or (weight < 0 and not registers.is_signed):
             raise ValueRefused(f"{raw} is more than the amplifier shows")
         values[FORCE] = abs(weight) if registers.negative else weight

@@ -16,6 +16,7 @@ FORCE: Final = "force"
 MOST_REGISTERS: Final = 32  # of a request: what small amplifiers answer at a time
 
 _WORDS: Final[dict[RegisterType, int]] = {"uint16": 1, "int16": 1, "uint32": 2, "int32": 2, "float32": 2}
+_FLOAT_DECIMALS: Final = 4
 _LARGEST: Final[dict[RegisterType, float]] = {
     "uint16": 65535.0,
     "int16": 32767.0,
@@ -45,7 +46,7 @@ class WeightRegisters:
     weight: Annotated[int, Ge(0), Le(65535)]  # register of the weight, of its first where it has two
     type: RegisterType = "int16"  # what the weight is
     word_order: WordOrder = "abcd"  # of a weight in two registers: abcd is the high word first
-    decimals: Annotated[int, Ge(0), Le(6)] = 0  # of the weight: 2 means that 1234 is 12.34
+    decimals: Annotated[int, Ge(0), Le(6)] = 0  # of a weight in whole numbers: 2 means that 1234 is 12.34
     negative: RegisterBit | None = None  # set: the weight is negative
     overload: tuple[RegisterBit, ...] = ()  # any one set: no weight to rely on, counts as over-force
     unstable: tuple[RegisterBit, ...] = ()  # any one set: in motion
@@ -56,6 +57,8 @@ class WeightRegisters:
         for name, register, words in self._wanted():
             if not self.first <= register <= self.last + 1 - words:
                 raise ValueError(f"{name}: register {register} is not within first..last = {self.first}..{self.last}")
+        if self.is_float and self.decimals:
+            raise ValueError("decimals are of whole numbers: a float32 has its own point, leave them out")
         taken = range(self.weight, self.weight + _WORDS[self.type])
         if any(register in taken for name, register, _ in self._wanted() if name != "weight"):
             raise ValueError("a bit of the weight's own register is no sign and no state")
@@ -74,6 +77,16 @@ class WeightRegisters:
     def is_signed(self) -> bool:
         """Decide whether the weight can be negative."""
         return self.negative is not None or not self.type.startswith("uint")
+
+    @property
+    def is_float(self) -> bool:
+        """Decide whether the weight carries its own point."""
+        return self.type == "float32"
+
+    @property
+    def shown_decimals(self) -> int:
+        """Decimals that a reading has: of a float32 as many as it tells apart at a hundred units."""
+        return _FLOAT_DECIMALS if self.is_float else self.decimals
 
     @property
     def largest_shown(self) -> float:

@@ -17,6 +17,8 @@ from gateway.profiles.rigs.faces import TlsFace
 from gateway.profiles.rigs.network_checks import is_loopback
 
 SOON_DAYS: Final = 30
+_PURPOSE: Final = 26  # X509_V_ERR_INVALID_PURPOSE
+_FLIGHTS: Final = 3  # of a handshake: hello, certificate, end
 _MAKE: Final = "`force-gateway certs DIR` makes a CA, a server and clients"
 
 
@@ -76,33 +78,52 @@ def _unreadable(path: str, face: TlsFace) -> Found:
 
 
 def _unfit(path: str, face: TlsFace) -> Found:
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    server, client = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER), ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     try:
-        context.load_cert_chain(face.certificate, face.key, password=lambda: b"")
+        server.load_cert_chain(face.certificate, face.key, password=lambda: b"")
     except (ssl.SSLError, OSError, ValueError) as error:
-        if isinstance(error, ssl.SSLError) and error.reason == KEY_MISMATCH:
-            yield (
-                f"{path}.key",
-                f"E172 {face.key} does not fit {face.certificate}: take the two that were made together",
-            )
-        else:
-            yield (
-                f"{path}.certificate",
-                f"E174 {face.certificate} with {face.key} cannot be used: {_reason(error)}; {_MAKE}",
-            )
+        yield _unfit_key(path, face, error)
+        return
     try:
-        context.load_verify_locations(face.ca)
+        client.load_verify_locations(face.ca)
     except (ssl.SSLError, OSError) as error:
         yield f"{path}.ca", f"E174 {face.ca} cannot be used: {_reason(error)}; {_MAKE}"
+        return
     shown, now = _certificate(face.certificate), _text(datetime.now(UTC))
     if shown and now > shown.ends:
-        yield (
-            f"{path}.certificate",
-            f"E173 {face.certificate} expired on {_day(shown.ends)}: no client would connect; {_MAKE}",
-        )
+        cure = f"no client would connect; {_MAKE}"
+        yield f"{path}.certificate", f"E173 {face.certificate} expired on {_day(shown.ends)}: {cure}"
     elif shown and now < shown.begins:
         cure = "look at this machine's clock, or wait"
         yield f"{path}.certificate", f"E173 {face.certificate} is not valid before {_day(shown.begins)}: {cure}"
+    elif why := _refusal(server, client):
+        cure = f"no client that trusts {face.ca} would connect; {_MAKE}"
+        yield f"{path}.certificate", f"E175 {face.certificate} {why}: {cure}"
+
+
+def _unfit_key(path: str, face: TlsFace, error: Exception) -> tuple[str, str]:
+    if isinstance(error, ssl.SSLError) and error.reason == KEY_MISMATCH:
+        return f"{path}.key", f"E172 {face.key} does not fit {face.certificate}: take the two that were made together"
+    what = f"E174 {face.certificate} with {face.key} cannot be used: {_reason(error)}; {_MAKE}"
+    return f"{path}.certificate", what
+
+
+def _refusal(server: ssl.SSLContext, client: ssl.SSLContext) -> str:
+    """Shake hands in memory, as a client will that has the CA's file; return why it would refuse, empty where it would not."""
+    client.check_hostname = False  # by which name it will be reached, nobody knows here
+    to_client, to_server = ssl.MemoryBIO(), ssl.MemoryBIO()
+    ends = (client.wrap_bio(to_client, to_server), server.wrap_bio(to_server, to_client, server_side=True))
+    for end in ends * _FLIGHTS:
+        try:
+            end.do_handshake()
+        except ssl.SSLWantReadError:
+            continue
+        except ssl.SSLCertVerificationError as error:
+            is_purpose = error.verify_code == _PURPOSE
+            return "is not one for a server (a client's?)" if is_purpose else "is not signed by the CA of this face"
+        except ssl.SSLError:  # nothing that the files are to blame for
+            break
+    return ""
 
 
 def _certificate(file: str) -> PeerCertificate | None:

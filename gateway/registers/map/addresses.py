@@ -20,7 +20,8 @@ def no_such_address(blocks: Sequence[Block], address: int, count: int) -> Refusa
     if shifted := _explain_shift(blocks, address, count):
         return Refusal(OFF_BY_ONE, address, shifted)
     ranges = ", ".join(f"{block.first}-{block.last}" for block in blocks)
-    elsewhere = f"{_range(address, count)} is not in one block; blocks are {ranges}"
+    verb = "is" if count == 1 else "are"
+    elsewhere = f"{_range(address, count)} {verb} not in one block; blocks are {ranges}"
     return Refusal(RefusalReason.ADDRESS, address, _explain_name_as_address(address) or elsewhere)
 
 

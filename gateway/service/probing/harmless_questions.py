@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.devices import DeviceProfile, DeviceRole, ValveDirection, ValveHost, cell_host, output_host
+from gateway.devices.device_checks.spelling import CheckSpelling
 from gateway.devices.exchange import UNIT
+from gateway.devices.grammar import Grammar
 from gateway.devices.messages import (
     Accepted,
-    AskDevice,
     DeviceAnswer,
     DeviceStep,
     ForceSample,
@@ -26,13 +27,20 @@ from gateway.devices.messages import (
 _MEANS_SOMETHING: Final = (Accepted, Pressure, ForceSample, RepeatedSample)
 
 
+def _nobody(received: bytes) -> str:
+    return ""
+
+
 @dataclass(frozen=True, slots=True)
 class HarmlessQuestion:
     """data: bytes to send, empty for a stream; understands: whether the bytes that came since are the right answer, and what
-    it says, empty where they are not."""
+    it says, empty where they are not. stranger: what the device calls itself where it is another one, else empty. is_enough:
+    its answer alone tells the device; else the next question is asked as well."""
 
     data: bytes
     understands: Callable[[bytes], str]
+    stranger: Callable[[bytes], str] = _nobody
+    is_enough: bool = True
 
 
 def harmless_questions(profile: DeviceProfile) -> Iterator[HarmlessQuestion]:
@@ -40,17 +48,40 @@ def harmless_questions(profile: DeviceProfile) -> Iterator[HarmlessQuestion]:
     if profile.role is DeviceRole.OUTPUT:
         yield from _of_output(profile)
     elif profile.role is DeviceRole.LOAD_CELL:
-        yield _of_cell(profile)
+        yield from _of_cell(profile)
     else:
         yield _of_valve(profile)
 
 
 def _of_output(profile: DeviceProfile) -> Iterator[HarmlessQuestion]:
-    questions: list[OutputRequest] = [AskDevice(DeviceStep.IDENTITY)] if profile.own_identity else []
-    questions += [ReadVoltage()] if profile.read_voltage else []
+    if profile.own_identity:
+        yield _who_it_is(profile, is_enough=True)
+    questions: list[OutputRequest] = [ReadVoltage()] if profile.read_voltage else []
     questions += [ReadPressure()] if profile.read_pressure else []
     for question in questions:
         yield HarmlessQuestion(output_host(profile).request(question), _understand_output(profile, question))
+
+
+def _who_it_is(profile: DeviceProfile, *, is_enough: bool) -> HarmlessQuestion:
+    grammar = Grammar(profile)
+    spelling = CheckSpelling(grammar)
+
+    def answer(received: bytes) -> DeviceAnswer | None:
+        answers = (
+            spelling.answer(DeviceStep.IDENTITY, grammar.body(line)) for line in grammar.answers().feed(received)
+        )
+        return next((one for one in answers if one), None)
+
+    def understands(received: bytes) -> str:
+        found = answer(received)
+        return f"it says that it is {found.text}" if found and found.is_right else ""
+
+    def stranger(received: bytes) -> str:
+        found = answer(received)
+        return found.text if found and not found.is_right else ""
+
+    data = grammar.question_line(spelling.ask(DeviceStep.IDENTITY))
+    return HarmlessQuestion(data, understands, stranger, is_enough)
 
 
 def _understand_output(profile: DeviceProfile, question: OutputRequest) -> Callable[[bytes], str]:
@@ -71,27 +102,23 @@ def _of_valve(profile: DeviceProfile) -> HarmlessQuestion:
     return HarmlessQuestion(ValveHost(profile).request(None), understands)
 
 
-def _of_cell(profile: DeviceProfile) -> HarmlessQuestion:
+def _of_cell(profile: DeviceProfile) -> Iterator[HarmlessQuestion]:
+    if profile.own_identity and profile.read_force:
+        yield _who_it_is(profile, is_enough=False)
     unit = None if profile.reading.newton_per_unit or profile.reading.template.field(UNIT) else "N"
 
     def understands(received: bytes) -> str:
         return _first_words(cell_host(profile, unit=unit).receive(received, 0.0))
 
-    return HarmlessQuestion(cell_host(profile, unit=unit).poll(), understands)
+    yield HarmlessQuestion(cell_host(profile, unit=unit).poll(), understands)
 
 
 def _first_words(messages: Sequence[object]) -> str:
-    return next((_words(one) for one in messages if _is_right(one)), "")
-
-
-def _is_right(message: object) -> bool:
-    return message.is_right if isinstance(message, DeviceAnswer) else isinstance(message, _MEANS_SOMETHING)
+    return next((_words(one) for one in messages if isinstance(one, _MEANS_SOMETHING)), "")
 
 
 def _words(message: object) -> str:
     match message:
-        case DeviceAnswer(_, _, text):
-            return f"it says that it is {text}"
         case Accepted(voltage_v):
             return f"set to {voltage_v:.3f} V"
         case Pressure(pressure_pa):

@@ -7,7 +7,7 @@ import asyncio
 import contextlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 from gateway.devices import DeviceProfile, SerialSettings
 from gateway.ports import PortEvents, SerialPort
@@ -37,12 +37,22 @@ class ProbeAnswer:
     rate_hz: float
 
 
+class Stranger(NamedTuple):
+    """A device that answers as the profile says, and is another one. said: what it calls itself."""
+
+    profile: DeviceProfile
+    settings: SerialSettings
+    said: str
+
+
 @dataclass(slots=True)
 class PortReport:
-    """What a port gave: answers in the order of finding; bytes heard in all, by settings; warning: of its adapter."""
+    """What a port gave: answers in the order of finding; strangers: devices that speak a profile's words and call themselves
+    something that it does not know; bytes heard in all, by settings; warning: of its adapter."""
 
     path: str
     answers: list[ProbeAnswer] = field(default_factory=list)
+    strangers: list[Stranger] = field(default_factory=list)
     heard: dict[str, bytes] = field(default_factory=dict)
     warning: str = ""
 
@@ -80,12 +90,12 @@ class _Ear:
 async def probe_port(
     path: str, profiles: Sequence[DeviceProfile], bauds: Sequence[int] = BAUDS, *, patience_s: float = 0.0
 ) -> PortReport:
-    """Try these profiles at their own speed and then at others, until one answers. PortError where the port does not open.
+    """Try these profiles at their own speed and then at others, until a device answers. PortError where the port does not open.
     patience_s: the least time that is waited for an answer, where the profile's own is shorter."""
     report = PortReport(path)
     for settings, fitting in _settings_to_try(profiles, bauds):
         await _probe_at(report, settings, fitting, patience_s)
-        if report.answers:
+        if report.answers or report.strangers:
             break
     return report
 
@@ -116,7 +126,7 @@ async def _probe_at(
             if profile.stream:
                 if answer := _streamed(profile, settings, streamed, listened_s):
                     report.answers.append(answer)
-            elif answer := await _asked(ear, profile, settings, patience_s):
+            elif answer := await _asked(ear, profile, settings, patience_s, report.strangers):
                 report.answers.append(answer)
             else:
                 report.heard[str(settings)] += ear.received
@@ -135,20 +145,34 @@ def _streamed(
     return ProbeAnswer(profile, settings, question.understands(received), b"", line, 0.0, count / listened_s)
 
 
-async def _asked(ear: _Ear, profile: DeviceProfile, settings: SerialSettings, patience_s: float) -> ProbeAnswer | None:
+async def _asked(
+    ear: _Ear, profile: DeviceProfile, settings: SerialSettings, patience_s: float, strangers: list[Stranger]
+) -> ProbeAnswer | None:
+    known = ""  # what is known of the device by now
     for question in harmless_questions(profile):
         if not question.data:
             continue
         on_the_wire_s = (len(question.data) + _LONGEST_ANSWER) * settings.character_s
         timeout_s = max(patience_s, profile.reply_timeout_s + on_the_wire_s)
-        if words := await ear.ask(question, timeout_s):
-            heard, began_s = ear.received, monotonic_s()
-            for _ in range(_ROUNDS):
-                await ear.ask(question, timeout_s)
-                await ear.listen(0.0)
-            took_s = (monotonic_s() - began_s) / _ROUNDS
-            return ProbeAnswer(profile, settings, words, question.data, heard, took_s, 1.0 / took_s)
+        words = await ear.ask(question, timeout_s)
+        if other := question.stranger(ear.received):
+            strangers.append(Stranger(profile, settings, other))
+            return None
+        if words and not question.is_enough:
+            known = f"{words}, "
+        elif words:
+            heard, took_s = ear.received, await _round_s(ear, question, timeout_s)
+            return ProbeAnswer(profile, settings, known + words, question.data, heard, took_s, 1.0 / took_s)
     return None
+
+
+async def _round_s(ear: _Ear, question: HarmlessQuestion, timeout_s: float) -> float:
+    """Measure how long a question and its answer take."""
+    began_s = monotonic_s()
+    for _ in range(_ROUNDS):
+        await ear.ask(question, timeout_s)
+        await ear.listen(0.0)
+    return (monotonic_s() - began_s) / _ROUNDS
 
 
 async def listen_to_port(path: str, settings: Iterable[SerialSettings], duration_s: float) -> PortReport:

@@ -62,6 +62,13 @@ def test_nothing_is_cut_on_a_narrow_terminal(width: int, writers, register_map: 
     assert ("192.168.125.101" in words) == (writers is not None)
 
 
+@pytest.mark.parametrize("state", State)
+def test_the_header_begins_with_the_state_by_its_name(state: State, register_map: RegisterMap) -> None:
+    track = Track()
+    track.add(0.0, poll_of(register_map, state=state))
+    assert text_of(View(track, "127.0.0.1:5020", 80, 24))[0].split()[0] == state.name
+
+
 def test_a_frame_like_the_last_one_writes_nothing_and_a_change_its_line() -> None:
     console = Console(width=20, height=5, file=StringIO(), force_terminal=True, color_system=None)
     screen = Screen(console)

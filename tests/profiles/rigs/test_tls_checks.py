@@ -73,6 +73,16 @@ FAULTS = [
         "fieldbus[0].certificate",
         "E173 {folder}/expired-gateway.crt expired",
     ),
+    (
+        files(ca="other-ca.crt"),
+        "fieldbus[0].certificate",
+        "E175 {folder}/gateway.crt is not signed by the CA of this face: no client that trusts {folder}/other-ca.crt",
+    ),
+    (
+        files("setpoint.crt", "setpoint.key"),
+        "fieldbus[0].certificate",
+        "E175 {folder}/setpoint.crt is not one for a server (a client's?): no client",
+    ),
     (files(more=", port: 5020"), "fieldbus[0].port", "5020 is the port of plain Modbus TCP too"),
     (
         files(more=", bind: 192.168.125.20"),

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from gateway.cli.main import command
 from gateway.cli.port_probing import tell_report
-from gateway.devices import ValveDevice
+from gateway.devices import ValveDevice, cell_device
 from gateway.devices.messages import AskDevice, DeviceStep, Garbage, ReadPressure, ReadVoltage
 from gateway.devices.profile import DeviceRole
 from gateway.processes import exit_codes
@@ -42,8 +42,12 @@ def test_what_a_probe_asks_changes_nothing(name: str) -> None:
     elif profile.role is DeviceRole.VALVE:
         assert [ValveDevice(profile).receive(one.data) for one in questions] == [[None]]
     else:
-        assert len(questions) == 1
-        assert bool(questions[0].data) is (profile.stream is None)
+        device = cell_device(profile, None if profile.reading.newton_per_unit else "N")
+        assert bool(questions[-1].data) is (profile.stream is None)
+        counts = [device.receive(one.data, 0.0) for one in questions]
+        answers = device.take_answers()
+        assert counts == [0] * (len(questions) - 1) + [1 if questions[-1].data else 0], "one reading at most"
+        assert bool(answers) is (len(questions) == 2), "and what it is, where it can be asked"
 
 
 def probe(folder: Path, paths: list[str], device: str = "icpdas-702x", baud: int = 9600) -> tuple[int, str]:
@@ -116,3 +120,53 @@ def test_the_rate_that_is_told_is_that_of_the_wire_and_the_device() -> None:
     told = " ".join(tell_report(PortReport("/dev/ttyUSB0", [answer])))
     assert "a question takes 23.5 ms (13.5 ms on the wire alone): about 21 settings with a reading a second" in told
     assert "the wire alone would carry 36" in told
+
+
+OF_ANOTHER_MODEL = """
+name: mine
+description: of another model
+role: {role}
+source: a manual
+certainty: manual
+hardware: never run on hardware
+serial: {{baud: 9600, data_bits: 8, parity: none, stop_bits: 1}}
+terminator: "\\r"
+constants: {{address: 1}}
+identity: {{ask: "${{address:02X}}M", answer: "!{{address:02X}}{{model:s}}", models: [4711]}}
+{exchanges}
+"""
+CELL_WORDS = 'read_force: {ask: "$014", frame: "{force:+.4f}", unit: N, rate_hz: 10}'
+OUTPUT_WORDS = """
+set_voltage: {ask: "#01{volts:06.3f}", answer: ">", range: {device: [0, 10], voltage_v: [0, 10]}}
+read_voltage: {ask: "$016", answer: "!01{volts:06.3f}", range: {device: [0, 10], voltage_v: [0, 10]}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("role", "exchanges", "shipped"),
+    [("load cell", CELL_WORDS, "adam-4016"), ("output", OUTPUT_WORDS, "icpdas-702x")],
+    ids=["cell", "output"],
+)
+def test_a_device_that_calls_itself_otherwise_is_told(role: str, exchanges: str, shipped: str, tmp_path: Path) -> None:
+    """The gateway would not drive it (A333): a reading that makes sense does not hide that."""
+    profile = load_device(shipped)
+    file = tmp_path / "mine.yaml"
+    file.write_text(OF_ANOTHER_MODEL.format(role=role, exchanges=exchanges))
+    with behind_ptys(FarEnd(profile)) as paths:
+        result = CliRunner().invoke(command, ["check", str(file), "--probe", "--port", paths[0]])
+        right = CliRunner().invoke(
+            command, ["check", f"profiles/devices/{shipped}.yaml", "--probe", "--port", paths[0]]
+        )
+    model = shipped.split("-")[1].replace("702x", "7021")
+    assert f"says that it is {model}, the profile knows 4711" in result.output, result.output
+    assert "mine answers" not in result.output
+    assert result.exit_code == exit_codes.DEVICE
+    assert f"it says that it is {model}" in right.output, right.output
+    assert right.exit_code == exit_codes.OK
+
+
+def test_a_device_at_another_speed_than_its_file_says_is_told(tmp_path: Path) -> None:
+    with behind_ptys(FarEnd(load_device("icpdas-702x"), 19200)) as paths:
+        file = "profiles/devices/icpdas-702x.yaml"
+        result = CliRunner().invoke(command, ["check", file, "--probe", "--port", paths[0]])
+    assert "the file says 9600 8N1: correct it, or say `baud: 19200` in the rig" in result.output, result.output
