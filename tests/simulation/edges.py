@@ -1,6 +1,7 @@
 """What of control and guardian reaches for the kernel, replaced: disk, clock, ports, counters, the last write."""
 
 import asyncio
+import errno
 import os
 from collections import deque
 from collections.abc import Callable
@@ -28,32 +29,49 @@ _SUPERVISOR = "gateway.service.supervisor"
 
 class SimulatedDisk:
     """Stands for `DiskWorker`: one thing after the other, which takes as long as the chance of the schedule says. Half of the
-    time it is done as it begins, else as it ends: where the process is killed in between it has happened, or not at all."""
+    time it is done as it begins, else as it ends: where the process is killed in between it has happened, or not at all. is_gone: the schedule is over."""
 
     delay_s: Callable[[], float] = staticmethod(lambda: 0.005)
-    is_full = False
+    is_full = is_gone = False
     folder = Path()
-    _free_s = 0.0
+
+    def __init__(self) -> None:
+        self._free_s = 0.0
+        self._waiting: deque[Callable[[], Any]] = deque()
+        self._results: deque[Any] = deque()
 
     def __call__(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
         loop, delay_s = asyncio.get_running_loop(), type(self).delay_s()
         self._free_s = max(self._free_s, loop.time()) + delay_s
+        self._waiting.append(work)
         if delay_s < DONE_AT_ONCE_S:
-            loop.call_at(self._free_s, done, self._result(work))
-        else:
-            loop.call_at(self._free_s, lambda: done(self._result(work)))
+            self._work_off()
+        loop.call_at(self._free_s, self._tell, done)
 
     def begin(self, work: Callable[[], Any]) -> None:
+        self._work_off()
         self._result(work)
 
+    def close(self) -> None:
+        self._work_off()
+
+    def _tell(self, done: Callable[[Any], None]) -> None:
+        if not self._results:
+            self._work_off()
+        done(self._results.popleft())
+
+    def _work_off(self) -> None:
+        while self._waiting:
+            self._results.append(self._result(self._waiting.popleft()))
+
     def _result(self, work: Callable[[], Any]) -> Any:
+        if type(self).is_gone:
+            return OSError(errno.EIO, os.strerror(errno.EIO))
         try:
             with watching(FailingDisk(self.folder, "full", 0)) if type(self).is_full else nullcontext():
                 return work()
         except Exception as error:
             return error
-
-    def close(self) -> None: ...
 
 
 class SimulatedTick:

@@ -21,7 +21,7 @@ from gateway.service.supervisor.child_process import LOST, Child
 from gateway.service.supervisor.guardian import Guardian
 from gateway.service.supervisor.run_options import RunOptions
 from tests.simulation.cables import CABLES
-from tests.simulation.edges import Log, NotedRunningRig
+from tests.simulation.edges import Log, NotedRunningRig, SimulatedDisk
 from tests.simulation.links import LinkEnd, create_link, read_in_memory, readable_ends
 from tests.simulation.network import serve_in_memory
 from tests.simulation.virtual_time import VirtualClock, VirtualLoop
@@ -201,6 +201,7 @@ class SimulatedService:
         if self._timer:
             self._timer.cancel()
         self._outside.halt()
+        SimulatedDisk.is_gone = True
         self.on_death = lambda: None
         for process in self._processes:
             process.loop.halt()

@@ -62,7 +62,9 @@ def simulated_rig(seed: int) -> Rig:
 
 
 class Simulation:
-    """A gateway, its world and its masters."""
+    """A gateway, its world and its masters. rest_n: force that a healthy cell reads at rest, None where nobody has looked."""
+
+    rest_n: float | None = None
 
     def __init__(self, seed: int, folder: Path) -> None:
         rig = simulated_rig(seed)
@@ -88,7 +90,7 @@ class Simulation:
             now_s=self.clock.now_s,
         )
         lay_cables(self.outside, rig, self._on_output, self.world.on_cell_bytes)
-        SimulatedDisk.is_full, SimulatedDisk.folder = False, folder
+        SimulatedDisk.is_full, SimulatedDisk.is_gone, SimulatedDisk.folder = False, False, folder
         SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(*DISK_S))
         self.service = SimulatedService(rig, folder, self.outside, self.log, self.clock)
         self.service.on_death = self._on_death
@@ -278,7 +280,9 @@ class Simulation:
         healer = self.masters["healer"]
         healer.reset(take=True)
         self._run_for(0.1)
-        if abs(self._read_force_n() - self.rest_n) > MOST_OFF_N:  # somebody has tared while the cell was broken
+        if (
+            self.rest_n is not None and abs(self._read_force_n() - self.rest_n) > MOST_OFF_N
+        ):  # somebody has tared while the cell was broken
             healer.tare()
             self._run_for(0.1)
         healer.hold(HELD_N)
@@ -288,6 +292,9 @@ class Simulation:
             self.observer.broken.append(
                 f"I13: {error_n:+.2f} N off {HEAL_S:g} s after healing; {list(self.log.lines)[-4:]}"
             )
+
+    def _is_zero_off(self) -> bool:
+        return self.rest_n is not None and abs(self._read_force_n() - self.rest_n) > MOST_OFF_N
 
     def _read_force_n(self) -> float:
         """The force that the gateway shows, N; not a number where nobody answers."""
