@@ -29,7 +29,8 @@ _SUPERVISOR = "gateway.service.supervisor"
 
 class SimulatedDisk:
     """Stands for `DiskWorker`: one thing after the other, which takes as long as the chance of the schedule says. Half of the
-    time it is done as it begins, else as it ends: where the process is killed in between it has happened, or not at all. is_gone: the schedule is over."""
+    time it is done as it begins, else as it ends: where the process is killed in between it has happened, or not at all.
+    is_gone: the schedule is over."""
 
     delay_s: Callable[[], float] = staticmethod(lambda: 0.005)
     is_full = is_gone = False
