@@ -85,7 +85,13 @@ def test_raw_counts_are_sized_by_the_rig(tmp_path: Path) -> None:
             ", watchdog_s: 60",
             "",
             ("icpdas-702x", "stream-st-gs"),
-            "output.watchdog_s: time = 258: does not fit in 2 characters",
+            "output.watchdog_s: 60 s is 600 counts of 0.1 s, and its sentence has room for 255: 25.5 s at most",
+        ),
+        (
+            ", watchdog_s: 0.05",
+            "",
+            ("icpdas-702x", "stream-st-gs"),
+            "output.watchdog_s: 0.05 s is less than one count of the watchdog, 0.1 s: it would trip later",
         ),
         (
             ", watchdog_s: 0.03, watchdog_tick_s: 0.01",
