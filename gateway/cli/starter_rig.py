@@ -62,7 +62,7 @@ network:
   units: @UNIT_IDS@
   # allow: [192.168.125.0/24] # who may connect at all
 
-# The ITV has no watchdog: if this machine loses power, it holds its last pressure. true says that you know, and that an
+# A device without a watchdog holds its last setting when this machine loses power. true says that you know, and that an
 # air dump valve on the E-stop circuit (separate hardware) deals with it.
 accept_no_device_watchdog: true # EDIT
 """

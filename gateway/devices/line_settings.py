@@ -35,9 +35,9 @@ class SerialSettings:
         """Time that one character takes on the wire, s."""
         return self.bits_per_character / self.baud
 
-    def at(self, baud: int) -> "SerialSettings":
-        """Return the same frame at another speed: what a rig file says about a device that can be set."""
-        return replace(self, baud=cast("Baud", baud))
+    def at(self, baud: int | None) -> "SerialSettings":
+        """Return the same frame at another speed: what a rig file says about a device that can be set. None: at this one."""
+        return self if baud is None else replace(self, baud=cast("Baud", baud))
 
     def __str__(self) -> str:
         return f"{self.baud} {self.data_bits}{_PARITY_LETTER[self.parity]}{self.stop_bits}"

@@ -211,7 +211,8 @@ class RtuReceiver:
     def _frame_size(self, at: int, *, is_start: bool) -> int:
         """Return the size of the whole frame that begins here; 0 for none. is_start: a frame is known to begin here, so that
         one of an unknown function ends where a checksum fits. Chance makes frames of noise and the beginning of a request: a
-        frame that begins behind a silence comes before one that goes across it."""
+        frame that begins behind a silence comes before one that goes across it, unless it lies wholly inside of that one: an
+        answer to another master may hold a request, and an adapter's pause may fall just there."""
         frame = bytes(self._burst[at : at + LONGEST_ADU])
         if len(frame) < SHORTEST_ADU or frame[0] > LARGEST_UNIT:
             return 0
@@ -227,9 +228,9 @@ class RtuReceiver:
             silence_at = next((mark for mark in self._marks if mark > at), len(self._burst))
             lengths.append(checksum_end(frame[: silence_at - at], SHORTEST_ADU))
         size = next((size for size in lengths if size and _is_whole(frame, size)), 0)
-        return (
-            0 if any(self._frame_size(mark, is_start=True) for mark in self._marks if at < mark < at + size) else size
-        )
+        end = at + size
+        ends = (mark + self._frame_size(mark, is_start=True) for mark in self._marks if at < mark < end)
+        return 0 if any(mark_end >= end for mark_end in ends) else size
 
     def _claimed_end(self, at: int) -> int:
         """Return where a frame would end that begins here, by its first bytes: `at` when none can, beyond the end of the

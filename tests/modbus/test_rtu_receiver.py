@@ -123,6 +123,13 @@ def test_a_request_inside_of_another_s_answer_is_no_request() -> None:
     assert Bus().send(encode_adu(7, READ) + INSIDE + OURS).requests() == answered()
 
 
+def test_nor_is_it_one_when_an_adapter_hands_that_answer_over_in_two_pieces() -> None:
+    """Also where the second piece begins with it: the whole answer has its checksum, and in doubt nothing is done."""
+    for cut in range(1, len(INSIDE)):
+        bus = Bus().send(INSIDE[:cut], INSIDE[cut:], pause_s=0.016)
+        assert bus.requests() == [] and bus.send(OURS).requests() == answered(), cut
+
+
 def test_nor_is_it_one_when_that_answer_is_cut_off() -> None:
     """Its unit was heard, at the latest in the request that it answers."""
     for cut in range(1, len(INSIDE)):

@@ -229,8 +229,11 @@ def judge_leak(slope: Slope, force_n: float, hold_s: float, pressure_per_s: floa
     text = f"{-slope.n_per_s:+.3f} N/s lost at {force_n:.1f} N over {hold_s:.0f} s, "
     text += _bounds(warns * force_n, fails * force_n, "N/s", 3)
     if pressure_per_s == pressure_per_s:
-        verdict = max(verdict, _above(pressure_per_s, LEAK_WARNS + _PRESSURE_NOISE, LEAK_FAILS + _PRESSURE_NOISE))
-        text += f"; pressure {100.0 * pressure_per_s:+.1f} % per second lost, allowed {100.0 * LEAK_WARNS:g} %"
+        warns, fails = LEAK_WARNS + _PRESSURE_NOISE, LEAK_FAILS + _PRESSURE_NOISE
+        verdict = max(verdict, _above(pressure_per_s, warns, fails))
+        text += f"; pressure {100.0 * pressure_per_s:+.1f} % per second lost, " + _bounds(
+            100 * warns, 100 * fails, "%", 1
+        )
     return Finding(Item.LEAK, verdict, text)
 
 

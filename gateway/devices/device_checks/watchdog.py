@@ -12,7 +12,7 @@ from typing import Annotated, Final
 from annotated_types import Gt, Le, MinLen
 
 from gateway.defaults import STRICT
-from gateway.devices.fields import Choice, HexNumber, TemplateError, WholeNumber
+from gateway.devices.fields import Choice, HexNumber, TemplateError, ValueRefused, WholeNumber
 from gateway.devices.template import compile_template
 
 TIME, STATE = "time", "state"
@@ -105,10 +105,19 @@ class Watchdog:
         return self.ticks * self.tick_s / FEEDS_PER_TIME
 
     def arming_text_fits(self) -> None:
-        """Raise ValueError where the time does not fit into the device's field."""
+        """Raise ValueError where the time is less than one count, or does not fit into the device's field."""
         field = compile_template(self.arm.ask).field(TIME)
-        assert field
-        field.encode(self.ticks)
+        assert isinstance(field, WholeNumber | HexNumber)
+        if self.ticks * self.tick_s > self.time_s * (1.0 + 1e-9):
+            raise ValueError(
+                f"{self.time_s:g} s is less than one count of the watchdog, {self.tick_s:g} s: it would trip later"
+            )
+        try:
+            field.encode(self.ticks)
+        except ValueRefused:
+            most = (16 if isinstance(field, HexNumber) else 10) ** field.width - 1
+            reason = f"{self.ticks} counts of {self.tick_s:g} s, and its sentence has room for {most}"
+            raise ValueError(f"{self.time_s:g} s is {reason}: {most * self.tick_s:g} s at most") from None
 
     def exchanges(self) -> tuple[WatchdogExchange, ...]:
         """Return the exchanges, apart from the state's question."""

@@ -262,7 +262,7 @@ def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: 
         seed=file.seed,
         loop_hz=file.loop_hz,
         register_map=register_map,
-        output=OutputLine(device=parts.output_device, port=file.output.port, baud=file.output.baud),
+        output=OutputLine.of(parts.output_device, file.output.port, file.output.baud),
         load_cell=_cell_line(file.load_cell, parts.cell_device),
         plant_profile=parts.plant,
         fallback_plant=None if parts.plant else load_plant(FALLBACK_PLANT),
@@ -313,11 +313,11 @@ def _valve_control(valve: ValveFile) -> ValveControl:
 def _valve_line(valve: ValveFile, device: DeviceProfile) -> ValveLine:
     if valve.address is not None:
         device = replace(device, constants={**device.constants, ADDRESS: valve.address})
-    return ValveLine(device=device, port=valve.port, baud=valve.baud)
+    return ValveLine.of(device, valve.port, valve.baud)
 
 
 def _cell_line(cell: CellFile, device: DeviceProfile) -> CellLine:
-    return CellLine(device=device, port=cell.port, baud=cell.baud, sign=cell.sign, unit=cell.unit, range_n=cell.range_n)
+    return CellLine.of(device, cell.port, cell.baud, sign=cell.sign, unit=cell.unit, range_n=cell.range_n)
 
 
 def _fingerprint(texts: Iterable[bytes]) -> str:

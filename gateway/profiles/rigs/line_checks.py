@@ -136,7 +136,7 @@ def check_ports_stable(parts: Parts) -> Found:
 def check_baud(parts: Parts) -> Found:
     """Yield a warning for a speed that differs from the device profile's."""
     for key, line, device in lines_of(parts):
-        if device and line.baud != device.serial.baud:
+        if device and line.baud not in (None, device.serial.baud):
             end = "the simulated device speaks" if parts.simulated else f"profile {device.name} says"
             yield f"{key}.baud", f"{line.baud} differs from the other end: {end} {device.serial}"
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from ipaddress import ip_address
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, Self
 
 from gateway import defaults
 from gateway.bsfm.model import Bsfm, Calibration, Response
@@ -44,6 +44,11 @@ class _SerialLine:
     device: DeviceProfile
     port: str | None
     baud: int
+
+    @classmethod
+    def of(cls, device: DeviceProfile, port: str | None, baud: int | None, **more: Any) -> Self:
+        """Return the line at the baud of the rig's file; where that says none, as the device's profile says."""
+        return cls(device=device, port=port, baud=device.serial.at(baud).baud, **more)
 
     @property
     def settings(self) -> SerialSettings:

@@ -37,7 +37,7 @@ class OutputFile:
     __pydantic_config__ = STRICT
     device: Annotated[str, MinLen(1)]  # name of a shipped device profile, or the path of one from this file
     port: Annotated[str, MinLen(1)] | None = None  # /dev/serial/by-id/...; absent in a simulated rig
-    baud: Baud = defaults.OUTPUT_BAUD  # as set in the device
+    baud: Baud | None = None  # as set in the device; null: as its profile says
     address: int | str | None = None  # of the device on its bus, its Modbus unit; null: the profile's
     channel: Annotated[int, Ge(0), Le(15)] | None = None  # of a device with several outputs; null: the profile's
     checksum: ChecksumName | None = None  # as set in a device that can have one; null: the profile's
@@ -54,7 +54,7 @@ class CellFile:
     __pydantic_config__ = STRICT
     device: Annotated[str, MinLen(1)]  # name of a shipped device profile, or the path of one from this file
     port: Annotated[str, MinLen(1)] | None = None  # /dev/serial/by-id/...; absent in a simulated rig
-    baud: Baud = defaults.CELL_BAUD  # as set in the amplifier
+    baud: Baud | None = None  # as set in the amplifier; null: as its profile says
     address: int | str | None = None  # of the device on its bus, its Modbus unit; null: the profile's
     checksum: ChecksumName | None = None  # as set in a device that can have one; null: the profile's
     sign: Literal[1, -1] = 1  # -1 where the wiring shows a push as a negative force
@@ -73,7 +73,7 @@ class ValveFile(ValveControl):
         str, MinLen(1)
     ]  # name of a shipped device profile of role valve, or the path of one from this file
     port: Annotated[str, MinLen(1)] | None = None  # /dev/serial/by-id/...; absent in a simulated rig
-    baud: Baud = defaults.OUTPUT_BAUD  # as set in the device
+    baud: Baud | None = None  # as set in the device; null: as its profile says
     address: int | str | None = None  # of the device on its bus, its Modbus unit; null: the profile's
     calibration: Annotated[str, MinLen(1)] | None = None  # measured pulling; null: that of pushing by pull_area_share
 

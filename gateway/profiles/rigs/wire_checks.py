@@ -100,7 +100,8 @@ def _readings(parts: Parts) -> Iterator[_Readings]:
     except ValueError:
         return
     characters = len(host.poll()) + len(cell_device(device, line.unit).frame(0.0))
-    yield _Readings(device, host, line.baud, characters * device.serial.at(line.baud).character_s)
+    settings = device.serial.at(line.baud)
+    yield _Readings(device, host, settings.baud, characters * settings.character_s)
 
 
 def _talks(parts: Parts) -> Iterator[tuple[str, float]]:
@@ -113,8 +114,9 @@ def _talks(parts: Parts) -> Iterator[tuple[str, float]]:
 def check_reply_timeout(parts: Parts) -> Found:
     """Yield a fault for a device whose reply_timeout_s is over before its answer can be through the wire."""
     if parts.output_device and parts.output:
+        baud = parts.output_device.serial.at(parts.output.baud).baud
         for name, took_s in _talks(parts):
-            yield from _check_reply_time("output.baud", parts.output_device, parts.output.baud, (name, took_s))
+            yield from _check_reply_time("output.baud", parts.output_device, baud, (name, took_s))
     for reading in _readings(parts):
         if reading.is_asked:
             yield from _check_reply_time("load_cell.baud", reading.device, reading.baud, ("read_force", reading.wire_s))

@@ -33,7 +33,7 @@ BOUNDS = {
                  "allowed 290 ms, fails above 530 ms (120 ms supervision.response_lag_s)"),
     "leak": (lambda x: judge_leak(Slope(-x, 0.0), 10.0, 4.0), 0.1, 0.4, "over 4 s, allowed 0.100 N/s, fails above 0.400 N/s"),
     "leak, unsure": (lambda x: judge_leak(Slope(-x, 0.01), 10.0, 4.0), 0.13, 0.43, "allowed 0.130 N/s, fails above 0.430 N/s"),
-    "pressure": (lambda x: judge_leak(Slope(0.0, 0.0), 10.0, 4.0, x), 0.013, 0.043, "% per second lost, allowed 1 %"),
+    "pressure": (lambda x: judge_leak(Slope(0.0, 0.0), 10.0, 4.0, x), 0.013, 0.043, "lost, allowed 1.3 %, fails above 4.3 %"),
     "slow answers": (lambda x: judge_output_line(WireCounts(100, 100, 0), x, RIG), 0.05, 0.1,
                      "of 100 ms, allowed 2 % lost, fails above 10 %"),
 }  # fmt: skip

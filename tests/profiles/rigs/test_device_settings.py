@@ -37,6 +37,18 @@ def test_the_address_the_checksum_and_the_watchdogs_time_are_the_rigs(tmp_path: 
     assert host.gap_s == 0.0
 
 
+def test_a_line_without_a_baud_has_that_of_its_devices_profile(tmp_path: Path) -> None:
+    path = tmp_path / "own.yaml"
+    text = RIG.replace(", baud: 38400OUTPUT_SETTINGS", "").replace(", baud: 115200", "").replace("CELL_SETTINGS", "")
+    path.write_text(text.replace("OUTPUT", "mcu-line").replace("CELL", "hbm-aed-binary"), encoding="utf-8")
+    path.write_text(path.read_text().replace("range_n: 98", "range_n: 98, newton_per_count: 0.0002"), encoding="utf-8")
+    found = check_report(path)
+    assert found.rig, found.faults
+    assert str(found.rig.output.settings) == "115200 8N1"
+    assert str(found.rig.load_cell.settings) == "38400 8E1"
+    assert not [each for each in found.warnings if "differs from the other end" in each.message]
+
+
 def test_a_modbus_units_address_is_the_rigs(tmp_path: Path) -> None:
     found = rig(tmp_path, ", address: 17", ", address: 3", "waveshare-ao8b", "laumas-tlb")
     assert found.rig, found.faults
@@ -85,7 +97,13 @@ def test_raw_counts_are_sized_by_the_rig(tmp_path: Path) -> None:
             ", watchdog_s: 60",
             "",
             ("icpdas-702x", "stream-st-gs"),
-            "output.watchdog_s: time = 258: does not fit in 2 characters",
+            "output.watchdog_s: 60 s is 600 counts of 0.1 s, and its sentence has room for 255: 25.5 s at most",
+        ),
+        (
+            ", watchdog_s: 0.05",
+            "",
+            ("icpdas-702x", "stream-st-gs"),
+            "output.watchdog_s: 0.05 s is less than one count of the watchdog, 0.1 s: it would trip later",
         ),
         (
             ", watchdog_s: 0.03, watchdog_tick_s: 0.01",
