@@ -29,7 +29,7 @@ RATES_HZ = (20,) * 16 + (25,) * 3 + (100,)
 """Of loop and load cell, drawn for each seed: at 20 Hz a schedule takes half of the time, and its laws are the same."""
 HELD_N = 12.0
 IN_BAND_N, SLOWLY_IN_BAND_N = 1.0, 2.5
-"""Of loops as a rig may have them, from 50 Hz on, and of those that are slower than allowed, for the sake of time: they hunt."""
+"""Of loops as a rig may have them, from 50 Hz on, and of slower ones, which are here for the sake of time: they hunt."""
 MOST_OFF_N = 0.5
 """By how much a healthy cell may read another force at rest than at first, until the zero is taken anew."""
 TARES = 5
