@@ -25,7 +25,7 @@ def test_each_value_that_is_set_stands_in_its_line(own_rig) -> None:
     for one in set_values:
         assert one["path"].rpartition(".")[2] in lines[one["line"] - 1], one
     by_path = {one["path"]: one for one in rig["values"]}
-    assert (by_path["output.baud"]["value"], by_path["output.baud"]["default"]) == ("9600", "9600")
+    assert (by_path["load_cell.sign"]["value"], by_path["load_cell.sign"]["default"]) == ("1", "1")
     assert by_path["network.idle_s"]["line"] is None  # nobody has written it
 
 
