@@ -293,7 +293,7 @@ def bench_idle(loop_hz: int, seconds: float) -> None:
 def main() -> None:
     """Print both benchmarks."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--setpoints", type=int, default=200)
+    parser.add_argument("--setpoints", type=int, default=600)
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--far-end", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
