@@ -16,6 +16,7 @@ COMMIT, STATUS = 1145, 1146
 HANDLES_AT = 6  # of the rising branch, two words each, behind order, an unused word and the range
 COMMITTED, FAILED = 3, 4
 STEP_N = 0.001
+MARKS = 50  # a plant has so many recipes, and not another one each time
 LOOK_S, ASK_S = 1.0, 0.1
 _HALVES = (read_pdu(ACTIVE, 100), read_pdu(ACTIVE + 100, 100))
 
@@ -35,16 +36,16 @@ class Integrator(Master):
         self._look()
 
     def upload(self) -> None:
-        """Commit a set of which one number is another one than ever before."""
+        """Commit a set of which one number is another one than in the MARKS - 1 before."""
         if self._first is None or self._sent is not None or not self.connect():
             return
-        self._mark += 1
+        self._mark = self._mark % MARKS + 1
         words = with_mark(self._first, self._mark)
         block = words[: 2 * HEAD_WORDS] + struct.pack(">H2xI", len(words) // 2, crc32(words)) + bytes(2)
         for address, part in ((0, block[:200]), (100, block[200:]), (TAIL_FROM, words[2 * HEAD_WORDS :])):
             self.ask(write_pdu(STAGING + address, *struct.unpack(f">{len(part) // 2}H", part)))
-        self._sent = words
-        self._allowed.add(words)
+        self._sent, self._before = words, self._allowed
+        self._allowed = self._allowed | {words}
         self.ask(write_pdu(COMMIT, 1))
 
     def lose(self) -> None:
@@ -91,8 +92,7 @@ class Integrator(Master):
             self._allowed, self._sent = {sent}, None
             self.committed += 1
         elif answer[0] & 0x80 or (answer[0] == 3 and answer[3] == FAILED):
-            self._allowed.discard(sent)
-            self._sent = None
+            self._allowed, self._sent = self._before, None
         else:
             self._outside.call_later(ASK_S, lambda: self._sent is sent and self.ask(read_pdu(STATUS, 1)))
 
