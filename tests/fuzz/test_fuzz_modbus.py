@@ -4,21 +4,15 @@ import struct
 from collections.abc import Callable
 from random import Random
 
-from gateway.modbus import Peer, Role, server
+from gateway.modbus import server
 from gateway.modbus.fast import whole_answer
-from gateway.modbus.mbap import FramingLost, MbapFramer
 from gateway.modbus.rtu_receiver import MOST_BYTES
-from gateway.profiles import load_register_map
-from gateway.registers import BankRules, RegisterBank
-from gateway.registers.words import ControlBit
-from tests.fuzz.bank_model import BankModel, assert_nothing_changed
 from tests.fuzz.conftest import PER_PUSH, Examples
 from tests.fuzz.damage import damaged, held_bytes, pieces
-from tests.fuzz.frame_model import crc, frames_of
+from tests.fuzz.frame_model import crc
+from tests.fuzz.modbus_laws import PEERS, assert_answered_as_model, assert_read_as_reference, bank_and_model
 from tests.modbus.rtu_bus import SILENCE_S, Bus
 
-MAP = load_register_map("force-v1")
-PEERS = [Peer(f"10.0.0.{k}", 4000 + k, role=Role.CALIBRATION) for k in (1, 2, 3)]
 PLACES = (0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 10, 13, 15, 16, 99, 100, 116, 131, 200, 200, 201, 202, 210, 226, 230, 232, 295,
           300, 300, 302, 310, 331, 400, 416, 416, 417, 431, 432, 999, 1000, 1145, 1199, 1500, 1699, 40001, 65535)  # fmt: skip
 WORDS = (
@@ -84,16 +78,7 @@ def test_a_stream_of_anything_is_read_as_the_reference_reads_it(examples: Callab
         ]
         stream = damaged(b"".join(sent), chance) if chance.random() < 0.7 else b"".join(sent)
         count -= len(sent)
-        framer, got, is_lost = MbapFramer(), [], False
-        for piece in pieces(stream, chance):
-            try:
-                got += framer.feed(piece)
-            except FramingLost as lost:
-                got, is_lost = [*got, *lost.frames], True
-                break
-            assert len(framer) < 260
-        assert ([tuple(one) for one in got], is_lost) == frames_of(stream), stream.hex()
-        lost_ones += is_lost
+        lost_ones += assert_read_as_reference(pieces(stream, chance))
     assert lost_ones > 100
 
 
@@ -139,32 +124,18 @@ def payload(chance: Random, address: int) -> bytes:
 
 def test_the_bank_answers_any_request_as_the_reference_does(examples: Callable[..., Examples]) -> None:
     count, chance = examples("bank requests")
-    rules = BankRules(rig_name="demo", force_max_n=60.0, supported_bits=ControlBit(15))
     codes = [0] * 256
-    bank, model = RegisterBank(MAP, rules, now=lambda: 1.0), BankModel()
-    for number in range(count):
+    bank, model = bank_and_model()
+    for _ in range(count):
         pdu, peer = request(chance), PEERS[chance.choice((0, 0, 0, 0, 1, 2))]
-        before = bytes(bank._image.data)
-        answer = server.answer(pdu, bank, peer)
-        code = answer[1] if answer[0] & 0x80 else 0
-        wanted = model.answer(pdu, peer.host)
-        assert wanted is None or code == wanted, f"{number}: {pdu.hex()} of {peer.host}: {code}, by the rules {wanted}"
-        assert len(answer) <= 253
-        codes[code] += 1
-        if code:
-            assert_nothing_changed(before, bytes(bank._image.data), pdu)
-        else:
-            for base, size in ((0, 16), (200, 32), (300, 32)):
-                assert bank.read_registers(base, size) == model.face(base), f"{number}: {pdu.hex()}"
-            assert bank.owner == model.owner
+        codes[assert_answered_as_model(bank, model, pdu, peer)] += 1
     assert held_bytes(bank) < 80_000
     assert all(codes[code] > count // 1000 for code in (0, 1, 2, 3, 6)), codes[:12]
 
 
 def test_the_short_way_answers_as_the_long_one() -> None:
     chance = Random(3)
-    rules = BankRules(rig_name="demo", force_max_n=60.0)
-    one, two = (RegisterBank(MAP, rules, now=lambda: 1.0) for _ in range(2))
+    (one, _), (two, _) = bank_and_model(), bank_and_model()
     for k in range(1500):
         pdu = request(chance)[:253]
         frame = bytearray(struct.pack(">HHHB", k, 0, len(pdu) + 1, 1) + pdu)

@@ -6,7 +6,7 @@ from gateway.devices import DeviceProfile, DeviceRole, cell_device, cell_host, o
 from gateway.devices.messages import AskDevice, ForceSample, Garbage, Quality, ReadPressure, ReadVoltage, SetVoltage
 from gateway.profiles import list_shipped, load_device
 from tests.fuzz.damage import held_bytes
-from tests.fuzz.guided.modbus_targets import framed, sliced
+from tests.fuzz.guided.slices import framed, sliced
 
 PROFILES = [load_device(name) for name in sorted(list_shipped("device"))]
 CELLS = [one for one in PROFILES if one.role is DeviceRole.LOAD_CELL]

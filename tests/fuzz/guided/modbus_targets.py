@@ -1,78 +1,33 @@
 """What a byte string does to framing, bank, RTU line and certificates, judged by references that share no code with them."""
 
 import struct
-from collections.abc import Iterator
 
 from cryptography import x509
 
-from gateway.modbus import Peer, Role, server
 from gateway.modbus.certificate import ROLE_OID, read_certificate
-from gateway.modbus.mbap import FramingLost, MbapFramer
 from gateway.modbus.rtu_receiver import MOST_BYTES
-from gateway.profiles import load_register_map
-from gateway.registers import BankRules, RegisterBank
-from gateway.registers.words import ControlBit
 from tests.certificates import signed
-from tests.fuzz.bank_model import BankModel, assert_nothing_changed
 from tests.fuzz.damage import held_bytes
-from tests.fuzz.frame_model import crc, frames_of
+from tests.fuzz.frame_model import crc
+from tests.fuzz.guided.slices import framed, sliced
+from tests.fuzz.modbus_laws import PEERS, assert_answered_as_model, assert_read_as_reference, bank_and_model
 from tests.modbus.rtu_bus import SILENCE_S, Bus
 
-MAP = load_register_map("force-v1")
-PEERS = [Peer(f"10.0.0.{k}", 4000 + k, role=Role.CALIBRATION) for k in (1, 2, 3)]
-FACES = ((0, 16), (200, 32), (300, 32))
 ASKED = struct.pack(">BBHH", 1, 3, 100, 4)
 ASKED += crc(ASKED)
 PAUSES_S = (0.0, 0.5 * SILENCE_S, 1.2 * SILENCE_S, 0.05)
 
 
-def sliced(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """The input as (selector, up to 31 bytes), by a byte that says both: a mutation elsewhere moves no cut."""
-    at = 0
-    while at < len(data):
-        size, selector = data[at] & 31, data[at] >> 5
-        yield selector, data[at + 1 : at + 1 + size]
-        at += 1 + size
-
-
-def framed(stream: bytes, selector: int = 0) -> bytes:
-    """An input whose slices are the stream's."""
-    parts = [stream[at : at + 31] for at in range(0, len(stream), 31)]
-    return b"".join(bytes((selector << 5 | len(part),)) + part for part in parts)
-
-
 def judge_mbap(data: bytes) -> None:
-    framer, got, is_lost, fed = MbapFramer(), [], False, bytearray()
-    for _, piece in sliced(data):
-        fed += piece
-        try:
-            got += framer.feed(piece)
-        except FramingLost as lost:
-            got, is_lost = [*got, *lost.frames], True
-            break
-        assert len(framer) < 260
-    assert ([tuple(one) for one in got], is_lost) == frames_of(bytes(fed))
+    assert_read_as_reference([piece for _, piece in sliced(data)])
 
 
 def judge_bank(data: bytes) -> None:
-    """Requests of three hosts in a row: answer, registers and owner as the model has them, and nothing of what is refused."""
-    rules = BankRules(rig_name="demo", force_max_n=60.0, supported_bits=ControlBit(15))
-    bank, model = RegisterBank(MAP, rules, now=lambda: 1.0), BankModel()
-    bank.read_registers(100, 32)  # a status is shown when somebody asks for the first time
+    """Requests of three hosts in a row."""
+    bank, model = bank_and_model()
     for selector, pdu in sliced(data):
-        if not pdu:
-            continue
-        peer, before = PEERS[selector % 3], bytes(bank._image.data)
-        answer = server.answer(pdu, bank, peer)
-        code = answer[1] if answer[0] & 0x80 else 0
-        wanted = model.answer(pdu, peer.host)
-        assert wanted is None or code == wanted, f"{pdu.hex()} of {peer.host}: {code}, by the rules {wanted}"
-        assert len(answer) <= 253
-        if code:
-            assert_nothing_changed(before, bytes(bank._image.data), pdu)
-        else:
-            assert all(bank.read_registers(base, size) == model.face(base) for base, size in FACES), pdu.hex()
-            assert bank.owner == model.owner
+        if pdu:
+            assert_answered_as_model(bank, model, pdu, PEERS[selector % 3])
 
 
 def judge_rtu(data: bytes) -> None:
