@@ -195,7 +195,7 @@ class RtuReceiver:
                     at += size - 1  # whole, but inside of something else: what is in it is no frame either
                 continue
             end_here = self._claimed_end(at)
-            longest = end_here if is_marked else max(longest, end_here)
+            longest = max(longest, end_here)
             start = at if is_marked else start
             is_known = self._burst[at] in self._units
             if is_marked or (is_known and at <= start + _STRAY_BYTES and end_here > claimed):
@@ -210,7 +210,8 @@ class RtuReceiver:
 
     def _frame_size(self, at: int, *, is_start: bool) -> int:
         """Return the size of the whole frame that begins here; 0 for none. is_start: a frame is known to begin here, so that
-        one of an unknown function ends where a checksum fits. Chance makes frames of noise and the beginning of a request: a
+        one of an unknown function ends where a checksum fits; to everybody it would act nowhere, and zeros, which many
+        requests are full of, are no broadcast of function 0. Chance makes frames of noise and the beginning of a request: a
         frame that begins behind a silence comes before one that goes across it, unless it lies wholly inside of that one: an
         answer to another master may hold a request, and an adapter's pause may fall just there."""
         frame = bytes(self._burst[at : at + LONGEST_ADU])
@@ -224,7 +225,7 @@ class RtuReceiver:
             return len(self._echo.frame)
         if frame[1] == DIAGNOSTICS:
             lengths.append(_DIAGNOSTICS_BYTES)
-        if is_start and not has_request_length(frame[1]):
+        if is_start and frame[0] != BROADCAST_UNIT and not has_request_length(frame[1]):
             silence_at = next((mark for mark in self._marks if mark > at), len(self._burst))
             lengths.append(checksum_end(frame[: silence_at - at], SHORTEST_ADU))
         size = next((size for size in lengths if size and _is_whole(frame, size)), 0)
