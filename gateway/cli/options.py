@@ -169,7 +169,7 @@ def _rtu_wire(path: str, unit: int, line: dict[str, Any]) -> "Wire":
     if not 1 <= unit <= LARGEST_UNIT:
         why = "0 is the broadcast, which nobody answers" if unit == 0 else f"{unit} is reserved"
         raise click.UsageError(f"--unit: a server on a serial line has 1 to {LARGEST_UNIT}; {why}")
-    baud, bauds = line["baud"] or defaults.RTU_BAUD, get_args(Baud)
+    baud, bauds = defaults.RTU_BAUD if line["baud"] is None else line["baud"], get_args(Baud)
     if baud not in bauds:
         near = min(bauds, key=lambda one: abs(one - baud))
         raise click.UsageError(f"--baud: {baud} is no speed of serial lines; did you mean {near}?")

@@ -138,8 +138,10 @@ class RefusalReason(IntEnum):
             "W211",
             "role too low",
             "A write to a block that this connection's role may not write.",
-            "Coefficients come over plain TCP and RTU only where the rig allows it; by TLS the certificate names the role.",
-            "Set network.allow_plain_upload in the rig file, or connect with a certificate of the role that the line names.",
+            "By TLS the certificate names the role, on a serial face its `role:`; plain TCP may command, and upload "
+            "coefficients where the rig allows it.",
+            "Connect with a certificate of the role that the line names; a serial face: raise its `role:`; coefficients by "
+            "plain TCP: network.allow_plain_upload.",
         ),
     )
     FAULT_LATCHED = (

@@ -58,7 +58,7 @@ def certificate_refusal(shown: PeerCertificate, revoked: frozenset[str], now: st
         return f"W241 {who} is valid from {shown.begins} to {shown.ends}, now is {now}"
     if shown.serial in revoked:
         return f"W245 {who} (serial {shown.serial}) is revoked in the rig file"
-    if not shown.name:
+    if not shown.name.strip():
         return "W242 the certificate has no common name: nobody could say who owns the setpoint"
     known = ", ".join(ROLES)
     if shown.role is None:

@@ -8,6 +8,7 @@ import errno
 import grp
 import os
 import pwd
+import re
 import termios
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +26,9 @@ SERIAL_FAILURES: Final = (SerialException, OSError, termios.error)
 
 _DENIED: Final = {errno.EACCES, errno.EPERM}
 _ABSENT: Final = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR}
+_NO_PORT: Final = {errno.ENOTTY, errno.EISDIR}
 _HELD: Final = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EBUSY}
+_NUMBER_IN_TEXT: Final = re.compile(r"\((\d+), '")
 
 
 class PortError(Exception):
@@ -47,6 +50,8 @@ def errno_of(error: Exception) -> int | None:
     number = getattr(error, "errno", None)
     if number is None and error.args and isinstance(error.args[0], int):
         number = error.args[0]
+    if number is None and (found := _NUMBER_IN_TEXT.search(str(error))):
+        number = int(found[1])
     return number
 
 
@@ -59,6 +64,8 @@ def explain_open_failure(path: str, error: Exception, present: Sequence[str]) ->
         return PortError("E102", _missing(path, present))
     if number in _HELD:
         return PortError("E103", describe_holders(path))
+    if number in _NO_PORT:
+        return PortError("E102", f"{path} is no serial port: `force-gateway ports` lists those of this machine")
     return PortError("E102", f"{path} does not open as a serial port: {error}")
 
 

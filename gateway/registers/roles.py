@@ -15,6 +15,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.modbus.peer import Peer, Role
 from gateway.registers.map.register_map import Block, RegisterMap
 from gateway.registers.refusal import Refusal
+from gateway.registers.writes.ownership import serial_place
 
 WRITE_ROLES: Final[Mapping[str, Role]] = {
     "command": Role.SETPOINT,
@@ -38,6 +39,8 @@ def role_refusal(peer: Peer, block: Block, needed: Role, address: int) -> Refusa
     have, needs = peer.role.name.lower(), needed.name.lower()
     if peer.name:
         cure = f"connect with a certificate that has it (force-gateway certs --client NAME:{needs})"
+    elif serial_place(peer.host) is not None and needed <= Role.CALIBRATION:
+        cure = f"set `role: {needs}` of this face in the rig file, or connect by TLS with a certificate that has it"
     elif needed is Role.CALIBRATION:
         cure = "set network.allow_plain_upload in the rig file, or connect by TLS with a certificate that has it"
     else:

@@ -67,6 +67,7 @@ REFUSED = [
         "captain",
         "W242 127.0.0.1:40000: the certificate of 'captain' names the role 'captain', known are monitor, setpoint",
     ),
+    ("nameless", "W242 127.0.0.1:40000: the certificate has no common name"),
     ("thief", "W245 127.0.0.1:40000: the certificate of 'thief' (serial "),
     ("gateway", "W240 127.0.0.1:40000: its certificate is not one for a client"),
     ("", "W240 127.0.0.1:40000: it showed no certificate"),

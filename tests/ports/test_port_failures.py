@@ -92,9 +92,9 @@ def test_no_port_at_all_asks_for_the_adapter(ear: Any, monkeypatch: pytest.Monke
 def test_a_file_is_no_serial_port(ear: Any, tmp_path: Path) -> None:
     file = tmp_path / "port"
     file.write_text("")
-    told = asyncio.run(told_by_opening(ear, str(file)))
-    assert told.code == "E102"
-    assert "does not open as a serial port" in told.sentence
+    for path in (str(file), str(tmp_path), "/dev/null"):
+        told = asyncio.run(told_by_opening(ear, path))
+        assert str(told) == f"E102 {path} is no serial port: `force-gateway ports` lists those of this machine"
 
 
 @pytest.mark.parametrize(

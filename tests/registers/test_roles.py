@@ -95,6 +95,8 @@ def test_a_block_that_the_table_has_forgotten_is_locked(register_map):
             "certificate that has it (force-gateway certs --client NAME:calibration)",
         ),
         (Peer("10.0.0.1", role=Role.MONITOR), 1, "connect by TLS"),
+        (Peer("serial:2", role=Role.MONITOR), 1, "set `role: setpoint` of this face"),
+        (Peer("serial:2", role=Role.MONITOR), 1000, "set `role: calibration` of this face"),
     ],
 )
 def test_the_sentence_says_what_would_help(bank, peer, address, cure):

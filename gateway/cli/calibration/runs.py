@@ -12,7 +12,7 @@ from typing import Any, Final
 from gateway import defaults
 from gateway.cli.control_socket import ask
 from gateway.cli.errors import CliError
-from gateway.cli.master.client import GatewayClient, RefusedError
+from gateway.cli.master.client import GatewayClient
 from gateway.cli.master.refusal_text import explain_refusals
 from gateway.cli.master.wires import Wire
 from gateway.profiles import load_register_map
@@ -124,10 +124,12 @@ class RemoteRun:
     def _command(self, word: int) -> None:
         register = self._map.find("control_word")
         try:
-            with explain_refusals(self._client):
-                self._client.write_values([_assignment(register, word)])
-        except RefusedError as error:
-            raise CliError(str(error)) from None
+            for frame in self._client.frames([_assignment(register, word)]):
+                with explain_refusals(self._client, [frame]):
+                    self._client.write(frame)
+        except CliError:  # the run ends with it, or is looked at by a new connection
+            self._client.close()
+            raise
 
 
 def _assignment(register: Any, word: int) -> Any:

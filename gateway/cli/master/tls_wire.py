@@ -74,7 +74,7 @@ class TlsWire(TcpWire):
         try:
             return context.wrap_socket(plain, server_hostname=self.host.strip("[]"))
         except ssl.SSLCertVerificationError as error:
-            why = f"the certificate of {self.where} is not to be trusted: {error.verify_message}"
+            why = f"the certificate of {self.where} is not to be trusted: {error.verify_message.rstrip('.')}"
             cure = "give --tls the CA that has signed it, and --gateway a name that is in it (certs --host)"
             raise CliError(f"E176 {why}; {cure}", exit_codes.DEVICE) from None
         except OSError as error:

@@ -108,7 +108,8 @@ class TcpWire:
         reset = isinstance(error, (OSError, ConnectionException))
         cause = "closed the connection" if reset else f"did not answer unit {unit} within {TIMEOUT_S:g} s"
         return CliError(
-            f"E131 {self.where} {cause}: not a Modbus server, another unit id, or this machine is not on its allow-list",
+            f"E131 {self.where} {cause}: not a Modbus server, the port of its line `modbus tls` (give --tls, --cert and "
+            "--key), another unit id, or this machine is not on its allow-list",
             exit_codes.DEVICE,
         )
 

@@ -9,6 +9,7 @@ from gateway.cli.master import local_gateways
 from gateway.cli.master.wires import RtuWire, TcpWire, Wire
 from gateway.codes.refusals import RefusalReason
 from gateway.devices.line_settings import SerialSettings
+from gateway.modbus import Role
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.words import ControlBit
 from gateway.registers.writes.proposed_write import EdgeRefusal
@@ -45,6 +46,19 @@ def test_elsewhere_the_registers_say_why_and_what_to_do(gateway: str, call, monk
         "W303 tare refused: exception 04 (device or state forbids it) to write 1 at 0; control_word = 4"
     )
     assert "force-gateway explain W303" in cure
+
+
+def test_who_may_not_calibrate_is_told_which_role_it_takes(
+    register_map: RegisterMap, serve, call, monkeypatch, tmp_path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    bank = RegisterBank(register_map, BankRules(rig_name="demo", force_max_n=60.0), now=lambda: 0.0)
+    answer = call("calibrate", "--yes", "--gateway", serve(bank, role=Role.MONITOR).address)
+    assert answer.exit_code == 1
+    assert answer.stderr.startswith(
+        "W211 role too low: exception 01 (function not served) to write 1 at 0; control_word"
+    )
+    assert "Connect with a certificate of the role" in answer.stderr
 
 
 @pytest.mark.parametrize("given", [True, False], ids=["--state", "where run puts it"])

@@ -77,6 +77,7 @@ def test_a_port_that_is_pulled_out_is_told(register_map) -> None:
         (("--rtu", "/dev/ttyS9", "--unit", "0"), "0 is the broadcast, which nobody answers"),
         (("--rtu", "/dev/ttyS9", "--unit", "248"), "248 is reserved"),
         (("--rtu", "/dev/ttyS9", "--baud", "19201"), "19201 is no speed of serial lines; did you mean 19200?"),
+        (("--rtu", "/dev/ttyS9", "--baud", "0"), "0 is no speed of serial lines; did you mean 300?"),
         (("--rtu", "/dev/ttyS9", "--parity", "evn"), "'evn' is not one of 'none', 'even', 'odd'"),
         (("--rtu", "ttyUSB0"), "ttyUSB0 is not the path of a port"),
         (("--rtu", "/dev/ttyS9", "--gateway", "10.0.0.1"), "give one of them"),
