@@ -11,7 +11,7 @@ from typing import Any, Final
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TaskProgressColumn, TextColumn
 
-from gateway.cli.calibration.runs import ENDED, LocalRun, RemoteRun, RunStatus
+from gateway.cli.calibration.runs import ENDED, Run, RunStatus
 from gateway.cli.errors import CliError
 
 _POLL_S: Final = 0.2
@@ -39,7 +39,7 @@ class NotBegunError(CliError):
     """Nothing has moved."""
 
 
-def follow(run: LocalRun | RemoteRun) -> dict[str, Any]:
+def follow(run: Run) -> dict[str, Any]:
     """Begin the run and wait for its end; how it ended."""
     run.begin()
     with _signals_as_ctrl_c(), _progress() as progress:
@@ -82,7 +82,7 @@ def _progress() -> Progress:
     return Progress(*bar, share, force, left, console=console, expand=True)
 
 
-def _wait(run: LocalRun | RemoteRun, progress: Progress, task: TaskID) -> None:
+def _wait(run: Run, progress: Progress, task: TaskID) -> None:
     began_s = time.monotonic()
     while True:
         look = run.look()

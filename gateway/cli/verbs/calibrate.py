@@ -4,6 +4,7 @@ With an experiment as its plan (`diagnose --plan` writes them) it records what t
 """
 
 import json
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -79,13 +80,14 @@ def command(
     """
     from gateway.cli.calibration.follow import follow
     from gateway.cli.calibration.plans import is_experiment
-    from gateway.cli.calibration.runs import LocalRun, RemoteRun
+    from gateway.cli.calibration.remote_run import RemoteRun
+    from gateway.cli.calibration.runs import LocalRun
 
     resumes = True
     if wire:
         if any(plan_options.values()):
             raise click.UsageError(
-                "by Modbus (--gateway, --rtu) the gateway runs its own plan: leave the plan's options out"
+                "by Modbus (--gateway, --rtu, --tls) the gateway runs its own plan: leave the plan's options out"
             )
         run: LocalRun | RemoteRun = RemoteRun(wire, unit)
     else:
@@ -100,7 +102,9 @@ def command(
     if wire is None:
         _warn_of_another_rig(run_request, preview)
     _ask(preview, yes)
-    _tell(follow(run), as_json, resumes=resumes)
+    with closing(run):
+        end = follow(run)
+    _tell(end, as_json, resumes=resumes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,101 @@
+"""A calibration of a gateway elsewhere, by Modbus: bit 5 starts the gateway's own plan, clearing it ends the run.
+
+A rig with a lease wants a heartbeat from the master that started the run, so one is kept from the start to the end, by a
+thread: a terminal that is slow to draw costs no lease. Both use one connection, one at a time: a serial line has only one.
+"""
+
+import threading
+from math import nan
+from typing import Any, Final
+
+from gateway import defaults
+from gateway.cli.calibration.runs import ENDED, RunStatus
+from gateway.cli.errors import CliError
+from gateway.cli.force_hold.heartbeat import DEFAULT_PERIOD_S
+from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
+from gateway.cli.master.refusal_text import explain_refusals
+from gateway.cli.master.wires import Wire
+from gateway.codes.faults import FaultCode
+from gateway.profiles import load_register_map
+from gateway.registers.words import CalibrationPhase, ControlBit
+
+_WORDS: Final = (
+    "calibration_phase", "calibration_progress", "calibration_stored", "force_measured", "output_voltage", "fault_code",
+)  # fmt: skip
+
+
+class RemoteRun:
+    """A gateway elsewhere; the recording and the report are there, too."""
+
+    def __init__(self, wire: Wire, unit: int) -> None:
+        self._map = load_register_map(defaults.REGISTER_MAP)
+        self._client = GatewayClient(wire, unit, self._map)
+        self._registers = [self._map.find(name) for name in _WORDS]
+        self._values: list[float] = []
+        self._before = ""
+        self._turn = threading.Lock()
+        self._ended = threading.Event()
+        self._beat = threading.Thread(target=self._keep_lease, daemon=True, name="heartbeat")
+
+    def preview(self) -> dict[str, Any]:
+        """Return nothing: by Modbus nobody says beforehand what will happen."""
+        return {}
+
+    def begin(self) -> None:
+        """Start the run by the control word, and keep its lease from now on."""
+        self._before = self.look().phase
+        self._command(int(ControlBit.START_CALIBRATION))
+        self._beat.start()
+
+    def look(self) -> RunStatus:
+        """Read from the registers how far the run is."""
+        with self._turn, explain_refusals(self._client):
+            self._values = [reading.value for reading in self._client.read_values(self._registers)]
+        phase, progress, _, force_n, output_mv, _ = self._values
+        name = CalibrationPhase(int(phase)).name.lower()
+        if name == self._before and name in ENDED:
+            name = "idle"  # what the run before left
+        elif name != self._before:
+            self._before = ""
+        return RunStatus(name, progress / 1000.0, nan, force_n, output_mv / 1000.0)
+
+    def stop(self) -> None:
+        """Stop the run; the force goes to 0."""
+        self._command(0)
+
+    def end(self) -> dict[str, Any]:
+        """Return how it ended: phase and number of the stored calibration; sentence: the fault that has ended it."""
+        phase = CalibrationPhase(int(self._values[0])).name.lower()
+        ended = {"phase": phase, "stored": int(self._values[2])}
+        fault = FaultCode(int(self._values[5])).explanation
+        if not fault.code:
+            return ended
+        cure = f"{fault.do} (force-gateway explain {fault.code})"
+        return ended | {"sentence": f"{fault.code} {fault.title}: {fault.seen} The calibration has stopped\n  {cure}"}
+
+    def close(self) -> None:
+        """End the heartbeat and the connection."""
+        self._ended.set()
+        if self._beat.is_alive():
+            self._beat.join()
+        self._client.close()
+
+    def _command(self, word: int) -> None:
+        register = self._map.find("control_word")
+        with self._turn:
+            for frame in self._client.frames([Assignment(register, register.encode(word))]):
+                with explain_refusals(self._client, [frame]):
+                    self._client.write(frame)
+
+    def _keep_lease(self) -> None:
+        """Change the heartbeat until the end, or until another master commands. Whoever looks tells of a lost connection."""
+        register, beat = self._map.find("heartbeat"), 0
+        while not self._ended.wait(DEFAULT_PERIOD_S):
+            beat = (beat + 1) % 0x10000
+            try:
+                with self._turn:
+                    self._client.write_values([Assignment(register, register.encode(beat))])
+            except RefusedError:
+                return
+            except CliError:
+                continue
