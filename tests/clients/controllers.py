@@ -194,6 +194,9 @@ class UniversalRobot:
         return True
 
     def read(self, count: int, _name: str, _timeout: float) -> list[int]:
+        """As socket_read_byte_list: "a maximum of 30 values can be read in one command" (script manual, e-Series)."""
+        if count > 30:
+            return [0] + [-1] * count
         if self.sending:
             self.sent.append(self.sending)
             try:

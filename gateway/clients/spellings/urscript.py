@@ -21,6 +21,7 @@ def spell_urscript(table: ExchangeTable) -> dict[str, str]:
         "bit_constants": _globals({f"FG_{name}": mask for name, mask in (control | shown | commit).items()}),
         "command_zeros": _zeros(words),
         "status_zeros": _zeros(table.status_span[1]),
+        "answer_zeros": _zeros(2 * table.status_span[1] + 3),
         "part_a_zeros": _zeros(part_a),
         "part_b_zeros": _zeros(part_b),
         "part_c_zeros": _zeros(part_c),
