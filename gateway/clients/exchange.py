@@ -57,6 +57,11 @@ class Endpoint:
     port: int
     unit: int
 
+    @property
+    def shown_port(self) -> str:
+        """The port as pages name it: 0 is none that anybody can ask, but says that one is chosen at each start."""
+        return str(self.port or "PORT")
+
 
 @dataclass(frozen=True)
 class ModelField:

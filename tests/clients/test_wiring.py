@@ -15,6 +15,7 @@ from gateway.clients import Endpoint, render_client
 from gateway.clients.wiring import wiring_page
 from gateway.profiles import list_shipped, load_register_map, load_rig
 from gateway.profiles.rigs.faces import TlsFace
+from tests.certificates import store_all
 from tests.clients.controllers import S7, MbClient
 from tests.clients.gateway_at_hand import GatewayAtHand
 
@@ -82,6 +83,17 @@ def test_a_face_with_certificates_is_told_from_what_the_clients_speak() -> None:
 
 def test_a_rig_that_no_robot_can_reach_is_told_so() -> None:
     assert "no robot can reach it" in call("wiring", "demo")
+
+
+def test_a_port_that_is_chosen_at_each_start_is_told_and_never_shown_as_0(tmp_path: Path) -> None:
+    store_all(tmp_path)
+    face = "{type: tls, port: 0, certificate: gateway.crt, key: gateway.key, ca: ca.crt}"
+    text = (PROFILES / "rigs" / "demo.yaml").read_text().replace("  port: 5020", "  port: 0")
+    (tmp_path / "any.yaml").write_text(f"{text}\nfieldbus:\n  - {face}\n")
+    page = call("wiring", str(tmp_path / "any.yaml"))
+    assert "network.port is 0: the gateway takes a free port at each start, PORT below" in " ".join(page.split())
+    assert "mbpoll -1 -p PORT -r 1 127.0.0.1 1 1200" in page and "-p 0" not in page
+    assert "127.0.0.1:a free port, which `run` names when it is ready" in page and ":0," not in page
 
 
 def test_the_s7_table_is_what_the_generated_block_asks(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -46,24 +46,10 @@ def _reachable(rig: Rig) -> Endpoint:
 
 def _network(rig: Rig, table: ExchangeTable) -> Section:
     network, where, lease_s = rig.network, table.where, rig.control.supervision.lease_s
-    sentences = ["Ethernet cable to the robot's or PLC's network (IRC5: WAN, LAN or service port)."]
-    if not network.plain:
-        sentences = ["Plain Modbus TCP is off in this rig (network.plain: false): none of what follows can connect."]
-    elif ip_address(network.bind).is_loopback:
-        sentences.append(
-            f"This rig listens on {network.bind} only: no robot can reach it. Set network.bind to this machine's address on "
-            "the cell's network, and network.allow to the networks that may connect."
-        )
-    if network.require_byte_order_echo:
-        echo = table.map.find("byte_order_echo").address
-        sentences.append(
-            f"Before the first enable write 1234.5 to byte_order_echo: words 16#449A, 16#5000 to address {echo} "
-            f"(4{echo + 1:04d}); the generated clients do it by themselves."
-        )
     allowed = ", ".join(map(str, network.allow)) or "nobody but this machine"
     rows = (
         ("what", "value"),
-        ("address", f"{where.host}:{where.port}, TCP"),
+        ("address", f"{where.host}:{where.shown_port}, TCP"),
         ("unit ids", ", ".join(map(str, network.units))),
         ("may connect", allowed),
         ("owner", network.owner or "the first master that commands, until it lets go"),
@@ -80,7 +66,31 @@ def _network(rig: Rig, table: ExchangeTable) -> Section:
             "echo of 1234.5 is demanded before enable" if network.require_byte_order_echo else "ABCD, not demanded",
         ),
     )
-    return Section("Network: Modbus TCP", tuple(sentences), rows)
+    return Section("Network: Modbus TCP", _network_sentences(rig, table), rows)
+
+
+def _network_sentences(rig: Rig, table: ExchangeTable) -> tuple[str, ...]:
+    network, where = rig.network, table.where
+    sentences = ["Ethernet cable to the robot's or PLC's network (IRC5: WAN, LAN or service port)."]
+    if not network.plain:
+        sentences = ["Plain Modbus TCP is off in this rig (network.plain: false): none of what follows can connect."]
+    elif ip_address(network.bind).is_loopback:
+        sentences.append(
+            f"This rig listens on {network.bind} only: no robot can reach it. Set network.bind to this machine's address on "
+            "the cell's network, and network.allow to the networks that may connect."
+        )
+    if network.plain and not where.port:
+        sentences.append(
+            f"network.port is 0: the gateway takes a free port at each start, {where.shown_port} below, and its banner says "
+            "which. A robot or PLC needs one that stays: set network.port (502 is Modbus' own)."
+        )
+    if network.require_byte_order_echo:
+        echo = table.map.find("byte_order_echo").address
+        sentences.append(
+            f"Before the first enable write 1234.5 to byte_order_echo: words 16#449A, 16#5000 to address {echo} "
+            f"(4{echo + 1:04d}); the generated clients do it by themselves."
+        )
+    return tuple(sentences)
 
 
 def _irc5(rig: Rig, table: ExchangeTable) -> Section:
@@ -92,7 +102,7 @@ def _irc5(rig: Rig, table: ExchangeTable) -> Section:
         ("what", "value"),
         ("options", "616-1 PC Interface (sockets); 623-1 Multitasking for the background task"),
         ("module", "ForceGateway.mod, from the command below"),
-        ("FG_HOST, FG_PORT, FG_UNIT", f'"{where.host}", {where.port}, {where.unit}'),
+        ("FG_HOST, FG_PORT, FG_UNIT", f'"{where.host}", {where.shown_port}, {where.unit}'),
         ("task", "T_FORCE, Type SemiStatic, Main entry FgServe, TrustLevel NoSafety; every FG_CYCLE 0.04 s"),
         ("without 623-1", f"FgTimerStart in T_ROB1, every 0.1 s ({timer})"),
     )
@@ -128,7 +138,7 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
         ("ConnectionType", "16#0B (TCP)"),
         ("ActiveEstablished", "TRUE"),
         ("RemoteAddress", shown),
-        ("RemotePort", str(where.port)),
+        ("RemotePort", where.shown_port),
         ("LocalPort", "0"),
         (
             "MB_Unit_ID",
@@ -156,7 +166,11 @@ def _codesys(rig: Rig, table: ExchangeTable) -> Section:
     where, (command, words), (status, status_words) = table.where, table.command_span, table.status_span
     rows = (
         ("what", "TwinCAT 3: FB_MBReadWriteRegs", "CODESYS V3: ClientRequestReadWriteMultipleRegisters"),
-        ("address", f"sIPAddr '{where.host}', nTCPPort {where.port}", f"ClientTCP: aIPaddr, uiPort {where.port}"),
+        (
+            "address",
+            f"sIPAddr '{where.host}', nTCPPort {where.shown_port}",
+            f"ClientTCP: aIPaddr, uiPort {where.shown_port}",
+        ),
         ("unit", f"nUnitID {where.unit}", f"uiUnitId {where.unit}"),
         (
             "write",
@@ -183,8 +197,8 @@ def _universal_robot(rig: Rig, table: ExchangeTable) -> Section:
     sentences = [f"{by_script} `fg_run = run fg_thread()`.", f"{own} {slave}, 20 Hz or more for the heartbeat."]
     if where.port != 502:
         sentences.append(
-            f"It asks port 502 always, and this rig listens on {where.port}: set network.port to 502 (force-gateway explain "
-            "E120), or use the script."
+            f"It asks port 502 always, and this rig listens on {where.shown_port}: set network.port to 502 (force-gateway "
+            "explain E120), or use the script."
         )
     if 255 not in rig.network.units:
         sentences.append("Its slave address is 255 unless you change it per signal, and this rig does not answer 255.")
@@ -198,7 +212,7 @@ def _universal_robot(rig: Rig, table: ExchangeTable) -> Section:
 def _mbpoll(rig: Rig, table: ExchangeTable) -> Section:
     where, network = table.where, rig.network
     unit = "" if where.unit == 1 else f" -a {where.unit}"
-    base = f"mbpoll -1 -p {where.port}{unit}"
+    base = f"mbpoll -1 -p {where.shown_port}{unit}"
     (command, _), (status, words) = table.command_span, table.status_span
     lines = [f"{base} -r {status + 1} -c {words} {where.host}    # status, int16"]
     for block in rig.register_map.blocks:
@@ -209,7 +223,7 @@ def _mbpoll(rig: Rig, table: ExchangeTable) -> Section:
     sentences = ["-r counts from 1: register 1 is address 0."]
     force_n = min(12.0, rig.control.limits.force_max_n)
     counts = round(force_n * table.at("force_setpoint", "command").counts_per_unit)
-    endpoint = f"{where.host}:{where.port}"
+    endpoint = f"{where.host}:{where.shown_port}"
     if rig.control.supervision.lease_s is not None or network.owner or network.require_byte_order_echo:
         sentences.append("mbpoll keeps no heartbeat, so it cannot hold a force here: `hold` does.")
         lines.append(f"force-gateway hold {force_n:g} --gateway {endpoint}    # enable, heartbeat; Ctrl-C ramps to 0")

@@ -64,9 +64,10 @@ def _face_section(place: int, face: RtuFace) -> Section:
 
 
 def _tls_section(place: int, face: TlsFace) -> Section:
+    port = face.port or "a free port, which `run` names when it is ready"
     rows = (
         ("what", "value"),
-        ("address", f"{face.bind}:{face.port}, Modbus/TCP Security (TLS 1.2 or 1.3)"),
+        ("address", f"{face.bind}:{port}, Modbus/TCP Security (TLS 1.2 or 1.3)"),
         ("may connect", ", ".join(map(str, face.allow)) or "nobody but this machine"),
         ("gateway's files", f"{face.certificate}, {face.key}"),
         ("masters need", f"a certificate signed by {face.ca}, with a role: setpoint to command, calibration to upload"),
