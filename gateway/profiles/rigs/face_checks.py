@@ -4,9 +4,10 @@ import os
 from collections.abc import Iterator
 from typing import Final
 
+from gateway.profiles.rigs.addresses import is_certificate
 from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.profiles.rigs.edit_marks import PLACEHOLDER
-from gateway.profiles.rigs.faces import RtuFace
+from gateway.profiles.rigs.faces import RtuFace, TlsFace
 from gateway.profiles.rigs.line_checks import UNSTABLE_PATHS, lines_of
 from gateway.registers.writes.ownership import serial_place
 
@@ -34,6 +35,26 @@ def check_serial_owner(parts: Parts) -> Found:
         return
     there = ", ".join(f"serial:{int(path.partition('.')[2]) + 1}" for path, _ in _rtu_faces(parts)) or "none"
     yield "network.owner", f"{owner} is no serial face of this rig; there is {there} (places in `fieldbus`, from 1)"
+
+
+def check_owner_can_come(parts: Parts) -> Found:
+    """Yield a fault for an owner that no face lets in as such: then nobody could command."""
+    network = parts.network
+    if network is None or network.owner is None or serial_place(network.owner) is not None or None in parts.fieldbus:
+        return
+    has_tls = any(isinstance(face, TlsFace) for face in parts.fieldbus)
+    if is_certificate(network.owner) and not has_tls:
+        remedy = "add a face {type: tls, ...} (`force-gateway certs DIR` prints its line), or name an address"
+        yield (
+            "network.owner",
+            f"{network.owner}: no face of this rig asks for certificates, so nobody could command: {remedy}",
+        )
+    elif not is_certificate(network.owner) and not network.plain:
+        remedy = "name `certificate NAME` or a serial face, or take `plain: false` away"
+        yield (
+            "network.owner",
+            f"{network.owner} commands by plain Modbus TCP only, which this rig does not serve: {remedy}",
+        )
 
 
 def check_face_ports_given(parts: Parts) -> Found:
@@ -75,5 +96,5 @@ def check_face_ports_stable(parts: Parts) -> Found:
 HARDWARE: Final[tuple[Check, ...]] = (check_face_ports_given, check_face_ports_differ)
 """Faults that a run with simulated devices does not mind: its serial faces are pseudo-terminals."""
 
-FAULTS: Final[tuple[Check, ...]] = (check_any_face, check_serial_owner)
+FAULTS: Final[tuple[Check, ...]] = (check_any_face, check_serial_owner, check_owner_can_come)
 WARNINGS: Final[tuple[Check, ...]] = (check_face_ports_stable,)

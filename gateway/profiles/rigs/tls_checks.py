@@ -72,6 +72,11 @@ def _unreadable(path: str, face: TlsFace) -> Found:
         if kind not in text:
             what = "private key" if name == "key" else "certificate"
             yield f"{path}.{name}", f"E174 {file} holds no {what} in PEM form; {_MAKE}"
+        elif name == "key" and b"ENCRYPTED" in text:
+            cure = (
+                f"nobody is there to type it when the gateway starts: openssl pkey -in {file} -out NEW.key takes it off"
+            )
+            yield f"{path}.key", f"E174 {file} has a password, and {cure}"
         if name == "key" and file.stat().st_mode & (stat.S_IRWXO | stat.S_IWGRP):
             mode = f"{stat.S_IMODE(file.stat().st_mode):03o}"
             yield f"{path}.key", f"E172 {file} can be used by everybody on this machine (mode {mode}): chmod 600 {file}"

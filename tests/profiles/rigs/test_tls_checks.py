@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives import serialization
 
 from gateway.profiles import Report, check_report
 from gateway.profiles.rigs.faces import TlsFace
@@ -20,7 +21,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "cut.crt").write_text("-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n")
     (folder / "open.key").write_bytes((folder / "gateway.key").read_bytes())
     (folder / "open.key").chmod(0o644)
-    for name in ("no.key", "cut.crt"):
+    key = serialization.load_pem_private_key((folder / "gateway.key").read_bytes(), None)
+    locked = serialization.BestAvailableEncryption(b"secret")
+    form = (serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8)
+    (folder / "locked.key").write_bytes(key.private_bytes(*form, locked))
+    for name in ("no.key", "cut.crt", "locked.key"):
         (folder / name).chmod(0o600)
     return folder
 
@@ -65,6 +70,11 @@ FAULTS = [
     ),
     (files("no.crt"), "fieldbus[0].certificate", "E174 {folder}/no.crt holds no certificate in PEM form"),
     (files(key="no.key"), "fieldbus[0].key", "E174 {folder}/no.key holds no private key in PEM form"),
+    (
+        files(key="locked.key"),
+        "fieldbus[0].key",
+        "E174 {folder}/locked.key has a password, and nobody is there to type",
+    ),
     (files(ca="gateway.key"), "fieldbus[0].ca", "E174 {folder}/gateway.key holds no certificate in PEM form"),
     (files(ca="cut.crt"), "fieldbus[0].ca", "E174 {folder}/cut.crt cannot be used: "),
     (files("cut.crt"), "fieldbus[0].certificate", "E174 {folder}/cut.crt with {folder}/gateway.key cannot be used: "),
@@ -102,6 +112,29 @@ def test_what_cannot_work_is_told_with_its_place(folder: Path, face: str, place:
     assert str(fault).split(" ", 1)[1].startswith(f"{place}: {sentence.format(folder=folder)}")
 
 
+@pytest.mark.parametrize(
+    ("owner", "more", "sentence"),
+    [
+        (
+            "certificate robot",
+            "",
+            "certificate robot: no face of this rig asks for certificates, so nobody could command",
+        ),
+        (
+            "10.0.0.1",
+            "\nfieldbus:\n  - {type: rtu, port: /dev/ttyS7}\n",
+            "10.0.0.1 commands by plain Modbus TCP only, which this rig does not serve",
+        ),
+    ],
+)
+def test_an_owner_that_no_face_lets_in_is_told(tmp_path: Path, owner: str, more: str, sentence: str) -> None:
+    plain = "  plain: false\n" if more else ""
+    text = DEMO.replace("network:\n", f"network:\n{plain}  owner: {owner}\n", 1) + more
+    (tmp_path / "rig.yaml").write_text(text, encoding="utf-8")
+    (fault,) = check_report(tmp_path / "rig.yaml", simulated=True).faults
+    assert f"network.owner: {sentence}" in str(fault)
+
+
 def test_two_faces_on_one_port_are_told(folder: Path) -> None:
     (fault,) = report(folder, files(), files()).faults
     assert "fieldbus[1].port: 802 is the port of another TLS face too" in str(fault)
@@ -116,6 +149,7 @@ def test_a_certificate_that_is_about_to_expire_is_a_warning_and_told_at_the_star
 
 def test_an_owner_may_be_named_by_its_certificate(folder: Path) -> None:
     path = folder / "owned.yaml"
-    path.write_text(DEMO.replace("network:\n", "network:\n  owner: certificate robot\n", 1), encoding="utf-8")
+    text = DEMO.replace("network:\n", "network:\n  owner: certificate robot\n", 1)
+    path.write_text(f"{text}\nfieldbus:\n  - {{type: tls, {files()}}}\n", encoding="utf-8")
     rig = check_report(path, simulated=True).rig
     assert rig is not None and rig.network.owner == "certificate robot"
