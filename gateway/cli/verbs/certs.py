@@ -1,6 +1,7 @@
 """`certs`: a test CA, the gateway's certificate and those of its clients, and what to do with them."""
 
 import re
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
 
@@ -14,7 +15,28 @@ from gateway.processes import exit_codes
 _HOSTS: Final = ("localhost", "127.0.0.1")
 _CLIENTS: Final = ("robot:setpoint", "service:calibration", "panel:monitor")
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,62}")
+_HOST: Final = re.compile(
+    r"(?=.{1,253}$)([A-Za-z0-9]([\w-]{0,61}[A-Za-z0-9])?\.)*(?!\d+$)[A-Za-z0-9]([\w-]{0,61}[A-Za-z0-9])?", re.ASCII
+)
 _TAKEN: Final = ("ca", "gateway")
+
+
+def check_hosts(context: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names and addresses as they were given, for an option's callback."""
+    for value in values:
+        if not _HOST.fullmatch(value) and not _is_address(value):
+            raise click.BadParameter(
+                f"{value!r} is neither a host name such as cell3.local nor an address, without a port"
+            )
+    return values
+
+
+def _is_address(text: str) -> bool:
+    try:
+        ip_address(text)
+    except ValueError:
+        return False
+    return True
 
 
 def parse_clients(context: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> dict[str, Role]:
@@ -43,6 +65,7 @@ EXAMPLES = (
 @click.option(
     "--host",
     "hosts",
+    callback=check_hosts,
     multiple=True,
     metavar="NAME|IP",
     help=f"The gateway is reached by this  [default: {', '.join(_HOSTS)}]",
