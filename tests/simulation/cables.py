@@ -44,7 +44,8 @@ class Cable:
 
     def send_to_device(self, data: bytes) -> None:
         """Put a host's bytes on the wire."""
-        self._put(self._to_device, data, self._arrive)
+        if self.is_plugged:  # a host that stood still meanwhile has not noticed yet
+            self._put(self._to_device, data, self._arrive)
 
     def send_to_host(self, data: bytes) -> None:
         """Put a device's bytes on the wire."""

@@ -55,17 +55,18 @@ def control_of(pdu: bytes) -> int | None:
 
 
 class Master:
-    """One program on one address. on_accepted(control word or None, pdu): a write was taken; complaints: broken answers."""
+    """One program on one address. on_write(control word or None, is_answered): a write was
+    taken, or nobody will hear whether it was; complaints: broken answers."""
 
     def __init__(
         self,
         name: str,
         outside: VirtualLoop,
         inside: Callable[[], VirtualLoop | None],
-        on_accepted: Callable[[int | None, bytes], None],
+        on_write: Callable[[int | None, bool], None],
         beat_s: float = BEATS_S[0],
     ) -> None:
-        self.name, self._outside, self._inside, self._on_accepted = name, outside, inside, on_accepted
+        self.name, self._outside, self._inside, self._on_write = name, outside, inside, on_write
         self.complaints: list[str] = []
         self.heard: list[tuple[float, bytes]] = []
         self._line: Line | None = None
@@ -103,6 +104,9 @@ class Master:
 
     def disconnect(self) -> None:
         if self._line:
+            for asked in self._waiting:
+                if asked.pdu[0] in WRITES:
+                    self._on_write(asked.control, False)
             self._line.close()
         self.lose()
 
@@ -193,7 +197,7 @@ class Master:
         self.heard.append((self._outside.time(), pdu))
         del self.heard[:-64]
         if pdu[0] in WRITES:
-            self._on_accepted(asked.control, asked.pdu)
+            self._on_write(asked.control, True)
         self.note_answer(asked.pdu, pdu)
 
     def note_answer(self, asked: bytes, answer: bytes) -> None:

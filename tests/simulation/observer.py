@@ -28,7 +28,7 @@ class Bounds:
     period_s: float
 
 
-RUN_BITS = 32 | 64
+ENABLE, RESET, RUN_BITS = 1, 2, 32 | 64
 DOWN_S = 4.0  # a run's end, whoever ends it, is a ramp down that needs no master; it takes this long at the most
 GRACE_S = 0.05  # and two periods: a tick decides nothing within one of a sample
 
@@ -102,11 +102,21 @@ class Observer:
             if self.is_run and not control & RUN_BITS:
                 self.run_ended_s = now_s
             self.is_run = bool(control & RUN_BITS)
-        if control == -1 or self.is_run or control & 1:
+        if control == -1 or self.is_run or control & ENABLE:
             self.disabled_s = None
         elif self.disabled_s is None:
             self.disabled_s = now_s
-        if control == -1 or control & 2:
+        if control & RESET:
+            self._reset_s = now_s
+
+    def note_unanswered(self, control: int | None, now_s: float) -> None:
+        """A master has hung up before it heard whether its write was taken: it may press until its lease has run out."""
+        self.write_s = now_s
+        if control is None:
+            return
+        if self.disabled_s is not None and control & (ENABLE | RUN_BITS):
+            self.disabled_s = max(self.disabled_s, now_s + self.bounds.lease_s)
+        if control & RESET:
             self._reset_s = now_s
 
     def note_status(self, pdu: bytes, now_s: float) -> None:

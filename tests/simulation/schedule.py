@@ -100,7 +100,7 @@ class Simulation:
                 f"10.0.0.{place}",
                 self.outside,
                 lambda: self.service.inside,
-                self._on_accepted,
+                self._on_write,
                 self.chance.choice(BEATS_S),
             )
             for place, name in enumerate(("worker", "rival", "fool", "villain", "healer"), start=1)
@@ -230,8 +230,9 @@ class Simulation:
         self.observer.output_lost_s = None
         self.world.on_output_bytes(chunk, now_s)
 
-    def _on_accepted(self, control: int | None, pdu: bytes) -> None:
-        self.observer.note_accepted(control, self.clock.now_s)
+    def _on_write(self, control: int | None, is_answered: bool) -> None:
+        note = self.observer.note_accepted if is_answered else self.observer.note_unanswered
+        note(control, self.clock.now_s)
 
     def _on_death(self) -> None:
         self.observer.note_death(self.clock.now_s, CABLES["output"].through_s)

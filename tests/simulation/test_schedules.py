@@ -15,7 +15,17 @@ PUSH_SEEDS, LONG_SEEDS = 500, 50_000
 SHARDS = 20
 SECONDS = float(os.environ.get("SIMULATION_SECONDS", "24"))
 """Of events; with its start and its healing a schedule is one of 30 s."""
-KEPT: list[tuple[int, list[Event]]] = []
+KEPT: list[tuple[int, list[Event]]] = [
+    (15547, [Event(0.0097, "worker", "hold", (25.51,)), Event(0.011, "worker", "disconnect")]),
+    (
+        14508,
+        [
+            Event(0.3416, "worker", "hold", (35.24,)),
+            Event(7.6123, "machine", "stop", (0.0767, 0.0)),
+            Event(7.6273, "output", "pull"),
+        ],
+    ),
+]
 """Schedules that once broke a law: the seed of the machine, and what happened to it."""
 
 
