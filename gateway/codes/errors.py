@@ -111,8 +111,8 @@ ERRORS: Final = (
         "no local socket for the tools",
         "control.sock (or rig.sock of a simulated rig) could not be made in the state directory. Control works "
         "without it.",
-        "A path of more than 107 bytes, or a file system that has no sockets.",
-        "Give a shorter --state DIR, on a local disk.",
+        "A path of more than 107 bytes, a file system that has no sockets, or somebody has put another file in its place.",
+        "Give a shorter --state DIR, on a local disk; another file in its place: remove it, the socket comes back.",
     ),
     Explanation(
         "E160",
