@@ -119,8 +119,8 @@ class JsonLineServer:
             return error.strerror or str(error)
 
     def _keep_file(self) -> None:
-        """Who cleans up a folder must not part a gateway from its tools: a socket whose file is gone gets a new one. What others
-        have put in its place stays theirs."""
+        """Make a new file where it is gone: who cleans up a folder must not part a gateway from its tools. What others have
+        put in its place stays theirs."""
         why = self._why_lost()
         if why is None and self._listener is not None:
             try:

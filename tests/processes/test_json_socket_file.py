@@ -1,4 +1,4 @@
-"""The file of a local socket: removed it comes back, replaced it is left alone, and what is another one's is never taken away."""
+"""The file of a local socket: removed it comes back; what another one has put in its place is never taken away."""
 
 import asyncio
 import json
