@@ -99,9 +99,8 @@ def test_a_rig_file_that_is_edited_meanwhile_is_for_the_next_start(tmp_path):
         pressing(gateway)
         os.kill(gateway.ready["pids"]["rig"], signal.SIGKILL)
         gateway.wait_until(lambda status: status["state"] == FAULT)
-        while gateway.status()["state"] == FAULT:  # no file of the rig could be read: it comes back as it was
-            gateway.client.write_registers(0, [2, 0])  # refused until its lines are there again
-            time.sleep(POLL_S)
+        gateway.write(0, 2, 0)
+        gateway.wait_until(lambda status: status["status_word"] & 2 and abs(status["force_measured"]) < 200)
         pressing(gateway)
     finally:
         assert stop(gateway) == 0
