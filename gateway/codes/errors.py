@@ -225,8 +225,8 @@ ERRORS: Final = (
         "E431",
         "calibration not stored",
         "The disk refused a calibration or plant, or the note of which one is in use. What was in use stays in use.",
-        "The disk is full (ENOSPC), read-only, or broken (EIO).",
-        "Free space (df -h on the state directory), then repeat the upload or `calibration use`.",
+        "The disk is full (ENOSPC), read-only, or broken (EIO); or the machine has no thread left for it, no memory.",
+        "Free space (df -h on the state directory) or memory, then repeat the upload or `calibration use`.",
     ),
     Explanation(
         "E432",
