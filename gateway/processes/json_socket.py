@@ -110,7 +110,8 @@ class JsonLineServer:
     # -- its file
 
     def _why_lost(self) -> str | None:
-        """Return why the path no longer leads here, empty where it does; None where it leads nowhere."""
+        """Return why the path no longer leads here, empty where it does; None where it leads nowhere. While the socket is open
+        the number of its inode is given to no other."""
         try:
             return "" if os.path.samestat(self._path.stat(), self._file) else "another file has its name"
         except FileNotFoundError:

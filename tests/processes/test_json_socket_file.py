@@ -3,6 +3,7 @@
 import asyncio
 import json
 import shutil
+import socket
 import stat
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -70,3 +71,17 @@ def test_what_stands_in_its_place_is_told_once_and_stays(tmp_path: Path) -> None
 
     beside_a_server(path, scene)
     assert path.read_text() == "somebody else's"
+
+
+def test_a_later_socket_of_another_gateway_is_not_taken_for_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "state" / "control.sock"
+
+    async def scene(said: asyncio.Queue[str]) -> None:
+        shutil.rmtree(path.parent)
+        path.parent.mkdir()
+        with socket.socket(socket.AF_UNIX) as other:
+            other.bind(str(path))
+            assert "another file has its name" in await said.get()
+
+    beside_a_server(path, scene)
+    assert path.is_socket()
