@@ -81,7 +81,7 @@ class Activation:
     def _candidates(self, fresh: Calibration) -> Iterator[int]:
         """Yield numbers of the store that seem to be this set, the last one first."""
         words = _words(fresh)
-        for number, stored in self.store.iterate_unchecked():
+        for number, stored in self.store.iterate_unchecked(fresh.data_sha256):
             with suppress(ValueError, struct.error, OverflowError):
                 if _words(stored) == words:
                     yield number

@@ -19,6 +19,7 @@ from gateway.profiles.strict_yaml.text import parse
 
 UNKNOWN_N: Final = -1.0
 """rms_n and max_n of a calibration whose data nobody has seen: an upload carries coefficients only."""
+_IS_UPLOAD: Final = f"\nrms_n: {UNKNOWN_N}\n"
 
 
 class CalibrationStore(NumberedStore[Calibration]):
@@ -54,12 +55,15 @@ class CalibrationStore(NumberedStore[Calibration]):
             raise StoreError("E432", str(faults[0]))
         return calibration
 
-    def iterate_unchecked(self) -> Iterator[tuple[int, Calibration]]:
-        """Yield every calibration, the last one first, without checking any: a search through hundreds of them must not
-        keep the loop waiting. So `load` what is found; files that cannot be read are left out."""
+    def iterate_unchecked(self, set_sha256: str) -> Iterator[tuple[int, Calibration]]:
+        """Yield every calibration that may hold the set with this hash, the last one first, without checking any: a search
+        through thousands of them must not keep the loop waiting, and so of uploads, which carry their set's hash, others are
+        not even parsed. So `load` what is found; files that cannot be read are left out."""
         for number in reversed(self.numbers()):
             with contextlib.suppress(OSError, ValueError, TypeError):
-                yield number, _parse_unchecked((self.directory / file_name(number)).read_text(encoding="utf-8"))
+                text = (self.directory / file_name(number)).read_text(encoding="utf-8")
+                if _IS_UPLOAD not in text or set_sha256 in text:
+                    yield number, _parse_unchecked(text)
 
     def find_data(self, data_sha256: str) -> int | None:
         """Return the number of the calibration that was made of these very data, None where there is none."""

@@ -190,7 +190,7 @@ class UploadService:
         self._end(CommitStatus.COMMITTED, self._describe_success(_describe_active(active)))
 
     def _fail(self, error: Exception) -> None:
-        """UnusableCalibration and StoreError are answers; anything else, an internal error, must not stop the control."""
+        """UnusableCalibration, StoreError and OSError are answers; anything else, an internal error, must not stop control."""
         index, reason, active = _NO_COEFFICIENT, int(UploadReason.DEFECT), self._calibration.number
         self._notice = NO_NOTICE
         if isinstance(error, UnusableCalibration):
@@ -198,6 +198,8 @@ class UploadService:
         elif isinstance(error, StoreError):
             sentence = f"{error}; active set {active} unchanged"
             reason = int(UploadReason.STORAGE if error.code == _NO_ROOM else UploadReason.NOT_STORED)
+        elif isinstance(error, OSError):
+            sentence, reason = f"{_NO_ROOM} {error.strerror}; active set {active} unchanged", int(UploadReason.STORAGE)
         else:
             trace = "".join(traceback.format_exception(error))
             sentence = f"A499 internal error, please report it; active set {active} unchanged:\n{trace}"

@@ -15,6 +15,7 @@ import tarfile
 from collections import deque
 from collections.abc import Callable, Iterable
 from importlib.metadata import version
+from ipaddress import IPv6Address
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,9 +29,16 @@ _SECRET_KEY: Final = re.compile(
     r"^(\s*(?:-\s*)?\"?(?:[\w.-]*(?:password|token|secret|passphrase|credential)[\w.-]*)\"?\s*[:=]\s*)\S.*$",
     re.I | re.M,
 )
+_SECRET_WORD: Final = re.compile(
+    r"(\b[\w.-]*(?:password|passwort|passwd|pwd|token|secret|passphrase|credential|api[_-]?key)\b[\"']?\s*[:=]\s*[\"']?)"
+    r"(?!\(left out)[^\s\"',;}\]]+",
+    re.I,
+)
+_LOGIN: Final = re.compile(r"(?<=://)[^/\s@\"]+(?=@)|(?<=\bbearer )[\w.~+/=-]+|(?<=\bbasic )[\w+/=]{8,}", re.I)
 _PEM: Final = re.compile(r"-----BEGIN [^-]+-----.*?(?:-----END [^-]+-----|\Z)", re.S)
 _IPV4: Final = re.compile(r"(?<![\d.])(?:\d{1,3}\.){3}\d{1,3}(?![\d.])")
-_OURS: Final = frozenset({HOST, "0.0.0.0"})
+_MAYBE_IPV6: Final = re.compile(r"(?<![\w:.])[0-9a-f]{0,4}(?::[0-9a-f]{0,4}){2,7}(?![\w:])", re.I)
+_OURS: Final = frozenset({HOST, "0.0.0.0", "::", "::1"})
 
 
 class Redaction:
@@ -42,12 +50,21 @@ class Redaction:
     def __call__(self, text: str) -> str:
         text = _PEM.sub("(a key or certificate, left out)", text)
         text = _SECRET_KEY.sub(r"\1(left out)", text)
-        return _IPV4.sub(lambda found: self._name_of(found[0]), text)
+        text = _SECRET_WORD.sub(r"\1(left out)", _LOGIN.sub("(left out)", text))
+        text = _IPV4.sub(lambda found: self._name_of(found[0]), text)
+        return _MAYBE_IPV6.sub(lambda found: self._name_of(found[0]) if _is_ipv6(found[0]) else found[0], text)
 
     def _name_of(self, address: str) -> str:
         if address in _OURS:
             return address
         return self._names.setdefault(address, f"master-{len(self._names) + 1}")
+
+
+def _is_ipv6(text: str) -> bool:
+    try:
+        return IPv6Address(text) is not None
+    except ValueError:
+        return False
 
 
 def collect(state: Path, rig_texts: Callable[[], Iterable[tuple[str, str]]]) -> dict[str, str]:

@@ -111,8 +111,8 @@ ERRORS: Final = (
         "no local socket for the tools",
         "control.sock (or rig.sock of a simulated rig) could not be made in the state directory. Control works "
         "without it.",
-        "A path of more than 107 bytes, or a file system that has no sockets.",
-        "Give a shorter --state DIR, on a local disk.",
+        "A path of more than 107 bytes, a file system that has no sockets, or somebody has put another file in its place.",
+        "Give a shorter --state DIR, on a local disk; another file in its place: remove it, the socket comes back.",
     ),
     Explanation(
         "E160",
@@ -225,8 +225,8 @@ ERRORS: Final = (
         "E431",
         "calibration not stored",
         "The disk refused a calibration or plant, or the note of which one is in use. What was in use stays in use.",
-        "The disk is full (ENOSPC), read-only, or broken (EIO).",
-        "Free space (df -h on the state directory), then repeat the upload or `calibration use`.",
+        "The disk is full (ENOSPC), read-only, or broken (EIO); or the machine has no thread left for it, no memory.",
+        "Free space (df -h on the state directory) or memory, then repeat the upload or `calibration use`.",
     ),
     Explanation(
         "E432",

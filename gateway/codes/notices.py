@@ -113,6 +113,14 @@ NOTICES: Final = (
         "force-gateway check RIG; end the gateway and start it again when the change is meant.",
     ),
     Explanation(
+        "W248",
+        "no room for new connections",
+        "The system had no descriptor or memory for a Modbus TCP connection: it waits. The force and who is connected do not "
+        "feel it.",
+        "Another program has opened all files that this machine or user may have, or this process's limit is small.",
+        "ulimit -n and /proc/sys/fs/file-nr show limit and use; end the program that opens so many, or raise LimitNOFILE.",
+    ),
+    Explanation(
         "W304",
         "force at the safe voltage",
         "The output is at the safe voltage and the load cell still measures a force.",

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Final
 
 from gateway.fieldbus.connection import Clock, Connection, ServerState, Timer
+from gateway.fieldbus.listener import Listener
 from gateway.fieldbus.peers import Peers, is_loopback
 from gateway.fieldbus.rate_limits import LogLimiter
 from gateway.fieldbus.settings import ServerSettings
@@ -45,7 +46,7 @@ class ModbusTcpServer:
         self._log = LogLimiter(log)
         self._clock = clock
         self._shared: ServerState | None = None
-        self._listener: asyncio.Server | None = None
+        self._listener: Listener | None = None
         self._sweep_timer: Timer | None = None
 
     @property
@@ -61,15 +62,15 @@ class ModbusTcpServer:
         loopback = is_loopback(host)
         if not loopback and not self._settings.allow:
             raise BindError(host)
-        loop = asyncio.get_running_loop()
-        clock: Clock = self._clock or loop
+        clock: Clock = self._clock or asyncio.get_running_loop()
         peers = Peers(self._settings, guarded=not loopback)
         shared = ServerState(self._bank, self._settings, clock, self._log, peers, self._on_peer_closed)
-        self._listener = await loop.create_server(self._make_protocol(shared), host, port)
+        self._listener = await Listener.open(
+            self._make_protocol(shared), host, port, lambda sentence: self._log("refused", sentence, clock.time())
+        )
         self._shared = shared
         self._sweep()
-        bound_host, bound_port = self._listener.sockets[0].getsockname()[:2]
-        return bound_host, bound_port
+        return self._listener.address
 
     async def close(self) -> None:
         """Stop listening and end every connection; returns when all have ended. Who does not read the last answers is cut."""
@@ -80,9 +81,9 @@ class ModbusTcpServer:
         self._shared.closing = True
         if self._sweep_timer is not None:
             self._sweep_timer.cancel()
+        await listener.wait_closed()
         if self._shared.connections:
             await self._end_connections(self._shared)
-        await listener.wait_closed()
 
     def _make_protocol(self, shared: ServerState) -> Callable[[], asyncio.BaseProtocol]:
         return lambda: Connection(shared)

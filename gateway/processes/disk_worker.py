@@ -1,7 +1,12 @@
-"""Work that waits for a disk, in a thread of its own, so that the control loop does not."""
+"""Work that waits for a disk, in a thread of its own, so that the control loop does not.
+
+A machine may refuse a thread (no memory, a container with few processes): the work is not done then, now or later, and
+whoever asked for it gets an OSError, as from a disk.
+"""
 
 import asyncio
 import contextlib
+import errno
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
@@ -16,6 +21,7 @@ class DiskWorker:
 
     def __init__(self) -> None:
         self._threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="calibration")
+        self._has_thread = False
 
     def __call__(self, work: Work, done: Done) -> None:
         loop = asyncio.get_running_loop()
@@ -24,11 +30,29 @@ class DiskWorker:
             with contextlib.suppress(RuntimeError):  # the loop is closed: nobody wants to know any more
                 loop.call_soon_threadsafe(done, future.exception() or future.result())
 
+        try:
+            self._need_thread()
+        except OSError as error:
+            loop.call_soon(done, error)
+            return
         self._threads.submit(work).add_done_callback(come_back)
 
     def begin(self, work: Callable[[], object]) -> None:
-        """Begin this, too: nobody waits for it, and it minds its own failures. Also outside of a loop."""
+        """Begin this, too: nobody waits for it, and it minds its own failures. OSError where it cannot begin. Also outside of a
+        loop."""
+        self._need_thread()
         self._threads.submit(work)
+
+    def _need_thread(self) -> None:
+        """The executor starts its thread with the first work, and keeps that work for later where it cannot: so the first does
+        nothing."""
+        if self._has_thread:
+            return
+        try:
+            self._threads.submit(lambda: None)
+        except RuntimeError as error:
+            raise OSError(errno.EAGAIN, f"no thread for the disk: {error}") from None
+        self._has_thread = True
 
     def close(self) -> None:
         """Take nothing more; what runs comes to its end, and the process waits for it."""

@@ -12,24 +12,50 @@ import contextlib
 import errno
 import fcntl
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 from zlib import crc32
 
 _FRESH: Final = ".new"
+_READER_BOUND_S: Final = 2.0
+_WRITER_BOUND_S: Final = 10.0  # the fsyncs of another one on a slow disk
+_LOCK_POLL_S: Final = 0.01
 _SEAL: Final = b"# crc32 %08x of all that follows\n"
 
 
 @contextlib.contextmanager
 def lock_directory(directory: Path, *, shared: bool = False) -> Iterator[int]:
-    """Yield the directory's descriptor, while no other holder changes it. FileNotFoundError when there is none."""
+    """Yield the directory's descriptor, while no other holder changes it. FileNotFoundError when there is none.
+
+    A holder that does not let go (stopped by Ctrl-Z, a hung disk) changes nothing either: who reads goes on without the lock,
+    who would change something gets an OSError.
+    """
     descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH if shared else fcntl.LOCK_EX)
+        _lock(descriptor, directory, shared=shared)
         yield descriptor
     finally:
         os.close(descriptor)
+
+
+def _lock(descriptor: int, directory: Path, *, shared: bool) -> None:
+    kind, bound_s = (fcntl.LOCK_SH, _READER_BOUND_S) if shared else (fcntl.LOCK_EX, _WRITER_BOUND_S)
+    ends_s = time.monotonic() + bound_s
+    while True:
+        try:
+            fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= ends_s:
+                break
+            time.sleep(_LOCK_POLL_S)
+        else:
+            return
+    if not shared:
+        raise OSError(
+            errno.EBUSY, f"another program has kept it locked for {bound_s:g} s: stopped, or hung?", str(directory)
+        )
 
 
 def make_directory(directory: Path) -> None:

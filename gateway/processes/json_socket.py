@@ -55,29 +55,40 @@ class JsonLineServer:
         self._queue: deque[Callable[[], None]] = deque()
         self._turn: asyncio.TimerHandle | None = None
         self._sweep_timer: asyncio.TimerHandle | None = None
+        self._told = ""  # why its file leads elsewhere
 
     async def start(self) -> str:
         """Begin to serve; empty, or a sentence that says why nothing is served."""
         if (length := len(os.fsencode(self._path))) > _LONGEST_PATH:
             why = f"{length} bytes of path, a socket takes {_LONGEST_PATH}: give a shorter --state DIR"
-            return f"{self._path} is not served, its tools will not find this gateway: {why}"
-        listener = socket.socket(socket.AF_UNIX)
-        listener.setblocking(False)
-        previous = os.umask(0o177)
+            return self._unserved(why)
         try:
             self._path.unlink(missing_ok=True)
-            listener.bind(str(self._path))
-            listener.listen(128)
+            self._listener = self._bind()
         except OSError as error:
-            listener.close()
-            return f"{self._path} is not served, its tools will not find this gateway: {error.strerror or error}"
-        finally:
-            os.umask(previous)
-        self._listener = listener
+            return self._unserved(error.strerror or str(error))
         self.loop = asyncio.get_running_loop()
         self._await_connection()
         self._sweep()
         return ""
+
+    def _unserved(self, why: str) -> str:
+        return f"{self._path} is not served, its tools will not find this gateway: {why}"
+
+    def _bind(self) -> socket.socket:
+        listener = socket.socket(socket.AF_UNIX)
+        listener.setblocking(False)
+        previous = os.umask(0o177)
+        try:
+            listener.bind(str(self._path))
+            listener.listen(128)
+            self._file = self._path.stat()
+        except OSError:
+            listener.close()
+            raise
+        finally:
+            os.umask(previous)
+        return listener
 
     async def close(self) -> None:
         """Close at once: a caller that reads nothing would never let go of a polite close."""
@@ -92,8 +103,40 @@ class JsonLineServer:
             if timer:
                 timer.cancel()
         self._queue.clear()
-        with contextlib.suppress(OSError):
-            self._path.unlink(missing_ok=True)
+        if self._why_lost() == "":
+            with contextlib.suppress(OSError):
+                self._path.unlink(missing_ok=True)
+
+    # -- its file
+
+    def _why_lost(self) -> str | None:
+        """Return why the path no longer leads here, empty where it does; None where it leads nowhere. While the socket is open
+        the number of its inode is given to no other."""
+        try:
+            return "" if os.path.samestat(self._path.stat(), self._file) else "another file has its name"
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            return error.strerror or str(error)
+
+    def _keep_file(self) -> None:
+        """Make a new file where it is gone: who cleans up a folder must not part a gateway from its tools. What others have
+        put in its place stays theirs."""
+        why = self._why_lost()
+        if why is None and self._listener is not None:
+            try:
+                fresh = self._bind()
+            except OSError as error:
+                why = error.strerror or str(error)
+            else:
+                self.loop.remove_reader(self._listener)
+                self._listener.close()
+                self._listener = fresh
+                self._await_connection()
+                self._log("socket", f"{self._path} was removed: it is served again")
+        if why and why != self._told:
+            self._log("socket", f"E152 {self._unserved(why)}")
+        self._told = why or ""
 
     # -- one thing at a time
 
@@ -164,6 +207,7 @@ class JsonLineServer:
         oldest_s = self.loop.time() - self.limits.idle_s
         for caller in [caller for caller in self._callers if caller.spoke_s <= oldest_s]:
             caller.dismiss(f"no whole request for {self.limits.idle_s:g} s")
+        self._keep_file()
         self._sweep_timer = self.loop.call_later(self.limits.idle_s / 4.0, self._sweep)
 
     # -- requests

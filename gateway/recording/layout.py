@@ -7,8 +7,10 @@ Little-endian throughout. A batch's CRC covers its number, its row count and its
 page of zeros that a power cut left behind, never passes for data. Batch numbers count from 0: a gap is seen.
 """
 
+import re
 import struct
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 from zlib import crc32
 
@@ -19,6 +21,12 @@ BATCH_PREFIX: Final = struct.Struct("<4sIII")
 COUNTS: Final = struct.Struct("<II")
 LONGEST_HEADER: Final = 16 << 20
 SUFFIX: Final = ".fgr"
+_NUMBER: Final = re.compile(r"[0-9]{1,15}")
+
+
+def number_in(path: Path) -> int | None:
+    """Return the number of a recording, or of a mark beside one, by the name of its file; None where it has another one."""
+    return int(path.stem) if _NUMBER.fullmatch(path.stem) else None
 
 
 def header_bytes(document: bytes) -> bytes:

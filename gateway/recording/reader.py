@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from zlib import crc32
 
 from gateway.recording.errors import RecordingError
-from gateway.recording.layout import HEADER_PREFIX, LONGEST_HEADER, MAGIC, MARK, SUFFIX, Batch, batch_at
+from gateway.recording.layout import HEADER_PREFIX, LONGEST_HEADER, MAGIC, MARK, SUFFIX, Batch, batch_at, number_in
 
 if TYPE_CHECKING:
     import numpy as np
@@ -80,14 +80,15 @@ def list_recordings(state_directory: Path) -> list[RecordingEntry]:
 
 def recording_paths(state_directory: Path) -> list[Path]:
     """Return the files of the recordings of one state directory by number."""
-    paths = [path for path in (state_directory / "recordings").glob(f"*{SUFFIX}") if path.stem.isdigit()]
-    return sorted(paths, key=lambda path: int(path.stem))
+    paths = (state_directory / "recordings").glob(f"*{SUFFIX}")
+    numbered = ((number, path) for path in paths if (number := number_in(path)) is not None)
+    return [path for _, path in sorted(numbered) if path.is_file()]  # a pipe or a device would be read for ever
 
 
 def find_recording(state_directory: Path, number: int) -> Path:
     """Return the file of one number; RecordingError that names the ones there are."""
     path = state_directory / "recordings" / f"{number:04d}{SUFFIX}"
-    if path.exists():
+    if path.is_file():
         return path
     present = ", ".join(str(entry.number) for entry in list_recordings(state_directory)) or "none"
     raise RecordingError(f"no recording {number} in {path.parent}; there: {present}")

@@ -6,7 +6,8 @@ Decisions
 - No fsync here: the kernel keeps what was written when the process dies; a power cut may cost the last half minute. Whoever
   records has `sync_recording` called in a thread, once it has begun (without its header a file is nothing) and once it has
   ended. SQLite and Parquet were rejected, for they sync as they go, and a torn Parquet file has no footer and so no data.
-- A full disk ends the recording, with a sentence, never the control loop. One that takes no header has no recording.
+- A full disk ends the recording, with a sentence, never the control loop; so does who deletes its file, or the folder, while
+  it is written. A disk that takes no header has no recording.
 - No numpy here: the control process needs none of it to record.
 """
 
@@ -22,11 +23,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.processes.durable_file import sync_path
-from gateway.recording.layout import BATCH_PREFIX, MARK, SUFFIX, batch_crc, header_bytes
+from gateway.recording.layout import BATCH_PREFIX, MARK, SUFFIX, batch_crc, header_bytes, number_in
 
 _FLUSH_S: Final = 0.1
 _BATCH_ROWS: Final = 256  # a batch is written early when it is full: 2.5 kHz still gives one write per 0.1 s
 _FORMAT: Final = 1
+_DELETED: Final = "somebody has deleted its file"
 
 
 class Recorder:
@@ -87,6 +89,8 @@ class Recorder:
         """Write the last rows and close the file; a second call does nothing."""
         if self._rows:
             self._write_batch()
+        elif self._descriptor is not None and self._is_deleted(self._descriptor):
+            self._stop(_DELETED)
         self._release()
 
     def _write_header(self, data: bytes) -> int:
@@ -117,12 +121,19 @@ class Recorder:
             return False
         try:
             written = os.write(self._descriptor, data)
+            if self._is_deleted(self._descriptor):
+                return self._stop(_DELETED)
         except OSError as error:
             return self._stop(error.strerror or str(error))
         if written < len(data):
             return self._stop("the disk is full")
         self._length += written
         return True
+
+    @staticmethod
+    def _is_deleted(descriptor: int) -> bool:
+        """A file without a name takes rows as before, and they are gone with its descriptor."""
+        return os.fstat(descriptor).st_nlink == 0
 
     def _stop(self, reason: str) -> bool:
         self.failure = f"E402 recording {self.path} stopped after {self.rows_written} rows: {reason}; control goes on"
@@ -150,7 +161,7 @@ def sync_recording(path: Path) -> None:
 def _create_next(directory: Path) -> tuple[int, Path, int]:
     """Number, path and descriptor of a file that nobody else has: O_EXCL settles who gets a number. None is used twice, also
     where its recording was deleted: then there is a mark."""
-    number = 1 + max((int(path.stem) for path in directory.iterdir() if path.stem.isdigit()), default=0)
+    number = 1 + max((number_in(path) or 0 for path in directory.iterdir()), default=0)
     while True:
         path = directory / f"{number:04d}{SUFFIX}"
         try:

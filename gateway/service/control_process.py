@@ -13,7 +13,7 @@ import socket
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from gateway.ports import PortError
 from gateway.processes import exit_codes, priority
@@ -22,6 +22,7 @@ from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import Ending
 from gateway.processes.priority import use_realtime
 from gateway.profiles import ProfileError, Rig, load_rig
+from gateway.profiles.kept_rig import keep_rig, kept_rig
 from gateway.recording.ring import SampleRing
 from gateway.service import banner
 from gateway.service.guardian_line import GuardianLine
@@ -41,7 +42,7 @@ def main(arguments: list[str]) -> int:
     priority.set_nice(priority.LOOP_NICE)
     with EventLog(source="control", file=EventFile(Path(options["state"]))) as log:
         try:
-            rig = load(options)
+            rig = kept_rig(options["rig"], simulated=options["simulate"])
             if options["rtu"] is not None:
                 rig = with_rtu_face(rig, options["rtu"])
             notes = use_realtime() if options["realtime"] else ()
@@ -69,13 +70,7 @@ def prepare(options: dict[str, Any]) -> None:
     """Prepare what takes long the first time: imports, and the types that the rig's files are checked against."""
     _loop_factory()
     with contextlib.suppress(ProfileError):  # told by the process that runs
-        _read_at_start[_files_of(options)] = _read(options)
-
-
-def load(options: dict[str, Any]) -> Rig:
-    """Return the rig of these options, as the gateway was started with it: what has become of its files meanwhile (an editor
-    that is half done, another limit) is for the next start. ProfileError with every fault of its files."""
-    return _read_at_start.get(_files_of(options)) or _read(options)
+        keep_rig(options["rig"], simulated=options["simulate"])
 
 
 def describe_change(rig: Rig, options: dict[str, Any]) -> str:
@@ -83,24 +78,12 @@ def describe_change(rig: Rig, options: dict[str, Any]) -> str:
     if options["restarted"] is None:
         return ""
     try:
-        if _read(options).fingerprint == rig.fingerprint:
+        if load_rig(options["rig"], simulated=options["simulate"]).fingerprint == rig.fingerprint:
             return ""
         now = "have changed"
     except ProfileError as error:
         now = f"have faults now ({error.faults[0]})"
     return f"W247 the files of rig {rig.name} {now}: it goes on as it was started, a new start takes them"
-
-
-def _read(options: dict[str, Any]) -> Rig:
-    return load_rig(options["rig"], simulated=options["simulate"])
-
-
-def _files_of(options: dict[str, Any]) -> tuple[str, bool]:
-    return options["rig"], options["simulate"]
-
-
-_read_at_start: Final[dict[tuple[str, bool], Rig]] = {}
-"""Filled in the process that control is forked from; empty in one that is started by itself."""
 
 
 def sample_ring(descriptor: int | None) -> SampleRing | None:

@@ -17,7 +17,10 @@ class RecordingSync:
         self._worker = DiskWorker()
 
     def __call__(self, path: Path) -> None:
-        self._worker.begin(lambda: self._sync(path))
+        try:
+            self._worker.begin(lambda: self._sync(path))
+        except OSError as error:
+            self._tell(path, error)
 
     def close(self) -> None:
         """Begin nothing more; what is under way comes to its end."""
@@ -29,6 +32,7 @@ class RecordingSync:
         except FileNotFoundError:  # deleted meanwhile
             return
         except OSError as error:
-            self._log(
-                "recording", f"E402 recording {path} may not outlive a power cut: {error.strerror}; control goes on"
-            )
+            self._tell(path, error)
+
+    def _tell(self, path: Path, error: OSError) -> None:
+        self._log("recording", f"E402 recording {path} may not outlive a power cut: {error.strerror}; control goes on")

@@ -19,13 +19,14 @@ from typing import Any, Final
 
 from gateway.devices import DeviceProfile
 from gateway.ports import PacedPty
+from gateway.processes import exit_codes, priority
 from gateway.processes import message_link as guardian_link
-from gateway.processes import priority
 from gateway.processes.clock_tick import ClockTick
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.json_socket import JsonLineServer
-from gateway.profiles import Rig, load_rig
+from gateway.profiles import ProfileError, Rig
+from gateway.profiles.kept_rig import kept_rig
 from gateway.service.simulation.kept_settings import KeptSettings
 from gateway.service.simulation.settings import SimulationSettings
 from gateway.service.simulation.world import SimulatedRig
@@ -177,7 +178,12 @@ def main(arguments: list[str]) -> int:
     priority.set_nice(priority.RIG_NICE)
     with EventLog(source="rig", file=EventFile(state)) as log:
         kept = KeptSettings(state, options.get("run", ""))
-        asyncio.run(serve(load_rig(options["rig"], simulated=True), link, kept, log))
+        try:
+            rig = kept_rig(options["rig"], simulated=options["simulate"])
+        except ProfileError as error:  # edited since
+            log("rig", "E151 the rig file has faults:\n" + "\n".join(map(str, error.faults)))
+            return exit_codes.CONFIGURATION
+        asyncio.run(serve(rig, link, kept, log))
     return 0
 
 

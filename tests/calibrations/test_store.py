@@ -1,6 +1,7 @@
 """Calibrations are old or new, never mixed; what is said to be stored is stored; what is damaged is named and passed over."""
 
 import errno
+import fcntl
 import os
 import threading
 from dataclasses import replace
@@ -9,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from gateway.calibrations.store import CalibrationStore
+from gateway.calibrations.store import UNKNOWN_N, CalibrationStore
 from gateway.numbered_documents.selection import BUILT_IN, Selection
 from gateway.numbered_documents.store import StoreError
+from gateway.processes import durable_file
 from gateway.profiles import load_calibration
 from tests.calibrations.coefficients import calibration, mark_of
 from tests.calibrations.failing_disk import disk
@@ -241,3 +243,31 @@ def test_a_directory_that_may_not_be_read_is_said(used, monkeypatch):
         selected = used.find_selected()
     assert selected.document == OWN
     assert "cannot be read: Permission denied" in selected.notes[0]
+
+
+# -- beside others
+
+
+def test_whoever_keeps_the_store_locked_keeps_no_start_waiting_and_no_change_for_ever(used, monkeypatch):
+    monkeypatch.setattr(durable_file, "_READER_BOUND_S", 0.03)
+    monkeypatch.setattr(durable_file, "_WRITER_BOUND_S", 0.03)
+    holder = os.open(used.directory, os.O_RDONLY)
+    fcntl.flock(holder, fcntl.LOCK_EX)
+    selected = CalibrationStore(used.directory.parent, OWN).find_selected()
+    assert (mark_of(selected.document), selected.notes) == (3, ())
+    before = files(used)
+    for change in (lambda: used.add(calibration(4)), lambda: used.use(2)):
+        with pytest.raises(StoreError, match=r"E431 .* another program has kept it locked for 0\.03 s"):
+            change()
+    assert files(used) == before
+    os.close(holder)
+    assert used.add(calibration(4)) == 4
+
+
+def test_a_search_for_a_set_reads_no_upload_of_another_one(store):
+    """Thousands of them, parsed, take the time of the loop in whose process they are."""
+    for mark in (2, 3, 4):
+        store.add(calibration(mark, rms_n=UNKNOWN_N, max_n=UNKNOWN_N, data_sha256=f"{mark:064x}"))
+    measured = store.add(calibration(9))
+    assert [number for number, _ in store.iterate_unchecked(f"{3:064x}")] == [measured, 3]
+    assert [number for number, _ in store.iterate_unchecked(f"{8:064x}")] == [measured]

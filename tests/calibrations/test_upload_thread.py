@@ -56,6 +56,31 @@ def test_the_loop_goes_on_while_the_disk_takes_its_time(bench: Bench):
     assert len(seen) > 100
 
 
+def test_an_upload_that_no_thread_can_be_had_for_fails_and_the_next_one_does_not(bench: Bench, monkeypatch):
+    """A container with few processes, or no memory: it must neither end control nor keep others out."""
+
+    def refuse(thread: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    async def upload() -> CommitStatus:
+        bench.write(1145, 1)
+        while bench.status in (CommitStatus.CHECKING, CommitStatus.WRITING):
+            await asyncio.sleep(0.001)
+        return bench.status
+
+    async def main() -> None:
+        bench.upload.run_in_background = apart = DiskWorker()
+        bench.stage(staged(CoefficientSet.of_calibration(calibration(16))))
+        with monkeypatch.context() as patch:
+            patch.setattr(threading.Thread, "start", refuse)
+            assert await upload() is CommitStatus.FAILED
+        assert bench.log[-1].startswith("E431 no thread for the disk")
+        assert await upload() is CommitStatus.COMMITTED
+        apart.close()
+
+    asyncio.run(main())
+
+
 def test_a_loop_that_ends_before_the_disk_is_ready_leaves_the_old_set_or_the_new_one(bench: Bench):
     go = threading.Event()
 

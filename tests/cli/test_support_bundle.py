@@ -43,6 +43,24 @@ def test_no_secret_of_a_rig_goes_in_and_all_else_stays() -> None:
     assert "force_max_n: 50" in text and "token: (left out)" in text
 
 
+def test_a_secret_in_a_comment_or_in_the_middle_of_a_sentence_does_not_go_in_either() -> None:
+    text = Redaction()(
+        "# was: passwd=s3cr3t-1, Passwort: s3cr3t-2 (api_key 'x')\n"
+        '{"text": "mqtt://robot:s3cr3t-3@broker failed; Authorization: Bearer s3cr3t-4; token=s3cr3t-5;", "time": "10:31:47"}\n'
+        'api-key: "s3cr3t-6"\n'
+    )
+    assert "s3cr3t" not in text
+    assert json.loads(text.splitlines()[1])["time"] == "10:31:47"
+    assert "@broker failed" in text
+
+
+def test_an_address_of_ipv6_is_one_too() -> None:
+    text = Redaction()(
+        "W204 [2001:db8::5]:40112 at 10:31:47.123Z, fe80::1ff:fe23:4567:890a%eth0, 2001:db8::5; bind ::1"
+    )
+    assert text == "W204 [master-1]:40112 at 10:31:47.123Z, master-2%eth0, master-1; bind ::1"
+
+
 def test_a_master_has_the_same_name_in_every_part_and_never_its_address(tmp_path: Path) -> None:
     state = with_events(tmp_path / "state", "W204 10.1.2.3 asked for 72 N", "W204 10.1.2.4", "W204 10.1.2.3 again")
     parts = collect(state, lambda: [("rig.yaml", "allow: [10.1.2.4/32]\nbind: 127.0.0.1\n")])

@@ -247,3 +247,10 @@ def test_a_workbook_gives_the_same_numbers(form: str, tmp_path: Path) -> None:
         assert other.columns["force_n"].tolist() == [2.0]
     with pytest.raises(RecordingError, match="has no sheet 'Secnd'; did you mean 'Second'"):
         read_table(tmp_path / "table.xlsx", column_mapping("sheet=Secnd,force_n=2"))
+
+
+def test_a_quote_that_nobody_closes_is_no_table_and_no_defect(tmp_path: Path) -> None:
+    path = tmp_path / "torn.csv"
+    path.write_text('time_s,command_v,force_n\n"' + "1," * 100_000 + "\n")
+    with pytest.raises(RecordingError, match="line 2 has quotes and 200002 characters"):
+        read_table(path)

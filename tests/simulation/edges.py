@@ -17,6 +17,7 @@ from gateway.service.running_rig.running_rig import RunningRig
 from tests.disk.failing_disks import FailingDisk
 from tests.disk.watched_disk import watching
 from tests.simulation.cables import CABLES, SimulatedPort
+from tests.simulation.network import MemoryListener
 from tests.simulation.virtual_time import VirtualClock
 
 TWIN_STEP_S = 10e-3
@@ -179,6 +180,7 @@ def simulated_edges() -> Any:
         patch.setattr("gateway.service.running_rig.lines.rig_ports.SerialPort", SimulatedPort)
         patch.setattr(f"{_RIG}.ClockTick", SimulatedTick)
         patch.setattr("gateway.service.control_process.RunningRig", NotedRunningRig)
+        patch.setattr("gateway.fieldbus.tcp_server.Listener", MemoryListener)
         NotedRunningRig.of.clear()
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
         patch.setattr(f"{_RIG}.explain_silent_device", _explain)

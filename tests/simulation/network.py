@@ -10,31 +10,25 @@ from tests.simulation.virtual_time import VirtualLoop
 DELAY_S = 0.0002
 
 
-class MemoryServer:
-    """What `create_server` gives: enough of asyncio.Server for who listens."""
+class MemoryListener:
+    """Stands for `Listener`: only `Line` reaches it."""
 
     def __init__(self, make: Callable[[], Any], port: int, loop: VirtualLoop) -> None:
         self.make, self.port, self._loop = make, port, loop
-        self.sockets = (self,)
+        self.address = "127.0.0.1", port
 
-    def getsockname(self) -> tuple[str, int]:
-        return "127.0.0.1", self.port
+    @classmethod
+    async def open(cls, make: Callable[[], Any], host: str, port: int, on_shortage: object) -> "MemoryListener":
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        loop.servers[port] = listener = cls(make, port, loop)
+        return listener
 
     def close(self) -> None:
         self._loop.servers.pop(self.port, None)
 
     async def wait_closed(self) -> None:
         return
-
-
-def serve_in_memory(loop: VirtualLoop) -> None:
-    """Have this loop's `create_server` make a server that only `connect` reaches."""
-
-    async def create_server(make: Callable[[], Any], host: str, port: int, **_: Any) -> MemoryServer:
-        loop.servers[port] = MemoryServer(make, port, loop)
-        return loop.servers[port]  # type: ignore[no-any-return]
-
-    loop.create_server = create_server  # type: ignore[method-assign,assignment]
 
 
 class Delay:

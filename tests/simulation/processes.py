@@ -23,7 +23,6 @@ from gateway.service.supervisor.run_options import RunOptions
 from tests.simulation.cables import CABLES
 from tests.simulation.edges import Log, NotedRunningRig, SimulatedDisk
 from tests.simulation.links import LinkEnd, create_link, read_in_memory, readable_ends
-from tests.simulation.network import serve_in_memory
 from tests.simulation.virtual_time import VirtualClock, VirtualLoop
 
 PORT = 5020
@@ -46,7 +45,6 @@ class SimulatedProcess(Child):
         ours, self.theirs = create_link()
         super().__init__(ours, pid, died=pid)  # type: ignore[arg-type]
         self.loop = VirtualLoop(clock)
-        serve_in_memory(self.loop)
         read_in_memory(self.loop)
         self._on_death = on_death
         self.exit_code: int | None = None

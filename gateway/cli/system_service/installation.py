@@ -4,10 +4,12 @@ Files go below a root, which is `/` on a running machine, and a folder where an 
 for anything.
 """
 
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from ipaddress import ip_network
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -20,7 +22,10 @@ if TYPE_CHECKING:
     from gateway.profiles import Rig
 
 UNITS: Final = "etc/systemd/system"
-_HIDDEN: Final = ("/home", "/root", "/run/user")  # ProtectHome=yes
+_HIDDEN: Final = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")
+_STEM: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+_NOT_OF_PROGRAMS: Final = frozenset("'\"\\$*?[")  # what systemd takes in no path of a program
+_NAMED_NETWORKS: Final = ("any", "localhost", "link-local", "multicast")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,13 +44,18 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
     named = str(Path(rig_name).absolute()) if is_file else rig_name
     for path in (str(program), *([named] if is_file else [])):
         _refuse_hidden(path)
+    if not _NOT_OF_PROGRAMS.isdisjoint(str(program)):
+        raise CliError(f"E107 {program}: systemd starts no program with such a path", exit_codes.CONFIGURATION)
+    if not _STEM.fullmatch(stem := Path(named).stem):
+        raise CliError(f"E107 {named}: its name names the unit: letters, digits, _ . - only", exit_codes.CONFIGURATION)
+    _refuse_no_networks(networks)
     lines = (rig.output, rig.load_cell, *([rig.valve] if rig.valve else []))
     faces = [face.port for face in rig.fieldbus if isinstance(face, RtuFace)]
     ports = [line.port for line in lines] + faces
     options = unit_file.UnitOptions(
         command=program,
         rig=named,
-        stem=Path(named).stem,
+        stem=stem,
         ports=_ports_of(rig),
         devices=() if rig.simulated else tuple(dict.fromkeys(port for port in ports if port)),
         networks=tuple(networks) or _networks_of(rig),
@@ -136,8 +146,20 @@ def _refuse_hidden(path: str) -> None:
             "pip install) and keep the rig in /etc/force-gateway, or give --command",
             exit_codes.CONFIGURATION,
         )
+    if not path.isprintable():
+        raise CliError(f"E107 {path!r}: a unit has no such characters in a path", exit_codes.CONFIGURATION)
     if not Path(path).is_absolute():
         raise CliError(f"E107 {path}: the service needs an absolute path", exit_codes.CONFIGURATION)
+
+
+def _refuse_no_networks(networks: Sequence[str]) -> None:
+    for network in networks:
+        try:
+            ip_network(network, strict=False)
+        except ValueError as error:
+            if network not in _NAMED_NETWORKS:
+                example = "such as 192.168.125.0/24"
+                raise CliError(f"E107 --allow {network}: {error}; {example}", exit_codes.CONFIGURATION) from None
 
 
 def _others(root: Path) -> str:

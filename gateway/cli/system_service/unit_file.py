@@ -15,7 +15,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from shlex import quote
 from typing import Final
 
 from gateway.processes import exit_codes
@@ -27,6 +26,7 @@ STOP_S: Final = 15  # a ramp of at most 5 s, the safe voltage, and the children'
 _NO_RESTART: Final = (exit_codes.USAGE, exit_codes.DATA, exit_codes.PERMISSION, exit_codes.CONFIGURATION)
 _LOWEST_FREE_PORT: Final = 1024
 _USB: Final = ("char-ttyUSB", "char-ttyACM")
+_PLAIN: Final = re.compile(r"[\w./+%-]+")
 _TTY: Final = re.compile(r"/dev/(tty[A-Z]+)\d+")
 
 _HARDENING: Final = """\
@@ -99,7 +99,7 @@ def unit_text(options: UnitOptions) -> str:
         "[Service]",
         "Type=notify",
         "NotifyAccess=main",
-        f"ExecStart={quote(str(options.command))} run {quote(options.rig)} --state %S/{NAME}/{stem}",
+        f"ExecStart={_word(str(options.command))} run {_word(options.rig).replace('$', '$$')} --state %S/{NAME}/{stem}",
         f"WatchdogSec={WATCHDOG_S}",
         "TimeoutStartSec=90",
         f"TimeoutStopSec={STOP_S}",
@@ -121,6 +121,12 @@ def unit_text(options: UnitOptions) -> str:
         "WantedBy=multi-user.target",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _word(text: str) -> str:
+    """Return one word of a command line as systemd reads it: quoted where it must be, and no % of it a specifier."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("%", "%%")
+    return escaped if _PLAIN.fullmatch(text) else f'"{escaped}"'
 
 
 def _of_the_rig(options: UnitOptions) -> list[str]:

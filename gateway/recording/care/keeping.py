@@ -12,6 +12,7 @@ from typing import Final
 
 from gateway.processes.durable_file import lock_directory, remove_if_possible, replace_durably
 from gateway.profiles.recordings_section import Retention
+from gateway.recording.layout import number_in
 from gateway.recording.reader import recording_paths
 
 _MARK: Final = ".keep"
@@ -107,14 +108,13 @@ def delete_recording(path: Path, reference: str) -> str:
 
 
 def _numbers(folder: Path) -> list[int]:
-    return [int(path.stem) for path in folder.iterdir() if path.stem.isdigit()]
+    return [number for path in folder.iterdir() if (number := number_in(path)) is not None]
 
 
 def _keep_highest_mark(folder: Path, descriptor: int) -> None:
-    *lower, _ = sorted(
-        (mark for mark in folder.glob(f"*{_GONE}") if mark.stem.isdigit()), key=lambda mark: int(mark.stem)
-    )
-    for mark in lower:
+    marks = ((number, path) for path in folder.glob(f"*{_GONE}") if (number := number_in(path)) is not None)
+    *lower, _ = sorted(marks)
+    for _, mark in lower:
         remove_if_possible(descriptor, mark.name)
 
 

@@ -24,6 +24,7 @@ MOST_COLUMNS: Final = 4096
 LONGEST_LINE: Final = 1 << 20
 _SAMPLE_LINES: Final = 200
 _MOST_TITLE_LINES: Final = 60
+_LONGEST_CELL: Final = csv.field_size_limit()  # whoever does not close a quote makes a cell of the whole line
 _DECIMAL_COMMA: Final = re.compile(r"\d,\d")
 _QUOTED_DECIMAL_COMMA: Final = re.compile(r'"\s*[-+]?\d+,\d+(?:[eE][-+]?\d+)?\s*"')
 _DECIMAL_POINT: Final = re.compile(r"(?<![\d.:])\d+\.\d+(?![\d.])")
@@ -120,6 +121,10 @@ def rows_of(stream: TextIO, facts: dict[str, str], path: Path) -> Iterator[tuple
     for at, line in enumerate(iter(lambda: stream.readline(LONGEST_LINE), ""), start=1):
         if len(line) == LONGEST_LINE:
             raise RecordingError(f"{path}: line {at} has a million characters or more: no table of rows and columns")
+        if len(line) > _LONGEST_CELL and '"' in line:
+            raise RecordingError(
+                f"{path}: line {at} has quotes and {len(line)} characters: no table of rows and columns"
+            )
         stripped = line.strip()
         if stripped.startswith("#"):
             key, colon, value = stripped[1:].partition(":")

@@ -241,7 +241,12 @@ class CalibrationRuns:
             self._ended = recorder.failure
             self._calibrating.phase = CalibrationPhase.STOPPED
         else:
-            self._child = FitLauncher(recorder.path, self._rig.file, self._state, self._on_result)
+            try:
+                self._child = FitLauncher(recorder.path, self._rig.file, self._state, self._on_result)
+            except OSError as error:  # no process, memory or descriptor
+                self._on_result(
+                    {"refused": f"A331 the fit did not start: {error.strerror}; force-gateway fit {recorder.number}"}
+                )
 
     def _on_result(self, result: Result) -> None:
         self._child, self._result = None, result

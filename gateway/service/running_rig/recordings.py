@@ -172,7 +172,7 @@ class Recordings:
             self._again.ask(str(error))
             return
         self._again.forget()
-        self._log("recording", f"there is room again: recording to {self.status()['recording']}")
+        self._log("recording", f"it goes on: recording to {self.status()['recording']}")
 
     def _is_long(self, size_bytes: int, now_s: float) -> bool:
         if self._began_s is None:

@@ -99,6 +99,8 @@ class RigPlants:
         self._has_failed = isinstance(result, Exception)
         if isinstance(result, StoreError):
             self._outcome = f"{result}; {_plant(self.rig)} stays in use"
+        elif isinstance(result, OSError):
+            self._outcome = f"E431 {result.strerror}; {_plant(self.rig)} stays in use"
         elif isinstance(result, Exception):
             self._outcome = f"A499 internal error, please report it: {result!r}; {_plant(self.rig)} stays in use"
         else:

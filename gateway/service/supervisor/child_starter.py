@@ -79,9 +79,9 @@ class ChildStarter:
     def rig(self, *, prepared: bool) -> Child:
         """Start the simulated rig; it outlives a kill of control, as a real rig does, and ends when its link does.
 
-        prepared: not for a second try, which avoids whatever went wrong with the first.
+        prepared: with the rig as it was read at the start; not after a try that came to nothing, to avoid whatever went wrong.
         """
-        arguments = {"rig": self._options["rig"], "state": str(self._state), "run": self._run}
+        arguments = {**self._options, "state": str(self._state), "run": self._run}
         return self._child(fork_server.RIG, arguments) if prepared else spawn_child(fork_server.RIG, arguments)
 
     def optional(self, name: str, arguments: dict[str, Any]) -> Child:

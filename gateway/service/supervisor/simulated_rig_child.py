@@ -21,8 +21,8 @@ Answer = dict[str, Any]
 
 
 class RigSupervisor:
-    """spawn: starts the process (True: for the first time), OSError when that fails; tell: an answer for control, as the
-    RIG message has it; say: a sentence for people. Times are monotonic seconds."""
+    """spawn: starts the process (True: it is the first, or the last one has worked), OSError when that fails; tell: an answer
+    for control, as the RIG message has it; say: a sentence for people. Times are monotonic seconds."""
 
     def __init__(
         self, spawn: Callable[[bool], Child], tell: Callable[[Answer], None], say: Callable[[str], None]
@@ -34,6 +34,7 @@ class RigSupervisor:
         self._due_s = inf  # of the next start, or of the first word
         self._began_s = 0.0
         self._deaths = 0
+        self._has_worked = True
 
     @property
     def pid(self) -> int | None:
@@ -79,7 +80,7 @@ class RigSupervisor:
     def _begin(self, now_s: float) -> None:
         self._due_s, self._began_s, self._answer, self._link_ended = now_s + _START_BOUND_S, now_s, None, False
         try:
-            self._child = self._spawn(self._deaths == 0)
+            self._child = self._spawn(self._has_worked)
         except OSError as error:
             self._on_death_of_child(error.strerror or str(error), now_s)
 
@@ -121,7 +122,7 @@ class RigSupervisor:
         if now_s - self._began_s >= _LONG_LIFE_S:
             self._deaths = 0
         self._deaths += 1
-        self._answer = None
+        self._has_worked, self._answer = self._answer is not None, None
         if self._deaths > len(PAUSES_S):
             self._due_s, self._answer = inf, {"failed": True}
             self._say(f"A409 the simulated rig ended {self._deaths} times ({how}): it stays off")

@@ -3,14 +3,18 @@
 import re
 import shutil
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
 
+from gateway.cli.errors import CliError
 from gateway.cli.main import command
+from gateway.cli.system_service.installation import plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, device_classes, unit_text
 from gateway.cli.system_service.unit_status import parse_status
+from gateway.profiles import load_rig
 
 ANALYZE = shutil.which("systemd-analyze")
 needs_systemd = pytest.mark.skipif(ANALYZE is None, reason="systemd-analyze is not here: nobody judges the unit")
@@ -53,6 +57,26 @@ def test_systemd_understands_every_line(tmp_path: Path) -> None:
     assert str(unit) not in done.stderr, done.stderr
 
 
+@needs_systemd
+def test_systemd_reads_any_path_as_it_is_written(tmp_path: Path) -> None:
+    program = tmp_path / "100%n" / "force gateway"
+    program.parent.mkdir()
+    program.symlink_to("/usr/bin/true")
+    unit = tmp_path / "force-gateway-x.service"
+    unit.write_text(unit_text(options(command=program, rig=f"{tmp_path}/50% $HOME it's/cell.yaml")))
+    done = subprocess.run([str(ANALYZE), "verify", str(unit)], capture_output=True, text=True, check=False)
+    assert "is not executable" not in done.stderr, done.stderr
+    assert str(unit) not in done.stderr, done.stderr
+    assert "/50%% $$HOME it's/cell.yaml\"" in unit.read_text()
+
+
+def test_a_rig_whose_file_cannot_name_a_unit_is_refused(tmp_path: Path) -> None:
+    rig = Path("/etc/force-gateway/my cell.yaml")
+    plan = partial(plan_installation, rig=load_rig("demo"), networks=(), command=Path("/opt/force-gateway"))
+    with pytest.raises(CliError, match=r"E107 .*my cell\.yaml: its name names the unit"):
+        plan(str(rig))
+
+
 def test_a_port_of_a_cabinet_is_allowed_by_its_class_and_one_by_id_as_any_usb_adapter() -> None:
     assert device_classes(("/dev/ttyS0", "/dev/ttyS1", "/dev/ttyAMA0")) == ["char-ttyS", "char-ttyAMA"]
     assert device_classes(("/dev/serial/by-id/usb-FTDI-port0",)) == ["char-ttyUSB", "char-ttyACM"]
@@ -92,6 +116,10 @@ def test_an_image_gets_the_files_and_one_unit_a_rig(tmp_path: Path) -> None:
     [
         (("nowhere",), 78, "nowhere"),
         (("irc5-cell", "--command", "/home/me/venv/bin/force-gateway"), 78, "E107 /home/me/venv/bin/force-gateway"),
+        (("irc5-cell", "--command", "/tmp/venv/bin/force-gateway"), 78, "E107 /tmp/venv/bin/force-gateway"),
+        (("irc5-cell", "--command", "/opt/x\nExecStartPre=/bin/rm"), 78, "E107"),
+        (("irc5-cell", "--command", "/opt/$x/force-gateway"), 78, "E107 /opt/$x/force-gateway: systemd starts no"),
+        (("irc5-cell", "--command", "/opt/x", "--allow", "10.0.0.0/8 any"), 78, "E107 --allow 10.0.0.0/8 any"),
         (("demo", "--allow"), 2, "--allow"),
     ],
 )

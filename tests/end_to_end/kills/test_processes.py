@@ -9,7 +9,7 @@ import psutil
 from gateway.profiles import shipped_profiles_folder
 from tests.end_to_end.conftest import POLL_S, start, stop
 
-OFF = 0
+OFF, FAULT = 0, 4
 
 
 def pressing(running, setpoint=2000):
@@ -85,7 +85,8 @@ def test_a_dead_guardian_takes_control_and_rig_with_it(running):
 
 
 def test_a_rig_file_that_is_edited_meanwhile_is_for_the_next_start(tmp_path):
-    """Half done when control dies, as editors leave files: the gateway goes on as it was started, and says so."""
+    """Half done, as editors leave files, when control dies, and then the simulated rig: all goes on as it was started, and
+    control says so."""
     rig = tmp_path / "cell.yaml"
     rig.write_text((shipped_profiles_folder() / "rigs" / "demo.yaml").read_text().replace("name: demo", "name: cell"))
     gateway = start(tmp_path / "state", rig=str(rig))
@@ -95,6 +96,11 @@ def test_a_rig_file_that_is_edited_meanwhile_is_for_the_next_start(tmp_path):
         assert reconnect(gateway)["state"] == OFF
         assert "go" in gateway.said("W247 the files of rig cell have faults now")
         gateway.next_ready()
+        pressing(gateway)
+        os.kill(gateway.ready["pids"]["rig"], signal.SIGKILL)
+        gateway.wait_until(lambda status: status["state"] == FAULT)
+        gateway.write(0, 2, 0)
+        gateway.wait_until(lambda status: status["status_word"] & 2 and abs(status["force_measured"]) < 200)
         pressing(gateway)
     finally:
         assert stop(gateway) == 0

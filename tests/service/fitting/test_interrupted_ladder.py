@@ -5,6 +5,8 @@ The cut is made in the recording: a run that was ended, killed or unplugged leav
 on is a run of its own in virtual time, one for each number of groups that may be left.
 """
 
+import errno
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -86,6 +88,21 @@ def written(state: Path, recording: Recording, rows: int | None = None, **facts:
 def groups_left_behind(recording: Recording, rows: int) -> int:
     """Told by the plan alone: the check's 9 stairs, then 17 to a group; a stair is left when the next one has begun."""
     return min(2, max(0, int(recording.columns["stair"][rows - 1]) - 9) // 17)
+
+
+def test_a_fit_that_cannot_start_is_told_and_its_ladder_waits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+    monkeypatch.setattr(calibration_runs, "FitLauncher", refuse)
+    wired = Wired(seed=11).ready()
+    runs = kept(wired, tmp_path)
+    runs.answer({"plan": PLAN})
+    while runs.answer({})["phase"] not in ("refused", "fitting"):
+        wired.run(0.5)
+    wired.run(0.1)
+    assert runs.answer({})["phase"] == "refused"
+    assert wired.said("A331 the fit did not start: Resource temporarily unavailable; force-gateway fit 1")
 
 
 def test_the_labels_are_the_registers_words() -> None:

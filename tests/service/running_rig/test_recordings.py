@@ -110,7 +110,7 @@ def test_one_that_a_full_disk_has_ended_goes_on_when_there_is_room(
     for now_s in range(300, 600):
         recordings.flush(float(now_s))
     assert recordings.status()["recording"]
-    assert "there is room again" in recordings._log[-1]
+    assert "it goes on: recording to" in recordings._log[-1]
     recordings.flush(7201.0)
     assert recordings.status() == {"recording": None}
     assert [label_of(entry.header).name for entry in list_recordings(tmp_path)] == ["long one"]

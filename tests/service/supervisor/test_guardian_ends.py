@@ -93,7 +93,7 @@ def test_a_rig_that_dies_is_started_again_and_control_learns_where_it_is_now(sce
     one.starter.rigs_started[0].dies(-9)
     assert beats_until_told(one) == [message_link.Message(message_link.RIG, {"ptys": moved})]
     assert one.said[0].startswith("A408 the simulated rig ended (SIGKILL)")
-    assert one.starter.calls[-1] == "rig prepared=False"
+    assert one.starter.calls[-1] == "rig prepared=True", "as the files were when control was started, too"
     assert len(one.starter.started) == 1, "control was left alone"
 
 

@@ -1,0 +1,87 @@
+"""The file of a local socket: removed it comes back; what another one has put in its place is never taken away."""
+
+import asyncio
+import json
+import shutil
+import socket
+import stat
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+
+from gateway.processes.json_connection import SocketLimits
+from gateway.processes.json_socket import JsonLineServer
+
+OFTEN = SocketLimits(idle_s=0.2)  # looks at its file four times as often
+
+
+def beside_a_server(path: Path, scene: Callable[[asyncio.Queue[str]], Awaitable[None]]) -> None:
+    async def play() -> None:
+        said: asyncio.Queue[str] = asyncio.Queue()
+        handlers = {"echo": lambda request: {"said": request.get("say")}}
+        server = JsonLineServer(path, handlers, lambda cause, sentence: said.put_nowait(sentence), OFTEN)
+        assert await server.start() == ""
+        async with asyncio.timeout(10):
+            await scene(said)
+        await server.close()
+        assert said.empty()
+
+    path.parent.mkdir(exist_ok=True)
+    asyncio.run(play())
+
+
+async def answer(path: Path) -> bool:
+    reader, writer = await asyncio.open_unix_connection(str(path))
+    writer.write(b'{"do": "echo", "say": 1}\n')
+    said = json.loads(await reader.readline())
+    writer.close()
+    await writer.wait_closed()
+    return bool(said == {"ok": True, "said": 1})
+
+
+@pytest.mark.parametrize("folder_too", [False, True])
+def test_a_socket_whose_file_is_removed_is_served_again(folder_too: bool, tmp_path: Path) -> None:
+    path = tmp_path / "state" / "control.sock"
+
+    async def scene(said: asyncio.Queue[str]) -> None:
+        if folder_too:
+            shutil.rmtree(path.parent)
+            assert "E152" in await said.get()
+            path.parent.mkdir()
+        else:
+            path.unlink()
+        assert "it is served again" in await said.get()
+        assert await answer(path)
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+
+    beside_a_server(path, scene)
+    assert not path.exists()
+
+
+def test_what_stands_in_its_place_is_told_once_and_stays(tmp_path: Path) -> None:
+    path = tmp_path / "state" / "control.sock"
+
+    async def scene(said: asyncio.Queue[str]) -> None:
+        path.unlink()
+        path.write_text("somebody else's")
+        assert "E152" in (sentence := await said.get())
+        assert "another file has its name" in sentence
+        await asyncio.sleep(4 * OFTEN.idle_s)  # it looks sixteen times, and says nothing more
+
+    beside_a_server(path, scene)
+    assert path.read_text() == "somebody else's"
+
+
+def test_a_later_socket_of_another_gateway_is_not_taken_for_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "state" / "control.sock"
+
+    async def scene(said: asyncio.Queue[str]) -> None:
+        shutil.rmtree(path.parent)
+        path.parent.mkdir()
+        with socket.socket(socket.AF_UNIX) as other:
+            other.bind(str(path))
+            assert "another file has its name" in await said.get()
+
+    beside_a_server(path, scene)
+    assert path.is_socket()

@@ -1,0 +1,45 @@
+"""What others put into the folder of the recordings, or take out of it, neither stops a recorder nor passes for a recording."""
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from gateway.recording import Recorder, RecordingError, find_recording, list_recordings
+from tests.recording.test_recorder import COLUMNS, HEADER, record
+
+
+@pytest.mark.parametrize("name", ["²", "٣.fgr", "9" * 200 + ".fgr", "-1.fgr", "1_0.fgr"])
+def test_what_somebody_else_has_put_into_the_folder_is_no_number(name: str, tmp_path: Path) -> None:
+    (tmp_path / "recordings").mkdir()
+    (tmp_path / "recordings" / name).touch()
+    path = record(tmp_path / "recordings", 1)
+    assert path.name == "0001.fgr"
+    assert [entry.number for entry in list_recordings(tmp_path)] == [1]
+
+
+def test_a_pipe_or_a_device_among_the_recordings_is_not_read(tmp_path: Path) -> None:
+    path = record(tmp_path / "recordings", 1)
+    os.mkfifo(path.with_name("0002.fgr"))
+    path.with_name("0003.fgr").symlink_to("/dev/zero")
+    path.with_name("0004.fgr").mkdir()
+    assert [entry.number for entry in list_recordings(tmp_path)] == [1]
+    with pytest.raises(RecordingError, match=r"no recording 2 in .*; there: 1"):
+        find_recording(tmp_path, 2)
+
+
+@pytest.mark.parametrize("rows_left", [0, 1])
+def test_who_deletes_a_recording_that_is_written_ends_it_and_it_says_so(rows_left: int, tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "recordings", HEADER, COLUMNS)
+    recorder.flush(0.0)
+    recorder.append((0.0, 0.0, 0.0))
+    recorder.flush(1.0)
+    shutil.rmtree(tmp_path / "recordings")
+    for _ in range(rows_left):
+        recorder.append((0.0, 0.0, 0.0))
+    recorder.close()
+    assert recorder.failure is not None
+    assert recorder.failure.startswith("E402")
+    assert "stopped after 1 rows: somebody has deleted its file; control goes on" in recorder.failure
+    assert not recorder.is_open
