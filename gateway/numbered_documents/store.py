@@ -1,6 +1,6 @@
 """A store of numbered, immutable documents of one rig, and which of them is in use.
 
-STATE/NAME holds NNNN.yaml, each with its CRC-32 in the first line, and the generations of the selection
+STATE/NAME holds NNNN.yaml (NNNNN.yaml from 10000 on), each with its CRC-32 in the first line, and the generations of the selection
 (gateway.numbered_documents.selection). Number and content belong together for good; a number that the rig's built-in
 document has is not given again. Whatever is damaged is named and passed over: the document in use, else the one before it,
 else the built-in one. There is no clock here: dates come with the documents.
@@ -21,8 +21,8 @@ from gateway.registers.upload.staging import SLOTS
 
 Document = TypeVar("Document")
 
-_NAME: Final = re.compile(r"(\d{4})\.yaml")
-_LAST: Final = 9999
+_NAME: Final = re.compile(r"(\d{4}|[1-9]\d{4})\.yaml")
+_LAST: Final = 0xFFFF  # what the registers can show
 
 
 class StoreError(Exception):

@@ -73,6 +73,9 @@ def test_a_number_that_a_slot_still_speaks_of_is_not_given_again(used):
 def test_the_last_number_is_the_last(store):
     store.add(calibration(1))
     (store.directory / "0002.yaml").rename(store.directory / "9999.yaml")
+    assert store.add(calibration(2)) == 10_000
+    assert store.load(10_000).number == 10_000
+    (store.directory / "9999.yaml").rename(store.directory / "65535.yaml")
     with pytest.raises(StoreError, match="the last number"):
         store.add(calibration(2))
 

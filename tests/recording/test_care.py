@@ -101,12 +101,19 @@ def test_days_take_the_older_ones_and_no_protected_one(tmp_path: Path) -> None:
     kept, reference, old, young = (record(tmp_path, days_ago=days) for days in (40, 39, 38, 2))
     keep_recording(kept)
     running = Recorder(tmp_path / "recordings", {}, COLUMNS)
-    os.utime(running.path, (0.0, 0.0))
+    os.utime(running.path, (1_600_000_000.0, 1_600_000_000.0))
     chosen = choose_prunable(recording_paths(tmp_path), Retention(days=30.0), reference.name, NOW_S)
     running.close()
     assert [one.path for one in chosen] == [old]
     assert "30 days" in chosen[0].why
     assert young.exists()
+
+
+def test_what_was_recorded_before_anybody_had_set_the_clock_is_not_old(tmp_path: Path) -> None:
+    path = record(tmp_path)
+    os.utime(path, (3600.0, 3600.0))
+    assert choose_prunable([path], Retention(days=30.0), "", NOW_S) == []
+    assert [one.path for one in choose_prunable([path], Retention(bytes=1), "", NOW_S)] == [path]
 
 
 def test_bytes_take_the_oldest_first_and_only_as_many_as_it_needs(tmp_path: Path) -> None:

@@ -17,6 +17,9 @@ from gateway.recording.reader import recording_paths
 
 _MARK: Final = ".keep"
 _GONE: Final = ".gone"  # of the highest number that was deleted: it is not used again
+_CLOCK_SET_S: Final = (
+    1_577_836_800.0  # 2020: times before it are of a clock that nobody has set yet, as after a power cut
+)
 _CLOSED_S: Final = 5.0  # rows come ten times a second: what was written later than this is being recorded, lock or not
 
 
@@ -72,15 +75,17 @@ def choose_prunable(paths: list[Path], retention: Retention, reference: str, now
     statuses = sorted(((path.stat(), path) for path in paths), key=lambda pair: (pair[0].st_mtime, pair[1].name))
     total, chosen = sum(status.st_size for status, _ in statuses), []
     for status, path in statuses:
-        why = _why_it_goes(now_s - status.st_mtime, total, retention)
+        age_s = now_s - status.st_mtime if status.st_mtime >= _CLOCK_SET_S else None
+        why = _why_it_goes(age_s, total, retention)
         if why and now_s - status.st_mtime > _CLOSED_S and not why_protected(path, reference):
             chosen.append(Prunable(path, status.st_size, why))
             total -= status.st_size
     return chosen
 
 
-def _why_it_goes(age_s: float, total_bytes: int, retention: Retention) -> str:
-    if retention.days is not None and age_s > retention.days * 86400.0:
+def _why_it_goes(age_s: float | None, total_bytes: int, retention: Retention) -> str:
+    """age_s: None where nobody knows."""
+    if retention.days is not None and age_s is not None and age_s > retention.days * 86400.0:
         return f"older than {retention.days:g} days"
     if retention.bytes is not None and total_bytes > retention.bytes:
         return f"all have more than {retention.bytes} bytes"
