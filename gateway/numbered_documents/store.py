@@ -1,7 +1,7 @@
 """A store of numbered, immutable documents of one rig, and which of them is in use.
 
-STATE/NAME holds NNNN.yaml (NNNNN.yaml from 10000 on), each with its CRC-32 in the first line, and the generations of the selection
-(gateway.numbered_documents.selection). Number and content belong together for good; a number that the rig's built-in
+STATE/NAME holds NNNN.yaml (NNNNN.yaml from 10000 on), each with its CRC-32 in the first line, and the generations of the
+selection (gateway.numbered_documents.selection). Number and content belong together for good; a number that the rig's built-in
 document has is not given again. Whatever is damaged is named and passed over: the document in use, else the one before it,
 else the built-in one. There is no clock here: dates come with the documents.
 
