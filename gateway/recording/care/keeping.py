@@ -17,9 +17,7 @@ from gateway.recording.reader import recording_paths
 
 _MARK: Final = ".keep"
 _GONE: Final = ".gone"  # of the highest number that was deleted: it is not used again
-_CLOCK_SET_S: Final = (
-    1_577_836_800.0  # 2020: times before it are of a clock that nobody has set yet, as after a power cut
-)
+_CLOCK_SET_S: Final = 1_577_836_800.0  # 2020: an earlier time is of a clock that nobody had set, as after a power cut
 _CLOSED_S: Final = 5.0  # rows come ten times a second: what was written later than this is being recorded, lock or not
 
 
