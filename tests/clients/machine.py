@@ -34,6 +34,14 @@ class RapidError(Exception):
     """An error number of RAPID, for the ERROR handler of a routine or of its callers."""
 
 
+class TaskStopped(Exception):  # noqa: N818
+    """RAPID: an error within an ERROR handler goes to the system's error handler, which stops the task."""
+
+
+LARGEST_NUM = 8_388_608
+"""RAPID: whole numbers are exact in num up to here (data type num)."""
+
+
 class Block:
     """An instance of a function block that was interpreted, with its variables."""
 
@@ -129,7 +137,9 @@ class Machine:
             return int(value) & ((1 << WIDTHS[name]) - 1)
         if name in SIGNED and not -(1 << SIGNED[name] - 1) <= value < 1 << SIGNED[name] - 1:
             raise OverflowError(f"{value} in {kind}")
-        if name == "REAL":
+        if name == "NUM" and isinstance(value, int) and abs(value) > LARGEST_NUM:
+            raise OverflowError(f"{value} is not exact in num")
+        if name in ("REAL", "NUM") and isinstance(value, float):
             return struct.unpack(">f", struct.pack(">f", value))[0]
         if name == "STRING" and len(value) > 80:
             raise OverflowError(f"{value!r} is longer than 80 characters")
@@ -216,6 +226,9 @@ class Machine:
             return
         if target[0] == "field":
             holder = self.value(target[1], frame)
+            if not isinstance(holder, dict):  # a static of a block of the controller's own
+                holder.set_static(target[2], value)
+                return
             holder[target[2] if isinstance(holder, Union) else self.key(target[2])] = self.store("", value)
             return
         name = self.key(target[1])
@@ -329,7 +342,10 @@ class Machine:
             if not routine.handler:
                 raise
             self.global_names["ERRNO"] = str(error)
-            self.run(routine.handler, frame)
+            try:
+                self.run(routine.handler, frame)
+            except RapidError as second:
+                raise TaskStopped(f"{second} in the ERROR handler of {routine.name}") from None
         except Returned:
             if routine.kind == "FUNCTION_BLOCK":
                 return

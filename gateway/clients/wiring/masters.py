@@ -140,10 +140,7 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
         ("RemoteAddress", shown),
         ("RemotePort", where.shown_port),
         ("LocalPort", "0"),
-        (
-            "MB_Unit_ID",
-            f"{255 if 255 in rig.network.units else where.unit}: static of the MB_CLIENT instance, 255 as it comes",
-        ),
+        ("MB_Unit_ID", f"{where.unit}: static of the MB_CLIENT instance, 255 as it comes; the block below sets it"),
         ("MB_DATA_PTR", "an Array of Word in a DB without optimized access, at least MB_DATA_LEN long"),
     )
     return Section("Siemens S7-1200/1500: connection of MB_CLIENT", rows=rows)
