@@ -33,8 +33,8 @@ FACE_ERRORS: Final = (
         "A request was written to the port, and no whole answer came in time.",
         "Baud, parity or unit id differ, A and B are swapped, no Modbus RTU face is there, two masters speak at once; where it "
         "answered before, noise or a loose wire.",
-        "Compare --baud, --parity and --unit with the gateway's line `modbus rtu`; where it answered before, look at shield and "
-        "termination.",
+        "Compare --baud, --parity and --unit with the gateway's line `modbus rtu`; where it answered before, look at shield "
+        "and termination.",
     ),
     Explanation(
         "E124",

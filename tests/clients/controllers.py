@@ -204,6 +204,7 @@ class UniversalRobot:
         self.sent: list[bytes] = []
         library = {
             "first_index": 0,
+            "typed": True,
             "socket_open": values(self.open),
             "socket_close": values(lambda name: None),
             "socket_send_byte": values(self.send_byte),

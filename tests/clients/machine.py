@@ -222,6 +222,8 @@ class Machine:
         if target[0] == "index":
             holder, place = self.value(target[1], frame), self.place(target, frame)
             kind = "WORD" if self.library.get("words") else ""
+            if self.library.get("typed"):
+                self.keep_type(str(target[1]), holder[place], value)
             holder[place] = self.store(kind if isinstance(value, int) and not isinstance(value, bool) else "", value)
             return
         if target[0] == "field":
@@ -232,6 +234,9 @@ class Machine:
             holder[target[2] if isinstance(holder, Union) else self.key(target[2])] = self.store("", value)
             return
         name = self.key(target[1])
+        if self.library.get("typed"):
+            known = {} if scope == "LOCAL" else frame.variables if name in frame.variables else self.global_names
+            self.keep_type(target[1], known.get(name, value), value)
         if name in frame.variables and scope != "GLOBAL":
             if name in frame.constants:
                 raise TypeError(f"{name} is a constant")
@@ -245,6 +250,11 @@ class Machine:
             self.global_names[name] = self.store(declared[0] if declared else "", value)
         else:
             raise NameError(f"line {target[2]}: {target[1]} is not declared")
+
+    def keep_type(self, name: str, before: Any, value: Any) -> None:
+        """URScript: "The type of a variable is deduced from the first assignment of the variable" (script manual, 1.3)."""
+        if type(before) is not type(value):
+            raise TypeError(f"{name} is {type(before).__name__}, not {type(value).__name__}")
 
     def run_if(self, node: Node, frame: Frame) -> None:
         for condition, body in node[1]:

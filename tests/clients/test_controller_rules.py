@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -127,3 +128,21 @@ def test_a_map_with_the_low_word_first_is_told_instead_of_read_wrongly(language:
     changed = own_map(tmp_path, "name: range_low, address: 1002,", "name: range_low, address: 1002, word_order: cdab,")
     with pytest.raises(MissingRegisterError, match=r"map own lacks word order abcd in block staging$"):
         render_client(changed, language, WHERE)
+
+
+def test_a_universal_robot_may_be_given_whole_numbers_and_decimal_ones_alike() -> None:
+    """A variable of URScript keeps the type of its first value."""
+    client = UniversalRobot(TEXTS["urscript"], GatewayAtHand(MAP))
+    client.machine.start("fg_model_number", client.get("FG_M_RANGE_HIGH"), 8)
+    client.machine.start("fg_model_count", client.get("FG_M_ORDER"), 2.0)
+    client.machine.start("fg_upload", 3.0)
+    words = client.get("fg_set_a")
+    assert struct.pack(">2H", *words[4:6]) == struct.pack(">f", 8.0)
+    assert words[0] == 2 and isinstance(words[0], int)
+
+
+def test_the_machine_of_urscript_knows_that_a_type_is_for_ever() -> None:
+    machine = Machine(parse("global a = 1\ndef f():\n  global a = 1.5\nend\n", "urscript"), {"typed": True}, fold=False)
+    machine.begin()
+    with pytest.raises(TypeError, match="a is int, not float"):
+        machine.start("f")

@@ -197,6 +197,11 @@ def _universal_robot(rig: Rig, table: ExchangeTable) -> Section:
             f"It asks port 502 always, and this rig listens on {where.shown_port}: set network.port to 502 (force-gateway "
             "explain E120), or use the script."
         )
+    if rig.network.require_byte_order_echo:
+        sentences.append(
+            "This rig wants the echo of 1234.5 before enable, which the robot's own client cannot write (FC06 carries half of "
+            "it): use the script."
+        )
     if 255 not in rig.network.units:
         sentences.append("Its slave address is 255 unless you change it per signal, and this rig does not answer 255.")
     rows = [("signal", "type", "address", "functions")]
