@@ -407,11 +407,14 @@ class Plc:
 
 
 class MbClient:
-    """MB_CLIENT: one request at a time, BUSY for a scan, DONE or ERROR for one call; the connection is its own."""
+    """MB_CLIENT: one request at a time, BUSY for a scan, DONE or ERROR for one call; the connection is its own.
+
+    Manuals call REQ a level, users have seen it want an edge: here it has to rise, which serves both.
+    """
 
     def __init__(self, plc: "S7") -> None:
         self.plc, self.BUSY, self.DONE, self.ERROR, self.STATUS, self.asked = plc, False, False, False, 0x7000, None
-        self.calls, self.MB_Unit_ID = 0, 255
+        self.calls, self.MB_Unit_ID, self.was_asked = 0, 255, False
 
     def set_static(self, name: str, value: int) -> None:
         """Set what a program may set of the instance (S7-1200 system manual, static variables of MB_CLIENT)."""
@@ -420,12 +423,13 @@ class MbClient:
 
     def call(self, given: dict[str, Any]) -> None:
         self.DONE = self.ERROR = False
+        rises, self.was_asked = given["REQ"] and not self.was_asked, given["REQ"]
         if given["DISCONNECT"]:
             assert not given["REQ"], "a request while the connection is closed"
             return
         place = {name: given[name] for name in ("MB_MODE", "MB_DATA_ADDR", "MB_DATA_LEN")}
         if not self.BUSY:
-            if given["REQ"]:
+            if rises:
                 self.BUSY, self.asked, self.calls = True, place, 0
                 self.data = list(given["MB_DATA_PTR"])
             return

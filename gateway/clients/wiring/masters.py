@@ -154,7 +154,7 @@ def _s7_requests(table: ExchangeTable) -> Section:
         function = 6 if writes and words == 1 else 16 if writes else 3
         numbers = (int(writes), _HOLDING + address, words, 100 + function, address)
         rows.append((what, *map(str, numbers), f"FC{function:02d}"))
-    once = "One MB_CLIENT instance, one request at a time: REQ stays TRUE until DONE or ERROR."
+    once = "One MB_CLIENT instance, one request at a time: REQ stays TRUE until DONE or ERROR, then FALSE for a call."
     other = "The second pair of MB_MODE and MB_DATA_ADDR counts from 0, and needs an MB_CLIENT that has it (S7-1200: FW 4.2)."
     return Section("Siemens S7-1200/1500: requests", (once, other), tuple(rows))
 
