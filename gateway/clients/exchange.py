@@ -7,6 +7,7 @@ commit. Registers are asked for by name; a map of the user's own that lacks one 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from ipaddress import ip_address
 from struct import unpack
 from typing import Final
 
@@ -18,8 +19,9 @@ from gateway.registers.map.register_map import Register, RegisterMap, UnknownReg
 from gateway.registers.values import WordOrder, pack_number
 from gateway.registers.writes.byte_order_echo import PROOF
 
-TEXT_LENGTH: Final = 80
-"""Characters of a RAPID string, the shortest that a language allows."""
+_IPV4: Final = 4
+TEXT_LENGTH: Final = 56
+"""Characters of a text: a RAPID string, the shortest that a language allows, has 80, and up to 23 of them say what failed."""
 
 COMMAND: Final = ("control_word", "force_setpoint", "force_ramp", "mode", "heartbeat", "command_sequence")
 STATUS: Final = (
@@ -33,6 +35,8 @@ PROOF_BLOCK: Final = ("byte_order_echo",)
 NEEDED: Final = {"command": COMMAND, "status": STATUS, "staging": STAGING, "active": ACTIVE, "proof": PROOF_BLOCK}
 """Block -> registers that the clients name."""
 
+_WITH_NUMBERS: Final = ("status", "staging", "active")
+"""Blocks with numbers of two words that the clients read or write, all high word first."""
 CONTROL_BITS: Final = ("enable", "reset_fault", "tare", "take_ownership", "valve_pull")
 STATUS_BITS: Final = {
     "enabled": "is_enabled",
@@ -61,6 +65,20 @@ class Endpoint:
     def shown_port(self) -> str:
         """The port as pages name it: 0 is none that anybody can ask, but says that one is chosen at each start."""
         return str(self.port or "PORT")
+
+    def to_fill_in(self, *, from_elsewhere: bool) -> tuple[str, ...]:
+        """Return what the integrator has to put in by hand, for no rig can know it. from_elsewhere: on another machine."""
+        sentences = []
+        host = ip_address(self.host)
+        if not self.port:
+            sentences.append("FILL IN the port: the rig's network.port is 0, another at each start.")
+        if host.is_unspecified:
+            sentences.append("FILL IN the address: the rig listens on every one of its machine.")
+        elif from_elsewhere and host.is_loopback:
+            sentences.append(f"FILL IN the address: no other machine reaches {host}.")
+        elif from_elsewhere and host.version > _IPV4:
+            sentences.append("FILL IN an IPv4 address: this client knows no IPv6.")
+        return tuple(sentences)
 
 
 @dataclass(frozen=True)
@@ -91,6 +109,9 @@ class ExchangeTable:
                     self.map.find(f"{name}@{block}")
                 except UnknownRegister:
                     yield f"{name} (block {block})"
+        for block in _WITH_NUMBERS:
+            if any(each.words > 1 and each.word_order is not WordOrder.ABCD for each in self.map.registers_of(block)):
+                yield f"word order abcd in block {block}"
         yield from self._find_missing_bits("control_word", CONTROL_BITS)
         yield from self._find_missing_bits("status_word", STATUS_BITS)
 

@@ -26,6 +26,18 @@ TEMPLATES: Final = {
 
 LANGUAGES: Final = tuple(TEMPLATES)
 
+_REMARKS: Final = {
+    "rapid": "  ! {}\n",
+    "scl": "      // {}\n",
+    "st": "    (* {} *)\n",
+    "urscript": "# {}\n",
+    "c": " *     {}\n",
+    "python": "# {}\n",
+}
+"""Language -> a remark beside the address."""
+_BESIDE_THE_GATEWAY: Final = ("c", "python")
+"""Languages of programs that may run on the gateway's machine."""
+
 
 def render_client(register_map: RegisterMap, language: str, where: Endpoint) -> str:
     """Return the client's whole text. Raises MissingRegisterError, ValueError for an unknown language."""
@@ -33,7 +45,9 @@ def render_client(register_map: RegisterMap, language: str, where: Endpoint) -> 
         raise ValueError(f"{language} is not one of {', '.join(LANGUAGES)}")
     table = ExchangeTable(register_map, where)
     text = files("gateway.clients").joinpath("templates", TEMPLATES[language]).read_text("utf-8")
-    return Template(text).substitute({**table.values(), **SPELLINGS[language](table)})
+    remarks = where.to_fill_in(from_elsewhere=language not in _BESIDE_THE_GATEWAY)
+    fill_in = "".join(map(_REMARKS[language].format, remarks))
+    return Template(text).substitute({**table.values(), **SPELLINGS[language](table), "fill_in": fill_in})
 
 
 def endpoint_of(rig: Rig | None) -> Endpoint:

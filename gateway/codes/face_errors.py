@@ -31,9 +31,10 @@ FACE_ERRORS: Final = (
         "E123",
         "no answer on the serial line",
         "A request was written to the port, and no whole answer came in time.",
-        "Baud, parity or unit id are not the gateway's, A and B are swapped, no Modbus RTU face is on this line, or two "
-        "masters speak at once.",
-        "Compare --baud, --parity and --unit with the line `modbus rtu` that the gateway prints when it is ready.",
+        "Baud, parity or unit id differ, A and B are swapped, no Modbus RTU face is there, two masters speak at once; where it "
+        "answered before, noise or a loose wire.",
+        "Compare --baud, --parity and --unit with the gateway's line `modbus rtu`; where it answered before, look at shield "
+        "and termination.",
     ),
     Explanation(
         "E124",

@@ -4,11 +4,17 @@ from typing import Any
 
 import pytest
 
-from tests.clients.controllers import S7, Codesys, Irc5, UniversalRobot
+from tests.clients.controllers import S7, Codesys, Irc5, TwinCat, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.scenes import MAP, TEXTS
 
-CONTROLLERS: dict[str, Any] = {"rapid": Irc5, "scl": S7, "st": Codesys, "urscript": UniversalRobot}
+CONTROLLERS: dict[str, Any] = {
+    "rapid": Irc5,
+    "scl": S7,
+    "urscript": UniversalRobot,
+    "twincat": TwinCat,
+    "codesys": Codesys,
+}
 
 
 @pytest.fixture(params=CONTROLLERS)

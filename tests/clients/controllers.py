@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
+from tests.clients.iec_libraries import modbus_fb, tc2_modbus_srv
 from tests.clients.machine import Frame, Machine, RapidError
 from tests.clients.syntax import Node, parse
 
@@ -28,7 +29,8 @@ class Irc5:
     """RAPID: FgInit once, FgCycle per cycle."""
 
     def __init__(self, text: str, gateway: GatewayAtHand) -> None:
-        self.gateway, self.received, self.now_s, self.zero_s, self.is_open = gateway, b"", 0.0, 0.0, False
+        self.gateway, self.received, self.is_open = gateway, b"", False
+        self.now_s, self.counted_s, self.started_s = 0.0, 0.0, None
         self.sent: list[bytes] = []
         self.said: list[str] = []
         self.machine = Machine(parse(text, "rapid"), self.library())
@@ -41,9 +43,11 @@ class Irc5:
             "implicit_for": True,
             **dict.fromkeys(["UINT", "USINT", "ERR_SOCK_TIMEOUT", "ERR_SOCK_CLOSED"]),
             **{name: name for name in ("UINT", "USINT", "ERR_SOCK_TIMEOUT", "ERR_SOCK_CLOSED", "ERR_FG_FRAME")},
-            **dict.fromkeys(["BOOKERRNO", "CLKSTART", "CLKSTOP", "IDELETE", "CONNECT", "ITIMER"], nothing),
-            "CLKRESET": lambda machine, arguments, frame: setattr(self, "zero_s", self.now_s),
-            "CLKREAD": lambda machine, arguments, frame: self.now_s - self.zero_s,
+            **dict.fromkeys(["BOOKERRNO", "IDELETE", "CONNECT", "ITIMER"], nothing),
+            "CLKSTART": lambda machine, arguments, frame: self.start_clock(),
+            "CLKSTOP": lambda machine, arguments, frame: self.stop_clock(),
+            "CLKRESET": lambda machine, arguments, frame: self.reset_clock(),
+            "CLKREAD": lambda machine, arguments, frame: self.read_clock(),
             "WAITTIME": nothing,
             "ERRWRITE": self.error_write,
             "SOCKETCLOSE": self.close,
@@ -65,12 +69,32 @@ class Irc5:
             "DNUMTONUM": values(int),
         }
 
+    def read_clock(self) -> float:
+        """Raise what ClkRead and ClkStop do of a clock that has run for 49 days (RAPID instructions, ClkStop)."""
+        running_s = 0.0 if self.started_s is None else self.now_s - self.started_s
+        if self.counted_s + running_s >= 4_294_967:
+            raise RapidError("ERR_OVERFLOW")
+        return self.counted_s + running_s
+
+    def start_clock(self) -> None:
+        if self.started_s is None:
+            self.started_s = self.now_s
+
+    def stop_clock(self) -> None:
+        self.counted_s, self.started_s = self.read_clock(), None
+
+    def reset_clock(self) -> None:
+        self.counted_s = 0.0
+        if self.started_s is not None:
+            self.started_s = self.now_s
+
     def options(self, machine: Machine, arguments: list[Node], frame: Frame) -> dict[str, Any]:
         return {each[1].upper(): machine.value(each[2], frame) for each in arguments if each[0] == "named"}
 
     def error_write(self, machine: Machine, arguments: list[Node], frame: Frame) -> None:
         words = [machine.value(each, frame) for each in arguments if each[0] != "named"]
         assert len(words) == 2 and len(words[0]) <= 46, "header and reason; ErrWrite has 46 characters for the header"
+        assert len(" ".join([*words, *map(str, self.options(machine, arguments, frame).values())])) <= 195
         self.said.append(" ".join(words))
 
     def close(self, _machine: Machine, _arguments: list[Node], _frame: Frame) -> None:
@@ -78,8 +102,10 @@ class Irc5:
 
     def connect(self, machine: Machine, arguments: list[Node], frame: Frame) -> None:
         assert self.options(machine, arguments, frame).keys() == {"TIME"}
-        if self.gateway.is_cut:
-            raise RapidError("ERR_SOCK_TIMEOUT")
+        try:
+            self.gateway.connect()
+        except Unplugged:
+            raise RapidError("ERR_SOCK_TIMEOUT") from None
         self.is_open = True
 
     def send(self, machine: Machine, arguments: list[Node], frame: Frame) -> None:
@@ -106,6 +132,9 @@ class Irc5:
         number, data = machine.value(value, frame), machine.value(buffer, frame) or b""
         assert options["NETWORK"] and machine.value(start, frame) == len(data) + 1
         shape = ">f" if "FLOAT4" in options else {"UINT": ">H", "USINT": ">B"}[options["INTX"]]
+        # "Must be integer within the value range of selected symbolic constant" (RAPID instructions, PackRawBytes)
+        if shape != ">f" and (number != int(number) or not 0 <= number < 1 << 8 * struct.calcsize(shape)):
+            raise RapidError("ERR_ARGVALERR")
         machine.assign(buffer, data + struct.pack(shape, number if shape == ">f" else int(number)), frame)
 
     def unpack(self, machine: Machine, arguments: list[Node], frame: Frame) -> None:
@@ -175,7 +204,8 @@ class UniversalRobot:
         self.sent: list[bytes] = []
         library = {
             "first_index": 0,
-            "socket_open": values(lambda host, port, name: not self.gateway.is_cut),
+            "typed": True,
+            "socket_open": values(self.open),
             "socket_close": values(lambda name: None),
             "socket_send_byte": values(self.send_byte),
             "socket_read_byte_list": values(self.read),
@@ -187,6 +217,13 @@ class UniversalRobot:
         }
         self.machine = Machine(parse(text, "urscript"), library, fold=False)
         self.machine.begin()
+
+    def open(self, _host: str, _port: int, _name: str) -> bool:
+        try:
+            self.gateway.connect()
+        except Unplugged:
+            return False
+        return True
 
     def send_byte(self, value: int, _name: str) -> bool:
         assert isinstance(value, int) and 0 <= value <= 255
@@ -370,20 +407,29 @@ class Plc:
 
 
 class MbClient:
-    """MB_CLIENT: one request at a time, BUSY for a scan, DONE or ERROR for one call; the connection is its own."""
+    """MB_CLIENT: one request at a time, BUSY for a scan, DONE or ERROR for one call; the connection is its own.
+
+    Manuals call REQ a level, users have seen it want an edge: here it has to rise, which serves both.
+    """
 
     def __init__(self, plc: "S7") -> None:
         self.plc, self.BUSY, self.DONE, self.ERROR, self.STATUS, self.asked = plc, False, False, False, 0x7000, None
-        self.calls = 0
+        self.calls, self.MB_Unit_ID, self.was_asked = 0, 255, False
+
+    def set_static(self, name: str, value: int) -> None:
+        """Set what a program may set of the instance (S7-1200 system manual, static variables of MB_CLIENT)."""
+        assert name == "MB_Unit_ID" and 0 <= value <= 255
+        self.MB_Unit_ID = value
 
     def call(self, given: dict[str, Any]) -> None:
         self.DONE = self.ERROR = False
+        rises, self.was_asked = given["REQ"] and not self.was_asked, given["REQ"]
         if given["DISCONNECT"]:
             assert not given["REQ"], "a request while the connection is closed"
             return
         place = {name: given[name] for name in ("MB_MODE", "MB_DATA_ADDR", "MB_DATA_LEN")}
         if not self.BUSY:
-            if given["REQ"]:
+            if rises:
                 self.BUSY, self.asked, self.calls = True, place, 0
                 self.data = list(given["MB_DATA_PTR"])
             return
@@ -404,7 +450,7 @@ class MbClient:
         else:
             request = struct.pack(f">BHHB{count}H", 16, address, count, 2 * count, *words[:count])
         try:
-            pdu = self.plc.gateway.answer(request)
+            pdu = self.plc.gateway.ask_unit(self.MB_Unit_ID, request)
         except Unplugged:
             self.ERROR, self.STATUS = True, 0x80C8
             return
@@ -443,8 +489,10 @@ class S7(Plc):
         self.block.call(given)
 
 
-class Codesys(Plc):
-    """Structured Text: FB_ForceGateway, and a transport that takes two scans."""
+class StructuredText(Plc):
+    """FB_ForceGateway, and the transport of a controller."""
+
+    TRANSPORT = ""
 
     TYPES = ("ST_FgCommand", "ST_FgModel")
     NAMES: ClassVar[dict[str, str]] = {
@@ -465,36 +513,31 @@ class Codesys(Plc):
     def __init__(self, text: str, gateway: GatewayAtHand) -> None:
         super().__init__(text, "st", gateway, "FB_ForceGateway")
         self.link = self.machine.fresh("ST_FgLink")
-        self.waited = 0
+        self.transport = self.machine.fresh(self.TRANSPORT)
+
+    def library(self) -> dict[str, Any]:
+        return super().library() | {"ADR": values(lambda data: data), "SIZEOF": values(lambda data: 2 * len(data))}
 
     def scan(self) -> None:
         self.now_s += self.CYCLE_S
         self.machine.steps = 0
         self.block.call(self.inputs | self.structures | {"stLink": self.link})
-        link = self.link
-        if not link["BREQUEST"]:
-            link["BDONE"] = link["BERROR"] = False
-            self.waited = 0
-        elif not (link["BDONE"] or link["BERROR"]):
-            self.waited += 1
-            if self.waited == 2:
-                self.carry_out(link)
+        self.transport.call({"stLink": self.link})
 
-    def carry_out(self, link: dict[str, Any]) -> None:
-        write = (link["NWRITEADDRESS"], link["NWRITEQUANTITY"])
-        read = (link["NREADADDRESS"], link["NREADQUANTITY"])
-        data = struct.pack(f">{write[1]}H", *link["AWRITE"][: write[1]])
-        if write[1] and read[1]:
-            request = struct.pack(">BHHHHB", 23, *read, *write, len(data)) + data
-        elif write[1]:
-            request = struct.pack(">BHHB", 16, *write, len(data)) + data
-        else:
-            request = struct.pack(">BHH", 3, *read)
-        try:
-            pdu = self.gateway.answer(request)
-        except Unplugged:
-            link["BERROR"] = True
-            return
-        link["BDONE"], link["BERROR"] = not pdu[0] & 0x80, bool(pdu[0] & 0x80)
-        if link["BDONE"] and read[1]:
-            link["AREAD"][: read[1]] = struct.unpack(f">{read[1]}H", pdu[2:])
+
+class TwinCat(StructuredText):
+    """With Tc2_ModbusSrv."""
+
+    TRANSPORT = "FB_FgTransportTc2"
+
+    def prepare(self) -> None:
+        self.machine.blocks |= tc2_modbus_srv(self.gateway)
+
+
+class Codesys(StructuredText):
+    """With ModbusFB."""
+
+    TRANSPORT = "FB_FgTransportCodesys"
+
+    def prepare(self) -> None:
+        self.machine.blocks |= modbus_fb(self.gateway)

@@ -25,7 +25,10 @@ class Unplugged(Exception):  # noqa: N818
 class GatewayAtHand:
     """requests: every PDU that was asked, exceptions: what was refused, as (function, code)."""
 
-    def __init__(self, register_map: RegisterMap, *, wants_echo: bool = False) -> None:
+    def __init__(
+        self, register_map: RegisterMap, *, wants_echo: bool = False, units: tuple[int, ...] = (0, 1, 255)
+    ) -> None:
+        self.units = units
         bits = BASIC_BITS | ControlBit.VALVE_PULL
         rules = BankRules(rig_name="test", force_max_n=60.0, supported_bits=bits, require_byte_order_echo=wants_echo)
         self.bank = RegisterBank(register_map, rules, now=lambda: 0.0)
@@ -92,8 +95,17 @@ class GatewayAtHand:
             raise Unplugged
         transaction, protocol, length, unit = struct.unpack(">HHHB", frame[:7])
         assert (protocol, length) == (0, len(frame) - 6)
-        pdu = self.answer(frame[7:])
+        pdu = self.ask_unit(unit, frame[7:])
         return struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu
+
+    def ask_unit(self, unit: int, request: bytes) -> bytes:
+        """Return the answer to a request's PDU; nobody but the rig's units is at home."""
+        return self.answer(request) if unit in self.units else bytes([request[0] | 0x80, 0x0B])
+
+    def connect(self) -> None:
+        """Accept a connection, or not."""
+        if self.is_cut:
+            raise Unplugged
 
     def answer(self, request: bytes) -> bytes:
         if self.is_cut:

@@ -34,6 +34,14 @@ class RapidError(Exception):
     """An error number of RAPID, for the ERROR handler of a routine or of its callers."""
 
 
+class TaskStopped(Exception):  # noqa: N818
+    """RAPID: an error within an ERROR handler goes to the system's error handler, which stops the task."""
+
+
+LARGEST_NUM = 8_388_608
+"""RAPID: whole numbers are exact in num up to here (data type num)."""
+
+
 class Block:
     """An instance of a function block that was interpreted, with its variables."""
 
@@ -129,7 +137,9 @@ class Machine:
             return int(value) & ((1 << WIDTHS[name]) - 1)
         if name in SIGNED and not -(1 << SIGNED[name] - 1) <= value < 1 << SIGNED[name] - 1:
             raise OverflowError(f"{value} in {kind}")
-        if name == "REAL":
+        if name == "NUM" and isinstance(value, int) and abs(value) > LARGEST_NUM:
+            raise OverflowError(f"{value} is not exact in num")
+        if name in ("REAL", "NUM") and isinstance(value, float):
             return struct.unpack(">f", struct.pack(">f", value))[0]
         if name == "STRING" and len(value) > 80:
             raise OverflowError(f"{value!r} is longer than 80 characters")
@@ -212,13 +222,21 @@ class Machine:
         if target[0] == "index":
             holder, place = self.value(target[1], frame), self.place(target, frame)
             kind = "WORD" if self.library.get("words") else ""
+            if self.library.get("typed"):
+                self.keep_type(str(target[1]), holder[place], value)
             holder[place] = self.store(kind if isinstance(value, int) and not isinstance(value, bool) else "", value)
             return
         if target[0] == "field":
             holder = self.value(target[1], frame)
+            if not isinstance(holder, dict):  # a static of a block of the controller's own
+                holder.set_static(target[2], value)
+                return
             holder[target[2] if isinstance(holder, Union) else self.key(target[2])] = self.store("", value)
             return
         name = self.key(target[1])
+        if self.library.get("typed"):
+            known = {} if scope == "LOCAL" else frame.variables if name in frame.variables else self.global_names
+            self.keep_type(target[1], known.get(name, value), value)
         if name in frame.variables and scope != "GLOBAL":
             if name in frame.constants:
                 raise TypeError(f"{name} is a constant")
@@ -232,6 +250,11 @@ class Machine:
             self.global_names[name] = self.store(declared[0] if declared else "", value)
         else:
             raise NameError(f"line {target[2]}: {target[1]} is not declared")
+
+    def keep_type(self, name: str, before: Any, value: Any) -> None:
+        """URScript: "The type of a variable is deduced from the first assignment of the variable" (script manual, 1.3)."""
+        if type(before) is not type(value):
+            raise TypeError(f"{name} is {type(before).__name__}, not {type(value).__name__}")
 
     def run_if(self, node: Node, frame: Frame) -> None:
         for condition, body in node[1]:
@@ -329,7 +352,10 @@ class Machine:
             if not routine.handler:
                 raise
             self.global_names["ERRNO"] = str(error)
-            self.run(routine.handler, frame)
+            try:
+                self.run(routine.handler, frame)
+            except RapidError as second:
+                raise TaskStopped(f"{second} in the ERROR handler of {routine.name}") from None
         except Returned:
             if routine.kind == "FUNCTION_BLOCK":
                 return

@@ -18,13 +18,31 @@ RESERVED = {
     "endrecord endtest endtrap endwhile error exit false for from func goto if inout local mod module nostepin not noview or "
     "pers proc "
     "raise readonly record retry return step sysmodule task test then to trap true trynext undo var viewonly while with xor",
+    "scl": "and any array at begin block_db bool by byte case char const constant continue counter data_block date dint do "
+    "dword "
+    "else elsif en end_case end_for end_if end_region end_repeat end_struct end_while eno exit false for function goto if int "
+    "label lint lreal mod nil not of ok or organization_block pointer program real region repeat return s5time sint string "
+    "struct then time timer title to true type udint uint ulint until usint var variant version void wchar while "
+    "word wstring xor "
+    # names of the system's own data types: MB_COMM_LOAD's "PORT" has quotes for that reason
+    "aom_ident conn_any conn_ouc conn_prg conn_r_id db_any db_dyn db_www event_any event_att hw_any hw_device hw_dpmaster "
+    "hw_dpslave hw_hsc hw_ieport hw_interface hw_io hw_iosystem hw_pto hw_pwm hw_submodule hw_subslot ob_any ob_att ob_cyclic "
+    "ob_delay ob_diag ob_hwint ob_pcycle ob_startup ob_timeerror ob_tod pip port remote rtm",
+    "st": "abs abstract acos action adr and and_then any array asin at atan bitadr bool by byte case concat configuration "
+    "constant continue cos date dint do dt dword else elsif end_action end_case end_for end_function end_function_block "
+    "end_if end_program end_repeat end_struct end_type end_var end_while exit exp expt extends false final find for from "
+    "function function_block goto if implements indexof ini insert int interface internal jmp ldate left len limit lint ln "
+    "log lreal lword max method mid min mod move mux not of on or or_else override pointer private program property "
+    "protected public real reference repeat replace resource retain return right rol ror sel set shl shr sin sint sizeof "
+    "sqrt step string struct super tan task then this time to tod transition true trunc type udint uint ulint union until "
+    "usint var var_config var_external var_global var_in_out var_input var_output var_temp while with word wstring xor",
     "urscript": "and break continue def elif else end enter_critical exit_critical false for global halt if join kill local "
     "not or return run sec signal switch sync thread true wait while xor case default length",
 }
 
 
 def names_of(unit: Unit) -> list[str]:
-    names = [*unit.variables, *unit.types, *unit.routines]
+    names = [*unit.variables, *unit.types, *unit.routines, *(member for each in unit.types.values() for member in each)]
     for routine in unit.routines.values():
         names += [*routine.variables, *(parameter[0] for parameter in routine.parameters)]
     return [name.strip('"').lstrip("#") for name in names]

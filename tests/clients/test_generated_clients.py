@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -14,7 +15,7 @@ from gateway.codes.faults import FaultCode
 from gateway.registers import Status
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.controllers import S7, Codesys, Irc5, UniversalRobot
-from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
 from tests.clients.scenes import MAP, TEXTS, WHERE, command, commands, cycles
 
 
@@ -172,17 +173,19 @@ def test_a_loss_while_enabled_ends_in_off_and_stays_there(client: Any, gateway: 
     assert client.enabled
 
 
-@pytest.mark.parametrize("language", ["rapid", "scl", "st"], indirect=True)
+@pytest.mark.parametrize("language", ["rapid", "scl", "twincat", "codesys"], indirect=True)
 def test_attempts_to_connect_again_become_rarer(language: str, gateway: GatewayAtHand) -> None:
-    client = {"rapid": Irc5, "scl": S7, "st": Codesys}[language](TEXTS[language], gateway)
+    client = CONTROLLERS[language](TEXTS[language], gateway)
     gateway.is_cut = True
     tries: list[float] = []
     now_s = 0.0
-    ask = gateway.answer
-    gateway.answer = lambda request: (tries.append(now_s), ask(request))[1]  # type: ignore[method-assign,func-returns-value]
-    if language == "rapid":
-        connect = client.machine.library["SOCKETCONNECT"]
-        client.machine.library["SOCKETCONNECT"] = lambda *given: (tries.append(now_s), connect(*given))
+
+    def refuse(*_: object) -> bytes:
+        tries.append(now_s)
+        raise Unplugged
+
+    gateway.answer = refuse  # type: ignore[method-assign]
+    gateway.connect = refuse  # type: ignore[method-assign,assignment]
     client.CYCLE_S = 0.05
     for _ in range(260):
         client.cycle(0.05)
@@ -216,7 +219,7 @@ def test_words_are_signed_and_unavailable_values_are_told_from_numbers(gateway: 
         shown = plc.output("status")
         assert (shown["FORCE_MEASURED"], shown["TRIM"], shown["REFUSAL_VALUE"]) == (-1.25, 9e9, 9e9)
         plc.enable(65.0)
-        plc.cycle()
+        cycles(plc, 2)
         assert plc.output("status")["REFUSAL_VALUE"] == 65.0
         plc.disable()
 
@@ -283,3 +286,13 @@ def test_a_refused_echo_leaves_the_reason_to_the_command(language: str) -> None:
     client.enable(12.0)
     cycles(client, 12)
     assert client.enabled and gateway.exceptions == [(16, 3)] and gateway.echoes == 1
+
+
+def test_a_gateway_that_answers_another_unit_than_1_is_asked_as_that_unit(language: str) -> None:
+    gateway = GatewayAtHand(MAP, units=(7,))
+    text = render_client(MAP, {"twincat": "st", "codesys": "st"}.get(language, language), replace(WHERE, unit=7))
+    client = CONTROLLERS[language](text, gateway)
+    client.enable(12.0)
+    cycles(client)
+    assert client.enabled and not gateway.exceptions
+    assert "255" not in "".join(line for line in text.splitlines() if "modbus_add_signal(" in line)

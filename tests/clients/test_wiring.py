@@ -96,6 +96,16 @@ def test_a_port_that_is_chosen_at_each_start_is_told_and_never_shown_as_0(tmp_pa
     assert "127.0.0.1:a free port, which `run` names when it is ready" in page and ":0," not in page
 
 
+def test_a_robot_that_writes_word_by_word_cannot_show_its_byte_order(own_rig: Path) -> None:
+    """FC06 with half of byte_order_echo is refused, so enable is refused too."""
+    told = "which the robot's own client cannot write (FC06 carries half of it): use the script"
+    assert told in " ".join(call("wiring", str(own_rig)).split())
+    assert told not in " ".join(call("wiring", "irc5-cell").split())
+    gateway = GatewayAtHand(MAP, wants_echo=True)
+    halves = [b"\x06\x01\xa0\x44\x9a", b"\x06\x01\xa1\x50\x00"]
+    assert [gateway.answer(each)[0] for each in (*halves, b"\x06\0\0\0\x01")] == [0x86, 0x86, 0x86]
+
+
 def test_the_s7_table_is_what_the_generated_block_asks(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = set()
     finish = MbClient.finish

@@ -2,6 +2,7 @@
 
 Decisions
 - pymodbus does the framing; timeout one second, no retries: a repeated write is a second write. The wire is in wires.py.
+  An upload repeats what may be repeated by itself, see upload.py.
 - Assignments go out as one FC16, because the gateway takes one request as one command: setpoint and enable together or not
   at all. Registers between them are read just before and written back as they were.
 """
@@ -69,6 +70,7 @@ class GatewayClient:
         self.where = wire.where
         self.register_map = register_map
         self._unit = unit
+        self._has_answered = False
         self._client: ModbusTcpClient | ModbusSerialClient | None = None
 
     def __enter__(self) -> "GatewayClient":
@@ -156,7 +158,8 @@ class GatewayClient:
             answer = getattr(client, method)(*arguments, device_id=self._unit, **options)
         except (ModbusException, OSError) as error:
             self.close()
-            raise self.wire.no_answer(self._unit, error) from None
+            raise self.wire.no_answer(self._unit, error, has_answered=self._has_answered) from None
+        self._has_answered = True
         if answer.isError():
             raise RefusedError(int(answer.exception_code), request)
         return answer

@@ -82,7 +82,7 @@ class TlsWire(TcpWire):
             why = f"no TLS with {self.where}: {(reason or 'the connection ended').lower().replace('_', ' ')}"
             raise CliError(f"E176 {why}; is this the port of its line `modbus tls`?", exit_codes.DEVICE) from None
 
-    def no_answer(self, unit: int, error: Exception) -> CliError:
+    def no_answer(self, unit: int, error: Exception, *, has_answered: bool) -> CliError:
         """Return E176: with TLS 1.3 a client learns with its first request only that its certificate was refused."""
         from pymodbus.exceptions import ConnectionException
 

@@ -1,15 +1,19 @@
-"""The master of an upload: sends the requests, waits for the outcome with a bound, reads the active set back."""
+"""The master of an upload: sends the requests, waits for the outcome with a bound, reads the active set back.
+
+On a serial line noise may take a request or its answer. Reading and staging may be done twice, so they are repeated; whether a
+commit without an answer was heard, commit_status and the active block tell.
+"""
 
 import struct
 import time
-from collections.abc import Iterable
-from typing import Final
+from typing import Any, Final
 
 from gateway import defaults
 from gateway.cli.errors import CliError, disk_hangs
 from gateway.cli.master.client import Frame, GatewayClient
 from gateway.cli.master.refusal_text import explain_refusals
 from gateway.cli.master.upload_frames import Request, UploadFrames
+from gateway.cli.master.wires import SilentLineError
 from gateway.modbus.pdu import WRITE_REGISTER
 from gateway.processes import exit_codes
 from gateway.registers.upload.coefficients import HEAD_WORDS, TAIL_FROM
@@ -18,6 +22,7 @@ from gateway.registers.words import CommitNotice, CommitStatus, UploadReason
 _OURS: Final = (UploadReason.STORAGE, UploadReason.DEFECT)
 _PATIENCE_S = defaults.COMMIT_PATIENCE_S
 _POLL_S: Final = 0.01
+_REPEATS: Final = 3
 _PLACES: Final = (
     "rising handle", "rising weight", "falling handle", "falling weight", "slip radius", "slip share", "response",
 )  # fmt: skip
@@ -27,15 +32,53 @@ _RESPONSE: Final = ("dead time", "lag", "second lag")
 class UploadClient(GatewayClient):
     """CliError for whatever goes wrong: no answer (69), a refusal (1), a set that fails a check (65)."""
 
-    def send(self, requests: Iterable[Request]) -> None:
+    def send(self, upload: UploadFrames, slot: int) -> None:
         """Send the requests in order. CliError when one is refused."""
-        for request in requests:
-            with explain_refusals(self, [Frame(request.address, request.words)]):
-                if request.function == WRITE_REGISTER:
-                    text = f"write 1 at {request.address}"
-                    self._ask("write_register", text, request.address, request.words[0])
-                else:
-                    self.write(Frame(request.address, request.words))
+        for request in upload.staging:
+            self._send(request)
+        self._commit(upload, slot)
+
+    def _commit(self, upload: UploadFrames, slot: int) -> None:
+        """Send the commit; again only where it has not been heard."""
+        before = self._commit_status(upload)
+        for is_last in (*[False] * _REPEATS, True):
+            try:
+                self._send(upload.commit, repeats=0)
+            except SilentLineError:
+                if is_last:
+                    raise
+                if self._was_heard(upload, slot, before):
+                    return
+            else:
+                return
+
+    def _was_heard(self, upload: UploadFrames, slot: int, before: int) -> bool:
+        """Decide whether the commit has begun. Where the status has not changed, only the set in use tells; a check and a
+        commit that failed change nothing, and may be done again."""
+        status = self._commit_status(upload)
+        return status != before or (status == CommitStatus.COMMITTED and not self._difference(upload, slot))
+
+    def _commit_status(self, upload: UploadFrames) -> int:
+        with explain_refusals(self):
+            return self.read_words(upload.poll.address, 1)[0]
+
+    def _send(self, request: Request, repeats: int = _REPEATS) -> None:
+        with explain_refusals(self, [Frame(request.address, request.words)]):
+            if request.function == WRITE_REGISTER:
+                text, words = f"write 1 at {request.address}", request.words[0]
+                self._ask("write_register", text, request.address, words, repeats=repeats)
+            else:
+                text, several = f"write {len(request.words)} at {request.address}", list(request.words)
+                self._ask("write_registers", text, request.address, several, repeats=repeats)
+
+    def _ask(self, method: str, request: str, *arguments: Any, repeats: int = _REPEATS, **options: Any) -> Any:
+        """Ask, and ask again where a serial line stays silent."""
+        for _ in range(repeats):
+            try:
+                return super()._ask(method, request, *arguments, **options)
+            except SilentLineError:
+                continue
+        return super()._ask(method, request, *arguments, **options)
 
     def calibration_id(self) -> int:
         """Read the number of the calibration in use."""
@@ -66,6 +109,13 @@ class UploadClient(GatewayClient):
 
     def check_active(self, upload: UploadFrames, slot: int) -> None:
         """Check that the active block holds what was sent, word for word."""
+        if where := self._difference(upload, slot):
+            raise CliError(
+                f"E434 committed, but another set is in use now ({where}): probably another master's; agree on one"
+            )
+
+    def _difference(self, upload: UploadFrames, slot: int) -> str:
+        """Return where the set in use differs from what was sent; empty where it does not."""
         expected = struct.unpack(f">{len(upload.set_words) // 2}H", upload.set_words)
         first = self.register_map.find("order@active").address
         places = [*range(first, first + HEAD_WORDS)]
@@ -75,11 +125,9 @@ class UploadClient(GatewayClient):
             words += self.read_words(first + TAIL_FROM, len(expected) - HEAD_WORDS)
             (active,) = self.read_words(self.register_map.find("active_slot").address, 1)
         different = [at for at, own, held_words in zip(places, expected, words, strict=True) if own != held_words]
-        if different or active != slot:
-            where = f"{len(different)} words differ, the first at {different[0]}" if different else f"slot {active}"
-            raise CliError(
-                f"E434 committed, but another set is in use now ({where}): probably another master's; agree on one"
-            )
+        if different:
+            return f"{len(different)} words differ, the first at {different[0]}"
+        return "" if active == slot else f"slot {active}"
 
     def _failure(self, index: int, reason: int) -> CliError:
         unchanged = f"active set {self.calibration_id()} unchanged"

@@ -25,6 +25,10 @@ _LOCAL: Final = "localhost"
 _PARITY: Final = {"none": "N", "even": "E", "odd": "O"}
 
 
+class SilentLineError(CliError):
+    """A serial line stayed silent, or noise took the answer: what may be asked twice can be asked again."""
+
+
 class Wire(Protocol):
     """Where a gateway is, and how it is reached."""
 
@@ -42,8 +46,8 @@ class Wire(Protocol):
     def connect(self) -> "ModbusTcpClient | ModbusSerialClient":
         """Return pymodbus' client, connected. CliError where that is not possible."""
 
-    def no_answer(self, unit: int, error: Exception) -> CliError:
-        """Return what is told of a request without an answer."""
+    def no_answer(self, unit: int, error: Exception, *, has_answered: bool) -> CliError:
+        """Return what is told of a request without an answer. has_answered: to an earlier one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +105,7 @@ class TcpWire:
             exit_codes.DEVICE,
         )
 
-    def no_answer(self, unit: int, error: Exception) -> CliError:
+    def no_answer(self, unit: int, error: Exception, *, has_answered: bool) -> CliError:
         """Return E131: closed, or silent."""
         from pymodbus.exceptions import ConnectionException
 
@@ -163,15 +167,20 @@ class RtuWire:
         client.socket = port
         return client
 
-    def no_answer(self, unit: int, error: Exception) -> CliError:
-        """Return E123: a line is silent for one of few reasons; E102 where the port is gone."""
+    def no_answer(self, unit: int, error: Exception, *, has_answered: bool) -> CliError:
+        """Return E123: a line is silent for one of few reasons, others where it spoke before; E102 where the port is gone."""
         from pymodbus.exceptions import ConnectionException
 
         if isinstance(error, (OSError, ConnectionException)):
             return CliError(f"E102 {self.path} disconnected: is the adapter still plugged in?", exit_codes.DEVICE)
-        settings = f"{self.settings} and unit {unit}"
-        return CliError(
-            f"E123 {self.path}: no answer within {self._timeout_s:.2g} s with {settings}: does the gateway's line "
+        silence = f"E123 {self.path}: no answer within {self._timeout_s:.2g} s"
+        if has_answered:
+            text = f"{silence}, though it answered before: noise, a loose wire, or it has stopped"
+            return SilentLineError(
+                f"{text}. Is the shield connected, each end terminated, the gateway running?", exit_codes.DEVICE
+            )
+        return SilentLineError(
+            f"{silence} with {self.settings} and unit {unit}: does the gateway's line "
             "`modbus rtu` say the same (--baud, --parity, --stop-bits, --unit)? Are A and B swapped?",
             exit_codes.DEVICE,
         )

@@ -83,7 +83,7 @@ def _send(upload: "UploadFrames", register_map: "RegisterMap", options: dict[str
 
     master = UploadClient(options["wire"], options["unit"], register_map)
     with master:
-        master.send(upload.requests)
+        master.send(upload, options["slot"])
         master.outcome(upload)
         committed, is_known = not options["dry_run"], False
         if committed:

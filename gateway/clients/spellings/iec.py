@@ -64,7 +64,8 @@ def spell_scl(table: ExchangeTable) -> dict[str, str]:
     }
     octets = {f"ip_{k}": octet for k, octet in enumerate(_octets(host), 1)}
     places = {f"s7_{name}": str(40001 + address) for name, address in numbers.items()}
-    return {**_lists(table, _SCL), **octets, **places, "set_words_hex": f"{part_a + part_b + part_c:04X}"}
+    hexadecimal = {"set_words_hex": f"{part_a + part_b + part_c:04X}", "unit_hex": f"{table.where.unit:02X}"}
+    return {**_lists(table, _SCL), **octets, **places, **hexadecimal}
 
 
 def spell_st(table: ExchangeTable) -> dict[str, str]:

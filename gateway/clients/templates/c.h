@@ -8,7 +8,7 @@
  *     #include "force_gateway.h"
  * everywhere else only the include.
  *
- *     static fg_client gateway;
+${fill_in} *     static fg_client gateway;
  *     fg_init(&gateway, "${host}", ${port}, ${unit});
  *     fg_enable(&gateway, 12.0f);                       enable, 12 N: acts in the next exchange
  *     for (;;) {                                        every 20 to 100 ms, faster than the rig's lease

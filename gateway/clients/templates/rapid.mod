@@ -54,7 +54,7 @@ MODULE ForceGateway
   !*******************************************************************
 
   ! ---- where the gateway is: EDIT -----------------------------------
-  CONST string FG_HOST:="${host}";
+${fill_in}  CONST string FG_HOST:="${host}";
   CONST num FG_PORT:=${port};
   CONST num FG_UNIT:=${unit};
   CONST num FG_TIMEOUT:=0.5;
@@ -89,7 +89,8 @@ MODULE ForceGateway
   ! (with A: from a routine of T_FORCE, or fill fgSet in T_ROB1):
   !    FgModelClear;
   !    FgModelCount FG_M_ORDER,2;
-  !    FgModelArray FG_M_RISING_B,[0,20.5,60];
+  !    FgModelArray FG_M_RISING_B,nRisingB;
+  ! with  CONST num nRisingB{3}:=[0,20.5,60];
   ! fgUpload:=TRUE sends it, a part per cycle, and goes FALSE when it
   ! is done: fgUploaded, or fgText says why not.
   PERS num fgSet{${set_words}}:=[${set_zeros}];
@@ -165,6 +166,7 @@ ${crc_table}];
     FgCycle;
     SocketClose sdGateway;
     fgConnected:=FALSE;
+    ClkStop clRetry;
   ENDPROC
 
   TRAP FgTick
@@ -186,11 +188,13 @@ ${crc_table}];
     FgForget;
     fgEnded:=FALSE;
     bOffPending:=FALSE;
+    ClkStop clRetry;
     ClkReset clRetry;
     ClkStart clRetry;
   ENDPROC
 
-  ! One exchange. Errors of sockets and frames end here.
+  ! One exchange. An error of any routine below comes up to here; one
+  ! in the handler itself would stop the task.
   PROC FgCycle()
     IF NOT fgConnected THEN
       IF ClkRead(clRetry)<nBackoff RETURN;
@@ -213,7 +217,7 @@ ${crc_table}];
     ELSEIF ERRNO=ERR_FG_FRAME THEN
       FgDrop "answer does not belong to the question";
     ELSE
-      FgDrop "socket error "+NumToStr(ERRNO,0);
+      FgDrop "error "+NumToStr(ERRNO,0);
     ENDIF
     RETURN;
   ENDPROC
@@ -231,6 +235,7 @@ ${crc_table}];
       ! What holds goes on, nothing is begun
       IF NOT FgIsOn() fgEnable:=FALSE;
     ENDIF
+    FgCheckCommand;
     nWant:=fgCommand;
     nWant{FG_C_CONTROL_WORD}:=0;
     nWant{FG_C_HEARTBEAT}:=0;
@@ -255,6 +260,20 @@ ${crc_table}];
       nWant{FG_C_FORCE_SETPOINT}:=nCounts;
       fgEnded:=FALSE;
     ENDIF
+  ENDPROC
+
+  ! PackRawBytes takes whole numbers of 16 bits only
+  LOCAL PROC FgCheckCommand()
+    VAR num nCounts;
+    FOR i FROM 1 TO COMMAND_WORDS DO
+      nCounts:=fgCommand{i};
+      IF nCounts<-32768 OR nCounts>65535 THEN
+        fgText:="fgCommand, place "+NumToStr(i,0)+": allowed -32768 .. 65535";
+        fgCommand{i}:=nGood{i};
+      ELSEIF nCounts<>Round(nCounts) THEN
+        fgCommand{i}:=Round(nCounts);
+      ENDIF
+    ENDFOR
   ENDPROC
 
   ! The bit, or 0 where it waits already
@@ -392,6 +411,8 @@ ${status_decoding}
     SocketCreate sdGateway;
     SocketConnect sdGateway,FG_HOST,FG_PORT\Time:=FG_TIMEOUT;
     fgConnected:=TRUE;
+    ! A clock that runs for 49 days overflows, and ClkStop raises it
+    ClkStop clRetry;
   ENDPROC
 
   LOCAL PROC FgDrop(string stWhy)

@@ -140,10 +140,7 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
         ("RemoteAddress", shown),
         ("RemotePort", where.shown_port),
         ("LocalPort", "0"),
-        (
-            "MB_Unit_ID",
-            f"{255 if 255 in rig.network.units else where.unit}: static of the MB_CLIENT instance, 255 as it comes",
-        ),
+        ("MB_Unit_ID", f"{where.unit}: static of the MB_CLIENT instance, 255 as it comes; the block below sets it"),
         ("MB_DATA_PTR", "an Array of Word in a DB without optimized access, at least MB_DATA_LEN long"),
     )
     return Section("Siemens S7-1200/1500: connection of MB_CLIENT", rows=rows)
@@ -157,7 +154,7 @@ def _s7_requests(table: ExchangeTable) -> Section:
         function = 6 if writes and words == 1 else 16 if writes else 3
         numbers = (int(writes), _HOLDING + address, words, 100 + function, address)
         rows.append((what, *map(str, numbers), f"FC{function:02d}"))
-    once = "One MB_CLIENT instance, one request at a time: REQ stays TRUE until DONE or ERROR."
+    once = "One MB_CLIENT instance, one request at a time: REQ stays TRUE until DONE or ERROR, then FALSE for a call."
     other = "The second pair of MB_MODE and MB_DATA_ADDR counts from 0, and needs an MB_CLIENT that has it (S7-1200: FW 4.2)."
     return Section("Siemens S7-1200/1500: requests", (once, other), tuple(rows))
 
@@ -199,6 +196,11 @@ def _universal_robot(rig: Rig, table: ExchangeTable) -> Section:
         sentences.append(
             f"It asks port 502 always, and this rig listens on {where.shown_port}: set network.port to 502 (force-gateway "
             "explain E120), or use the script."
+        )
+    if rig.network.require_byte_order_echo:
+        sentences.append(
+            "This rig wants the echo of 1234.5 before enable, which the robot's own client cannot write (FC06 carries half of "
+            "it): use the script."
         )
     if 255 not in rig.network.units:
         sentences.append("Its slave address is 255 unless you change it per signal, and this rig does not answer 255.")
