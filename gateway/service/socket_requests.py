@@ -14,6 +14,7 @@ from annotated_types import Ge, Le, MaxLen
 from gateway import defaults
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
+from gateway.profiles.strict_yaml.faults import printable
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import adapter, build
 from gateway.recording.label import LONGEST_NAME, LONGEST_NOTE
@@ -136,8 +137,8 @@ def parse_request(shape: type[Shape], request: Mapping[str, Any]) -> Shape:
     fields = {key: value for key, value in request.items() if key != "do"}
     for key, value in fields.items():
         if value is None:
-            raise ValueError(f"{key} is null: leave it out instead")
+            raise ValueError(f"{printable(key)} is null: leave it out instead")
     shaped, faults = build(shape, Document("request", fields, {}))
     if shaped is None or faults:
-        raise ValueError(f"{faults[0].path} {faults[0].message}".strip())
+        raise ValueError(printable(f"{faults[0].path} {faults[0].message}".strip()))
     return shaped

@@ -17,6 +17,7 @@ SECONDS = 300
 FOUND = [
     ("table", b"\0\x89FGR1\r\n\n" + bytes(300)),  # a header of no bytes, whose CRC-32 is right
     ("yaml", b"{" * 600),  # keys that are mappings, in one another
+    ("request", rb'{"dn\ne": "a", "for_/": 2.5}'),  # a key of two lines, which made two of the log's
 ]
 """What the search found broken, shrunk; mended since."""
 
