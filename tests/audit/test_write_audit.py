@@ -15,6 +15,7 @@ from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.audit.rig_audit import RigAudit
 from gateway.audit.write_audit import WriteAudit
 from gateway.modbus import ModbusError, Peer, Role
+from gateway.processes.event import utc_text
 from gateway.profiles import load_register_map
 from gateway.registers import BankRules, RegisterBank
 
@@ -244,3 +245,22 @@ def test_a_write_that_fails_halfway_leaves_the_chain_whole(tmp_path: Path, monke
     file.close()
     assert [record["what"] for record in read_audit(tmp_path)] == ["enable", "disable"]
     assert not verify_audit(tmp_path).broken
+
+
+def test_each_loss_is_told_with_its_own_times() -> None:
+    """A full disk in spring, and one in autumn: nothing was lost between them."""
+    file, said, now = FailingFile(), list[str](), [0.0]
+    log = audit_log(file, said, lambda: now[0])
+    for begin_s in (0.0, 1.0e7):
+        file.is_full, now[0] = True, begin_s
+        for _ in range(MOST_WAITING + 10):
+            log.put({})
+        for is_full in (True, False):
+            now[0] += 10.0
+            file.is_full = is_full
+            log.flush()
+    lost = [record for record in file.taken if record.get("what") == "lost"]
+    spans = [" ".join(f"to {utc_text(1.7e9 + at_s)}" for at_s in (begin_s, begin_s))[3:] for begin_s in (0.0, 1.0e7)]
+    assert [record["text"] for record in lost] == [
+        f"10 records from {span} were lost: the disk took none, and memory is bounded" for span in spans
+    ]
