@@ -18,6 +18,8 @@ from gateway.modbus import ModbusError, Peer, Role
 from gateway.processes.event import utc_text
 from gateway.profiles import load_register_map
 from gateway.registers import BankRules, RegisterBank
+from gateway.registers.command import Status
+from gateway.registers.words import State
 
 ROBOT, OTHER = Peer("10.0.0.5", 4711, "robot", Role.SETPOINT), Peer("10.0.0.6", 4712)
 
@@ -66,6 +68,14 @@ def test_who_what_old_new_and_result_are_kept(watched: Watched) -> None:
     assert refused["text"].startswith("W210 certificate robot owns the setpoint")
     watched.write(OTHER, 0, 0)
     assert ("disable", 1.0, 0.0) in watched.told("what", "old", "new")
+
+
+def test_a_stop_of_a_run_that_this_machine_has_begun_is_kept_although_no_bit_falls(watched: Watched) -> None:
+    watched.write(OTHER, 0, 0)
+    assert watched.kept == []
+    watched.bank.publish(Status(state=State.CALIBRATING))
+    watched.write(OTHER, 0, 0)
+    assert watched.told("peer", "what", "result") == [("10.0.0.6:4712", "stop", "accepted")]
 
 
 def test_each_line_names_the_connection_that_wrote(watched: Watched) -> None:

@@ -100,7 +100,8 @@ def test_a_port_that_was_unplugged_is_served_again(tmp_path: Path) -> None:
         name.symlink_to(lines[0].path)
         async with Face().serving(str(name)) as face:
             os.write(lines[0].fd, encode_adu(3, READ)[:5])  # half a request, then the plug
-            await asyncio.sleep(0)
+            while not face.server._receiver._burst:
+                await asyncio.sleep(0)
             name.unlink()
             lines[0].close()
             assert "disconnected" in await face.until_told("E102")

@@ -136,3 +136,16 @@ def test_behind_a_plug_may_be_another_cell() -> None:
         assert wire.exchange.identity.fault is fault
         wire.tick(1.0)
         assert (wire.asked[-1] == b"W?\r\n") is (fault is FaultCode.NONE)
+
+
+def test_questions_are_counted_and_a_stream_has_none(wire: Wire) -> None:
+    """What the metrics call asked: the answered, the lost and the one that is out."""
+    for _ in range(3):
+        wire.tick()
+        wire.answer()
+    wire.tick(2.0 * TIMEOUT_S)
+    assert wire.exchange.counts.asked == len(wire.asked) == 5
+    stream = Wire(load_device("stream-st-gs"))
+    stream.tick()
+    stream.answer()
+    assert stream.exchange.counts.asked == 0
