@@ -23,14 +23,14 @@ Clock = Callable[[], float]
 class _Lost(NamedTuple):
     """Records that were dropped: how many, and the times of the first and the last."""
 
-    count: int
+    number: int
     first: str
     last: str
 
     def and_then(self, later: "_Lost") -> "_Lost":
-        if not (self.count and later.count):
-            return self if self.count else later
-        return _Lost(self.count + later.count, self.first, later.last)
+        if not (self.number and later.number):
+            return self if self.number else later
+        return _Lost(self.number + later.number, self.first, later.last)
 
 
 _NONE_LOST: Final = _Lost(0, "", "")
@@ -78,16 +78,16 @@ class AuditLog:
 
     def _take_lost(self) -> tuple[dict[str, Any], ...]:
         self._told, self._lost = self._lost, _NONE_LOST
-        if not self._told.count:
+        if not self._told.number:
             return ()
-        span = f"{self._told.count} records from {self._told.first} to {self._told.last}"
+        span = f"{self._told.number} records from {self._told.first} to {self._told.last}"
         text = f"{span} were lost: the disk took none, and memory is bounded"
-        return ({"time": utc_text(self._wall()), "what": "lost", "count": self._told.count, "text": text},)
+        return ({"time": utc_text(self._wall()), "what": "lost", "count": self._told.number, "text": text},)
 
     def _on_written(self, result: Any) -> None:
         batch, self._in_flight = self._in_flight, []
         if isinstance(result, Exception):
-            self._put_back(batch[1:] if self._told.count else batch)
+            self._put_back(batch[1:] if self._told.number else batch)
             self._lost = self._told.and_then(self._lost)
             self._not_before_s = self._clock() + _AGAIN_S
             if not self._has_failed:

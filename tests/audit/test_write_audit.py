@@ -78,6 +78,15 @@ def test_a_stop_of_a_run_that_this_machine_has_begun_is_kept_although_no_bit_fal
     assert watched.told("peer", "what", "result") == [("10.0.0.6:4712", "stop", "accepted")]
 
 
+def test_a_value_is_kept_in_the_unit_of_its_register(watched: Watched) -> None:
+    registers = load_register_map("force-v1").registers_of("command")
+    for register in registers:
+        if register.unit:
+            watched.write(ROBOT, register.address, 1)
+    units = {what: unit for what, unit in watched.told("what", "unit") if what != "owner"}
+    assert units == {register.name: register.unit for register in registers if register.unit}
+
+
 def test_each_line_names_the_connection_that_wrote(watched: Watched) -> None:
     for port, word in ((1, 1), (2, 0), (3, 1)):
         watched.write(Peer("10.0.0.5", port), 0, word)

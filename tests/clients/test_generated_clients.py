@@ -283,3 +283,9 @@ def test_a_refused_echo_leaves_the_reason_to_the_command(language: str) -> None:
     client.enable(12.0)
     cycles(client, 12)
     assert client.enabled and gateway.exceptions == [(16, 3)] and gateway.echoes == 1
+
+
+def test_the_signals_of_a_robot_enable_by_the_bit_of_the_map() -> None:
+    text = render_client(MAP, "urscript", WHERE)
+    (bit,) = [bit for bit, name in MAP.find("control_word").bits.items() if name == "enable"]
+    assert f'modbus_set_output_register("fg_control", {1 << bit}, False)' in text
