@@ -7,7 +7,7 @@ control goes on. Of more the oldest go; how many, and from when to when, is a li
 import asyncio
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from gateway.audit.audit_file import AuditFile
 from gateway.processes.disk_worker import DiskWorker
@@ -18,6 +18,22 @@ _AGAIN_S: Final = 5.0
 _LAST_WORDS_S: Final = 1.0
 Log = Callable[[str, str], None]
 Clock = Callable[[], float]
+
+
+class _Lost(NamedTuple):
+    """Records that were dropped: how many, and the times of the first and the last."""
+
+    number: int
+    first: str
+    last: str
+
+    def and_then(self, later: "_Lost") -> "_Lost":
+        if not (self.number and later.number):
+            return self if self.number else later
+        return _Lost(self.number + later.number, self.first, later.last)
+
+
+_NONE_LOST: Final = _Lost(0, "", "")
 
 
 class AuditLog:
@@ -31,16 +47,14 @@ class AuditLog:
         self._in_flight: list[dict[str, Any]] = []
         self._not_before_s = 0.0
         self._has_failed = False
-        self._lost: list[str] = []  # times of the first and the last record that was dropped
-        self._lost_count = self._told_lost = 0
+        self._lost = self._told = _NONE_LOST  # dropped and not told yet; told by what is being written
 
     def put(self, fields: Mapping[str, Any]) -> None:
         """Keep this record, with the time of now."""
         self._waiting.append({"time": utc_text(self._wall()), **fields})
         if len(self._waiting) > MOST_WAITING:
             time = self._waiting.popleft()["time"]
-            self._lost = [self._lost[0] if self._lost else time, time]
-            self._lost_count += 1
+            self._lost = self._lost.and_then(_Lost(1, time, time))
 
     def flush(self) -> None:
         """Begin to write what waits, unless that is under way, or has failed a moment ago."""
@@ -63,19 +77,18 @@ class AuditLog:
         self._worker.close()
 
     def _take_lost(self) -> tuple[dict[str, Any], ...]:
-        if not self._lost_count:
+        self._told, self._lost = self._lost, _NONE_LOST
+        if not self._told.number:
             return ()
-        span = f"{self._lost_count} records from {self._lost[0]} to {self._lost[1]}"
+        span = f"{self._told.number} records from {self._told.first} to {self._told.last}"
         text = f"{span} were lost: the disk took none, and memory is bounded"
-        lost = {"time": utc_text(self._wall()), "what": "lost", "count": self._lost_count, "text": text}
-        self._told_lost = self._lost_count
-        return (lost,)
+        return ({"time": utc_text(self._wall()), "what": "lost", "count": self._told.number, "text": text},)
 
     def _on_written(self, result: Any) -> None:
         batch, self._in_flight = self._in_flight, []
-        told_lost, self._told_lost = self._told_lost, 0
         if isinstance(result, Exception):
-            self._put_back(batch[1:] if told_lost else batch)
+            self._put_back(batch[1:] if self._told.number else batch)
+            self._lost = self._told.and_then(self._lost)
             self._not_before_s = self._clock() + _AGAIN_S
             if not self._has_failed:
                 why = f"{result.strerror or result}" if isinstance(result, OSError) else repr(result)
@@ -84,8 +97,6 @@ class AuditLog:
                     f"A351 the audit is not stored: {why}; kept in memory (at most {MOST_WAITING}), control goes on",
                 )
             self._has_failed = True
-        else:
-            self._lost_count -= told_lost
         if self._has_failed and not isinstance(result, Exception):
             self._has_failed = False
             self._log("audit", f"A351 the audit is stored again, {len(batch)} records of meanwhile with it")
@@ -96,7 +107,6 @@ class AuditLog:
     def _put_back(self, batch: list[dict[str, Any]]) -> None:
         for record in reversed(batch):
             if len(self._waiting) >= MOST_WAITING:
-                self._lost = [record["time"], self._lost[1] if self._lost else record["time"]]
-                self._lost_count += 1
+                self._lost = _Lost(1, record["time"], record["time"]).and_then(self._lost)
             else:
                 self._waiting.appendleft(record)

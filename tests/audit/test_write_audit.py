@@ -15,8 +15,11 @@ from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.audit.rig_audit import RigAudit
 from gateway.audit.write_audit import WriteAudit
 from gateway.modbus import ModbusError, Peer, Role
+from gateway.processes.event import utc_text
 from gateway.profiles import load_register_map
 from gateway.registers import BankRules, RegisterBank
+from gateway.registers.command import Status
+from gateway.registers.words import State
 
 ROBOT, OTHER = Peer("10.0.0.5", 4711, "robot", Role.SETPOINT), Peer("10.0.0.6", 4712)
 
@@ -65,6 +68,23 @@ def test_who_what_old_new_and_result_are_kept(watched: Watched) -> None:
     assert refused["text"].startswith("W210 certificate robot owns the setpoint")
     watched.write(OTHER, 0, 0)
     assert ("disable", 1.0, 0.0) in watched.told("what", "old", "new")
+
+
+def test_a_stop_of_a_run_that_this_machine_has_begun_is_kept_although_no_bit_falls(watched: Watched) -> None:
+    watched.write(OTHER, 0, 0)
+    assert watched.kept == []
+    watched.bank.publish(Status(state=State.CALIBRATING))
+    watched.write(OTHER, 0, 0)
+    assert watched.told("peer", "what", "result") == [("10.0.0.6:4712", "stop", "accepted")]
+
+
+def test_a_value_is_kept_in_the_unit_of_its_register(watched: Watched) -> None:
+    registers = load_register_map("force-v1").registers_of("command")
+    for register in registers:
+        if register.unit:
+            watched.write(ROBOT, register.address, 1)
+    units = {what: unit for what, unit in watched.told("what", "unit") if what != "owner"}
+    assert units == {register.name: register.unit for register in registers if register.unit}
 
 
 def test_each_line_names_the_connection_that_wrote(watched: Watched) -> None:
@@ -244,3 +264,22 @@ def test_a_write_that_fails_halfway_leaves_the_chain_whole(tmp_path: Path, monke
     file.close()
     assert [record["what"] for record in read_audit(tmp_path)] == ["enable", "disable"]
     assert not verify_audit(tmp_path).broken
+
+
+def test_each_loss_is_told_with_its_own_times() -> None:
+    """A full disk in spring, and one in autumn: nothing was lost between them."""
+    file, said, now = FailingFile(), list[str](), [0.0]
+    log = audit_log(file, said, lambda: now[0])
+    for begin_s in (0.0, 1.0e7):
+        file.is_full, now[0] = True, begin_s
+        for _ in range(MOST_WAITING + 10):
+            log.put({})
+        for is_full in (True, False):
+            now[0] += 10.0
+            file.is_full = is_full
+            log.flush()
+    lost = [record for record in file.taken if record.get("what") == "lost"]
+    spans = [" ".join(f"to {utc_text(1.7e9 + at_s)}" for at_s in (begin_s, begin_s))[3:] for begin_s in (0.0, 1.0e7)]
+    assert [record["text"] for record in lost] == [
+        f"10 records from {span} were lost: the disk took none, and memory is bounded" for span in spans
+    ]

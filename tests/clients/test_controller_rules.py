@@ -146,3 +146,9 @@ def test_the_machine_of_urscript_knows_that_a_type_is_for_ever() -> None:
     machine.begin()
     with pytest.raises(TypeError, match="a is int, not float"):
         machine.start("f")
+
+
+def test_the_signals_of_a_robot_enable_by_the_bit_of_the_map() -> None:
+    text = render_client(MAP, "urscript", WHERE)
+    (bit,) = [bit for bit, name in MAP.find("control_word").bits.items() if name == "enable"]
+    assert f'modbus_set_output_register("fg_control", {1 << bit}, False)' in text

@@ -80,6 +80,8 @@ def test_what_the_range_does_not_carry_is_refused(voltage_v: float) -> None:
     [
         (DeviceStep.IDENTITY, b"$01M\r", b"!017021\r", True, "7021"),
         (DeviceStep.IDENTITY, b"$01M\r", b"!017060\r", False, "7060"),
+        (DeviceStep.IDENTITY, b"$01M\r", b"!0170211\r", False, "70211"),  # a longer number is another module
+        (DeviceStep.IDENTITY, b"$01M\r", b"!01702\r", False, "702"),
         (DeviceStep.ARM, b"~013164\r", b"!01\r", True, ""),
         (DeviceStep.VERIFY, b"~012\r", b"!01164\r", True, "100"),
         (DeviceStep.VERIFY, b"~012\r", b"!0164\r", True, "100"),  # firmware that does not say whether it is enabled

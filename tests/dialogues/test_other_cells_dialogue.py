@@ -43,6 +43,7 @@ def sample(raw: float, force_n: float, quality: Quality = Quality.OK) -> ForceSa
         (BINARY, None, b"MSV?;", bytes.fromhex("FFFF06550D0A"), sample(-250, -2.5)),  # the lowest byte is a status
         (BINARY, None, b"MSV?;", bytes.fromhex("0D0A0D000D0A"), sample(0x0D0A0D, 8545.41)),  # ends of lines within
         (BINARY, None, b"MSV?;", bytes.fromhex("7FFFFF000D0A"), sample(8388607, 83886.07, Quality.OVERLOAD)),
+        (BINARY, None, b"MSV?;", bytes.fromhex("800001000D0A"), sample(-8388607, -83886.07, Quality.OVERLOAD)),
         (ADAM, None, b"#**\r$074\r", b">071+5.8222\r", sample(5.8222, 58.222)),
         (ADAM, None, b"#**\r$074\r", b"!071-0.0100\r", sample(-0.01, -0.1)),
         (ADAM, None, b"#**\r$074\r", b">070+5.8222\r", RepeatedSample()),  # measured nothing since

@@ -14,7 +14,8 @@ from gateway.devices import SerialSettings
 from gateway.fieldbus import ModbusRtuServer, RtuSettings
 from gateway.modbus import Peer
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.modbus.rtu import encode_adu
+from gateway.modbus.rtu import LONGEST_ADU, encode_adu
+from gateway.modbus.rtu_receiver import RtuRequest
 from gateway.ports import Pty
 from tests.fieldbus.conftest import NotingBank
 
@@ -99,16 +100,34 @@ def test_a_port_that_was_unplugged_is_served_again(tmp_path: Path) -> None:
         name.symlink_to(lines[0].path)
         async with Face().serving(str(name)) as face:
             os.write(lines[0].fd, encode_adu(3, READ)[:5])  # half a request, then the plug
-            await asyncio.sleep(0)
+            while not face.server._receiver._burst:
+                await asyncio.sleep(0)
             name.unlink()
             lines[0].close()
             assert "disconnected" in await face.until_told("E102")
             assert face.gone == [FACE] and face.server.peers == ()
             name.symlink_to(lines[1].path)
             await face.until_told("is back")
+            os.write(lines[1].fd, encode_adu(3, READ)[5:])  # the other half is no request together with the first
+            await asyncio.sleep(0.05)
+            assert is_silent(lines[1].fd)
             os.write(lines[1].fd, encode_adu(3, READ))
             assert await heard(lines[1].fd, len(ANSWER)) == ANSWER
         lines[1].close()
+
+    play(scene())
+
+
+def test_answers_do_not_pile_up_behind_a_slow_line() -> None:
+    """Who asks again before an answer is through the wire is obeyed, and gets none of an hour ago."""
+
+    async def scene() -> None:
+        async with Face().serving(None) as face:
+            for k in range(20):
+                write = P.read_write_request(0, 125, 20, bytes((0, k)))
+                face.server._execute(RtuRequest(3, write, True))
+                assert face.server._backlog_bytes <= 2 * LONGEST_ADU
+            assert [data for _, data, _ in face.bank.writes] == [bytes((0, k)) for k in range(20)]
 
     play(scene())
 

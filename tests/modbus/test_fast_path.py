@@ -76,3 +76,16 @@ def test_any_segment_is_answered_as_the_long_way_or_left_to_it(segment: bytes, s
     buffer = bytearray(stale)
     buffer[: len(segment)] = segment
     assert whole_answer(buffer, len(segment), UNITS, bank(), PEER) == the_long_way(segment)
+
+
+@given(st.integers(0, 126), st.integers(0, 255), st.binary(max_size=250))
+@example(2, 6, bytes(4))  # a byte count that is not the data's
+@example(2, 4, bytes(6))
+@example(3, 4, bytes(4))
+def test_a_write_is_executed_as_the_long_way_or_left_to_it(count: int, data_bytes: int, data: bytes) -> None:
+    segment = encode(Adu(7, 1, pack(">BHHB", 16, 0, count, data_bytes) + data[:247]))
+    buffer, quick = bytearray(300), bank()
+    buffer[: len(segment)] = segment
+    assert whole_answer(buffer, len(segment), UNITS, quick, PEER) == the_long_way(segment)
+    is_sound = data_bytes == 2 * count == len(data) and 1 <= count <= 123
+    assert quick.image[: len(data)] == data if is_sound else quick.image == bank().image

@@ -61,6 +61,15 @@ def test_an_object_that_fills_an_answer_is_whole_and_a_longer_one_is_cut() -> No
         assert parse_identification(alone[1:]) == ({3: bytes(room)}, None)
 
 
+@pytest.mark.parametrize("over", [0, 1, 2])
+def test_objects_that_do_not_fit_together_by_a_byte_come_in_two_answers(over: int) -> None:
+    room = 253 - 7
+    identity = {0: bytes(100), 1: bytes(room - 2 - 100 - 2 + over)}
+    reply = identification_answer(identification_request(BASIC), identity)
+    assert (len(reply) == 253, parse_identification(reply[1:])[1]) == ((True, None) if over == 0 else (False, 1))
+    assert walked(identity, BASIC) == identity
+
+
 def test_one_object_can_be_asked_for() -> None:
     reply = identification_answer(identification_request(INDIVIDUAL, 1), SHORT)
     assert parse_identification(reply[1:]) == ({1: b"Product"}, None)

@@ -257,3 +257,15 @@ def test_a_busy_bus_without_visible_silence_is_followed() -> None:
         bus.send(FOREIGN["a read"], pause_s=0.1e-3)
     assert bus.send(OURS).requests() == answered() and bus.receiver.noise_bytes == 0
     assert bus.receiver.frames == 201
+
+
+def test_behind_a_plug_may_be_another_bus() -> None:
+    """Bytes that begin a frame of a unit which this line is known for hide what may be inside of it."""
+    hidden = P.write_registers_request(0, bytes(40))
+    begun = encode_adu(2, hidden)[:7] + OURS
+    for is_replugged in (False, True):
+        bus = Bus()
+        assert bus.send(encode_adu(2, READ)).requests() == []
+        if is_replugged:
+            bus.receiver.forget()
+        assert bus.send(begun).requests() == (answered() if is_replugged else [])

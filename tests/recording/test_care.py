@@ -148,3 +148,23 @@ def test_the_number_of_a_deleted_recording_is_not_used_again(tmp_path: Path) -> 
         assert delete_recording(path, "") == ""
     assert record(tmp_path).stem == "0004"
     assert sorted(path.name for path in (tmp_path / "recordings").iterdir()) == ["0003.gone", "0004.fgr"]
+
+
+def test_what_is_said_to_be_deleted_is_gone_after_a_power_cut_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder is synchronised behind the last name that goes."""
+    _, path, _ = (record(tmp_path) for _ in range(3))
+    keep_recording(path)
+    let_recording_go(path)
+    acts: list[str] = []
+    sync, unlink = os.fsync, Path.unlink
+
+    def noting_unlink(one: Path, missing_ok: bool = False) -> None:
+        acts.append("unlink")
+        unlink(one, missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", noting_unlink)
+    monkeypatch.setattr(os, "fsync", lambda descriptor: (acts.append("fsync"), sync(descriptor)))
+    assert delete_recording(path, "") == ""
+    assert acts == ["unlink", "fsync"]

@@ -53,6 +53,16 @@ def test_a_restarted_writer_goes_on_behind_what_is_there(descriptor):
     assert [row[0] for row in rows_of(RingReader(descriptor).newest(100))] == [float(k) for k in range(11)]
 
 
+def test_the_count_tells_of_a_row_that_is_there(descriptor):
+    """The count goes up behind the row: a row that could not be written is never told of."""
+    ring = filled(descriptor, 5)
+    with pytest.raises(struct.error):
+        ring.append((5.0,))
+    assert RingReader(descriptor).rows_written == 5
+    ring.append((5.0, 10.0, -5.0))
+    assert RingReader(descriptor).rows_written == 6
+
+
 def test_other_columns_begin_a_new_ring(descriptor):
     filled(descriptor, 10).close()
     SampleRing(descriptor, (*COLUMNS, "pressure_kpa"), 16)

@@ -15,6 +15,8 @@ from gateway.registers.refusal import Refusal
 from gateway.registers.words import ControlBit, Mode
 from tests.calibrations.coefficients import calibration
 
+OWNER_IP = 116
+
 
 def test_enable_and_setpoint_in_one_write_are_one_command(master, commands):
     master.write(0, 1, 1200)
@@ -115,6 +117,16 @@ def test_clear_command_is_controls_own_and_not_a_new_command(bank, master, comma
     bank.clear_command()
 
 
+def test_what_control_clears_waits_for_no_enable_to_come(bank, master, commands):
+    """A voltage or a force of before a fault would be out with the next enable alone."""
+    master.write(0, 1, 1200, 50, 1, 7, 2500)
+    bank.clear_command()
+    assert (bank.command.voltage_setpoint_v, master.word(5)) == (0.0, 0)
+    assert (bank.owner, bank.read_registers(OWNER_IP, 2)) == (None, bytes(4))
+    master.write(0, 1)
+    assert (commands[-1].control_word, commands[-1].force_setpoint_n, commands[-1].voltage_setpoint_v) == (1, 0.0, 0.0)
+
+
 def test_control_may_clear_inside_its_own_call(bank, master):
     bank.on_command = lambda command: bank.clear_command()
     master.write(0, 1, 1200)
@@ -144,6 +156,8 @@ def test_a_mask_write_goes_through_the_same_checks(bank, master, commands):
     bank.mask_write(1, 0x00FF, 0x0200, master.peer)
     assert master.word(1) == 0x0201
     assert commands[-1].force_setpoint_n == 5.13
+    bank.mask_write(1, 0xFFF0, 0x4444, master.peer)  # bits of the word that the and-mask keeps are not the or-mask's
+    assert master.word(1) == 0x0204
     assert master.refusal(bank.mask_write, 1, 0, 0x7000, master.peer).reason is RefusalReason.OUT_OF_RANGE
     assert master.refusal(bank.mask_write, 202, 0, 1, master.peer).reason is RefusalReason.HALF_VALUE
     assert master.refusal(bank.mask_write, 500, 0, 1, master.peer).reason is RefusalReason.ADDRESS
@@ -220,6 +234,10 @@ def test_a_setpoint_lowered_twice_is_told_as_it_was_asked_for_first(make_bank, m
         sentence = bank.set_active_model(calibration(force_limits_n=(0.0, high_n)))
         assert f"to {left / 100:.2f} N" in sentence and master.word(1) == left
         assert bank.command.force_requested_n == 50.0
+    master.write(4, 8)  # a heartbeat changes nothing of what was asked for
+    assert (bank.command.force_setpoint_n, bank.command.force_requested_n) == (30.0, 50.0)
+    master.write(1, 1000)
+    assert (bank.command.force_setpoint_n, bank.command.force_requested_n) == (10.0, 10.0)
 
 
 def test_a_calibration_whose_force_begins_at_nothing_takes_the_smallest_setpoint(bank, master):

@@ -6,7 +6,9 @@ from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer, answer
 from gateway.modbus.server import refuse_unit
 from gateway.registers import RegisterBank
+from gateway.registers.command import Status
 from gateway.registers.refusal import NO_ADDRESS
+from gateway.registers.words import StatusBit
 
 MASTER = Peer("10.0.0.5", 40001)
 
@@ -62,5 +64,6 @@ def test_the_server_id_says_who_it_is_and_whether_a_fault_stands(bank: RegisterB
     running = answer(b"\x11", bank, MASTER)
     assert running[2:4] == b"F\xff" and running[-1] == 0xFF
     assert running[4:-1].startswith(b"force-gateway ")
-    bank._image.write(100, b"\x00\x10")  # status_word: fault
-    assert answer(b"\x11", bank, MASTER)[2:4] == b"F\x00"
+    for word, run in ((StatusBit.FAULT, b"F\x00"), (StatusBit(0), b"F\xff")):
+        bank.publish(Status(status_word=int(word)))  # of now, although nobody has read a register since
+        assert answer(b"\x11", bank, MASTER)[2:4] == run

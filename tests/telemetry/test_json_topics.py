@@ -41,6 +41,9 @@ def test_state_is_retained_and_force_comes_with_every_look() -> None:
     session.offer(replace(holding(), time_unix_s=5.0), 1.2)
     ((topic, force, retain),) = drain(session)
     assert (topic, force["measured_n"], force["time_unix_s"], retain) == ("force", 11.5, 1.2, False)
+    for time_s, topics in ((10.9, ["force"]), (11.0, ["state", "force"]), (20.9, ["force"])):
+        session.offer(holding(), time_s)  # unchanged, and told again: somebody may have cleared what is retained
+        assert [name for name, _, _ in drain(session)] == topics
 
 
 def test_events_wait_for_the_broker_and_forces_do_not() -> None:

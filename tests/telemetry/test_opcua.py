@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import socket
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,9 @@ from typing import Any
 import pytest
 
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
-from gateway.telemetry.opcua_process import NAMESPACE, bound_requests
+from gateway.telemetry.opcua_process import NAMESPACE, GatewayNodes, bound_requests
 from gateway.telemetry.sparkplug_metrics import NODE_METRICS
+from gateway.telemetry.sparkplug_payload import DataType
 from tests.end_to_end.conftest import start, stop
 
 DEMO = shipped_profiles_folder() / "rigs" / "demo.yaml"
@@ -62,6 +64,17 @@ def test_a_request_that_has_no_end_is_cut_and_holds_no_memory(monkeypatch: pytes
         assert transport.is_cut
 
     asyncio.run(scene())
+
+
+@pytest.mark.parametrize(
+    ("value", "is_there", "status"),
+    [(12.5, True, "Good"), (0.0, True, "Good"), (None, True, "BadNoData"), (None, False, "BadNoCommunication")],
+)
+def test_a_value_that_is_not_known_is_not_good(value: float | None, is_there: bool, status: str) -> None:
+    ua = pytest.importorskip("asyncua").ua
+    told = GatewayNodes(ua, None)._data_value(DataType.DOUBLE, value, datetime.now(UTC), is_there=is_there)
+    assert told.StatusCode.name == status
+    assert told.Value.Value == (value or 0.0)
 
 
 @pytest.fixture

@@ -121,6 +121,7 @@ def test_a_lease_is_kept_while_the_browser_is_there_and_not_a_second_longer_than
     async def scene(commands: Commands, stage: Stage) -> None:
         wired = stage.wired
         commands.join("me")
+        commands.join("another")  # who only looks on keeps no force
         await commands.enable("me", 12.0)
         for _ in range(20):  # 4 s: longer than the grace
             for _ in range(4):
@@ -141,6 +142,23 @@ def test_a_lease_is_kept_while_the_browser_is_there_and_not_a_second_longer_than
         await commands.reset("me")
         wired.run(0.1)
         assert wired.state is State.OFF
+
+    play(tmp_path, scene, leased())
+
+
+def test_behind_a_stop_nobody_beats_any_more(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        commands.join("me")
+        await commands.enable("me", 12.0)
+        for _ in range(20):
+            await asyncio.sleep(0)
+        await commands.stop()
+        beats = []
+        for _ in range(20):
+            commands.note_alive("me")
+            await asyncio.sleep(0)
+            beats.append(stage.wired.word("heartbeat"))
+        assert beats == beats[:1] * 20
 
     play(tmp_path, scene, leased())
 

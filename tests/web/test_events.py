@@ -3,7 +3,7 @@
 import asyncio
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +135,32 @@ def test_a_viewer_that_does_not_read_is_dropped_and_the_others_go_on(
         await source.close()
 
     asyncio.run(scene())
+
+
+def test_who_comes_while_the_gateway_is_gone_is_shown_no_state_of_before(
+    tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(events, "_SAMPLES_S", 0.001)
+
+    async def until(stream: AsyncGenerator[bytes], wanted: str) -> list[str]:
+        kinds: list[str] = []
+        while wanted not in kinds:
+            kinds.append(read(await anext(stream))[0])
+        return kinds
+
+    async def scene() -> None:
+        context = Context(tmp_path)
+        source = EventSource(context, RingRows(ring[0]), Commands())  # type: ignore[arg-type]
+        first, late = source.stream("first"), source.stream("late")
+        await until(first, "state")
+        context.control.is_gone = True
+        await until(first, "gone")
+        assert "state" not in await until(late, "gone")
+        await first.aclose()
+        await late.aclose()
+        await source.close()
+
+    asyncio.run(asyncio.wait_for(scene(), 20.0))
 
 
 def test_a_gateway_that_does_not_answer_is_said_and_what_it_logged_is_shown(

@@ -118,6 +118,20 @@ def test_with_a_token_nothing_is_told_before_the_login(tmp_path: Path, monkeypat
     assert answer(app, "POST", ALIVE, {"cookie": entered.cookie, "x-csrf-token": told["csrf"]}).status == 200
 
 
+def test_guesses_wait_for_one_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many at once cost as long as one behind the other: else a thousand connections would guess a thousand times a second."""
+    monkeypatch.setattr(security, "_FAILED_LOGIN_S", 0.02)
+    app = page(tmp_path, TOKEN)
+
+    async def scene() -> float:
+        began_s = asyncio.get_running_loop().time()
+        answers = await asyncio.gather(*(call(app, "POST", "/login", None, b"wrong") for _ in range(8)))
+        assert {one.status for one in answers} == {401}
+        return asyncio.get_running_loop().time() - began_s
+
+    assert asyncio.run(scene()) >= 8 * 0.02
+
+
 def test_a_tool_sends_the_token_itself(tmp_path: Path) -> None:
     app = page(tmp_path, TOKEN)
     assert answer(app, "POST", ALIVE, {"authorization": f"Bearer {TOKEN}"}).status == 200

@@ -20,7 +20,7 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import Controller
 from gateway.control.blame_for_silence import NOT_HELD, Held
-from gateway.control.inputs import LineStatus, Output, WireCounts
+from gateway.control.inputs import LineStatus, Output
 from gateway.devices.messages import ForceSample, Garbage
 from gateway.processes.scheduler_counters import ProcessorTime, time_between
 from gateway.recording.ring import SampleRing
@@ -85,7 +85,7 @@ class ControlLoop:
         self.decision: Output | None = None
         self.sample: ForceSample | None = None
         self.samples = self.cell_garbage_bytes = 0
-        self.cell_counts = WireCounts()
+        self.cell_counts = cell.counts
         self.pressure_pa_per_v = self._pressure_pa = nan  # of the output device: by its profile; at the last decision
         self.output_lost = FaultCode.NONE
         self.valve: ValveExchange | None = None

@@ -32,6 +32,8 @@ def test_the_top_stays_below_the_over_force_trip() -> None:
     assert model.force_n(top_v, -1.0) <= 0.93 * limits.over_force_n + 0.5
     with pytest.raises(ValueError, match=r"over-force trips at 45 N"):
         stairs_of(CalibrationPlan(v_max_v=8.0), replace(limits, over_force_n=45.0), model)
+    with pytest.raises(ValueError, match=r"the rig allows force_max_n = 30 N"):
+        stairs_of(CalibrationPlan(v_max_v=6.0), replace(limits, force_max_n=30.0), model)
 
 
 @pytest.mark.parametrize(
@@ -40,6 +42,7 @@ def test_the_top_stays_below_the_over_force_trip() -> None:
         (CalibrationPlan(step_v=0.0), "step = 0 V, allowed"),
         (CalibrationPlan(step_v=float("nan")), "step = nan V"),
         (CalibrationPlan(v_max_v=12.0), "allowed up to 9 V"),
+        (CalibrationPlan(v_max_v=9.01), "allowed up to 9 V"),
         (CalibrationPlan(groups=0), "groups = 0"),
         (CalibrationPlan(minor_points=-1), "minor_points = -1"),
         (CalibrationPlan(step_v=0.01, groups=50), "at most 20000"),

@@ -215,6 +215,30 @@ def test_a_local_run_needs_no_heartbeat_but_the_masters_own_does() -> None:
     assert masters.last.fault is FaultCode.MASTER_LOST
 
 
+def test_behind_a_local_run_a_lost_master_is_a_loss_again() -> None:
+    """What needed no master is over: the next force is a master's, and its lease counts; so does nothing that a run saw."""
+    bench = begun(Bench(settings(lease_s=0.2), seed=15))
+    run = bench.controller.active_run
+    ceiling = run._ceiling
+    for _ in range(2):
+        bench.run(2.0)
+        run.ask_stop("calibration stopped by a person")
+        bench.run(1.0)
+        assert bench.last.state is State.OFF and not run.is_local
+        begun(bench)
+        assert run.is_local and run._ceiling is not ceiling
+    run.ask_stop("calibration stopped by a person")
+    bench.run(1.0)
+    bench.heartbeat_every_ms = 50
+    bench.run(0.3)
+    bench.enable(12.0)
+    bench.run(1.0)
+    assert bench.last.state is State.HOLDING
+    bench.heartbeat_every_ms = 0
+    bench.run(0.3)
+    assert bench.last.fault is FaultCode.MASTER_LOST
+
+
 def test_a_stop_of_the_service_ends_it() -> None:
     bench = begun(Bench(seed=16))
     bench.run(3.0)

@@ -4,8 +4,19 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.control.inputs import WireCounts
-from gateway.control.self_test.items import FAILED, NOT_TESTED, PASSED, WARNED
+from gateway.control.self_test.items import (
+    FAILED,
+    FORCE_ITEMS,
+    NOT_TESTED,
+    PASSED,
+    WARNED,
+    Finding,
+    Item,
+    RunEnding,
+    report_of,
+)
 from gateway.control.self_test.judgement import (
     Known,
     judge_leak,
@@ -16,8 +27,9 @@ from gateway.control.self_test.judgement import (
     judge_scale,
     judge_zero,
 )
-from gateway.control.self_test.measurements import Slope
+from gateway.control.self_test.measurements import Slope, intervals_of
 from gateway.control.settings import SelfTestSettings
+from gateway.registers.words import SelfTestResult, SelfTestVerdict
 from tests.control.bench import bsfm, settings
 
 RIG = Known(replace(settings(), self_test=SelfTestSettings()), bsfm())
@@ -45,6 +57,40 @@ def test_a_verdict_changes_at_its_bound_and_nowhere_else(name: str) -> None:
     found = [judge(share) for share in (0.1 * warns, 0.99 * warns, 1.01 * warns, 0.99 * fails, 1.01 * fails)]
     assert [one.verdict for one in found] == [PASSED, PASSED, WARNED, WARNED, FAILED]
     assert all(words in one.text for one in found)
+
+
+def test_what_was_measured_is_told_in_the_units_that_it_says() -> None:
+    assert judge_response(0.25, RIG).text.startswith("250 ms to 63 % of a step, ")
+    assert judge_leak(Slope(-0.05, 0.0), 10.0, 4.0, 0.01).text.startswith("+0.050 N/s lost at 10.0 N over 4 s, ")
+    assert "; pressure +1.0 % per second lost, " in judge_leak(Slope(0.0, 0.0), 10.0, 4.0, 0.01).text
+    slow = judge_output_line(WireCounts(100, 97, 1), 0.02, RIG).text
+    assert slow.startswith(
+        "2 of 100 questions without an answer, 1 answers unreadable, the slowest within 20 ms of 100 ms"
+    )
+
+
+def test_the_longest_gap_is_the_longest_wherever_it_was() -> None:
+    found = intervals_of([0.0, 0.01, 0.02, 0.06, 0.07, 0.08])
+    assert (found.median_s, found.longest_s, found.missing) == (pytest.approx(0.01), pytest.approx(0.04), 3)
+
+
+@pytest.mark.parametrize("verdict", [PASSED, WARNED, FAILED])
+@pytest.mark.parametrize("item", Item)
+def test_a_self_test_is_as_good_as_its_worst_item(item: Item, verdict: SelfTestVerdict) -> None:
+    findings = {one: Finding(one, verdict if one is item else PASSED, "") for one in Item}
+    report = report_of(1, findings, RunEnding(FaultCode.NONE, is_done=True, wants_force=True))
+    assert report.result.name == verdict.name
+
+
+@pytest.mark.parametrize("item", Item)
+def test_a_force_that_was_not_tried_deserves_a_look(item: Item) -> None:
+    findings = {one: Finding(one, NOT_TESTED if one is item else PASSED, "") for one in Item}
+    wanted, unwanted = (
+        report_of(1, findings, RunEnding(FaultCode.NONE, is_done=True, wants_force=wants_force)).result
+        for wants_force in (True, False)
+    )
+    assert wanted is (SelfTestResult.WARNED if item in FORCE_ITEMS else SelfTestResult.PASSED)
+    assert unwanted is SelfTestResult.PASSED
 
 
 def test_what_is_pressed_at_rest_is_told_with_a_cure() -> None:

@@ -63,6 +63,7 @@ class Samples:
 
     def __init__(self) -> None:
         self.next: ForceSample | None = None
+        self.counts = WireCounts()
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | None]:
         return [self.next]

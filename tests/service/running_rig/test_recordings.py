@@ -5,10 +5,15 @@ from pathlib import Path
 
 import pytest
 
+from gateway.codes.faults import FaultCode
+from gateway.control import CalibrationInUse, Controller
+from gateway.devices.messages import ForceSample, Quality
 from gateway.recording import list_recordings
 from gateway.recording.label import RecordingLabel, label_of
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.lines.output_line import LineState
+from gateway.service.running_rig.recorded_row import COLUMNS, row_of
 from gateway.service.running_rig.recordings import LONGEST_S, Recordings
+from tests.control.bench import bsfm
 from tests.service.rigs import demo
 
 
@@ -20,6 +25,17 @@ class Log(list[str]):
 @pytest.fixture
 def recordings(tmp_path: Path) -> Recordings:
     return Recordings(tmp_path / "recordings", demo(), Log())
+
+
+def test_a_row_is_in_the_units_of_its_columns() -> None:
+    """Seconds since the voltage went out, kilopascals, volts and newtons: each where its column is."""
+    sample = ForceSample(1.0, 12.5, Quality.UNSTABLE, time_s=1000.25)
+    decision = Controller(demo().control, CalibrationInUse(bsfm(), 1)).safe_output(FaultCode.NONE)
+    decision = decision._replace(voltage_v=3.0, force_measured_n=12.0, force_applied_n=11.0, trim_v=-0.25)
+    row = dict(zip(COLUMNS, row_of(0.25, sample, decision, LineState(210_000.0, 2.5, 1000.0)), strict=True))
+    expected = {"time_s": 0.25, "pressure_kpa": 210.0, "sent_v": 2.5, "sent_age_s": 0.25, "quality": 1.0}
+    expected |= {"command_v": 3.0, "force_n": 12.0, "applied_n": 11.0, "trim_v": -0.25}
+    assert {name: row[name] for name in expected} == expected
 
 
 def test_name_and_note_stand_in_the_header_and_only_where_they_were_given(

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Final
 
+from gateway.control.inputs import WireCounts
 from gateway.devices import CellHost, DeviceProfile
 from gateway.devices.messages import ForceSample, Garbage, RepeatedSample
 from gateway.service.running_rig.lines.cell_identity import CellIdentity
@@ -19,12 +20,14 @@ _FASTEST_HZ: Final = 250.0  # the loop's fastest tick: more readings would only 
 
 
 class CellExchange:
-    """Asks through `write` what has to be asked, and tells what came. unanswered_since_s: None for a stream, or in time."""
+    """Asks through `write` what has to be asked, and tells what came. counts: since the start, whatever reset in between; what
+    was heard of readings, and what was garbled, its owner counts."""
 
     def __init__(self, host: CellHost, write: Callable[[bytes], None], profile: DeviceProfile) -> None:
         self._host = host
         self.identity = CellIdentity(profile)
         self._write = write
+        self.counts = WireCounts()
         self._question = host.poll()
         self._reply_timeout_s = profile.reply_timeout_s
         self._period_s = 1.0 / min(profile.reading.rate_hz or inf, _FASTEST_HZ)
@@ -57,6 +60,7 @@ class CellExchange:
     def _receive_identity(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
         garbage = self.identity.receive(chunk)
         if not self.identity.is_due:
+            self.counts.heard += 1
             self._sent_s, self._is_overdue, self._next_s = None, False, now_s + self._host.gap_s
             self._send_next(now_s)
         return [*garbage]
@@ -71,4 +75,5 @@ class CellExchange:
     def _send_next(self, now_s: float) -> None:
         if self._question and self._sent_s is None and now_s >= self._next_s and not self.identity.fault:
             self._sent_s, self._next_s = now_s, now_s + self._period_s
+            self.counts.asked += 1
             self._write(self.identity.question if self.identity.is_due else self._question)

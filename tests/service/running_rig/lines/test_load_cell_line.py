@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.devices import DeviceProfile, cell_device, cell_host
+from gateway.devices.device_checks.identity import Identity
 from gateway.devices.exchange import ForceReading
 from gateway.devices.messages import ForceSample
 from gateway.service.running_rig.lines.load_cell_line import CellExchange
@@ -112,3 +114,38 @@ def test_half_an_answer_from_before_a_reopening_is_no_part_of_the_next(wire: Wir
     wire.tick()
     wire.answer(2.0)
     assert [sample.force_n for sample in wire.samples] == [2.0]
+
+
+def test_behind_a_plug_may_be_another_cell() -> None:
+    """What it is, is asked anew after each opening, and no reading of a cell is taken before it has said so."""
+    profile = replace(POLLED, identity=Identity(ask="ID?", answer="ID {model:s}", models=("A1",)))
+    wire = Wire(profile)
+    for said, fault in (
+        (b"ID A1\r\n", FaultCode.NONE),
+        (b"ID B2\r\n", FaultCode.WRONG_DEVICE),
+        (b"ID A1\r\n", FaultCode.NONE),
+    ):
+        wire.exchange.reset()
+        wire.asked.clear()
+        wire.tick()
+        assert wire.asked == [b"ID?\r\n"]
+        before = len(wire.samples)
+        wire.answer()
+        assert len(wire.samples) == before
+        wire.exchange.receive(said, wire.now_s)
+        assert wire.exchange.identity.fault is fault
+        wire.tick(1.0)
+        assert (wire.asked[-1] == b"W?\r\n") is (fault is FaultCode.NONE)
+
+
+def test_questions_are_counted_and_a_stream_has_none(wire: Wire) -> None:
+    """What the metrics call asked: the answered, the lost and the one that is out."""
+    for _ in range(3):
+        wire.tick()
+        wire.answer()
+    wire.tick(2.0 * TIMEOUT_S)
+    assert wire.exchange.counts.asked == len(wire.asked) == 5
+    stream = Wire(load_device("stream-st-gs"))
+    stream.tick()
+    stream.answer()
+    assert stream.exchange.counts.asked == 0

@@ -3,6 +3,7 @@
 from gateway.devices import ValveDevice, ValveDirection, ValveHost
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from tests.profile_files import load_device
+from tests.service.running_rig.simulated_rig import SmallRig
 
 PUSH, PULL = ValveDirection
 PROFILE = load_device("waveshare-relay")
@@ -17,6 +18,7 @@ class Relay:
         self.is_deaf = self.is_stuck = False
         self.asked: list[tuple[float, ValveDirection | None]] = []
         self.answers: list[tuple[float, bytes]] = []
+        self.shown: set[ValveDirection | None] = set()
         self.line = ValveExchange(ValveHost(PROFILE), self.hear, PROFILE.reply_timeout_s)
 
     def hear(self, data: bytes) -> None:
@@ -37,6 +39,7 @@ class Relay:
                 self.line.on_bytes(self.answers.pop(0)[1], self.now_s)
             self.line.tick(self.now_s)
             self.line.set_direction(order, self.now_s)
+            self.shown.add(self.line.status.stands)
         return self
 
     @property
@@ -76,6 +79,16 @@ def test_a_relay_that_does_not_move_keeps_its_readback_and_is_told_again() -> No
     relay.is_stuck = True
     relay.run(1.0, PULL)
     assert relay.line.status.stands is PUSH and len(relay.orders) > 2
+    assert relay.shown == {None, PUSH}, "an answer to an order is no readback"
+
+
+def test_a_port_that_is_back_is_lost_no_more() -> None:
+    rig, relay = SmallRig(), Relay(PULL).run(0.5)
+    rig.loop.valve = relay.line
+    rig.loop.on_valve_closed()
+    assert (relay.line.status.lost, relay.line.status.stands) == (True, None)
+    rig.loop.on_valve_opened()
+    assert (relay.line.status.lost, relay.run(0.5).line.status.stands) == (False, PULL)
 
 
 def test_silence_has_an_age_until_an_answer_ends_it() -> None:

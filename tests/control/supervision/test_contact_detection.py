@@ -1,0 +1,21 @@
+"""When the tool touches, and when it does not any more."""
+
+from gateway.control.sample_conditioning import Reading
+from gateway.control.supervision.contact_detection import ContactDetector
+
+STEP_S = 0.02
+
+
+def felt(detector: ContactDetector, *forces_n: float) -> bool:
+    for force_n in forces_n:
+        detector.update(Reading(force_n, force_n, interval_s=STEP_S, is_new=True, is_fresh=True, is_usable=True))
+    return detector.touching
+
+
+def test_two_samples_touch_and_a_tenth_of_a_second_without_a_break_releases() -> None:
+    detector = ContactDetector(1.0)
+    assert not felt(detector, 1.0, 0.9, 1.0)
+    assert felt(detector, 1.0, 1.0)
+    assert felt(detector, 0.6, *[0.4] * 4)
+    assert felt(detector, *[0.4, 0.4, 0.5] * 20), "a break begins the tenth anew"
+    assert not felt(detector, *[0.4] * 5)
