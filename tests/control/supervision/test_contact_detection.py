@@ -17,5 +17,5 @@ def test_two_samples_touch_and_a_tenth_of_a_second_without_a_break_releases() ->
     assert not felt(detector, 1.0, 0.9, 1.0)
     assert felt(detector, 1.0, 1.0)
     assert felt(detector, 0.6, *[0.4] * 4)
-    assert felt(detector, *[0.4, 0.4, 0.5] * 20), "a break begins the tenth anew"
+    assert felt(detector, *[0.5, 0.4, 0.4] * 20), "a break begins the tenth anew"
     assert not felt(detector, *[0.4] * 5)
