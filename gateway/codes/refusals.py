@@ -298,7 +298,7 @@ class RefusalReason(IntEnum):
             "W303",
             "tare refused",
             "The tare bit was written and the zero not taken; the log line says why.",
-            "A voltage is out, the force moves or is still leaving, a fault is latched, or samples are missing.",
+            "A voltage is out, the output is silent, the force moves or is leaving, a fault is latched, or samples miss.",
             "Set the force to 0, lift the tool into the air, let it rest for a second, and write the bit again.",
         ),
     )

@@ -44,7 +44,8 @@ _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
 @dataclass(frozen=True, slots=True)
 class Situation:
     """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; excuse: the
-    machine, where that is the cause of it; line_fault: what the output line reports, with its code;
+    machine, where that is the cause of it; line_fault: what the output line reports, with its code; is_output_known: that the
+    output answers, so that its voltage is ours;
     expected_n: force that the voltages of late still make, by the model; repeats: that the load cell seems to be frozen;
     ramps_down: the force goes to 0, and then the output off."""
 
@@ -55,6 +56,7 @@ class Situation:
     block: RefusalReason
     excuse: str
     line_fault: str
+    is_output_known: bool
     voltage_v: float
     applied_n: float
     expected_n: float
@@ -85,6 +87,7 @@ class Readiness:
             block=block,
             excuse=self._parts.faults.excuse(block, now_s, reading, line),
             line_fault=f"{line.fault.code} {line_words(line)}" if line.fault else "",
+            is_output_known=line.acknowledged_v is not None and block is not RefusalReason.OUTPUT_FAULT,
             voltage_v=loop.voltage_v,
             applied_n=loop.applied_n,
             expected_n=loop.compute_expected_rise(),
@@ -215,6 +218,8 @@ class EdgeCheck:
             return "a fault is latched: fix its cause, then reset"
         if at.state in ENABLED_STATES and at.voltage_v > 0.0:
             return f"{at.voltage_v:.2f} V are out: disable the output or set the force to 0 first"
+        if not at.is_output_known:
+            return f"{at.line_fault or 'the output does not answer'}: whether air still presses is not known"
         if not at.reading.is_fresh:
             return "no fresh load-cell sample"
         if at.repeats:

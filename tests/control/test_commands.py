@@ -1,4 +1,4 @@
-"""Direct voltage, tare, stop, bands and warnings, as a master sees them."""
+"""Direct voltage, stop, bands and warnings, as a master sees them."""
 
 from dataclasses import replace
 from math import isnan, nan
@@ -15,7 +15,7 @@ from gateway.control.command_edges import CommandTracker
 from gateway.control.demand import demand_of
 from gateway.devices.messages import Quality
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit, LimitedBy, State, StatusBit
+from gateway.registers.words import LimitedBy, State, StatusBit
 from tests.control.bench import Bench, settings
 
 
@@ -96,65 +96,6 @@ def test_in_band_is_left_when_the_force_leaves():
     bench.run(0.02)
     assert bench.last.state is State.RAMPING
     assert not bench.last.status & StatusBit.IN_BAND
-
-
-def test_a_tare_makes_the_resting_force_zero():
-    bench = Bench()
-    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 1.7)
-    bench.run(0.3)
-    assert bench.last.force_measured_n == pytest.approx(1.7, abs=0.2)
-    bench.write(control_word=ControlBit.TARE)
-    bench.run(0.1)
-    assert bench.last.force_measured_n == pytest.approx(0.0, abs=0.2)
-    assert any(event.startswith("tare") for event in bench.events)
-
-
-def test_a_tare_with_payload_makes_the_contact_force_zero_at_any_tilt():
-    bench = Bench()
-    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n - 5.88)  # 0.6 kg hang on the cell
-    bench.write(payload_kg=0.6, control_word=ControlBit.TARE)
-    assert bench.refused and bench.refused.text.startswith("tare refused: no fresh")
-    assert bench.command.payload_kg == 0.0, "nothing of that write is taken"
-    bench.run(0.3)
-    bench.write(payload_kg=0.6, control_word=ControlBit.TARE)
-    bench.run(0.1)
-    assert bench.last.force_measured_n == pytest.approx(0.0, abs=0.2)
-
-
-def test_a_tare_under_force_is_refused():
-    bench = enabled()
-    bench.force(12.0)
-    bench.run(1.0)
-    output = bench.write(control_word=ControlBit.ENABLE | ControlBit.TARE)
-    assert bench.refused and "V are out: disable the output or set the force to 0 first" in bench.refused.text
-    assert output.events == ()
-    assert bench.run(0.1).force_measured_n == pytest.approx(12.0, abs=1.0)
-
-
-def test_a_tare_of_a_decaying_force_is_refused():
-    bench = enabled()
-    bench.force(40.0)
-    bench.run(1.0)
-    bench.disable()
-    bench.run(0.15)
-    bench.write(control_word=ControlBit.TARE)
-    assert bench.refused and "still on their way to 0" in bench.refused.text
-
-
-def test_a_tare_of_a_frozen_cell_is_refused():
-    """Its reading is no zero: once the cell lives again, every force would be wrong by it."""
-    bench = Bench(seed=3, noise_n=0.12)
-    bench.run(1.0)
-    bench.enable(12.0)
-    bench.run(6.0)
-    bench.cell_frozen = True
-    bench.disable()
-    bench.run(1.5)
-    bench.write(control_word=ControlBit.TARE)
-    assert bench.refused and "samples bit for bit" in bench.refused.text and "is no zero" in bench.refused.text
-    bench.cell_frozen = False
-    bench.run(1.0)
-    assert bench.write(control_word=ControlBit.TARE) and not bench.refused
 
 
 def test_stop_ramps_to_zero_within_the_time_and_ends_in_off():

@@ -137,7 +137,12 @@ class Master:
     def run(self, name: str) -> None:
         """Clear what is latched, start a run by its bit, and beat from now on."""
         self.reset(take=True)
-        self._outside.call_later(RESET_S, self.hold, 0.0, RUNS[name])
+        self._beating += 1
+        self._outside.call_later(RESET_S, self._begin_run, self._beating, RUNS[name])
+
+    def _begin_run(self, number: int, bit: int) -> None:
+        if number == self._beating:  # nothing else has been asked of it meanwhile
+            self.hold(0.0, bit)
 
     def tare(self) -> None:
         """Beside the bits that stand."""

@@ -25,6 +25,15 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(7.6273, "output", "pull"),
         ],
     ),
+    (
+        14276,
+        [
+            Event(8.2807, "worker", "take", (11.22,)),
+            Event(10.4051, "output", "pull"),
+            Event(19.2659, "worker", "self_test"),
+            Event(19.32, "worker", "tare"),
+        ],
+    ),
 ]
 """Schedules that once broke a law: the seed of the machine, and what happened to it."""
 
