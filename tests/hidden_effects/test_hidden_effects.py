@@ -116,6 +116,7 @@ def test_lost_motion_is_no_leak_where_friction_could_hold_a_force_at_the_first_r
     assert row["right"] and not row["wrong"], row
 
 
+@pytest.mark.long
 def test_the_tool_with_two_processes_writes_the_rows_of_one(tmp_path: Path) -> None:
     """With an engine that says nothing, so that only the harness is asked."""
     words = ("--engine", "silent", "--effects", "linear-drift,null", "--sizes", "1", "--table")

@@ -44,6 +44,7 @@ sys.exit(runpy.run_path(sys.argv[1] + "/paper/reproduce", run_name="small")["mai
 """
 
 
+@pytest.mark.long
 def test_the_report_is_one_file_with_every_figure_and_the_terminal_shows_the_same_verdicts(tmp_path: Path) -> None:
     """In a process of its own, where a warning is an error: matplotlib keeps its fonts open for ever."""
     page_file, folder = tmp_path / "report.html", tmp_path / "figures"

@@ -30,7 +30,7 @@ async def prune_at(state: Path, *times_s: float) -> list[str]:
     said = Said()
     retention = RecordingRetention(state, Retention(days=30.0), said)
     for now_s in times_s:
-        record(state, days_ago=25_000)
+        record(state, days_ago=1_000)
         said.heard.clear()
         retention.tick(now_s)
         await asyncio.wait_for(said.heard.wait(), 10)

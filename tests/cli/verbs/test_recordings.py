@@ -87,7 +87,7 @@ def test_a_plot_is_a_page_or_one_svg_that_parses(state: Path, call, monkeypatch:
 
 def test_prune_says_what_would_go_before_it_goes(state: Path, call) -> None:
     os.utime(state / "recordings" / "0002.fgr")
-    os.utime(state / "recordings" / "0001.fgr", (0.0, 0.0))
+    os.utime(state / "recordings" / "0001.fgr", (1.6e9, 1.6e9))
     would = call("recordings", "prune", "--dry-run", "--days", "30", "--state", state)
     assert words_of(would.output).endswith("0001.fgr: older than 30 days")
     assert (state / "recordings" / "0001.fgr").exists()
@@ -99,7 +99,7 @@ def test_prune_says_what_would_go_before_it_goes(state: Path, call) -> None:
 def test_prune_takes_the_rigs_own_limits_and_says_where_there_are_none(
     state: Path, call, tmp_path: Path, rig_file_with_retention: Path
 ) -> None:
-    os.utime(state / "recordings" / "0001.fgr", (0.0, 0.0))
+    os.utime(state / "recordings" / "0001.fgr", (1.6e9, 1.6e9))
     assert "retains everything" in call("recordings", "prune", "--rig", "demo", "--state", state).stderr
     told = call("recordings", "prune", "--dry-run", "--rig", rig_file_with_retention, "--state", state)
     assert "older than 7 days" in told.output
