@@ -45,6 +45,10 @@ MOST_BYTES: Final = 512
 
 _STRAY_BYTES: Final = 2  # before or behind a request: a line that floats makes one or two
 _DIAGNOSTICS_BYTES: Final = 8  # the usual FC08: a sub-function with one word
+_FRAMED: Final = frozenset(
+    function for function in range(256) if has_request_length(function) or has_answer_length(function)
+) | {DIAGNOSTICS}
+"""Functions of frames that end by what they say themselves; those of noise are others, nine times in ten."""
 
 
 def silence_s(baud: int, character_s: float) -> float:
@@ -183,7 +187,7 @@ class RtuReceiver:
         claimed = longest = self._claimed_end(at)  # what the noise may be a frame of, and up to where
         if self._burst[at] not in self._units:
             claimed = at
-        while (at := at + 1) < end:
+        while (at := self._next_beginning(at + 1)) < end:
             is_marked = at in self._marks
             if size := self._frame_size(at, is_start=is_marked):
                 is_stray = at <= claimer + _STRAY_BYTES
@@ -201,6 +205,22 @@ class RtuReceiver:
             if is_marked or (is_known and at <= start + _STRAY_BYTES and end_here > claimed):
                 claimer, claimed = at, end_here if is_known else at
         return None, longest > end
+
+    def _next_beginning(self, at: int) -> int:
+        """Return the next place at which a frame may begin, or may be claimed to. Most bytes of noise are told by themselves
+        and the one behind them: half a kilobyte of it must not take the time of a control step."""
+        burst, marks, units = self._burst, self._marks, self._units
+        echoed = self._echo.frame[0] if self._echo.frame else None
+        for place in range(at, len(burst) - 1):
+            unit = burst[place]
+            if (
+                unit in units
+                or unit == echoed
+                or place in marks
+                or (unit <= LARGEST_UNIT and burst[place + 1] in _FRAMED)
+            ):
+                return place
+        return max(at, len(burst) - 1)
 
     def _is_all_frames(self, at: int) -> bool:
         """Decide whether whole frames and nothing else follow, up to a silence that was seen or the end."""
@@ -229,6 +249,8 @@ class RtuReceiver:
             silence_at = next((mark for mark in self._marks if mark > at), len(self._burst))
             lengths.append(checksum_end(frame[: silence_at - at], SHORTEST_ADU))
         size = next((size for size in lengths if size and _is_whole(frame, size)), 0)
+        if not size:
+            return 0
         end = at + size
         ends = (mark + self._frame_size(mark, is_start=True) for mark in self._marks if at < mark < end)
         return 0 if any(mark_end >= end for mark_end in ends) else size
