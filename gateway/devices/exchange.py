@@ -5,7 +5,7 @@ Checked when built: a template that means nothing is told to its author, not to 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import ceil, floor
+from math import ceil, floor, inf
 from typing import Annotated, Final, Literal
 
 from annotated_types import Ge, Gt, Le, MinLen
@@ -201,7 +201,8 @@ class ForceReading:
     frame: template with the number {force:...}, perhaps a word {status:...} and a word {unit:...}. Where the frame says its
     unit, that unit counts; `unit` is what the simulated device is set to, and what a frame without one means. Raw counts
     of a converter have no unit but newton_per_count and zero_count, which a rig has measured. before: a sentence that is
-    sent ahead of each question and not answered. modbus: registers, in place of frame and ask.
+    sent ahead of each question and not answered. modbus: registers, in place of frame and ask. overload, underload: what
+    the device says in place of the frame where it has no number to show; nothing in them changes but the profile's constants.
     """
 
     __pydantic_config__ = STRICT
@@ -217,6 +218,10 @@ class ForceReading:
         default_factory=dict
     )  # word of {status:...} -> how far to believe the reading
     blank_is_overload: bool = False  # blanks instead of digits mean beyond the range
+    overload: tuple[str, ...] = ()  # sentences of their own that mean beyond the range: ["S +"]
+    underload: tuple[
+        str, ...
+    ] = ()  # the same beyond its other end: ["S -"]; without it the device says overload there, too
     rate_hz: Annotated[float, Ge(0), Le(10_000)] = 0.0  # readings per second; with ask: the most, 0: as the wire allows
 
     def __post_init__(self) -> None:
@@ -231,7 +236,11 @@ class ForceReading:
             raise ValueError("`before` is sent ahead of a question: there is no `ask`")
         if self.unit and self.newton_per_count:
             raise ValueError(f"unit {self.unit} and newton_per_count are two units for one number: leave one out")
-        for text in filter(None, (self.ask, self.before)):
+        if self.modbus and self.beyond_range:
+            raise ValueError(
+                "`overload` and `underload` are sentences: beside `modbus` say the bits in `modbus.overload`"
+            )
+        for text in (*filter(None, (self.ask, self.before)), *self.overload, *self.underload):
             compile_template(text)
         _check_reading(compile_template(self.frame), self)
 
@@ -245,9 +254,15 @@ class ForceReading:
         """Decide whether the device tells by itself that it is beyond its range."""
         return (
             self.blank_is_overload
+            or bool(self.overload)
             or Quality.OVERLOAD in self.quality.values()
             or bool(self.modbus and self.modbus.overload)
         )
+
+    @property
+    def beyond_range(self) -> tuple[tuple[str, float], ...]:
+        """The sentences that mean beyond the range, each with the number that it stands for: inf or -inf."""
+        return tuple((text, inf) for text in self.overload) + tuple((text, -inf) for text in self.underload)
 
     @property
     def template(self) -> Template:

@@ -251,3 +251,6 @@ def _check_load_cell(profile: DeviceProfile) -> None:
         raise ValueError("stream has a rate_hz and no ask")
     if profile.read_force and not profile.read_force.ask:
         raise ValueError("read_force needs an ask")
+    for text, _ in profile.reading.beyond_range:
+        if any(one.name not in profile.constants for one in compile_template(text).fields):
+            raise TemplateError(f"{text!r} of overload or underload is said as it stands: no field in it but constants")
