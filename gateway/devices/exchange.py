@@ -15,7 +15,7 @@ from gateway.devices.binary.register_access import RegisterAccess, check_directi
 from gateway.devices.binary.weight_registers import WeightRegisters
 from gateway.devices.fields import Choice, Decimals, HexNumber, RegisterNumber, TemplateError, WholeNumber
 from gateway.devices.messages import Quality
-from gateway.devices.template import Template, compile_template
+from gateway.devices.template import Template, compile_template, quote
 from gateway.units import NEWTON_PER_UNIT
 
 Span = tuple[float, float]
@@ -162,7 +162,7 @@ class Step:
 
     def __post_init__(self) -> None:
         if compile_template(self.ask).fields:
-            raise TemplateError(f"{self.ask!r}: a step is a bare word")
+            raise TemplateError(f"{quote(self.ask)}: a step is a bare word")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -312,16 +312,16 @@ class ForceReading:
 def _check_reading(template: Template, reading: ForceReading) -> None:
     number = template.field(FORCE)
     if not isinstance(number, Decimals | WholeNumber | HexNumber | RegisterNumber):
-        raise TemplateError(f"{template.text!r} has no number {{force:...}}")
+        raise TemplateError(f"{quote(template.text)} has no number {{force:...}}")
     if reading.blank_is_overload and (number.is_open or not isinstance(number, Decimals)):
-        raise TemplateError(f"{template.text!r}: blank_is_overload needs decimals of fixed width")
+        raise TemplateError(f"{quote(template.text)}: blank_is_overload needs decimals of fixed width")
     unit = template.field(UNIT)
     if unit and not (isinstance(unit, Choice) and set(unit.words) <= set(NEWTON_PER_UNIT)):
-        raise TemplateError(f"{template.text!r}: units are {', '.join(NEWTON_PER_UNIT)}")
+        raise TemplateError(f"{quote(template.text)}: units are {', '.join(NEWTON_PER_UNIT)}")
     if isinstance(unit, Choice) and reading.unit and reading.unit not in unit.words:
-        raise TemplateError(f"{template.text!r} never says {reading.unit}: unit is one of {', '.join(unit.words)}")
+        raise TemplateError(f"{quote(template.text)} never says {reading.unit}: unit is one of {', '.join(unit.words)}")
     status = template.field(STATUS)
     if set(status.words if isinstance(status, Choice) else ()) != set(reading.quality):
-        raise TemplateError(f"{template.text!r}: quality must name each word of {{status:...}}, and no other")
+        raise TemplateError(f"{quote(template.text)}: quality must name each word of {{status:...}}, and no other")
     if reading.quality and set(reading.quality.values()) <= {Quality.OVERLOAD, Quality.REPEATED}:
-        raise TemplateError(f"{template.text!r}: quality has no word for a good reading (ok, unstable)")
+        raise TemplateError(f"{quote(template.text)}: quality has no word for a good reading (ok, unstable)")

@@ -32,6 +32,7 @@ from gateway.devices.messages import (
 )
 from gateway.devices.profile import DeviceProfile, DeviceRole
 from gateway.devices.roles import CellHost
+from gateway.devices.template import quote
 from gateway.devices.valve import ValveDevice, ValveHost
 from gateway.devices.valve_profile import ValveDirection
 
@@ -129,7 +130,10 @@ def _refusals(profile: DeviceProfile) -> Found:
         except (ValueRefused, UnicodeEncodeError) as error:
             replies, text = [], str(error)
         if replies != [Refused(text)]:
-            yield ("refusals",), f"{text!r} as an answer is read as {' and '.join(map(_name, replies)) or 'nothing'}"
+            yield (
+                ("refusals",),
+                f"{quote(text)} as an answer is read as {' and '.join(map(_name, replies)) or 'nothing'}",
+            )
 
 
 def _cell(profile: DeviceProfile) -> Found:
@@ -160,7 +164,7 @@ def _cell(profile: DeviceProfile) -> Found:
                     if counts < 0
                     else ": it needs more digits"
                 )
-                yield place, f"{force_n:.3g} N cannot be shown by {reading.frame!r}{sign}"
+                yield place, f"{force_n:.3g} N cannot be shown by {quote(reading.frame)}{sign}"
                 return
     except (ValueRefused, UnicodeEncodeError) as error:
         yield place, str(error)
@@ -181,9 +185,9 @@ def _other_meaning(grammar: Grammar, text: str, body: bytes) -> str:
     reading = grammar.profile.reading
     if grammar.read(reading.frame, body, reading.may_be_blank):
         what_to_do = "leave it out where that means an overload already, else narrow the frame"
-        return f"{text!r} is an ordinary reading of {reading.frame!r}, too: {what_to_do}"
+        return f"{quote(text)} is an ordinary reading of {quote(reading.frame)}, too: {what_to_do}"
     if [one for one, _ in reading.beyond_range].count(text) > 1:
-        return f"{text!r} stands here twice: it can mean one side only, leave the other out"
+        return f"{quote(text)} stands here twice: it can mean one side only, leave the other out"
     return ""
 
 
@@ -197,7 +201,7 @@ def _misread(host: CellHost, line: bytes, force_n: float) -> str:
 
 
 def _line(data: bytes) -> str:
-    text = repr(data.decode("ascii", "replace"))
+    text = quote(data.decode("ascii", "replace"))
     return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}...'"
 
 

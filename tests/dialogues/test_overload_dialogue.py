@@ -8,12 +8,12 @@ from gateway.devices import DeviceProfile, cell_device, cell_host
 from gateway.devices.exchange import ForceReading
 from gateway.devices.line_settings import SerialSettings
 from gateway.devices.messages import ForceSample, Garbage, Quality
-from gateway.devices.profile import Certainty, DeviceRole
+from gateway.devices.profile import Certainty, DeviceRole, Terminator
 
 GRAM_N = 0.00980665
 
 
-def cell(**reading: ForceReading) -> DeviceProfile:
+def cell(*, terminator: Terminator = "\r\n", **reading: ForceReading) -> DeviceProfile:
     return DeviceProfile(
         name="own",
         description="a load cell",
@@ -22,7 +22,7 @@ def cell(**reading: ForceReading) -> DeviceProfile:
         certainty=Certainty.MANUAL,
         hardware="never run on hardware",
         serial=SerialSettings(baud=38400, data_bits=8, parity="none", stop_bits=1),
-        terminator="\r\n",
+        terminator=terminator,
         **reading,  # type: ignore[arg-type]
     )
 
