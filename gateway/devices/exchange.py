@@ -5,7 +5,7 @@ Checked when built: a template that means nothing is told to its author, not to 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import ceil, floor
+from math import ceil, floor, inf
 from typing import Annotated, Final, Literal
 
 from annotated_types import Ge, Gt, Le, MinLen
@@ -15,7 +15,7 @@ from gateway.devices.binary.register_access import RegisterAccess, check_directi
 from gateway.devices.binary.weight_registers import WeightRegisters
 from gateway.devices.fields import Choice, Decimals, HexNumber, RegisterNumber, TemplateError, WholeNumber
 from gateway.devices.messages import Quality
-from gateway.devices.template import Template, compile_template
+from gateway.devices.template import Template, compile_template, quote
 from gateway.units import NEWTON_PER_UNIT
 
 Span = tuple[float, float]
@@ -162,7 +162,7 @@ class Step:
 
     def __post_init__(self) -> None:
         if compile_template(self.ask).fields:
-            raise TemplateError(f"{self.ask!r}: a step is a bare word")
+            raise TemplateError(f"{quote(self.ask)}: a step is a bare word")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,7 +201,8 @@ class ForceReading:
     frame: template with the number {force:...}, perhaps a word {status:...} and a word {unit:...}. Where the frame says its
     unit, that unit counts; `unit` is what the simulated device is set to, and what a frame without one means. Raw counts
     of a converter have no unit but newton_per_count and zero_count, which a rig has measured. before: a sentence that is
-    sent ahead of each question and not answered. modbus: registers, in place of frame and ask.
+    sent ahead of each question and not answered. modbus: registers, in place of frame and ask. overload, underload: what
+    the device says in place of the frame where it has no number to show; nothing in them changes but the profile's constants.
     """
 
     __pydantic_config__ = STRICT
@@ -217,6 +218,10 @@ class ForceReading:
         default_factory=dict
     )  # word of {status:...} -> how far to believe the reading
     blank_is_overload: bool = False  # blanks instead of digits mean beyond the range
+    overload: tuple[str, ...] = ()  # sentences of their own that mean beyond the range: ["S +"]
+    underload: tuple[
+        str, ...
+    ] = ()  # the same beyond its other end: ["S -"]; without it the device says overload there, too
     rate_hz: Annotated[float, Ge(0), Le(10_000)] = 0.0  # readings per second; with ask: the most, 0: as the wire allows
 
     def __post_init__(self) -> None:
@@ -231,7 +236,11 @@ class ForceReading:
             raise ValueError("`before` is sent ahead of a question: there is no `ask`")
         if self.unit and self.newton_per_count:
             raise ValueError(f"unit {self.unit} and newton_per_count are two units for one number: leave one out")
-        for text in filter(None, (self.ask, self.before)):
+        if self.modbus and self.beyond_range:
+            raise ValueError(
+                "`overload` and `underload` are sentences: beside `modbus` say the bits in `modbus.overload`"
+            )
+        for text in (*filter(None, (self.ask, self.before)), *self.overload, *self.underload):
             compile_template(text)
         _check_reading(compile_template(self.frame), self)
 
@@ -245,9 +254,15 @@ class ForceReading:
         """Decide whether the device tells by itself that it is beyond its range."""
         return (
             self.blank_is_overload
+            or bool(self.overload)
             or Quality.OVERLOAD in self.quality.values()
             or bool(self.modbus and self.modbus.overload)
         )
+
+    @property
+    def beyond_range(self) -> tuple[tuple[str, float], ...]:
+        """The sentences that mean beyond the range, each with the number that it stands for: inf or -inf."""
+        return tuple((text, inf) for text in self.overload) + tuple((text, -inf) for text in self.underload)
 
     @property
     def template(self) -> Template:
@@ -297,16 +312,16 @@ class ForceReading:
 def _check_reading(template: Template, reading: ForceReading) -> None:
     number = template.field(FORCE)
     if not isinstance(number, Decimals | WholeNumber | HexNumber | RegisterNumber):
-        raise TemplateError(f"{template.text!r} has no number {{force:...}}")
+        raise TemplateError(f"{quote(template.text)} has no number {{force:...}}")
     if reading.blank_is_overload and (number.is_open or not isinstance(number, Decimals)):
-        raise TemplateError(f"{template.text!r}: blank_is_overload needs decimals of fixed width")
+        raise TemplateError(f"{quote(template.text)}: blank_is_overload needs decimals of fixed width")
     unit = template.field(UNIT)
     if unit and not (isinstance(unit, Choice) and set(unit.words) <= set(NEWTON_PER_UNIT)):
-        raise TemplateError(f"{template.text!r}: units are {', '.join(NEWTON_PER_UNIT)}")
+        raise TemplateError(f"{quote(template.text)}: units are {', '.join(NEWTON_PER_UNIT)}; another is text, with `unit`")
     if isinstance(unit, Choice) and reading.unit and reading.unit not in unit.words:
-        raise TemplateError(f"{template.text!r} never says {reading.unit}: unit is one of {', '.join(unit.words)}")
+        raise TemplateError(f"{quote(template.text)} never says {reading.unit}: unit is one of {', '.join(unit.words)}")
     status = template.field(STATUS)
     if set(status.words if isinstance(status, Choice) else ()) != set(reading.quality):
-        raise TemplateError(f"{template.text!r}: quality must name each word of {{status:...}}, and no other")
+        raise TemplateError(f"{quote(template.text)}: quality must name each word of {{status:...}}, and no other")
     if reading.quality and set(reading.quality.values()) <= {Quality.OVERLOAD, Quality.REPEATED}:
-        raise TemplateError(f"{template.text!r}: quality has no word for a good reading (ok, unstable)")
+        raise TemplateError(f"{quote(template.text)}: quality has no word for a good reading (ok, unstable)")

@@ -95,8 +95,8 @@ class Quality(StrEnum):
 class ForceSample:
     """One reading of the load cell.
 
-    raw: in the device's own unit; force_n: converted to N with the sign of the wiring, before tare; nan when overload
-    carries no digits. time_s: monotonic arrival time of the last byte.
+    raw: in the device's own unit; force_n: converted to N with the sign of the wiring, before tare. Where an overload carries
+    no digits both are nan, or inf of the side that the device has told. time_s: monotonic arrival time of the last byte.
     """
 
     raw: float

@@ -27,7 +27,7 @@ from gateway.devices.exchange import (
 )
 from gateway.devices.fields import Choice, Decimals, Field, HexNumber, RegisterNumber, TemplateError, WholeNumber
 from gateway.devices.line_settings import SerialSettings
-from gateway.devices.template import compile_template
+from gateway.devices.template import compile_template, quote
 from gateway.devices.valve_profile import ValveReading, ValveSettings
 
 MODBUS_RTU: Final = "modbus-rtu"
@@ -38,7 +38,7 @@ ADDRESS: Final = "address"
 _NUMBERS: Final = (WholeNumber, HexNumber, Decimals, RegisterNumber)
 _LONGEST_MODBUS_S: Final = 0.1  # later than this a Modbus answer is no use to a force loop
 _LARGEST_UNIT: Final = 255  # 247 by the specification; some devices take all that fit into a byte
-Terminator = Literal["", "\r\n", "\r", "\n"]
+Terminator = Literal["", "\r\n", "\r", "\n", "\x03"]  # the last one is ETX
 
 
 class Certainty(StrEnum):
@@ -71,7 +71,9 @@ class DeviceProfile:
     codec: str = TEMPLATE  # template, modbus-rtu, or the name of a Python codec in gateway/devices/codecs.py
     serial: SerialSettings  # the line as the device comes; a rig may set another baud
     terminator: Terminator = ""  # end of every line, both ways; a Modbus device has none
-    question_terminator: Literal["", "\r\n", "\r", "\n", ";"] = ""  # end of what the gateway says, where it is another
+    question_terminator: Literal["", "\r\n", "\r", "\n", "\x03", ";"] = (
+        ""  # end of what the gateway says, where another
+    )
     checksum: ChecksumName = "none"  # appended before the terminator
     constants: Mapping[str, int | str] = field(
         default_factory=dict
@@ -162,7 +164,7 @@ class DeviceProfile:
         numbers = [one for one in numbers if one.name == VALUE] or numbers
         if len(numbers) > 1 or any(not isinstance(one, _NUMBERS) for one in numbers):
             raise TemplateError(
-                f"{template_text!r} must carry one number beside constants and words; of several, call the one {{value:...}}"
+                f"{quote(template_text)} must carry one number beside constants and words; of several, call one {{value:...}}"
             )
         return numbers[0] if numbers else None
 
@@ -216,7 +218,7 @@ def _check_output(profile: DeviceProfile) -> None:
     if profile.stream or profile.read_force:
         raise ValueError("stream and read_force belong to a load cell")
     if profile.number_in(profile.set_voltage.ask) is None:
-        raise TemplateError(f"{profile.set_voltage.ask!r} carries no number")
+        raise TemplateError(f"{quote(profile.set_voltage.ask)} carries no number")
     if profile.set_voltage.answer:
         profile.number_in(profile.set_voltage.answer)
     elif profile.read_voltage is None:
@@ -226,9 +228,9 @@ def _check_output(profile: DeviceProfile) -> None:
         )
     for exchange in (profile.read_voltage, profile.read_pressure):
         if exchange and profile.number_in(exchange.ask) is not None:
-            raise TemplateError(f"{exchange.ask!r} asks for a number and must not carry one")
+            raise TemplateError(f"{quote(exchange.ask)} asks for a number and must not carry one")
         if exchange and (not exchange.answer or profile.number_in(exchange.answer) is None):
-            raise TemplateError(f"{exchange.answer!r} carries no number")
+            raise TemplateError(f"{quote(exchange.answer)} carries no number")
 
 
 def _check_valve(profile: DeviceProfile) -> None:
@@ -251,3 +253,8 @@ def _check_load_cell(profile: DeviceProfile) -> None:
         raise ValueError("stream has a rate_hz and no ask")
     if profile.read_force and not profile.read_force.ask:
         raise ValueError("read_force needs an ask")
+    for text, _ in profile.reading.beyond_range:
+        if any(one.name not in profile.constants for one in compile_template(text).fields):
+            raise TemplateError(
+                f"{quote(text)} of overload or underload is said as it stands: no field in it but constants"
+            )

@@ -6,6 +6,7 @@ refusal, a display without room for a minus sign.
 """
 
 from collections.abc import Iterator
+from math import inf
 from typing import Final
 
 from gateway.devices.codecs import cell_device, cell_host, output_device, output_host
@@ -30,10 +31,12 @@ from gateway.devices.messages import (
     SetVoltage,
 )
 from gateway.devices.profile import DeviceProfile, DeviceRole
+from gateway.devices.roles import CellHost
+from gateway.devices.template import quote
 from gateway.devices.valve import ValveDevice, ValveHost
 from gateway.devices.valve_profile import ValveDirection
 
-Found = Iterator[tuple[tuple[str, ...], str]]
+Found = Iterator[tuple[tuple[str | int, ...], str]]
 """(place in the profile, sentence)."""
 
 _NOW_S: Final = 0.0
@@ -127,7 +130,10 @@ def _refusals(profile: DeviceProfile) -> Found:
         except (ValueRefused, UnicodeEncodeError) as error:
             replies, text = [], str(error)
         if replies != [Refused(text)]:
-            yield ("refusals",), f"{text!r} as an answer is read as {' and '.join(map(_name, replies)) or 'nothing'}"
+            yield (
+                ("refusals",),
+                f"{quote(text)} as an answer is read as {' and '.join(map(_name, replies)) or 'nothing'}",
+            )
 
 
 def _cell(profile: DeviceProfile) -> Found:
@@ -138,6 +144,9 @@ def _cell(profile: DeviceProfile) -> Found:
         question = host.poll()
         if question and device.receive(question, _NOW_S) != 1:
             yield place, f"the device does not know its own question {_line(question)}{_too_long(question)}"
+            return
+        if complaints := list(_beyond_range(profile, host, place)):
+            yield from complaints
             return
         for counts in (0, 1, -1):
             force_n = counts * host.resolution_n
@@ -155,14 +164,44 @@ def _cell(profile: DeviceProfile) -> Found:
                     if counts < 0
                     else ": it needs more digits"
                 )
-                yield place, f"{force_n:.3g} N cannot be shown by {reading.frame!r}{sign}"
+                yield place, f"{force_n:.3g} N cannot be shown by {quote(reading.frame)}{sign}"
                 return
     except (ValueRefused, UnicodeEncodeError) as error:
         yield place, str(error)
 
 
+def _beyond_range(profile: DeviceProfile, host: CellHost, place: tuple[str, ...]) -> Found:
+    """Each sentence that means an overload must mean nothing else."""
+    grammar = Grammar(profile)
+    for key, sign in (("overload", 1.0), ("underload", -1.0)):
+        for index, text in enumerate(getattr(profile.reading, key)):
+            body = grammar.encode(text)
+            if complaint := _other_meaning(grammar, text, body) or _misread(host, grammar.line(body), sign * inf):
+                yield (*place, key, index), complaint
+
+
+def _other_meaning(grammar: Grammar, text: str, body: bytes) -> str:
+    """Return what a sentence of overload means besides, empty where it means nothing else."""
+    reading = grammar.profile.reading
+    if grammar.read(reading.frame, body, reading.may_be_blank):
+        what_to_do = "leave it out where that means an overload already, else narrow the frame"
+        return f"{quote(text)} is an ordinary reading of {quote(reading.frame)}, too: {what_to_do}"
+    if [one for one, _ in reading.beyond_range].count(text) > 1:
+        return f"{quote(text)} stands here twice: it can mean one side only, leave the other out"
+    return ""
+
+
+def _misread(host: CellHost, line: bytes, force_n: float) -> str:
+    """Return why this line is not the overload that it should be, empty where it is."""
+    host.forget()
+    samples = host.receive(line, _NOW_S)
+    if samples == [ForceSample(force_n, force_n, Quality.OVERLOAD, _NOW_S)]:
+        return ""
+    return f"{_line(line)} is read as {' and '.join(map(_name, samples)) or 'nothing'}{_too_long(line)}"
+
+
 def _line(data: bytes) -> str:
-    text = repr(data.decode("ascii", "replace"))
+    text = quote(data.decode("ascii", "replace"))
     return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}...'"
 
 

@@ -1,7 +1,8 @@
 """A text template, compiled to an encoder and a decoder: "SET {counts:d}" is both `SET 512` and how to read it.
 
 There are no branches, loops or arithmetic here, and there never will be: a device that needs them gets a Python codec.
-A template that could be read in two ways (two open fields without a mark between them) is refused when it is compiled.
+Text is printable ASCII, and what frames have besides: STX, ETX and tab. A template that could be read in two ways (two open
+fields without a mark between them) is refused when it is compiled.
 """
 
 import re
@@ -11,8 +12,18 @@ from functools import cache
 from itertools import pairwise
 from math import isnan
 from string import Formatter
+from typing import Final
 
 from gateway.devices.fields import Choice, Decimals, Field, TemplateError, Text, Value, ValueRefused, field_from
+
+_NAMES: Final = {"\x02": "<STX>", "\x03": "<ETX>", "\t": "<TAB>"}
+_WITH_NAMES: Final = str.maketrans(_NAMES)
+_TEXT: Final = re.compile(f"[ -~{''.join(_NAMES)}]+")
+
+
+def quote(text: str) -> str:
+    """Return a sentence as a message shows it: '<STX>+  12.34 N'."""
+    return repr(text.translate(_WITH_NAMES))
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +47,7 @@ class Template:
         )
         data = text.encode("ascii")
         if any(isinstance(field, Text) for field in self.fields) and self.decode(data, may_be_blank) is None:
-            raise ValueRefused(f"{text!r} could not be read back as {self.text!r}")
+            raise ValueRefused(f"{quote(text)} could not be read back as {quote(self.text)}")
         return data
 
     def around(self, field: Field, values: Mapping[str, Value]) -> tuple[str, str]:
@@ -91,24 +102,24 @@ def _pieces(text: str) -> list[str | Field]:
                 pieces.append(literal)
             if name is not None:
                 if not name.isidentifier() or conversion:
-                    raise TemplateError(f"{text!r}: a field is {{name:shape}}")
+                    raise TemplateError(f"{quote(text)}: a field is {{name:shape}}")
                 pieces.append(field_from(name, spec or ""))
     except TemplateError:
         raise
     except ValueError as error:  # a lone brace
-        raise TemplateError(f"{text!r}: {error}") from error
+        raise TemplateError(f"{quote(text)}: {error}") from error
     return pieces
 
 
 def _check(text: str, pieces: list[str | Field]) -> None:
-    if not text or not re.fullmatch("[ -~]+", text):
-        raise TemplateError(f"{text!r} is not printable text (the terminator is a setting of its own)")
+    if not _TEXT.fullmatch(text):
+        raise TemplateError(f"{text!r} is not printable text, STX, ETX or tab (the terminator is a setting of its own)")
     names = [piece.name for piece in pieces if not isinstance(piece, str)]
     if len(set(names)) != len(names):
-        raise TemplateError(f"{text!r} uses a field twice")
+        raise TemplateError(f"{quote(text)} uses a field twice")
     for piece, following in pairwise(pieces):
         if not isinstance(piece, str) and piece.is_open and _runs_on(following):
-            raise TemplateError(f"{text!r}: nothing marks the end of {{{piece.name}}}; give it a width")
+            raise TemplateError(f"{quote(text)}: nothing marks the end of {{{piece.name}}}; give it a width")
 
 
 def _runs_on(following: str | Field) -> bool:

@@ -14,7 +14,7 @@ from annotated_types import MinLen
 
 from gateway.defaults import STRICT
 from gateway.devices.fields import Choice, TemplateError
-from gateway.devices.template import compile_template
+from gateway.devices.template import compile_template, quote
 
 STATE: Final = "state"
 
@@ -45,7 +45,7 @@ class ValveSettings:
 
     def __post_init__(self) -> None:
         if self.push.ask == self.pull.ask:
-            raise ValueError(f"push and pull both say {self.push.ask!r}")
+            raise ValueError(f"push and pull both say {quote(self.push.ask)}")
 
     def of(self, direction: ValveDirection) -> ValveSetting:
         """Return how this direction is set."""
@@ -64,9 +64,9 @@ class ValveReading:
     def __post_init__(self) -> None:
         field = compile_template(self.answer).field(STATE)
         if not isinstance(field, Choice):
-            raise TemplateError(f"{self.answer!r} needs a field {{{STATE}:A|B}} with the device's words")
+            raise TemplateError(f"{quote(self.answer)} needs a field {{{STATE}:A|B}} with the device's words")
         if unknown := set(self.words) - set(field.words):
-            raise ValueError(f"words names {', '.join(sorted(unknown))}, which {self.answer!r} does not have")
+            raise ValueError(f"words names {', '.join(sorted(unknown))}, which {quote(self.answer)} does not have")
         if set(self.words.values()) != set(ValveDirection):
             raise ValueError("words must say which word means push and which one means pull")
 

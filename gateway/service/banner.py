@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from ipaddress import ip_address
+from math import isfinite
 from typing import Any, Final
 
 from gateway import VERSION, defaults
@@ -179,7 +180,9 @@ def _force_to_try_n(rig: Rig) -> float:
 
 
 def _reading(value: float | None, unit: str, digits: int) -> str:
-    return "silent" if value is None else f"ok   {value:.{digits}f} {unit}"
+    if value is None:
+        return "silent"
+    return f"ok   {value:.{digits}f} {unit}" if isfinite(value) else "beyond its range"
 
 
 def _lease(rig: Rig) -> str:

@@ -115,6 +115,15 @@ def test_the_unit_that_a_frame_says_counts_and_no_other(unit: str, newtons: floa
     assert isinstance(sample, ForceSample) and sample.force_n == pytest.approx(newtons)
 
 
+def test_a_unit_that_is_spelt_otherwise_is_text_of_the_frame(indicator: DeviceProfile) -> None:
+    profile = replace(indicator, stream=ForceReading(frame="{force:.2f} lbF", unit="lb", rate_hz=10.0))
+    host = cell_host(profile)
+    (sample,) = host.receive(b"-18.78 lbF\r\n", 1.0)
+    assert isinstance(sample, ForceSample) and sample.force_n == pytest.approx(-18.78 * 4.4482216152605)
+    assert host.receive(b"-18.78 kgF\r\n", 1.0) == [Garbage(b"-18.78 kgF\r\n")], "never taken for pounds"
+    assert cell_device(profile).frame(sample.force_n) == b"-18.78 lbF\r\n"
+
+
 def test_a_reading_that_the_device_calls_repeated_is_no_sample() -> None:
     """It keeps a dead converter from looking alive."""
     profile = load_device("stream-st-gs")
@@ -169,7 +178,7 @@ def test_a_load_cell_is_no_output(indicator: DeviceProfile) -> None:
     [
         ({"frame": "{load:.2f}"}, "has no number"),
         ({"frame": "{force:s}"}, "has no number"),
-        ({"frame": "{force:.2f} {unit:kg|oz}"}, "units are"),
+        ({"frame": "{force:.2f} {unit:kg|oz}"}, "units are N, kg, g, lb; another is text, with `unit`"),
         ({"frame": "{status:ST|US} {force:.2f}", "quality": {"ST": Quality.OK}}, "quality must name"),
         ({"frame": "{force:.2f}", "quality": {"ST": Quality.OK}}, "quality must name"),
         ({"frame": "{force:.2f}", "blank_is_overload": True}, "fixed width"),

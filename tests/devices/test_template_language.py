@@ -35,6 +35,8 @@ from gateway.devices.template import compile_template
         ("model {name:s}!", {"name": "X-1 a"}, b"model X-1 a!"),
         ("{name:8s};", {"name": "ITV"}, b"ITV     ;"),
         ("a{{b}}{counts:d}", {"counts": 1}, b"a{b}1"),
+        ("\x02{force:+08.2f} N\x03", {"force": 12.34}, b"\x02+0012.34 N\x03"),
+        ("one:\t{x:.1f}\t| average:\t{y:d}", {"x": 12.3, "y": 7}, b"one:\t12.3\t| average:\t7"),
     ],
 )
 def test_one_text_is_encoder_and_decoder(template: str, values: dict[str, float | str], wire: bytes) -> None:
@@ -174,6 +176,9 @@ def test_blanks_are_a_value_only_where_they_may_be() -> None:
         ("SET {x:d}\r\n", "not printable"),
         ("", "not printable"),
         ("µ{x:d}", "not printable"),
+        ("\x01{x:d}", "not printable text, STX, ETX or tab"),
+        ("\x02{x:d}\t{x:d}\x03{x", "'<STX>{x:d}<TAB>{x:d}<ETX>{x'"),
+        ("\x02{x:d}{y:d}\x03", "'<STX>{x:d}{y:d}<ETX>': nothing marks the end of {x}"),
     ],
 )
 def test_an_author_is_told_what_is_wrong(template: str, hint: str) -> None:

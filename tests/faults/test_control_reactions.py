@@ -1,7 +1,7 @@
 """The hazards that supervision detects, one by one: what is detected, and within which time the safe voltage goes out."""
 
 from dataclasses import replace
-from math import nan
+from math import inf, isfinite, nan
 
 import pytest
 
@@ -128,10 +128,10 @@ def test_one_spike_is_not_over_force():
     assert bench.last.fault is FaultCode.NONE
 
 
-@pytest.mark.parametrize("force_n", [98.1, -98.1, nan])
+@pytest.mark.parametrize("force_n", [98.1, -98.1, nan, inf, -inf])
 def test_saturation_counts_as_over_force(force_n):
     bench = pressing(12.0)
-    quality = Quality.OVERLOAD if force_n != force_n else Quality.OK
+    quality = Quality.OK if isfinite(force_n) else Quality.OVERLOAD
     bench.alter_sample = lambda sample: replace(sample, force_n=force_n, quality=quality)
     assert_faulted(bench, FaultCode.OVER_FORCE, 3 * SAMPLE_S + TICK_S)
 

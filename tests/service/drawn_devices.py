@@ -112,6 +112,8 @@ def drawn_cell(rng: Random) -> Profile:
     reading["frame"] = frame
     _maybe(rng, reading, "unit", rng.choice(["N", "N", "kg", "g", "lb"]), 0.7)
     _maybe(rng, reading, "blank_is_overload", rng.choice([True, False]), 0.4)
+    _maybe(rng, reading, "overload", rng.choice([["S +"], ["OL,+9999999E+19", "------"]]), 0.3)
+    _maybe(rng, reading, "underload", ["S -"], 0.3)
     is_asked = rng.random() < 0.6
     if is_asked:
         reading["ask"] = _sentence(rng, profile, rng.choice(["W?", "SYS?", "MSV?;"]))

@@ -150,5 +150,5 @@ def test_the_draws_cover_the_schema_and_enough_of_them_are_accepted(all_drawn: l
     assert seen(lambda drawn: "read_pressure" in drawn.output) == {True, False}
     assert seen(lambda drawn: bool(drawn.output["set_voltage"].get("answer"))) == {True, False}
     for owner in ("output", "cell"):
-        assert seen(lambda drawn, owner=owner: getattr(drawn, owner).get("terminator")) >= {"\r\n", "\r", "\n"}
+        assert seen(lambda drawn, owner=owner: getattr(drawn, owner).get("terminator")) >= {"\r\n", "\r", "\n", "\x03"}
         assert seen(lambda drawn, owner=owner: getattr(drawn, owner).get("checksum")) >= {"none", "dcon-sum", "xor"}

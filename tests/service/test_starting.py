@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from ipaddress import ip_network
+from math import inf, nan
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,11 @@ def test_a_silent_device_is_not_shown_as_zero() -> None:
     text = format_banner(ready(voltage_v=None, force_n=None, notes=("E111 /dev/pts/6: silence at every speed",)))
     assert text.count("silent") == 2
     assert "  note         E111 /dev/pts/6" in text
+
+
+@pytest.mark.parametrize("force_n", [nan, inf, -inf])
+def test_an_overloaded_cell_is_not_shown_as_well(force_n: float) -> None:
+    assert "stream-st-gs 115200  beyond its range\n" in format_banner(ready(force_n=force_n))
 
 
 def test_the_command_to_try_names_another_gateway() -> None:

@@ -8,7 +8,7 @@ from annotated_types import MinLen
 from gateway.defaults import STRICT
 from gateway.devices.binary.register_access import VALUE, RegisterAccess, check_direction, templates_of
 from gateway.devices.fields import TemplateError, Value
-from gateway.devices.template import compile_template
+from gateway.devices.template import compile_template, quote
 
 MODEL: Final = "model"
 
@@ -33,7 +33,7 @@ class Identity:
         object.__setattr__(self, "answer", answer)
         compile_template(ask)
         if compile_template(answer).field(self._field) is None:
-            raise TemplateError(f"{answer!r} has no {{model:...}}: what the device says that it is")
+            raise TemplateError(f"{quote(answer)} has no {{model:...}}: what the device says that it is")
 
     @property
     def _field(self) -> str:

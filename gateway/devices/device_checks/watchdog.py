@@ -13,7 +13,7 @@ from annotated_types import Gt, Le, MinLen
 
 from gateway.defaults import STRICT
 from gateway.devices.fields import Choice, HexNumber, TemplateError, ValueRefused, WholeNumber
-from gateway.devices.template import compile_template
+from gateway.devices.template import compile_template, quote
 
 TIME, STATE = "time", "state"
 FEEDS_PER_TIME: Final = 4  # so that three may be lost
@@ -59,7 +59,7 @@ class WatchdogQuestion:
         compile_template(self.ask)
         state = compile_template(self.answer).field(STATE)
         if not isinstance(state, Choice) or set(state.words) != set(self.words):
-            raise TemplateError(f"{self.answer!r}: words must name each word of {{state:...}}, and no other")
+            raise TemplateError(f"{quote(self.answer)}: words must name each word of {{state:...}}, and no other")
 
     def word(self, state: WatchdogState) -> str | None:
         """Return the first word that means this, None where the device has none."""
@@ -85,11 +85,11 @@ class Watchdog:
     def __post_init__(self) -> None:
         field = compile_template(self.arm.ask).field(TIME)
         if not isinstance(field, WholeNumber | HexNumber):
-            raise TemplateError(f"{self.arm.ask!r} has no whole number {{time:...}}")
+            raise TemplateError(f"{quote(self.arm.ask)} has no whole number {{time:...}}")
         if self.verify is None and self.status is None:
             raise ValueError("a watchdog needs verify or status: one that cannot be read back is none to rely on")
         if self.verify and compile_template(self.verify.answer).field(TIME) is None:
-            raise TemplateError(f"{self.verify.answer!r} has no {{time:...}}")
+            raise TemplateError(f"{quote(self.verify.answer)} has no {{time:...}}")
         if self.feed:
             compile_template(self.feed)
         self.arming_text_fits()

@@ -1,7 +1,8 @@
 """Both ends of the line from a load-cell amplifier whose readings are templates: a stream, or answers to polls.
 
 The frame's own unit counts, so kilograms never pass for newtons. Blanks instead of digits are an overload whatever the
-status word says: a display that shows nothing has no valid reading, and saturation counts as over-force.
+status word says: a display that shows nothing has no valid reading, and saturation counts as over-force. So are the sentences
+that a device says in place of a number.
 """
 
 from math import isfinite, isnan, nan
@@ -77,6 +78,10 @@ class TemplateCellHost:
         self._sign = sign
         self._lines = self._grammar.answers()
         self._known: dict[bytes, _KnownReading] = {}  # a force at rest says the same few sentences
+        self._beyond_range = {
+            self._grammar.encode(text): _KnownReading(raw, self._newtons(raw, {}), Quality.OVERLOAD)
+            for text, raw in self._reading.beyond_range
+        }
         self.resolution_n = self._reading.step * self._newton_per_unit
         self.gap_s = quiet_s(profile.serial.character_s) if profile.is_modbus else 0.0
 
@@ -102,14 +107,20 @@ class TemplateCellHost:
         return Garbage(line.data) if meaning is None else meaning.at(now_s)
 
     def _understand(self, line: Line) -> _KnownReading | None:
-        values = self._grammar.read(self._reading.frame, self._grammar.body(line), self._reading.may_be_blank)
+        body = self._grammar.body(line)
+        meaning = self._beyond_range.get(body or b"") or self._read(body)
+        if meaning is not None:
+            if len(self._known) >= _MOST_KNOWN:
+                self._known.clear()
+            self._known[line.data] = meaning
+        return meaning
+
+    def _read(self, body: bytes | None) -> _KnownReading | None:
+        values = self._grammar.read(self._reading.frame, body, self._reading.may_be_blank)
         if values is None:
             return None
-        if len(self._known) >= _MOST_KNOWN:
-            self._known.clear()
         raw = self._raw(values)
-        self._known[line.data] = meaning = _KnownReading(raw, self._newtons(raw, values), self._quality(raw, values))
-        return meaning
+        return _KnownReading(raw, self._newtons(raw, values), self._quality(raw, values))
 
     def _raw(self, values: dict[str, Value]) -> float:
         """The number of the device, in its own unit."""
@@ -164,6 +175,8 @@ class TemplateCellDevice:
                 return self._encode_frame(raw, quality)
             except ValueRefused:  # more digits than the display has
                 pass
+        if sentences := (self._reading.underload if force_n < 0.0 else ()) or self._reading.overload:
+            return self._grammar.line(self._grammar.encode(sentences[0]))
         return self._encode_frame(nan if self._reading.blank_is_overload else self._largest(), Quality.OVERLOAD)
 
     def _largest(self) -> float:

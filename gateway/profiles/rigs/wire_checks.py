@@ -291,7 +291,7 @@ def check_sample_quantum(parts: Parts) -> Found:
     for reading in _readings(parts):
         count_n = reading.host.resolution_n
         if parts.supervision and parts.supervision.sample_quantum_n > _MOST_QUANTUM_COUNTS * count_n:
-            reason = f"is far from one count of {reading.device.name}, {count_n:.3g} N"
+            reason = f"is far from one count of {reading.device.name}, {count_n:.3g} N: write {count_n:.3g}"
             yield "supervision.sample_quantum_n", f"{newton(parts.supervision.sample_quantum_n)} {reason}"
 
 

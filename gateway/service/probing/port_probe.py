@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from gateway.devices import DeviceProfile, SerialSettings
+from gateway.devices.template import quote
 from gateway.ports import PortEvents, SerialPort
 from gateway.ports.port import monotonic_s
 from gateway.service.probing.harmless_questions import HarmlessQuestion, count_readings, harmless_questions
@@ -196,6 +197,6 @@ def show_bytes(data: bytes) -> str:
     """Return bytes as people can read them: text as text, anything else in hexadecimal."""
     shown = data[:_SHOWN_BYTES]
     text = shown.decode("ascii", "replace")
-    is_text = shown.isascii() and all(one.isprintable() or one in "\r\n" for one in text)
+    is_text = shown.isascii() and all(one.isprintable() or one in "\r\n\t\x02\x03" for one in text)
     more = "..." if len(data) > _SHOWN_BYTES else ""
-    return repr(text) + more if is_text else shown.hex(" ") + more
+    return quote(text) + more if is_text else shown.hex(" ") + more

@@ -14,6 +14,7 @@ import time
 from dataclasses import dataclass
 
 _REPEATS = 3
+_TEXT = re.compile(rb"[ -~\t\x02\x03]*")  # of a sentence; a binary reply has other bytes
 
 
 @dataclass(frozen=True)
@@ -58,10 +59,11 @@ class SafeLine:
 
     def _acknowledges(self, received: bytes) -> bool:
         """A binary reply (Modbus RTU) has no line's end and may contain one; with its checksum it is whole where it stands."""
-        words = self.reply.strip(b"\r\n")
-        if not words.isascii() or not words.decode("ascii").isprintable():
+        end = b"\x03" if self.reply.endswith(b"\x03") else b"\r\n"
+        words = self.reply.strip(end)
+        if not _TEXT.fullmatch(words):
             return self.reply in received
-        return words in re.split(rb"[\r\n]+", received)[:-1]
+        return words in re.split(b"[%b]+" % end, received)[:-1]
 
 
 def _drop_input(descriptor: int) -> None:

@@ -94,7 +94,7 @@ def test_room_for_the_trim_says_which_force_would_fit(tmp_path: Path) -> None:
         (DEMO, "voltage_max_v: 8.5", "voltage_max_v: 10",
          "limits.voltage_max_v: 10 V asks for 0.9 MPa, the plant's supply has 0.85 MPa: above 9.44 V nothing changes"),
         (DEMO, "saturation_n: 96", "saturation_n: 96\n  sample_quantum_n: 1",
-         "supervision.sample_quantum_n: 1 N is far from one count of stream-st-gs, 0.0981 N"),
+         "supervision.sample_quantum_n: 1 N is far from one count of stream-st-gs, 0.0981 N: write 0.0981"),
         (CELL, "lease_s: 0.2", "lease_s: null", "supervision.lease_s: there is no lease"),
         (CELL, "/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A10K1ITV-if00-port0", "/dev/ttyUSB0",
          "output.port: /dev/ttyUSB0 may be another adapter after a replug"),

@@ -14,7 +14,7 @@ from gateway.devices.profile import DeviceRole
 from gateway.processes import exit_codes
 from gateway.profiles import list_shipped, load_device
 from gateway.service.probing.harmless_questions import harmless_questions
-from gateway.service.probing.port_probe import PortReport, ProbeAnswer
+from gateway.service.probing.port_probe import PortReport, ProbeAnswer, show_bytes
 from tests.service.probing.far_ends import FarEnd, behind_ptys
 
 RIG = """
@@ -92,6 +92,19 @@ def test_listening_says_what_comes_and_sends_nothing() -> None:
     assert by_speed["115200 8N1"] > 3
     assert all(one["bytes_per_s"] == 0 for one in silent["heard"])
     assert module.heard == []
+
+
+@pytest.mark.parametrize(
+    ("data", "shown"),
+    [
+        (b"ST,+1\r\n", r"'ST,+1\r\n'"),
+        (b"\x02+1.0\tN\x03", "'<STX>+1.0<TAB>N<ETX>'"),
+        (b"\x01\x06\x00", "01 06 00"),
+        (b"a" * 100, f"'{'a' * 48}'..."),
+    ],
+)
+def test_bytes_are_shown_as_people_can_read_them(data: bytes, shown: str) -> None:
+    assert show_bytes(data) == shown
 
 
 def test_what_cannot_be_probed_is_told() -> None:

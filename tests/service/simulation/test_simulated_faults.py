@@ -1,10 +1,13 @@
 """Each fault that `sim set` knows, in virtual time through the whole control loop: which code, and the safe voltage."""
 
+from dataclasses import replace
+
 import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.devices import DeviceRole
 from gateway.registers.words import State
+from tests.profile_files import load_device
 from tests.service.rigs import strict
 from tests.service.test_every_device_presses import PROFILES, rig_with
 from tests.service.wired import ENABLE, RESET, Wired
@@ -42,6 +45,26 @@ def test_a_fault_leads_to_its_code_and_the_safe_voltage_and_cleared_the_force_re
     wired.write(0, ENABLE, 1500)
     wired.until(lambda: abs(wired.force_n - 15.0) <= 1.0, 3.0)
     wired.observer.check(wired.rig)
+
+
+@pytest.mark.parametrize("key", ["stream", "read_force"])
+@pytest.mark.parametrize("inverted", [False, True], ids=["over", "under"])
+def test_a_cell_that_says_its_overload_without_a_number_trips_over_force(key, inverted) -> None:
+    reading = replace(
+        load_device("stream-st-gs").reading,
+        blank_is_overload=False,
+        overload=("S +",),
+        underload=("S -",),
+        rate_hz=50.0,
+    )
+    said = {"stream": None, "read_force": None, key: replace(reading, ask="SI" if key == "read_force" else "")}
+    wired = Wired(rig_with(replace(load_device("stream-st-gs"), **said))).pressing(20.0)
+    simulate(wired, cell__scale=8.0, cell__inverted=inverted)
+    took_s = wired.until(lambda: wired.state is State.FAULT, 0.5)
+    assert wired.fault_code is FaultCode.OVER_FORCE, wired.log
+    assert took_s < 0.2, "long before the sample would be too old"
+    assert "cell saturated" in wired.log[-1][1]
+    assert wired.loop.cell_garbage_bytes == 0
 
 
 @pytest.mark.parametrize("output", OUTPUTS, ids=lambda output: output.name)

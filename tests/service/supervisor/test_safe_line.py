@@ -185,6 +185,15 @@ def test_a_line_that_takes_no_bytes_does_not_hold_the_guardian(pty: Pty, client:
         ("0106000d0a0089c9", "0106000d0a0089c9", True),  # a line's end within
         ("300d0a", "3531300d0a", False),  # 510 is not 0
         ("300d0a", "300d0a", True),
+        ("3003", "35313003", False),  # neither where a line ends with ETX
+        ("3003", "3f033003", True),
+        ("3003", "30", False),
+        ("02303103", "0202303103", False),  # half a frame before it
+        ("02303103", "3f0302303103", True),
+        ("0230030d0a", "0230030d0a", True),  # ETX as text ahead of the line's end
+        ("0230030d0a", "023003", False),
+        ("30090d0a", "30090d0a", True),
+        ("300d0a", "03300d0a", False),  # ETX ends no line here
     ],
 )
 def test_a_reply_in_lines_and_one_in_bytes_are_told_apart(reply: str, received: str, is_acknowledged: bool) -> None:

@@ -1,0 +1,73 @@
+"""Frames between STX and ETX, as Rinstrum's R300 prints its automatic output, and the tabs of an HX711 sketch."""
+
+from math import inf
+
+import pytest
+
+from gateway.devices import DeviceProfile, cell_device, cell_host
+from gateway.devices.exchange import ForceReading
+from gateway.devices.messages import ForceSample, Garbage, Quality
+from tests.dialogues.test_overload_dialogue import cell
+
+WORDS = dict.fromkeys("OUE", Quality.OVERLOAD) | {"G": Quality.OK, "N": Quality.OK, "M": Quality.UNSTABLE}
+RINSTRUM = cell(
+    terminator="\x03",
+    stream=ForceReading(frame="\x02{force:8.2f}{status:G|N|M|O|U|E}", unit="N", quality=WORDS, rate_hz=10.0),
+)
+WITH_UNIT = cell(
+    terminator="\x03",
+    stream=ForceReading(frame="\x02{force:8.2f} {unit:N|kg}", unit="N", overload=("\x02------",), rate_hz=10.0),
+)
+ENDS_WITH_A_LINE = cell(
+    terminator="\r\n", stream=ForceReading(frame="\x02{force:8.2f} {unit:N|kg}\x03", unit="N", rate_hz=10.0)
+)
+SKETCH = cell(
+    terminator="\r\n",
+    stream=ForceReading(frame="one reading:\t{one:.1f}\t| average:\t{force:.5f}", unit="N", rate_hz=10.0),
+)
+
+
+@pytest.mark.parametrize(
+    ("profile", "frame", "raw", "quality"),
+    [
+        (RINSTRUM, b"\x02   12.34G\x03", 12.34, Quality.OK),
+        (RINSTRUM, b"\x02-   0.20M\x03", -0.2, Quality.UNSTABLE),
+        (RINSTRUM, b"\x02 9999.99O\x03", 9999.99, Quality.OVERLOAD),
+        (WITH_UNIT, b"\x02+  12.34 N\x03", 12.34, Quality.OK),
+        (WITH_UNIT, b"\x02------\x03", inf, Quality.OVERLOAD),
+        (ENDS_WITH_A_LINE, b"\x02+  12.34 N\x03\r\n", 12.34, Quality.OK),
+        (SKETCH, b"one reading:\t12.3\t| average:\t12.34000\r\n", 12.34, Quality.OK),
+    ],
+)
+def test_a_frame_is_read_as_printed(profile: DeviceProfile, frame: bytes, raw: float, quality: Quality) -> None:
+    assert cell_host(profile).receive(frame, 7.0) == [ForceSample(raw, raw, quality, 7.0)]
+
+
+@pytest.mark.parametrize(
+    ("profile", "frame"),
+    [
+        (RINSTRUM, b"   12.34G\x03"),  # its STX is lost
+        (RINSTRUM, b"\x02\x02   12.34G\x03"),
+        (RINSTRUM, b"\x02   12.34X\x03"),
+        (WITH_UNIT, b"\x02+  12.34\tN\x03"),
+        (ENDS_WITH_A_LINE, b"\x02+  12.34 N\r\n"),
+        (SKETCH, b"one reading: 12.3 | average: 12.34000\r\n"),
+    ],
+)
+def test_anything_else_is_garbage_and_counted_whole(profile: DeviceProfile, frame: bytes) -> None:
+    assert cell_host(profile).receive(frame, 7.0) == [Garbage(frame)]
+
+
+@pytest.mark.parametrize(
+    ("profile", "force_n", "frame"),
+    [
+        (RINSTRUM, 12.34, b"\x02   12.34G\x03"),
+        (RINSTRUM, 1e9, b"\x02 9999.99O\x03"),
+        (WITH_UNIT, -12.34, b"\x02  -12.34 N\x03"),
+        (WITH_UNIT, 1e9, b"\x02------\x03"),
+        (ENDS_WITH_A_LINE, 12.34, b"\x02   12.34 N\x03\r\n"),
+        (SKETCH, 12.34, b"one reading:\t0.0\t| average:\t12.34000\r\n"),
+    ],
+)
+def test_the_simulated_device_prints_so(profile: DeviceProfile, force_n: float, frame: bytes) -> None:
+    assert cell_device(profile).frame(force_n) == frame
