@@ -184,6 +184,23 @@ def test_the_payloads_weight_counts_the_other_way() -> None:
     assert bench.last.force_measured_n == pytest.approx(-10.0, abs=1.0)
 
 
+def test_a_tare_while_the_tool_pulls_takes_the_same_zero_as_one_while_it_pushes() -> None:
+    """The zero is the cell's: 0.5 kg that hang on it weigh the same whichever way the tool acts. It is 1.3 N off."""
+    bench = ValveBench()
+    bench.alter_sample = lambda sample: replace(sample, force_n=1.3 + min(sample.force_n, -4.9))
+    bench.run(1.0)
+    bench.write(control_word=ENABLE | BIT_4, payload_kg=0.5)
+    bench.run(2.0)
+    bench.write(control_word=ENABLE | BIT_4 | ControlBit.TARE)
+    bench.run(0.2)
+    assert bench.refused is None and bench.stands is PULL
+    assert bench.last.force_measured_n == pytest.approx(0.0, abs=0.2)
+    assert bench.controller.zero_n == pytest.approx(1.3, abs=0.1)
+    bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=10.0)
+    bench.run(3.0)
+    assert bench.last.state is State.HOLDING and bench.plant.force_n == pytest.approx(14.9, abs=1.0)
+
+
 def test_the_derived_model_is_that_of_pushing_by_the_share_of_the_area() -> None:
     model, pull = bsfm(), scale_forces(bsfm(), SHARE)
     for share in (-1.0, 0.0, 1.0):
