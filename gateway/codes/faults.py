@@ -228,7 +228,7 @@ class FaultCode(IntEnum):
             "another device than the rig names",
             "The device was asked what it is, and its profile is not for what it said; nothing but the safe voltage goes out.",
             "Two adapters are exchanged, or the rig file names another profile, or another address, than the device has.",
-            "Compare what it says with `models` in its profile; force-gateway check RIG --probe asks every port.",
+            "Compare what it says with `models` in its profile; force-gateway check RIG --probe asks every port. Then reset.",
         ),
     )
     WATCHDOG_NOT_ARMED = (

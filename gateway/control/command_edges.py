@@ -85,15 +85,16 @@ class CommandTracker:
 
     def demand_by(self, command: Command) -> Demand:
         """Return what this command would demand. NotFiniteError as `demand_of`."""
-        return demand_of(command, self._settings)
+        return self._turned(demand_of(command, self._settings))
+
+    def _turned(self, demand: Demand) -> Demand:
+        return demand._replace(gravity_n=-demand.gravity_n) if self._direction < 0.0 else demand
 
     def _update_demand(self) -> None:
         try:
             demand = demand_of(self.command, self._settings, self._manner)
             self._manner = self._manner or manner_of(self.command, self._settings.defaults)
-            if self._direction < 0.0:
-                demand = demand._replace(gravity_n=-demand.gravity_n)
-            self.demand, self.not_finite = demand, ""
+            self.demand, self.not_finite = self._turned(demand), ""
         except NotFiniteError as error:
             self.not_finite = str(error)
 

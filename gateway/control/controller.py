@@ -59,7 +59,7 @@ class Controller:
         self._valve = ValveSwitch(settings.valve) if settings.valve else None
         self._rig_settings = compensation.settings(settings)
         self._settings = settings = timing_of(calibration.response, self._rig_settings)
-        self._compensation, self._outside_n = compensation, 0.0
+        self._compensation = compensation
         self.calibration_id = calibration.number
         self._commands = CommandTracker(settings)
         self._commands.use(model)
@@ -198,7 +198,6 @@ class Controller:
         self._machine.begin_step()
         self._loop.elapse(dt_s, line)
         edges = self._commands.take(now_s, command)
-        self._outside_n = self._compensation.outside_n(command.tilt_angle_rad, line.feed_mm_s)
         self._sense(now_s, sample, line)
         self._obey(now_s, edges)
         if self._valve is not None and self._turning.follow(now_s, line.valve, self._machine):
@@ -208,6 +207,12 @@ class Controller:
         if self._machine.is_enabled:
             self._move(now_s, dt_s)
         return self._loop.voltage_v
+
+    @property
+    def _outside_n(self) -> float:
+        """Contact force that neither slide nor payload gives, along the tool's direction: what presses is against a pull."""
+        tilt_rad = self._commands.command.tilt_angle_rad
+        return self._conditioner.direction * self._compensation.outside_n(tilt_rad, self._line.feed_mm_s)
 
     @property
     def _given_n(self) -> float:

@@ -91,13 +91,14 @@ class SampleConditioner:
         return self._zero.largest_spread_n
 
     def take_zero(self, gravity_n: float) -> float:
-        """Take the present force as zero (tare) and return by how much the zero moved, N.
-        gravity_n as in `demand`. Ask `why_no_zero` first."""
-        return self._zero.take(gravity_n)
+        """Take the present force as zero (tare) and return by how much less a reading says from now on, N.
+        gravity_n as in `demand`, along the tool's direction as readings are; the zero is the cell's own, whichever way the
+        tool acts. Ask `why_no_zero` first."""
+        return self.direction * self._zero.take(self.direction * gravity_n)
 
     def why_no_zero(self, gravity_n: float) -> str:
         """Return why the recent samples are no zero, in numbers; empty where they are one."""
-        return self._zero.unsteady(gravity_n)
+        return self._zero.unsteady(self.direction * gravity_n)
 
     def _interval_s(self, time_s: float) -> float:
         """Time since the sample before, at most the time-out; 0 for the same one, or one from the past."""

@@ -26,7 +26,9 @@ class SimulatedWatchdog:
         return True
 
     def feed(self, now_s: float) -> None:
-        """Note that the host is alive."""
+        """Note that the host is alive. A trip that the device has no words to clear is over by that: it obeys again."""
+        if self._profile.clear is None and self.state is WatchdogState.TRIPPED:
+            self.state = WatchdogState.OFF
         self._due_s = now_s + self.ticks * self._profile.tick_s
 
     def do(self, step: DeviceStep, ticks: int | None, now_s: float) -> None:

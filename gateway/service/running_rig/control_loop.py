@@ -293,6 +293,7 @@ class ControlLoop:
             self.bank.release_owner()
         if decision.resets_device:
             self.output.clear_faults()
+            self._cell.clear_faults()
         self.health.loop_time_s = self.clock() - now_s
         self.bank.publish_when_read(decision.state, self._status)
         if self.controller.active_run.self_test is not self._shown_self_test:

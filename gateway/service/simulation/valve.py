@@ -10,6 +10,7 @@ from gateway.twin import Plant
 from gateway.twin.plant import with_value
 
 _VALVE_MOVES_S: Final = 0.03  # of a small solenoid valve with its relay
+_FROM_OUTSIDE: Final = ("tilt_n", "feed_drag_n_s_per_mm", "feed_drag_n", "feed_drag_abs_n_s_per_mm")
 
 
 class SimulatedValve:
@@ -28,10 +29,14 @@ class SimulatedValve:
         return -1.0 if self._stands is ValveDirection.PULL else 1.0
 
     def plant_of(self, plant: Plant) -> Plant:
-        """Return the plant with the chamber that has the pressure: the rod takes a part of the other one's area."""
+        """Return the plant with the chamber that has the pressure: the rod takes a part of the other one's area, and what
+        presses from outside is against a pull."""
         if self._stands is ValveDirection.PUSH:
             return plant
-        return with_value(plant, "cylinder", "area_m2", plant.cylinder.area_m2 * self._share)
+        pulling = with_value(plant, "cylinder", "area_m2", plant.cylinder.area_m2 * self._share)
+        for name in _FROM_OUTSIDE:
+            pulling = with_value(pulling, "contact", name, -getattr(plant.contact, name))
+        return with_value(pulling, "contact", "tilt_deg", 180.0 - plant.contact.tilt_deg)
 
     def receive(self, chunk: bytes, now_s: float) -> bytes:
         """Return the answers to what these bytes ask."""

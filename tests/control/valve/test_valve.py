@@ -7,6 +7,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control import Controller
+from gateway.control.compensation.compensation import Compensation, OutsideForce
 from gateway.control.inputs import CalibrationInUse, Output, ValveStatus
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.settings import SafeDirection, ValveControl
@@ -182,6 +183,35 @@ def test_the_payloads_weight_counts_the_other_way() -> None:
     assert bench.last.state is State.HOLDING
     assert bench.plant.force_n == pytest.approx(14.9, abs=1.0)
     assert bench.last.force_measured_n == pytest.approx(-10.0, abs=1.0)
+
+
+def test_a_compensated_force_from_outside_counts_against_a_pull() -> None:
+    """5 N that press at this tilt: to pull with 10 N the slide gives 15 N, and the cell feels no more than it is told to."""
+    bench = ValveBench()
+    outside = Compensation(outside=OutsideForce(tilt_n=5.0))
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1), compensation=outside)
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 5.0)
+    bench.pulling(10.0)
+    assert bench.last.state is State.HOLDING
+    assert bench.plant.force_n == pytest.approx(15.0, abs=1.0)
+    assert bench.last.model_residual_n == pytest.approx(0.0, abs=2.5)
+
+
+def test_a_tare_while_the_tool_pulls_takes_the_same_zero_as_one_while_it_pushes() -> None:
+    """The zero is the cell's: 0.5 kg that hang on it weigh the same whichever way the tool acts. It is 1.3 N off."""
+    bench = ValveBench()
+    bench.alter_sample = lambda sample: replace(sample, force_n=1.3 + min(sample.force_n, -4.9))
+    bench.run(1.0)
+    bench.write(control_word=ENABLE | BIT_4, payload_kg=0.5)
+    bench.run(2.0)
+    bench.write(control_word=ENABLE | BIT_4 | ControlBit.TARE)
+    bench.run(0.2)
+    assert bench.refused is None and bench.stands is PULL
+    assert bench.last.force_measured_n == pytest.approx(0.0, abs=0.2)
+    assert bench.controller.zero_n == pytest.approx(1.3, abs=0.1)
+    bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=10.0)
+    bench.run(3.0)
+    assert bench.last.state is State.HOLDING and bench.plant.force_n == pytest.approx(14.9, abs=1.0)
 
 
 def test_the_derived_model_is_that_of_pushing_by_the_share_of_the_area() -> None:

@@ -96,6 +96,37 @@ def test_a_device_that_says_that_it_is_another_one_gets_the_safe_voltage_and_not
     assert b"~013114" not in heard_by(wired), "nor is it armed"
 
 
+def test_a_reset_asks_a_device_again_that_seemed_to_be_another_one() -> None:
+    """One answer that was another question's must not shut out the right device until somebody pulls its plug."""
+    wired = Wired(rig_with(device()))
+    identity = device().own_identity
+    assert identity
+    right = wired.world._output
+    wired.world._output = output_device(replace(device(), identity=replace(identity, models=(7060,))))
+    wired.run(1.0)
+    assert wired.exchange.fault is FaultCode.WRONG_DEVICE
+    wired.write(0, RESET)
+    wired.run(0.5)
+    assert wired.exchange.fault is FaultCode.WRONG_DEVICE, "it still is another one"
+    wired.world._output = right
+    wired.write(0, RESET)
+    wired.until(lambda: wired.exchange.checks.is_armed, 1.0)
+    wired.pressing(12.0)
+
+
+def test_after_a_trip_that_no_word_clears_the_device_obeys_again_and_is_armed_anew() -> None:
+    """The ADAM-4024 leaves its emergency value with the next setting."""
+    wired = Wired(rig_with(device("adam-4024"))).pressing(12.0)
+    wired.unplug()
+    wired.run(3.0)
+    assert wired.world._output.is_tripped  # type: ignore[attr-defined]
+    wired.replug()
+    wired.until(lambda: wired.exchange.checks.is_armed, 2.0)
+    wired.write(0, RESET)
+    wired.run(0.5)
+    wired.pressing(12.0)
+
+
 def test_after_an_unplug_the_device_is_asked_anew_what_it_is_and_armed_again() -> None:
     wired = Wired(rig_with(device())).pressing(12.0)
     wired.unplug()
@@ -158,3 +189,6 @@ def test_a_load_cell_that_says_that_it_is_another_one_is_not_read() -> None:
     with pytest.raises(Refusal, match=r"A333 another device answers .* \(it says: adam-4016's port: 4011\)"):
         wired.write(0, ENABLE, 1200)
     assert wired.loop.samples == 0
+    wired.world._cell = cell_device(module)
+    wired.write(0, RESET)
+    wired.until(lambda: wired.loop.samples > 0, 1.0)

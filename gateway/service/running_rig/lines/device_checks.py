@@ -80,7 +80,7 @@ class DeviceChecks:
         if self.fault is FaultCode.WATCHDOG_TRIPPED and DeviceStep.CLEAR in self._known:
             self.fault = FaultCode.NONE  # is_tripped lasts until the device has answered: before, it obeys nothing
             self._waiting = self._known_of(DeviceStep.CLEAR, DeviceStep.STATUS, *self._arming)
-        elif self.fault is FaultCode.WATCHDOG_NOT_ARMED:
+        elif self.fault in _ASKED_AGAIN:
             self.begin()
         self._settle()
 
@@ -132,4 +132,5 @@ class DeviceChecks:
             self._waiting.clear()
 
 
+_ASKED_AGAIN = (FaultCode.WATCHDOG_NOT_ARMED, FaultCode.WRONG_DEVICE)  # an answer may have been another question's
 _GOES_ON = (FaultCode.NONE, FaultCode.WATCHDOG_TRIPPED)

@@ -41,6 +41,11 @@ class CellExchange:
         self._next_s = -inf
         self._is_overdue = False
 
+    def clear_faults(self) -> None:
+        """Ask again what is behind the port where another device seemed to be: somebody has reset."""
+        if self.identity.fault:
+            self.reset()
+
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
         """Return what these bytes complete; the next question goes out at once where it is due and the wire needs no pause."""
         if self.identity.is_due:
