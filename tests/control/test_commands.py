@@ -107,6 +107,8 @@ def test_stop_ramps_to_zero_within_the_time_and_ends_in_off():
     assert not bench.controller.has_stopped
     bench.run(0.05)
     assert bench.last.voltage_v > 0.0
+    bench.force(20.0)
+    assert bench.refused and bench.refused.reason is RefusalReason.STOPPING
     took_s = bench.seconds_until(lambda output: output.state is State.OFF, 4.5)
     assert took_s <= 4.0
     assert bench.controller.has_stopped

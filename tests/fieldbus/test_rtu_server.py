@@ -17,6 +17,7 @@ from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.rtu import LONGEST_ADU, encode_adu
 from gateway.modbus.rtu_receiver import RtuRequest
 from gateway.ports import Pty
+from gateway.ports.port import monotonic_s
 from tests.fieldbus.conftest import NotingBank
 
 LINE = SerialSettings(baud=115200)
@@ -130,6 +131,17 @@ def test_answers_do_not_pile_up_behind_a_slow_line() -> None:
             assert [data for _, data, _ in face.bank.writes] == [bytes((0, k)) for k in range(20)]
 
     play(scene())
+
+
+def test_an_answer_that_comes_back_is_not_asked_again() -> None:
+    """An adapter for two wires hears itself, and what answers FC06 is a request, letter by letter."""
+    bank = NotingBank()
+    settings = RtuSettings("/dev/ttyNONE", LINE, unit=3, peer=FACE)
+    server = ModbusRtuServer(bank, settings, on_peer_closed=lambda peer: None, log=lambda cause, told: None)
+    write, now_s = P.write_register_request(0, 7), monotonic_s()
+    server._execute(RtuRequest(3, write, True))
+    server._receiver.receive(encode_adu(3, write), now_s)
+    assert len(bank.writes) == 1 and server._receiver.take(now_s + 1.0) == []
 
 
 def test_noise_is_told_once_and_a_line_that_is_set_otherwise_as_such() -> None:

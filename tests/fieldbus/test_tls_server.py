@@ -1,11 +1,13 @@
 """Modbus/TCP Security: who gets in and as what, what is said of those who do not, and that they leave nothing behind."""
 
 import asyncio
+import contextlib
 import resource
 import shutil
 import ssl
 import subprocess
 from datetime import UTC, datetime
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +15,13 @@ import pytest
 from pymodbus.client import AsyncModbusTlsClient
 
 from gateway.fieldbus import ModbusTlsServer, ServerSettings, TlsSettings
+from gateway.fieldbus.peers import Peers
 from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING
 from gateway.modbus import Peer, Role, pdu
 from gateway.modbus.certificate import ROLES, read_certificate
 from tests.certificates import Folder, serial_of, store_all
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
-from tests.fieldbus.conftest import NotingBank
+from tests.fieldbus.conftest import HandClock, NotingBank
 from tests.fieldbus.tls_by_hand import Face, client
 
 READ_TWO = framed(READ, 7)
@@ -144,6 +147,14 @@ def test_eight_handshakes_at_a_time_each_at_most_five_seconds(face: Face) -> Non
     assert face.log[1:] == ["W243 127.0.0.1:40000: the handshake was not finished within 5 s"] * MOST_PENDING
 
 
+def test_a_stranger_to_the_allow_list_begins_no_handshake(face: Face) -> None:
+    face.shared.peers = Peers(ServerSettings(allow=(ip_network("10.0.0.0/8"),)), guarded=True)
+    stranger, friend = face.accept("192.168.1.9"), face.accept("10.0.0.9")
+    assert face.handshakes.pending == {friend.stream} and stranger.socket.ended == "aborted"
+    assert face.log == ["W230 192.168.1.9:40000: its address is in none of the allowed networks"]
+    friend.socket.leave()
+
+
 def test_one_address_has_twenty_handshakes_a_second(face: Face) -> None:
     for _ in range(30):
         face.accept("10.0.0.7").socket.leave()
@@ -266,6 +277,26 @@ def test_foreign_clients_speak_with_it(folder: Folder) -> None:
         await ask_with_openssl(folder, port)
         await server.close()
         assert server.pending == 0 and log == []
+
+    asyncio.run(asyncio.wait_for(main(), 20.0))
+
+
+def test_a_server_cuts_who_connects_and_says_nothing(folder: Folder) -> None:
+    async def main() -> None:
+        clock, log = HandClock(), list[str]()
+        files = TlsSettings(ServerSettings(), folder.crt("gateway"), folder.key("gateway"), folder.crt("ca"))
+        server = ModbusTlsServer(
+            NotingBank(), files, on_peer_closed=list[Peer]().append, log=lambda _, told: log.append(told), clock=clock
+        )
+        reader, writer = await asyncio.open_connection(*await server.start("127.0.0.1", 0))
+        while not server.pending:
+            await asyncio.sleep(0.001)
+        clock.advance(HANDSHAKE_S + 0.5)
+        with contextlib.suppress(ConnectionResetError):
+            assert await reader.read() == b""
+        assert server.pending == 0 and log[0].startswith("W243 ")
+        writer.close()
+        await server.close()
 
     asyncio.run(asyncio.wait_for(main(), 20.0))
 

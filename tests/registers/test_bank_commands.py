@@ -240,6 +240,21 @@ def test_a_setpoint_lowered_twice_is_told_as_it_was_asked_for_first(make_bank, m
     assert (bank.command.force_setpoint_n, bank.command.force_requested_n) == (10.0, 10.0)
 
 
+def test_words_that_were_taken_once_are_judged_anew_by_other_limits(bank, master):
+    """A master that writes in cycles sends the same words again and again; what they mean is remembered."""
+    master.write(0, 1, 5000)
+    bank.set_active_model(calibration(force_limits_n=(0.0, 40.0)))
+    assert master.refusal(master.write, 0, 1, 5000).reason is RefusalReason.OUT_OF_RANGE
+
+
+def test_what_was_asked_for_before_control_cleared_is_no_request_any_more(bank, master):
+    master.write(0, 1, 5000)
+    bank.set_active_model(calibration(force_limits_n=(0.0, 40.0)))
+    bank.clear_command()
+    master.write(4, 8)
+    assert bank.command.force_requested_n == 0.0
+
+
 def test_a_calibration_whose_force_begins_at_nothing_takes_the_smallest_setpoint(bank, master):
     bank.set_active_model(replace(calibration(), force_limits_n=(0.0, 50.0)))
     master.write(1, 1)

@@ -145,6 +145,13 @@ def test_the_lease_end_releases(bank, master, other):
     assert bank.owner == "10.0.0.2"
 
 
+def test_the_lease_end_releases_who_took_over_and_shows_it(bank, master):
+    master.write(0, 1 | TAKE, 1200)
+    bank.clear_command()
+    bank.release_owner()
+    assert (bank.owner, bank.read_registers(116, 2)) == (None, bytes(4))
+
+
 def test_the_byte_order_proof_needs_no_ownership(bank, master, other):
     master.write(0, 1, 1200)
     other.write_float(416, 1234.5)

@@ -180,6 +180,9 @@ def test_proofs_of_many_hosts_are_forgotten_oldest_first(make_bank, master_of):
     for one in masters:
         one.write_float(416, 1234.5)
     assert masters[0].refusal(masters[0].write, 0, 1).reason is R.BYTE_ORDER_UNPROVEN
+    masters[1].write_float(416, 1234.5)  # once more: the latest now
+    masters[0].write_float(416, 1234.5)
+    assert masters[2].refusal(masters[2].write, 0, 1).reason is R.BYTE_ORDER_UNPROVEN
     masters[1].write(0, 1)
 
 

@@ -108,6 +108,8 @@ def test_force_limits_of_its_own_come_out_as_the_decimals_that_were_meant(low_n,
         ({"force_high_n": 61.0}, -1, UploadReason.FORCE_LIMITS),
         ({"force_low_n": 59.0}, -1, UploadReason.FORCE_LIMITS),
         ({"force_low_n": float("nan")}, -1, UploadReason.FORCE_LIMITS),
+        ({"falling_handles_n": (0.0, 30.0, 64.0), "force_high_n": 62.0}, -1, UploadReason.FORCE_LIMITS),
+        ({"rising_handles_n": (-4.0, 20.0, 60.0), "force_low_n": -2.0}, -1, UploadReason.FORCE_LIMITS),
     ],
 )
 def test_a_bad_set_is_refused_with_index_and_reason(change, index, reason):
