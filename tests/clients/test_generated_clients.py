@@ -273,10 +273,9 @@ def test_a_rig_that_wants_the_byte_order_first_is_enabled_and_shown_it_once_a_co
     cycles(client)
     gateway.is_cut = False
     cycles(client, 12)
-    client.cycle(10.0)
+    client.cycle(4.0)
     client.enable(12.0)
-    for _ in range(12):
-        client.cycle(1.0)
+    cycles(client, 12)
     assert client.enabled and gateway.echoes == 2
 
 

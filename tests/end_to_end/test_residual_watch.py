@@ -1,5 +1,6 @@
 """The residual watch beside a running gateway: a process that nobody feels, and that names what has changed in the machine."""
 
+import contextlib
 import json
 import os
 import random
@@ -58,8 +59,25 @@ def watched_gateway(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runnin
     """A watch that looks often at little."""
     folder = tmp_path_factory.mktemp("watched")
     gateway = start(folder / "state", "--sim", rig=str(watched_rig(folder, "{window_s: 5, every_s: 1}")))
+    hurry(gateway.ready["pids"]["watch"])
     yield gateway
     stop(gateway)
+
+
+def hurry(watch: int) -> None:
+    """Let a watch run that a test waits for: other workers leave nothing to the idle class for half a minute. Only root may."""
+    until_behind(watch)
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(watch, os.SCHED_OTHER, os.sched_param(0))
+        os.setpriority(os.PRIO_PROCESS, watch, 0)
+        Path(f"/proc/{watch}/autogroup").write_text("0")
+
+
+def until_behind(watch: int) -> None:
+    deadline_s = time.monotonic() + 5.0
+    while os.sched_getscheduler(watch) != os.SCHED_IDLE:
+        assert time.monotonic() < deadline_s
+        time.sleep(0.02)
 
 
 @pytest.fixture
@@ -70,10 +88,7 @@ def watched(watched_gateway: RunningGateway) -> RunningGateway:
 
 def test_the_watch_stands_behind_everybody_and_loads_nothing_before_it_must(rested):
     watch = rested.ready["pids"]["watch"]
-    deadline_s = time.monotonic() + 5.0
-    while os.sched_getscheduler(watch) != os.SCHED_IDLE:
-        assert time.monotonic() < deadline_s
-        time.sleep(0.02)
+    until_behind(watch)
     assert int(Path(f"/proc/{watch}/oom_score_adj").read_text()) == 900
     assert os.getpriority(os.PRIO_PROCESS, watch) >= 10
     files = mapped(watch)

@@ -10,6 +10,7 @@ way on to the peak, and its way back from there, and what is settled is what has
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf
 from typing import Final
 
@@ -60,7 +61,7 @@ class Lags:
     damping: float = 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class StepResponse:
     """One step of the command, and what came back.
 
@@ -96,13 +97,14 @@ class StepResponse:
         beyond_v = self.way * (arrived_v - self.end_v)
         peak_v = np.maximum.accumulate(np.maximum(beyond_v, 0.0))
         start_n, end_n = (self.path_n[0], self.path_n[-1]) if self.way > 0.0 else (self.path_n[-1], self.path_n[0])
-        slope = self._slope_at_end()
+        slope = self._slope_at_end
         lost_n = np.interp(np.where(peak_v > 0.0, peak_v - beyond_v, 0.0), self.back_v, self.back_n)
         kept_n = slope * peak_v[-1] - float(np.interp(peak_v[-1], self.back_v, self.back_n))
         share = (np.where(peak_v > 0.0, end_n, on_way_n) - start_n) / (end_n - start_n)
         expected_n = start_n + share * (end_n - self.way * kept_n - start_n) + self.way * (slope * peak_v - lost_n)
         return np.asarray(expected_n, dtype=np.float64)
 
+    @cached_property
     def _slope_at_end(self) -> float:
         """N/V over the last third of the way; where the model's range ends there, not more than twice that of the whole."""
         third = slice(-PATH_POINTS // 3, None) if self.way > 0.0 else slice(0, PATH_POINTS // 3)

@@ -21,19 +21,27 @@ PHASE, CHECK, LADDER, STOPPED = 126, 2, 3, 7
 START_CALIBRATION = 1 << 5
 
 
-@pytest.fixture
-def patient(tmp_path: Path) -> Iterator[RunningGateway]:
+@pytest.fixture(scope="module")
+def waiting(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningGateway]:
     """The demo rig with bounds that a machine which is busy with other things keeps: its simulation is a process like any
     other, and a sample that comes 0.27 s late is a fault (A311) that ends a ladder before its person can go away."""
     text = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
     for key in ("sample_timeout_s", "output_timeout_s", "stall_s"):
         text, count = re.subn(rf"{key}: \S+", f"{key}: 3.0", text)
         assert count == 1
-    rig = tmp_path / "patient.yaml"
+    folder = tmp_path_factory.mktemp("patient")
+    rig = folder / "patient.yaml"
     rig.write_text(text, encoding="utf-8")
-    gateway = start(tmp_path / "state", "--sim", rig=str(rig))
+    gateway = start(folder / "state", "--sim", rig=str(rig))
     yield gateway
     stop(gateway)
+
+
+@pytest.fixture
+def patient(waiting: RunningGateway) -> RunningGateway:
+    """The same to each test of the module."""
+    waiting.rest()
+    return waiting
 
 
 def calibrated(state: Path, *options: str) -> "subprocess.CompletedProcess[str]":
@@ -52,7 +60,7 @@ def volts_along(model: Bsfm, forces_n: list[float]) -> list[float]:
 
 def test_a_quick_ladder_gives_a_numbered_calibration_that_agrees_with_the_shipped_one(patient) -> None:
     before = patient.words(122, 1)
-    done = calibrated(patient.state, "--step", "1", "--groups", "1", "--minor", "13", "--response", "2", "--json")
+    done = calibrated(patient.state, "--step", "1.5", "--groups", "1", "--minor", "13", "--response", "2", "--json")
     assert done.returncode == 0, done.stderr
     end = json.loads(done.stdout)
     patient.client.close()  # which has asked nothing for most of a minute, and may have been hung up on
@@ -87,7 +95,8 @@ def test_a_register_bit_starts_it_and_clearing_it_ends_it_with_the_data_kept(pat
     status = patient.wait_until(lambda status: status["state"] == OFF)
     assert status["output_voltage"] == 0
     assert patient.words(PHASE, 1) == [STOPPED]
-    assert read_recording(patient.state / "recordings" / "0001.fgr").header["ladder"]["stairs"] > 100
+    newest = max((patient.state / "recordings").glob("*.fgr"))
+    assert read_recording(newest).header["ladder"]["stairs"] > 100
 
 
 def test_a_person_who_goes_away_ends_the_run(patient, tmp_path: Path) -> None:

@@ -78,7 +78,7 @@ def gate_sample(seed: int) -> list[Case]:
     outside = rng.choice(OUTSIDE, 2, replace=False).tolist()
     found = list(cases(Plan((*alone, *outside, "null"), first_seed=seed)))
     found += cases(Plan(("two",), first_seed=seed))
-    found += cases(Plan(("three",), first_seed=seed + 2))
+    found += cases(Plan(("three",), first_seed=seed + 4))
     found += [Case("null", Wish(seed=seed, size=0.0, excitation=excitation)) for excitation in ("ladder", "constant")]
     return found
 

@@ -1,6 +1,7 @@
 """What is written as a plant file is read back as the same plant, with every source and range."""
 
 from dataclasses import fields, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -75,12 +76,18 @@ NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 TEXTS = st.text(min_size=1, max_size=40).filter(str.strip)
 
 
-def allowed(section: str, name: str, value: float) -> bool:
-    """Within the bounds of the field itself."""
+@cache
+def adapter(section: str) -> TypeAdapter[Any]:
+    """Made once: pydantic takes longer for it than a plant takes to be written and read."""
     kind = next(field.type for field in fields(Plant) if field.name == section)
     assert isinstance(kind, type)
+    return TypeAdapter(kind)
+
+
+def allowed(section: str, name: str, value: float) -> bool:
+    """Within the bounds of the field itself."""
     try:
-        TypeAdapter(kind).validate_python({name: value}, strict=True)
+        adapter(section).validate_python({name: value}, strict=True)
     except ValidationError:
         return False
     return True

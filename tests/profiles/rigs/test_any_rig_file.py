@@ -14,7 +14,8 @@ from gateway.profiles import Report, check_report
 from gateway.profiles.strict_yaml.text import parse
 
 DEMO = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
-STEADY = settings(derandomize=True, deadline=None, max_examples=60)
+IS_PUSH = settings.default is not None and settings.default.derandomize
+DRAWN = settings(deadline=None, max_examples=25 if IS_PUSH else 400)
 VALUE: dict[str, Any] = parse(DEMO.encode(), "demo.yaml").value
 
 ANYTHING = st.recursive(
@@ -73,7 +74,7 @@ def test_a_deleted_key_is_missing_or_has_a_default(rig_file: Path, path: tuple[A
     assert all(fault.line >= 1 for fault in report.faults)
 
 
-@STEADY
+@DRAWN
 @given(path=st.sampled_from(PATHS), value=ANYTHING)
 def test_any_value_in_any_place_is_taken_or_told(rig_file: Path, path: tuple[Any, ...], value: Any) -> None:
     document = copy.deepcopy(VALUE)
@@ -81,7 +82,7 @@ def test_any_value_in_any_place_is_taken_or_told(rig_file: Path, path: tuple[Any
     assert is_a_rig_or_faults(told(rig_file, yaml.safe_dump(document, sort_keys=False, allow_unicode=True)))
 
 
-@STEADY
+@DRAWN
 @given(
     path=st.sampled_from([path for path in PATHS if isinstance(path[-1], str)]),
     key=st.text(max_size=12) | st.integers(),
@@ -93,7 +94,7 @@ def test_any_key_in_any_place_is_known_or_told(rig_file: Path, path: tuple[Any, 
     assert is_a_rig_or_faults(told(rig_file, yaml.safe_dump(document, sort_keys=False, allow_unicode=True)))
 
 
-@STEADY
+@DRAWN
 @given(
     start=st.integers(0, len(DEMO)),
     length=st.integers(0, 60),
