@@ -219,9 +219,7 @@ class ForceReading:
     )  # word of {status:...} -> how far to believe the reading
     blank_is_overload: bool = False  # blanks instead of digits mean beyond the range
     overload: tuple[str, ...] = ()  # sentences of their own that mean beyond the range: ["S +"]
-    underload: tuple[
-        str, ...
-    ] = ()  # the same beyond its other end: ["S -"]; without it the device says overload there, too
+    underload: tuple[str, ...] = ()  # beyond its other end: ["S -"]; without it the device says overload there, too
     rate_hz: Annotated[float, Ge(0), Le(10_000)] = 0.0  # readings per second; with ask: the most, 0: as the wire allows
 
     def __post_init__(self) -> None:

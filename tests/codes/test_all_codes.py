@@ -19,13 +19,18 @@ ROOT = Path(gateway.__file__).parent
 CODE = re.compile(r"\b[EWA]\d{3}\b")
 STARTS_WITH_CODE = re.compile(r"\n?([EWA]\d{3})\b")
 NUMBERED = (*FaultCode, *RefusalReason, *WarningBit)
+SPECIAL = [name for name, value in vars(refusals).items() if isinstance(value, SpecialRefusal)]
+NAMED = re.compile(
+    "|".join([CODE.pattern, *(table.__name__ for table in (FaultCode, WarningBit, RefusalReason)), *SPECIAL])
+)
 
 
 @cache
 def trees() -> tuple[tuple[str, ast.Module], ...]:
-    """Every source file outside the table."""
+    """Every source file outside the table in which a code may stand: the others are not worth parsing."""
     paths = sorted(path for path in ROOT.rglob("*.py") if path.relative_to(ROOT).parts[0] != "codes")
-    return tuple((str(path.relative_to(ROOT)), ast.parse(path.read_text(encoding="utf-8"))) for path in paths)
+    texts = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in paths}
+    return tuple((name, ast.parse(text)) for name, text in texts.items() if NAMED.search(text))
 
 
 @cache

@@ -1,8 +1,8 @@
 """Virtual time for asyncio: loops that never wait, all on one clock, which leaps from one event to the next.
 
-Tasks, futures and handles are asyncio's own. What is to be done stands in one queue for all loops, in the order of its time,
-and of its asking where the time is the same; so nothing here depends on how fast the machine is, and a turn costs a few
-microseconds. Nothing comes from real descriptors: they can be opened and closed (a unix socket that listens), and stay quiet.
+Tasks and futures are asyncio's own. What is to be done stands in one queue for all loops, in the order of its time,
+and of its asking where the time is the same; so nothing here depends on how fast the machine is, and a turn costs a
+microsecond. Nothing comes from real descriptors: they can be opened and closed (a unix socket that listens), and stay quiet.
 """
 
 import asyncio
@@ -19,14 +19,38 @@ BEGIN_S = 1000.0
 EPOCH_S = 1.7e9
 
 
+class Handle(asyncio.TimerHandle):
+    """asyncio's, without what it keeps for a loop that debugs, for the gate makes millions of them. A callback for which no
+    context is given runs in the one that all share: here nobody sets a variable of it."""
+
+    __slots__ = ()
+
+    def __init__(
+        self, when: float, callback: Callable[..., Any], args: tuple[Any, ...], loop: "VirtualLoop", context: Any
+    ) -> None:
+        self._when, self._callback, self._args, self._loop, self._context = when, callback, args, loop, context
+        self._cancelled = False
+
+    def __repr__(self) -> str:
+        return f"<{self._callback!r} at {self._when:g} s>"
+
+    def cancel(self) -> None:
+        """A cancelled timer is passed over when it is due."""
+        self._cancelled, self._args = True, ()
+
+    def tell(self, error: Exception) -> None:
+        """Tell the loop what the callback has raised, as asyncio's handle does."""
+        self._loop.call_exception_handler({"message": f"Exception in {self!r}", "exception": error, "handle": self})
+
+
 class VirtualClock:
     """Stands for the kernel's clocks, and runs what is due by them. jump_s: what an operator has set the wall clock by."""
 
     def __init__(self) -> None:
         self.now_s = BEGIN_S
         self.jump_s = 0.0
-        self._ready: deque[asyncio.Handle] = deque()
-        self._timers: list[tuple[float, int, asyncio.Handle]] = []
+        self._ready: deque[Handle] = deque()
+        self._timers: list[tuple[float, int, Handle]] = []
         self._asked = 0
 
     def monotonic(self) -> float:
@@ -43,14 +67,14 @@ class VirtualClock:
             patch.setattr("time.time", self.wall)
             yield
 
-    def add(self, handle: asyncio.Handle) -> None:
+    def add(self, handle: Handle) -> None:
         """Have this done as soon as everything is done that was asked for before."""
         self._ready.append(handle)
 
-    def add_timer(self, when_s: float, handle: asyncio.Handle) -> None:
-        """Have this done at this time."""
+    def add_timer(self, handle: Handle) -> None:
+        """Have this done at its time."""
         self._asked += 1
-        heapq.heappush(self._timers, (when_s, self._asked, handle))
+        heapq.heappush(self._timers, (handle._when, self._asked, handle))
 
     def run_until(self, end_s: float) -> None:
         """Do everything that is due until then, and let the clock show end_s. What a halted loop has to do waits until it goes
@@ -67,14 +91,20 @@ class VirtualClock:
                 else:
                     self.now_s = max(self.now_s, end_s)
                     return
-                loop: VirtualLoop = handle._loop  # type: ignore[attr-defined]
+                loop = handle._loop
                 if loop.is_halted:
                     loop.waiting.append(handle)
-                elif not handle.cancelled():
+                elif not handle._cancelled:
                     if loop is not running:
                         running = loop
                         asyncio._set_running_loop(loop)
-                    handle._run()
+                    try:
+                        if handle._context is None:
+                            handle._callback(*handle._args)
+                        else:
+                            handle._context.run(handle._callback, *handle._args)
+                    except Exception as error:
+                        handle.tell(error)
         finally:
             asyncio._set_running_loop(None)
 
@@ -87,7 +117,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self._virtual_clock = clock
         self.servers: dict[int, Any] = {}
         self.is_halted = False
-        self.waiting: list[asyncio.Handle] = []
+        self.waiting: list[Handle] = []
 
     def time(self) -> float:
         return self._virtual_clock.now_s
@@ -103,10 +133,8 @@ class VirtualLoop(asyncio.SelectorEventLoop):
             self._virtual_clock.add(handle)
         self.waiting.clear()
 
-    def call_soon(
-        self, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
-    ) -> asyncio.Handle:
-        handle = asyncio.Handle(callback, args, self, context)
+    def call_soon(self, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None) -> Handle:
+        handle = Handle(0.0, callback, args, self, context)
         self._virtual_clock.add(handle)
         return handle
 
@@ -114,15 +142,14 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     def call_later(
         self, delay: float, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
-    ) -> asyncio.TimerHandle:
-        return self.call_at(self.time() + delay, callback, *args, context=context)
+    ) -> Handle:
+        handle = Handle(self._virtual_clock.now_s + delay, callback, args, self, context)
+        self._virtual_clock.add_timer(handle)
+        return handle
 
     def call_at(
         self, when: float, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
-    ) -> asyncio.TimerHandle:
-        handle = asyncio.TimerHandle(when, callback, args, self, context)
-        self._virtual_clock.add_timer(when, handle)
+    ) -> Handle:
+        handle = Handle(when, callback, args, self, context)
+        self._virtual_clock.add_timer(handle)
         return handle
-
-    def _timer_handle_cancelled(self, handle: asyncio.TimerHandle) -> None:
-        """A cancelled timer is passed over when it is due."""

@@ -12,6 +12,7 @@ Stops nearer to the turn give way first in any memory that a movement from there
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import isfinite
 from typing import Final
 
@@ -118,11 +119,13 @@ def middle_and_half(branches: Branches, force_n: float) -> tuple[float, float]:
     return 0.5 * (rising_v + falling_v), 0.5 * (rising_v - falling_v)
 
 
+@lru_cache(maxsize=16)
 def half_width_bound_v(branches: Branches) -> float:
     """Return a bound of half the loop's width, V: nowhere is it wider; at most BOUND_SHARE too much.
 
     Both inverses grow, so the ends of a range of forces bound all of it: rise(high) - fall(low). Ranges are halved until
-    that is close to the widest place seen. An uploaded set waits for this, so no voltage is reckoned twice.
+    that is close to the widest place seen. An uploaded set waits for this, so no voltage is reckoned twice; one that is judged,
+    stored and loaded is the same each time.
     """
     rising, falling = branches.rising, branches.falling
     low_n, high_n = min(rising.handles[0], falling.handles[0]), max(rising.handles[-1], falling.handles[-1])

@@ -147,7 +147,9 @@ class TemplateCellDevice:
         self._newton_per_unit = newton_per_unit(
             profile, unit or (None if self._reading.newton_per_count else self._unit)
         )
-        self._around = {field.name: _nothing(field) for field in self._reading.template.fields}
+        nothing = {field.name: _nothing(field) for field in self._reading.template.fields}
+        self._around: dict[str, Value] = {**nothing, **profile.constants, UNIT: self._unit}
+        self._largest, self._decimals = self._reading.largest_shown, self._reading.decimals
         self._lines = self._grammar.questions()
         self._checks, self._answers = CheckSpelling(self._grammar), b""
 
@@ -170,22 +172,17 @@ class TemplateCellDevice:
     def frame(self, force_n: float, quality: Quality = Quality.OK) -> bytes:
         """Return the frame that shows this force, or overload where the display is too small for it."""
         raw = force_n / self._newton_per_unit + self._reading.zero_count
-        if quality is not Quality.OVERLOAD and isfinite(raw) and abs(raw) <= self._reading.largest_shown:
+        if quality is not Quality.OVERLOAD and isfinite(raw) and abs(raw) <= self._largest:
             try:
                 return self._encode_frame(raw, quality)
             except ValueRefused:  # more digits than the display has
                 pass
         if sentences := (self._reading.underload if force_n < 0.0 else ()) or self._reading.overload:
             return self._grammar.line(self._grammar.encode(sentences[0]))
-        return self._encode_frame(nan if self._reading.blank_is_overload else self._largest(), Quality.OVERLOAD)
-
-    def _largest(self) -> float:
-        """The largest number that the display can show: what a grammar without blanks says at overload."""
-        return self._reading.largest_shown
+        return self._encode_frame(nan if self._reading.blank_is_overload else self._largest, Quality.OVERLOAD)
 
     def _encode_frame(self, raw: float, quality: Quality) -> bytes:
-        values: dict[str, Value] = {**self._around, **self._grammar.profile.constants, UNIT: self._unit}
-        values[FORCE] = round(raw, self._reading.decimals) if isfinite(raw) else raw
+        values = {**self._around, FORCE: round(raw, self._decimals) if isfinite(raw) else raw}
         word = self._reading.word(quality)
         if word is not None:
             values[STATUS] = word

@@ -11,6 +11,7 @@ import pytest
 from gateway.control import NO_COMPENSATION, CellMap
 from gateway.profiles import load_plant, load_rig
 from gateway.profiles.rigs.compensated_effects import ALL_INPUTS, compensation_of
+from gateway.service.closed_loop import identified_model
 from gateway.service.closed_loop.identified_model import identify_model, quasi_static
 from gateway.service.closed_loop.study import HEADROOM, ClosedLoopGain, closed_loop_gain, format_gain
 from gateway.twin import Plant, Twin
@@ -18,6 +19,7 @@ from gateway.twin.plant import with_value
 from gateway.twin.surroundings import Surroundings
 
 BASE = load_plant("paper-slide").plant
+DEMO = load_rig("demo")
 
 
 def plant_with(**values: float) -> Plant:
@@ -26,7 +28,7 @@ def plant_with(**values: float) -> Plant:
 
 
 def gain(extended: Plant, **options: object) -> ClosedLoopGain:
-    return closed_loop_gain(BASE, extended, seeds=[0], **options)  # type: ignore[arg-type]
+    return closed_loop_gain(BASE, extended, DEMO, seeds=[0], **options)  # type: ignore[arg-type]
 
 
 # effect, its numbers, largest allowed ratio of the error after to before
@@ -101,7 +103,7 @@ def test_an_input_that_nobody_gives_leaves_its_effect_and_says_so():
 def test_several_at_once_with_an_interval_over_seeds():
     """The friction is that of the test above: its model has been identified."""
     extended = plant_with(contact__tilt_n=3.0, cell__quadratic_per_n=0.0015, friction__coulomb_n=3.0)
-    found = closed_loop_gain(BASE, extended, load_rig("demo"), seeds=[7, 8])
+    found = closed_loop_gain(BASE, extended, DEMO, seeds=[7, 8])
     assert set(found.compensated) == {"tilt-gravity", "sensor-quadratic", "coulomb-friction"}
     assert found.seeds == (7, 8)
     low, high = found.rms_ratio_ci95
@@ -112,8 +114,10 @@ def test_several_at_once_with_an_interval_over_seeds():
     assert "tilt-gravity" in "\n".join(told)
 
 
-def test_a_plant_without_a_model_keeps_the_one_before_and_says_so():
-    """No air: nothing a ladder could identify."""
+@pytest.mark.parametrize("turn_stairs", [0, pytest.param(identified_model.TURN_STAIRS, marks=pytest.mark.long)])
+def test_a_plant_without_a_model_keeps_the_one_before_and_says_so(turn_stairs, monkeypatch):
+    """No air: nothing a ladder could identify, however many stairs it leaves out after a turn: each more is seconds of fits."""
+    monkeypatch.setattr(identified_model, "TURN_STAIRS", turn_stairs)
     found = gain(plant_with(regulator__supply_pa=5.0e4, friction__coulomb_n=1.5))
     told = dict(found.not_compensated)
     assert "the extended plant gives no model" in told["coulomb-friction"]
@@ -121,7 +125,7 @@ def test_a_plant_without_a_model_keeps_the_one_before_and_says_so():
 
 
 def test_plants_that_rest_alike_share_one_model():
-    top_v = HEADROOM * load_rig("demo").control.limits.voltage_max_v  # as every study asks, so that the model is there
+    top_v = HEADROOM * DEMO.control.limits.voltage_max_v  # as every study asks, so that the model is there
     other = plant_with(contact__tilt_n=3.0, cell__noise_n=0.5, regulator__delay_s=0.2)
     assert identify_model(other, top_v) is identify_model(BASE, top_v)
     assert quasi_static(BASE) == quasi_static(quasi_static(BASE))
