@@ -315,7 +315,9 @@ def _check_reading(template: Template, reading: ForceReading) -> None:
         raise TemplateError(f"{quote(template.text)}: blank_is_overload needs decimals of fixed width")
     unit = template.field(UNIT)
     if unit and not (isinstance(unit, Choice) and set(unit.words) <= set(NEWTON_PER_UNIT)):
-        raise TemplateError(f"{quote(template.text)}: units are {', '.join(NEWTON_PER_UNIT)}; another is text, with `unit`")
+        raise TemplateError(
+            f"{quote(template.text)}: units are {', '.join(NEWTON_PER_UNIT)}; another is text, with `unit`"
+        )
     if isinstance(unit, Choice) and reading.unit and reading.unit not in unit.words:
         raise TemplateError(f"{quote(template.text)} never says {reading.unit}: unit is one of {', '.join(unit.words)}")
     status = template.field(STATUS)
