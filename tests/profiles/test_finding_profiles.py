@@ -104,4 +104,4 @@ def test_an_ending_that_none_has_is_told_readably(tmp_path: Path) -> None:
     assert changed != device
     (tmp_path / "any.yaml").write_text(changed, encoding="utf-8")
     (fault,) = check_file(tmp_path / "any.yaml").faults
-    assert str(fault).endswith(r'terminator: "\n\r" is not one of "", "\r\n", "\r", "\n"')
+    assert str(fault).endswith(r'terminator: "\n\r" is not one of "", "\r\n", "\r", "\n", "\x03"')
