@@ -219,11 +219,13 @@ class OutputExchange:
         )
 
     def _check_setting(self, request: OutputRequest, reply: Accepted) -> None:
-        """The echo of a setting, or the setting as it was read: another one than was sent is set anew, and counted."""
-        self.acknowledged_v = self._standing_v = reply.voltage_v
+        """The echo of a setting, or the setting as it was read: another one than was sent is set anew, and counted. What then
+        stands is not known: an echo that lost its first digits says 0, and the safe voltage must go out all the same."""
+        self.acknowledged_v, self._standing_v = reply.voltage_v, None
         if not self._host.confirms(self._asked_v, reply, request):
             self._count_failure(type(request), FaultCode.OUTPUT_ALTERED)
             return
+        self._standing_v = reply.voltage_v
         if abs(reply.voltage_v - self._asked_v) > self._host.resolution_v:
             self._standing_v = self._asked_v  # the answer only counts in coarser steps
         self._failures[type(request)] = 0

@@ -130,6 +130,20 @@ def test_three_bad_echoes_in_a_row_are_an_altered_output(wire: Wire) -> None:
     assert wire.exchange.acknowledged_v == pytest.approx(510 * 10 / 1023)  # what stands, not what was asked
 
 
+@pytest.mark.parametrize("cut_before", [0, 2])
+def test_an_echo_cut_down_to_0_keeps_no_safe_voltage_back(wire: Wire, cut_before: int) -> None:
+    """The device stands at 510 counts, and of its echo only the last digit arrived: then the output is disabled."""
+    wire.set_voltage(510)
+    for _ in range(cut_before):
+        wire.answer("0")
+        assert wire.last == "SET 510"
+    wire.set_voltage(0)
+    wire.answer("0")
+    assert wire.last == "SET 0"
+    wire.answer("0")
+    assert wire.exchange.acknowledged_v == 0.0 and not wire.exchange.fault, "a good echo heals what bad ones have found"
+
+
 def test_a_good_echo_between_bad_ones_starts_the_count_anew(wire: Wire) -> None:
     for counts in (512, 600, 512):
         wire.set_voltage(counts)
