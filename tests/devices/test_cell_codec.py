@@ -46,6 +46,9 @@ def test_cutting_the_stream_elsewhere_changes_nothing(
 def test_a_sentence_that_is_known_by_heart_is_read_as_when_it_was_new(indicator: DeviceProfile) -> None:
     host, frame = cell_host(indicator), cell_device(indicator).frame(12.0)
     (first,) = host.receive(frame, 1.0)
+    for force_n in range(1, 100):
+        host.receive(cell_device(indicator).frame(force_n), 1.0)
+        assert len(host._known) <= 64, "memory is bounded, whatever comes"
     (again,) = host.receive(frame, 2.0)
     assert isinstance(first, ForceSample)
     assert again == replace(first, time_s=2.0)

@@ -56,6 +56,17 @@ def test_an_off_grid_voltage_is_echoed_within_half_a_step(itv: DeviceProfile, vo
     assert abs(reply.voltage_v - voltage_v) <= 0.5001 * host.resolution_v
 
 
+@pytest.mark.parametrize("question", [SetVoltage(5.0), ReadVoltage()])
+def test_half_a_step_is_the_device_s_rounding_and_a_whole_one_is_another_voltage(
+    itv: DeviceProfile, question: OutputRequest
+) -> None:
+    host = output_host(itv)
+    off = {
+        share: host.confirms(5.0, Accepted(5.0 + share * host.resolution_v), question) for share in (-1, -0.5, 0.5, 1)
+    }
+    assert off == {-1: False, -0.5: True, 0.5: True, 1: False}
+
+
 @pytest.mark.parametrize("voltage_v", [nan, inf, -inf, -0.01, 10.01])
 def test_a_voltage_that_is_none_never_reaches_the_wire(itv: DeviceProfile, voltage_v: float) -> None:
     host = output_host(itv)

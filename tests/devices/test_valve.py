@@ -46,6 +46,16 @@ def test_what_was_not_asked_or_is_broken_tells_no_direction(name: str) -> None:
     assert PUSH not in host.receive(device.reply(PULL, PULL)), "the answer to another setting is none to this one"
 
 
+@pytest.mark.parametrize("name", VALVES)
+def test_what_was_left_of_an_answer_before_is_no_part_of_the_next(name: str) -> None:
+    host, device = ValveHost(load_device(name)), ValveDevice(load_device(name))
+    answer = device.reply(None, PULL)
+    host.request(None)
+    assert host.receive(answer[:3]) == []
+    host.request(None)
+    assert host.receive(answer) == [PULL]
+
+
 def test_shipped_valves_are_of_the_role_and_say_what_they_are() -> None:
     assert set(VALVES) <= set(list_shipped("device"))
     for name in VALVES:

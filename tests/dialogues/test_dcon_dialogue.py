@@ -33,6 +33,11 @@ def test_a_setting_is_acknowledged_without_an_echo() -> None:
     assert (host.safe_frame(0.0), host.safe_reply) == (b"#0100.000\r", b">\r")
 
 
+def test_the_last_that_a_module_hears_is_that_nobody_will_feed_its_watchdog() -> None:
+    assert output_host(I7021_TEN).last_frame == b"~013064\r"
+    assert output_host(load_device("smc-itv-rc")).last_frame == b""
+
+
 def test_the_checksum_is_the_sum_of_the_codes() -> None:
     host = output_host(I7021_SUM)
     assert host.request(SetVoltage(5.0)) == b"#0105.000A7\r"

@@ -84,6 +84,32 @@ def test_reopening_waits_longer_each_time_up_to_two_seconds(
     assert asyncio.run(scene()) == pytest.approx([0.1, 0.2, 0.4, 0.8, 1.6, 2.0, 2.0, 2.0])
 
 
+def test_a_port_that_was_back_is_looked_for_soon_when_it_is_lost_again(ear: Any, line: Pty, tmp_path: Path) -> None:
+    name, delays_s = tmp_path / "by-id", list[float]()
+    name.symlink_to(line.path)
+
+    async def scene() -> None:
+        port, other = ear.port(str(name)), Pty()
+
+        def at_once(delay_s: float) -> None:
+            delays_s.append(delay_s)
+            if len(delays_s) == 4:
+                name.unlink()
+                name.symlink_to(other.path)
+            asyncio.get_running_loop().call_soon(port._reopen)
+
+        port._reopen_after = at_once
+        await port.open()
+        line.close()
+        await ear.until(lambda: len(ear.opened) == 2)
+        other.close()
+        await ear.until(lambda: len(ear.losses) == 2)
+        port.close()
+
+    asyncio.run(scene())
+    assert delays_s[:5] == pytest.approx([0.1, 0.2, 0.4, 0.8, 0.1])
+
+
 def test_a_lost_port_that_is_found_elsewhere_is_opened_there_at_once(ear: Any, line: Pty) -> None:
     async def scene() -> None:
         port, other = ear.port(line.path), Pty()

@@ -1,12 +1,14 @@
 """The port class on real ptys: bytes both ways, the plug pulled, the lock, bytes that do not fit, the last bytes."""
 
 import asyncio
+import errno
 import fcntl
 import os
 import sys
 from typing import Any, get_args
 
 import pytest
+import serial
 
 from gateway.devices import SerialSettings
 from gateway.devices.line_settings import Baud
@@ -157,3 +159,18 @@ def test_every_speed_and_frame_that_a_profile_may_name_can_be_set(line: Pty, par
         line.set_client_baud(9600)
         line.set_client_baud(baud)
         assert line.client_baud() == baud
+
+
+def test_the_driver_is_told_the_frame_that_the_device_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pty has no frame: only the call tells."""
+    told: list[dict[str, object]] = []
+
+    def open_nothing(path: str, baud: int, **settings: object) -> None:
+        told.append({"baud": baud, **settings})
+        raise OSError(errno.ENOENT, "not there")
+
+    monkeypatch.setattr(serial, "Serial", open_nothing)
+    with pytest.raises(PortError):
+        open_descriptor("/dev/ttyNONE", SerialSettings(baud=19200, data_bits=7, parity="even", stop_bits=2))
+    frame = {"baud": 19200, "bytesize": 7, "parity": serial.PARITY_EVEN, "stopbits": 2, "exclusive": True}
+    assert frame.items() <= told[0].items()

@@ -191,9 +191,21 @@ def test_a_line_that_the_disk_takes_half_of_does_not_spoil_the_next(tmp_path: Pa
     file.append(encode_event(event("whole")))
     file.close()
     assert [each.text for each in kept(tmp_path)] == ["whole"]
+    assert json.loads((tmp_path / "events.jsonl").read_text().splitlines()[-1])["text"] == "whole", "for any tool"
 
 
 def test_a_state_directory_that_was_removed_is_an_error_of_the_system_and_no_more(tmp_path: Path) -> None:
     file = EventFile(tmp_path / "gone")
     with pytest.raises(FileNotFoundError):
         file.append(encode_event(event("x")))
+
+
+def test_who_comes_late_to_a_full_file_leaves_the_new_one_its_name(tmp_path: Path) -> None:
+    line = encode_event(event("one"))
+    late, other = EventFile(tmp_path, 2 * len(line)), EventFile(tmp_path, 2 * len(line))
+    late.append(line)
+    other.append(line)  # full: it gets its old name
+    other.append(line)
+    late._rotate()
+    other.close()
+    assert (tmp_path / "events.jsonl").read_bytes() == line and not (tmp_path / "events.jsonl.2").exists()
