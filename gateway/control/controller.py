@@ -124,8 +124,7 @@ class Controller:
 
     def _inform_runs(self, calibration: CalibrationInUse) -> None:
         timed = timing_of(calibration.response, self._rig_settings)
-        lag_s = timed.supervision.response_lag_s
-        self.active_run.use(calibration.model, timed.timing, calibration.noise_n, lag_s)
+        self.active_run.use(calibration.model, timed.timing, calibration.noise_n, timed.supervision.response_lag_s)
 
     @property
     def can_compensate_anew(self) -> bool:
@@ -136,9 +135,7 @@ class Controller:
         """Compensate something else from now on. settings: of the rig file; calibration: the one in use, as this compensation
         has it. ValueError while the output is enabled: a reading and a voltage that both jump are a step of the force."""
         if not self.can_compensate_anew:
-            raise ValueError(
-                f"what is compensated changes only while the output is disabled, not while {self.state.name}"
-            )
+            raise ValueError(f"what is compensated changes while the output is disabled, not while {self.state.name}")
         self._rig_settings = compensation.settings(settings)
         self._compensation = compensation
         self._conditioner.use(compensation.cell)
@@ -147,9 +144,8 @@ class Controller:
 
     def refusal_of(self, now_s: float, proposal: ProposedWrite, line: LineStatus) -> EdgeRefusal | None:
         """Return why a command cannot be taken now; None: the next step takes it. Nothing changes by asking."""
-        if self.takes_at_once(proposal):
-            return None
-        return self._edge_check.refusal(proposal, self._situation(now_s, line))
+        at_once = self.takes_at_once(proposal)
+        return None if at_once else self._edge_check.refusal(proposal, self._situation(now_s, line))
 
     def takes_at_once(self, proposal: ProposedWrite) -> bool:
         """Decide whether nothing about a command has to be asked. Most writes are so: a setpoint, a heartbeat."""
@@ -211,8 +207,8 @@ class Controller:
     @property
     def _outside_n(self) -> float:
         """Contact force that neither slide nor payload gives, along the tool's direction: what presses is against a pull."""
-        tilt_rad = self._commands.command.tilt_angle_rad
-        return self._conditioner.direction * self._compensation.outside_n(tilt_rad, self._line.feed_mm_s)
+        outside_n = self._compensation.outside_n(self._commands.command.tilt_angle_rad, self._line.feed_mm_s)
+        return self._conditioner.direction * outside_n
 
     @property
     def _given_n(self) -> float:
