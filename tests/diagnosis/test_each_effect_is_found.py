@@ -1,7 +1,8 @@
 """Each effect of the catalogue, strong and excited, is named with its size; without it the same recording shows nothing.
 
-The twin makes these recordings: the least that a search must do. The push gate asks eight effects of different families and
-two recordings without any; --long asks all 45, with and without.
+The twin makes these recordings: the least that a search must do. The push gate asks six effects of different families and
+two recordings without any; --long asks all 45, with and without. Load-dependent friction and a quantised command are asked in
+each push too, by search/test_laws_of_the_search.py.
 """
 
 import pytest
@@ -13,9 +14,7 @@ from tests.diagnosis.machine import NOISE_N
 
 GATE = (
     "transport-delay",
-    "command-quantisation",
     "presliding",
-    "load-dependent-friction",
     "tilt-gravity",
     "creep",
     "thermal-span-drift",

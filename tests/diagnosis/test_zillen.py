@@ -67,6 +67,7 @@ def test_hidden_friction_of_the_lip_seal_is_found() -> None:
     assert 0.75 < found.baseline.rms_n < 1.1
 
 
+@pytest.mark.long
 def test_hidden_friction_of_the_o_ring_is_found() -> None:
     found = diagnosed(("O-ring257_1bar",))
     assert_friction_found(found, 0.65)
