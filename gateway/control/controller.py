@@ -135,7 +135,7 @@ class Controller:
         """Compensate something else from now on. settings: of the rig file; calibration: the one in use, as this compensation
         has it. ValueError while the output is enabled: a reading and a voltage that both jump are a step of the force."""
         if not self.can_compensate_anew:
-            raise ValueError(f"what is compensated changes while the output is disabled, not while {self.state.name}")
+            raise ValueError(f"compensation changes only while the output is disabled, not while {self.state.name}")
         self._rig_settings = compensation.settings(settings)
         self._compensation = compensation
         self._conditioner.use(compensation.cell)
@@ -187,8 +187,7 @@ class Controller:
     # -- the order of a step
 
     def decide(self, now_s: float, command: Command, sample: ForceSample | None, line: LineStatus) -> float:
-        """Return the voltage that must be written now; `explain` is to follow, once it is on its way. An exception is an
-        internal error, and the caller asks `fail_internally`."""
+        """Return the voltage to write now; `explain` follows. An exception is an internal error: ask `fail_internally`."""
         dt_s = 0.0 if self._last_s is None else max(0.0, now_s - self._last_s)
         self._last_s, self._line, self._moved_by = now_s, line, None
         self._machine.begin_step()

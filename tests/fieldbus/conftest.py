@@ -13,6 +13,7 @@ from gateway.fieldbus.connection import Connection, ServerState
 from gateway.fieldbus.peers import Peers
 from gateway.fieldbus.rate_limits import LogLimiter
 from gateway.modbus import Peer
+from tests.certificates import Folder, store_all
 from tests.modbus.memory_bank import MemoryBank
 
 
@@ -235,3 +236,9 @@ def run(request: pytest.FixtureRequest) -> Callable[[Any], Any]:
             return runner.run(bounded(main))
 
     return run_one
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Folder:
+    """Certificates of all kinds, each with its key."""
+    return store_all(tmp_path_factory.mktemp("certificates"))

@@ -1,36 +1,24 @@
 """Modbus/TCP Security: who gets in and as what, what is said of those who do not, and that they leave nothing behind."""
 
-import asyncio
-import contextlib
 import resource
-import shutil
 import ssl
-import subprocess
 from datetime import UTC, datetime
 from ipaddress import ip_network
 from pathlib import Path
-from typing import Any
 
 import pytest
-from pymodbus.client import AsyncModbusTlsClient
 
-from gateway.fieldbus import ModbusTlsServer, ServerSettings, TlsSettings
+from gateway.fieldbus import ServerSettings
 from gateway.fieldbus.peers import Peers
 from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING
-from gateway.modbus import Peer, Role, pdu
+from gateway.modbus import Role, pdu
 from gateway.modbus.certificate import ROLES, read_certificate
-from tests.certificates import Folder, serial_of, store_all
+from tests.certificates import Folder, serial_of
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
-from tests.fieldbus.conftest import HandClock, NotingBank
 from tests.fieldbus.tls_by_hand import Face, client
 
 READ_TWO = framed(READ, 7)
 VERSIONS = [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3]
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Folder:
-    return store_all(tmp_path_factory.mktemp("certificates"))
 
 
 @pytest.fixture
@@ -254,70 +242,3 @@ def test_no_bytes_break_the_reading(folder: Folder) -> None:
         except ValueError:
             continue
         assert isinstance(shown.name, str)
-
-
-def test_foreign_clients_speak_with_it(folder: Folder) -> None:
-    """pymodbus by TLS, and OpenSSL's own client; over a socket, on the stock loop."""
-
-    async def main() -> None:
-        bank, closed, log = NotingBank(), list[Peer](), list[str]()
-        server = ModbusTlsServer(
-            bank,
-            TlsSettings(ServerSettings(), folder.crt("gateway"), folder.key("gateway"), folder.crt("ca")),
-            on_peer_closed=closed.append,
-            log=lambda cause, sentence: log.append(sentence),
-        )
-        _, port = await server.start("127.0.0.1", 0)
-        master = AsyncModbusTlsClient("127.0.0.1", port=port, sslctx=unnamed(client(folder, "admin")), retries=0)
-        assert await master.connect()
-        assert not (await master.write_registers(3, [7, 8])).isError()
-        assert (await master.read_holding_registers(3, count=2)).registers == [7, 8]
-        assert bank.writes[0][2].identity == "certificate admin"
-        master.close()
-        await ask_with_openssl(folder, port)
-        await server.close()
-        assert server.pending == 0 and log == []
-
-    asyncio.run(asyncio.wait_for(main(), 20.0))
-
-
-def test_a_server_cuts_who_connects_and_says_nothing(folder: Folder) -> None:
-    async def main() -> None:
-        clock, log = HandClock(), list[str]()
-        files = TlsSettings(ServerSettings(), folder.crt("gateway"), folder.key("gateway"), folder.crt("ca"))
-        server = ModbusTlsServer(
-            NotingBank(), files, on_peer_closed=list[Peer]().append, log=lambda _, told: log.append(told), clock=clock
-        )
-        reader, writer = await asyncio.open_connection(*await server.start("127.0.0.1", 0))
-        while not server.pending:
-            await asyncio.sleep(0.001)
-        clock.advance(HANDSHAKE_S + 0.5)
-        with contextlib.suppress(ConnectionResetError):
-            assert await reader.read() == b""
-        assert server.pending == 0 and log[0].startswith("W243 ")
-        writer.close()
-        await server.close()
-
-    asyncio.run(asyncio.wait_for(main(), 20.0))
-
-
-def unnamed(context: ssl.SSLContext) -> Any:
-    context.check_hostname = False
-    return context
-
-
-async def ask_with_openssl(folder: Folder, port: int) -> None:
-    if shutil.which("openssl") is None:
-        pytest.skip("openssl is not installed")
-    words = ["s_client", "-quiet", "-connect", f"127.0.0.1:{port}", "-CAfile", folder.crt("ca")]
-    words += ["-cert", folder.crt("setpoint"), "-key", folder.key("setpoint")]
-    process = await asyncio.create_subprocess_exec(
-        "openssl", *words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-    )
-    assert process.stdin and process.stdout
-    process.stdin.write(READ_TWO)
-    await process.stdin.drain()
-    assert await process.stdout.readexactly(len(framed(READ_ANSWER, 7))) == framed(READ_ANSWER, 7)
-    process.stdin.close()
-    process.kill()
-    await process.wait()
