@@ -8,7 +8,6 @@ taken and comes all the same is an internal error: the safe voltage and a latche
 The controller asks its own parts and none of theirs: commands, conditioner, faults, contact, loop, run, machine.
 """
 
-from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
 from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
@@ -51,9 +50,7 @@ class Controller:
         *,
         unclean_restart: bool = False,
         compensation: Compensation = NO_COMPENSATION,
-        pull_model: Bsfm | None = None,
     ) -> None:
-        """pull_model: measured, in place of the one that follows from the calibration."""
         model = calibration.model
         self._calibration = calibration
         self._valve = ValveSwitch(settings.valve) if settings.valve else None
@@ -69,7 +66,7 @@ class Controller:
         self._faults = FaultDetector(settings)
         self._faults.expect_noise(calibration.noise_n)
         self._conditioner = SampleConditioner(settings.supervision, compensation.cell)
-        self._turning = Turning(self._valve, self._commands, self._conditioner, pull_model)
+        self._turning = Turning(self._valve, self._commands, self._conditioner)
         self._edge_check = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self._most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._one_shot = OneShotEvents(settings.supervision.stuck_n)

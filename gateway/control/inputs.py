@@ -21,12 +21,14 @@ _NO_STATUS: Final = StatusBit(0)
 @dataclass(frozen=True, slots=True)
 class CalibrationInUse:
     """A calibration as control uses it. model: as volts are sent (`apply_command_map`); response: as the calibration measured
-    it, None where the rig file's timing counts; noise_n: of the load cell, as it was measured, 0 where that is not known."""
+    it, None where the rig file's timing counts; noise_n: of the load cell, as it was measured, 0 where that is not known;
+    pull_model: measured while pulling, as volts are sent, None where it follows from that of pushing."""
 
     model: Bsfm
     number: int
     response: Response | None = None
     noise_n: float = 0.0
+    pull_model: Bsfm | None = None
 
 
 @dataclass(slots=True)

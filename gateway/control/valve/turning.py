@@ -14,27 +14,20 @@ _VENTED_N = 0.5  # expected above rest: less than friction holds
 
 
 class Turning:
-    """valve: None on a rig without one, then everything pushes. pull_model: measured, in place of the one that follows from the
-    calibration of pushing."""
+    """valve: None on a rig without one, then everything pushes."""
 
-    def __init__(
-        self,
-        valve: ValveSwitch | None,
-        commands: CommandTracker,
-        conditioner: SampleConditioner,
-        pull_model: Bsfm | None,
-    ) -> None:
+    def __init__(self, valve: ValveSwitch | None, commands: CommandTracker, conditioner: SampleConditioner) -> None:
         self.valve = valve
-        self._commands, self._conditioner, self._pull_model = commands, conditioner, pull_model
+        self._commands, self._conditioner = commands, conditioner
 
     def model_of(self, calibration: CalibrationInUse) -> Bsfm:
         """Return the model of the direction in effect."""
         return self.model_of_pull(calibration) if self.valve and self.valve.is_pulling else calibration.model
 
     def model_of_pull(self, calibration: CalibrationInUse) -> Bsfm:
-        """Return the measured model of pulling, or the one derived from this calibration."""
+        """Return the measured model of pulling, or the one that follows from that of pushing."""
         share = self.valve.settings.pull_area_share if self.valve else 1.0
-        return self._pull_model or scale_forces(calibration.model, share)
+        return calibration.pull_model or scale_forces(calibration.model, share)
 
     def follow(self, now_s: float, status: ValveStatus | None, machine: Transitions) -> bool:
         """Follow the valve; return whether the direction has changed: then the caller takes the other model."""

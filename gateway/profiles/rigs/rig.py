@@ -173,7 +173,12 @@ class Rig:
         """Return the calibration as control uses it here. model: its model, where that has been made already."""
         model = self.model_of(calibration, model or calibration.model())
         noise_n = calibration.noise_n if self._has_made(calibration) else 0.0
-        return CalibrationInUse(model, calibration.number, self.response_of(calibration), noise_n)
+        return CalibrationInUse(model, calibration.number, self.response_of(calibration), noise_n, self._pull_model())
+
+    def _pull_model(self) -> Bsfm | None:
+        """Return the measured model of pulling as control uses it here; None where it follows from that of pushing."""
+        pulling = self.pull_calibration
+        return self.model_of(pulling, pulling.model()) if pulling else None
 
     def ports(self) -> dict[str, str]:
         """Return the serial ports of a real rig, by line; empty for a simulated one."""

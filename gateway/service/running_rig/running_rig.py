@@ -150,7 +150,6 @@ class RunningRig:
             rig.calibration_in_use(rig.calibration),
             unclean_restart=bool(cause),
             compensation=rig.compensation,
-            pull_model=rig.pull_calibration.model() if rig.pull_calibration else None,
         )
         self.loop = ControlLoop(
             self.bank,

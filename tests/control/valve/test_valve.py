@@ -214,6 +214,17 @@ def test_a_tare_while_the_tool_pulls_takes_the_same_zero_as_one_while_it_pushes(
     assert bench.last.state is State.HOLDING and bench.plant.force_n == pytest.approx(14.9, abs=1.0)
 
 
+def test_a_measured_model_of_pulling_counts_in_place_of_the_derived_one_whichever_set_it_came_with() -> None:
+    measured = [scale_forces(bsfm(), share) for share in (0.5, 0.6)]
+    bench = ValveBench()
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1, pull_model=measured[0]))
+    bench.pulling(12.0)
+    assert bench.last.feedforward_v == pytest.approx(measured[0].voltage_v(12.0, 1.0)[0], abs=0.05)
+    bench.controller.use(CalibrationInUse(bsfm(), 2, pull_model=measured[1]))
+    bench.run(2.0)
+    assert bench.last.feedforward_v == pytest.approx(measured[1].voltage_v(12.0, 1.0)[0], abs=0.05)
+
+
 def test_the_derived_model_is_that_of_pushing_by_the_share_of_the_area() -> None:
     model, pull = bsfm(), scale_forces(bsfm(), SHARE)
     for share in (-1.0, 0.0, 1.0):

@@ -1,9 +1,11 @@
 """A rig with a valve or a self-test: what keeps it from starting, each in a sentence that says what to do."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from gateway.control import CommandMap
 from gateway.control.settings import SafeDirection
 from gateway.profiles import check_report, load_rig
 from gateway.registers.words import ControlBit
@@ -70,3 +72,9 @@ def test_a_measured_pull_comes_from_its_own_calibration(tmp_path: Path) -> None:
     rig = load_rig(tmp_path / "rig.yaml")
     assert rig.pull_calibration and rig.pull_calibration.name == "demo"
     assert load_rig("paper-pull").pull_calibration is None
+    command = CommandMap(bow=0.06, s=0.0)
+    bent = replace(rig, compensation=replace(rig.compensation, command=command))
+    for_here, as_measured = (one.calibration_in_use(one.calibration).pull_model for one in (bent, rig))
+    assert for_here and as_measured
+    assert for_here.voltage_v(12.0, 1.0)[0] == command.sent_v(as_measured.voltage_v(12.0, 1.0)[0])
+    assert for_here.voltage_v(12.0, 1.0) != as_measured.voltage_v(12.0, 1.0)
