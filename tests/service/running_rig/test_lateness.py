@@ -99,7 +99,9 @@ def test_a_stopped_process_is_told_from_a_silent_one() -> None:
     try:
         os.kill(process.pid, signal.SIGSTOP)
         os.waitid(os.P_PID, process.pid, os.WSTOPPED)
-        for now_s in range(500):  # it is told as stopped before it has left its processor, and its last turn is counted then
+        for now_s in range(
+            500
+        ):  # it is told as stopped before it has left its processor, and its last turn is counted then
             lateness.tick(now_s, None)
             held = lateness.since(now_s, now_s + 0.1, None)
             if held.rig_stopped_s:
