@@ -131,7 +131,10 @@ class LiveAnswers:
 
     def _limits(self, loop: ControlLoop) -> live.LiveLimits:
         control, command = self._rig.control, loop.bank.command
-        low_n, high_n = loop.controller.active_run.model.force_range_n
+        model = loop.controller.active_run.model
+        low_n, high_n = model.force_range_n
+        if model.limits_n:
+            low_n, high_n = max(low_n, model.limits_n[0]), min(high_n, model.limits_n[1])
         return live.LiveLimits(
             force_min_n=max(control.limits.smallest_force_n, low_n),
             force_max_n=min(control.limits.force_max_n, high_n),

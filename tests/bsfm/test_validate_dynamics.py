@@ -38,6 +38,7 @@ FAULTS = [
     (stops((0.1, 0.3), (0.6, 0.4)), 64, STIFF,
      "slip stops give way over 0.136 V at first, on a loop of up to +-0.26 V: more than 0.274 V is needed"),
     (response(damping=0.5), 99, RESPONSE, "damping 0.5: 0 for real lags, or 0.1 and more with two lags"),
+    (response(damping=1.0), 99, RESPONSE, "damping 1: 0 for real lags, or 0.1 and more with two lags"),
     (response(second_lag_s=0.02, damping=0.05), 99, RESPONSE,
      "damping 0.05: 0 for real lags, or 0.1 and more with two lags"),
     (response(dead_time_s=0.0, lag_s=0.0), 96, RESPONSE,

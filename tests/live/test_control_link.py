@@ -1,11 +1,14 @@
 """The way to control's socket: answers in order, refusals as sentences, and a restarted control is found again."""
 
 import asyncio
+import contextlib
+import json
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
 
+from gateway.live import control_link
 from gateway.live.control_link import ControlLink, ask_once
 from gateway.processes.json_messages import Answer
 from gateway.processes.json_socket import JsonLineServer
@@ -31,6 +34,37 @@ def test_questions_asked_at_once_get_their_own_answers(tmp_path: Path) -> None:
             await link.ask({"do": "refuse", "what": "butter"})
         await link.close()
         await control.close()
+
+    asyncio.run(scene())
+
+
+def test_an_answer_that_comes_too_late_is_none_to_the_next_question(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(control_link, "ANSWER_S", 0.05)
+
+    async def scene() -> None:
+        given_up, link, connections = asyncio.Event(), ControlLink(tmp_path), []
+
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            connections.append(asyncio.current_task())
+            with contextlib.suppress(ConnectionError):
+                while line := await reader.readline():
+                    request = json.loads(line)
+                    if request["n"] == 0:
+                        await given_up.wait()
+                    writer.write(json.dumps({"ok": True, "n": request["n"]}).encode() + b"\n")
+            writer.close()
+
+        async with await asyncio.start_unix_server(serve, tmp_path / "control.sock"):
+            with pytest.raises(TimeoutError):
+                await link.ask({"n": 0})
+            given_up.set()
+            monkeypatch.setattr(control_link, "ANSWER_S", 5.0)
+            answer = await link.ask({"n": 1})
+            await link.close()
+            await asyncio.gather(*connections)
+            assert answer == {"n": 1}
 
     asyncio.run(scene())
 

@@ -13,6 +13,7 @@ from gateway.registers.words import State
 from gateway.service.live_answers import AlarmTimes
 from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.starting import StartError
+from tests.control.bench import bsfm
 from tests.service.rigs import demo
 from tests.service.test_hostile_requests import Stage
 
@@ -55,6 +56,22 @@ def test_who_does_not_own_the_setpoint_may_stop_and_nothing_else(stage: Stage) -
     assert send(stage, DISABLE) == DISABLE
     stage.wired.run(0.1)
     assert stage.wired.state is State.OFF
+
+
+def test_limits_are_those_that_a_setpoint_meets(stage: Stage) -> None:
+    run = stage.wired.controller.active_run
+    run.use(bsfm())  # of 57 N
+    stage.wired.write(11, 50)
+    limits = LiveState.from_json(ask(stage, {"do": "state"})).limits
+    assert (limits.force_max_n, limits.tolerance_n) == (57.0, 0.5)
+    run.use(replace(bsfm(), limits_n=(2.0, 25.3)))
+    limits = LiveState.from_json(ask(stage, {"do": "state"})).limits
+    assert (limits.force_min_n, limits.force_max_n) == (2.0, 25.3)
+
+
+def test_the_page_has_the_role_of_every_plain_face(stage: Stage) -> None:
+    stage_order_2 = "0603e80002"
+    assert send(stage, stage_order_2) == stage_order_2, "this rig allows uploads without a certificate"
 
 
 def test_an_alarm_keeps_the_time_at_which_it_rose(stage: Stage) -> None:

@@ -16,7 +16,7 @@ def holding() -> LiveState:
         version="1",
         time_unix_s=1000.0,
         state="holding",
-        force=live.LiveForce(requested_n=12.0, accepted_n=12.0, applied_n=12.0, measured_n=11.5, pressure_kpa=200.0),
+        force=live.LiveForce(requested_n=13.0, accepted_n=12.5, applied_n=12.0, measured_n=11.5, pressure_kpa=200.0),
         calibration=live.LiveCalibration(number=3, name="ladder", age_s=60.0),
         output=live.LiveLine(port="/dev/a", asked=20, heard=19, garbled=1, age_s=0.01),
         load_cell=live.LiveLine(port="/dev/b", heard=80, age_s=0.02),

@@ -13,7 +13,7 @@ from gateway.live.live_state import LiveState
 from gateway.telemetry.broker_session import BrokerMessage
 from gateway.telemetry.edge_node import REBIRTH, EdgeNode
 from gateway.telemetry.kept_bd_seq import KeptBdSeq
-from gateway.telemetry.sparkplug_metrics import TYPES
+from gateway.telemetry.sparkplug_metrics import TYPES, values_of
 from gateway.telemetry.sparkplug_payload import DataType, SparkplugMetric, decode_values, encode_payload
 from tests.telemetry.readings import holding
 from tests.telemetry.sparkplug_schema import Payload, decoded, values
@@ -54,6 +54,12 @@ def test_a_birth_names_all_with_types_and_its_death_has_its_bd_seq() -> None:
         assert told["Force/Measured N"] == 11.5 and told["State"] == "holding" and told["Alarms/Warnings"] == "W301"
         assert {one.name: one.datatype for one in said.metrics}["Force/Measured N"] == 10
         node.lose()
+
+
+def test_no_force_is_told_under_the_name_of_another() -> None:
+    state, told = holding(), values_of(holding())
+    for name in ("measured", "requested", "accepted", "applied"):
+        assert told[f"Force/{name.capitalize()} N"] == getattr(state.force, f"{name}_n")
 
 
 def test_data_tells_what_changed_and_seq_goes_round() -> None:

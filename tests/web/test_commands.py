@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.modbus import pdu as P  # noqa: N812
 from gateway.profiles import Rig
-from gateway.registers.words import State
+from gateway.registers.words import ControlBit, State
 from gateway.web.commands import RELOAD_S, Commands, RefusedCommand
 from gateway.web.context import WebContext
 from tests.service.rigs import demo
@@ -100,6 +101,24 @@ def test_stop_ends_a_calibration_too(tmp_path: Path) -> None:
         assert wired.until(lambda: wired.state is State.OFF, 2.0) < 2.0
 
     play(tmp_path, scene)
+
+
+def test_an_enable_leaves_the_valve_where_it_stands() -> None:
+    """Another direction than the one that stands is what nobody at the page has asked for."""
+    written: list[bytes] = []
+
+    class PullingBank:
+        async def ask(self, request: dict[str, Any]) -> dict[str, Any]:
+            pdu = bytes.fromhex(request["pdu"])
+            if pdu[0] == P.READ_HOLDING_REGISTERS:
+                return {"pdu": bytes((pdu[0], 2, 0, ControlBit.VALVE_PULL)).hex()}
+            written.append(pdu)
+            return {"pdu": pdu[:5].hex()}
+
+    context = WebContext(Path(), "demo", True, PullingBank())  # type: ignore[arg-type]
+    context.__dict__["profile"] = demo()
+    asyncio.run(Commands(context).enable("me", 12.0))
+    assert written == [P.write_registers_request(0, bytes((0, ControlBit.VALVE_PULL | ControlBit.ENABLE, 4, 0xB0)))]
 
 
 @pytest.mark.parametrize("force_n", [70.0, -1.0, 1e9, float("nan"), float("inf")])

@@ -115,6 +115,22 @@ def test_every_viewer_gets_every_row_and_control_is_asked_once_for_all(
     asyncio.run(scene())
 
 
+def test_a_browser_that_closes_one_of_two_tabs_is_still_there(tmp_path: Path) -> None:
+    async def scene() -> None:
+        commands = Commands()
+        source = EventSource(Context(tmp_path), None, commands)  # type: ignore[arg-type]
+        tabs = [source.stream("me"), source.stream("me")]
+        for tab in tabs:
+            await anext(tab)
+        await tabs[0].aclose()
+        assert commands.present == ["me", "me"], "it has not left"
+        await tabs[1].aclose()
+        assert commands.present == ["me"]
+        await source.close()
+
+    asyncio.run(scene())
+
+
 def test_a_viewer_that_does_not_read_is_dropped_and_the_others_go_on(
     tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -44,6 +44,7 @@ def test_a_name_that_leads_here_is_not_this_machine(app: Any, host: str) -> None
 
 def test_a_command_needs_the_token_of_its_own_session(app: Any) -> None:
     mine, other = session_of(app), session_of(app)
+    assert mine["x-csrf-token"] not in mine["cookie"], "what a script may know opens no session"
     assert answer(app, "POST", ALIVE, mine).status == 200
     assert answer(app, "POST", ALIVE).json["reason"] == "session"
     assert answer(app, "POST", ALIVE, {"cookie": mine["cookie"]}).status == 403

@@ -9,7 +9,7 @@ import pytest
 
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
-from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, status_reading_of
+from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, HoldWrite, StatusReading, status_reading_of
 from gateway.cli.master.client import GatewayClient
 from gateway.cli.master.wires import TcpWire
 from gateway.codes.faults import FaultCode
@@ -92,6 +92,20 @@ def test_a_fault_while_holding_ends_it_and_is_reset_on_request_alone() -> None:
     again = Master(wired, 12.0, resets=True).keep(3.0)
     assert again.run.end is None
     assert wired.state is State.HOLDING, wired.log
+    wired.fault("cell-cut")
+    assert again.keep(2.0).run.end is HoldEnd.FAULT, "a reset was asked for the beginning alone"
+
+
+def test_a_ramp_is_waited_for_while_it_makes_way_and_three_seconds_more() -> None:
+    run, status = HoldRun(12.0, heartbeat=0xFFFE, resets=False), StatusReading(State.HOLDING, applied_n=12.0)
+    writes = [run.next(status, 0.0, stops=stops) for stops in (False, True)]
+    assert [write and write.heartbeat for write in writes] == [0xFFFF, 0], "a register has 16 bits"
+    for second in range(1, 9):
+        write = run.next(replace(status, applied_n=12.0 - second), float(second), stops=True)
+        assert write and write.control_word is None
+    stuck = replace(status, applied_n=4.0)
+    assert run.next(stuck, 10.9, stops=True) and run.end is None
+    assert run.next(stuck, 11.1, stops=True) == HoldWrite(10, 0) and run.end is HoldEnd.STOPPED
 
 
 def test_somebody_who_disables_ends_it() -> None:
@@ -154,6 +168,8 @@ def waited(condition: Callable[[], bool]) -> bool:
 
 def test_the_heart_beats_whatever_the_terminal_does(bank: PlainBank, serve: Serve, beating: Beating) -> None:
     """Nobody shows anything here, as when stdout blocks; and each beat has another value."""
+    bank.set("mode", 1)  # what another master has left
+    bank.set("force_ramp", 2.0)
     beat = beating(serve(bank), KnownLease(0.02))
     assert waited(lambda: len(bank.writes) > 20)
     beat.stopping.set()
@@ -169,10 +185,10 @@ def test_a_second_order_to_stop_skips_the_ramp(bank: PlainBank, serve: Serve, be
     bank.set("force_applied", 12.0)
     beat = beating(serve(bank))
     assert waited(lambda: len(bank.writes) > 2)
-    beat.stopping.set()
     beat.dropping.set()
+    beat.stopping.set()
     beat.join(5.0)
-    assert not beat.is_alive()
+    assert not beat.is_alive() and not any(words[:2] == (1, 0) for _, words in bank.writes)
     assert bank.writes[-1][1][:2] == (0, 0)
 
 

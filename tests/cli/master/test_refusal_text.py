@@ -9,10 +9,11 @@ from gateway.cli.master import local_gateways
 from gateway.cli.master.wires import RtuWire, TcpWire, Wire
 from gateway.codes.refusals import RefusalReason
 from gateway.devices.line_settings import SerialSettings
-from gateway.modbus import Role
+from gateway.modbus import ModbusError, Peer, Role
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.words import ControlBit
 from gateway.registers.writes.proposed_write import EdgeRefusal
+from tests.cli.conftest import PlainBank
 
 OWN = "tare refused: 1.56 V are out: disable the output or set the force to 0 first"
 
@@ -46,6 +47,22 @@ def test_elsewhere_the_registers_say_why_and_what_to_do(gateway: str, call, monk
         "W303 tare refused: exception 04 (device or state forbids it) to write 1 at 0; control_word = 4"
     )
     assert "force-gateway explain W303" in cure
+
+
+def test_what_the_registers_tell_of_another_request_explains_nothing(
+    register_map: RegisterMap, serve, call, monkeypatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    bank = PlainBank(register_map)
+    bank.set("refusal_address", 1)
+    bank.set("refusal_reason", RefusalReason.OUT_OF_RANGE)
+    monkeypatch.setattr(bank, "write_registers", refuse_without_a_word)
+    answer = call("write", "payload=200", "--gateway", serve(bank).address)
+    assert answer.exit_code == 1 and "exception 04" in answer.stderr and "force_setpoint" not in answer.stderr
+
+
+def refuse_without_a_word(address: int, data: bytes, peer: Peer) -> None:
+    raise ModbusError(4, "no")
 
 
 def test_who_may_not_calibrate_is_told_which_role_it_takes(
