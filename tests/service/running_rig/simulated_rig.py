@@ -71,6 +71,9 @@ class Samples:
     def tick(self, now_s: float) -> None:
         """A stream is not asked."""
 
+    def clear_faults(self) -> None:
+        """Nobody doubts what is behind the port."""
+
 
 class SmallRig:
     """Times are virtual seconds. beats: the owner's heartbeat changes every tenth of a second, where there is a lease."""
