@@ -1,5 +1,6 @@
 """Nobody alters the audit unseen, and a kill or a power cut is not called tampering."""
 
+import errno
 import json
 import os
 import random
@@ -131,6 +132,30 @@ def test_a_line_cut_anywhere_is_told_apart_from_tampering_and_the_chain_goes_on(
         last_two = [record["what"] for record in read_audit(state)][-2:]
         assert last_two == ["torn line", "disable"]
         path.write_bytes(before)
+
+
+def test_half_a_line_that_a_full_disk_took_and_kept_is_gone_before_the_next(
+    state: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, write, room = AuditFile(state, 10 * FILE_BYTES), os.write, [20]
+    file.append(records(1, 15))
+
+    def fill(descriptor: int, data: bytes) -> int:
+        if not room:
+            raise OSError(errno.ENOSPC, "full")
+        return write(descriptor, data[: room.pop()])
+
+    def refuse(descriptor: int, length: int) -> None:
+        raise OSError(errno.EIO, "broken")
+
+    with monkeypatch.context() as full:
+        full.setattr(os, "write", fill)
+        full.setattr(os, "ftruncate", refuse)
+        with pytest.raises(OSError, match="full"):
+            file.append(records(1, 16))
+    file.append(records(1, 16))
+    file.close()
+    assert (verify_audit(state).broken, verify_audit(state).end.number) == (None, 16)
 
 
 def test_lines_cut_off_at_the_end_are_tampering_and_a_new_start_hides_nothing(state: Path) -> None:

@@ -167,6 +167,14 @@ def test_warnings_of_the_line_are_passed_on():
     assert bench.run(0.1).warnings == WarningBit.SERIAL_NOISE
 
 
+def test_what_is_read_in_free_air_is_no_held_force_however_little_was_asked_for():
+    bench = Bench(contact=False)
+    bench.run(0.1)
+    bench.enable(0.8)
+    bench.run(1.5)
+    assert bench.last.force_applied_n == 0.8 and not bench.last.status & StatusBit.IN_BAND
+
+
 def test_a_lease_that_holds_keeps_the_force_and_warns():
     bench = enabled(settings(lease_s=0.2, lease_action=LeaseAction.HOLD))
     bench.heartbeat_every_ms = 50
@@ -179,6 +187,9 @@ def test_a_lease_that_holds_keeps_the_force_and_warns():
     assert bench.releases == 1
     bench.heartbeat_every_ms = 50
     assert not bench.run(0.2).warnings & WarningBit.MASTER_LOST
+    bench.heartbeat_every_ms = 0
+    assert bench.run(0.5).warnings & WarningBit.MASTER_LOST
+    assert not bench.disable().warnings & WarningBit.MASTER_LOST, "nobody is missed any more"
 
 
 def test_a_lease_that_ramps_ends_in_off_without_a_fault():

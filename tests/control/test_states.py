@@ -222,6 +222,16 @@ def test_echoes_follow_the_command():
     assert output.force_accepted_n == 0.0  # not enabled
 
 
+def test_a_reset_is_for_the_output_s_own_faults_too_whether_one_is_latched_here_or_not():
+    bench = ready()
+    assert bench.write(control_word=ControlBit.RESET_FAULT).resets_device
+    bench.enable(12.0)
+    bench.line = bench.line._replace(fault=FaultCode.OUTPUT_REFUSED)
+    assert bench.step().state is State.FAULT
+    bench.line = bench.line._replace(fault=FaultCode.NONE)
+    assert bench.reset().resets_device and bench.last.state is State.OFF
+
+
 def test_a_defect_of_ours_latches_and_the_caller_gets_the_safe_voltage():
     bench = ready()
     bench.enable(12.0)

@@ -2,8 +2,11 @@
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.plausibility import RiseCheck
+from gateway.registers.words import State
+from tests.control.bench import Bench
 
 RESTING = Reading(cell_n=1.0, interval_s=0.01, is_new=True, is_fresh=True, is_usable=True)
 
@@ -17,3 +20,16 @@ def test_a_force_that_stays_has_not_risen_however_soon_behind_the_start_it_is_en
     for _ in range(50):
         check.smooth(RESTING)
     assert check.measured_rise_n == pytest.approx(0.0)
+
+
+def test_a_scale_that_was_right_is_looked_at_again_at_the_next_enable() -> None:
+    bench = Bench(seed=3)
+    bench.run(0.3)
+    bench.enable(12.0)
+    assert bench.run(2.0).state is State.HOLDING
+    bench.disable()
+    bench.run(1.0)
+    bench.plant.unit = 9.80665
+    bench.enable(12.0)
+    bench.run(2.0)
+    assert bench.last.fault is FaultCode.GAIN_WRONG

@@ -81,6 +81,15 @@ def test_without_a_pressure_what_was_right_before_counts_and_no_more_is_claimed(
     assert told(never).endswith("no air, valve closed or no contact")
 
 
+def test_a_force_that_was_right_before_this_enable_counts_for_nothing() -> None:
+    bench = holding(Bench(seed=5))
+    bench.disable()
+    bench.run(0.5)
+    bench.plant.air = False
+    bench.enable(12.0)
+    assert told(bench).endswith("no air, valve closed or no contact")
+
+
 @pytest.mark.parametrize(("contact", "words"), [(False, "so no contact"), (True, "no air, or a closed valve")])
 def test_before_anything_was_right_the_ranges_of_the_device_say_it(contact: bool, words: str) -> None:
     bench = Measured(seed=6, contact=contact, air=not contact)
