@@ -10,7 +10,7 @@ from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.diagnostics import loopback_request, report_request
 from gateway.modbus.identification import identification_request
 from gateway.modbus.rtu import encode_adu
-from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuRequest
+from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuRequest
 from tests.modbus.rtu_bus import SILENCE_S, Bus
 
 READ = P.read_request(3, 100, 12)
@@ -269,3 +269,22 @@ def test_behind_a_plug_may_be_another_bus() -> None:
         if is_replugged:
             bus.receiver.forget()
         assert bus.send(begun).requests() == (answered() if is_replugged else [])
+
+
+def test_what_is_passed_over_in_noise_could_begin_nothing() -> None:
+    """Held against the slow way: each place by itself, a silence before it or not."""
+    for seed in range(40):
+        chance = random.Random(seed)
+        receiver = RtuReceiver(1, 19200, 11 / 19200)
+        frames = [encode_adu(chance.randrange(1, 9), pdu) for pdu in chance.sample(PDUS, 3)]
+        for part in (chance.randbytes(20), frames[0], chance.randbytes(9), frames[1][:-1], frames[2]):
+            receiver.receive(part, (receiver.deadline_s or 0.0) + chance.choice((-0.001, 0.001)))
+        last, begun = len(receiver._burst) - 1, set[int]()
+        at = receiver._next_beginning(0)
+        while at < last:
+            begun.add(at)
+            at = receiver._next_beginning(at + 1)
+        for place in set(range(last)) - begun:
+            assert place not in receiver._marks, seed
+            assert receiver._frame_size(place, is_start=False) == 0, seed
+            assert receiver._claimed_end(place) == place, seed
