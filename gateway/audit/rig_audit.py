@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Final
 
@@ -57,7 +58,13 @@ class RigAudit:
             except (ValueError, OSError) as error:
                 self._writes.note_local(verb, request, str(error))
                 raise
-            self._writes.note_local(verb, request, "accepted")
+            if isinstance(answer, Future):
+                answer.add_done_callback(lambda done: note(request, done))
+            else:
+                self._writes.note_local(verb, request, "accepted")
             return answer
+
+        def note(request: dict[str, Any], done: Future[Any]) -> None:
+            self._writes.note_local(verb, request, str(done.exception() or "accepted"))
 
         return watched

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import socket
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -29,8 +30,8 @@ class ConnectionServer(Protocol):
     def enqueue(self, turn: Callable[[], None]) -> None:
         """Put something to do at the end of the queue. It must not raise."""
 
-    def answer(self, line: bytes) -> bytes:
-        """Return the answer to one line, whatever it is."""
+    def answer(self, line: bytes) -> bytes | Future[bytes]:
+        """Return the answer to one line, whatever it is, or a future of it."""
         ...
 
     def note_activity(self, caller: "JsonConnection") -> None:
@@ -94,13 +95,19 @@ class JsonConnection:
         elif end:
             line = bytes(self._unread[:end])
             del self._unread[:end]
-            self._send(self._server.answer(line))
+            answer = self._server.answer(line)
+            if isinstance(answer, Future):
+                answer.add_done_callback(lambda done: self._server.enqueue(lambda: self._send(done.result())))
+            else:
+                self._send(answer)
         elif self._is_last:
             self.close()
         else:
             self.listen()
 
     def _send(self, data: bytes) -> None:
+        if self._is_closed:
+            return
         try:
             sent = self._peer.send(data)
         except BlockingIOError:
@@ -120,9 +127,8 @@ class JsonConnection:
         self._server.enqueue(self._send_rest)
 
     def _send_rest(self) -> None:
-        if not self._is_closed:
-            data, self._unsent = self._unsent, b""
-            self._send(data)
+        data, self._unsent = self._unsent, b""
+        self._send(data)
 
     def _continue(self) -> None:
         if self._unread:

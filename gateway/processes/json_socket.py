@@ -18,13 +18,15 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Final
 
 from gateway.processes.json_connection import JsonConnection, SocketLimits, close_with_sentence
 from gateway.processes.json_messages import Answer, encode_answer, error_answer, refuse_constant, why_too_large
 
-Handler = Callable[[dict[str, Any]], Answer]
+Handler = Callable[[dict[str, Any]], Answer | Future[Answer]]
+"""A future, done in the loop, is for what waits for a disk."""
 _LONGEST_PATH: Final = 107  # bytes, of a Unix socket's address
 _LONGEST_ANSWER: Final = 1 << 20
 _SHARE: Final = 0.1  # of the loop's time
@@ -212,13 +214,30 @@ class JsonLineServer:
 
     # -- requests
 
-    def answer(self, line: bytes) -> bytes:
-        """Return the answer to one line, whatever it is."""
-        try:
+    def answer(self, line: bytes) -> bytes | Future[bytes]:
+        """Return the answer to one line, whatever it is, or a future of it."""
+        answer: Answer | Future[Answer] = {}
+
+        def handled() -> Answer:
+            nonlocal answer
             answer = self._handle_line(line)
-            text = encode_answer(answer)
+            return {} if isinstance(answer, Future) else answer
+
+        text = self._encode(handled)
+        if not isinstance(answer, Future):
+            return text
+        later: Future[bytes] = Future()
+        answer.add_done_callback(lambda done: later.set_result(self._encode(done.result)))
+        return later
+
+    def _encode(self, take: Callable[[], Answer]) -> bytes:
+        """Return the line of the answer that is taken, or of why there is none."""
+        try:
+            text = encode_answer({"ok": True} | take())
             if len(text) > _LONGEST_ANSWER:
                 text = encode_answer(error_answer(f"the answer would have {len(text)} bytes"))
+        except (ValueError, OSError) as error:
+            text = encode_answer(error_answer(str(error)))
         except Exception as error:
             self._log(
                 "internal",
@@ -228,7 +247,7 @@ class JsonLineServer:
             text = encode_answer(error_answer(sentence))
         return text.encode() + b"\n"
 
-    def _handle_line(self, line: bytes) -> Answer:
+    def _handle_line(self, line: bytes) -> Answer | Future[Answer]:
         try:
             request = json.loads(line, parse_constant=refuse_constant)
             handler = self._handlers[request["do"]]
@@ -236,7 +255,4 @@ class JsonLineServer:
             return error_answer(f'expected {{"do": one of {", ".join(sorted(self._handlers))}, ...}}')
         if too_much := why_too_large(request):
             return error_answer(too_much)
-        try:
-            return {"ok": True} | handler(request)
-        except (ValueError, OSError) as error:
-            return error_answer(str(error))
+        return handler(request)

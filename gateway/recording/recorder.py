@@ -1,11 +1,12 @@
-"""Writes a recording from inside the control loop: one os.write per 0.1 s, and no other call that could block.
+"""Writes a recording: one os.write per 0.1 s. A gateway does so in a thread beside its control loop, for a disk may keep any
+of these calls waiting.
 
 Decisions
 - Rows go into one buffer that is reused; a batch is complete, with its CRC, before its single write. A kill -9 at any
   moment leaves whole batches and at most one torn one.
 - No fsync here: the kernel keeps what was written when the process dies; a power cut may cost the last half minute. Whoever
-  records has `sync_recording` called in a thread, once it has begun (without its header a file is nothing) and once it has
-  ended. SQLite and Parquet were rejected, for they sync as they go, and a torn Parquet file has no footer and so no data.
+  records has `sync_recording` called once it has begun (without its header a file is nothing) and once it has ended. SQLite
+  and Parquet were rejected, for they sync as they go, and a torn Parquet file has no footer and so no data.
 - A full disk ends the recording, with a sentence, never the control loop; so does who deletes its file, or the folder, while
   it is written. A disk that takes no header has no recording.
 - No numpy here: the control process needs none of it to record.
@@ -25,7 +26,7 @@ from typing import Any, Final
 from gateway.processes.durable_file import sync_path
 from gateway.recording.layout import BATCH_PREFIX, MARK, SUFFIX, batch_crc, header_bytes, number_in
 
-_FLUSH_S: Final = 0.1
+FLUSH_S: Final = 0.1
 _BATCH_ROWS: Final = 256  # a batch is written early when it is full: 2.5 kHz still gives one write per 0.1 s
 _FORMAT: Final = 1
 _DELETED: Final = "somebody has deleted its file"
@@ -80,10 +81,15 @@ class Recorder:
     def flush(self, now_s: float) -> None:
         """Write what has been gathered if 0.1 s passed since the last write. now_s: monotonic."""
         if self._next_flush_s is None:
-            self._next_flush_s = now_s + _FLUSH_S
+            self._next_flush_s = now_s + FLUSH_S
         elif self._rows and now_s >= self._next_flush_s:
+            self.write()
+            self._next_flush_s = now_s + FLUSH_S
+
+    def write(self) -> None:
+        """Write what has been gathered now."""
+        if self._rows:
             self._write_batch()
-            self._next_flush_s = now_s + _FLUSH_S
 
     def close(self) -> None:
         """Write the last rows and close the file; a second call does nothing."""

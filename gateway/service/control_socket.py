@@ -9,6 +9,7 @@ Mode 0600: whoever may write the state directory may ask. What each verb takes s
 """
 
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -72,7 +73,7 @@ class ControlSocket(JsonLineServer):
         super().__init__(state / "control.sock", parts.audit.watch_handlers(handlers), log)
         self._asked = parts
 
-    def _record(self, request: dict[str, Any]) -> dict[str, Any]:
+    def _record(self, request: dict[str, Any]) -> dict[str, Any] | Future[dict[str, Any]]:
         query, recordings = parse_request(RecordRequest, request), self._asked.recordings
         if query.on is None:
             return recordings.status()

@@ -2,8 +2,10 @@
 
 import asyncio
 import errno
+import json
 import struct
 from collections.abc import Callable, Iterable
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -249,6 +251,23 @@ def test_what_waits_at_the_end_is_written(tmp_path: Path) -> None:
     assert not verify_audit(tmp_path).broken
     with pytest.raises(FileNotFoundError):
         verify_audit(tmp_path / "audit")
+
+
+def test_what_waits_for_a_disk_is_told_with_its_end(tmp_path: Path) -> None:
+    async def run() -> None:
+        audit = RigAudit(tmp_path, lambda cause, sentence: None)
+        ends: list[Future[dict[str, Any]]] = [Future(), Future()]
+        waiting = iter(ends)
+        watched = audit.watch_handlers({"record": lambda request: next(waiting)})
+        for _ in ends:
+            watched["record"]({"do": "record", "on": True})
+        ends[1].set_exception(OSError("recordings: No space left on device"))
+        ends[0].set_result({})
+        await audit.close()
+
+    asyncio.run(run())
+    refused, accepted, _ = read_audit(tmp_path)
+    assert "No space left" in json.dumps(refused) and "accepted" in json.dumps(accepted)
 
 
 def test_a_write_that_fails_halfway_leaves_the_chain_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

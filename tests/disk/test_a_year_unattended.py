@@ -1,10 +1,9 @@
 """A year without anybody: recordings, events and audit stay within their bounds, hour by hour, in virtual time."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -18,6 +17,7 @@ from gateway.recording.care.keeping import keep_recording, prune_recordings
 from gateway.recording.label import RecordingLabel
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.running_rig.recordings import Recordings
+from tests.disk.at_once import AtOnce
 from tests.disk.failing_disks import FailingDisk
 from tests.disk.watched_disk import watching
 from tests.recording.test_care import record
@@ -27,18 +27,6 @@ HOUR_S, DAY_S = 3600.0, 86400.0
 ROWS_AN_HOUR = 150
 LIMIT = Retention(bytes=1_000_000, days=20.0)
 ROW = (1.0,) * len(COLUMNS)
-
-
-class AtOnce:
-    """Stands for `DiskWorker`: what it is given is done now."""
-
-    def __call__(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
-        done(work())
-
-    def begin(self, work: Callable[[], object]) -> None:
-        """No sync: the tests of a power cut ask for it."""
-
-    def close(self) -> None: ...
 
 
 class Calendar:
@@ -63,8 +51,11 @@ class Calendar:
 def calendar(monkeypatch: pytest.MonkeyPatch) -> Calendar:
     calendar = Calendar()
     monkeypatch.setattr("time.time", lambda: calendar.now_s)
-    for user in ("recording_retention", "recording_sync"):
+    for user in ("recording_retention", "running_rig.recordings"):
         monkeypatch.setattr(f"gateway.service.{user}.DiskWorker", AtOnce)
+    monkeypatch.setattr(
+        "gateway.service.run_recording.sync_recording", lambda path: None
+    )  # the power-cut tests ask for it
     return calendar
 
 
@@ -91,7 +82,7 @@ def test_a_year_of_recording_takes_no_more_room_than_the_limit(
     days, most_bytes, oldest_s, numbers = (365 if budget > 1 else 25), 0, 0.0, set()
     for now_s in calendar.hours(days, fast_folder):
         for _ in range(ROWS_AN_HOUR):
-            recordings._current.recorder.append(ROW)
+            recordings._current._gathered.append(ROW)
         recordings.flush(now_s)
         recordings.flush(now_s + 0.2)
         recordings.flush(now_s + 0.3)

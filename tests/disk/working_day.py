@@ -1,6 +1,7 @@
 """The whole control process in virtual time, with a force held, while it is asked for all that is stored: on any disk."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -65,11 +66,22 @@ class Day:
         assert inside is not None
         answers: list[dict[str, Any]] = []
 
-        def answer() -> None:
+        def take(read: Callable[[], dict[str, Any]]) -> None:
             try:
-                answers.append(handler({key: value for key, value in request.items() if key != "do"}))
+                answers.append(read())
             except (ValueError, OSError) as error:
                 answers.append({"error": str(error)})
+
+        def answer() -> None:
+            try:
+                given = handler({key: value for key, value in request.items() if key != "do"})
+            except (ValueError, OSError) as error:
+                answers.append({"error": str(error)})
+                return
+            if isinstance(given, Future):
+                given.add_done_callback(lambda done: take(done.result))
+            else:
+                answers.append(given)
 
         inside.call_soon(answer)
         self.simulation._run_for(STEP_S)

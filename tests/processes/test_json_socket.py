@@ -5,13 +5,14 @@ import json
 import socket
 import stat
 from collections.abc import Awaitable, Callable
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gateway.processes.json_connection import SocketLimits
-from gateway.processes.json_socket import JsonLineServer
+from gateway.processes.json_socket import Handler, JsonLineServer
 
 
 def refuse(request: dict[str, Any]) -> dict[str, Any]:
@@ -22,7 +23,11 @@ def no_space(request: dict[str, Any]) -> dict[str, Any]:
     raise OSError(28, "No space left on device")
 
 
-HANDLERS = {"echo": lambda request: {"said": request.get("say")}, "refuse": refuse, "record": no_space}
+HANDLERS: dict[str, Handler] = {
+    "echo": lambda request: {"said": request.get("say")},
+    "refuse": refuse,
+    "record": no_space,
+}
 Scene = Callable[[Path], Awaitable[None]]
 
 
@@ -70,6 +75,58 @@ def test_a_refusal_and_a_full_disk_are_sentences(tmp_path: Path) -> None:
     assert refused == {"ok": False, "error": "already recording"}
     assert full["ok"] is False
     assert "No space left" in full["error"]
+
+
+def test_an_answer_that_a_disk_is_waited_for_comes_later_and_others_are_answered_meanwhile(tmp_path: Path) -> None:
+    waiting: list[Future[dict[str, Any]]] = []
+
+    def wait(request: dict[str, Any]) -> Future[dict[str, Any]]:
+        waiting.append(Future())
+        return waiting[-1]
+
+    async def scene(path: Path) -> None:
+        slow, to_slow = await asyncio.open_unix_connection(str(path))
+        to_slow.write(b'{"do": "wait"}\n{"do": "wait"}\n')
+        other, to_other = await asyncio.open_unix_connection(str(path))
+        while not waiting:
+            to_other.write(b'{"do": "echo", "say": 1}\n')
+            assert json.loads(await other.readline())["said"] == 1
+        assert len(waiting) == 1, "one request at a time"
+        waiting[0].set_result({"written": 7})
+        assert json.loads(await slow.readline()) == {"ok": True, "written": 7}
+        while len(waiting) < 2:
+            await asyncio.sleep(0)
+        waiting[1].set_exception(OSError(28, "No space left on device"))
+        assert "No space left" in json.loads(await slow.readline())["error"]
+        for writer in (to_slow, to_other):
+            writer.close()
+            await writer.wait_closed()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(HANDLERS, "wait", wait)
+        assert with_server(tmp_path, scene) == []
+
+
+def test_an_answer_for_a_caller_that_has_left_goes_nowhere(tmp_path: Path) -> None:
+    waiting: list[Future[dict[str, Any]]] = []
+
+    async def scene(path: Path) -> None:
+        _, writer = await asyncio.open_unix_connection(str(path))
+        writer.write(b'{"do": "wait"}\n')
+        while not waiting:
+            await asyncio.sleep(0)
+        writer.close()
+        await writer.wait_closed()
+        waiting[0].set_result({})
+        reader, writer = await asyncio.open_unix_connection(str(path))
+        writer.write(b'{"do": "echo", "say": 2}\n')
+        assert json.loads(await reader.readline())["said"] == 2
+        writer.close()
+        await writer.wait_closed()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(HANDLERS, "wait", lambda request: waiting.append(Future()) or waiting[-1])
+        assert with_server(tmp_path, scene) == []
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,10 @@
 Seeded: a failure names its line, and the next run has it again.
 """
 
+import asyncio
 import json
 import time
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,7 @@ from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
 from gateway.service.simulation.requests import SimulationRequests
 from gateway.service.simulation.world import SimulatedRig
 from gateway.service.watch_reports import WatchReports
+from tests.disk.at_once import AtOnce
 from tests.service.hostile import garbage, mutants
 from tests.service.wired import ENABLE, MASTER, Wired
 
@@ -79,9 +82,11 @@ class Stage:
         wired = self.wired
         self.said: list[str] = []
         log = lambda cause, sentence: self.said.append(sentence)  # noqa: E731
-        self.recordings = Recordings(self.state / "recordings", wired.rig, log)  # type: ignore[arg-type]
+        self.recordings = Recordings(self.state / "recordings", wired.rig, log, AtOnce())  # type: ignore[arg-type]
         wired.loop.recordings = self.recordings
-        self.calibration_runs = CalibrationRuns(wired.controller, wired.rig, self.state, lambda: wired.now_s, log)
+        self.calibration_runs = CalibrationRuns(
+            wired.controller, wired.rig, self.state, lambda: wired.now_s, log, AtOnce()
+        )  # type: ignore[arg-type]
         wired.loop.calibration_runs = self.calibration_runs
         self.upload = RigCalibrations(wired.rig, self.state).serve(wired.bank, lambda taken: None, log)
         self.upload.run_in_background = lambda work, done: None  # type: ignore[assignment]  # a disk that never answers
@@ -111,13 +116,15 @@ class Stage:
 
     def close(self) -> None:
         self.recordings.stop()
-        self.calibration_runs.close()
+        asyncio.run(self.calibration_runs.close())
         self.upload.close()
 
 
 def assert_answered(server: JsonLineServer, line: bytes) -> dict[str, Any]:
     """The answer, which must be one line of true JSON, and no internal error."""
     data = server.answer(line)
+    if isinstance(data, Future):
+        data = data.result(timeout=0.0)
     assert data.count(b"\n") == 1 and data.endswith(b"\n")
     answer: dict[str, Any] = json.loads(data, parse_constant=pytest.fail)
     assert answer["ok"] is True or (answer["ok"] is False and isinstance(answer["error"], str) and answer["error"])

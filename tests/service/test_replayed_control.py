@@ -11,13 +11,14 @@ from gateway.recording import Recording, RecordingError, list_recordings, read_r
 from gateway.registers.words import State
 from gateway.service.replayed_control import ReplaySetup, SignalDifference, compare_decisions, replay_control
 from gateway.service.running_rig.recordings import Recordings
+from tests.disk.at_once import AtOnce
 from tests.service.wired import ENABLE, Wired
 
 
 def record_work(state: Path) -> Recording:
     """Record three levels of force, from OFF to OFF."""
     wired = Wired().ready()
-    recordings = Recordings(state / "recordings", wired.rig, lambda cause, sentence: None)
+    recordings = Recordings(state / "recordings", wired.rig, lambda cause, sentence: None, AtOnce())
     recordings.start()
     wired.loop.recordings = recordings
     wired.run(0.2)

@@ -189,7 +189,8 @@ def simulated_edges() -> Any:
             "gateway.service.running_rig.rig_plants",
             "gateway.audit.audit_log",
             "gateway.service.recording_retention",
-            "gateway.service.recording_sync",
+            "gateway.service.running_rig.calibration_runs",
+            "gateway.service.running_rig.recordings",
         ):
             patch.setattr(f"{user}.DiskWorker", SimulatedDisk)
         collector = SimpleNamespace(collect=lambda: None, freeze=lambda: None)

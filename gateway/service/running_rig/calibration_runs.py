@@ -1,13 +1,16 @@
 """Keeps a calibration run or experiment: starts it for this machine, records it, and has a ladder fitted when it is done.
 
 The recording is one of its own, beside whatever else is recorded, with the plan in its header and, of a ladder, the stair in
-each row; it stays whatever becomes of the run. A disk that does not take it ends the run: a ladder without data is wear for
-nothing. One more row after the last stair says that this one was finished, too. A run
-that a person at this machine has started is stopped when nobody has asked for its status for FOLLOWED_S: a closed terminal
-must not leave a tool climbing stairs.
+each row; it stays whatever becomes of the run, whose end is told here once its file is closed. A disk that does not take it
+ends the run: a ladder without data is wear for nothing. One more row after the last stair says that this one was finished,
+too. A run that a person at this machine has started is stopped when nobody has asked for its status for FOLLOWED_S: a closed
+terminal must not leave a tool climbing stairs.
 """
 
+import asyncio
+import contextlib
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -19,26 +22,35 @@ from gateway.control.runs.active_run import RecordedPlan, RecordedRun
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.experiment_run import ExperimentRun
 from gateway.devices.messages import ForceSample
+from gateway.processes.disk_worker import DiskWorker
 from gateway.profiles import Rig
 from gateway.profiles.kinds.plans import plan_document, plan_of
 from gateway.recording import Recorder
 from gateway.registers.words import CalibrationPhase
-from gateway.service.recording_sync import RecordingSync
+from gateway.service.run_recording import RunRecording
 from gateway.service.running_rig.fit_launcher import FitLauncher, Result
 from gateway.service.running_rig.lines.output_line import LineState
-from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
+from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.socket_requests import CalibrateRequest, EmptyRequest, parse_request
 
 FOLLOWED_S: Final = 3.0
+_END_BOUND_S: Final = 1.0
 _CLOSING_S: Final = 1.0  # without a sample for so long after the last stair the run is recorded as cut there
 Answer = dict[str, Any]
 
 
 class CalibrationRuns:
-    """stored: number of the calibration that the last run gave, 0 for none. Called from the loop only."""
+    """stored: number of the calibration that the last run gave, 0 for none. Called from the loop only. disk: a thread, where
+    none is given."""
 
     def __init__(
-        self, controller: Controller, rig: Rig, state: Path, clock: Callable[[], float], log: Callable[[str, str], None]
+        self,
+        controller: Controller,
+        rig: Rig,
+        state: Path,
+        clock: Callable[[], float],
+        log: Callable[[str, str], None],
+        disk: DiskWorker | None = None,
     ) -> None:
         self.stored = 0
         self._controller = controller
@@ -47,14 +59,16 @@ class CalibrationRuns:
         self._state = state
         self._clock = clock
         self._log = log
-        self._sync = RecordingSync(log)
+        self._disk = disk or DiskWorker()
         self._continues: tuple[int, ...] = ()
         self._name = ""
         self._stairs = 0
         self._closing_s: float | None = None
         self._payload_n = 0.0
         self._recording: RunRecording | None = None
-        self._path: Path | None = None
+        self._last: RunRecording | None = None
+        self._phase_before_end = CalibrationPhase.IDLE
+        self._is_closing = False
         self._child: FitLauncher | None = None
         self._result: Result = {}
         self._ended = ""
@@ -122,8 +136,8 @@ class CalibrationRuns:
         calibrating, decision = self._calibrating, self._decision
         run = calibrating.recorded
         return {
-            "running": calibrating.running,
-            "phase": calibrating.phase.name.lower(),
+            "running": calibrating.running or self._is_closing,
+            "phase": (self._phase_before_end if self._is_closing else calibrating.phase).name.lower(),
             "progress": calibrating.progress,
             "eta_s": round(calibrating.eta_s, 1),
             **_describe_progress(run),
@@ -132,7 +146,7 @@ class CalibrationRuns:
             "force_n": decision.force_measured_n
             if decision and decision.force_measured_n == decision.force_measured_n
             else None,
-            "recording": str(self._path) if self._path else None,
+            "recording": str(self._last.path) if self._last and self._last.path else None,
             "ended": self._ended,
             "result": self._result,
         }
@@ -143,6 +157,8 @@ class CalibrationRuns:
         """Follow the run; to be called after each step of the controller."""
         self._decision = decision
         calibrating = self._calibrating
+        if calibrating.running:
+            self._phase_before_end = calibrating.phase
         if calibrating.recorded and self._recording is None:
             self._begin()
         elif self._closing_s is not None:
@@ -150,7 +166,7 @@ class CalibrationRuns:
                 self._close_ladder()
         elif self._recording is not None and not calibrating.running:
             self._end(decision)
-        elif self._recording is not None and (failure := self._recording.recorder.failure):
+        elif self._recording is not None and (failure := self._recording.failure):
             calibrating.ask_stop(f"A330 calibration stopped: {failure}")
         elif calibrating.running and calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
             calibrating.ask_stop("A330 calibration stopped: nobody at this machine follows it any more")
@@ -176,18 +192,20 @@ class CalibrationRuns:
         return float(self._calibrating.phase), float(group), float(run.done)
 
     def flush(self, now_s: float) -> None:
-        """Write what has been recorded to the file."""
-        if self._recording:
-            self._recording.recorder.flush(now_s)
+        """Hand over what has been recorded, once a tick."""
+        if self._last:
+            self._last.flush(now_s)
 
-    def close(self) -> None:
-        """Close the recording and the line to a fit under way."""
+    async def close(self) -> None:
+        """Close the recording and the line to a fit under way. A disk that takes nothing for a second is not waited for."""
         if self._recording:
-            self._recording.recorder.close()
-            self._sync(self._recording.recorder.path)
+            closed: Future[None] = Future()
+            self._recording.close(lambda: closed.set_result(None))
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(asyncio.wrap_future(closed), _END_BOUND_S)
         if self._child:
             self._child.close()
-        self._sync.close()
+        self._disk.close()
 
     def _begin(self) -> None:
         run, rig = self._calibrating.recorded, self._rig
@@ -206,47 +224,55 @@ class CalibrationRuns:
             "zero_n": self._controller.zero_n,
         }
         columns = COLUMNS if isinstance(run, ExperimentRun) else (*COLUMNS, *LABELS)
-        try:
-            recorder = Recorder(self._state / "recordings", header, columns)
-        except OSError as error:
-            self._calibrating.ask_stop(f"A330 calibration stopped: the recording cannot be written: {error.strerror}")
-            return
-        self._recording, self._path = RunRecording(recorder), recorder.path
-        self._sync(recorder.path)
+        folder = self._state / "recordings"
+        self._recording = self._last = RunRecording(self._disk, lambda: Recorder(folder, header, columns), self._log)
+        self._is_closing = False
+        self._recording.begin(self._on_opened)
         self._continues, self._name = (), ""
+
+    def _on_opened(self, error: OSError | None) -> None:
+        if error and self._calibrating.running:
+            self._calibrating.ask_stop(f"A330 calibration stopped: the recording cannot be written: {error.strerror}")
 
     def _end(self, decision: Output) -> None:
         assert self._recording
+        self._ended = decision.events[0] if decision.events else ""
         if self._calibrating.phase is CalibrationPhase.FITTING:
             self._closing_s = self._clock()
-            self._ended = decision.events[0] if decision.events else ""
             return
-        recorder, self._recording = self._recording.recorder, None
-        recorder.close()
-        self._sync(recorder.path)
-        self._ended = decision.events[0] if decision.events else ""
-        if recorder.failure:
-            self._ended = recorder.failure
-            self._calibrating.phase = CalibrationPhase.STOPPED
+        recording, self._recording = self._recording, None
+        self._is_closing = True
+        recording.close(lambda: self._on_closed(recording))
+
+    def _on_closed(self, recording: RunRecording) -> None:
+        if recording is not self._last:
+            return
+        self._is_closing = False
+        if recording.failure:
+            self._tell_failure(recording.failure)
         elif self._calibrating.phase is CalibrationPhase.RECORDED:
-            self._log("calibration", f"experiment recorded in {recorder.path}; force-gateway diagnose takes it")
+            self._log("calibration", f"experiment recorded in {recording.path}; force-gateway diagnose takes it")
+
+    def _tell_failure(self, failure: str) -> None:
+        self._ended = failure
+        self._calibrating.phase = CalibrationPhase.STOPPED
 
     def _close_ladder(self) -> None:
         """A finished ladder is fitted, if the disk took all of it."""
         assert self._recording
-        recorder, self._recording, self._closing_s = self._recording.recorder, None, None
-        recorder.close()
-        self._sync(recorder.path)
-        if recorder.failure:
-            self._ended = recorder.failure
-            self._calibrating.phase = CalibrationPhase.STOPPED
-        else:
-            try:
-                self._child = FitLauncher(recorder.path, self._rig.file, self._state, self._on_result)
-            except OSError as error:  # no process, memory or descriptor
-                self._on_result(
-                    {"refused": f"A331 the fit did not start: {error.strerror}; force-gateway fit {recorder.number}"}
-                )
+        recording, self._recording, self._closing_s = self._recording, None, None
+        recording.close(lambda: self._fit(recording))
+
+    def _fit(self, recording: RunRecording) -> None:
+        if recording.failure or not recording.path:
+            self._tell_failure(recording.failure or "the disk took no recording")
+            return
+        try:
+            self._child = FitLauncher(recording.path, self._rig.file, self._state, self._on_result)
+        except OSError as error:  # no process, memory or descriptor
+            self._on_result(
+                {"refused": f"A331 the fit did not start: {error.strerror}; force-gateway fit {recording.number}"}
+            )
 
     def _on_result(self, result: Result) -> None:
         self._child, self._result = None, result

@@ -7,7 +7,6 @@ this row.
 
 from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample, Quality
-from gateway.recording import Recorder
 from gateway.recording.tables.column_names import DERIVED, SENT
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.units import kilopascal_from_pascal
@@ -36,24 +35,3 @@ def row_of(time_s: float, sample: ForceSample, decision: Output, line: LineState
         line.sent_v,
         sample.time_s - line.sent_s,
     )
-
-
-class RunRecording:
-    """One open recording; time_s counts from its first row."""
-
-    def __init__(self, recorder: Recorder) -> None:
-        self._recorder = recorder
-        self._start_s: float | None = None
-        self.rows = 0
-
-    @property
-    def recorder(self) -> Recorder:
-        """The recorder of the run's file."""
-        return self._recorder
-
-    def append(self, sample: ForceSample, decision: Output, line: LineState, *labels: float) -> None:
-        """Append a row. labels: of the columns that a run adds."""
-        if self._start_s is None:
-            self._start_s = sample.time_s
-        self.rows += 1
-        self._recorder.append(row_of(sample.time_s - self._start_s, sample, decision, line) + labels)

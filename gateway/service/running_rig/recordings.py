@@ -1,43 +1,52 @@
 """The running gateway's recording: at most one, started and stopped on command; a full disk ends it, not the control, and it
-goes on by itself when there is room (recording_again.py).
+goes on by itself when there is room (recording_again.py). Nothing here waits for the disk (run_recording.py).
 
 One that goes on for ever goes on in another file after a day, or when it is as long as one may be, so that whoever prunes
 recordings has something to prune, and no file is too long to be read.
 """
 
+import asyncio
 import contextlib
+from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Final
 
 from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample
 from gateway.plants.in_use import in_use_facts
+from gateway.processes.disk_worker import DiskWorker
 from gateway.processes.event_log import EventLog
 from gateway.profiles import Rig
 from gateway.recording import Recorder
 from gateway.recording.label import NO_LABEL, RecordingLabel
 from gateway.service.recording_retention import RecordingRetention
-from gateway.service.recording_sync import RecordingSync
+from gateway.service.run_recording import RunRecording
 from gateway.service.running_rig.lines.output_line import LineState
-from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
+from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.running_rig.recording_again import RecordingAgain
 
 LONGEST_BYTES: Final = 256 << 20
 LONGEST_S: Final = 86400.0
 _SHARES: Final = 8
 """How many files there are at least in what a rig's limits have room for."""
+_END_BOUND_S: Final = 1.0
+Answer = dict[str, Any]
+Opened = Callable[[RunRecording, OSError | None], None]
 
 
 class Recordings:
-    """Recordings of a rig: at most one open file, each under its time."""
+    """Recordings of a rig: at most one open file, each under its time. disk: a thread by default. What is asked here is
+    answered by a future of the loop: it is done when the disk has done its part."""
 
-    def __init__(self, directory: Path, rig: Rig, log: EventLog) -> None:
+    def __init__(self, directory: Path, rig: Rig, log: EventLog, disk: DiskWorker | None = None) -> None:
         self._directory = directory
         self._rig = rig
         self._log = log
+        self._disk = disk or DiskWorker()
         self._current: RunRecording | None = None
+        self._closing: list[RunRecording] = []
         self._retention = RecordingRetention(directory.parent, rig.retention, log)
-        self._sync = RecordingSync(log)
         self._again = RecordingAgain()
         days, most = rig.retention.days, rig.retention.bytes
         self._longest_bytes = LONGEST_BYTES if most is None else min(LONGEST_BYTES, most // _SHARES)
@@ -49,20 +58,29 @@ class Recordings:
         self.calibration = rig.calibration
         self.plant_in_use = in_use_facts(rig)
 
-    def start(self, label: RecordingLabel = NO_LABEL, for_s: float = 0.0) -> dict[str, Any]:
-        """Begin a recording; ValueError when one is running, OSError where the disk takes none: one that waits for room goes on
-        waiting. for_s: it ends by itself so long after the next tick, 0: it does not."""
+    def start(self, label: RecordingLabel = NO_LABEL, for_s: float = 0.0) -> Future[Answer]:
+        """Begin a recording; ValueError when one is running. The answer is the status, or OSError where the disk takes none:
+        one that waits for room goes on waiting. for_s: it ends by itself so long after the next tick, 0: it does not."""
         if self._current:
-            raise ValueError(f"already recording to {self._current.recorder.path}")
-        self._label, self._for_s, self._ends_s, self._began_s = label, for_s, None, None
-        try:
-            self._begin()
-        except OSError as error:
-            raise OSError(f"{self._directory}: {error.strerror or error}") from error
-        self._again.forget()
-        return self.status()
+            raise ValueError(f"already recording to {self._current.path}")
+        return self._start(label, for_s, waits_for_room=False)
 
-    def _begin(self) -> None:
+    def _start(self, label: RecordingLabel, for_s: float, *, waits_for_room: bool) -> Future[Answer]:
+        self._label, self._for_s, self._ends_s = label, for_s, None
+        answer: Future[Answer] = Future()
+
+        def opened(fresh: RunRecording, error: OSError | None) -> None:
+            if error:
+                answer.set_exception(OSError(f"{self._directory}: {error.strerror or error}"))
+            else:
+                self._again.forget()
+                answer.set_result(_facts_of(fresh))
+
+        self._begin(opened, waits_for_room=waits_for_room)
+        return answer
+
+    def _begin(self, opened: Opened, *, waits_for_room: bool = True) -> None:
+        """Begin a file. waits_for_room: where the disk takes none it is tried again, unless somebody has ended it by then."""
         rig, label = self._rig, self._label
         header = {
             **label.as_header(),
@@ -75,60 +93,87 @@ class Recordings:
             "simulated": rig.simulated,
             "seed": rig.seed,
         }
-        self._current, self._began_s = RunRecording(Recorder(self._directory, header, COLUMNS)), None
-        self._sync(self._current.recorder.path)
+        recording = RunRecording(self._disk, lambda: Recorder(self._directory, header, COLUMNS), self._log)
+
+        def tell(error: OSError | None) -> None:
+            if error and self._current is recording:
+                self._current = None
+                if waits_for_room:
+                    self._again.ask(str(error))
+            opened(recording, error)
+
+        self._current, self._began_s = recording, None
+        recording.begin(tell)
 
     def use_plant(self, rig: Rig) -> None:
         """Note the plant that is in use from now on. A recording that runs goes on in another file: it says of all its rows
         how they were read."""
         self.plant_in_use = in_use_facts(rig)
         if self._current:
-            self._go_on_in_another("with the plant in use")
+            self._go_on_in_another(self._current, "with the plant in use")
 
-    def _go_on_in_another(self, why: str) -> None:
-        ended = self.stop()
-        try:
-            self._begin()
-            self._log("recording", f"{ended['written']} ends {why}, {self.status()['recording']} goes on")
-        except OSError as error:
-            self._again.ask(str(error))
-            self._log("recording", f"E402 {ended['written']} ends {why}, not recording: {error}; control goes on")
+    def _go_on_in_another(self, ended: RunRecording, why: str) -> None:
+        def opened(fresh: RunRecording, error: OSError | None) -> None:
+            if error:
+                self._log("recording", f"E402 {ended.path} ends {why}, not recording: {error}; control goes on")
+            else:
+                self._log("recording", f"{ended.path} ends {why}, {fresh.path} goes on")
 
-    def try_start(self) -> tuple[str, ...]:
+        self._end(ended, lambda: None)
+        self._begin(opened)
+
+    def try_start(self) -> Future[tuple[str, ...]]:
         """Begin a recording; a sentence where the disk takes none, which is no reason not to control."""
-        try:
-            self.start()
-        except OSError as error:
-            self._again.ask(str(error))
-            return (f"not recording: {error}",)
-        return ()
+        notes: Future[tuple[str, ...]] = Future()
 
-    def stop(self) -> dict[str, Any]:
+        def started(answer: Future[Answer]) -> None:
+            error = answer.exception()
+            notes.set_result((f"not recording: {error}",) if error else ())
+
+        self._start(NO_LABEL, 0.0, waits_for_room=True).add_done_callback(started)
+        return notes
+
+    def stop(self) -> Future[Answer]:
         """End the recording, if there is one; return where it is and how many rows the disk has taken, and as `fault` why not
         all of them."""
+        answer: Future[Answer] = Future()
         self._again.forget()
-        if not self._current:
-            return {"recording": None}
-        recorder, self._current = self._current.recorder, None
-        recorder.close()
-        self._sync(recorder.path)
-        answer = {"recording": None, "written": str(recorder.path), "rows": recorder.rows_written}
-        if recorder.failure:
-            self._log("recording", recorder.failure)
-            answer["fault"] = recorder.failure
+        if not (ended := self._current):
+            answer.set_result({"recording": None})
+            return answer
+
+        def closed() -> None:
+            facts: Answer = {"recording": None}
+            if ended.path:
+                facts |= {"written": str(ended.path), "rows": ended.rows_written}
+            answer.set_result(facts | {"fault": ended.failure} if ended.failure else facts)
+
+        self._end(ended, closed)
         return answer
 
-    def close(self) -> None:
-        """End the recording, if there is one, for good."""
-        self.stop()
-        self._retention.close()
-        self._sync.close()
+    def _end(self, ended: RunRecording, closed: Callable[[], None]) -> None:
+        def tell() -> None:
+            self._closing.remove(ended)
+            if ended.failure:
+                self._log("recording", ended.failure)
+            closed()
 
-    def status(self) -> dict[str, Any]:
+        self._current = None
+        self._closing.append(ended)
+        ended.close(tell, drops_empty=bool(ended.failure))
+
+    async def close(self) -> None:
+        """End the recording, if there is one, for good. A disk that takes nothing for a second is not waited for."""
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(asyncio.wrap_future(self.stop()), _END_BOUND_S)
+        self._retention.close()
+        self._disk.close()
+
+    def status(self) -> Answer:
         """Return where the current recording is and how many rows it has; `waits`: why there is none until there is room."""
-        if not self._current:
-            return {"recording": None, "waits": self._again.why} if self._again.why else {"recording": None}
-        return {"recording": str(self._current.recorder.path), "rows": self._current.rows}
+        if self._current and self._current.path:
+            return _facts_of(self._current)
+        return {"recording": None, "waits": self._again.why} if self._again.why else {"recording": None}
 
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
         """Append a row to the open recording, if there is one."""
@@ -136,43 +181,41 @@ class Recordings:
             self._current.append(sample, decision, line)
 
     def flush(self, now_s: float) -> None:
-        """Write what waits, once a tick. A recorder that has stopped (disk full) is logged once and dropped; one whose time is
-        over ends. What there is no room for goes."""
+        """Hand over what waits, once a tick. A recording that has stopped (disk full) is logged once and dropped; one whose
+        time is over ends. What there is no room for goes."""
         self._retention.tick(now_s)
-        if self._current:
-            recorder = self._current.recorder
-            recorder.flush(now_s)
-            if recorder.failure:
-                self._end_failed(recorder, now_s)
+        for ended in tuple(self._closing):
+            ended.flush(now_s)
+        if recording := self._current:
+            recording.flush(now_s)
+            if recording.failure:
+                self._end_failed(recording, now_s)
             elif self._is_over(now_s):
-                ended = self.stop()
-                self._log("recording", f"{ended['written']} ends after {self._for_s:g} s, {ended['rows']} rows")
-            elif self._is_long(recorder.size_bytes, now_s):
-                self._go_on_in_another("as long as one may be")
+                self._end(recording, lambda: self._tell_over(recording))
+            elif self._is_long(recording.size_bytes, now_s):
+                self._go_on_in_another(recording, "as long as one may be")
                 self._retention.hasten()
         elif self._again.is_due(now_s):
             self._try_again(now_s)
 
-    def _end_failed(self, recorder: Recorder, now_s: float) -> None:
-        self._log("recording", recorder.failure or "")
-        self._current = None
-        if not recorder.rows_written:
-            with contextlib.suppress(OSError):
-                recorder.path.unlink()
+    def _tell_over(self, ended: RunRecording) -> None:
+        self._log("recording", f"{ended.path} ends after {self._for_s:g} s, {ended.rows_written} rows")
+
+    def _end_failed(self, recording: RunRecording, now_s: float) -> None:
+        self._end(recording, lambda: None)
         self._again.note_lasting(now_s - (now_s if self._began_s is None else self._began_s))
-        self._again.ask(recorder.failure or "")
+        self._again.ask(recording.failure or "")
 
     def _try_again(self, now_s: float) -> None:
+        def opened(fresh: RunRecording, error: OSError | None) -> None:
+            if not error:
+                self._again.forget()
+                self._log("recording", f"it goes on: recording to {fresh.path}")
+
         if self._is_over(now_s):
             self._again.forget()
-            return
-        try:
-            self._begin()
-        except OSError as error:
-            self._again.ask(str(error))
-            return
-        self._again.forget()
-        self._log("recording", f"it goes on: recording to {self.status()['recording']}")
+        else:
+            self._begin(opened)
 
     def _is_long(self, size_bytes: int, now_s: float) -> bool:
         if self._began_s is None:
@@ -183,3 +226,7 @@ class Recordings:
         if self._for_s and self._ends_s is None:
             self._ends_s = now_s + self._for_s
         return self._ends_s is not None and now_s >= self._ends_s
+
+
+def _facts_of(recording: RunRecording) -> Answer:
+    return {"recording": str(recording.path), "rows": recording.rows}

@@ -175,7 +175,7 @@ class RunningRig:
             await asyncio.wait_for(self._spoke.wait(), _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S)
         notes = await self._notes(restarted)
         if record:
-            notes += self._recordings.try_start()
+            notes += await asyncio.wrap_future(self._recordings.try_start())
         if unserved := await self._control_socket.start():
             notes += (f"E152 {unserved}",)
         for note in notes:
@@ -267,8 +267,8 @@ class RunningRig:
             await self._ports.write_last(self._last_frame)
         await self._faces.close()
         await self._control_socket.close()
-        self._recordings.close()
-        self._calibration_runs.close()
+        await self._recordings.close()
+        await self._calibration_runs.close()
         await self._audit.close()
         for part in (self._ports, self._upload, self._plants, self._counters, self._lateness):
             part.close()

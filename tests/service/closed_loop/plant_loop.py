@@ -12,6 +12,7 @@ from gateway.recording import Recording, list_recordings, read_recording
 from gateway.registers.words import State
 from gateway.service.running_rig.recordings import Recordings
 from gateway.twin.plant import with_value
+from tests.disk.at_once import AtOnce
 from tests.service.rigs import demo
 from tests.service.wired import ENABLE, Wired
 
@@ -46,7 +47,7 @@ class Machine:
     def record(self, plant: NumberedPlant | None, rounds: int = 1) -> Recording:
         """Work for some rounds under command and record it in the state directory."""
         wired = self.wired(plant).ready()
-        recordings = Recordings(self.state / "recordings", wired.rig, _Log())
+        recordings = Recordings(self.state / "recordings", wired.rig, _Log(), AtOnce())
         recordings.start()
         wired.loop.recordings = recordings
         work(wired, rounds)

@@ -9,6 +9,7 @@ from gateway.control.runs.ladder_stairs import QUICK
 from gateway.recording import read_recording
 from gateway.registers.words import CalibrationPhase, State
 from gateway.service.running_rig.calibration_runs import FOLLOWED_S, CalibrationRuns
+from tests.disk.at_once import AtOnce
 from tests.service.wired import ENABLE, Wired
 
 PLAN = {"step_v": QUICK.step_v, "groups": QUICK.groups, "minor_points": QUICK.minor_points}
@@ -22,6 +23,7 @@ def kept(wired: Wired, state: Path) -> CalibrationRuns:
         state,
         lambda: wired.now_s,
         lambda cause, sentence: wired.log.append((wired.now_s, sentence)),
+        AtOnce(),
     )
     wired.loop.calibration_runs = runs
     wired.run(0.1)
@@ -80,11 +82,11 @@ def test_a_disk_that_takes_no_more_ends_the_run_for_its_stairs_would_be_wear_for
     wired = Wired().ready()
     runs = kept(wired, tmp_path)
     runs.answer({"plan": PLAN})
-    wired.run(1.0)
     runs.flush(0.0)
+    wired.run(1.0)
     with open("/dev/full", "wb", buffering=0) as full:  # noqa: PTH123
-        assert runs._recording and runs._recording.recorder._descriptor
-        os.dup2(full.fileno(), runs._recording.recorder._descriptor)
+        assert runs._recording and runs._recording._file
+        os.dup2(full.fileno(), runs._recording._file._descriptor)
     runs.flush(1.0)
     wired.until(lambda: not runs.answer({})["running"], FOLLOWED_S)
     assert "E402" in runs.status()["ended"] and "No space left" in runs.status()["ended"]

@@ -14,6 +14,7 @@ from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, row_of
 from gateway.service.running_rig.recordings import LONGEST_S, Recordings
 from tests.control.bench import bsfm
+from tests.disk.at_once import AtOnce
 from tests.service.rigs import demo
 
 
@@ -24,7 +25,7 @@ class Log(list[str]):
 
 @pytest.fixture
 def recordings(tmp_path: Path) -> Recordings:
-    return Recordings(tmp_path / "recordings", demo(), Log())
+    return Recordings(tmp_path / "recordings", demo(), Log(), AtOnce())
 
 
 def test_a_row_is_in_the_units_of_its_columns() -> None:
@@ -97,11 +98,11 @@ def test_a_disk_that_takes_no_header_has_no_recording_and_says_so(
 ) -> None:
     monkeypatch.setattr(os, "write", lambda descriptor, data: 3)
     with pytest.raises(OSError, match="No space left"):
-        recordings.start()
+        recordings.start().result()
     monkeypatch.undo()
     assert recordings.status() == {"recording": None}
     assert list_recordings(tmp_path) == []
-    assert recordings.start()["recording"].endswith("0001.fgr")
+    assert recordings.start().result()["recording"].endswith("0001.fgr")
     recordings.stop()
 
 
@@ -114,8 +115,8 @@ def test_one_that_a_full_disk_has_ended_goes_on_when_there_is_room(
     real_write, is_full = os.write, [True]
     monkeypatch.setattr(os, "write", lambda descriptor, data: real_write(descriptor, data[:3] if is_full[0] else data))
     begin, tries = recordings._begin, []
-    monkeypatch.setattr(recordings, "_begin", lambda: (tries.append(now_s), begin()))
-    recordings._current.recorder.append((0.0,) * len(COLUMNS))
+    monkeypatch.setattr(recordings, "_begin", lambda opened: (tries.append(now_s), begin(opened)))
+    recordings._current._gathered.append((0.0,) * len(COLUMNS))
     for now_s in range(300):
         recordings.flush(float(now_s))
     assert tries == [32, 93, 214]
@@ -137,9 +138,9 @@ def test_whoever_ends_one_that_waits_for_room_has_ended_it(
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(os, "write", lambda descriptor, data: 3)
-        assert "No space left" in recordings.try_start()[0]
+        assert "No space left" in recordings.try_start().result()[0]
         recordings.flush(0.0)
-    assert recordings.stop() == {"recording": None}
+    assert recordings.stop().result() == {"recording": None}
     recordings.flush(1000.0)
     assert recordings.status() == {"recording": None}
 
@@ -148,9 +149,9 @@ def test_what_the_last_batch_has_cost_is_said_to_whoever_ends_it(
     recordings: Recordings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recordings.start()
-    recordings._current.recorder.append((0.0,) * len(COLUMNS))
+    recordings._current._gathered.append((0.0,) * len(COLUMNS))
     monkeypatch.setattr(os, "write", lambda descriptor, data: 3)
-    ended = recordings.stop()
+    ended = recordings.stop().result()
     assert ended["rows"] == 0
     assert ended["fault"].startswith("E402") and recordings._log == [ended["fault"]]
 
@@ -162,7 +163,7 @@ def test_whoever_begins_one_in_vain_leaves_it_waiting_for_room(
         patch.setattr(os, "write", lambda descriptor, data: 3)
         recordings.try_start()
         with pytest.raises(OSError, match=r"recordings: No space left on device$"):
-            recordings.start()
+            recordings.start().result()
         recordings.flush(0.0)
     recordings.flush(1000.0)
     assert recordings.status()["recording"]

@@ -12,8 +12,10 @@ from gateway.devices.messages import ForceSample
 from gateway.recording import Recorder, read_recording
 from gateway.registers import Refusal
 from gateway.registers.words import State
+from gateway.service.run_recording import RunRecording
 from gateway.service.running_rig.lines.output_line import LineState
-from gateway.service.running_rig.recorded_row import COLUMNS, RunRecording
+from gateway.service.running_rig.recorded_row import COLUMNS
+from tests.disk.at_once import AtOnce
 from tests.service.rigs import demo, without_trim
 from tests.service.wired import ENABLE, Wired
 
@@ -209,14 +211,16 @@ class Rows:
     """The recorder's place in the gateway, with a real file behind it."""
 
     def __init__(self, directory: Path) -> None:
-        self._run = RunRecording(Recorder(directory, {"rig": "demo"}, COLUMNS))
+        self._run = RunRecording(AtOnce(), lambda: Recorder(directory, {"rig": "demo"}, COLUMNS), lambda *said: None)
+        self._run.begin(lambda error: None)
 
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
         self._run.append(sample, decision, line)
 
     def close(self) -> Path:
-        self._run.recorder.close()
-        return self._run.recorder.path
+        self._run.close(lambda: None)
+        assert self._run.path
+        return self._run.path
 
 
 def test_every_sample_is_a_row_of_what_was_read_and_what_was_decided(tmp_path: Path) -> None:

@@ -1,0 +1,166 @@
+"""One recording of the running gateway: rows are gathered in the loop; a thread makes the file, writes, syncs and closes it.
+
+A disk that others keep busy holds up a write, and a new file even more, for as long as it likes: control stood still for 241 ms
+on a machine whose other processes synced files, and was ended for it. Rows wait in memory meanwhile; a disk that has taken
+nothing for HANGS_S ends the recording, never the control.
+"""
+
+import contextlib
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+from gateway.control.inputs import Output
+from gateway.devices.messages import ForceSample
+from gateway.processes.disk_worker import DiskWorker
+from gateway.recording import Recorder
+from gateway.recording.recorder import FLUSH_S, sync_recording
+from gateway.service.running_rig.lines.output_line import LineState
+from gateway.service.running_rig.recorded_row import row_of
+
+HANGS_S: Final = 30.0
+Log = Callable[[str, str], None]
+
+
+class RunRecording:
+    """Called from the loop only; time_s of its rows counts from the first of them.
+
+    disk: does one thing after the other. make: of the file, in the thread.
+    """
+
+    def __init__(self, disk: DiskWorker, make: Callable[[], Recorder], log: Log) -> None:
+        self.rows = 0
+        self._disk, self._make, self._log = disk, make, log
+        self._file: Recorder | None = None  # put there by the thread
+        self._start_s: float | None = None
+        self._gathered: list[tuple[float, ...]] = []
+        self._next_flush_s: float | None = None
+        self._now_s = 0.0
+        self._waiting_s: deque[float] = deque()  # when each batch was handed over that the disk has not taken
+        self._given = self._taken = 0
+        self._is_hung = False
+        self._closed: Callable[[], object] | None = None
+
+    # -- in the loop
+
+    def begin(self, opened: Callable[[OSError | None], object]) -> None:
+        """Have the file made. opened(error): once there is one (None), or why there is none; nothing is written then."""
+
+        def tell(result: Any) -> None:
+            opened(result if isinstance(result, OSError) else None)
+
+        self._disk(self._open, tell)
+        self._begin(self._sync)
+
+    @property
+    def path(self) -> Path | None:
+        """Path of the file, None until there is one."""
+        return self._file.path if self._file else None
+
+    @property
+    def number(self) -> int:
+        """Number of the file, 0 until there is one."""
+        return self._file.number if self._file else 0
+
+    @property
+    def rows_written(self) -> int:
+        """How many rows the disk has taken."""
+        return self._file.rows_written if self._file else 0
+
+    @property
+    def size_bytes(self) -> int:
+        """How long the file is."""
+        return self._file.size_bytes if self._file else 0
+
+    @property
+    def failure(self) -> str | None:
+        """Sentence that says why it stopped by itself; None while it records, and where no file was opened."""
+        if self._is_hung:
+            stopped = f"stopped after {self.rows_written} rows: the disk has taken nothing for {HANGS_S:g} s"
+            return f"E402 recording {self.path or ''} {stopped}; control goes on"
+        return self._file.failure if self._file else None
+
+    def append(self, sample: ForceSample, decision: Output, line: LineState, *labels: float) -> None:
+        """Append a row. labels: of the columns that a run adds."""
+        if self._start_s is None:
+            self._start_s = sample.time_s
+        self.rows += 1
+        self._gathered.append(row_of(sample.time_s - self._start_s, sample, decision, line) + labels)
+
+    def flush(self, now_s: float) -> None:
+        """Hand over what has been gathered, each 0.1 s, and look whether the disk hangs; once a tick, also while it closes."""
+        self._now_s = now_s
+        while len(self._waiting_s) > self._given - self._taken:
+            self._waiting_s.popleft()
+        if self._waiting_s and now_s - self._waiting_s[0] > HANGS_S:
+            self._is_hung = True
+            self._tell_closed()
+        elif self._next_flush_s is None or now_s >= self._next_flush_s:
+            self._next_flush_s = now_s + FLUSH_S
+            self._hand_over()
+
+    def close(self, closed: Callable[[], object], *, drops_empty: bool = False) -> None:
+        """Have the last rows written and the file closed. closed(): in the loop, once that is done, or the disk hangs.
+        drops_empty: a file without a row goes."""
+        self._closed = closed
+        self._hand_over()
+        self._give(lambda work: self._disk(work, lambda _: self._tell_closed()), lambda: self._close(drops_empty))
+        self._begin(self._sync)
+
+    def _tell_closed(self) -> None:
+        if closed := self._closed:
+            self._closed = None
+            closed()
+
+    def _hand_over(self) -> None:
+        if self._gathered:
+            rows, self._gathered = self._gathered, []
+            self._give(self._begin, lambda: self._write(rows))
+
+    def _give(self, begin: Callable[[Callable[[], None]], None], work: Callable[[], None]) -> None:
+        def counted() -> None:
+            try:
+                work()
+            finally:
+                self._taken += 1
+
+        self._given += 1
+        self._waiting_s.append(self._now_s)
+        begin(counted)
+
+    def _begin(self, work: Callable[[], None]) -> None:
+        with contextlib.suppress(OSError):  # no thread: `opened` tells it
+            self._disk.begin(work)
+
+    # -- in the thread
+
+    def _open(self) -> None:
+        if not self._is_hung:
+            self._file = self._make()
+
+    def _write(self, rows: list[tuple[float, ...]]) -> None:
+        if self._file:
+            for row in rows:
+                self._file.append(row)
+            self._file.write()
+
+    def _close(self, drops_empty: bool) -> None:
+        if self._file:
+            self._file.close()
+            if drops_empty and not self._file.rows_written:
+                with contextlib.suppress(OSError):
+                    self._file.path.unlink()
+
+    def _sync(self) -> None:
+        if not self._file:
+            return
+        path = self._file.path
+        try:
+            sync_recording(path)
+        except FileNotFoundError:  # deleted meanwhile
+            return
+        except OSError as error:
+            self._log(
+                "recording", f"E402 recording {path} may not outlive a power cut: {error.strerror}; control goes on"
+            )
