@@ -1,4 +1,4 @@
-"""Real file systems for a state directory: small enough to be filled, or one that turns read-only under open files.
+"""Real file systems for a state directory: small enough to be filled, or one that turns read-only or hangs under open files.
 
 Mounting is root's; where it cannot be done the tests that need it are skipped, and say why.
 """
@@ -81,3 +81,16 @@ class FailingExt4:
         if not trigger.exists():
             pytest.skip(f"{trigger} is not there: this kernel cannot be asked for an error of ext4")
         trigger.write_text("asked for by a test")
+
+
+@contextlib.contextmanager
+def hanging(disk: Path) -> Iterator[None]:
+    """Whoever writes to this file system waits, for as long as this lasts."""
+    try:
+        run("fsfreeze", "--freeze", disk)
+    except (OSError, subprocess.CalledProcessError) as error:
+        pytest.skip(f"cannot freeze a file system here ({getattr(error, 'stderr', '') or error})")
+    try:
+        yield
+    finally:
+        run("fsfreeze", "--unfreeze", disk)
