@@ -13,6 +13,7 @@ from weakref import WeakSet
 
 import pytest
 
+from gateway.recording import Recorder
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.disk.failing_disks import FailingDisk
 from tests.disk.watched_disk import watching
@@ -172,10 +173,27 @@ class NotedRunningRig(RunningRig):
         await super().close()
 
 
+class NotedRecorder(Recorder):
+    """Control's own, and known here: the kernel closes the file of a process that is dead, and here whoever ends it."""
+
+    of: ClassVar[list["NotedRecorder"]] = []
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.of.append(self)
+
+    @classmethod
+    def close_all(cls) -> None:
+        while cls.of:
+            cls.of.pop()._release()
+
+
 @contextmanager
 def simulated_edges() -> Any:
     """Everything that reaches for the kernel, replaced."""
     with pytest.MonkeyPatch.context() as patch:
+        for maker in ("calibration_runs", "recordings"):
+            patch.setattr(f"gateway.service.running_rig.{maker}.Recorder", NotedRecorder)
         patch.setattr("gateway.twin.simulation.STEP_S", TWIN_STEP_S)
         patch.setattr("gateway.service.running_rig.lines.rig_ports.SerialPort", SimulatedPort)
         patch.setattr(f"{_RIG}.ClockTick", SimulatedTick)

@@ -21,7 +21,7 @@ from gateway.service.supervisor.child_process import LOST, Child
 from gateway.service.supervisor.guardian import Guardian
 from gateway.service.supervisor.run_options import RunOptions
 from tests.simulation.cables import CABLES
-from tests.simulation.edges import Log, NotedRunningRig, SimulatedDisk
+from tests.simulation.edges import Log, NotedRecorder, NotedRunningRig, SimulatedDisk
 from tests.simulation.links import LinkEnd, create_link, read_in_memory, readable_ends
 from tests.simulation.virtual_time import VirtualClock, VirtualLoop
 
@@ -210,6 +210,7 @@ class SimulatedService:
             self._clock.run_until(self._clock.now_s + CLOSING_S)
             process.end()
             process.loop.close()
+        NotedRecorder.close_all()
         if self._guardian:
             self._close_descriptors(self._guardian)
 
