@@ -6,11 +6,13 @@ it is opened again with a growing pause, and nothing that was written before a l
 
 import asyncio
 import os
+from collections import deque
 from collections.abc import Callable
 
 from gateway.devices import PacedWire, SerialSettings
 from gateway.ports import PortError, PortEvents
 from gateway.profiles import Rig
+from tests.simulation.spoiled import Spoil, spoiled
 from tests.simulation.virtual_time import VirtualLoop
 
 
@@ -23,6 +25,7 @@ class Cable:
         self._outside, self._settings, self._on_device = outside, settings, on_device
         self.port: SimulatedPort | None = None
         self.is_plugged = True
+        self._spoils: deque[Spoil] = deque()
         self.cut()
 
     def cut(self) -> None:
@@ -48,9 +51,24 @@ class Cable:
             self._put(self._to_device, data, self._arrive)
 
     def send_to_host(self, data: bytes) -> None:
-        """Put a device's bytes on the wire."""
+        """Put a device's bytes on the wire, or what becomes of them."""
+        if self._spoils and data:
+            self._send_spoiled(data)
+        elif self.is_plugged:
+            self._put(self._to_host, data, self._reach_host)
+
+    def spoil(self, *spoils: Spoil) -> None:
+        """Do this to the next answers; with nothing: to none of them any more."""
+        self._spoils = deque(one for spoil in spoils for one in [spoil] * spoil.count)
+
+    def say(self, data: bytes) -> None:
+        """Bytes that nobody asked for, of whatever else is on this wire."""
         if self.is_plugged:
             self._put(self._to_host, data, self._reach_host)
+
+    def _send_spoiled(self, data: bytes) -> None:
+        for late_s, piece in spoiled(self._spoils.popleft(), data):
+            self._outside.call_later(late_s, self.say, piece) if late_s else self.say(piece)
 
     def pull(self) -> None:
         """Pull the plug."""

@@ -8,8 +8,26 @@ from dataclasses import dataclass
 from random import Random
 
 from tests.simulation.masters import read_pdu, write_pdu
+from tests.simulation.spoiled import KINDS
 
 FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "cell-frozen", "output-cut")
+LATE_S = (0.005, 0.4)
+"""Sooner than a reply's time-out, and long after it."""
+SAID = {
+    "output": (b"0\r\n", b"510\r\n", b"1023\r\n", b"UNKNOWN COMMAND\r\n", b"OUT OF RANGE\r\n", b"!017021\r", b"\r\n"),
+    "load_cell": (
+        b"OL,GS,        kg\r\n",
+        b"OL,GS,+9999.99kg\r\n",
+        b"ST,GS,+0000.00kg\r\n",
+        b"ST,GS,-0004.00kg\r\n",
+        b"ST,GS,+0001.20 N\r\n",
+        b"ST,NT,+0001.20kg\r\n",
+        b"ST,GS,     nankg\r\n",
+        b"\r\n",
+        b"510\r\n",
+    ),
+}
+"""What a device may say at another time, or another device at its place."""
 
 
 @dataclass(frozen=True)
@@ -24,10 +42,10 @@ class Event:
 
 
 def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
-    """What happens, in its order: a little more than two events a second."""
+    """What happens, in its order: some two and a half events a second."""
     chance, at_s = Random(seed), 0.0
-    while (at_s := at_s + chance.expovariate(2.2)) < duration_s:
-        event = _draw(chance, round(at_s, 4))
+    while (at_s := at_s + chance.expovariate(2.5)) < duration_s:
+        event = _draw_spoil(chance, round(at_s, 4)) if chance.random() < 0.12 else _draw(chance, round(at_s, 4))
         yield event
         if event.what == "terminate" and chance.random() < 0.5:  # and it stands still on its way down
             at_s = event.at_s + chance.uniform(0.0, 0.25)
@@ -56,6 +74,17 @@ def _draw(chance: Random, at_s: float) -> Event:
         return Event(at_s, chance.choice(("output", "load_cell")), chance.choice(("pull", "push", "push")))
     what = chance.choice(("kill", "stop", "kill_guardian", "terminate", "disk_full", "disk_free", "clock_jump"))
     return Event(at_s, "machine", what, (round(chance.uniform(0.005, 0.3), 4), chance.uniform(-1e6, 1e6)))
+
+
+def _draw_spoil(chance: Random, at_s: float) -> Event:
+    """Something on a wire that the device did not say so: most often one answer of it, now and then many in a row."""
+    line = chance.choice(("output", "output", "load_cell"))
+    said = chance.choice(SAID[line]) if chance.random() < 0.8 else chance.randbytes(chance.randrange(1, 40))
+    if chance.random() < 0.2:
+        return Event(at_s, line, "say", data=said)
+    kind, count = chance.choice(KINDS), chance.choice((1, 1, 1, 2, 3, 12))
+    number = round(chance.uniform(*LATE_S) if kind == "late" else chance.random(), 4)
+    return Event(at_s, line, kind, (float(count), number), said)
 
 
 def _stupid(chance: Random) -> bytes:

@@ -22,6 +22,7 @@ from tests.simulation.integrator import Integrator
 from tests.simulation.masters import BEATS_S, ENABLE, RUNS, TAKE, Master, read_pdu
 from tests.simulation.observer import STATUS_FIRST, STATUS_WORDS, Bounds, Observer
 from tests.simulation.processes import SimulatedService
+from tests.simulation.spoiled import Spoil
 from tests.simulation.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 
 LEASE_S, STALL_S = 0.2, 0.1
@@ -159,10 +160,8 @@ class Simulation:
             self._set_fault(event.what, on=bool(event.numbers[0]))
         elif event.whom == "machine":
             self._shake(event)
-        elif event.what == "pull":
-            self._pull(event.whom)
         else:
-            self._push(event.whom)
+            self._touch_line(event)
 
     def _command(self, master: Master, event: Event) -> None:
         if event.what in ("hold", "take"):
@@ -201,6 +200,17 @@ class Simulation:
         self.world.fault({"do": "fault", "name": name, "on": on})
         if name == "cell-cut":
             self._judge_cell(is_cut=on)
+
+    def _touch_line(self, event: Event) -> None:
+        if event.what == "pull":
+            self._pull(event.whom)
+        elif event.what == "push":
+            self._push(event.whom)
+        elif event.what == "say":
+            CABLES[event.whom].say(event.data)
+        else:
+            count, number = event.numbers
+            CABLES[event.whom].spoil(Spoil(event.what, int(count), number, event.data))
 
     def _pull(self, line: str) -> None:
         CABLES[line].pull()
@@ -274,6 +284,7 @@ class Simulation:
             self._set_fault(name, on=False)
         for line in ("output", "load_cell"):
             self._push(line)
+            CABLES[line].spoil()
         SimulatedDisk.is_full = False
         for master in self.masters.values():
             master.fall_silent()
