@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from random import Random
 
-from tests.simulation.masters import read_pdu, write_pdu
+from tests.simulation.spelling import WAYS, coils_pdu, mask_pdu, read_and_write_pdu, read_pdu, write_one_pdu, write_pdu
 from tests.simulation.spoiled import KINDS
 
 FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "cell-frozen", "output-cut")
@@ -32,13 +32,14 @@ SAID = {
 
 @dataclass(frozen=True)
 class Event:
-    """At at_s after READY, `what` happens to `whom`, with these numbers."""
+    """At at_s after READY, `what` happens to `whom`, with these numbers. way: how a master spells it (spelling.py)."""
 
     at_s: float
     whom: str
     what: str
     numbers: tuple[float, ...] = ()
     data: bytes = b""
+    way: str = "block"
 
 
 def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
@@ -55,9 +56,7 @@ def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
 def _draw(chance: Random, at_s: float) -> Event:
     draw, master = chance.random(), chance.choice(("worker", "worker", "rival"))
     if draw < 0.30:
-        return Event(
-            at_s, master, chance.choice(("hold", "hold", "hold", "take")), (round(chance.uniform(0.0, 66.0), 2),)
-        )
+        return _draw_command(chance, at_s, master)
     if draw < 0.36:
         return Event(at_s, master, chance.choice(("calibrate", "self_test", "self_test")))
     if draw < 0.47:
@@ -65,7 +64,8 @@ def _draw(chance: Random, at_s: float) -> Event:
     if draw < 0.51:
         return Event(at_s, "integrator", "upload")
     if draw < 0.64:
-        return Event(at_s, chance.choice(("worker", "rival", "fool")), "ask", data=_stupid(chance))
+        unit = chance.choice((1, 1, 1, 1, 1, 1, 0, 2, 247, 255))
+        return Event(at_s, chance.choice(("worker", "rival", "fool")), "ask", (unit,), _stupid(chance))
     if draw < 0.69:
         return Event(at_s, "villain", "send_raw", data=_hostile(chance))
     if draw < 0.86:
@@ -74,6 +74,13 @@ def _draw(chance: Random, at_s: float) -> Event:
         return Event(at_s, chance.choice(("output", "load_cell")), chance.choice(("pull", "push", "push")))
     what = chance.choice(("kill", "stop", "kill_guardian", "terminate", "disk_full", "disk_free", "clock_jump"))
     return Event(at_s, "machine", what, (round(chance.uniform(0.005, 0.3), 4), chance.uniform(-1e6, 1e6)))
+
+
+def _draw_command(chance: Random, at_s: float, master: str) -> Event:
+    what = chance.choice(("hold", "hold", "hold", "hold", "take", "take", "pull", "drive"))
+    number = chance.uniform(0.0, 9.0 if what == "drive" else 66.0)
+    way = chance.choice(tuple(WAYS)) if chance.random() < 0.4 else "block"
+    return Event(at_s, master, what, (round(number, 2),), way=way)
 
 
 def _draw_spoil(chance: Random, at_s: float) -> Event:
@@ -100,13 +107,22 @@ def _stupid(chance: Random) -> bytes:
     if function == 16:
         return write_pdu(address, *words)
     if function == 6:
-        return struct.pack(">BHH", 6, address, words[0])
+        return write_one_pdu(address, words[0])
+    if function in (1, 2, 3, 4):
+        return struct.pack(">BHH", function, address, chance.choice((0, 1, 10, 125, 126, 65535)))
+    return _stupid_bits(chance, function, address, words)
+
+
+def _stupid_bits(chance: Random, function: int, address: int, words: list[int]) -> bytes:
+    """The same by functions that change bits, or that do two things; and any bytes behind any function."""
     if function == 5:
         return struct.pack(">BHH", 5, chance.choice((0, 1, 2, 3, 4)), chance.choice((0, 0xFF00, 0x1234)))
     if function == 22:
-        return struct.pack(">BHHH", 22, address, 0xFF9F, chance.randrange(65536) & ~0x60 & 0xFFFF)
-    if function in (1, 2, 3, 4):
-        return struct.pack(">BHH", function, address, chance.choice((0, 1, 10, 125, 126, 65535)))
+        return mask_pdu(address, chance.randrange(65536) | 0x60, chance.randrange(65536))
+    if function == 15 and chance.random() < 0.7:
+        return coils_pdu(chance.choice((0, 0, 1, 3)), chance.randrange(32), chance.randrange(1, 3))
+    if function == 23 and chance.random() < 0.7:
+        return read_and_write_pdu(chance.choice((100, 0, 99)), chance.choice((1, 10, 200)), address, *words)
     return bytes((function,)) + chance.randbytes(chance.randrange(0, 40))
 
 

@@ -19,15 +19,17 @@ from tests.simulation.cables import CABLES, lay_cables
 from tests.simulation.edges import DISK_S, Log, SimulatedDisk, simulated_edges
 from tests.simulation.events import FAULTS, Event
 from tests.simulation.integrator import Integrator
-from tests.simulation.masters import BEATS_S, ENABLE, RUNS, TAKE, Master, read_pdu
+from tests.simulation.masters import BEATS_S, PULL, RUNS, TAKE, Master
 from tests.simulation.observer import STATUS_FIRST, STATUS_WORDS, Bounds, Observer
 from tests.simulation.processes import SimulatedService
+from tests.simulation.spelling import BITS, DISABLED_BY_BIT, ENABLE, read_pdu
 from tests.simulation.spoiled import Spoil
 from tests.simulation.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 
 LEASE_S, STALL_S = 0.2, 0.1
 RATES_HZ = (20,) * 16 + (25,) * 3 + (100,)
 """Of loop and load cell, drawn for each seed: at 20 Hz a schedule takes half of the time, and its laws are the same."""
+COMMANDS = {"hold": ENABLE, "take": ENABLE | TAKE, "pull": ENABLE | PULL}
 HELD_N = 12.0
 IN_BAND_N, SLOWLY_IN_BAND_N = 1.0, 2.5
 """Of loops as a rig may have them, from 50 Hz on, and of slower ones, which are here for the sake of time: they hunt."""
@@ -164,10 +166,14 @@ class Simulation:
             self._touch_line(event)
 
     def _command(self, master: Master, event: Event) -> None:
-        if event.what in ("hold", "take"):
-            master.hold(event.numbers[0], ENABLE if event.what == "hold" else ENABLE | TAKE)
+        if event.what == "drive":
+            master.hold(0.0, way=event.way, voltage_v=event.numbers[0])
+        elif event.what in COMMANDS:
+            master.hold(event.numbers[0], COMMANDS[event.what], event.way)
         elif event.what in RUNS:
             master.run(event.what)
+        elif event.what == "ask":
+            master.ask(event.data, *map(int, event.numbers))
         elif event.data:
             getattr(master, event.what)(event.data)
         else:
@@ -241,6 +247,8 @@ class Simulation:
         self.world.on_output_bytes(chunk, now_s)
 
     def _on_write(self, control: int | None, is_answered: bool) -> None:
+        if control == DISABLED_BY_BIT:  # which ends no run
+            control = BITS if self.observer.is_run else 0
         note = self.observer.note_accepted if is_answered else self.observer.note_unanswered
         note(control, self.clock.now_s)
 
