@@ -34,6 +34,14 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(19.32, "worker", "tare"),
         ],
     ),
+    (
+        13,
+        [
+            Event(11.5915, "world", "cell-frozen", (1.0,)),
+            Event(11.9218, "worker", "hold", (37.19,)),
+            Event(13.6262, "output", "replaced", (12.0, 0.4523), b"OUT OF RANGE\r\n"),
+        ],
+    ),
 ]
 """Schedules that once broke a law: the seed of the machine, and what happened to it."""
 
