@@ -26,6 +26,7 @@ class Cable:
         self.port: SimulatedPort | None = None
         self.is_plugged = True
         self._spoils: deque[Spoil] = deque()
+        self.strange_s = 0.0  # when something strange was said last
         self.cut()
 
     def cut(self) -> None:
@@ -62,7 +63,8 @@ class Cable:
         self._spoils = deque(one for spoil in spoils for one in [spoil] * spoil.count)
 
     def say(self, data: bytes) -> None:
-        """Bytes that nobody asked for, of whatever else is on this wire."""
+        """Bytes that are not as the device said them, or not when: of whatever else is on this wire."""
+        self.strange_s = self._outside.time()
         if self.is_plugged:
             self._put(self._to_host, data, self._reach_host)
 

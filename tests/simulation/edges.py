@@ -172,6 +172,10 @@ class NotedRunningRig(RunningRig):
         await super().close()
 
 
+def _no_fit(*_: Any) -> None:
+    raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+
 @contextmanager
 def simulated_edges() -> Any:
     """Everything that reaches for the kernel, replaced."""
@@ -184,6 +188,7 @@ def simulated_edges() -> Any:
         NotedRunningRig.of.clear()
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
         patch.setattr(f"{_RIG}.explain_silent_device", _explain)
+        patch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", _no_fit)
         for user in (
             "gateway.calibrations.upload",
             "gateway.service.running_rig.rig_plants",

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from random import Random
 
+from tests.simulation.socket_lines import draw_line
 from tests.simulation.spelling import WAYS, coils_pdu, mask_pdu, read_and_write_pdu, read_pdu, write_one_pdu, write_pdu
 from tests.simulation.spoiled import KINDS
 
@@ -45,12 +46,19 @@ class Event:
 def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
     """What happens, in its order: some two and a half events a second."""
     chance, at_s = Random(seed), 0.0
-    while (at_s := at_s + chance.expovariate(2.5)) < duration_s:
-        event = _draw_spoil(chance, round(at_s, 4)) if chance.random() < 0.12 else _draw(chance, round(at_s, 4))
+    while (at_s := at_s + chance.expovariate(2.6)) < duration_s:
+        event = _draw_one(chance, round(at_s, 4))
         yield event
         if event.what == "terminate" and chance.random() < 0.5:  # and it stands still on its way down
             at_s = event.at_s + chance.uniform(0.0, 0.25)
             yield Event(round(at_s, 4), "machine", "stop", (round(chance.uniform(0.05, 0.6), 4), 0.0))
+
+
+def _draw_one(chance: Random, at_s: float) -> Event:
+    draw = chance.random()
+    if draw < 0.11:
+        return _draw_spoil(chance, at_s)
+    return Event(at_s, "person", "say", data=draw_line(chance)) if draw < 0.16 else _draw(chance, at_s)
 
 
 def _draw(chance: Random, at_s: float) -> Event:

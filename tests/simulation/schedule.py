@@ -12,8 +12,11 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from gateway.profiles import Rig
+from gateway.plants.store import NumberedPlant, PlantStore, Provenance
+from gateway.profiles import Rig, load_plant
+from gateway.profiles.kinds.plant_writer import with_origins
 from gateway.service.simulation.world import SimulatedRig
+from gateway.twin.plant import with_value
 from tests.service.rigs import strict, with_supervision
 from tests.simulation.cables import CABLES, lay_cables
 from tests.simulation.edges import DISK_S, Log, SimulatedDisk, simulated_edges
@@ -22,6 +25,7 @@ from tests.simulation.integrator import Integrator
 from tests.simulation.masters import BEATS_S, PULL, RUNS, TAKE, Master
 from tests.simulation.observer import STATUS_FIRST, STATUS_WORDS, Bounds, Observer
 from tests.simulation.processes import SimulatedService
+from tests.simulation.socket_user import SocketUser
 from tests.simulation.spelling import BITS, DISABLED_BY_BIT, ENABLE, read_pdu
 from tests.simulation.spoiled import Spoil
 from tests.simulation.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
@@ -29,6 +33,7 @@ from tests.simulation.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 LEASE_S, STALL_S = 0.2, 0.1
 RATES_HZ = (20,) * 16 + (25,) * 3 + (100,)
 """Of loop and load cell, drawn for each seed: at 20 Hz a schedule takes half of the time, and its laws are the same."""
+RUN_BIT, SELF_TEST = RUNS.values()
 COMMANDS = {"hold": ENABLE, "take": ENABLE | TAKE, "pull": ENABLE | PULL}
 HELD_N = 12.0
 IN_BAND_N, SLOWLY_IN_BAND_N = 1.0, 2.5
@@ -36,6 +41,9 @@ IN_BAND_N, SLOWLY_IN_BAND_N = 1.0, 2.5
 MOST_OFF_N = 0.5
 """By how much a healthy cell may read another force at rest than at first, until the zero is taken anew."""
 TARES = 5
+PLANTS_EVERY = 8
+"""Of so many rigs one has numbered plants stored, which somebody may take into use."""
+BOW = 0.005
 HEAL_S = 2.0
 LOOK_S = 0.02
 READ_S = 0.1
@@ -63,6 +71,16 @@ def simulated_rig(seed: int) -> Rig:
     still = replace(plant.contact, mass_kg=0.0, pad_damping_n_s_per_m=0.0)
     profile = replace(rig.plant_profile, plant=replace(plant, contact=still))
     return replace(rig, seed=seed, loop_hz=loop_hz, output=output, load_cell=load_cell, plant_profile=profile)
+
+
+def store_plants(rig: Rig, state: Path) -> None:
+    """Two numbered plants: the shipped one, and one whose command is bent a little, for which control compensates."""
+    plain = load_plant("paper-slide")
+    told = Provenance(made_utc="2026-11-22T17:30:00Z", version="0.1.0", rig=rig.name, start=plain.name)
+    plant = with_value(plain.plant, "regulator", "command_bow", BOW)
+    bent = with_origins(replace(plain, name="bent"), plant, {"regulator.command_bow": "diagnosed"})
+    for profile in (plain, bent):
+        PlantStore(state).add(NumberedPlant(number=0, profile=profile, provenance=told))
 
 
 class Simulation:
@@ -96,6 +114,8 @@ class Simulation:
         lay_cables(self.outside, rig, self._on_output, self.world.on_cell_bytes)
         SimulatedDisk.is_full, SimulatedDisk.is_gone, SimulatedDisk.folder = False, False, folder
         SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(*DISK_S))
+        if seed % PLANTS_EVERY == 0:
+            store_plants(rig, folder)
         self.service = SimulatedService(rig, folder, self.outside, self.log, self.clock)
         self.service.on_death = self._on_death
         self.masters = {
@@ -110,6 +130,9 @@ class Simulation:
         }
         self.reader = Master("10.0.0.9", self.outside, lambda: self.service.inside, lambda *_: None)
         self.integrator = Integrator("10.0.0.8", self.outside, lambda: self.service.inside, lambda *_: None)
+        self.person = SocketUser(lambda: self.service.inside, self.service.answer_socket)
+        self.person.on_write = lambda control: self._on_write(control, True)
+        self.person.on_model = self.integrator.expect_any
         self.clients = (*self.masters.values(), self.reader, self.integrator)
         self.outside.call_later(0.3 * self.period_s, self._stream)
         self.outside.call_later(LOOK_S, self._look)
@@ -123,8 +146,8 @@ class Simulation:
         self._happen_next(iter(events))
         self._run_for(duration_s)
         self._heal()
-        for master in self.clients:
-            self.observer.broken += master.complaints
+        for client in (*self.clients, self.person):
+            self.observer.broken += client.complaints
         self.observer.broken += self.log.internal_errors
         self.observer.fingerprint.update("\n".join(self.observer.broken).encode())
         return Outcome(
@@ -158,6 +181,8 @@ class Simulation:
             self._command(self.masters[event.whom], event)
         elif event.whom == "integrator":
             self.integrator.upload()
+        elif event.whom == "person":
+            self.person.say(event.data)
         elif event.whom == "world":
             self._set_fault(event.what, on=bool(event.numbers[0]))
         elif event.whom == "machine":
@@ -249,12 +274,16 @@ class Simulation:
     def _on_write(self, control: int | None, is_answered: bool) -> None:
         if control == DISABLED_BY_BIT:  # which ends no run
             control = BITS if self.observer.is_run else 0
+        if control is not None and control & (ENABLE | RUN_BIT | SELF_TEST) and control > 0 and is_answered:
+            self.person.lose()  # a run that was asked for at the machine excludes that
         note = self.observer.note_accepted if is_answered else self.observer.note_unanswered
         note(control, self.clock.now_s)
 
     def _on_death(self) -> None:
         self.observer.note_death(self.clock.now_s, CABLES["output"].through_s)
         self._lose_control()
+        self.person.lose()
+        self._was_watched = False
         for master in self.clients:
             master.lose()
         self.reader.heard.clear()
@@ -268,7 +297,26 @@ class Simulation:
             self.world.stream(self.clock.now_s)
         self.outside.call_later(self.period_s, self._stream)
 
+    _was_watched = False
+
+    def _follow_person(self) -> None:
+        """A run that somebody has started at the machine presses without a master, as long as that person looks at it."""
+        is_watched = self.person.watched_s is not None
+        if is_watched:
+            self.observer.note_accepted(RUN_BIT, self.clock.now_s)
+        elif self._was_watched and self.observer.is_run:
+            self.observer.note_accepted(0, self.clock.now_s)
+        self._was_watched = is_watched
+
+    def _note_strange_words(self) -> None:
+        """A sentence that fits is a sample, whoever says it: the cell is lost from then on."""
+        lost_s, strange_s = self.observer.cell_lost_s, CABLES["load_cell"].strange_s
+        if lost_s is not None and strange_s > lost_s:
+            self.observer.cell_lost_s = strange_s
+
     def _look(self) -> None:
+        self._follow_person()
+        self._note_strange_words()
         if self.service.is_serving:
             self.observer.control_lost_s = None
         self.observer.look(self.clock.now_s)
