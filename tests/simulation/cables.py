@@ -196,9 +196,15 @@ class SimulatedPort:
 
 
 def lay_cables(
-    outside: VirtualLoop, rig: Rig, on_output: Callable[[bytes, float], None], on_cell: Callable[[bytes, float], None]
+    outside: VirtualLoop,
+    rig: Rig,
+    on_output: Callable[[bytes, float], None],
+    on_cell: Callable[[bytes, float], None],
+    on_valve: Callable[[bytes, float], None],
 ) -> None:
     """Connect the world to control."""
     CABLES.clear()
     CABLES["output"] = Cable(outside, rig.output.settings, on_output)
     CABLES["load_cell"] = Cable(outside, rig.load_cell.settings, on_cell)
+    if rig.valve:
+        CABLES["valve"] = Cable(outside, rig.valve.settings, on_valve)

@@ -12,6 +12,8 @@ from tests.simulation.spelling import WAYS, coils_pdu, mask_pdu, read_and_write_
 from tests.simulation.spoiled import KINDS
 
 FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "cell-frozen", "output-cut")
+VALVE_FAULTS = ("valve-cut", "valve-stuck")
+"""These mean nothing to a rig without a valve."""
 LATE_S = (0.005, 0.4)
 """Sooner than a reply's time-out, and long after it."""
 SAID = {
@@ -26,6 +28,12 @@ SAID = {
         b"ST,GS,     nankg\r\n",
         b"\r\n",
         b"510\r\n",
+    ),
+    "valve": (
+        b"\x01\x05\x00\x00\xff\x00\x8c\x3a",
+        b"\x01\x01\x01\x01\x90\x48",
+        b"\x01\x01\x01\x00\x51\x88",
+        b"\x01\x85\x02\xc3\x51",
     ),
 }
 """What a device may say at another time, or another device at its place."""
@@ -77,9 +85,10 @@ def _draw(chance: Random, at_s: float) -> Event:
     if draw < 0.69:
         return Event(at_s, "villain", "send_raw", data=_hostile(chance))
     if draw < 0.86:
-        return Event(at_s, "world", chance.choice(FAULTS), (float(chance.random() < 0.35),))
+        fault = chance.choice(VALVE_FAULTS if chance.random() < 0.1 else FAULTS)
+        return Event(at_s, "world", fault, (float(chance.random() < 0.35),))
     if draw < 0.92:
-        return Event(at_s, chance.choice(("output", "load_cell")), chance.choice(("pull", "push", "push")))
+        return Event(at_s, chance.choice(("output", "load_cell", "valve")), chance.choice(("pull", "push", "push")))
     what = chance.choice(("kill", "stop", "kill_guardian", "terminate", "disk_full", "disk_free", "clock_jump"))
     return Event(at_s, "machine", what, (round(chance.uniform(0.005, 0.3), 4), chance.uniform(-1e6, 1e6)))
 
@@ -93,7 +102,7 @@ def _draw_command(chance: Random, at_s: float, master: str) -> Event:
 
 def _draw_spoil(chance: Random, at_s: float) -> Event:
     """Something on a wire that the device did not say so: most often one answer of it, now and then many in a row."""
-    line = chance.choice(("output", "output", "load_cell"))
+    line = chance.choice(("output",) * 5 + ("load_cell",) * 3 + ("valve",))
     said = chance.choice(SAID[line]) if chance.random() < 0.8 else chance.randbytes(chance.randrange(1, 40))
     if chance.random() < 0.2:
         return Event(at_s, line, "say", data=said)

@@ -31,7 +31,7 @@ class SocketUser:
         self.answers = 0
         self.on_write: Callable[[int | None], None] = lambda control: None
         self.on_model: Callable[[], None] = lambda: None
-        self._patience = 0
+        self._patience = self._run = 0
 
     def say(self, line: bytes) -> None:
         """Ask this, in the turn of the process that serves."""
@@ -67,15 +67,13 @@ class SocketUser:
 
     def _watch(self, inside: VirtualLoop) -> None:
         """Look at the run as long as this person has patience."""
-        if self.watched_s is not None:
-            return
         self.watched_s = inside.time()
-        inside.call_later(ASK_S, self._look, inside)
+        self._run += 1
+        inside.call_later(ASK_S, self._look, inside, self._run)
 
-    def _look(self, inside: VirtualLoop) -> None:
-        if inside is not self._inside():
+    def _look(self, inside: VirtualLoop, run: int) -> None:
+        if inside is not self._inside() or self.watched_s is None or run != self._run:
             return
-        assert self.watched_s is not None
         if self._patience > 0:
             self._patience -= 1
             if not json.loads(self._answer(b'{"do": "calibrate"}')).get("running"):
@@ -85,4 +83,4 @@ class SocketUser:
         elif inside.time() - self.watched_s > LEFT_S:
             self.watched_s = None
             return
-        inside.call_later(ASK_S, self._look, inside)
+        inside.call_later(ASK_S, self._look, inside, run)
