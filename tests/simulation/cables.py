@@ -12,6 +12,7 @@ from collections.abc import Callable
 from gateway.devices import PacedWire, SerialSettings
 from gateway.ports import PortError, PortEvents
 from gateway.profiles import Rig
+from gateway.profiles.rigs.faces import RtuFace
 from tests.simulation.spoiled import Spoil, spoiled
 from tests.simulation.virtual_time import VirtualLoop
 
@@ -22,7 +23,7 @@ class Cable:
     def __init__(
         self, outside: VirtualLoop, settings: SerialSettings, on_device: Callable[[bytes, float], None]
     ) -> None:
-        self._outside, self._settings, self._on_device = outside, settings, on_device
+        self._outside, self._settings, self.on_device = outside, settings, on_device
         self.port: SimulatedPort | None = None
         self.is_plugged = True
         self._spoils: deque[Spoil] = deque()
@@ -90,7 +91,7 @@ class Cable:
 
     def _arrive(self, wire: PacedWire) -> None:
         if wire is self._to_device and (chunk := wire.bytes_through(self._outside.time())):
-            self._on_device(chunk, self._outside.time())
+            self.on_device(chunk, self._outside.time())
 
     def _reach_host(self, wire: PacedWire) -> None:
         if wire is self._to_host and (chunk := wire.bytes_through(self._outside.time())) and self.port:
@@ -133,6 +134,11 @@ class SimulatedPort:
         if self.is_open:
             self._cable.send_to_device(data)
         return self.is_open
+
+    @property
+    def unsent_bytes(self) -> int:
+        """What the kernel still holds of what was written."""
+        return max(0, int((self._cable.through_s - self._loop.time()) / self._settings.character_s))
 
     def flush_input(self) -> int:
         dropped = len(self._buffer)
@@ -206,5 +212,8 @@ def lay_cables(
     CABLES.clear()
     CABLES["output"] = Cable(outside, rig.output.settings, on_output)
     CABLES["load_cell"] = Cable(outside, rig.load_cell.settings, on_cell)
+    for face in rig.fieldbus:
+        if isinstance(face, RtuFace):
+            CABLES["bus"] = Cable(outside, face.settings, lambda chunk, now_s: None)
     if rig.valve:
         CABLES["valve"] = Cable(outside, rig.valve.settings, on_valve)

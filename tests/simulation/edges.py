@@ -182,6 +182,7 @@ def simulated_edges() -> Any:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("gateway.twin.simulation.STEP_S", TWIN_STEP_S)
         patch.setattr("gateway.service.running_rig.lines.rig_ports.SerialPort", SimulatedPort)
+        patch.setattr("gateway.fieldbus.rtu_server.SerialPort", SimulatedPort)
         patch.setattr(f"{_RIG}.ClockTick", SimulatedTick)
         patch.setattr("gateway.service.control_process.RunningRig", NotedRunningRig)
         patch.setattr("gateway.fieldbus.tcp_server.Listener", MemoryListener)

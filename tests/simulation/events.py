@@ -35,6 +35,7 @@ SAID = {
         b"\x01\x01\x01\x00\x51\x88",
         b"\x01\x85\x02\xc3\x51",
     ),
+    "bus": (b"\x00", b"\x01\x03\x00\x64\x00", b"\x01\x06\x00\x00\x00\x01\x48\x0c", b"\x11\x03\x00\x6b\x00\x03\x76\x87"),
 }
 """What a device may say at another time, or another device at its place."""
 
@@ -88,7 +89,9 @@ def _draw(chance: Random, at_s: float) -> Event:
         fault = chance.choice(VALVE_FAULTS if chance.random() < 0.1 else FAULTS)
         return Event(at_s, "world", fault, (float(chance.random() < 0.35),))
     if draw < 0.92:
-        return Event(at_s, chance.choice(("output", "load_cell", "valve")), chance.choice(("pull", "push", "push")))
+        return Event(
+            at_s, chance.choice(("output", "load_cell", "valve", "bus")), chance.choice(("pull", "push", "push"))
+        )
     what = chance.choice(("kill", "stop", "kill_guardian", "terminate", "disk_full", "disk_free", "clock_jump"))
     return Event(at_s, "machine", what, (round(chance.uniform(0.005, 0.3), 4), chance.uniform(-1e6, 1e6)))
 
@@ -102,11 +105,13 @@ def _draw_command(chance: Random, at_s: float, master: str) -> Event:
 
 def _draw_spoil(chance: Random, at_s: float) -> Event:
     """Something on a wire that the device did not say so: most often one answer of it, now and then many in a row."""
-    line = chance.choice(("output",) * 5 + ("load_cell",) * 3 + ("valve",))
+    line = chance.choice(("output",) * 5 + ("load_cell",) * 3 + ("valve", "bus"))
     said = chance.choice(SAID[line]) if chance.random() < 0.8 else chance.randbytes(chance.randrange(1, 40))
     if chance.random() < 0.2:
         return Event(at_s, line, "say", data=said)
     kind, count = chance.choice(KINDS), chance.choice((1, 1, 1, 2, 3, 12))
+    if line == "bus" and kind == "late":
+        kind = "lost"  # a request that its master has given up long ago: nobody could tell it from a new one
     number = round(chance.uniform(*LATE_S) if kind == "late" else chance.random(), 4)
     return Event(at_s, line, kind, (float(count), number), said)
 

@@ -12,6 +12,7 @@ from gateway.plants.store import NumberedPlant, PlantStore, Provenance
 from gateway.profiles import Rig, load_plant, load_rig
 from gateway.profiles.kinds.plant_writer import with_origins
 from gateway.profiles.rigs.assembly import check_report
+from gateway.profiles.rigs.faces import RtuFace
 from gateway.twin.plant import with_value
 from tests.service.rigs import demo, with_supervision
 from tests.simulation.heard import OUTPUTS, RTU_OUTPUT, SENTENCES, LineObserver, RtuObserver
@@ -26,7 +27,7 @@ CELL_SHARES = (0.5, 1.0 / 3.0, 2.0)
 CELLS = ("hbm-aed", "hbm-aed-binary", "laumas-tlb", "mantracourt-dsc", "hx711-line", "adam-4016")
 COUNTS_N = {"adam-4016": 10.0}
 UNITS = {"mantracourt-dsc": ", unit: N", "laumas-tlb": ""}
-KINDS = ("plain",) * 28 + ("rate",) + ("cell",) * 4 + ("valve",) * 3 + ("devices",) * 4
+KINDS = ("plain",) * 28 + ("rate",) + ("cell",) * 4 + ("valve",) * 3 + ("devices",) * 4 + ("bus",) * 3
 BOW = 0.005
 RIG = """name: pair
 plant: paper-slide
@@ -63,7 +64,7 @@ class Drawn:
 
 def draw_rig(seed: int) -> Drawn:
     """The rig of this seed, with strict bounds: a cell that is late by two samples and a half is lost."""
-    loop_hz, chance = Random(f"rate {seed}").choice(RATES_HZ), Random(f"rig 1 {seed}")
+    loop_hz, chance = Random(f"rate {seed}").choice(RATES_HZ), Random(f"rig 2 {seed}")
     kind, output, share = chance.choice(KINDS), "smc-itv-rc", 1.0
     if kind == "rate":
         loop_hz = chance.choice(OTHER_RATES_HZ)
@@ -72,7 +73,9 @@ def draw_rig(seed: int) -> Drawn:
     elif kind == "devices":
         output = chance.choice(OUTPUTS)
     rig = demo() if kind != "valve" else with_valve()
-    if kind == "devices":
+    if kind == "bus":
+        rig = replace(rig, fieldbus=(RtuFace(type="rtu", port="bus"),))
+    elif kind == "devices":
         rig = with_devices(output, chance.choice(CELLS))
     cell_hz = share * loop_hz
     device = rig.load_cell.device

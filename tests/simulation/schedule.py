@@ -14,6 +14,7 @@ from typing import Any
 
 from gateway.profiles import Rig
 from gateway.service.simulation.world import SimulatedRig
+from tests.simulation.bus_master import make_master
 from tests.simulation.cables import CABLES, lay_cables
 from tests.simulation.edges import DISK_S, Log, SimulatedDisk, simulated_edges
 from tests.simulation.events import FAULTS, VALVE_FAULTS, Event
@@ -85,7 +86,7 @@ class Simulation:
         self.service = SimulatedService(rig, folder, self.outside, self.log, self.clock)
         self.service.on_death = self._on_death
         self.masters = {
-            name: Master(
+            name: make_master(name, "bus" in CABLES)(
                 f"10.0.0.{place}",
                 self.outside,
                 lambda: self.service.inside,
