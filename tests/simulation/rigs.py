@@ -24,6 +24,7 @@ RATES_HZ = (20,) * 16 + (25,) * 3 + (100,)
 OTHER_RATES_HZ = (50, 50, 250)
 CELL_SHARES = (0.5, 1.0 / 3.0, 2.0)
 """Of a load cell's rate in the loop's, where they differ."""
+DEMO_OUTPUT = "smc-itv-rc"
 CELLS = ("hbm-aed", "hbm-aed-binary", "laumas-tlb", "mantracourt-dsc", "hx711-line", "adam-4016")
 COUNTS_N = {"adam-4016": 10.0}
 UNITS = {"mantracourt-dsc": ", unit: N", "laumas-tlb": ""}
@@ -53,7 +54,15 @@ class Drawn:
 
     rig: Rig
     cell_s: float | None
-    output: str = "smc-itv-rc"
+    output: str = DEMO_OUTPUT
+
+    @property
+    def in_band_n(self) -> float:
+        """How near the force must come. Of loops as a rig may have them, from 50 Hz on, and of slower ones, which are here for
+        the sake of time: they hunt, and more so where a reading must be asked for."""
+        if max(1.0 / self.rig.loop_hz, self.cell_s or 0.0) <= 0.02:
+            return 1.0
+        return 2.5 if self.output == DEMO_OUTPUT else 4.0
 
     def observer(self, bounds: Bounds) -> Observer:
         """Who hears what this output is told."""
@@ -65,7 +74,7 @@ class Drawn:
 def draw_rig(seed: int) -> Drawn:
     """The rig of this seed, with strict bounds: a cell that is late by two samples and a half is lost."""
     loop_hz, chance = Random(f"rate {seed}").choice(RATES_HZ), Random(f"rig 2 {seed}")
-    kind, output, share = chance.choice(KINDS), "smc-itv-rc", 1.0
+    kind, output, share = chance.choice(KINDS), DEMO_OUTPUT, 1.0
     if kind == "rate":
         loop_hz = chance.choice(OTHER_RATES_HZ)
     elif kind == "cell":
@@ -81,7 +90,7 @@ def draw_rig(seed: int) -> Drawn:
     device = rig.load_cell.device
     if reading := device.read_force:
         cell_hz = min(cell_hz, reading.rate_hz or cell_hz)
-        asked = replace(device, read_force=replace(reading, rate_hz=cell_hz))
+        asked = replace(device, read_force=replace(reading, rate_hz=2.0 * cell_hz))  # so that each tick finds it due
         rig = replace(rig, load_cell=replace(rig.load_cell, device=asked))
     return Drawn(_strict(rig, seed, loop_hz, cell_hz), 1.0 / cell_hz if device.stream else None, output)
 
