@@ -1,11 +1,8 @@
-"""One schedule: what masters, people and fate do to a gateway (events.py), run in virtual time, judged and shrunk.
-
-The shortest list of events that still breaks a law is what a failing seed is told by.
-"""
+"""One schedule: what masters, people and fate do to a gateway (events.py), run in virtual time and judged."""
 
 import struct
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
@@ -17,7 +14,8 @@ from gateway.service.simulation.world import SimulatedRig
 from tests.simulation.bus_master import make_master
 from tests.simulation.cables import CABLES, lay_cables
 from tests.simulation.edges import DISK_S, Log, SimulatedDisk, simulated_edges
-from tests.simulation.events import FAULTS, VALVE_FAULTS, Event
+from tests.simulation.events import Event
+from tests.simulation.healing import ANSWER_S, heal
 from tests.simulation.integrator import Integrator
 from tests.simulation.masters import BEATS_S, PULL, RUNS, TAKE, Master
 from tests.simulation.observer import STATUS_FIRST, STATUS_WORDS, Bounds
@@ -30,16 +28,8 @@ from tests.simulation.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 
 RUN_BIT, SELF_TEST = RUNS.values()
 COMMANDS = {"hold": ENABLE, "take": ENABLE | TAKE, "pull": ENABLE | PULL}
-HELD_N = 12.0
-MOST_OFF_N = 0.5
-"""By how much a healthy cell may read another force at rest than at first, until the zero is taken anew."""
-TARES = 5
 PLANTS_EVERY = 8
 """Of so many rigs one has numbered plants stored, which somebody may take into use."""
-HEAL_S = 2.0
-HUNTING_READS, HUNTING_READ_S = 10, 0.05
-ANSWER_S = 0.02
-FIRST_WORDS_S = 3.5
 FIRST_SETTING_S = 0.3
 """On a line that is back: a watchdog is fed before the safe voltage goes out."""
 LOOK_S = 0.02
@@ -334,47 +324,7 @@ class Simulation:
     # -- healing (I13)
 
     def _heal(self) -> None:
-        for name in (*FAULTS, *VALVE_FAULTS):
-            self._set_fault(name, on=False)
-        for line, cable in CABLES.items():
-            self._push(line)
-            cable.spoil()
-        SimulatedDisk.is_full = False
-        for master in self.masters.values():
-            master.fall_silent()
-            master.disconnect()
-        self._run_for(3.0)  # what is plugged in is looked for, and a guardian started again, every 2 s at the most
-        until_s = (
-            self.clock.now_s + FIRST_WORDS_S
-        )  # of a device that obeys nothing until a person resets, then it serves
-        while not self.service.is_serving and self.clock.now_s < until_s:
-            self._run_for(0.1)
-        healer = self.masters["healer"]
-        healer.reset(take=True)
-        self._run_for(0.1)
-        for _ in range(TARES):
-            if self._is_zero_off():  # somebody has tared while the cell was broken; noise may refuse one of these
-                healer.tare()
-                self._run_for(0.1)
-        healer.hold(HELD_N)
-        error_n = self._settled_force_n() - HELD_N
-        if not abs(error_n) <= self.in_band_n:
-            self.observer.broken.append(
-                f"I13: {error_n:+.2f} N off {HEAL_S:g} s after healing; {list(self.log.lines)[-4:]}"
-            )
-
-    def _settled_force_n(self) -> float:
-        """The force when it must be in the band; of a slow loop the mean around which it hunts."""
-        reads = HUNTING_READS if self.in_band_n > 1.0 else 1
-        self._run_for(HEAL_S - HUNTING_READ_S * (reads - 1))
-        forces_n = [self._read_force_n()]
-        while len(forces_n) < reads:
-            self._run_for(HUNTING_READ_S - ANSWER_S)
-            forces_n.append(self._read_force_n())
-        return sum(forces_n) / reads
-
-    def _is_zero_off(self) -> bool:
-        return self.rest_n is not None and abs(self._read_force_n() - self.rest_n) > MOST_OFF_N
+        heal(self)
 
     def _read_force_n(self) -> float:
         """The force that the gateway shows, N; not a number where nobody answers."""
@@ -394,19 +344,3 @@ def run_schedule(seed: int, events: Sequence[Event], duration_s: float) -> Outco
                 return simulation.run(events, duration_s)
             finally:
                 simulation.close()
-
-
-def shrink(events: Sequence[Event], is_broken: Callable[[Sequence[Event]], bool]) -> list[Event]:
-    """Return a shorter list that is still broken: halves, quarters ... down to single events are left out (ddmin)."""
-    kept, size = list(events), max(1, len(events) // 2)
-    while True:
-        at = 0
-        while at < len(kept):
-            shorter = kept[:at] + kept[at + size :]
-            if is_broken(shorter):
-                kept = shorter
-            else:
-                at += size
-        if size == 1:
-            return kept
-        size = max(1, size // 2)

@@ -9,7 +9,8 @@ import os
 import pytest
 
 from tests.simulation.events import Event, draw_events
-from tests.simulation.schedule import Outcome, run_schedule, shrink
+from tests.simulation.schedule import Outcome, run_schedule
+from tests.simulation.shrinking import shrink
 
 PUSH_SEEDS, LONG_SEEDS = 500, 50_000
 SHARDS = 20
