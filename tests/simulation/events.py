@@ -53,9 +53,9 @@ class Event:
 
 
 def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
-    """What happens, in its order: some two and a half events a second."""
+    """What happens, in its order: a little more than two events a second."""
     chance, at_s = Random(seed), 0.0
-    while (at_s := at_s + chance.expovariate(2.6)) < duration_s:
+    while (at_s := at_s + chance.expovariate(2.4)) < duration_s:
         event = _draw_one(chance, round(at_s, 4))
         yield event
         if event.what == "terminate" and chance.random() < 0.5:  # and it stands still on its way down
