@@ -6,11 +6,14 @@ it is opened again with a growing pause, and nothing that was written before a l
 
 import asyncio
 import os
+from collections import deque
 from collections.abc import Callable
 
 from gateway.devices import PacedWire, SerialSettings
 from gateway.ports import PortError, PortEvents
 from gateway.profiles import Rig
+from gateway.profiles.rigs.faces import RtuFace
+from tests.simulation.spoiled import Spoil, spoiled
 from tests.simulation.virtual_time import VirtualLoop
 
 
@@ -20,9 +23,11 @@ class Cable:
     def __init__(
         self, outside: VirtualLoop, settings: SerialSettings, on_device: Callable[[bytes, float], None]
     ) -> None:
-        self._outside, self._settings, self._on_device = outside, settings, on_device
+        self._outside, self._settings, self.on_device = outside, settings, on_device
         self.port: SimulatedPort | None = None
         self.is_plugged = True
+        self._spoils: deque[Spoil] = deque()
+        self.strange_s = 0.0  # when something strange was said last
         self.cut()
 
     def cut(self) -> None:
@@ -48,9 +53,25 @@ class Cable:
             self._put(self._to_device, data, self._arrive)
 
     def send_to_host(self, data: bytes) -> None:
-        """Put a device's bytes on the wire."""
+        """Put a device's bytes on the wire, or what becomes of them."""
+        if self._spoils and data:
+            self._send_spoiled(data)
+        elif self.is_plugged:
+            self._put(self._to_host, data, self._reach_host)
+
+    def spoil(self, *spoils: Spoil) -> None:
+        """Do this to the next answers; with nothing: to none of them any more."""
+        self._spoils = deque(one for spoil in spoils for one in [spoil] * spoil.count)
+
+    def say(self, data: bytes) -> None:
+        """Bytes that are not as the device said them, or not when: of whatever else is on this wire."""
+        self.strange_s = self._outside.time()
         if self.is_plugged:
             self._put(self._to_host, data, self._reach_host)
+
+    def _send_spoiled(self, data: bytes) -> None:
+        for late_s, piece in spoiled(self._spoils.popleft(), data):
+            self._outside.call_later(late_s, self.say, piece) if late_s else self.say(piece)
 
     def pull(self) -> None:
         """Pull the plug."""
@@ -70,7 +91,7 @@ class Cable:
 
     def _arrive(self, wire: PacedWire) -> None:
         if wire is self._to_device and (chunk := wire.bytes_through(self._outside.time())):
-            self._on_device(chunk, self._outside.time())
+            self.on_device(chunk, self._outside.time())
 
     def _reach_host(self, wire: PacedWire) -> None:
         if wire is self._to_host and (chunk := wire.bytes_through(self._outside.time())) and self.port:
@@ -113,6 +134,11 @@ class SimulatedPort:
         if self.is_open:
             self._cable.send_to_device(data)
         return self.is_open
+
+    @property
+    def unsent_bytes(self) -> int:
+        """What the kernel still holds of what was written."""
+        return max(0, int((self._cable.through_s - self._loop.time()) / self._settings.character_s))
 
     def flush_input(self) -> int:
         dropped = len(self._buffer)
@@ -176,9 +202,18 @@ class SimulatedPort:
 
 
 def lay_cables(
-    outside: VirtualLoop, rig: Rig, on_output: Callable[[bytes, float], None], on_cell: Callable[[bytes, float], None]
+    outside: VirtualLoop,
+    rig: Rig,
+    on_output: Callable[[bytes, float], None],
+    on_cell: Callable[[bytes, float], None],
+    on_valve: Callable[[bytes, float], None],
 ) -> None:
     """Connect the world to control."""
     CABLES.clear()
     CABLES["output"] = Cable(outside, rig.output.settings, on_output)
     CABLES["load_cell"] = Cable(outside, rig.load_cell.settings, on_cell)
+    for face in rig.fieldbus:
+        if isinstance(face, RtuFace):
+            CABLES["bus"] = Cable(outside, face.settings, lambda chunk, now_s: None)
+    if rig.valve:
+        CABLES["valve"] = Cable(outside, rig.valve.settings, on_valve)

@@ -188,6 +188,10 @@ class NotedRecorder(Recorder):
             cls.of.pop()._release()
 
 
+def _no_fit(*_: Any) -> None:
+    raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+
 @contextmanager
 def simulated_edges() -> Any:
     """Everything that reaches for the kernel, replaced."""
@@ -196,12 +200,14 @@ def simulated_edges() -> Any:
             patch.setattr(f"gateway.service.running_rig.{maker}.Recorder", NotedRecorder)
         patch.setattr("gateway.twin.simulation.STEP_S", TWIN_STEP_S)
         patch.setattr("gateway.service.running_rig.lines.rig_ports.SerialPort", SimulatedPort)
+        patch.setattr("gateway.fieldbus.rtu_server.SerialPort", SimulatedPort)
         patch.setattr(f"{_RIG}.ClockTick", SimulatedTick)
         patch.setattr("gateway.service.control_process.RunningRig", NotedRunningRig)
         patch.setattr("gateway.fieldbus.tcp_server.Listener", MemoryListener)
         NotedRunningRig.of.clear()
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
         patch.setattr(f"{_RIG}.explain_silent_device", _explain)
+        patch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", _no_fit)
         for user in (
             "gateway.calibrations.upload",
             "gateway.service.running_rig.rig_plants",

@@ -8,7 +8,8 @@ after a kill, too.
 import struct
 from zlib import crc32
 
-from tests.simulation.masters import Master, read_pdu, write_pdu
+from tests.simulation.masters import Master
+from tests.simulation.spelling import read_pdu, write_pdu
 
 STAGING, ACTIVE = 1000, 1500
 HEAD_WORDS, TAIL_FROM = 140, 150
@@ -32,6 +33,7 @@ class Integrator(Master):
     def watch(self) -> None:
         """Look at what is in use, from now on."""
         self._allowed: set[bytes] = set()
+        self._known: set[bytes] = set()
         self._seen: list[bytes] = []
         self._look()
 
@@ -45,8 +47,13 @@ class Integrator(Master):
         for address, part in ((0, block[:200]), (100, block[200:]), (TAIL_FROM, words[2 * HEAD_WORDS :])):
             self.ask(write_pdu(STAGING + address, *struct.unpack(f">{len(part) // 2}H", part)))
         self._sent, self._before = words, self._allowed
+        self._known.add(words)
         self._allowed = self._allowed | {words}
         self.ask(write_pdu(COMMIT, 1))
+
+    def expect_any(self) -> None:
+        """Somebody else takes one of the sets that there are into use."""
+        self._allowed, self._sent = set(self._known), None
 
     def lose(self) -> None:
         """Nobody knows now how a commit went: either set may be in use."""
@@ -83,6 +90,7 @@ class Integrator(Master):
         if self._first is None:
             self._first = words
             self._allowed.add(words)
+            self._known.add(words)
         elif words not in self._allowed:
             which = f"the set with the CRC-32 {crc32(words):08x}"
             self.complaints.append(f"I9 at {self._outside.time():.4f}: {which} is in use, which nobody committed")

@@ -6,19 +6,19 @@ They spell frames themselves. Each checks its own answers: the right transaction
 import struct
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tests.simulation.network import Line
+from tests.simulation.spelling import ENABLE, WAYS, WRITES, Wish, control_of, write_one_pdu, write_pdu
 from tests.simulation.virtual_time import VirtualLoop
 
-ENABLE, RESET, TARE, TAKE = 1, 2, 4, 8
+RESET, TARE, TAKE, PULL = 2, 4, 8, 16
 RUNS = {"calibrate": 32, "self_test": 64}
 """Bits that start a run, which lasts while they stand."""
 BEATS_S = (0.08, 0.1, 0.15)
 """Time between two heartbeats of one that works: more than once within a lease of 0.2 s."""
 RESET_S = 0.3
 """Until what a reset has changed is seen: some ticks."""
-WRITES = frozenset((5, 6, 15, 16, 22, 23))
 
 
 @dataclass(frozen=True)
@@ -28,30 +28,6 @@ class Asked:
     transaction: int
     pdu: bytes
     control: int | None
-
-
-def write_pdu(address: int, *words: int) -> bytes:
-    """FC16."""
-    return struct.pack(
-        f">BHHB{len(words)}H", 16, address, len(words), 2 * len(words), *(word & 0xFFFF for word in words)
-    )
-
-
-def read_pdu(address: int, count: int) -> bytes:
-    """FC03."""
-    return struct.pack(">BHH", 3, address, count)
-
-
-def control_of(pdu: bytes) -> int | None:
-    """The control word that a write would set, None where it is not among what it writes; -1 where it changes single bits."""
-    if pdu[0] not in WRITES or len(pdu) < (10 if pdu[0] == 23 else 5):
-        return None
-    address = struct.unpack_from(">H", pdu, 5 if pdu[0] == 23 else 1)[0]
-    if pdu[0] in (5, 15, 22):
-        return -1 if address < 16 else None
-    data = {6: pdu[3:5], 16: pdu[6:], 23: pdu[10:]}[pdu[0]]
-    in_floats = address in (200, 300)
-    return struct.unpack_from(">H", data)[0] if address == 0 and len(data) >= 2 else -1 if in_floats else None
 
 
 class Master:
@@ -73,8 +49,8 @@ class Master:
         self._waiting: deque[Asked] = deque()
         self._stream = b""
         self._transaction = self._beat = self._port = 0
-        self._force_n = 0.0
-        self._control = 0
+        self._wish = Wish(0, 0.0, 0)
+        self._way = WAYS["block"]
         self._beating = 0
         self._is_framed = True
         self._beat_s = beat_s
@@ -128,10 +104,13 @@ class Master:
 
     # -- one that works
 
-    def hold(self, force_n: float, control: int = ENABLE) -> None:
-        """Command this force, and beat from now on."""
-        self._force_n, self._control = force_n, control
+    def hold(self, force_n: float, control: int = ENABLE, way: str = "block", voltage_v: float | None = None) -> None:
+        """Command this force, or this voltage, and beat from now on; way: of WAYS."""
+        self._wish, self._way = Wish(control, force_n, self._beat, voltage_v), WAYS[way]
         self._beating += 1
+        if self._way.beat:
+            for pdu in self._way.begin(self._wish):
+                self.ask(pdu)
         self._keep_beating(self._beating)
 
     def run(self, name: str) -> None:
@@ -146,12 +125,12 @@ class Master:
 
     def tare(self) -> None:
         """Beside the bits that stand."""
-        self.ask(struct.pack(">BHH", 6, 0, self._control | TARE))
+        self.ask(write_one_pdu(0, self._wish.control | TARE))
 
     def let_go(self) -> None:
         """Disable in words."""
         self._beating += 1
-        self._control = 0
+        self._wish = replace(self._wish, control=0)
         self._beat += 1
         self.ask(write_pdu(0, 0, 0, 0, 0, self._beat))
 
@@ -162,7 +141,7 @@ class Master:
     def reset(self, take: bool = False) -> None:
         """Reset faults, with a heartbeat of its own, and whatever somebody else has left in the other words of the block; take
         over, if asked."""
-        self._control = 0
+        self._wish = replace(self._wish, control=0)
         for control in (TAKE if take else 0, RESET):
             self._beat += 1
             self.ask(write_pdu(0, control, 0, 0, 0, self._beat, *[0] * 8))
@@ -170,7 +149,9 @@ class Master:
     def _keep_beating(self, number: int) -> None:
         if number == self._beating:
             self._beat += 1
-            self.ask(write_pdu(0, self._control, round(100 * self._force_n), 0, 0, self._beat))
+            wish = self._wish = replace(self._wish, beat=self._beat)
+            for pdu in (self._way.beat(wish),) if self._way.beat else self._way.begin(wish):
+                self.ask(pdu)
             self._outside.call_later(self._beat_s, self._keep_beating, number)
 
     # -- answers

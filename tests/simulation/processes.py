@@ -165,6 +165,10 @@ class SimulatedService:
     def is_guarded(self) -> bool:
         return self._guardian is not None
 
+    def answer_socket(self, line: bytes) -> bytes:
+        """What control.sock of the control process that lives says to a line."""
+        return NotedRunningRig.of[-1]._control_socket.answer(line)
+
     # -- what happens to it
 
     def kill_control(self) -> None:

@@ -1,12 +1,9 @@
-"""One schedule: what masters, people and fate do to a gateway (events.py), run in virtual time, judged and shrunk.
-
-The shortest list of events that still breaks a law is what a failing seed is told by.
-"""
+"""One schedule: what masters, people and fate do to a gateway (events.py), run in virtual time and judged."""
 
 import struct
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 from random import Random
@@ -14,26 +11,27 @@ from typing import Any
 
 from gateway.profiles import Rig
 from gateway.service.simulation.world import SimulatedRig
-from tests.service.rigs import strict, with_supervision
+from tests.simulation.bus_master import make_master
 from tests.simulation.cables import CABLES, lay_cables
 from tests.simulation.edges import DISK_S, Log, SimulatedDisk, simulated_edges
-from tests.simulation.events import FAULTS, Event
+from tests.simulation.events import Event
+from tests.simulation.healing import ANSWER_S, heal
 from tests.simulation.integrator import Integrator
-from tests.simulation.masters import BEATS_S, ENABLE, RUNS, TAKE, Master, read_pdu
-from tests.simulation.observer import STATUS_FIRST, STATUS_WORDS, Bounds, Observer
+from tests.simulation.masters import BEATS_S, PULL, RUNS, TAKE, Master
+from tests.simulation.observer import STATUS_FIRST, STATUS_WORDS, Bounds
 from tests.simulation.processes import SimulatedService
+from tests.simulation.rigs import LEASE_S, draw_rig, store_plants
+from tests.simulation.socket_user import SocketUser
+from tests.simulation.spelling import BITS, DISABLED_BY_BIT, ENABLE, read_pdu
+from tests.simulation.spoiled import Spoil
 from tests.simulation.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 
-LEASE_S, STALL_S = 0.2, 0.1
-RATES_HZ = (20,) * 16 + (25,) * 3 + (100,)
-"""Of loop and load cell, drawn for each seed: at 20 Hz a schedule takes half of the time, and its laws are the same."""
-HELD_N = 12.0
-IN_BAND_N, SLOWLY_IN_BAND_N = 1.0, 2.5
-"""Of loops as a rig may have them, from 50 Hz on, and of slower ones, which are here for the sake of time: they hunt."""
-MOST_OFF_N = 0.5
-"""By how much a healthy cell may read another force at rest than at first, until the zero is taken anew."""
-TARES = 5
-HEAL_S = 2.0
+RUN_BIT, SELF_TEST = RUNS.values()
+COMMANDS = {"hold": ENABLE, "take": ENABLE | TAKE, "pull": ENABLE | PULL}
+PLANTS_EVERY = 8
+"""Of so many rigs one has numbered plants stored, which somebody may take into use."""
+FIRST_SETTING_S = 0.3
+"""On a line that is back: a watchdog is fed before the safe voltage goes out."""
 LOOK_S = 0.02
 READ_S = 0.1
 
@@ -49,38 +47,17 @@ class Outcome:
     commits: int
 
 
-def simulated_rig(seed: int) -> Rig:
-    """A demo rig with strict bounds, at a rate of its own: a cell that is late by two samples and a half is lost."""
-    loop_hz = Random(f"rate {seed}").choice(RATES_HZ)
-    bounds = {"sample_timeout_s": max(0.05, 2.5 / loop_hz), "output_timeout_s": max(0.1, 3.0 / loop_hz)}
-    rig = with_supervision(strict(), lease_s=LEASE_S, stall_s=STALL_S, **bounds)
-    output, load_cell = replace(rig.output, port="output"), replace(rig.load_cell, port="load_cell")
-    assert rig.plant_profile
-    plant = rig.plant_profile.plant  # without inertia its steps may be of any length; it lies, so that it has no weight
-    still = replace(plant.contact, mass_kg=0.0, pad_damping_n_s_per_m=0.0)
-    profile = replace(rig.plant_profile, plant=replace(plant, contact=still))
-    return replace(rig, seed=seed, loop_hz=loop_hz, output=output, load_cell=load_cell, plant_profile=profile)
-
-
 class Simulation:
     """A gateway, its world and its masters. rest_n: force that a healthy cell reads at rest, None where nobody has looked."""
 
     rest_n: float | None = None
 
     def __init__(self, seed: int, folder: Path) -> None:
-        rig = simulated_rig(seed)
-        self.period_s = 1.0 / rig.loop_hz
+        drawn = draw_rig(seed)
+        rig = drawn.rig
+        self.period_s, self.cell_s, self.in_band_n = 1.0 / rig.loop_hz, drawn.cell_s, drawn.in_band_n
         self.clock, self.chance = VirtualClock(), Random(~seed)
-        supervision, limits = rig.control.supervision, rig.control.limits
-        bounds = Bounds(
-            limits.voltage_max_v,
-            limits.voltage_slew_v_per_s,
-            supervision.sample_timeout_s,
-            supervision.stall_s,
-            LEASE_S,
-            self.period_s,
-        )
-        self.observer = Observer(bounds)
+        self.observer = drawn.observer(self._bounds_of(rig))
         self.outside = VirtualLoop(self.clock)
         self.outside.set_exception_handler(self._on_error)
         self.log = Log(self.clock)
@@ -90,13 +67,16 @@ class Simulation:
             send_cell=lambda data: CABLES["load_cell"].send_to_host(data),
             now_s=self.clock.now_s,
         )
-        lay_cables(self.outside, rig, self._on_output, self.world.on_cell_bytes)
+        self._move_valve, self.world.valve.move = self.world.valve.move, self._judge_valve  # type: ignore[method-assign]
+        lay_cables(self.outside, rig, self._on_output, self.world.on_cell_bytes, self._on_valve)
         SimulatedDisk.is_full, SimulatedDisk.is_gone, SimulatedDisk.folder = False, False, folder
         SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(*DISK_S))
+        if seed % PLANTS_EVERY == 0:
+            store_plants(rig, folder)
         self.service = SimulatedService(rig, folder, self.outside, self.log, self.clock)
         self.service.on_death = self._on_death
         self.masters = {
-            name: Master(
+            name: make_master(name, "bus" in CABLES)(
                 f"10.0.0.{place}",
                 self.outside,
                 lambda: self.service.inside,
@@ -107,11 +87,26 @@ class Simulation:
         }
         self.reader = Master("10.0.0.9", self.outside, lambda: self.service.inside, lambda *_: None)
         self.integrator = Integrator("10.0.0.8", self.outside, lambda: self.service.inside, lambda *_: None)
+        self.person = SocketUser(lambda: self.service.inside, self.service.answer_socket)
+        self.person.on_write = lambda control: self._on_write(control, True)
+        self.person.on_model = self.integrator.expect_any
         self.clients = (*self.masters.values(), self.reader, self.integrator)
-        self.outside.call_later(0.3 * self.period_s, self._stream)
+        if self.cell_s:
+            self.outside.call_later(0.3 * self.cell_s, self._stream)
         self.outside.call_later(LOOK_S, self._look)
         self.outside.call_later(READ_S, self._read_status)
         self.outside.call_later(READ_S, self.integrator.watch)
+
+    def _bounds_of(self, rig: Rig) -> Bounds:
+        supervision, limits = rig.control.supervision, rig.control.limits
+        return Bounds(
+            limits.voltage_max_v,
+            limits.voltage_slew_v_per_s,
+            supervision.sample_timeout_s,
+            supervision.stall_s,
+            LEASE_S,
+            self.period_s,
+        )
 
     def run(self, events: Iterable[Event], duration_s: float) -> Outcome:
         """Run the events, then heal everything, reset, and see the force come back."""
@@ -120,8 +115,8 @@ class Simulation:
         self._happen_next(iter(events))
         self._run_for(duration_s)
         self._heal()
-        for master in self.clients:
-            self.observer.broken += master.complaints
+        for client in (*self.clients, self.person):
+            self.observer.broken += client.complaints
         self.observer.broken += self.log.internal_errors
         self.observer.fingerprint.update("\n".join(self.observer.broken).encode())
         return Outcome(
@@ -155,20 +150,24 @@ class Simulation:
             self._command(self.masters[event.whom], event)
         elif event.whom == "integrator":
             self.integrator.upload()
+        elif event.whom == "person":
+            self.person.say(event.data)
         elif event.whom == "world":
             self._set_fault(event.what, on=bool(event.numbers[0]))
         elif event.whom == "machine":
             self._shake(event)
-        elif event.what == "pull":
-            self._pull(event.whom)
         else:
-            self._push(event.whom)
+            self._touch_line(event)
 
     def _command(self, master: Master, event: Event) -> None:
-        if event.what in ("hold", "take"):
-            master.hold(event.numbers[0], ENABLE if event.what == "hold" else ENABLE | TAKE)
+        if event.what == "drive":
+            master.hold(0.0, way=event.way, voltage_v=event.numbers[0])
+        elif event.what in COMMANDS:
+            master.hold(event.numbers[0], COMMANDS[event.what], event.way)
         elif event.what in RUNS:
             master.run(event.what)
+        elif event.what == "ask":
+            master.ask(event.data, *map(int, event.numbers))
         elif event.data:
             getattr(master, event.what)(event.data)
         else:
@@ -202,11 +201,26 @@ class Simulation:
         if name == "cell-cut":
             self._judge_cell(is_cut=on)
 
+    def _touch_line(self, event: Event) -> None:
+        if event.whom not in CABLES:
+            return  # a rig without a valve
+        if event.what == "pull":
+            self._pull(event.whom)
+        elif event.what == "push":
+            self._push(event.whom)
+        elif event.what == "say":
+            CABLES[event.whom].say(event.data)
+        else:
+            count, number = event.numbers
+            CABLES[event.whom].spoil(Spoil(event.what, int(count), number, event.data))
+
     def _pull(self, line: str) -> None:
         CABLES[line].pull()
+        if line == "valve":
+            return
         if line == "output":
             self.observer.note_cut(self.clock.now_s)
-            self.observer.output_lost_s = self.clock.now_s
+            self.observer.output_lost_s, self._back_s = self.clock.now_s, 0.0
         else:
             self._judge_cell(is_cut=None)
 
@@ -226,17 +240,38 @@ class Simulation:
     # -- what goes on
 
     def _on_output(self, chunk: bytes, now_s: float) -> None:
+        settings = self.observer.settings
         self.observer.hear(chunk, now_s)
-        self.observer.output_lost_s = None
+        if self.observer.output_lost_s is not None:
+            self._back_s = self._back_s or now_s
+            if self.observer.settings > settings or now_s - self._back_s > FIRST_SETTING_S:
+                self.observer.output_lost_s, self._back_s = None, 0.0
         self.world.on_output_bytes(chunk, now_s)
 
+    _back_s = 0.0  # when a line that was lost has brought its first byte
+
+    def _on_valve(self, chunk: bytes, now_s: float) -> None:
+        CABLES["valve"].send_to_host(self.world.on_valve_bytes(chunk, now_s))
+
+    def _judge_valve(self, now_s: float) -> bool:
+        """The valve is moved without pressure, whatever its relay was told and when."""
+        if (has_moved := self._move_valve(now_s)) and self.observer.voltage_v > 0.0:
+            self.observer.broken.append(f"valve at {now_s:.4f}: it moves under {self.observer.voltage_v:.3f} V")
+        return has_moved
+
     def _on_write(self, control: int | None, is_answered: bool) -> None:
+        if control == DISABLED_BY_BIT:  # which ends no run
+            control = BITS if self.observer.is_run else 0
+        if control is not None and control & (ENABLE | RUN_BIT | SELF_TEST) and control > 0 and is_answered:
+            self.person.lose()  # a run that was asked for at the machine excludes that
         note = self.observer.note_accepted if is_answered else self.observer.note_unanswered
         note(control, self.clock.now_s)
 
     def _on_death(self) -> None:
         self.observer.note_death(self.clock.now_s, CABLES["output"].through_s)
         self._lose_control()
+        self.person.lose()
+        self._was_watched = False
         for master in self.clients:
             master.lose()
         self.reader.heard.clear()
@@ -248,9 +283,28 @@ class Simulation:
     def _stream(self) -> None:
         if CABLES["load_cell"].backlog_s < 0.01:
             self.world.stream(self.clock.now_s)
-        self.outside.call_later(self.period_s, self._stream)
+        self.outside.call_later(self.cell_s or self.period_s, self._stream)
+
+    _was_watched = False
+
+    def _follow_person(self) -> None:
+        """A run that somebody has started at the machine presses without a master, as long as that person looks at it."""
+        is_watched = self.person.watched_s is not None
+        if is_watched:
+            self.observer.note_accepted(RUN_BIT, self.clock.now_s)
+        elif self._was_watched and self.observer.is_run:
+            self.observer.note_accepted(0, self.clock.now_s)
+        self._was_watched = is_watched
+
+    def _note_strange_words(self) -> None:
+        """A sentence that fits is a sample, whoever says it: the cell is lost from then on."""
+        lost_s, strange_s = self.observer.cell_lost_s, CABLES["load_cell"].strange_s
+        if lost_s is not None and strange_s > lost_s:
+            self.observer.cell_lost_s = strange_s
 
     def _look(self) -> None:
+        self._follow_person()
+        self._note_strange_words()
         if self.service.is_serving:
             self.observer.control_lost_s = None
         self.observer.look(self.clock.now_s)
@@ -270,37 +324,12 @@ class Simulation:
     # -- healing (I13)
 
     def _heal(self) -> None:
-        for name in FAULTS:
-            self._set_fault(name, on=False)
-        for line in ("output", "load_cell"):
-            self._push(line)
-        SimulatedDisk.is_full = False
-        for master in self.masters.values():
-            master.fall_silent()
-            master.disconnect()
-        self._run_for(3.0)  # what is plugged in is looked for, and a guardian started again, every 2 s at the most
-        healer = self.masters["healer"]
-        healer.reset(take=True)
-        self._run_for(0.1)
-        for _ in range(TARES):
-            if self._is_zero_off():  # somebody has tared while the cell was broken; noise may refuse one of these
-                healer.tare()
-                self._run_for(0.1)
-        healer.hold(HELD_N)
-        self._run_for(HEAL_S)
-        error_n = self._read_force_n() - HELD_N
-        if not abs(error_n) <= (IN_BAND_N if self.period_s <= 0.02 else SLOWLY_IN_BAND_N):
-            self.observer.broken.append(
-                f"I13: {error_n:+.2f} N off {HEAL_S:g} s after healing; {list(self.log.lines)[-4:]}"
-            )
-
-    def _is_zero_off(self) -> bool:
-        return self.rest_n is not None and abs(self._read_force_n() - self.rest_n) > MOST_OFF_N
+        heal(self)
 
     def _read_force_n(self) -> float:
         """The force that the gateway shows, N; not a number where nobody answers."""
         self.masters["healer"].ask(read_pdu(102, 1))
-        self._run_for(0.02)
+        self._run_for(ANSWER_S)
         answers = [pdu for _, pdu in self.masters["healer"].heard if pdu[:2] == b"\x03\x02"]
         return float(struct.unpack(">h", answers[-1][2:4])[0]) * 0.01 if answers else nan
 
@@ -315,19 +344,3 @@ def run_schedule(seed: int, events: Sequence[Event], duration_s: float) -> Outco
                 return simulation.run(events, duration_s)
             finally:
                 simulation.close()
-
-
-def shrink(events: Sequence[Event], is_broken: Callable[[Sequence[Event]], bool]) -> list[Event]:
-    """Return a shorter list that is still broken: halves, quarters ... down to single events are left out (ddmin)."""
-    kept, size = list(events), max(1, len(events) // 2)
-    while True:
-        at = 0
-        while at < len(kept):
-            shorter = kept[:at] + kept[at + size :]
-            if is_broken(shorter):
-                kept = shorter
-            else:
-                at += size
-        if size == 1:
-            return kept
-        size = max(1, size // 2)

@@ -9,7 +9,8 @@ import os
 import pytest
 
 from tests.simulation.events import Event, draw_events
-from tests.simulation.schedule import Outcome, run_schedule, shrink
+from tests.simulation.schedule import Outcome, run_schedule
+from tests.simulation.shrinking import shrink
 
 PUSH_SEEDS, LONG_SEEDS = 500, 50_000
 SHARDS = 20
@@ -32,6 +33,14 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(10.4051, "output", "pull"),
             Event(19.2659, "worker", "self_test"),
             Event(19.32, "worker", "tare"),
+        ],
+    ),
+    (
+        13,
+        [
+            Event(11.5915, "world", "cell-frozen", (1.0,)),
+            Event(11.9218, "worker", "hold", (37.19,)),
+            Event(13.6262, "output", "replaced", (12.0, 0.4523), b"OUT OF RANGE\r\n"),
         ],
     ),
 ]

@@ -12,7 +12,7 @@ from gateway.devices import DeviceProfile, cell_device, output_device
 from gateway.devices.device_checks.spelling import CheckSpelling
 from gateway.devices.fields import Value
 from gateway.devices.grammar import Grammar
-from gateway.devices.messages import DeviceStep
+from gateway.devices.messages import AskDevice, DeviceStep
 from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.registers.refusal import Refusal
 from gateway.registers.words import State
@@ -81,6 +81,19 @@ def test_a_latched_trip_at_the_start_refuses_an_enable_until_the_reset() -> None
     wired.write(0, RESET)
     wired.run(1.0)
     wired.pressing(12.0)
+
+
+def test_a_reset_is_not_undone_by_the_answer_to_a_question_of_before_it() -> None:
+    """The state is asked for once a second: `tripped` may still be on the wire when somebody resets."""
+    wired = Wired(rig_with(device()))
+    wired.world._output.watchdog.do(DeviceStep.ARM, 1, 0.0)  # type: ignore[attr-defined]
+    assert wired.world._output.elapse(0.2)
+    wired.run(1.0)
+    assert wired.exchange.fault is FaultCode.WATCHDOG_TRIPPED
+    wired.until(lambda: wired.exchange._in_flight == AskDevice(DeviceStep.STATUS), 2.0)
+    wired.write(0, RESET)
+    assert wired.exchange._in_flight == AskDevice(DeviceStep.STATUS)
+    wired.until(lambda: wired.exchange.checks.is_armed, 0.5)
 
 
 def test_a_device_that_says_that_it_is_another_one_gets_the_safe_voltage_and_nothing_else() -> None:

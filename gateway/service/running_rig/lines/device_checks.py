@@ -94,7 +94,8 @@ class DeviceChecks:
         elif answer.step is DeviceStep.CLEAR:
             self.is_tripped = False
         elif answer.step is DeviceStep.STATUS:
-            self._take_state(WatchdogState(answer.text))
+            if DeviceStep.CLEAR not in self._waiting:  # else it was asked before the reset
+                self._take_state(WatchdogState(answer.text))
         elif answer.step is DeviceStep.VERIFY:
             self._take_proof(is_armed=answer.is_right)
         self._settle()

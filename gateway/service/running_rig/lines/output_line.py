@@ -198,8 +198,8 @@ class OutputExchange:
         elif isinstance(reply, WatchdogTripped):
             self.checks.trip()
         elif isinstance(reply, Pressure):
-            self._failures[type(request)] = 0
             self.pressure_pa = reply.pressure_pa
+            self._note_success(type(request))
         elif isinstance(reply, Refused):
             self._count_failure(type(request), FaultCode.OUTPUT_REFUSED)
         elif request is not None and isinstance(reply, Accepted):
@@ -228,7 +228,11 @@ class OutputExchange:
         self._standing_v = reply.voltage_v
         if abs(reply.voltage_v - self._asked_v) > self._host.resolution_v:
             self._standing_v = self._asked_v  # the answer only counts in coarser steps
-        self._failures[type(request)] = 0
+        self._note_success(type(request))
+
+    def _note_success(self, question: type) -> None:
+        """The fault ends with whichever question was its last reason: where the safe voltage stands, only polls go on."""
+        self._failures[question] = 0
         if max(self._failures.values()) < _FAILURES_BEFORE_FAULT:
             self._line_fault = FaultCode.NONE
 

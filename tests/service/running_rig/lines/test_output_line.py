@@ -170,6 +170,21 @@ def test_the_fault_is_gone_once_the_device_obeys_again(wire: Wire) -> None:
     assert wire.exchange.fault is FaultCode.NONE
 
 
+def test_refused_polls_are_no_fault_any_more_once_one_is_answered(wire: Wire) -> None:
+    """Where the safe voltage stands nothing is set anew: the polls alone must end what they have begun."""
+    wire.settle(0)
+    for _ in range(3):
+        while wire.exchange.unanswered_since_s is None:
+            wire.tick()
+        wire.answer("UNKNOWN COMMAND")
+    assert wire.exchange.fault is FaultCode.OUTPUT_REFUSED
+    while wire.exchange.unanswered_since_s is None:
+        wire.tick()
+    assert wire.last == "MON"
+    wire.answer("7")
+    assert wire.exchange.fault is FaultCode.NONE
+
+
 def test_garbage_is_counted_and_answers_nothing(wire: Wire) -> None:
     wire.set_voltage(512)
     wire.answer("5a2")

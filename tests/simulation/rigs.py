@@ -1,0 +1,145 @@
+"""The rig of a seed: most often the demo rig on a slow loop, for the sake of time; now and then a fast loop, a load cell of
+another rate, a directional valve, or other devices on the wires.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+
+from gateway.plants.store import NumberedPlant, PlantStore, Provenance
+from gateway.profiles import Rig, load_plant, load_rig
+from gateway.profiles.kinds.plant_writer import with_origins
+from gateway.profiles.rigs.assembly import check_report
+from gateway.profiles.rigs.faces import RtuFace
+from gateway.twin.plant import with_value
+from tests.service.rigs import demo, with_supervision
+from tests.simulation.heard import OUTPUTS, RTU_OUTPUT, SENTENCES, LineObserver, RtuObserver
+from tests.simulation.observer import Bounds, Observer
+
+LEASE_S, STALL_S = 0.2, 0.1
+RATES_HZ = (20,) * 16 + (25,) * 3 + (100,)
+"""Of loop and load cell, drawn for each seed: at 20 Hz a schedule takes half of the time, and its laws are the same."""
+SLOW_HZ = 25
+"""The most for rigs that have something else of their own, for the sake of time."""
+OTHER_RATES_HZ = (50, 50, 250)
+CELL_SHARES = (0.5, 1.0 / 3.0, 2.0)
+"""Of a load cell's rate in the loop's, where they differ."""
+DEMO_OUTPUT = "smc-itv-rc"
+CELLS = ("hbm-aed", "hbm-aed-binary", "laumas-tlb", "mantracourt-dsc", "hx711-line", "adam-4016")
+COUNTS_N = {"adam-4016": 10.0}
+UNITS = {"mantracourt-dsc": ", unit: N", "laumas-tlb": ""}
+KINDS = ("plain",) * 28 + ("rate",) + ("cell",) * 4 + ("valve",) * 3 + ("devices",) * 4 + ("bus",) * 3
+BOW = 0.005
+RIG = """name: pair
+plant: paper-slide
+calibration: demo
+output: {{device: {output}, port: /dev/serial/by-id/output}}
+load_cell: {{device: {cell}, port: /dev/serial/by-id/cell, range_n: 98.07{more}}}
+limits: {{force_max_n: 60, over_force_n: 75, voltage_max_v: 8.5, safe_voltage_v: 0}}
+defaults: {{force_ramp_n_per_s: 200, precontact_force_n: 3}}
+trim: {{gain_v_per_n_s: 0.3, limit_v: 0.5}}
+lead: {{lag_s: 0.072, second_lag_s: 0.072}}
+supervision: {{sample_timeout_s: 0.25, output_timeout_s: 0.3, saturation_n: 96}}
+self_test: {{force_n: 15}}
+network: {{allow_plain_upload: true}}
+accept_no_device_watchdog: {unwatched}
+"""
+WATCHED = frozenset(("icpdas-702x", "icpdas-7024", "adam-4024", "mcu-line"))
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """rig: as the gateway has it; cell_s: between two readings of a load cell that talks by itself, None for one that is asked;
+    output: the device on that wire."""
+
+    rig: Rig
+    cell_s: float | None
+    output: str = DEMO_OUTPUT
+
+    @property
+    def in_band_n(self) -> float:
+        """How near the force must come. Of loops as a rig may have them, from 50 Hz on, and of slower ones, which are here for
+        the sake of time: they hunt, and more so where a reading must be asked for."""
+        if max(1.0 / self.rig.loop_hz, self.cell_s or 0.0) <= 0.02:
+            return 1.0
+        return 2.5 if self.output == DEMO_OUTPUT else 4.0
+
+    def observer(self, bounds: Bounds) -> Observer:
+        """Who hears what this output is told."""
+        if self.output == RTU_OUTPUT:
+            return RtuObserver(bounds)
+        return LineObserver(bounds, sentences=SENTENCES[self.output]) if self.output in SENTENCES else Observer(bounds)
+
+
+def draw_rig(seed: int) -> Drawn:
+    """The rig of this seed, with strict bounds: a cell that is late by two samples and a half is lost."""
+    loop_hz, chance = Random(f"rate {seed}").choice(RATES_HZ), Random(f"rig 2 {seed}")
+    kind, output, share = chance.choice(KINDS), DEMO_OUTPUT, 1.0
+    if kind != "plain":
+        loop_hz = min(loop_hz, SLOW_HZ)
+    if kind == "rate":
+        loop_hz = chance.choice(OTHER_RATES_HZ)
+    elif kind == "cell":
+        share = chance.choice(CELL_SHARES)
+    elif kind == "devices":
+        output = chance.choice(OUTPUTS)
+    rig = demo() if kind != "valve" else with_valve()
+    if kind == "bus":
+        rig = replace(rig, fieldbus=(RtuFace(type="rtu", port="bus"),))
+    elif kind == "devices":
+        rig = with_devices(output, chance.choice(CELLS))
+    cell_hz = share * loop_hz
+    device = rig.load_cell.device
+    if reading := device.read_force:
+        cell_hz = min(cell_hz, reading.rate_hz or cell_hz)
+        asked = replace(device, read_force=replace(reading, rate_hz=2.0 * cell_hz))  # so that each tick finds it due
+        rig = replace(rig, load_cell=replace(rig.load_cell, device=asked))
+    return Drawn(_strict(rig, seed, loop_hz, cell_hz), 1.0 / cell_hz if device.stream else None, output)
+
+
+def _strict(rig: Rig, seed: int, loop_hz: float, cell_hz: float) -> Rig:
+    if rig.load_cell.device.read_force:  # it is asked at a tick
+        cell_hz = 1.0 / (1.0 / cell_hz + 1.0 / loop_hz)
+    bounds = {
+        "sample_timeout_s": max(0.05, 2.5 / min(loop_hz, cell_hz)),
+        "output_timeout_s": max(0.1, 3.0 / loop_hz, 1.7 * rig.output.device.reply_timeout_s),
+    }
+    rig = with_supervision(rig, lease_s=LEASE_S, stall_s=STALL_S, **bounds)
+    lines = {"output": replace(rig.output, port="output"), "load_cell": replace(rig.load_cell, port="load_cell")}
+    if rig.valve:
+        lines["valve"] = replace(rig.valve, port="valve")
+    assert rig.plant_profile
+    plant = rig.plant_profile.plant  # without inertia its steps may be of any length; it lies, so that it has no weight
+    still = replace(plant.contact, mass_kg=0.0, pad_damping_n_s_per_m=0.0)
+    profile = replace(rig.plant_profile, plant=replace(plant, contact=still))
+    return replace(rig, seed=seed, loop_hz=loop_hz, plant_profile=profile, **lines)
+
+
+@cache
+def with_valve() -> Rig:
+    return load_rig("paper-pull")
+
+
+@cache
+def with_devices(output: str, cell: str) -> Rig:
+    """The demo rig with other devices on its wires."""
+    more = UNITS.get(cell, f", newton_per_count: {COUNTS_N.get(cell, 0.01)}")
+    unwatched = "false" if output in WATCHED else "true"
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "pair.yaml"
+        file.write_text(RIG.format(output=output, cell=cell, more=more, unwatched=unwatched), encoding="utf-8")
+        report = check_report(file, simulated=True)
+    assert report.rig, report.faults
+    return report.rig
+
+
+def store_plants(rig: Rig, state: Path) -> None:
+    """Two numbered plants: the shipped one, and one whose command is bent a little, for which control compensates."""
+    plain = load_plant("paper-slide")
+    told = Provenance(made_utc="2026-11-22T17:30:00Z", version="0.1.0", rig=rig.name, start=plain.name)
+    plant = with_value(plain.plant, "regulator", "command_bow", BOW)
+    bent = with_origins(replace(plain, name="bent"), plant, {"regulator.command_bow": "diagnosed"})
+    for profile in (plain, bent):
+        PlantStore(state).add(NumberedPlant(number=0, profile=profile, provenance=told))

@@ -1,0 +1,132 @@
+"""How masters spell one and the same command: every function of Modbus that writes, words, floats in both orders, coils.
+
+A way gives the requests that begin a command, in their order, and the one that beats from then on.
+"""
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+
+WRITES = frozenset((5, 6, 15, 16, 22, 23))
+ENABLE = 1
+DISABLED_BY_BIT, BITS = -2, -1
+"""Stand for a control word that nobody can tell from the request: of enable only it is known that it is cleared, or nothing."""
+
+
+def write_pdu(address: int, *words: int) -> bytes:
+    """FC16."""
+    return struct.pack(
+        f">BHHB{len(words)}H", 16, address, len(words), 2 * len(words), *(word & 0xFFFF for word in words)
+    )
+
+
+def write_one_pdu(address: int, word: int) -> bytes:
+    """FC06."""
+    return struct.pack(">BHH", 6, address, word & 0xFFFF)
+
+
+def read_pdu(address: int, count: int) -> bytes:
+    """FC03."""
+    return struct.pack(">BHH", 3, address, count)
+
+
+def read_and_write_pdu(first: int, count: int, address: int, *words: int) -> bytes:
+    """FC23."""
+    return struct.pack(">BHH", 23, first, count) + write_pdu(address, *words)[1:]
+
+
+def mask_pdu(address: int, kept: int, word: int) -> bytes:
+    """FC22: the bits of `kept` stay, the others become those of word."""
+    return struct.pack(">BHHH", 22, address, kept & 0xFFFF, word & ~kept & 0xFFFF)
+
+
+def coil_pdu(number: int, *, on: bool) -> bytes:
+    """FC05."""
+    return struct.pack(">BHH", 5, number, 0xFF00 if on else 0)
+
+
+def coils_pdu(number: int, bits: int, count: int) -> bytes:
+    """FC15."""
+    return struct.pack(">BHHBB", 15, number, count, 1, bits & ((1 << count) - 1))
+
+
+def floats_pdu(address: int, *numbers: float, is_swapped: bool) -> bytes:
+    """FC16 on float32 values, high word first or low word first."""
+    words = struct.unpack(f">{2 * len(numbers)}H", struct.pack(f">{len(numbers)}f", *numbers))
+    if is_swapped:
+        words = tuple(word for high, low in zip(words[::2], words[1::2], strict=True) for word in (low, high))
+    return write_pdu(address, *words)
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a master commands. voltage_v: drive this instead of a force, None for a force; beat: its heartbeat."""
+
+    control: int
+    force_n: float
+    beat: int
+    voltage_v: float | None = None
+
+    @property
+    def words(self) -> tuple[int, ...]:
+        block = (self.control, round(100 * self.force_n), 0)
+        return (*block, 0, self.beat) if self.voltage_v is None else (*block, 1, self.beat, round(1e3 * self.voltage_v))
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        return (float(self.control), self.force_n, 0.0, float(self.voltage_v is not None), float(self.beat))
+
+
+@dataclass(frozen=True)
+class Way:
+    """begin: the requests of a new command; beat: what is sent again and again, all of it where nothing else is given."""
+
+    begin: Callable[[Wish], tuple[bytes, ...]]
+    beat: Callable[[Wish], bytes] | None = None
+
+
+def _beat(wish: Wish) -> bytes:
+    return write_one_pdu(4, wish.beat)
+
+
+WAYS: dict[str, Way] = {
+    "block": Way(lambda wish: (write_pdu(0, *wish.words),)),
+    "read_and_write": Way(lambda wish: (read_and_write_pdu(100, 11, 0, *wish.words),)),
+    "floats": Way(lambda wish: (floats_pdu(200, *wish.numbers, is_swapped=False),)),
+    "swapped": Way(lambda wish: (floats_pdu(300, *wish.numbers, is_swapped=True),)),
+    "singles": Way(lambda wish: (write_one_pdu(1, wish.words[1]), write_one_pdu(0, wish.control)), _beat),
+    "mask": Way(
+        lambda wish: (write_pdu(1, *wish.words[1:]), mask_pdu(0, ~(wish.control | ENABLE), wish.control)),
+        lambda wish: mask_pdu(4, 0, wish.beat),
+    ),
+    "coil": Way(lambda wish: (write_pdu(1, *wish.words[1:]), coil_pdu(0, on=bool(wish.control & ENABLE))), _beat),
+    "coils": Way(lambda wish: (write_pdu(1, *wish.words[1:]), coils_pdu(0, wish.control, 5)), _beat),
+}
+
+
+def control_of(pdu: bytes) -> int | None:
+    """The control word that a write would set, None where it is not among what it writes; BITS where it changes single bits,
+    DISABLED_BY_BIT where enable is cleared among them."""
+    if pdu[0] not in WRITES or len(pdu) < (10 if pdu[0] == 23 else 5):
+        return None
+    address = struct.unpack_from(">H", pdu, 5 if pdu[0] == 23 else 1)[0]
+    if pdu[0] in (5, 15, 22):
+        return None if address >= 16 or (pdu[0] == 22 and address) else _bits_of(pdu, address)
+    data = {6: pdu[3:5], 16: pdu[6:], 23: pdu[10:]}[pdu[0]]
+    if address in (200, 300) and len(data) >= 4:
+        number = struct.unpack(">f", data[:4] if address == 200 else data[2:4] + data[:2])[0]
+        return int(number) if isfinite(number) and 0 <= number < 65536 else BITS
+    return struct.unpack_from(">H", data)[0] if address == 0 and len(data) >= 2 else None
+
+
+def _bits_of(pdu: bytes, address: int) -> int:
+    """Whether a write of single bits clears enable: coil 0, or bit 0 of the word."""
+    word = struct.unpack_from(">H", pdu, 3)[0]
+    if pdu[0] == 22:
+        is_cleared = len(pdu) >= 7 and not (word | struct.unpack_from(">H", pdu, 5)[0]) & ENABLE
+    elif pdu[0] == 5:
+        is_cleared = address == 0 and word == 0
+    else:
+        is_cleared = address == 0 and len(pdu) > 6 and not pdu[6] & ENABLE
+    return DISABLED_BY_BIT if is_cleared else BITS
