@@ -8,7 +8,7 @@ trim has something to do.
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from math import nan
+from math import ceil, nan
 from random import Random
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
@@ -181,16 +181,31 @@ class Bench:
         return output
 
     def run(self, seconds: float) -> Output:
-        for _ in range(round(seconds / STEP_S)):
-            self._millisecond()
+        left = round(seconds / STEP_S)
+        while left > 0:
+            steps = min(left, self._steps_to_next())
+            self._advance(steps)
+            left -= steps
         return self.last
 
-    def _millisecond(self) -> None:
-        self.ms += 1
-        self.plant.advance(self.voltage_v)
+    @property
+    def _sampled_at_ms(self) -> int:
+        """Of each period of the load cell."""
+        return min(5, self.sample_every_ms - 1)
+
+    def _steps_to_next(self) -> int:
+        """Steps until something may happen besides the plant's motion: until then nobody looks at it."""
+        to_sample = (self._sampled_at_ms - self.ms - 1) % self.sample_every_ms + 1
+        to_beat = self.heartbeat_every_ms - self.ms % self.heartbeat_every_ms if self.heartbeat_every_ms else to_sample
+        return min(10 - self.ms % 10, to_sample, to_beat)
+
+    def _advance(self, steps: int) -> None:
+        """No more than `_steps_to_next`."""
+        self.ms += steps
+        self.plant.advance(self.voltage_v, steps)
         if self.loop_blocked:
             return
-        if self.ms % self.sample_every_ms == min(5, self.sample_every_ms - 1) and not self.cell_silent:
+        if self.ms % self.sample_every_ms == self._sampled_at_ms and not self.cell_silent:
             self._measure()
             self.step()
         if self.heartbeat_every_ms and self.ms % self.heartbeat_every_ms == 0:
@@ -228,7 +243,7 @@ class Bench:
         start_ms = self.ms
         seen = len(self.history)
         while self.ms - start_ms < limit_s / STEP_S:
-            self._millisecond()
+            self._advance(min(self._steps_to_next(), ceil(limit_s / STEP_S - (self.ms - start_ms))))
             if any(done(record.output) for record in self.history[seen:]):
                 return (self.ms - start_ms) * STEP_S
             seen = len(self.history)
