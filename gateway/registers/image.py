@@ -3,42 +3,23 @@
 A read is a slice, a publish is `pack_into`. Words inside a block that no register uses read 0.
 """
 
-from array import array
-from collections.abc import Iterable
-from typing import Final
-
-from gateway.registers.map.register_map import Block, Register, RegisterMap
-
-ADDRESSES: Final = 0x10000
+from gateway.registers.map.register_map import Register, RegisterMap
 
 
 class RegisterImage:
-    """`data[2 * address]` is the high byte of a word. room[address]: words from there to its block's end, 0 outside.
+    """`data[2 * address]` is the high byte of a word. room, writable, block_at and register_at: of the map (AddressTables).
     is_behind: more has been accepted or published than is packed here: whoever reads has that done first."""
 
     def __init__(self, register_map: RegisterMap) -> None:
         last = max((block.last for block in register_map.blocks), default=-1)
         self.is_behind = False
         self.data = bytearray(2 * (last + 1))
-        self.room = array("H", bytes(2 * ADDRESSES))
-        self.writable = array("H", bytes(2 * ADDRESSES))  # words from there on that are not read-only, inside the block
-        self.block_at: dict[int, Block] = {}
-        self.register_at: dict[int, Register] = {}
-        for block in register_map.blocks:
-            self._add_block(block, register_map.registers_of(block.name))
-
-    def _add_block(self, block: Block, registers: Iterable[Register]) -> None:
-        for register in registers:
-            for address in range(register.address, register.address + register.words):
-                self.register_at[address] = register
+        tables = register_map.by_address
+        self.room, self.writable = tables.room, tables.writable
+        self.block_at, self.register_at = tables.block_at, tables.register_at
+        for register in register_map.registers:
             if register.constant is not None:
                 self.put(register, register.constant)
-        for address in range(block.last, block.first - 1, -1):
-            self.block_at[address] = block
-            self.room[address] = block.last - address + 1
-            mapped = self.register_at.get(address)
-            is_closed = mapped is not None and not mapped.is_writable
-            self.writable[address] = 0 if is_closed else self.writable[address + 1] + 1 if address < block.last else 1
 
     def read(self, address: int, count: int) -> bytes:
         """Return words without any check."""

@@ -8,7 +8,7 @@ trim has something to do.
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from math import nan
+from math import ceil, nan
 from random import Random
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
@@ -61,16 +61,26 @@ class SmallPlant:
     _cell_n: float = 0.0
     _waiting: deque[float] = field(default_factory=deque)
 
-    def advance(self, voltage_v: float) -> None:
-        """One step of 1 ms."""
-        self._waiting.append(voltage_v if self.air else 0.0)
-        delayed_v = self._waiting.popleft() if len(self._waiting) > round(self.delay_s / STEP_S) else 0.0
-        self._pressure += (delayed_v - self._pressure) * STEP_S / self.lag_s
-        drive_n = self.gain_n_per_v * self._pressure
-        play_n = min(self.friction_n, 0.25 * drive_n)
-        held_n = max(drive_n - play_n, min(drive_n + play_n, self.force_n))
-        self.force_n = max(0.0, held_n) if self.contact else 0.0
-        self._cell_n += (self.force_n - self._cell_n) * STEP_S / self.cell_lag_s
+    def advance(self, voltage_v: float, steps: int = 1) -> None:
+        """Steps of 1 ms under one voltage: by the million in the gate, hence the local names."""
+        waiting, arriving_v, delay = self._waiting, voltage_v if self.air else 0.0, round(self.delay_s / STEP_S)
+        gain, friction_n, force_n, has_contact = self.gain_n_per_v, self.friction_n, self.force_n, self.contact
+        pressure, cell_n, lag_s, cell_lag_s = self._pressure, self._cell_n, self.lag_s, self.cell_lag_s
+        for _ in range(steps):
+            waiting.append(arriving_v)
+            delayed_v = waiting.popleft() if len(waiting) > delay else 0.0
+            pressure += (delayed_v - pressure) * STEP_S / lag_s
+            drive_n = gain * pressure
+            play_n = 0.25 * drive_n
+            if play_n > friction_n:
+                play_n = friction_n
+            low_n, high_n = drive_n - play_n, drive_n + play_n
+            held_n = force_n if force_n < high_n else high_n
+            if held_n < low_n:
+                held_n = low_n
+            force_n = held_n if has_contact and held_n > 0.0 else 0.0
+            cell_n += (force_n - cell_n) * STEP_S / cell_lag_s
+        self.force_n, self._pressure, self._cell_n = force_n, pressure, cell_n
 
     def reading_n(self) -> float:
         noisy_n = self.sign * self.unit * self._cell_n + self.rng.gauss(0.0, self.noise_n)
@@ -171,16 +181,31 @@ class Bench:
         return output
 
     def run(self, seconds: float) -> Output:
-        for _ in range(round(seconds / STEP_S)):
-            self._millisecond()
+        left = round(seconds / STEP_S)
+        while left > 0:
+            steps = min(left, self._steps_to_next())
+            self._advance(steps)
+            left -= steps
         return self.last
 
-    def _millisecond(self) -> None:
-        self.ms += 1
-        self.plant.advance(self.voltage_v)
+    @property
+    def _sampled_at_ms(self) -> int:
+        """Of each period of the load cell."""
+        return min(5, self.sample_every_ms - 1)
+
+    def _steps_to_next(self) -> int:
+        """Steps until something may happen besides the plant's motion: until then nobody looks at it."""
+        to_sample = (self._sampled_at_ms - self.ms - 1) % self.sample_every_ms + 1
+        to_beat = self.heartbeat_every_ms - self.ms % self.heartbeat_every_ms if self.heartbeat_every_ms else to_sample
+        return min(10 - self.ms % 10, to_sample, to_beat)
+
+    def _advance(self, steps: int) -> None:
+        """No more than `_steps_to_next`."""
+        self.ms += steps
+        self.plant.advance(self.voltage_v, steps)
         if self.loop_blocked:
             return
-        if self.ms % self.sample_every_ms == min(5, self.sample_every_ms - 1) and not self.cell_silent:
+        if self.ms % self.sample_every_ms == self._sampled_at_ms and not self.cell_silent:
             self._measure()
             self.step()
         if self.heartbeat_every_ms and self.ms % self.heartbeat_every_ms == 0:
@@ -218,7 +243,7 @@ class Bench:
         start_ms = self.ms
         seen = len(self.history)
         while self.ms - start_ms < limit_s / STEP_S:
-            self._millisecond()
+            self._advance(min(self._steps_to_next(), ceil(limit_s / STEP_S - (self.ms - start_ms))))
             if any(done(record.output) for record in self.history[seen:]):
                 return (self.ms - start_ms) * STEP_S
             seen = len(self.history)

@@ -8,6 +8,7 @@ Defaults: LADDER_STEP_V, LADDER_GROUPS, LADDER_MINOR_POINTS and LADDER_RESPONSE_
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from math import isfinite
 from typing import Final
@@ -59,8 +60,11 @@ class PlannedStair:
     is_step: bool = False
 
 
+@lru_cache(maxsize=4)
 def stairs_of(plan: CalibrationPlan, limits: Limits, model: Bsfm) -> tuple[PlannedStair, ...]:
-    """Return the stairs of a whole run. ValueError with a sentence for a plan that the rig does not allow."""
+    """Return the stairs of a whole run. ValueError with a sentence for a plan that the rig does not allow.
+
+    Kept: a master that asks again and again for what is refused has them made each time, half a thousand, within its write."""
     top_v = _top(plan.v_max_v, limits, model)
     _check(plan, top_v)
     ladder = ladder_plan(top_v, plan.step_v, plan.groups)

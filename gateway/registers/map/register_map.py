@@ -4,16 +4,18 @@ Built from profiles/registers/*.yaml by map_reader.read_map. Addresses are 0-bas
 within its block; a bare NAME means the int16 register, `NAME@BLOCK` any other.
 """
 
-from collections.abc import Mapping
+from array import array
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 from json import dumps
-from typing import Any
+from typing import Any, Final
 from zlib import crc32
 
 from gateway.registers.values import WordOrder, pack_number, unpack_number, words_of
 
+ADDRESSES: Final = 0x10000
 PLAIN_BLOCKS = ("command", "status")
 """Blocks whose registers a bare NAME means."""
 
@@ -121,6 +123,43 @@ def repeat_as_float(register: Register, source: Block, block: Block) -> Register
     )
 
 
+def _zero_words() -> "array[int]":
+    return array("H", bytes(2 * ADDRESSES))
+
+
+@dataclass(frozen=True, slots=True)
+class AddressTables:
+    """What there is at each address, made once for a map: a bank is made at each start, and by the thousand in tests.
+    room[address]: words from there to its block's end, 0 outside; writable[address]: words from there on that are not
+    read-only, inside the block. Nobody changes them."""
+
+    room: "array[int]" = field(default_factory=_zero_words)
+    writable: "array[int]" = field(default_factory=_zero_words)
+    block_at: dict[int, Block] = field(default_factory=dict)
+    register_at: dict[int, Register] = field(default_factory=dict)
+
+
+def address_tables(blocks: Sequence[Block], registers: Sequence[Register]) -> AddressTables:
+    """Return the tables of a map that has these blocks and registers."""
+    tables = AddressTables()
+    for register in registers:
+        for address in range(register.address, register.address + register.words):
+            tables.register_at[address] = register
+    for block in blocks:
+        _add_block(tables, block)
+    return tables
+
+
+def _add_block(tables: AddressTables, block: Block) -> None:
+    room, writable = tables.room, tables.writable
+    for address in range(block.last, block.first - 1, -1):
+        tables.block_at[address] = block
+        room[address] = block.last - address + 1
+        mapped = tables.register_at.get(address)
+        is_closed = mapped is not None and not mapped.is_writable
+        writable[address] = 0 if is_closed else writable[address + 1] + 1 if address < block.last else 1
+
+
 @dataclass(frozen=True)
 class RegisterMap:
     """One version of the map. Numbers are frozen within a version."""
@@ -174,6 +213,11 @@ class RegisterMap:
         names = {f"{register.name}@{register.block}": register for register in self.registers}
         plain = {register.name: register for register in self.registers if register.block in PLAIN_BLOCKS}
         return plain | names
+
+    @cached_property
+    def by_address(self) -> AddressTables:
+        """Return what there is at each address."""
+        return address_tables(self.blocks, self.registers)
 
     @cached_property
     def map_hash(self) -> int:

@@ -24,6 +24,8 @@ from tests.control.bench import SmallPlant, bsfm, settings
 
 OWNER, OTHER = Peer("10.0.0.5", 4001), Peer("10.0.0.6", 4002)
 TICK_S = 0.01
+LOOK_TICKS = 10
+"""Between two looks at the register of the state: to read it at each tick has the whole status packed each time."""
 MAP = load_register_map("force-v1")
 ENABLE, RESET, TARE, TAKE, VALVE, CALIBRATE, SELF_TEST = (int(bit) for bit in ControlBit)
 
@@ -121,15 +123,15 @@ class SmallRig:
 
     def until(self, state: State, within_s: float = 5.0) -> "SmallRig":
         for _ in range(round(within_s / TICK_S)):
-            if self.state is state:
+            if self.loop.decision.state is state:
+                assert self.state is state, "the registers show another one"
                 return self
             self._tick()
         raise AssertionError(f"{self.state.name}, not {state.name}, within {within_s} s: {self.log[-3:]}")
 
     def _tick(self) -> None:
         self.ticks += 1
-        for _ in range(10):
-            self.plant.advance(self.wire.voltage_v)
+        self.plant.advance(self.wire.voltage_v, 10)
         if not self.is_cell_silent:
             force_n = self.plant.reading_n()
             self.samples.next = ForceSample(force_n, force_n, Quality.OK, self.now())
@@ -138,7 +140,10 @@ class SmallRig:
             self.beat += 1
             self.write(4, self.beat)
         self.loop.on_tick(1, 0.0)
-        self.trace.append((self.state, self.wire.voltage_v, self.plant.force_n))
+        decided = self.loop.decision.state
+        if self.ticks % LOOK_TICKS == 0:
+            assert self.state is decided, "the registers show another state"
+        self.trace.append((decided, self.wire.voltage_v, self.plant.force_n))
 
     # -- masters
 
