@@ -19,6 +19,7 @@ from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.running_rig.recordings import Recordings
 from tests.control.bench import bsfm
+from tests.disk.at_once import AtOnce
 from tests.service.rigs import demo
 
 DECISION = Controller(demo().control, CalibrationInUse(bsfm(), 1)).safe_output(FaultCode.NONE)
@@ -176,3 +177,29 @@ def test_the_loop_goes_on_while_a_thread_waits_for_the_disk(tmp_path: Path) -> N
 
     path = asyncio.run(main())
     assert path and read_recording(path).rows == 11
+
+
+def test_a_file_is_put_on_the_disk_once_it_has_begun_and_once_it_has_ended(
+    tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without its header a file is nothing; a power cut in between may cost rows."""
+    synced: list[int] = []
+    monkeypatch.setattr(
+        "gateway.service.run_recording.sync_recording", lambda path: synced.append(read_recording(path).rows)
+    )
+    recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())  # type: ignore[arg-type]
+    recordings.start()
+    rows_until(recordings, 1.0)
+    assert synced == [0]
+    recordings.stop()
+    assert synced == [0, 11]
+
+
+def test_a_file_that_nobody_waits_for_any_more_is_not_made(
+    recordings: Recordings, disk: HangingDisk, tmp_path: Path
+) -> None:
+    recordings.start()
+    rows_until(recordings, HANGS_S + 1.0)
+    assert "waits" in recordings.status()
+    disk.let_go()
+    assert list_recordings(tmp_path) == []

@@ -32,40 +32,60 @@ _SUPERVISOR = "gateway.service.supervisor"
 class SimulatedDisk:
     """Stands for `DiskWorker`: one thing after the other, which takes as long as the chance of the schedule says. Half of the
     time it is done as it begins, else as it ends: where the process is killed in between it has happened, or not at all.
-    is_gone: the schedule is over."""
+    is_hung: nothing is done, until somebody lets it `go_on`. is_gone: the schedule is over."""
 
     delay_s: Callable[[], float] = staticmethod(lambda: 0.005)
-    is_full = is_gone = False
+    is_full = is_gone = is_hung = False
     folder = Path()
+    hung: ClassVar[WeakSet["SimulatedDisk"]] = WeakSet()
 
     def __init__(self) -> None:
         self._free_s = 0.0
-        self._waiting: deque[Callable[[], Any]] = deque()
+        self._waiting: deque[tuple[Callable[[], Any], bool]] = deque()  # and whether somebody wants the result
         self._results: deque[Any] = deque()
+        self._held: deque[tuple[asyncio.AbstractEventLoop, Callable[[Any], None]]] = deque()
 
     def __call__(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
         loop, delay_s = asyncio.get_running_loop(), type(self).delay_s()
         self._free_s = max(self._free_s, loop.time()) + delay_s
-        self._waiting.append(work)
+        self._waiting.append((work, True))
         if delay_s < DONE_AT_ONCE_S:
             self._work_off()
-        loop.call_at(self._free_s, self._tell, done)
+        loop.call_at(self._free_s, self._tell, loop, done)
 
     def begin(self, work: Callable[[], Any]) -> None:
+        self._waiting.append((work, False))
         self._work_off()
-        self._result(work)
 
     def close(self) -> None:
         self._work_off()
 
-    def _tell(self, done: Callable[[Any], None]) -> None:
+    @classmethod
+    def go_on(cls) -> None:
+        """End what hung: what waits is done now, as far as whoever asked for it still lives."""
+        cls.is_hung = False
+        for disk in tuple(cls.hung):
+            held = tuple(disk._held)
+            disk._held.clear()
+            for loop, done in held:
+                loop.call_at(loop.time(), disk._tell, loop, done)
+        cls.hung.clear()
+
+    def _tell(self, loop: asyncio.AbstractEventLoop, done: Callable[[Any], None]) -> None:
         if not self._results:
             self._work_off()
-        done(self._results.popleft())
+        if self._results:
+            done(self._results.popleft())
+        else:
+            self._held.append((loop, done))
+            self.hung.add(self)
 
     def _work_off(self) -> None:
-        while self._waiting:
-            self._results.append(self._result(self._waiting.popleft()))
+        while self._waiting and not type(self).is_hung:
+            work, is_wanted = self._waiting.popleft()
+            result = self._result(work)
+            if is_wanted:
+                self._results.append(result)
 
     def _result(self, work: Callable[[], Any]) -> Any:
         if type(self).is_gone:

@@ -92,7 +92,9 @@ def _draw(chance: Random, at_s: float) -> Event:
         return Event(
             at_s, chance.choice(("output", "load_cell", "valve", "bus")), chance.choice(("pull", "push", "push"))
         )
-    what = chance.choice(("kill", "stop", "kill_guardian", "terminate", "disk_full", "disk_free", "clock_jump"))
+    what = chance.choice(
+        ("kill", "stop", "kill_guardian", "terminate", "disk_full", "disk_hung", "disk_free", "clock_jump")
+    )
     return Event(at_s, "machine", what, (round(chance.uniform(0.005, 0.3), 4), chance.uniform(-1e6, 1e6)))
 
 

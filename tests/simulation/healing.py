@@ -50,6 +50,7 @@ def _repair(simulation: "Simulation") -> None:
         simulation._push(line)
         cable.spoil()
     SimulatedDisk.is_full = False
+    SimulatedDisk.go_on()
     for master in simulation.masters.values():
         master.fall_silent()
         master.disconnect()

@@ -215,6 +215,8 @@ class SimulatedService:
             process.end()
             process.loop.close()
         NotedRecorder.close_all()
+        for running in NotedRunningRig.of:  # the kernel does so, where a disk hung to the end
+            running._audit._log._file.close()
         if self._guardian:
             self._close_descriptors(self._guardian)
 

@@ -69,7 +69,8 @@ class Simulation:
         )
         self._move_valve, self.world.valve.move = self.world.valve.move, self._judge_valve  # type: ignore[method-assign]
         lay_cables(self.outside, rig, self._on_output, self.world.on_cell_bytes, self._on_valve)
-        SimulatedDisk.is_full, SimulatedDisk.is_gone, SimulatedDisk.folder = False, False, folder
+        SimulatedDisk.is_full = SimulatedDisk.is_gone = SimulatedDisk.is_hung = False
+        SimulatedDisk.folder = folder
         SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(*DISK_S))
         if seed % PLANTS_EVERY == 0:
             store_plants(rig, folder)
@@ -186,8 +187,11 @@ class Simulation:
                 self._lose_control()
         elif event.what == "clock_jump":
             self.clock.jump_s += event.numbers[1]
+        elif event.what == "disk_hung":
+            SimulatedDisk.is_hung = True
         else:
             SimulatedDisk.is_full = event.what == "disk_full"
+            SimulatedDisk.go_on()
 
     def _kill_guardian(self) -> None:
         """Control learns of it at once, and ends with the safe voltage. Where it stands still itself that is two faults at a
