@@ -164,7 +164,10 @@ class Simulation:
         if event.what == "drive":
             master.hold(0.0, way=event.way, voltage_v=event.numbers[0])
         elif event.what in COMMANDS:
-            master.hold(event.numbers[0], COMMANDS[event.what], event.way)
+            control = COMMANDS[event.what]
+            if "valve" in CABLES and round(100 * event.numbers[0]) % 2:
+                control ^= PULL  # where it can be pulled, half of all commands do
+            master.hold(event.numbers[0], control, event.way)
         elif event.what in RUNS:
             master.run(event.what)
         elif event.what == "ask":

@@ -35,6 +35,7 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(19.32, "worker", "tare"),
         ],
     ),
+    (54, [Event(5.0, "output", "pull"), Event(8.0, "output", "push")]),
     (
         13,
         [
