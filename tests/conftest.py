@@ -6,6 +6,7 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -41,9 +42,56 @@ def places_from_another_one_on(worker: dict[str, Any]) -> list[str]:
     return [str(place) for place in places[first:] + places[:first]]
 
 
-def pytest_collection_finish() -> None:
+KEPT_PROFILES = 64
+READERS = ("gateway.profiles.load", "gateway.calibrations.store", "gateway.plants.store")
+parsed: dict[tuple[bytes, str], Any] = {}
+"""Documents by their bytes and their file's name."""
+
+
+def keep_parsed_profiles() -> None:
+    """Parse each file that is read again and again once, and make a register map of it once: a rig is assembled two thousand
+    times in the gate, of the same few files. What tells a file's faults is not kept."""
+    from gateway.profiles.kinds import registers
+    from gateway.profiles.strict_yaml.text import Document, parse
+    from gateway.registers.map.register_map import RegisterMap
+
+    maps: dict[int, tuple[Any, RegisterMap]] = {}  # by their values' identity, which stays as long as they are held
+    read_map = registers.read_map
+
+    def parse_once(data: bytes, file: str) -> Document:
+        document = parsed.pop((data, file), None) or parse(data, file)
+        parsed[data, file] = document  # behind all others: who is not asked for is forgotten
+        if len(parsed) > KEPT_PROFILES:
+            del parsed[next(iter(parsed))]
+        return document
+
+    def read_map_once(value: Any) -> RegisterMap:
+        known = maps.pop(id(value), None) or (value, read_map(value))
+        maps[id(value)] = known
+        if len(maps) > KEPT_PROFILES:
+            del maps[next(iter(maps))]
+        return known[1]
+
+    for name in READERS:
+        import_module(name).parse = parse_once  # type: ignore[attr-defined]
+    registers.read_map = read_map_once
+
+
+@pytest.fixture(scope="session", autouse=True)
+def nobody_changes_what_all_share() -> Iterator[None]:
+    """At a worker's end, on its last test."""
+    from gateway.profiles.strict_yaml.text import parse
+
+    yield
+    changed = [file for (data, file), document in parsed.items() if document != parse(data, file)]
+    assert not changed, f"somebody has changed what was read of {changed}"
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
     """The thousands of tests stay until the end: they are not walked through at each collection of garbage, of which there is
     one for every so many new things. At Python's own 700 it takes a thirtieth of a simulated schedule."""
+    if session.items:
+        keep_parsed_profiles()
     gc.freeze()
     gc.set_threshold(*COLLECT_AT)
     gc.enable()
@@ -59,6 +107,8 @@ HERE = Path(__file__).parent
 
 COLLECT_AT = (20_000, 20, 20)
 """New things until the youngest are walked through, and how often that until the older ones are."""
+
+DESCRIPTORS = "/proc/self/fd/"
 
 BEHIND_REAL_TIME = 5
 """Nice value of the workers that run what waits for no clock."""
@@ -171,10 +221,11 @@ def budget(request: pytest.FixtureRequest) -> int:
 
 
 def open_descriptors() -> dict[str, str]:
+    """By `os`, not by `pathlib`: this is asked twice at each of nine thousand tests."""
     found = {}
-    for entry in Path("/proc/self/fd").iterdir():
+    for name in os.listdir(DESCRIPTORS):  # noqa: PTH208
         try:
-            found[entry.name] = str(entry.readlink())
+            found[name] = os.readlink(DESCRIPTORS + name)  # noqa: PTH115
         except OSError:  # the listing's own descriptor
             continue
     return {name: target for name, target in found.items() if not target.startswith("/proc/")}

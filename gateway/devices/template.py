@@ -28,12 +28,14 @@ def quote(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """Compiled by `compile_template`. may_be_blank names the one field whose blanks mean "no digits", nan as a value."""
+    """Compiled by `compile_template`. may_be_blank names the one field whose blanks mean "no digits", nan as a value; has_text:
+    one of the fields is free text."""
 
     text: str
     pieces: tuple[str | Field, ...]
     fields: tuple[Field, ...]
     pattern: re.Pattern[bytes]
+    has_text: bool
 
     def field(self, name: str) -> Field | None:
         """Return the field of this name, None where the template has none."""
@@ -43,10 +45,10 @@ class Template:
         """Return the bytes of one sentence. A choice that is not given is its first word. ValueRefused when a value does not
         fit."""
         text = "".join(
-            piece if isinstance(piece, str) else _encode_field(piece, values, may_be_blank) for piece in self.pieces
+            [piece if isinstance(piece, str) else _encode_field(piece, values, may_be_blank) for piece in self.pieces]
         )
         data = text.encode("ascii")
-        if any(isinstance(field, Text) for field in self.fields) and self.decode(data, may_be_blank) is None:
+        if self.has_text and self.decode(data, may_be_blank) is None:
             raise ValueRefused(f"{quote(text)} could not be read back as {quote(self.text)}")
         return data
 
@@ -91,7 +93,8 @@ def compile_template(text: str) -> Template:
     _check(text, pieces)
     expression = "".join(re.escape(piece) if isinstance(piece, str) else f"({piece.pattern})" for piece in pieces)
     fields = tuple(piece for piece in pieces if not isinstance(piece, str))
-    return Template(text, tuple(pieces), fields, re.compile(expression.encode("ascii")))
+    has_text = any(isinstance(field, Text) for field in fields)
+    return Template(text, tuple(pieces), fields, re.compile(expression.encode("ascii")), has_text)
 
 
 def _pieces(text: str) -> list[str | Field]:

@@ -86,9 +86,9 @@ class StepResponse:
 
     def expected_n(self, lags: Lags) -> Floats:
         """Return the force by the model, N, at the times of the readings."""
-        changes = np.array(self.changes)
-        since_s = self.time_s[:, None] - (changes[:, 0] + lags.dead_time_s)
-        arrived_v = self.end_v - missing_share(since_s, lags.lag_s, lags.second_lag_s, lags.damping) @ changes[:, 1]
+        since_s = self.time_s[:, None] - (self._changes[:, 0] + lags.dead_time_s)
+        share = missing_share(since_s, lags.lag_s, lags.second_lag_s, lags.damping)
+        arrived_v = self.end_v - share @ self._changes[:, 1]
         on_way_n = np.interp(arrived_v, self.path_v, self.path_n)
         return self._with_overshoot(arrived_v, on_way_n) if lags.damping else on_way_n
 
@@ -103,6 +103,11 @@ class StepResponse:
         share = (np.where(peak_v > 0.0, end_n, on_way_n) - start_n) / (end_n - start_n)
         expected_n = start_n + share * (end_n - self.way * kept_n - start_n) + self.way * (slope * peak_v - lost_n)
         return np.asarray(expected_n, dtype=np.float64)
+
+    @cached_property
+    def _changes(self) -> Floats:
+        """Of shape (changes, 2): a fit asks a thousand times."""
+        return np.array(self.changes)
 
     @cached_property
     def _slope_at_end(self) -> float:
@@ -120,7 +125,8 @@ def missing_share(since_s: Floats, lag_s: float, second_lag_s: float, damping: f
         pair = SecondOrder(lag_s, second_lag_s, damping)
         decay_per_s = 0.5 * pair.delay_s / pair.bend_s2
         swing_per_s = np.sqrt(1.0 - damping**2) / pair.natural_s
-        swing = np.cos(swing_per_s * since_s) + decay_per_s / swing_per_s * np.sin(swing_per_s * since_s)
+        turn = swing_per_s * since_s
+        swing = np.cos(turn) + decay_per_s / swing_per_s * np.sin(turn)
         return np.asarray(np.exp(-decay_per_s * since_s) * swing)
     if second_lag_s < SHORTEST_LAG_S:
         return np.exp(-since_s / lag_s)

@@ -125,15 +125,18 @@ def _is_of_type(kind: type, group: Any) -> bool:
     return isinstance(group, dict) and group.get("type") in get_args(get_type_hints(kind).get("type"))
 
 
-def groups(kind: type) -> Iterator[tuple[str, type]]:
-    """Yield (key, dataclass) for each field of a dataclass that is one itself, also as `X | None` or `tuple[X, ...]`."""
+@cache
+def groups(kind: type) -> tuple[tuple[str, type], ...]:
+    """Return (key, dataclass) for each field of a dataclass that is one itself, also as `X | None` or `tuple[X, ...]`."""
     if not is_dataclass(kind):  # a union of several
-        return
+        return ()
     hints = get_type_hints(kind)
-    for field in fields(kind):
-        for candidate in _members(hints[field.name]):
-            if is_dataclass(candidate) and isinstance(candidate, type):
-                yield field.name, candidate
+    return tuple(
+        (field.name, candidate)
+        for field in fields(kind)
+        for candidate in _members(hints[field.name])
+        if is_dataclass(candidate) and isinstance(candidate, type)
+    )
 
 
 def _members(hint: Any) -> Iterator[Any]:
