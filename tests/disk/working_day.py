@@ -13,8 +13,8 @@ from gateway.profiles import load_calibration
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.disk.watched_disk import WatchedDisk, watching
 from tests.plants.test_plant_store import numbered
-from tests.simulation.edges import NotedRunningRig, SimulatedDisk, simulated_edges
 from tests.simulation.healing import HELD_N
+from tests.simulation.kernel.edges import NotedRunningRig, SimulatedDisk, simulated_edges
 from tests.simulation.schedule import Simulation
 
 STEP_S = 0.2

@@ -7,9 +7,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from random import Random
 
-from tests.simulation.socket_lines import draw_line
-from tests.simulation.spelling import WAYS, coils_pdu, mask_pdu, read_and_write_pdu, read_pdu, write_one_pdu, write_pdu
-from tests.simulation.spoiled import KINDS
+from tests.simulation.kernel.spoiled import KINDS
+from tests.simulation.masters.socket_lines import draw_line
+from tests.simulation.masters.spelling import (
+    WAYS,
+    coils_pdu,
+    mask_pdu,
+    read_and_write_pdu,
+    read_pdu,
+    write_one_pdu,
+    write_pdu,
+)
 
 FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "cell-frozen", "output-cut")
 VALVE_FAULTS = ("valve-cut", "valve-stuck")

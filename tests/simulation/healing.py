@@ -2,9 +2,9 @@
 
 from typing import TYPE_CHECKING
 
-from tests.simulation.cables import CABLES
-from tests.simulation.edges import SimulatedDisk
 from tests.simulation.events import FAULTS, VALVE_FAULTS
+from tests.simulation.kernel.cables import CABLES
+from tests.simulation.kernel.edges import SimulatedDisk
 
 if TYPE_CHECKING:
     from tests.simulation.schedule import Simulation

@@ -11,23 +11,22 @@ from typing import Any
 
 from gateway.profiles import Rig
 from gateway.service.simulation.world import SimulatedRig
-from tests.simulation.bus_master import make_master
-from tests.simulation.cables import CABLES, lay_cables
-from tests.simulation.edges import DISK_S, Log, SimulatedDisk, simulated_edges
 from tests.simulation.events import Event
+from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, heal
-from tests.simulation.integrator import Integrator
-from tests.simulation.masters import BEATS_S, PULL, RUNS, TAKE, Master
+from tests.simulation.kernel.cables import CABLES, lay_cables
+from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_edges
+from tests.simulation.kernel.processes import SimulatedService
+from tests.simulation.kernel.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
+from tests.simulation.masters.bus_master import make_master
+from tests.simulation.masters.integrator import Integrator
+from tests.simulation.masters.socket_user import SocketUser
+from tests.simulation.masters.spelling import BITS, DISABLED_BY_BIT, ENABLE, read_pdu
+from tests.simulation.masters.tcp_master import BEATS_S, RUNS, Master
 from tests.simulation.observer import STATUS_FIRST, STATUS_WORDS, Bounds
-from tests.simulation.processes import SimulatedService
 from tests.simulation.rigs import LEASE_S, draw_rig, store_plants
-from tests.simulation.socket_user import SocketUser
-from tests.simulation.spelling import BITS, DISABLED_BY_BIT, ENABLE, read_pdu
-from tests.simulation.spoiled import Spoil
-from tests.simulation.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 
 RUN_BIT, SELF_TEST = RUNS.values()
-COMMANDS = {"hold": ENABLE, "take": ENABLE | TAKE, "pull": ENABLE | PULL}
 PLANTS_EVERY = 8
 """Of so many rigs one has numbered plants stored, which somebody may take into use."""
 FIRST_SETTING_S = 0.3
@@ -143,83 +142,13 @@ class Simulation:
             self.outside.call_at(BEGIN_S + 1.0 + event.at_s, self._happen_then, event, events)
 
     def _happen_then(self, event: Event, events: Iterator[Event]) -> None:
-        self._happen(event)
+        happen(self, event)
         self._happen_next(events)
-
-    def _happen(self, event: Event) -> None:
-        if event.whom in self.masters:
-            self._command(self.masters[event.whom], event)
-        elif event.whom == "integrator":
-            self.integrator.upload()
-        elif event.whom == "person":
-            self.person.say(event.data)
-        elif event.whom == "world":
-            self._set_fault(event.what, on=bool(event.numbers[0]))
-        elif event.whom == "machine":
-            self._shake(event)
-        else:
-            self._touch_line(event)
-
-    def _command(self, master: Master, event: Event) -> None:
-        if event.what == "drive":
-            master.hold(0.0, way=event.way, voltage_v=event.numbers[0])
-        elif event.what in COMMANDS:
-            control = COMMANDS[event.what]
-            if "valve" in CABLES and round(100 * event.numbers[0]) % 2:
-                control ^= PULL  # where it can be pulled, half of all commands do
-            master.hold(event.numbers[0], control, event.way)
-        elif event.what in RUNS:
-            master.run(event.what)
-        elif event.what == "ask":
-            master.ask(event.data, *map(int, event.numbers))
-        elif event.data:
-            getattr(master, event.what)(event.data)
-        else:
-            getattr(master, event.what)()
-
-    def _shake(self, event: Event) -> None:
-        if event.what == "kill":
-            self.service.kill_control()
-        elif event.what == "kill_guardian":
-            self._kill_guardian()
-        elif event.what == "terminate":
-            self.service.terminate()
-        elif event.what == "stop" and self.service.is_guarded:
-            self.service.stop_control(event.numbers[0])
-            if event.numbers[0] > self.observer.bounds.stall_s:
-                self._lose_control()
-        elif event.what == "clock_jump":
-            self.clock.jump_s += event.numbers[1]
-        elif event.what == "disk_hung":
-            SimulatedDisk.is_hung = True
-        else:
-            SimulatedDisk.is_full = event.what == "disk_full"
-            SimulatedDisk.go_on()
-
-    def _kill_guardian(self) -> None:
-        """Control learns of it at once, and ends with the safe voltage. Where it stands still itself that is two faults at a
-        time, for which the device has its watchdog."""
-        if self.service.is_serving:
-            self.service.kill_guardian()
-            self.observer.note_disabled(self.clock.now_s)
 
     def _set_fault(self, name: str, *, on: bool) -> None:
         self.world.fault({"do": "fault", "name": name, "on": on})
         if name == "cell-cut":
             self._judge_cell(is_cut=on)
-
-    def _touch_line(self, event: Event) -> None:
-        if event.whom not in CABLES:
-            return  # a rig without a valve
-        if event.what == "pull":
-            self._pull(event.whom)
-        elif event.what == "push":
-            self._push(event.whom)
-        elif event.what == "say":
-            CABLES[event.whom].say(event.data)
-        else:
-            count, number = event.numbers
-            CABLES[event.whom].spoil(Spoil(event.what, int(count), number, event.data))
 
     def _pull(self, line: str) -> None:
         CABLES[line].pull()

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.simulation.edges import simulated_edges
 from tests.simulation.events import Event, draw_events
+from tests.simulation.kernel.edges import simulated_edges
 from tests.simulation.schedule import Simulation
 
 PUSH_S, LONG_S = 200.0, float(os.environ.get("SOAK_SECONDS", "86400"))

@@ -20,10 +20,10 @@ from gateway.service.running_rig.starting import StartError
 from gateway.service.supervisor.child_process import LOST, Child
 from gateway.service.supervisor.guardian import Guardian
 from gateway.service.supervisor.run_options import RunOptions
-from tests.simulation.cables import CABLES
-from tests.simulation.edges import Log, NotedRecorder, NotedRunningRig, SimulatedDisk
-from tests.simulation.links import LinkEnd, create_link, read_in_memory, readable_ends
-from tests.simulation.virtual_time import VirtualClock, VirtualLoop
+from tests.simulation.kernel.cables import CABLES
+from tests.simulation.kernel.edges import Log, NotedRecorder, NotedRunningRig, SimulatedDisk
+from tests.simulation.kernel.links import LinkEnd, create_link, read_in_memory, readable_ends
+from tests.simulation.kernel.virtual_time import VirtualClock, VirtualLoop
 
 PORT = 5020
 CLOSING_S = 3.0

@@ -17,9 +17,9 @@ from gateway.recording import Recorder
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.disk.failing_disks import FailingDisk
 from tests.disk.watched_disk import watching
-from tests.simulation.cables import CABLES, SimulatedPort
-from tests.simulation.network import MemoryListener
-from tests.simulation.virtual_time import VirtualClock
+from tests.simulation.kernel.cables import CABLES, SimulatedPort
+from tests.simulation.kernel.network import MemoryListener
+from tests.simulation.kernel.virtual_time import VirtualClock
 
 TWIN_STEP_S = 10e-3
 """The period of the fastest loop. At its own step of 1 ms the twin takes a third of the processor's time."""

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from tests.simulation.virtual_time import VirtualLoop
+from tests.simulation.kernel.virtual_time import VirtualLoop
 
 DELAY_S = 0.0002
 

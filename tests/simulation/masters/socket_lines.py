@@ -4,7 +4,7 @@ import json
 from random import Random
 from typing import Any
 
-from tests.simulation.spelling import read_pdu, write_one_pdu, write_pdu
+from tests.simulation.masters.spelling import read_pdu, write_one_pdu, write_pdu
 
 STEPS = {
     "name": "steps",

@@ -13,8 +13,8 @@ from gateway.devices import PacedWire, SerialSettings
 from gateway.ports import PortError, PortEvents
 from gateway.profiles import Rig
 from gateway.profiles.rigs.faces import RtuFace
-from tests.simulation.spoiled import Spoil, spoiled
-from tests.simulation.virtual_time import VirtualLoop
+from tests.simulation.kernel.spoiled import Spoil, spoiled
+from tests.simulation.kernel.virtual_time import VirtualLoop
 
 
 class Cable:

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
-from tests.simulation.spelling import control_of
-from tests.simulation.virtual_time import VirtualLoop
+from tests.simulation.kernel.virtual_time import VirtualLoop
+from tests.simulation.masters.spelling import control_of
 
 ASK_S = 0.5
 """Between two looks at a run that this person has started; nobody stops it meanwhile."""

@@ -8,9 +8,9 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from tests.simulation.network import Line
-from tests.simulation.spelling import ENABLE, WAYS, WRITES, Wish, control_of, write_one_pdu, write_pdu
-from tests.simulation.virtual_time import VirtualLoop
+from tests.simulation.kernel.network import Line
+from tests.simulation.kernel.virtual_time import VirtualLoop
+from tests.simulation.masters.spelling import ENABLE, WAYS, WRITES, Wish, control_of, write_one_pdu, write_pdu
 
 RESET, TARE, TAKE, PULL = 2, 4, 8, 16
 RUNS = {"calibrate": 32, "self_test": 64}

@@ -8,8 +8,8 @@ after a kill, too.
 import struct
 from zlib import crc32
 
-from tests.simulation.masters import Master
-from tests.simulation.spelling import read_pdu, write_pdu
+from tests.simulation.masters.spelling import read_pdu, write_pdu
+from tests.simulation.masters.tcp_master import Master
 
 STAGING, ACTIVE = 1000, 1500
 HEAD_WORDS, TAIL_FROM = 140, 150

@@ -8,10 +8,10 @@ been done all the same.
 from collections.abc import Callable
 from typing import Any
 
-from tests.simulation.cables import CABLES
 from tests.simulation.heard import crc16
-from tests.simulation.masters import Asked, Master
-from tests.simulation.spelling import WRITES, control_of
+from tests.simulation.kernel.cables import CABLES
+from tests.simulation.masters.spelling import WRITES, control_of
+from tests.simulation.masters.tcp_master import Asked, Master
 
 PATIENCE_S = 0.1
 PAUSE_S = 0.7

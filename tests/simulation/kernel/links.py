@@ -12,7 +12,7 @@ from contextlib import suppress
 from itertools import count
 from typing import Any
 
-from tests.simulation.virtual_time import VirtualLoop
+from tests.simulation.kernel.virtual_time import VirtualLoop
 
 _NUMBERS = count(1 << 20)  # no process has so many descriptors
 _ENDS: dict[int, "LinkEnd"] = {}

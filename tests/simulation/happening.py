@@ -1,0 +1,90 @@
+"""What one event does to the gateway, its masters, its wires and its machine."""
+
+from typing import TYPE_CHECKING
+
+from tests.simulation.events import Event
+from tests.simulation.kernel.cables import CABLES
+from tests.simulation.kernel.edges import SimulatedDisk
+from tests.simulation.kernel.spoiled import Spoil
+from tests.simulation.masters.spelling import ENABLE
+from tests.simulation.masters.tcp_master import PULL, RUNS, TAKE, Master
+
+if TYPE_CHECKING:
+    from tests.simulation.schedule import Simulation
+
+COMMANDS = {"hold": ENABLE, "take": ENABLE | TAKE, "pull": ENABLE | PULL}
+
+
+def happen(simulation: "Simulation", event: Event) -> None:
+    if event.whom in simulation.masters:
+        _command(simulation.masters[event.whom], event)
+    elif event.whom == "integrator":
+        simulation.integrator.upload()
+    elif event.whom == "person":
+        simulation.person.say(event.data)
+    elif event.whom == "world":
+        simulation._set_fault(event.what, on=bool(event.numbers[0]))
+    elif event.whom == "machine":
+        _shake(simulation, event)
+    else:
+        _touch_line(simulation, event)
+
+
+def _command(master: Master, event: Event) -> None:
+    if event.what == "drive":
+        master.hold(0.0, way=event.way, voltage_v=event.numbers[0])
+    elif event.what in COMMANDS:
+        control = COMMANDS[event.what]
+        if "valve" in CABLES and round(100 * event.numbers[0]) % 2:
+            control ^= PULL  # where it can be pulled, half of all commands do
+        master.hold(event.numbers[0], control, event.way)
+    elif event.what in RUNS:
+        master.run(event.what)
+    elif event.what == "ask":
+        master.ask(event.data, *map(int, event.numbers))
+    elif event.data:
+        getattr(master, event.what)(event.data)
+    else:
+        getattr(master, event.what)()
+
+
+def _shake(simulation: "Simulation", event: Event) -> None:
+    if event.what == "kill":
+        simulation.service.kill_control()
+    elif event.what == "kill_guardian":
+        _kill_guardian(simulation)
+    elif event.what == "terminate":
+        simulation.service.terminate()
+    elif event.what == "stop" and simulation.service.is_guarded:
+        simulation.service.stop_control(event.numbers[0])
+        if event.numbers[0] > simulation.observer.bounds.stall_s:
+            simulation._lose_control()
+    elif event.what == "clock_jump":
+        simulation.clock.jump_s += event.numbers[1]
+    elif event.what == "disk_hung":
+        SimulatedDisk.is_hung = True
+    else:
+        SimulatedDisk.is_full = event.what == "disk_full"
+        SimulatedDisk.go_on()
+
+
+def _kill_guardian(simulation: "Simulation") -> None:
+    """Control learns of it at once, and ends with the safe voltage. Where it stands still itself that is two faults at a
+    time, for which the device has its watchdog."""
+    if simulation.service.is_serving:
+        simulation.service.kill_guardian()
+        simulation.observer.note_disabled(simulation.clock.now_s)
+
+
+def _touch_line(simulation: "Simulation", event: Event) -> None:
+    if event.whom not in CABLES:
+        return  # a rig without a valve
+    if event.what == "pull":
+        simulation._pull(event.whom)
+    elif event.what == "push":
+        simulation._push(event.whom)
+    elif event.what == "say":
+        CABLES[event.whom].say(event.data)
+    else:
+        count, number = event.numbers
+        CABLES[event.whom].spoil(Spoil(event.what, int(count), number, event.data))
