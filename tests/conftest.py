@@ -122,10 +122,13 @@ LONG_WAITS = ("end_to_end/first_hour/test_calibrate.py", "end_to_end/first_hour/
 
 SLOW = (
     "service/closed_loop/test_study.py",
+    "service/edge_table/test_edge_table.py",
     "service/fitting/test_interrupted_ladder.py",
     "diagnosis/changes/test_what_has_changed.py",
     "watch/test_watch_in_virtual_time.py",
     "paper/test_paper_report.py",
+    "control/foreign/test_foreign_machines.py",
+    "test_compiled_folder.py",
 )
 """Files of more than ten seconds of processor: begun first, so that none is left to one worker at the end."""
 

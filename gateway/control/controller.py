@@ -192,7 +192,7 @@ class Controller:
         edges = self._commands.take(now_s, command)
         self._sense(now_s, sample, line)
         self._obey(now_s, edges)
-        if self._valve is not None and self._turning.follow(now_s, line.valve, self._machine):
+        if self._valve is not None and self._turning.follow(now_s, line, self._machine):
             self._use_model()
         if self._machine.is_enabled:
             self._supervise(now_s, line)

@@ -65,12 +65,12 @@ class RunRecording:
 
     @property
     def rows_written(self) -> int:
-        """How many rows the disk has taken."""
+        """Number of rows that the disk has taken."""
         return self._file.rows_written if self._file else 0
 
     @property
     def size_bytes(self) -> int:
-        """How long the file is."""
+        """Length of the file."""
         return self._file.size_bytes if self._file else 0
 
     @property

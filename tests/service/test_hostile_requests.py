@@ -84,9 +84,8 @@ class Stage:
         log = lambda cause, sentence: self.said.append(sentence)  # noqa: E731
         self.recordings = Recordings(self.state / "recordings", wired.rig, log, AtOnce())  # type: ignore[arg-type]
         wired.loop.recordings = self.recordings
-        self.calibration_runs = CalibrationRuns(
-            wired.controller, wired.rig, self.state, lambda: wired.now_s, log, AtOnce()
-        )  # type: ignore[arg-type]
+        self.calibration_runs = CalibrationRuns(wired.controller, wired.rig, self.state, lambda: wired.now_s, log)
+        self.calibration_runs.disk = AtOnce()  # type: ignore[assignment]
         wired.loop.calibration_runs = self.calibration_runs
         self.upload = RigCalibrations(wired.rig, self.state).serve(wired.bank, lambda taken: None, log)
         self.upload.run_in_background = lambda work, done: None  # type: ignore[assignment]  # a disk that never answers

@@ -44,6 +44,10 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(13.6262, "output", "replaced", (12.0, 0.4523), b"OUT OF RANGE\r\n"),
         ],
     ),
+    (
+        419,
+        [Event(11.3621, "worker", "hold", (19.73,), way="mask"), Event(11.9957, "output", "pull")],
+    ),
 ]
 """Schedules that once broke a law: the seed of the machine, and what happened to it."""
 

@@ -40,17 +40,11 @@ Answer = dict[str, Any]
 
 
 class CalibrationRuns:
-    """stored: number of the calibration that the last run gave, 0 for none. Called from the loop only. disk: a thread, where
-    none is given."""
+    """stored: number of the calibration that the last run gave, 0 for none. disk: what the recordings wait for. Called from the
+    loop only."""
 
     def __init__(
-        self,
-        controller: Controller,
-        rig: Rig,
-        state: Path,
-        clock: Callable[[], float],
-        log: Callable[[str, str], None],
-        disk: DiskWorker | None = None,
+        self, controller: Controller, rig: Rig, state: Path, clock: Callable[[], float], log: Callable[[str, str], None]
     ) -> None:
         self.stored = 0
         self._controller = controller
@@ -59,7 +53,7 @@ class CalibrationRuns:
         self._state = state
         self._clock = clock
         self._log = log
-        self._disk = disk or DiskWorker()
+        self.disk = DiskWorker()
         self._continues: tuple[int, ...] = ()
         self._name = ""
         self._stairs = 0
@@ -205,7 +199,7 @@ class CalibrationRuns:
                 await asyncio.wait_for(asyncio.wrap_future(closed), _END_BOUND_S)
         if self._child:
             self._child.close()
-        self._disk.close()
+        self.disk.close()
 
     def _begin(self) -> None:
         run, rig = self._calibrating.recorded, self._rig
@@ -225,7 +219,7 @@ class CalibrationRuns:
         }
         columns = COLUMNS if isinstance(run, ExperimentRun) else (*COLUMNS, *LABELS)
         folder = self._state / "recordings"
-        self._recording = self._last = RunRecording(self._disk, lambda: Recorder(folder, header, columns), self._log)
+        self._recording = self._last = RunRecording(self.disk, lambda: Recorder(folder, header, columns), self._log)
         self._is_closing = False
         self._recording.begin(self._on_opened)
         self._continues, self._name = (), ""

@@ -237,6 +237,7 @@ class ControlLoop:
         late_s, output = self._late_s(now_s), self.output
         return LineStatus(
             acknowledged_v=output.confirmed_v,
+            standing_v=output.standing_v,
             unanswered_since_s=output.unanswered_since_s,
             fault=self.output_lost or output.fault or self._cell.identity.fault,
             said=output.said or self._cell.identity.said,

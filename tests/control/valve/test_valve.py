@@ -46,7 +46,8 @@ class ValveBench(Bench):
             self.switched.append((self.now_s, self.plant.force_n, self.voltage_v))
             self.turn(self.told)  # type: ignore[arg-type]
         since_s = self.silent_s if self.is_silent else None
-        self.line = self.line._replace(valve=ValveStatus(self.stands, since_s))
+        standing_v = None if self.output_silent else self.voltage_v
+        self.line = self.line._replace(valve=ValveStatus(self.stands, since_s), standing_v=standing_v)
         output = super().step()
         if output.valve is not self.told:
             self.told, self.told_s = output.valve, self.now_s
@@ -123,6 +124,16 @@ def test_a_fault_leads_to_the_safe_direction_without_pressure() -> None:
     bench.run(2.0)
     assert bench.last.fault is FaultCode.SAMPLE_STALE and bench.stands is PUSH
     assert bench.switched[-1][2] == 0.0
+
+
+def test_a_regulator_that_hears_nothing_keeps_its_pressure_and_the_valve_waits_for_it() -> None:
+    bench = ValveBench().pulling()
+    bench.silence_output()
+    bench.run(2.0)
+    assert bench.last.fault is FaultCode.OUTPUT_SILENT and bench.stands is PULL
+    bench.heal()
+    bench.run(2.0)
+    assert bench.stands is PUSH and bench.switched[-1][2] == 0.0
 
 
 def test_a_valve_that_does_not_follow_is_a_fault_within_its_bound() -> None:

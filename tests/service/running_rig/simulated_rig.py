@@ -45,6 +45,8 @@ class Wire:
     def confirmed_v(self) -> float:
         return self.acknowledged_v
 
+    standing_v = confirmed_v
+
     def clear_faults(self) -> None:
         """There are none that only a reset clears."""
 

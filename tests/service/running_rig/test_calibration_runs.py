@@ -23,8 +23,8 @@ def kept(wired: Wired, state: Path) -> CalibrationRuns:
         state,
         lambda: wired.now_s,
         lambda cause, sentence: wired.log.append((wired.now_s, sentence)),
-        AtOnce(),
     )
+    runs.disk = AtOnce()  # type: ignore[assignment]
     wired.loop.calibration_runs = runs
     wired.run(0.1)
     return runs

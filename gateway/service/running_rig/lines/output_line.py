@@ -52,7 +52,8 @@ class LineState(NamedTuple):
 class OutputExchange:
     """Asks the device through `write`, keeps what it answered.
 
-    acknowledged_v: confirmed by the device, None before the first; unanswered_since_s: send time of the oldest question
+    acknowledged_v: confirmed by the device, None before the first; standing_v: surely stands there, None while another one is
+    on its way, and where nobody knows; unanswered_since_s: send time of the oldest question
     without an answer; fault: three failures in a row, or what the device's checks have found; pressure_pa: last measured, nan
     before the first; counts: since the start, whatever reset in between. checks: the questions about the device itself, made
     from the host where none are given.
@@ -83,7 +84,7 @@ class OutputExchange:
         self._wanted_v: float | None = None
         self._in_flight: OutputRequest | None = None
         self._asked_v = inf
-        self._standing_v: float | None = None
+        self.standing_v: float | None = None
         self._is_overdue = False  # a question was given up, its answer may still come
         self._quiet_until_s = 0.0
         self._sent_s = 0.0
@@ -155,7 +156,7 @@ class OutputExchange:
             self._write(self._host.sign_of_life)
         elif not self._is_confirmed(wanted_v) and not self.checks.is_tripped:
             self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
-            self._asked_v, self._standing_v = wanted_v, None
+            self._asked_v, self.standing_v = wanted_v, None
             if self._host.idle_question is None:  # this is what a poll would say
                 self._next_poll_s = now_s + _POLL_PERIOD_S
             self._sent_v, self._setting_s = wanted_v, now_s
@@ -169,7 +170,7 @@ class OutputExchange:
     def _is_confirmed(self, voltage_v: float) -> bool:
         """Within half a step of what surely stands there is nothing to send. After a question without an answer nothing
         surely stands: a device whose answer was lost may have obeyed, and must hear the safe voltage."""
-        standing_v = self._standing_v
+        standing_v = self.standing_v
         return standing_v is not None and abs(voltage_v - standing_v) <= 0.5 * self._host.resolution_v
 
     def _send(self, request: OutputRequest, now_s: float) -> None:
@@ -221,13 +222,13 @@ class OutputExchange:
     def _check_setting(self, request: OutputRequest, reply: Accepted) -> None:
         """The echo of a setting, or the setting as it was read: another one than was sent is set anew, and counted. What then
         stands is not known: an echo that lost its first digits says 0, and the safe voltage must go out all the same."""
-        self.acknowledged_v, self._standing_v = reply.voltage_v, None
+        self.acknowledged_v, self.standing_v = reply.voltage_v, None
         if not self._host.confirms(self._asked_v, reply, request):
             self._count_failure(type(request), FaultCode.OUTPUT_ALTERED)
             return
-        self._standing_v = reply.voltage_v
+        self.standing_v = reply.voltage_v
         if abs(reply.voltage_v - self._asked_v) > self._host.resolution_v:
-            self._standing_v = self._asked_v  # the answer only counts in coarser steps
+            self.standing_v = self._asked_v  # the answer only counts in coarser steps
         self._note_success(type(request))
 
     def _note_success(self, question: type) -> None:
