@@ -55,6 +55,7 @@ class Observer:
     _is_cut: bool = True
     _must_be_safe: bool = True
     _begun_s: float = 0.0
+    _pressing_s: float = 0.0
     _fault: int | None = None
     _reset_s: float = -1.0
 
@@ -84,6 +85,8 @@ class Observer:
                 self._complain("I6", f"{voltage_v:.3f} V comes first", now_s)
             self._must_be_safe = False
         before_s, before_v = self.setting_s, self.voltage_v
+        if before_v <= 0.0 < voltage_v:
+            self._pressing_s = now_s
         allowed_v = self.bounds.slew_v_per_s * (now_s - before_s + 0.02) + COUNT_V
         if self.settings and voltage_v - before_v > allowed_v + 1e-9:
             self._complain("I2", f"{before_v:.3f} -> {voltage_v:.3f} V in {now_s - before_s:.4f} s", now_s)
@@ -161,6 +164,8 @@ class Observer:
         for law, since_s, bound_s in limits:
             if self.control_lost_s is not None and law != "I3 control":
                 continue  # who stands still hears nothing: then it is the guardian's turn, within its own bound
+            if law == "I4" and now_s - self._pressing_s <= GRACE_S:
+                continue  # the answer to the write that has begun it is still on its way
             if since_s is not None and now_s - since_s > bound_s + GRACE_S + 2.0 * self.bounds.period_s:
                 self._complain(
                     law, f"{self.voltage_v:.3f} V for {standing_s:.3f} s, {now_s - since_s:.3f} s after", now_s

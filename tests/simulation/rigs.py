@@ -62,9 +62,10 @@ class Drawn:
     def in_band_n(self) -> float:
         """How near the force must come. Of loops as a rig may have them, from 50 Hz on, and of slower ones, which are here for
         the sake of time: they hunt, and more so where a reading must be asked for."""
-        if max(1.0 / self.rig.loop_hz, self.cell_s or 0.0) <= 0.02:
+        slowest_s = max(1.0 / self.rig.loop_hz, self.cell_s or 0.0)
+        if slowest_s <= 0.02:
             return 1.0
-        return 2.5 if self.output == DEMO_OUTPUT else 4.0
+        return 2.5 if self.output == DEMO_OUTPUT and slowest_s <= 0.05 else 4.0
 
     def observer(self, bounds: Bounds) -> Observer:
         """Who hears what this output is told."""
