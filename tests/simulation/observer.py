@@ -164,7 +164,7 @@ class Observer:
         for law, since_s, bound_s in limits:
             if self.control_lost_s is not None and law != "I3 control":
                 continue  # who stands still hears nothing: then it is the guardian's turn, within its own bound
-            if law == "I4" and now_s - self._pressing_s <= GRACE_S:
+            if law in ("I4", "I3 master") and now_s - self._pressing_s <= GRACE_S:
                 continue  # the answer to the write that has begun it is still on its way
             if since_s is not None and now_s - since_s > bound_s + GRACE_S + 2.0 * self.bounds.period_s:
                 self._complain(
