@@ -19,7 +19,8 @@ FIRST_WORDS_S = 3.5
 """So long a start waits for the first words of a device that obeys nothing until a person resets; then it serves."""
 MOST_OFF_N = 0.5
 """By how much a healthy cell may read another force at rest than at first, until the zero is taken anew."""
-TARES = 5
+TARES, TARE_S = 5, 0.3
+"""Two readings that differ too much refuse it as long as both are looked at."""
 
 
 def heal(simulation: "Simulation") -> None:
@@ -35,7 +36,7 @@ def heal(simulation: "Simulation") -> None:
     for _ in range(TARES):
         if _is_zero_off(simulation):  # somebody has tared while the cell was broken; noise may refuse one of these
             healer.tare()
-            simulation._run_for(0.1)
+            simulation._run_for(TARE_S)
     healer.hold(HELD_N)
     error_n = _settled_force_n(simulation) - HELD_N
     if not abs(error_n) <= simulation.in_band_n:
