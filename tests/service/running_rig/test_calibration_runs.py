@@ -10,6 +10,7 @@ from gateway.recording import read_recording
 from gateway.registers.words import CalibrationPhase, State
 from gateway.service.running_rig.calibration_runs import FOLLOWED_S, CalibrationRuns
 from tests.disk.at_once import AtOnce
+from tests.service.test_run_recording import HangingDisk
 from tests.service.wired import ENABLE, Wired
 
 PLAN = {"step_v": QUICK.step_v, "groups": QUICK.groups, "minor_points": QUICK.minor_points}
@@ -92,3 +93,32 @@ def test_a_disk_that_takes_no_more_ends_the_run_for_its_stairs_would_be_wear_for
     assert "E402" in runs.status()["ended"] and "No space left" in runs.status()["ended"]
     assert wired.word("calibration_phase") == CalibrationPhase.STOPPED
     wired.until(lambda: wired.value("output_voltage") == 0.0, 5.0)
+
+
+def test_a_disk_that_takes_no_file_ends_the_run_at_its_beginning(tmp_path: Path) -> None:
+    (tmp_path / "recordings").write_text("no folder")
+    wired = Wired().ready()
+    runs = kept(wired, tmp_path)
+    runs.answer({"plan": PLAN})
+    wired.until(lambda: bool(runs.answer({})["ended"]), 1.0)
+    assert "A330 calibration stopped: the recording cannot be written: File exists" in runs.status()["ended"]
+    assert runs.status()["recording"] is None
+    assert wired.word("calibration_phase") == CalibrationPhase.STOPPED
+
+
+def test_the_end_of_a_run_is_told_once_its_file_is_closed(tmp_path: Path) -> None:
+    """Whoever follows it reads the file then."""
+    wired = Wired().ready()
+    runs = kept(wired, tmp_path)
+    disk = runs.disk = HangingDisk()  # type: ignore[assignment]
+    runs.answer({"plan": PLAN})
+    wired.run(1.0)
+    runs.answer({"stop": True})
+    wired.until(lambda: wired.state is State.OFF, 2.0)
+    wired.run(0.1)
+    told = runs.status()
+    assert told["running"] and told["phase"] != "stopped" and told["recording"] is None
+    disk.let_go()
+    told = runs.status()
+    assert not told["running"] and told["phase"] == "stopped"
+    assert read_recording(Path(told["recording"])).rows > 80
