@@ -59,8 +59,8 @@ def shows(page: Any, selector: str, text: str) -> None:
     until(page, lambda: page.text_content(selector) == text)
 
 
-def until(page: Any, condition: Callable[[], bool], within_s: float = 5.0) -> None:
-    """Wait in the test, not in the page: its own policy forbids it to evaluate texts."""
+def until(page: Any, condition: Callable[[], bool], within_s: float = 20.0) -> None:
+    """Wait in the test, not in the page: its own policy forbids it to evaluate texts. A busy machine lets a browser wait."""
     deadline_s = time.monotonic() + within_s
     while not condition():
         assert time.monotonic() < deadline_s, f"not within {within_s} s; the page says {page.text_content('#said')!r}"

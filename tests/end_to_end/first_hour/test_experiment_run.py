@@ -44,32 +44,32 @@ def written(folder: Path, text: str) -> Path:
     return file
 
 
-def test_beyond_the_rig_it_is_refused_before_anything_moves(rested, tmp_path: Path) -> None:
+def test_beyond_the_rig_it_is_refused_before_anything_moves(patient, tmp_path: Path) -> None:
     """The first test of the module, so that nothing has been run."""
     plan = written(tmp_path, PLAN.replace("to_n: 20", "to_n: 95"))
-    done = CliRunner().invoke(gateway_command, words(rested.state, plan))
+    done = CliRunner().invoke(gateway_command, words(patient.state, plan))
     assert done.exit_code == 1
     assert "plan short, part swings, move 1 (ramp): 95 N, allowed up to" in done.stderr
     spoilt = written(tmp_path, PLAN.replace("times: 2", "tims: 2"))
-    done = CliRunner().invoke(gateway_command, words(rested.state, spoilt))
+    done = CliRunner().invoke(gateway_command, words(patient.state, spoilt))
     assert done.exit_code == 78
     assert ":9:" in done.stderr
     assert "did you mean times?" in done.stderr
-    assert rested.words(PHASE, 1) == [0]
-    assert not list((rested.state / "recordings").glob("*.fgr"))
+    assert patient.words(PHASE, 1) == [0]
+    assert not list((patient.state / "recordings").glob("*.fgr"))
 
 
-def test_a_plan_is_run_and_recorded_and_no_calibration_comes_of_it(rested, tmp_path: Path) -> None:
+def test_a_plan_is_run_and_recorded_and_no_calibration_comes_of_it(patient, tmp_path: Path) -> None:
     plan = written(tmp_path, PLAN)
-    done = subprocess.run(command(rested.state, plan, "--json"), capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command(patient.state, plan, "--json"), capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     end = json.loads(done.stdout)
     assert (end["phase"], end["fit"]) == ("recorded", {})
     assert "demo: experiment short, 1 parts (swings) up to" in done.stderr
-    assert rested.words(PHASE, 3) == [RECORDED, 1000, 0]
-    status = rested.status()
+    assert patient.words(PHASE, 3) == [RECORDED, 1000, 0]
+    status = patient.status()
     assert (status["state"], status["output_voltage"]) == (OFF, 0)
-    assert not list((rested.state / "calibrations").glob("*.yaml"))
+    assert not list((patient.state / "calibrations").glob("*.yaml"))
     recording = read_recording(Path(end["recording"]))
     assert recording.header["experiment"] == plan_document(load_plan(plan))
     assert "ladder" not in recording.header
@@ -81,15 +81,15 @@ def test_a_plan_is_run_and_recorded_and_no_calibration_comes_of_it(rested, tmp_p
     assert len(np.unique(np.round(swings_v, 2))) > 40  # even ramps, not stairs, on a slow machine too
 
 
-def test_ctrl_c_goes_to_zero_and_keeps_the_data(rested, tmp_path: Path) -> None:
+def test_ctrl_c_goes_to_zero_and_keeps_the_data(patient, tmp_path: Path) -> None:
     plan = written(tmp_path, PLAN)
-    process = subprocess.Popen(command(rested.state, plan), stderr=subprocess.PIPE, text=True)
-    rested.wait_until(lambda status: status["output_voltage"] > 500, within_s=15.0)
+    process = subprocess.Popen(command(patient.state, plan), stderr=subprocess.PIPE, text=True)
+    patient.wait_until(lambda status: status["output_voltage"] > 500, within_s=15.0)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=10)
     assert process.returncode == 1
     assert "the data are kept in" in said
     assert "--resume" not in said
-    status = rested.wait_until(lambda status: status["state"] == OFF)
+    status = patient.wait_until(lambda status: status["state"] == OFF)
     assert status["output_voltage"] == 0
-    assert rested.words(PHASE, 1) == [STOPPED]
+    assert patient.words(PHASE, 1) == [STOPPED]
