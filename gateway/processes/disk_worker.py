@@ -20,7 +20,7 @@ class DiskWorker:
     """One thread; what it is given runs one after the other. Called in a running loop, where `done` is called back."""
 
     def __init__(self) -> None:
-        self._threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="calibration")
+        self._threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="disk")
         self._has_thread = False
 
     def __call__(self, work: Work, done: Done) -> None:

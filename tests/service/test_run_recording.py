@@ -203,3 +203,18 @@ def test_a_file_that_nobody_waits_for_any_more_is_not_made(
     assert "waits" in recordings.status()
     disk.let_go()
     assert list_recordings(tmp_path) == []
+
+
+def test_a_disk_that_comes_back_behind_the_end_is_no_internal_error(
+    recordings: Recordings, disk: HangingDisk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.service.running_rig.recordings.END_BOUND_S", 0.0)
+
+    async def main() -> None:
+        recordings.start()
+        disk.let_go()
+        rows_until(recordings, 1.0)
+        await recordings.close()
+        disk.let_go()
+
+    asyncio.run(main())

@@ -8,7 +8,6 @@ terminal must not leave a tool climbing stairs.
 """
 
 import asyncio
-import contextlib
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import asdict
@@ -31,10 +30,10 @@ from gateway.service.run_recording import RunRecording
 from gateway.service.running_rig.fit_launcher import FitLauncher, Result
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recordings import END_BOUND_S
 from gateway.service.socket_requests import CalibrateRequest, EmptyRequest, parse_request
 
 FOLLOWED_S: Final = 3.0
-_END_BOUND_S: Final = 1.0
 _CLOSING_S: Final = 1.0  # without a sample for so long after the last stair the run is recorded as cut there
 Answer = dict[str, Any]
 
@@ -195,8 +194,7 @@ class CalibrationRuns:
         if self._recording:
             closed: Future[None] = Future()
             self._recording.close(lambda: closed.set_result(None))
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(asyncio.wrap_future(closed), _END_BOUND_S)
+            await asyncio.wait([asyncio.wrap_future(closed)], timeout=END_BOUND_S)
         if self._child:
             self._child.close()
         self.disk.close()

@@ -6,7 +6,6 @@ recordings has something to prune, and no file is too long to be read.
 """
 
 import asyncio
-import contextlib
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
@@ -30,7 +29,7 @@ LONGEST_BYTES: Final = 256 << 20
 LONGEST_S: Final = 86400.0
 _SHARES: Final = 8
 """How many files there are at least in what a rig's limits have room for."""
-_END_BOUND_S: Final = 1.0
+END_BOUND_S: Final = 1.0
 Answer = dict[str, Any]
 Opened = Callable[[RunRecording, OSError | None], None]
 
@@ -164,8 +163,8 @@ class Recordings:
 
     async def close(self) -> None:
         """End the recording, if there is one, for good. A disk that takes nothing for a second is not waited for."""
-        with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(asyncio.wrap_future(self.stop()), _END_BOUND_S)
+        ended = asyncio.wrap_future(self.stop())
+        await asyncio.wait([ended], timeout=END_BOUND_S)  # not cancelled: the disk may still tell its end
         self._retention.close()
         self._disk.close()
 

@@ -33,6 +33,7 @@ class ValveBench(Bench):
         self.stands, self.obeys, self.is_silent = stands, True, False
         self.told: ValveDirection | None = stands
         self.told_s = self.silent_s = 0.0
+        self.kept_v: float | None = None  # what a silent output is known to keep
         self.switched: list[tuple[float, float, float]] = []
         self.turn(stands)
 
@@ -46,7 +47,7 @@ class ValveBench(Bench):
             self.switched.append((self.now_s, self.plant.force_n, self.voltage_v))
             self.turn(self.told)  # type: ignore[arg-type]
         since_s = self.silent_s if self.is_silent else None
-        standing_v = None if self.output_silent else self.voltage_v
+        standing_v = self.kept_v if self.output_silent else self.voltage_v
         self.line = self.line._replace(valve=ValveStatus(self.stands, since_s), standing_v=standing_v)
         output = super().step()
         if output.valve is not self.told:
@@ -126,8 +127,10 @@ def test_a_fault_leads_to_the_safe_direction_without_pressure() -> None:
     assert bench.switched[-1][2] == 0.0
 
 
-def test_a_regulator_that_hears_nothing_keeps_its_pressure_and_the_valve_waits_for_it() -> None:
+@pytest.mark.parametrize("is_known", [False, True])
+def test_a_regulator_that_hears_nothing_keeps_its_pressure_and_the_valve_waits_for_it(is_known: bool) -> None:
     bench = ValveBench().pulling()
+    bench.kept_v = bench.last.voltage_v if is_known else None
     bench.silence_output()
     bench.run(2.0)
     assert bench.last.fault is FaultCode.OUTPUT_SILENT and bench.stands is PULL
