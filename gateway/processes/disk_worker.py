@@ -15,12 +15,15 @@ Work = Callable[[], Any]
 Done = Callable[[Any], None]
 """done(result), or done(exception) when the work raised one."""
 
+THREAD_NAME = "disk"
+"""How the names of these threads begin, for whoever looks at the process."""
+
 
 class DiskWorker:
     """One thread; what it is given runs one after the other. Called in a running loop, where `done` is called back."""
 
     def __init__(self) -> None:
-        self._threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix="disk")
+        self._threads = ThreadPoolExecutor(max_workers=1, thread_name_prefix=THREAD_NAME)
         self._has_thread = False
 
     def __call__(self, work: Work, done: Done) -> None:

@@ -15,6 +15,7 @@ from tests.calibrations.failing_disk import disk
 from tests.calibrations.upload_bench import Bench
 from tests.control.bench import Bench as ControlBench
 from tests.control.bench import settings
+from tests.disk.threads import join_disk_threads
 
 
 def in_use(active: ActiveCalibration) -> CalibrationInUse:
@@ -95,9 +96,7 @@ def test_a_loop_that_ends_before_the_disk_is_ready_leaves_the_old_set_or_the_new
         there.before_fsync = lambda name: go.wait(10)
         asyncio.run(begin())
         go.set()
-        for thread in threading.enumerate():
-            if thread.name.startswith("calibration"):
-                thread.join(10)
+        assert join_disk_threads() == 1
     assert bench.restarted().upload.status()["active"] == 2
 
 

@@ -206,7 +206,7 @@ def test_a_file_that_nobody_waits_for_any_more_is_not_made(
 
 
 def test_a_disk_that_comes_back_behind_the_end_is_no_internal_error(
-    recordings: Recordings, disk: HangingDisk, monkeypatch: pytest.MonkeyPatch
+    recordings: Recordings, disk: HangingDisk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gateway.service.running_rig.recordings.END_BOUND_S", 0.0)
 
@@ -215,6 +215,9 @@ def test_a_disk_that_comes_back_behind_the_end_is_no_internal_error(
         disk.let_go()
         rows_until(recordings, 1.0)
         await recordings.close()
+        [path] = (tmp_path / "recordings").glob("*.fgr")
+        assert read_recording(path).rows == 0, "the disk has not come back"
         disk.let_go()
+        assert read_recording(path).rows == 11
 
     asyncio.run(main())

@@ -1,6 +1,5 @@
 """`upload` over a serial line that loses requests and answers: each is repeated that may be, and a commit is done once."""
 
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from pymodbus.exceptions import ModbusIOException
 from gateway.calibrations.store import as_text
 from tests.calibrations.coefficients import calibration
 from tests.cli.master.test_upload import Gateway
+from tests.disk.threads import join_disk_threads
 
 
 class Noise:
@@ -51,9 +51,7 @@ def line(gateway, serve):
     server = serve(gateway.bank)
     yield ("--rtu", server.serial_path, "--baud", "115200", "--unit", "3")
     gateway.upload.close()
-    for thread in threading.enumerate():
-        if thread.name.startswith("calibration"):
-            thread.join(10)
+    join_disk_threads()
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 import json
 import struct
-import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from gateway.registers.words import CommitStatus
 from tests.calibrations.coefficients import calibration
 from tests.calibrations.failing_disk import disk
 from tests.calibrations.slots import slot_number
+from tests.disk.threads import join_disk_threads
 
 OWN = calibration(8, number=1)
 
@@ -63,9 +63,7 @@ def gateway(tmp_path: Path, register_map: RegisterMap) -> Gateway:
 def address(gateway: Gateway, serve):
     yield serve(gateway.bank).address
     gateway.upload.close()
-    for thread in threading.enumerate():
-        if thread.name.startswith("calibration"):
-            thread.join(10)
+    join_disk_threads()
 
 
 @pytest.fixture
