@@ -9,6 +9,7 @@ import re
 import struct
 from dataclasses import dataclass, field
 from hashlib import sha256
+from math import inf
 from typing import Any
 
 COUNT_V = 10.0 / 1023
@@ -18,7 +19,8 @@ STATUS_FIRST, STATUS_WORDS = 100, 11
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the rig's file says, and what the wire takes (`GRACE_S`: one tick, two sentences of 9600 baud, the loop's grid)."""
+    """What the rig's file says, and what the wire takes (`GRACE_S`: one tick, two sentences of 9600 baud, the loop's grid).
+    lease_s: endless where a lost master's force is held; lost_down_s: how long it may take to ramp down."""
 
     voltage_max_v: float
     slew_v_per_s: float
@@ -26,6 +28,7 @@ class Bounds:
     stall_s: float
     lease_s: float
     period_s: float
+    lost_down_s: float = 0.0
 
 
 ENABLE, RESET, RUN_BITS = 1, 2, 32 | 64
@@ -113,12 +116,14 @@ class Observer:
             self._reset_s = now_s
 
     def note_unanswered(self, control: int | None, now_s: float) -> None:
-        """A master has hung up before it heard whether its write was taken: it may press until its lease has run out."""
+        """A master has hung up before it heard whether its write was taken: it may press until its lease has run out, if
+        it ever does."""
         self.write_s = now_s
         if control is None:
             return
         if self.disabled_s is not None and control & (ENABLE | RUN_BITS):
-            self.disabled_s = max(self.disabled_s, now_s + self.bounds.lease_s)
+            until_s = max(self.disabled_s, now_s + self.bounds.lease_s)
+            self.disabled_s = None if until_s == inf else until_s
         if control & RESET:
             self._reset_s = now_s
 
@@ -158,7 +163,7 @@ class Observer:
         limits = (
             ("I3 cell", self.cell_lost_s, self.bounds.sample_timeout_s),
             ("I3 control", self.control_lost_s, self.bounds.stall_s),
-            ("I3 master", self.write_s, self.bounds.lease_s + down_s),
+            ("I3 master", self.write_s, self.bounds.lease_s + max(down_s, self.bounds.lost_down_s)),
             ("I4", self.disabled_s, down_s),
         )
         for law, since_s, bound_s in limits:

@@ -8,6 +8,7 @@ from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 
+from gateway.control import LeaseAction
 from gateway.plants.store import NumberedPlant, PlantStore, Provenance
 from gateway.profiles import Rig, load_plant, load_rig
 from gateway.profiles.kinds.plant_writer import with_origins
@@ -19,6 +20,13 @@ from tests.simulation.heard import OUTPUTS, RTU_OUTPUT, SENTENCES, LineObserver,
 from tests.simulation.observer import Bounds, Observer
 
 LEASE_S, STALL_S = 0.2, 0.1
+LEASES = ((LEASE_S, LeaseAction.FAULT),) * 20 + (
+    (LEASE_S, LeaseAction.RAMP),
+    (LEASE_S, LeaseAction.RAMP),
+    (LEASE_S, LeaseAction.HOLD),
+    (None, LeaseAction.FAULT),
+)
+"""How long a command lasts without a heartbeat, and what becomes of the force then."""
 RATES_HZ = (20,) * 16 + (25,) * 3 + (100,)
 """Of loop and load cell, drawn for each seed: at 20 Hz a schedule takes half of the time, and its laws are the same."""
 SLOW_HZ = 25
@@ -107,7 +115,8 @@ def _strict(rig: Rig, seed: int, loop_hz: float, cell_hz: float) -> Rig:
         "sample_timeout_s": max(0.05, 2.5 / min(loop_hz, cell_hz)),
         "output_timeout_s": max(0.1, 3.0 / loop_hz, 1.7 * rig.output.device.reply_timeout_s),
     }
-    rig = with_supervision(rig, lease_s=LEASE_S, stall_s=STALL_S, **bounds)
+    lease_s, action = Random(f"lease {seed}").choice(LEASES)
+    rig = with_supervision(rig, lease_s=lease_s, lease_action=action, stall_s=STALL_S, **bounds)
     lines = {"output": replace(rig.output, port="output"), "load_cell": replace(rig.load_cell, port="load_cell")}
     if rig.valve:
         lines["valve"] = replace(rig.valve, port="valve")

@@ -4,11 +4,12 @@ import struct
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from math import nan
+from math import inf, nan
 from pathlib import Path
 from random import Random
 from typing import Any
 
+from gateway.control import LeaseAction
 from gateway.profiles import Rig
 from gateway.service.simulation.world import SimulatedRig
 from tests.simulation.events import Event
@@ -23,7 +24,7 @@ from tests.simulation.masters.integrator import Integrator
 from tests.simulation.masters.socket_user import SocketUser
 from tests.simulation.masters.spelling import BITS, DISABLED_BY_BIT, ENABLE, read_pdu
 from tests.simulation.masters.tcp_master import BEATS_S, RUNS, Master
-from tests.simulation.observer import STATUS_FIRST, STATUS_WORDS, Bounds
+from tests.simulation.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
 from tests.simulation.rigs import LEASE_S, draw_rig, store_plants
 
 RUN_BIT, SELF_TEST = RUNS.values()
@@ -104,8 +105,9 @@ class Simulation:
             limits.voltage_slew_v_per_s,
             supervision.sample_timeout_s,
             supervision.stall_s,
-            LEASE_S,
+            LEASE_S if supervision.lease_s and supervision.lease_action is not LeaseAction.HOLD else inf,
             self.period_s,
+            DOWN_S if supervision.lease_action is LeaseAction.RAMP else 0.0,
         )
 
     def run(self, events: Iterable[Event], duration_s: float) -> Outcome:
