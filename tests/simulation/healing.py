@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 HELD_N = 12.0
 HEAL_S = 2.0
-HUNTING_READS, HUNTING_READ_S = 10, 0.05
+IN_BAND_N = 1.0
 ANSWER_S = 0.02
 LOOKING_S = 3.0
 """What is plugged in is looked for, and a guardian started again, every 2 s at the most."""
@@ -38,8 +38,9 @@ def heal(simulation: "Simulation") -> None:
             healer.tare()
             simulation._run_for(TARE_S)
     healer.hold(HELD_N)
-    error_n = _settled_force_n(simulation) - HELD_N
-    if not abs(error_n) <= simulation.in_band_n:
+    simulation._run_for(HEAL_S)
+    error_n = simulation._read_force_n() - HELD_N
+    if not abs(error_n) <= IN_BAND_N:
         words = f"{error_n:+.2f} N off {HEAL_S:g} s after healing; {list(simulation.log.lines)[-4:]}"
         simulation.observer.broken.append(f"I13: {words}")
 
@@ -55,17 +56,6 @@ def _repair(simulation: "Simulation") -> None:
     for master in simulation.masters.values():
         master.fall_silent()
         master.disconnect()
-
-
-def _settled_force_n(simulation: "Simulation") -> float:
-    """The force when it must be in the band; of a slow loop the mean around which it hunts."""
-    reads = HUNTING_READS if simulation.in_band_n > 1.0 else 1
-    simulation._run_for(HEAL_S - HUNTING_READ_S * (reads - 1))
-    forces_n = [simulation._read_force_n()]
-    while len(forces_n) < reads:
-        simulation._run_for(HUNTING_READ_S - ANSWER_S)
-        forces_n.append(simulation._read_force_n())
-    return sum(forces_n) / reads
 
 
 def _is_zero_off(simulation: "Simulation") -> bool:

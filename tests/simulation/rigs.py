@@ -8,7 +8,8 @@ from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 
-from gateway.control import LeaseAction
+from gateway.control import LeadSettings, LeaseAction
+from gateway.control.settings import ResponseSource
 from gateway.plants.store import NumberedPlant, PlantStore, Provenance
 from gateway.profiles import Rig, load_plant, load_rig
 from gateway.profiles.kinds.plant_writer import with_origins
@@ -29,6 +30,9 @@ LEASES = ((LEASE_S, LeaseAction.FAULT),) * 20 + (
 """How long a command lasts without a heartbeat, and what becomes of the force then."""
 RATES_HZ = (20,) * 16 + (25,) * 3 + (100,)
 """Of loop and load cell, drawn for each seed: at 20 Hz a schedule takes half of the time, and its laws are the same."""
+LEAST_HZ = 50
+"""The least that a rig file may ask for. Slower loops are here for the sake of time and have no lead: a push that stands for
+longer than the lags that it inverts goes beyond them, and such a loop swings."""
 SLOW_HZ = 25
 """The most for rigs that have something else of their own, for the sake of time."""
 OTHER_RATES_HZ = (50, 50, 250)
@@ -65,15 +69,6 @@ class Drawn:
     rig: Rig
     cell_s: float | None
     output: str = DEMO_OUTPUT
-
-    @property
-    def in_band_n(self) -> float:
-        """How near the force must come. Of loops as a rig may have them, from 50 Hz on, and of slower ones, which are here for
-        the sake of time: they hunt, and more so where a reading must be asked for."""
-        slowest_s = max(1.0 / self.rig.loop_hz, self.cell_s or 0.0)
-        if slowest_s <= 0.02:
-            return 1.0
-        return 2.5 if self.output == DEMO_OUTPUT and slowest_s <= 0.05 else 4.0
 
     def observer(self, bounds: Bounds) -> Observer:
         """Who hears what this output is told."""
@@ -116,6 +111,8 @@ def _strict(rig: Rig, seed: int, loop_hz: float, cell_hz: float) -> Rig:
         "output_timeout_s": max(0.1, 3.0 / loop_hz, 1.7 * rig.output.device.reply_timeout_s),
     }
     lease_s, action = Random(f"lease {seed}").choice(LEASES)
+    if loop_hz < LEAST_HZ:
+        rig = replace(rig, control=replace(rig.control, response=ResponseSource.RIG, lead=LeadSettings()))
     rig = with_supervision(rig, lease_s=lease_s, lease_action=action, stall_s=STALL_S, **bounds)
     lines = {"output": replace(rig.output, port="output"), "load_cell": replace(rig.load_cell, port="load_cell")}
     if rig.valve:

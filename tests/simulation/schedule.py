@@ -55,7 +55,7 @@ class Simulation:
     def __init__(self, seed: int, folder: Path) -> None:
         drawn = draw_rig(seed)
         rig = drawn.rig
-        self.period_s, self.cell_s, self.in_band_n = 1.0 / rig.loop_hz, drawn.cell_s, drawn.in_band_n
+        self.period_s, self.cell_s = 1.0 / rig.loop_hz, drawn.cell_s
         self.clock, self.chance = VirtualClock(), Random(~seed)
         self.observer = drawn.observer(self._bounds_of(rig))
         self.outside = VirtualLoop(self.clock)
