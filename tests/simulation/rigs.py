@@ -9,12 +9,13 @@ from random import Random
 from tempfile import TemporaryDirectory
 
 from gateway.control import LeadSettings, LeaseAction
-from gateway.control.settings import ResponseSource
+from gateway.control.settings import ResponseSource, SafeDirection
 from gateway.plants.store import NumberedPlant, PlantStore, Provenance
-from gateway.profiles import Rig, load_plant, load_rig
+from gateway.profiles import Rig, load_device, load_plant, load_rig
 from gateway.profiles.kinds.plant_writer import with_origins
 from gateway.profiles.rigs.assembly import check_report
 from gateway.profiles.rigs.faces import RtuFace
+from gateway.profiles.rigs.rig import ValveLine
 from gateway.twin.plant import with_value
 from tests.service.rigs import demo, with_supervision
 from tests.simulation.heard import OUTPUTS, RTU_OUTPUT, SENTENCES, LineObserver, RtuObserver
@@ -42,6 +43,14 @@ DEMO_OUTPUT = "smc-itv-rc"
 CELLS = ("hbm-aed", "hbm-aed-binary", "laumas-tlb", "mantracourt-dsc", "hx711-line", "adam-4016")
 COUNTS_N = {"adam-4016": 10.0}
 UNITS = {"mantracourt-dsc": ", unit: N", "laumas-tlb": ""}
+VALVES = (
+    ("waveshare-relay", SafeDirection.PUSH),
+    ("waveshare-relay", SafeDirection.PUSH),
+    ("mcu-valve", SafeDirection.PUSH),
+    ("waveshare-relay", SafeDirection.PULL),
+    ("mcu-valve", SafeDirection.KEEP),
+)
+"""What switches it, and where it goes while the output is off."""
 KINDS = ("plain",) * 28 + ("rate",) + ("cell",) * 4 + ("valve",) * 3 + ("devices",) * 4 + ("bus",) * 3
 BOW = 0.005
 RIG = """name: pair
@@ -89,7 +98,7 @@ def draw_rig(seed: int) -> Drawn:
         share = chance.choice(CELL_SHARES)
     elif kind == "devices":
         output = chance.choice(OUTPUTS)
-    rig = demo() if kind != "valve" else with_valve()
+    rig = demo() if kind != "valve" else with_valve(*Random(f"valve {seed}").choice(VALVES))
     if kind == "bus":
         rig = replace(rig, fieldbus=(RtuFace(type="rtu", port="bus"),))
     elif kind == "devices":
@@ -125,8 +134,12 @@ def _strict(rig: Rig, seed: int, loop_hz: float, cell_hz: float) -> Rig:
 
 
 @cache
-def with_valve() -> Rig:
-    return load_rig("paper-pull")
+def with_valve(device: str, safe: SafeDirection) -> Rig:
+    """The paper's rig that pulls, with this device at its valve."""
+    rig = load_rig("paper-pull")
+    assert rig.control.valve
+    control = replace(rig.control, valve=replace(rig.control.valve, safe=safe))
+    return replace(rig, valve=ValveLine.of(load_device(device), None, None), control=control)
 
 
 @cache
