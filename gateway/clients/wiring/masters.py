@@ -104,6 +104,10 @@ def _irc5(rig: Rig, table: ExchangeTable) -> Section:
         ("module", "ForceGateway.mod, from the command below"),
         ("FG_HOST, FG_PORT, FG_UNIT", f'"{where.host}", {where.shown_port}, {where.unit}'),
         ("task", "T_FORCE, Type SemiStatic, Main entry FgServe, TrustLevel NoSafety; every FG_CYCLE 0.04 s"),
+        (
+            "program that stops",
+            "T_ROB1's timer counts fgAlive on: where that stands, the task takes the force off (0.5 s)",
+        ),
         ("without 623-1", f"FgTimerStart in T_ROB1, every 0.1 s ({timer})"),
     )
     return Section("ABB IRC5: RAPID sockets", rows=rows)
@@ -143,7 +147,8 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
         ("MB_Unit_ID", f"{where.unit}: static of the MB_CLIENT instance, 255 as it comes; the block below sets it"),
         ("MB_DATA_PTR", "an Array of Word in a DB without optimized access, at least MB_DATA_LEN long"),
     )
-    return Section("Siemens S7-1200/1500: connection of MB_CLIENT", rows=rows)
+    stop = "A CPU goes on at an emergency stop: `enable` of the block has to fall with it (and with the guard, and the robot)."
+    return Section("Siemens S7-1200/1500: connection of MB_CLIENT", (stop,), rows)
 
 
 def _s7_requests(table: ExchangeTable) -> Section:
