@@ -5,7 +5,7 @@ from functools import reduce
 from operator import xor
 from typing import Final, Literal
 
-ChecksumName = Literal["none", "dcon-sum", "xor"]
+ChecksumName = Literal["none", "dcon-sum", "xor", "xor-hex"]
 
 
 def _nothing(body: bytes) -> bytes:
@@ -22,10 +22,16 @@ def _xor(body: bytes) -> bytes:
     return b"*%02X" % reduce(xor, body, 0)
 
 
+def _xor_hex(body: bytes) -> bytes:
+    """Exclusive or of all characters but a leading STX, as two digits (Yaohua XK3190-A23p, page 24)."""
+    return b"%02X" % reduce(xor, body.removeprefix(b"\x02"), 0)
+
+
 _TRAILERS: Final[dict[ChecksumName, Callable[[bytes], bytes]]] = {
     "none": _nothing,
     "dcon-sum": _dcon_sum,
     "xor": _xor,
+    "xor-hex": _xor_hex,
 }
 
 

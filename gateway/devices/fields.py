@@ -3,7 +3,7 @@
     {counts:d} {counts:04d} {counts:+05d}   whole number, open or of fixed width
     {address:02X}                           upper-case hex of fixed width
     {voltage_v:+07.3f} {voltage_v:.4f}      decimals, open or of fixed width; the point is always there
-    {status:ST|US|OL}                       one of the words; the first is the default
+    {status:ST|US|OL} {status: |M|O}        one of the words; the first is the default; one may be a blank
     {text:s} {model:8s}                     printable text, open or of fixed width
 
 Each shape is both ways: it encodes a value or refuses it (nan, inf, too wide), and decodes its own text. A shape with a
@@ -300,7 +300,7 @@ _HEX = re.compile(r"0([1-8])X")
 _DECIMALS = re.compile(r"(\+?)(0?)(\d{0,2})\.([1-9])f")
 _TEXT = re.compile(r"(\d{0,2})s")
 _REGISTERS = re.compile(r"(u?int16|u?int32|float32)(-cdab)?")
-_WORD = re.compile(r"[!-~]+")
+_WORD = re.compile(r"[!-~]+| +")  # no blank beside letters: `ST | US` would be a slip that no line ever matches
 
 
 def field_from(name: str, spec: str) -> Field:
@@ -315,7 +315,16 @@ def field_from(name: str, spec: str) -> Field:
         return Text(name, int(match[1] or 0))
     if match := _REGISTERS.fullmatch(spec):
         return RegisterNumber(name, match[1], bool(match[2]))
-    words = tuple(spec.split("|"))
-    if len(words) > 1 and len(set(words)) == len(words) and all(_WORD.fullmatch(word) for word in words):
-        return Choice(name, words)
+    if "|" in spec:
+        return _choice(name, spec)
     raise TemplateError(f"{{{name}:{spec}}} is none of d, 04d, 02X, +07.3f, ONE|TWO, s")
+
+
+def _choice(name: str, spec: str) -> Choice:
+    words = tuple(spec.split("|"))
+    for word in words:
+        if not _WORD.fullmatch(word):
+            raise TemplateError(f"{{{name}:{spec}}}: {word!r} is no word: characters without blanks, or blanks alone")
+    if len(set(words)) < len(words):
+        raise TemplateError(f"{{{name}:{spec}}} has a word twice")
+    return Choice(name, words)

@@ -4,6 +4,7 @@ Structured Text behind a transport. Each runs a client's text against a gateway 
 import math
 import struct
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, ClassVar
 
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
@@ -26,7 +27,7 @@ def nothing(*_: Any) -> None:
 
 
 class Irc5:
-    """RAPID: FgInit once, FgCycle per cycle."""
+    """RAPID: FgInit once, FgCycle per cycle; or its task's own main entry, `serve`."""
 
     def __init__(self, text: str, gateway: GatewayAtHand) -> None:
         self.gateway, self.received, self.is_open = gateway, b"", False
@@ -36,6 +37,19 @@ class Irc5:
         self.machine = Machine(parse(text, "rapid"), self.library())
         self.machine.begin()
         self.machine.start("FgInit")
+
+    def serve(self, waits: int, meanwhile: Callable[[], Any] = nothing) -> None:
+        """Run FgServe until so many of its pauses are over; `meanwhile` is what T_ROB1 does in each."""
+        left = iter(range(waits - 1))
+
+        def pause(*_: Any) -> None:
+            meanwhile()
+            if next(left, None) is None:
+                raise StopIteration
+
+        self.machine.library["WAITTIME"] = pause
+        with suppress(StopIteration):
+            self.machine.start("FgServe")
 
     def library(self) -> dict[str, Any]:
         return {
@@ -399,6 +413,8 @@ class Plc:
             else:
                 holder[name.upper()] = value
         self.inputs[self.NAMES["slot"]] = slot
+        self.inputs[self.NAMES["upload"]] = False
+        self.scan()
         self.inputs[self.NAMES["upload"]] = True
 
     @property
@@ -414,12 +430,12 @@ class MbClient:
 
     def __init__(self, plc: "S7") -> None:
         self.plc, self.BUSY, self.DONE, self.ERROR, self.STATUS, self.asked = plc, False, False, False, 0x7000, None
-        self.calls, self.MB_Unit_ID, self.was_asked = 0, 255, False
+        self.calls, self.MB_Unit_ID, self.RCV_TIMEOUT, self.was_asked = 0, 255, 2.0, False
 
-    def set_static(self, name: str, value: int) -> None:
+    def set_static(self, name: str, value: float) -> None:
         """Set what a program may set of the instance (S7-1200 system manual, static variables of MB_CLIENT)."""
-        assert name == "MB_Unit_ID" and 0 <= value <= 255
-        self.MB_Unit_ID = value
+        assert (name == "RCV_TIMEOUT" and value == 0.5) or (name == "MB_Unit_ID" and 0 <= value <= 255)
+        setattr(self, name, value)
 
     def call(self, given: dict[str, Any]) -> None:
         self.DONE = self.ERROR = False

@@ -129,7 +129,7 @@ class CodesysRequest:
         self.executed, self.calls = False, 0
 
     def call(self, given: dict[str, Any]) -> None:
-        assert given["udiReplyTimeout"] >= 50_000
+        assert 50_000 <= given["udiReplyTimeout"] < given["udiTimeOut"], "0, its own, would wait for ever"
         rises, self.executed = given["xExecute"] and not self.executed, given["xExecute"]
         if rises and not self.xBusy:
             self.xBusy, self.calls = True, 0

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import struct
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from gateway.clients import Endpoint, MissingRegisterError, render_client
 from gateway.profiles import load_register_map
 from gateway.registers import RegisterMap
-from tests.clients.controllers import Irc5, UniversalRobot
+from tests.clients.controllers import S7, Codesys, Irc5, MbClient, Plc, TwinCat, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.iec_libraries import TwinCatRequest
 from tests.clients.machine import Machine, TaskStopped
 from tests.clients.scenes import MAP, MODEL, TEXTS, WHERE, command, commands, cycles
 from tests.clients.syntax import parse
@@ -40,6 +43,69 @@ def test_a_loss_after_fifty_days_does_not_stop_the_task_of_an_irc5() -> None:
     client.enable(5.0)
     cycles(client)
     assert client.enabled
+
+
+def test_a_task_beside_the_motion_program_keeps_no_force_up_when_that_program_stands() -> None:
+    """A SemiStatic task runs on after a stop or an emergency stop of T_ROB1, whose timer interrupt does not."""
+    gateway = GatewayAtHand(MAP)
+    client = Irc5(TEXTS["rapid"], gateway)
+    alive: list[int] = []
+
+    def program() -> None:
+        alive.append(len(alive))
+        client.set(fgAlive=(client.get("fgAlive") + 1) % 1000)
+        if len(alive) == 2:
+            client.enable(12.0)
+
+    def program_for_20_pauses() -> None:
+        if len(alive) < 20:
+            program()
+        elif len(alive) == 20:
+            alive.append(gateway.bank.command.control_word)
+
+    client.serve(40, program_for_20_pauses)
+    assert alive[-1] == 1, "it pressed while the program ran"
+    assert commands(gateway) == [command(1, 1200), command(0, 0)]
+    assert client.ended and not client.get("fgEnable") and "T_ROB1 does not count fgAlive" in client.text
+
+
+def test_a_task_beside_a_motion_program_that_shows_no_life_enables_nothing() -> None:
+    gateway = GatewayAtHand(MAP)
+    client = Irc5(TEXTS["rapid"], gateway)
+    client.serve(5, lambda: client.enable(12.0))
+    assert gateway.writes == [] and client.ended and "fgAlive" in client.text
+
+
+@pytest.mark.parametrize("kind", [S7, TwinCat, Codesys])
+def test_an_input_that_is_true_when_a_controller_starts_enables_nothing(kind: type[Plc]) -> None:
+    gateway = GatewayAtHand(MAP)
+    client = kind(TEXTS["scl" if kind is S7 else "st"], gateway)
+    client.inputs |= dict.fromkeys([client.NAMES[each] for each in ("enable", "reset", "upload")], True)
+    client.inputs[client.NAMES["force"]] = 12.0
+    cycles(client)
+    assert gateway.requests and gateway.writes == []
+    client.enable(12.0)
+    cycles(client)
+    assert client.enabled
+
+
+@pytest.mark.parametrize("kind", [S7, TwinCat])
+def test_a_request_that_fails_in_its_own_call_is_tried_again_no_sooner(
+    kind: type[Plc], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tries: list[float] = []
+
+    def fail(block: Any, given: dict[str, Any]) -> None:
+        is_asked = given["REQ"] if kind is S7 else given["bExecute"]
+        block.ERROR = block.bError = is_asked
+        if is_asked:
+            tries.append(client.now_s)
+
+    monkeypatch.setattr(MbClient if kind is S7 else TwinCatRequest, "call", fail)
+    client = kind(TEXTS["scl" if kind is S7 else "st"], GatewayAtHand(MAP))
+    client.cycle(8.0)
+    gaps = [later - earlier for earlier, later in pairwise(tries)]
+    assert [round(gap, 1) for gap in gaps] == [0.3, 0.5, 1.0, 2.0, 4.0]
 
 
 def test_an_error_within_a_handler_of_rapid_stops_the_task() -> None:

@@ -81,6 +81,19 @@ def test_a_face_with_certificates_is_told_from_what_the_clients_speak() -> None:
     assert "plain Modbus TCP" in shown["not for"]
 
 
+def test_a_rig_that_answers_another_unit_only_is_asked_as_that_by_every_line(tmp_path: Path) -> None:
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("units: [0, 1, 255]", "units: [7]")
+    (tmp_path / "own.yaml").write_text(text)
+    (section,) = [each for each in page_of(tmp_path / "own.yaml")["sections"] if each["title"].startswith("mbpoll")]
+    assert all("-a 7 " in line or "--unit 7 " in line for line in section["commands"])
+
+
+def test_a_rig_without_a_lease_is_told_that_its_force_outlives_the_master() -> None:
+    told = "This rig has no lease: the force lasts when the master's program stops"
+    assert told in " ".join(call("wiring", "demo").split())
+    assert told not in " ".join(call("wiring", "irc5-cell").split())
+
+
 def test_a_rig_that_no_robot_can_reach_is_told_so() -> None:
     assert "no robot can reach it" in call("wiring", "demo")
 

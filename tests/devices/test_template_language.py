@@ -97,6 +97,7 @@ SHAPES = {
     "float32-cdab": RegisterNumber("x", "float32", True),
     "uint16": RegisterNumber("x", "uint16", False),
     "ST|US": Choice("x", ("ST", "US")),
+    " |M": Choice("x", (" ", "M")),
 }
 
 
@@ -163,8 +164,9 @@ def test_blanks_are_a_value_only_where_they_may_be() -> None:
     [
         ("{x:q}", "none of"),
         ("{x}", "none of"),
-        ("{x:A|A}", "none of"),
-        ("{x:A|}", "none of"),
+        ("{x:A|A}", "{x:A|A} has a word twice"),
+        ("{x:A|}", "'' is no word"),
+        ("{x:ST | US}", "'ST ' is no word: characters without blanks, or blanks alone"),
         ("{x:.0f}", "none of"),
         ("{x:d", "'{x:d'"),
         ("x}", "Single '}'"),
@@ -209,7 +211,7 @@ def test_no_bytes_make_a_decoder_raise(data: bytes) -> None:
         assert values is None or isinstance(values, dict)
 
 
-@given(st.binary(max_size=40), st.sampled_from(["none", "dcon-sum", "xor"]))
+@given(st.binary(max_size=40), st.sampled_from(["none", "dcon-sum", "xor", "xor-hex"]))
 def test_a_checksum_opens_what_it_sealed(body: bytes, name: str) -> None:
     assert strip_checksum(add_checksum(body, name), name) == body  # type: ignore[arg-type]
 

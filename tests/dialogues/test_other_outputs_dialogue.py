@@ -46,6 +46,10 @@ PSI_PA = 6894.757
         (ADAM, SetVoltage(7.456), b"#02C2+07.456\r", b"?02\r", Refused("?02")),
         (ALICAT, SetVoltage(0.544), b"as5.44\r", b"A +014.70 +005.44\r", Accepted(0.544)),
         (ALICAT, ReadPressure(), b"a\r", b"A +014.70 +005.44\r", Pressure(pytest.approx(14.70 * PSI_PA, rel=1e-6))),
+        # a sensor without pressure reads a little less than 0, and more than its end while the pressure overshoots
+        (ALICAT, ReadPressure(), b"a\r", b"A -000.03 +000.00\r", Pressure(pytest.approx(-0.03 * PSI_PA, rel=1e-6))),
+        (ALICAT, ReadPressure(), b"a\r", b"A +104.20 +100.00\r", Pressure(pytest.approx(104.2 * PSI_PA, rel=1e-6))),
+        (ALICAT, ReadPressure(), b"a\r", b"A +140.00 +100.00\r", Garbage(b"A +140.00 +100.00\r")),
         (ALICAT, SetVoltage(0.544), b"as5.44\r", b"?\r", Refused("?")),
         (MCU, SetVoltage(5.0), b"V1 5.0000*5C\n", b"OK 5.0000*3F\n", Accepted(5.0)),
         (MCU, SetVoltage(5.0), b"V1 5.0000*5C\n", b"ERR TRIPPED*2B\n", WatchdogTripped()),

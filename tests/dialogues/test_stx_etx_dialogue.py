@@ -1,10 +1,12 @@
 """Frames between STX and ETX, as Rinstrum's R300 prints its automatic output, and the tabs of an HX711 sketch."""
 
+from dataclasses import replace
 from math import inf
 
 import pytest
 
 from gateway.devices import DeviceProfile, cell_device, cell_host
+from gateway.devices.checksum import add_checksum
 from gateway.devices.exchange import ForceReading
 from gateway.devices.messages import ForceSample, Garbage, Quality
 from tests.dialogues.test_overload_dialogue import cell
@@ -25,6 +27,26 @@ SKETCH = cell(
     terminator="\r\n",
     stream=ForceReading(frame="one reading:\t{one:.1f}\t| average:\t{force:.5f}", unit="N", rate_hz=10.0),
 )
+RICE_LAKE = cell(  # Revolution 680, page 63: STX, polarity, 7 characters, unit, G/N, status (a blank is valid), CR LF
+    terminator="\r\n",
+    stream=ForceReading(
+        frame="\x02{force:8.2f}K{mode:G|N}{status: |M|Z|I|O}",
+        unit="N",
+        quality=dict.fromkeys("IO", Quality.OVERLOAD) | {" ": Quality.OK, "Z": Quality.OK, "M": Quality.UNSTABLE},
+        rate_hz=20.0,
+    ),
+)
+YAOHUA = replace(  # XK3190-A23p, page 24: STX, address, command, exclusive or of both, ETX
+    cell(terminator="\x03", read_force=ForceReading(ask="\x02AB", frame="\x02AB{force:+07d}2", unit="N", rate_hz=20.0)),
+    checksum="xor-hex",
+)
+
+
+def test_a_question_with_an_exclusive_or_in_digits_is_the_manual_s() -> None:
+    assert cell_host(YAOHUA).poll() == bytes.fromhex("02 41 42 30 33 03")
+    assert cell_device(YAOHUA).receive(bytes.fromhex("02 41 42 30 33 03"), 0.0) == 1
+    for command, digits in ((b"A", b"00"), (b"C", b"02"), (b"D", b"05"), (b"E", b"04"), (b"F", b"07")):
+        assert add_checksum(b"\x02A" + command, "xor-hex") == b"\x02A" + command + digits
 
 
 @pytest.mark.parametrize(
@@ -34,6 +56,10 @@ SKETCH = cell(
         (RINSTRUM, b"\x02-   0.20M\x03", -0.2, Quality.UNSTABLE),
         (RINSTRUM, b"\x02 9999.99O\x03", 9999.99, Quality.OVERLOAD),
         (WITH_UNIT, b"\x02+  12.34 N\x03", 12.34, Quality.OK),
+        (RICE_LAKE, b"\x02   12.34KG \r\n", 12.34, Quality.OK),
+        (RICE_LAKE, b"\x02-   0.52KGM\r\n", -0.52, Quality.UNSTABLE),
+        (RICE_LAKE, b"\x02   99.99KGO\r\n", 99.99, Quality.OVERLOAD),
+        (YAOHUA, b"\x02AB+00123421E\x03", 1234.0, Quality.OK),
         (WITH_UNIT, b"\x02------\x03", inf, Quality.OVERLOAD),
         (ENDS_WITH_A_LINE, b"\x02+  12.34 N\x03\r\n", 12.34, Quality.OK),
         (SKETCH, b"one reading:\t12.3\t| average:\t12.34000\r\n", 12.34, Quality.OK),
@@ -49,6 +75,8 @@ def test_a_frame_is_read_as_printed(profile: DeviceProfile, frame: bytes, raw: f
         (RINSTRUM, b"   12.34G\x03"),  # its STX is lost
         (RINSTRUM, b"\x02\x02   12.34G\x03"),
         (RINSTRUM, b"\x02   12.34X\x03"),
+        (RICE_LAKE, b"\x02   12.34LG \r\n"),
+        (YAOHUA, b"\x02AB+00123521E\x03"),
         (WITH_UNIT, b"\x02+  12.34\tN\x03"),
         (ENDS_WITH_A_LINE, b"\x02+  12.34 N\r\n"),
         (SKETCH, b"one reading: 12.3 | average: 12.34000\r\n"),
@@ -66,6 +94,8 @@ def test_anything_else_is_garbage_and_counted_whole(profile: DeviceProfile, fram
         (WITH_UNIT, -12.34, b"\x02  -12.34 N\x03"),
         (WITH_UNIT, 1e9, b"\x02------\x03"),
         (ENDS_WITH_A_LINE, 12.34, b"\x02   12.34 N\x03\r\n"),
+        (RICE_LAKE, 12.34, b"\x02   12.34KG \r\n"),
+        (YAOHUA, 1234.0, b"\x02AB+00123421E\x03"),
         (SKETCH, 12.34, b"one reading:\t0.0\t| average:\t12.34000\r\n"),
     ],
 )

@@ -48,7 +48,7 @@ int main(int argc, char **argv) {
     uint8_t frame[260];
     int result;
     if (argc < 2) return 9;
-    fg_init(&g, "127.0.0.1", (uint16_t)atoi(argv[1]), 1);
+    fg_init(&g, "localhost", (uint16_t)atoi(argv[1]), 1); /* ::1 first, where there is IPv6 */
     g.timeout_ms = 10000;
     printf("crc %08lX\n", (unsigned long)fg_crc32((const uint8_t *)"123456789", 9));
     fg_enable(&g, 12.0f);
@@ -70,6 +70,12 @@ int main(int argc, char **argv) {
     printf("lost %d\n", fg_exchange(&g));
     while ((result = fg_exchange(&g)) == FG_LOST) {}
     printf("back %d %u %u\n", result, g.status.enabled, g.ended);
+    fg_enable(&g, 5.0f);
+    fg_exchange(&g);
+    fg_close(&g);
+    fg_force(&g, 6.0f);
+    result = fg_exchange(&g);
+    printf("closed %d %u %u\n", result, g.status.enabled, g.ended);
     result = fg_read_active(&g, &model, words);
     fg_model_words(&model, again);
     printf("active %d %d\n", result, memcmp(words, again, sizeof words));
@@ -95,6 +101,7 @@ refused 1 refused: W204 value out of range (exception 3, address 1, value 65)
 still 0 12 1 0
 lost 2
 back 0 0 1
+closed 0 0 1
 active 0 0
 committed 0
 bad 4 commit failed at number 16: weight range""".splitlines()
@@ -160,6 +167,11 @@ def test_the_python_client_does_all_of_it(rested: Any, tmp_path: Path) -> None:
     assert client.status is None
     rested.wait_until(lambda _: back(client, module))
     assert client.ended and not client.status["enabled"]
+    client.enable(5.0)
+    assert client.exchange()["enabled"]
+    client.close()
+    client.force(6.0)
+    assert not client.exchange()["enabled"] and client.ended, "closed: nothing is commanded until it is asked for again"
     model, words = client.read_active()
     assert module.model_to_words(model) == words
     client.stage(model)

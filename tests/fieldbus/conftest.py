@@ -68,9 +68,13 @@ class HandTransport:
     ended: str = ""
     high_bytes: int = 0
     connection: Any = None
+    options: list[int] = field(default_factory=list)
 
-    def get_extra_info(self, name: str) -> tuple[str, int] | None:
-        return (self.host, self.port) if name == "peername" else None
+    def get_extra_info(self, name: str) -> Any:
+        return {"peername": (self.host, self.port), "socket": self}.get(name)
+
+    def setsockopt(self, _level: int, option: int, _value: int) -> None:
+        self.options.append(option)
 
     def set_write_buffer_limits(self, high: int) -> None:
         self.high_bytes = high

@@ -1,5 +1,6 @@
 """A connection's laws with time and transport in the test's hand: cuts, limits, deadlines."""
 
+import socket
 from typing import Any
 
 import pytest
@@ -69,6 +70,17 @@ def test_a_limited_peer_gets_the_answers_of_an_unlimited_one_only_later(
         reply = answer(adu.pdu, bank, connection.peer) if served else bytes((adu.pdu[0] | 0x80, 0x0B))
         expected += encode(Adu(adu.transaction, adu.unit, reply))
     assert far.written == expected
+
+
+def test_half_a_request_is_acknowledged_at_once_and_a_whole_one_by_its_answer(stand: Any, deliver: Any) -> None:
+    """Who sends single bytes waits for that with the rest of each request: 40 ms, unless it is told to acknowledge now."""
+    connection, far = stand().connect()
+    deliver(connection, far, framed(READ) * 2)
+    assert far.options == []
+    deliver(connection, far, framed(READ)[:1])
+    assert far.options == [socket.TCP_QUICKACK]
+    deliver(connection, far, framed(READ)[1:])
+    assert answered(far) == [1, 1, 1] and len(far.options) == 1
 
 
 def test_requests_in_one_segment_are_answered_in_one_write(stand: Any, deliver: Any) -> None:

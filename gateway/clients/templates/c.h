@@ -22,7 +22,10 @@ ${fill_in} *     static fg_client gateway;
  * One exchange is one FC23: it writes the whole command block where something has changed, else the heartbeat alone (to
  * repeat enable would undo another master's stop), and reads the whole status block. While nothing is commanded it is one
  * FC03, so a client that only watches owns nothing and disturbs nobody.
- * A program that stops lets the lease end, and the gateway takes the force off.
+ * A program that stops lets the lease end, and the gateway takes the force off: call fg_exchange from the loop that decides
+ * about the force, not from a thread that goes on when that loop stands.
+ * fg_exchange waits for the answer: a millisecond usually, at most timeout_ms (500) for each of its requests. A name instead of
+ * an address may wait for its name server as long as that likes.
  * After a refusal, a fault, a loss or a restart of the gateway this client never enables again by itself:
  *     refused   the last accepted command goes on (a refused write would not renew the lease), `message` says why
  *     ended     the gateway is not enabled any more: enable and force are 0 here, too; `ended` is 1 until fg_enable
@@ -101,6 +104,7 @@ typedef struct fg_client {
     uint16_t once;              /* edges of the next write: reset, tare, take ownership */
     uint16_t heartbeat;
     int off_pending, pulls;
+    uint16_t asked;             /* control_word on its way: without an answer nobody knows whether it is on */
     int proven;                 /* byte_order_echo was written over this connection */
     uint8_t ended, exception;   /* exception: of the last refused request, 0 none */
     fg_status status;
@@ -245,17 +249,21 @@ static int fg_wait(int descriptor, short events, long long until_ms) {
     }
 }
 
-static void fg_drop(fg_client *client, const char *why) {
-    if (client->socket >= 0) close(client->socket);
-    client->socket = -1;
-    if (client->good[FG_CONTROL_WORD] & FG_ENABLE || client->want[FG_CONTROL_WORD] & FG_ENABLE) {
-        client->off_pending = 1;
-        client->ended = 1;
-    }
+/* Without a connection nothing is commanded; the first write of the next one is OFF where this one had enabled. */
+static void fg_forget(fg_client *client) {
+    if ((client->good[FG_CONTROL_WORD] | client->asked) & FG_ENABLE) client->off_pending = 1;
+    if ((client->good[FG_CONTROL_WORD] | client->want[FG_CONTROL_WORD]) & FG_ENABLE) client->ended = 1;
+    client->asked = 0;
     client->want[FG_CONTROL_WORD] = 0;
     client->want[FG_FORCE_SETPOINT] = 0;
     memcpy(client->good, client->want, sizeof client->good);
     client->once = 0;
+}
+
+static void fg_drop(fg_client *client, const char *why) {
+    if (client->socket >= 0) close(client->socket);
+    client->socket = -1;
+    fg_forget(client);
     memset(&client->status, 0, sizeof client->status);
     client->status.force_measured = NAN;
     client->backoff_ms = client->backoff_ms ? client->backoff_ms * 2 : FG_BACKOFF_FIRST_MS;
@@ -269,6 +277,7 @@ static int fg_connect_address(const struct addrinfo *to, long long until_ms) {
     socklen_t length = sizeof error;
     if (made < 0) return -1;
     setsockopt(made, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+    fcntl(made, F_SETFD, FD_CLOEXEC);
     fcntl(made, F_SETFL, O_NONBLOCK);
     if (connect(made, to->ai_addr, to->ai_addrlen) == 0) return made;
     if (errno == EINPROGRESS && fg_wait(made, POLLOUT, until_ms) &&
@@ -279,7 +288,8 @@ static int fg_connect_address(const struct addrinfo *to, long long until_ms) {
 }
 
 static int fg_connect(fg_client *client) {
-    struct addrinfo hints, *found = NULL;
+    struct addrinfo hints, *found = NULL, *each;
+    long long until_ms;
     char service[8];
     if (client->socket >= 0) return FG_OK;
     if (fg_now_ms() < client->retry_at_ms) return FG_LOST;
@@ -290,7 +300,9 @@ static int fg_connect(fg_client *client) {
         fg_drop(client, "no such host");
         return FG_LOST;
     }
-    client->socket = fg_connect_address(found, fg_now_ms() + client->timeout_ms);
+    until_ms = fg_now_ms() + client->timeout_ms;
+    /* A name may have several addresses: "localhost" is ::1 first where there is IPv6, and the gateway listens on 127.0.0.1. */
+    for (each = found; each && client->socket < 0; each = each->ai_next) client->socket = fg_connect_address(each, until_ms);
     freeaddrinfo(found);
     client->proven = 0;
     if (client->socket >= 0) return FG_OK;
@@ -465,9 +477,10 @@ int fg_exchange(fg_client *client) {
     else
         length = fg_frame_exchange(frame, client->transaction, client->unit, FG_COMMAND_FIRST + FG_HEARTBEAT, 1,
                                    command + FG_HEARTBEAT);
+    client->asked = client->want[FG_CONTROL_WORD];
     result = fg_ask(client, frame, length);
     if (result == FG_REFUSED) {
-        client->off_pending = 0;
+        client->off_pending = client->asked = 0;
         result = fg_explain(client);
         if (!changed && result == FG_REFUSED) fg_end(client); /* not even the heartbeat: another master owns the setpoint */
         return result;
@@ -476,7 +489,7 @@ int fg_exchange(fg_client *client) {
     if (result != FG_OK) return result;
     memcpy(client->good, client->want, sizeof client->good);
     client->once = 0;
-    client->off_pending = 0;
+    client->off_pending = client->asked = 0;
     fg_follow(client);
     return FG_OK;
 }
@@ -523,9 +536,11 @@ void fg_tare(fg_client *client) { client->once |= FG_TARE; }
 
 void fg_take_ownership(fg_client *client) { client->once |= FG_TAKE_OWNERSHIP; }
 
+/* Forgets what was commanded, too: whoever connects again later has to ask for force again. */
 void fg_close(fg_client *client) {
     if (client->socket >= 0) close(client->socket);
     client->socket = -1;
+    fg_forget(client);
 }
 
 /* ---- coefficients --------------------------------------------------------------------------------------------------- */

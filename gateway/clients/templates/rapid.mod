@@ -19,23 +19,43 @@ MODULE ForceGateway
   !      PERS bool fgReset;     PERS bool fgInBand;
   !      PERS bool fgEnabled;   PERS num fgStatus{${status_words}};
   !      PERS bool fgEnded;     PERS string fgText;
-  !    A SemiStatic task runs on while T_ROB1 is stopped: the force
-  !    stays on then. Let it follow the program by an event routine
-  !    (Stop, QStop, Restart, Reset) that sets fgEnable:=FALSE.
+  !      PERS num fgAlive;      VAR intnum irAlive;
+  !    A SemiStatic task runs on when T_ROB1 stops, whatever stops it.
+  !    So T_ROB1 has to show that it runs: its timer, which stops with
+  !    it (Stop, E-stop, an error, single steps), counts fgAlive on.
+  !    Where that stands for FG_QUIET cycles (0.5 s), the force goes
+  !    off; without it nothing is enabled. Call FgAliveStart first:
+  !      PROC FgAliveStart()
+  !        IDelete irAlive;
+  !        CONNECT irAlive WITH FgAliveTick;
+  !        ITimer 0.1,irAlive;
+  !        fgAlive:=(fgAlive+1) MOD 1000;
+  !      ENDPROC
+  !      TRAP FgAliveTick
+  !        fgAlive:=(fgAlive+1) MOD 1000;
+  !      ENDTRAP
   !
   ! B) Without it: load it into T_ROB1, call FgTimerStart once. A timer
   !    interrupt exchanges every 0.1 s, which needs a lease of 0.3 s
   !    or more (the rig's supervision: lease_s). When the program
   !    stops, so do interrupts: the lease ends and the force is off.
-  !    Call FgTimerStop before you go without force.
+  !    A gateway that is silent holds the program for FG_TIMEOUT at a
+  !    time. Call FgTimerStop before you go without force.
   !
   ! Use in T_ROB1, both cases:
   !    fgForce:=12;                  ! N
   !    fgEnable:=TRUE;
   !    WaitUntil fgInBand\MaxTime:=3\TimeFlag:=bLate;
-  !    IF bLate TPWrite fgText;
+  !    IF bLate THEN
+  !      TPWrite fgText;
+  !      Stop;
+  !    ENDIF
   !    MoveL pGrind,v50,fine,tGrinder\WObj:=wPart;
   !    fgEnable:=FALSE;
+  ! The motion goes on when the force ends. To stop it then:
+  !    CONNECT irEnded WITH MyTrap;  IPers fgEnded,irEnded;
+  ! and in MyTrap: IF fgEnded StopMove;
+  ! After a fault: fgReset:=TRUE, which goes FALSE when it is sent.
   ! A new fgForce while enabled: WaitTime 0.2 before fgInBand counts,
   ! it is still that of the old force.
   !
@@ -60,6 +80,8 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   CONST num FG_TIMEOUT:=0.5;
   CONST num FG_CYCLE:=0.04;
   CONST num FG_TIMER:=0.1;
+  ! Cycles that fgAlive may stand still (A)
+  CONST num FG_QUIET:=12;
 
   ! ---- what T_ROB1 sets ---------------------------------------------
   PERS bool fgEnable:=FALSE;
@@ -69,6 +91,8 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   PERS bool fgTake:=FALSE;
   ! Pull instead of push, on a rig with a directional valve
   PERS bool fgPull:=FALSE;
+  ! Counted on by T_ROB1 while its program runs (A)
+  PERS num fgAlive:=0;
   ! The other words of the command, in counts: index FG_C_...
   PERS num fgCommand{${command_words}}:=[${command_zeros}];
 
@@ -134,6 +158,12 @@ ${crc_table}];
   LOCAL VAR num nException:=0;
   LOCAL VAR num nOnce:=0;
   LOCAL VAR bool bOffPending:=FALSE;
+  ! Enable is on its way: without an answer nobody knows
+  LOCAL VAR bool bAsking:=FALSE;
+  ! A: fgAlive is watched, its last value, cycles it has stood still
+  LOCAL VAR bool bWatch:=FALSE;
+  LOCAL VAR num nAlive:=0;
+  LOCAL VAR num nQuiet:=0;
   ! byte_order_echo was written over this connection
   LOCAL VAR bool bProven:=FALSE;
   LOCAL VAR num nWant{${command_words}};
@@ -147,6 +177,9 @@ ${crc_table}];
   ! Main entry of task T_FORCE
   PROC FgServe()
     FgInit;
+    bWatch:=TRUE;
+    nAlive:=fgAlive;
+    nQuiet:=FG_QUIET;
     WHILE TRUE DO
       FgCycle;
       WaitTime FG_CYCLE;
@@ -188,6 +221,7 @@ ${crc_table}];
     FgForget;
     fgEnded:=FALSE;
     bOffPending:=FALSE;
+    bAsking:=FALSE;
     ClkStop clRetry;
     ClkReset clRetry;
     ClkStart clRetry;
@@ -196,6 +230,7 @@ ${crc_table}];
   ! One exchange. An error of any routine below comes up to here; one
   ! in the handler itself would stop the task.
   PROC FgCycle()
+    IF bWatch FgWatchProgram;
     IF NOT fgConnected THEN
       IF ClkRead(clRetry)<nBackoff RETURN;
       FgConnect;
@@ -262,6 +297,21 @@ ${crc_table}];
     ENDIF
   ENDPROC
 
+  ! T_ROB1 stands: this task must not keep its force up
+  LOCAL PROC FgWatchProgram()
+    IF fgAlive<>nAlive THEN
+      nAlive:=fgAlive;
+      nQuiet:=0;
+    ELSEIF nQuiet<FG_QUIET THEN
+      nQuiet:=nQuiet+1;
+    ELSEIF fgEnable THEN
+      fgEnable:=FALSE;
+      fgForce:=0;
+      fgEnded:=TRUE;
+      fgText:="off: T_ROB1 does not count fgAlive";
+    ENDIF
+  ENDPROC
+
   ! PackRawBytes takes whole numbers of 16 bits only
   LOCAL PROC FgCheckCommand()
     VAR num nCounts;
@@ -295,9 +345,11 @@ ${crc_table}];
     IF NOT bProven FgProveByteOrder;
     nHeartbeat:=(nHeartbeat+1) MOD 65536;
     FgFrameExchange nFrom,nTo;
+    bAsking:=nWant{FG_C_CONTROL_WORD}<>0;
     FgAsk 23;
     bOffPending:=FALSE;
     IF nException<>0 THEN
+      bAsking:=FALSE;
       FgExplain;
       ! Not even the heartbeat: another master owns the setpoint
       IF nFrom=nTo FgForget;
@@ -306,6 +358,7 @@ ${crc_table}];
     FgTakeWords STATUS_WORDS;
     nGood:=nWant;
     nOnce:=0;
+    bAsking:=FALSE;
     FgFollow;
   ENDPROC
 
@@ -417,7 +470,8 @@ ${status_decoding}
 
   LOCAL PROC FgDrop(string stWhy)
     SocketClose sdGateway;
-    IF FgIsOn() bOffPending:=TRUE;
+    IF bAsking OR FgIsOn() bOffPending:=TRUE;
+    bAsking:=FALSE;
     IF fgConnected ErrWrite\W,"Force gateway: lost",stWhy;
     fgConnected:=FALSE;
     fgEnabled:=FALSE;

@@ -58,6 +58,12 @@ _INIT: Final = (
     "Change baud or checksum only in this state; then remove it and power up again."
 )
 _ADAM: Final = Wires(RS485, ("DATA+, DATA-, GND, +Vs.",), (_INIT,), "ADAM-4000 User's Manual, chapter 2.3, page 2-9")
+_ICPDAS: Final = Wires(
+    RS485,
+    ("DATA+, DATA-, GND, +Vs; the output at VOUT (of the channel), not IOUT.",),
+    (_INIT,),
+    "I-7021, I-7022, I-7024 User Manual Rev B1.2, chapters 1.4 and 3.7",
+)
 _AED: Final = Wires(
     RS485_4,
     ("AED9101: TA, TB, RA, RB, GND.",),
@@ -75,7 +81,25 @@ _BY_NAME: Final[dict[str, Wires]] = {
     ),
     "adam-4024": _ADAM,
     "adam-4016": _ADAM,
-    "icpdas-702x": Wires(RS485, ("DATA+, DATA-, GND, +Vs.",), (_INIT,), "as the ADAM-4000, whose protocol it speaks"),
+    "icpdas-702x": _ICPDAS,
+    "icpdas-7024": _ICPDAS,
+    "alicat-pc": Wires(
+        EITHER,
+        (
+            "8-pin Mini-DIN, RS-232: 3 is its input (from TxD, DB9 pin 3), 5 its output (to RxD, pin 2), 8 ground (pin 5).",
+            "8-pin Mini-DIN, RS-485: 3 is -, 5 is +. 7 is the supply, 8 ground of all; pins 1 to 6 bear no supply.",
+        ),
+        (),
+        "Alicat MC series operating manual, page 14, standard 8-pin Mini-DIN; other connectors: alicat.com/pinout",
+    ),
+    "waveshare-relay": Wires(
+        RS485,
+        (
+            "A to A, B to B. Relay 1: COM and NO in the supply of the valve's coil; a DC coil needs its free-wheeling diode.",
+        ),
+        ("Baud and address are set by Modbus commands; 9600 8N1, address 1 as delivered.",),
+        "waveshare.com/wiki/Modbus_RTU_Relay",
+    ),
     "waveshare-ao8b": Wires(
         RS485,
         ("A to A, B to B. AO1 .. AO8 against AGND; a supply of 15 V or more for 10 V out.",),

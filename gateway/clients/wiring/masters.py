@@ -6,6 +6,7 @@ from dataclasses import replace
 from ipaddress import ip_address
 from typing import Final
 
+from gateway import defaults
 from gateway.clients.exchange import Endpoint, ExchangeTable
 from gateway.clients.rendering import endpoint_of
 from gateway.clients.wiring.section import Row, Section
@@ -84,6 +85,11 @@ def _network_sentences(rig: Rig, table: ExchangeTable) -> tuple[str, ...]:
             f"network.port is 0: the gateway takes a free port at each start, {where.shown_port} below, and its banner says "
             "which. A robot or PLC needs one that stays: set network.port (502 is Modbus' own)."
         )
+    if rig.control.supervision.lease_s is None:
+        sentences.append(
+            "This rig has no lease: the force lasts when the master's program stops or its cable is pulled. Before a robot or "
+            f"PLC commands it, set supervision.lease_s ({defaults.LEASE_S:g})."
+        )
     if network.require_byte_order_echo:
         echo = table.map.find("byte_order_echo").address
         sentences.append(
@@ -104,6 +110,10 @@ def _irc5(rig: Rig, table: ExchangeTable) -> Section:
         ("module", "ForceGateway.mod, from the command below"),
         ("FG_HOST, FG_PORT, FG_UNIT", f'"{where.host}", {where.shown_port}, {where.unit}'),
         ("task", "T_FORCE, Type SemiStatic, Main entry FgServe, TrustLevel NoSafety; every FG_CYCLE 0.04 s"),
+        (
+            "program that stops",
+            "T_ROB1's timer counts fgAlive on: where that stands, the task takes the force off (0.5 s)",
+        ),
         ("without 623-1", f"FgTimerStart in T_ROB1, every 0.1 s ({timer})"),
     )
     return Section("ABB IRC5: RAPID sockets", rows=rows)
@@ -143,7 +153,8 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
         ("MB_Unit_ID", f"{where.unit}: static of the MB_CLIENT instance, 255 as it comes; the block below sets it"),
         ("MB_DATA_PTR", "an Array of Word in a DB without optimized access, at least MB_DATA_LEN long"),
     )
-    return Section("Siemens S7-1200/1500: connection of MB_CLIENT", rows=rows)
+    stop = "A CPU goes on at an emergency stop: `enable` of the block has to fall with it (and with the guard, and the robot)."
+    return Section("Siemens S7-1200/1500: connection of MB_CLIENT", (stop,), rows)
 
 
 def _s7_requests(table: ExchangeTable) -> Section:
@@ -213,7 +224,7 @@ def _universal_robot(rig: Rig, table: ExchangeTable) -> Section:
 
 def _mbpoll(rig: Rig, table: ExchangeTable) -> Section:
     where, network = table.where, rig.network
-    unit = "" if where.unit == 1 else f" -a {where.unit}"
+    unit = "" if where.unit == defaults.UNIT_ID else f" -a {where.unit}"
     base = f"mbpoll -1 -p {where.shown_port}{unit}"
     (command, _), (status, words) = table.command_span, table.status_span
     lines = [f"{base} -r {status + 1} -c {words} {where.host}    # status, int16"]
@@ -225,7 +236,7 @@ def _mbpoll(rig: Rig, table: ExchangeTable) -> Section:
     sentences = ["-r counts from 1: register 1 is address 0."]
     force_n = min(12.0, rig.control.limits.force_max_n)
     counts = round(force_n * table.at("force_setpoint", "command").counts_per_unit)
-    endpoint = f"{where.host}:{where.shown_port}"
+    endpoint = f"{where.host}:{where.shown_port}" + ("" if where.unit == defaults.UNIT_ID else f" --unit {where.unit}")
     if rig.control.supervision.lease_s is not None or network.owner or network.require_byte_order_echo:
         sentences.append("mbpoll keeps no heartbeat, so it cannot hold a force here: `hold` does.")
         lines.append(f"force-gateway hold {force_n:g} --gateway {endpoint}    # enable, heartbeat; Ctrl-C ramps to 0")

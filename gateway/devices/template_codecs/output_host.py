@@ -12,7 +12,7 @@ from typing import Final
 
 from gateway.devices.binary.rtu_framing import exception_text, quiet_s
 from gateway.devices.device_checks.spelling import CheckSpelling
-from gateway.devices.exchange import VoltageExchange
+from gateway.devices.exchange import Exchange, VoltageExchange
 from gateway.devices.framing import Line
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import (
@@ -32,6 +32,9 @@ from gateway.devices.messages import (
 from gateway.devices.profile import DeviceProfile
 from gateway.devices.template_codecs.voltage_sentence import VoltageSentence
 
+_PRESSURE_BEYOND: Final = 1 / 3
+"""Of its range: a sensor without pressure reads a little less than 0, and more than its end while the pressure overshoots.
+Taken for garbage, the first would be a silent device for as long as nothing presses."""
 _ROUNDING: Final = 0.6  # of a step: half of it is the device's rounding, the rest its arithmetic
 
 
@@ -148,10 +151,16 @@ class TemplateOutputHost:
         number = self._grammar.number(exchange.answer, values)
         if number is None:  # the device says only that it obeyed
             return Accepted(request.voltage_v) if isinstance(request, SetVoltage) else None
-        if not exchange.range.scale.carries(number, self._grammar.half_step(exchange.answer)):
+        if not exchange.range.scale.carries(number, self._slack(request, exchange)):
             return None
         value = exchange.range.scale.to_physical(number)
         return Pressure(value) if isinstance(request, ReadPressure) else Accepted(value)
+
+    def _slack(self, request: OutputRequest, exchange: Exchange) -> float:
+        """How far beyond its range the device's number may be: a setting by its rounding, a measured pressure by much more."""
+        low, high = exchange.range.device
+        beyond = _PRESSURE_BEYOND * (high - low) if isinstance(request, ReadPressure) else 0.0
+        return beyond + self._grammar.half_step(exchange.answer)
 
     def _refusal(self, body: bytes) -> Refused | None:
         text = self._refusals.get(body) or (exception_text(body) if self._grammar.profile.is_modbus else "")

@@ -1,0 +1,76 @@
+"""Whoever is not sure whether it has enabled says OFF first; whoever has not enabled stops no other master."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from gateway.clients import render_client
+from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
+from tests.clients.scenes import MAP, WHERE, command, commands, cycles
+
+
+def test_an_enable_whose_answer_is_lost_is_taken_back(client: Any, gateway: GatewayAtHand) -> None:
+    """A rig without a lease would press on."""
+    cycles(client)
+    answer = gateway.answer
+
+    def lose(request: bytes) -> bytes:
+        pdu = answer(request)
+        if gateway.words:
+            gateway.is_cut = True
+            raise Unplugged
+        return pdu
+
+    gateway.answer = lose  # type: ignore[method-assign]
+    client.enable(12.0)
+    cycles(client)
+    gateway.answer = answer  # type: ignore[method-assign]
+    assert gateway.bank.command.control_word == 1 and client.ended
+    gateway.is_cut = False
+    for _ in range(6):
+        client.cycle(1.0)
+    assert commands(gateway) == [command(1, 1200), command(0, 0)]
+    assert gateway.bank.command.control_word == 0
+
+
+def test_who_never_reached_a_gateway_stops_no_other_master_there(client: Any, gateway: GatewayAtHand) -> None:
+    gateway.is_cut = True
+    client.enable(12.0)
+    cycles(client)
+    gateway.is_cut = False
+    gateway.take_over_from_elsewhere()
+    for _ in range(6):
+        client.cycle(1.0)
+    assert gateway.requests and gateway.writes == []
+    assert client.ended and gateway.bank.command.force_setpoint_n == 7.0
+
+
+def test_the_python_client_takes_an_enable_back_whose_answer_was_lost(gateway: GatewayAtHand) -> None:
+    python: dict[str, Any] = {}
+    exec(render_client(MAP, "python", WHERE), python)
+    client = python["Client"]()
+
+    def lose(frame: bytes) -> bytes:
+        gateway.ask(frame)
+        raise client._drop("no answer")
+
+    def answer(frame: bytes) -> bytes:
+        return gateway.ask(frame)[8:]
+
+    client._connect = lambda: None
+    client._drop("not there yet")
+    client.enable(12.0)
+    client._drop("not there yet")
+    client._ask = answer
+    client.exchange()
+    assert gateway.writes == [], "who has not enabled stops no other master"
+    client.enable(12.0)
+    client._prove_byte_order()
+    client._ask = lose
+    with pytest.raises(python["Lost"]):
+        client.exchange()
+    client._ask = answer
+    client.exchange()
+    assert commands(gateway) == [command(1, 1200), command(0, 0)] and client.ended
