@@ -36,7 +36,7 @@ class RunRecording:
         self._start_s: float | None = None
         self._gathered: list[tuple[float, ...]] = []
         self._next_flush_s: float | None = None
-        self._now_s = 0.0
+        self._now_s: float | None = None  # of the last tick
         self._waiting_s: deque[float] = deque()  # when each batch was handed over that the disk has not taken
         self._given = self._taken = 0
         self._is_hung = False
@@ -90,6 +90,8 @@ class RunRecording:
 
     def flush(self, now_s: float) -> None:
         """Hand over what has been gathered, each 0.1 s, and look whether the disk hangs; once a tick, also while it closes."""
+        if self._now_s is None:  # what was handed over before the first tick waits from now on
+            self._waiting_s = deque(now_s for _ in self._waiting_s)
         self._now_s = now_s
         while len(self._waiting_s) > self._given - self._taken:
             self._waiting_s.popleft()
@@ -126,7 +128,7 @@ class RunRecording:
                 self._taken += 1
 
         self._given += 1
-        self._waiting_s.append(self._now_s)
+        self._waiting_s.append(self._now_s or 0.0)
         begin(counted)
 
     def _begin(self, work: Callable[[], None]) -> None:

@@ -63,7 +63,10 @@ def make_metrics_app(state_directory: Path) -> "Starlette":
     async def metrics(request: "Request") -> "Response":
         registry = prometheus.CollectorRegistry(auto_describe=False)
         registry.register(ReadingCollector(await read_gateway(link)))
-        encode, content_type = choose_encoder(request.headers.get("accept", ""))
+        try:
+            encode, content_type = choose_encoder(request.headers.get("accept", ""))
+        except (TypeError, ValueError):  # the library's, of a version that is no number
+            encode, content_type = choose_encoder("")
         return Response(encode(registry), headers={"content-type": content_type, "cache-control": "no-store"})
 
     return Starlette(routes=[Route("/metrics", metrics)])
@@ -74,8 +77,17 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
     app = make_metrics_app(Path(options["state"]))
     import uvicorn
 
+    from gateway.processes.impatient_http import ImpatientProtocol
+
     config = uvicorn.Config(
-        app, log_config=None, access_log=False, server_header=False, ws="none", lifespan="off", limit_concurrency=32
+        app,
+        http=ImpatientProtocol,
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        ws="none",
+        lifespan="off",
+        limit_concurrency=32,
     )
     await uvicorn.Server(config).serve(sockets=[socket.socket(fileno=options["listen"])])
 

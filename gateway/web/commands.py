@@ -3,7 +3,7 @@
 A rig with a lease wants a heartbeat. The browser that commands says once a second that it is there; while it does, this process
 changes the heartbeat register four times in a lease. When the browser goes (closed, asleep, off the network), the beat ends
 within GRACE_S (RELOAD_S where its connection has closed) and the lease does its work: no force is held for nobody. A reload
-within that time loses nothing.
+within that time loses nothing. A command that was refused makes nobody the commander, and who is overtaken ceases to be it.
 
 Disabling is granted to every master, whoever owns the setpoint, and to nobody else's harm: that is what `stop` is.
 """
@@ -24,6 +24,9 @@ from gateway.web.context import WebContext
 GRACE_S: Final = 2.5
 RELOAD_S: Final = 1.5
 _BEATS_PER_LEASE: Final = 4.0
+_REFUSED_BEATS: Final = 8
+"""In a row: another master has the setpoint. More of them would fill its refusal registers and the log for as long as the
+browser stays open."""
 _MOST_WORDS: Final = 120
 _PROOF: Final = 1234.5
 Words = dict[str, list[int]]
@@ -76,16 +79,16 @@ class Commands:
 
     async def enable(self, viewer: str, force_n: float) -> None:
         """Enable, with this setpoint. RefusedCommand says why not."""
-        self._begin_to_beat(viewer)
         if self._context.profile.network.require_byte_order_echo:
             await self._write("byte_order_echo@proof", _PROOF)
         word = await self._control_word() | ControlBit.ENABLE
         await self._write_command(word, self._checked(force_n))
+        self._begin_to_beat(viewer)
 
     async def set_force(self, viewer: str, force_n: float) -> None:
         """Change the setpoint, N."""
-        self._begin_to_beat(viewer)
         await self._write("force_setpoint", self._checked(force_n))
+        self._begin_to_beat(viewer)
 
     async def stop(self) -> None:
         """Switch the output off, whoever owns the setpoint; ends a run, too. The safe voltage is out before the answer."""
@@ -95,8 +98,8 @@ class Commands:
 
     async def take_ownership(self, viewer: str) -> None:
         """Take the setpoint over from whoever owns it."""
-        self._begin_to_beat(viewer)
         await self._set_bit(ControlBit.TAKE_OWNERSHIP)
+        self._begin_to_beat(viewer)
 
     async def reset(self, viewer: str) -> None:
         """Reset a latched fault: with setpoint 0 and another heartbeat, all in one write. What stands in the control word
@@ -201,7 +204,15 @@ class Commands:
             self._beat = None
 
     async def _keep_beating(self, every_s: float) -> None:
-        while self.is_attended:
-            with contextlib.suppress(OSError, ValueError):  # a restarted control is off; another owner says so
+        refused = 0
+        while self.is_attended and refused < _REFUSED_BEATS:
+            try:
                 await self.beat_once()
+                refused = 0
+            except RefusedCommand:
+                refused += 1
+            except (OSError, ValueError):  # a control that is being restarted
+                pass
             await self._sleep(every_s)
+        if refused >= _REFUSED_BEATS:
+            self.commander = ""

@@ -11,6 +11,7 @@ Decisions
 """
 
 import asyncio
+import contextlib
 import hmac
 import secrets
 from dataclasses import dataclass, field
@@ -20,7 +21,7 @@ from socket import gethostname
 from typing import Final
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -112,7 +113,8 @@ class Guard:
 
         request = Request(scope)
         refusal = self._refusal(request)
-        await (refusal or self._app)(scope, receive, send_with_headers)
+        with contextlib.suppress(ClientDisconnect):  # in the middle of its body: nobody is there to be told anything
+            await (refusal or self._app)(scope, receive, send_with_headers)
 
     def _refusal(self, request: Request) -> Response | None:
         """Return why a request is not let through, None where it is."""
@@ -129,12 +131,14 @@ class Guard:
         if request.method in _SAFE_METHODS:
             return None
         if not _is_small(headers):
-            return refuse(413, f"a request has at most {LONGEST_BODY} bytes")
+            return refuse(413, f"a request has at most {LONGEST_BODY} bytes, and says how many")
         if not _is_own_origin(headers):
             return refuse(403, "another site sent this command")
         if is_bearer or path == "/login":
             return None
-        if has_session and hmac.compare_digest(headers.get(CSRF_HEADER, ""), door.csrf_token(session)):
+        if has_session and hmac.compare_digest(
+            headers.get(CSRF_HEADER, "").encode(), door.csrf_token(session).encode()
+        ):
             return None
         return refuse(403, "the session is over: reload the page", "session")
 
@@ -174,6 +178,9 @@ def _set_session(response: Response, door: Door, value: str) -> None:
 
 
 def _is_small(headers: Headers) -> bool:
+    """A body in chunks says no length, or another one than it has."""
+    if "transfer-encoding" in headers:
+        return False
     length = headers.get("content-length", "")
     return length.isdecimal() and int(length) <= LONGEST_BODY
 

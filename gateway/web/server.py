@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from importlib import import_module
 from importlib.resources import files
+from math import inf
 from typing import Any, Final
 
 from starlette.applications import Starlette
@@ -92,7 +93,7 @@ def _file(name: str) -> Response:
         return refuse(404, f"there is no file {name}")
     try:
         return Response(_STATIC.joinpath(*parts).read_bytes(), media_type=kind)
-    except (FileNotFoundError, IsADirectoryError, NotADirectoryError):
+    except (OSError, ValueError):  # ValueError: a null character; OSError: too long a name, too
         return refuse(404, f"there is no file {name}")
 
 
@@ -151,20 +152,32 @@ def _command(context: WebContext, commands: Commands) -> Callable[[Request], Awa
         name = request.path_params["name"]
         if name not in acts:
             return refuse(404, f"{name} is none of {', '.join(acts)}")
-        body = json.loads(await request.body() or b"{}")
-        if not isinstance(body, dict):
-            return refuse(400, "a JSON object is expected")
+        body = _fields(await request.body())
         answer = await acts[name](_viewer(request), body)
         return _answer({"ok": True} | (answer or {}))
 
     return command
 
 
+def _fields(body: bytes) -> dict[str, Any]:
+    """Return the fields of a request's body. ValueError for anything but a JSON object, however deeply it nests."""
+    try:
+        fields = json.loads(body or b"{}")
+    except (ValueError, RecursionError):
+        fields = None
+    if not isinstance(fields, dict):
+        raise ValueError("a JSON object is expected")
+    return fields
+
+
 def _number(body: dict[str, Any], name: str) -> float:
     value = body[name]
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise TypeError(repr(name))
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        return inf  # refused as what it means
 
 
 def _switch(body: dict[str, Any], name: str) -> bool:

@@ -22,6 +22,7 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
 
     from gateway.live.control_link import ControlLink
     from gateway.live.ring_rows import RingRows
+    from gateway.processes.impatient_http import ImpatientProtocol
     from gateway.web.context import WebContext
     from gateway.web.security import Door
     from gateway.web.server import make_app
@@ -40,6 +41,7 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
     rows = None if options["ring"] is None else RingRows(options["ring"])
     config = uvicorn.Config(
         make_app(context, door, rows),
+        http=ImpatientProtocol,
         log_config=None,
         access_log=False,
         server_header=False,

@@ -221,3 +221,17 @@ def test_a_disk_that_comes_back_behind_the_end_is_no_internal_error(
         assert read_recording(path).rows == 11
 
     asyncio.run(main())
+
+
+def test_a_recording_that_ends_before_its_first_tick_is_not_blamed_on_the_disk(
+    tmp_path: Path, disk: HangingDisk
+) -> None:
+    """The clock of the ticks began days ago."""
+    log = Log()
+    recordings = Recordings(tmp_path, demo(), log, disk)  # type: ignore[arg-type]
+    recordings.start()
+    stopped = recordings.stop()
+    for tick in range(3):
+        recordings.flush(400_000.0 + tick / 100)
+    disk.let_go()
+    assert "fault" not in stopped.result(0) and not log

@@ -31,6 +31,12 @@ def scrape(app: Starlette) -> Samples:
     return samples(answer.body.decode())
 
 
+def test_a_scraper_that_asks_for_a_version_that_is_none_reads_the_usual_text(tmp_path: Path) -> None:
+    asked = {"accept": "application/openmetrics-text;version=zz"}
+    answer = asyncio.run(call(make_metrics_app(tmp_path), "GET", "/metrics", asked))
+    assert answer.status == 200 and answer.headers["content-type"].startswith("text/plain")
+
+
 def test_both_ways_tell_the_same_and_an_absent_control_leaves_nothing_but_down(tmp_path: Path) -> None:
     health = HEALTH | {"residual": {"cause": 0, "name": "none", "looks": 4}}
 

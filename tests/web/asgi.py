@@ -39,7 +39,7 @@ async def call(app: Any, method: str, path: str, headers: dict[str, str] | None 
         "query_string": b"",
         "root_path": "",
         "scheme": "http",
-        "headers": [(name.lower().encode(), value.encode()) for name, value in own.items()],
+        "headers": [(name.lower().encode(), value.encode("latin-1")) for name, value in own.items()],
         "client": ("127.0.0.1", 4711),
         "server": ("127.0.0.1", 8080),
     }

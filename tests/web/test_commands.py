@@ -182,6 +182,44 @@ def test_behind_a_stop_nobody_beats_any_more(tmp_path: Path) -> None:
     play(tmp_path, scene, leased())
 
 
+def test_a_command_that_was_refused_makes_no_commander_and_no_beat(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        commands.join("me")
+        stage.wired.write(0, 1, 1000, 0, 0, 1)
+        assert stage.wired.bank.owner == "10.0.0.5"
+        for refused in (commands.enable("me", 20.0), commands.set_force("me", 20.0)):
+            with pytest.raises(RefusedCommand):
+                await refused
+        told = stage.wired.bank.refusals
+        for _ in range(10):
+            await asyncio.sleep(0)
+        assert commands.commander == "" and stage.wired.bank.refusals == told
+
+    play(tmp_path, scene, leased())
+
+
+def test_a_browser_that_was_overtaken_soon_leaves_the_refusal_registers_to_the_new_owner(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
+        commands.join("me")
+        await commands.enable("me", 12.0)
+        for _ in range(8):
+            await asyncio.sleep(0)
+        wired.write(0, 1 | 8, 1200, 0, 0, 77)
+        assert wired.bank.owner == "10.0.0.5"
+        for beat in range(40):
+            commands.note_alive("me")
+            wired.write(4, 100 + beat)
+            await asyncio.sleep(0)
+        told = wired.bank.refusals
+        assert 0 < told < 20 and commands.commander == ""
+        for _ in range(10):
+            await asyncio.sleep(0)
+        assert wired.bank.refusals == told and wired.state in (State.RAMPING, State.HOLDING)
+
+    play(tmp_path, scene, leased())
+
+
 def test_a_reload_within_the_grace_loses_nothing(tmp_path: Path) -> None:
     async def scene(commands: Commands, stage: Stage) -> None:
         wired = stage.wired

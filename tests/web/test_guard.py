@@ -64,6 +64,8 @@ def test_a_command_needs_the_token_of_its_own_session(app: Any) -> None:
         ({"sec-fetch-site": "same-origin"}, 200),
         ({"content-length": "100000"}, 413),
         ({"content-length": "lots"}, 413),
+        ({"content-length": "3", "transfer-encoding": "chunked"}, 413),
+        ({"x-csrf-token": "\u00e9"}, 403),
     ],
 )
 def test_another_site_commands_nothing_even_with_a_stolen_session(
@@ -92,7 +94,19 @@ def test_every_answer_forbids_what_the_page_does_not_need(app: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", ["../security.py", "..%2f", "tabs/../../security.py", "", ".", "uplot", "app.js/", "/etc/passwd"]
+    "path",
+    [
+        "../security.py",
+        "..%2f",
+        "tabs/../../security.py",
+        "",
+        ".",
+        "uplot",
+        "app.js/",
+        "/etc/passwd",
+        "a\0.js",
+        f"{'a' * 5000}.js",
+    ],
 )
 def test_nothing_but_the_page_s_own_files_is_served(app: Any, path: str) -> None:
     assert answer(app, "GET", f"/static/{path}").status == 404
@@ -156,9 +170,35 @@ def test_a_page_without_its_gateway_says_so(app: Any) -> None:
         ("setpoint", b'{"force_n": null}'),
         ("record", b'{"on": "false"}'),
         ("record", b'{"on": 1}'),
+        ("enable", b"[" * 30_000),
+        ("record", b'{"on":' * 9_000),
+        ("tare", b"[]"),
+        ("setpoint", b'{"force_n": ' + b"9" * 5_000 + b"}"),
     ],
 )
 def test_a_value_of_another_kind_is_not_guessed_at(app: Any, name: str, body: bytes) -> None:
     """`true` would press with 1 N, and "false" begin a recording."""
     refused = answer(app, "POST", f"/api/v1/command/{name}", session_of(app), body)
-    assert refused.status == 400 and "of the wrong kind" in refused.json["error"]
+    assert refused.status == 400
+    assert "of the wrong kind" in refused.json["error"] or "a JSON object is expected" in refused.json["error"]
+
+
+def test_a_whole_number_that_no_float_holds_is_no_force(app: Any) -> None:
+    refused = answer(app, "POST", "/api/v1/command/setpoint", session_of(app), b'{"force_n": ' + b"9" * 400 + b"}")
+    assert refused.status == 409 and "force in newtons" in refused.json["error"]
+
+
+def test_who_leaves_within_its_request_makes_no_error_of_ours(app: Any) -> None:
+    headers = session_of(app) | {"host": "127.0.0.1", "content-length": "100"}
+    scope = {"type": "http", "method": "POST", "path": "/login", "query_string": b"", "root_path": "", "headers": []}
+    scope["headers"] = [(name.encode(), value.encode()) for name, value in headers.items()]
+    sent: list[Any] = []
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "http.disconnect"}
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    asyncio.run(app(scope, receive, send))
+    assert not sent

@@ -1,0 +1,47 @@
+"""HTTP for processes beside control: a connection that does not come to a whole request in time is closed.
+
+uvicorn waits for the rest of a request for ever, and refuses everybody while its bound of connections is full: who opened as
+many and said nothing shut out all others, and the page's Stop with them.
+"""
+
+import asyncio
+from typing import Final
+
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+WHOLE_REQUEST_S: Final = 10.0
+"""From its first byte, or from the connection. The largest request that is taken has 64 KB."""
+
+
+class ImpatientProtocol(H11Protocol):
+    """One connection."""
+
+    _patience: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
+        """Begin to wait for a request."""
+        super().connection_made(transport)
+        self._watch_request()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Wait for nothing any more."""
+        super().connection_lost(exc)
+        self._end_patience()
+
+    def data_received(self, data: bytes) -> None:
+        """Take the next bytes."""
+        super().data_received(data)
+        self._watch_request()
+
+    def _watch_request(self) -> None:
+        """More of the same request does not begin the time anew."""
+        if self.conn.their_state not in (h11.IDLE, h11.SEND_BODY):
+            self._end_patience()
+        elif self._patience is None:
+            self._patience = self.loop.call_later(WHOLE_REQUEST_S, self.transport.close)
+
+    def _end_patience(self) -> None:
+        patience, self._patience = self._patience, None
+        if patience:
+            patience.cancel()

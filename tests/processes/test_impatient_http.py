@@ -1,0 +1,64 @@
+"""Who asks for nothing, or for half of something, keeps no place from others."""
+
+import asyncio
+import socket
+
+import pytest
+from starlette.applications import Starlette
+from starlette.responses import PlainTextResponse
+from starlette.routing import Route
+from uvicorn import Config
+from uvicorn.server import ServerState
+
+from gateway.processes import impatient_http
+
+WHOLE = b"GET / HTTP/1.1\r\nHost: a\r\n\r\n"
+
+
+async def heard(said: bytes, then: bytes = b"") -> bytes:
+    """What a caller reads until it is hung up on, which says one thing, and then a byte of another again and again."""
+
+    async def index(request: object) -> PlainTextResponse:
+        return PlainTextResponse("here")
+
+    config = Config(Starlette(routes=[Route("/", index)]), ws="none", lifespan="off", log_config=None)
+    config.load()
+    ours, far = socket.socketpair()
+    await asyncio.get_running_loop().connect_accepted_socket(
+        lambda: impatient_http.ImpatientProtocol(config, ServerState(), {}), ours
+    )
+    reader, writer = await asyncio.open_connection(sock=far)
+    writer.write(said)
+
+    async def drip() -> None:
+        for byte in then:
+            writer.write(bytes((byte,)))
+            await asyncio.sleep(0.002)
+
+    dripping = asyncio.create_task(drip())
+    async with asyncio.timeout(5.0):
+        answer = await reader.read()
+    dripping.cancel()
+    writer.close()
+    return answer
+
+
+@pytest.mark.parametrize(
+    ("said", "then"),
+    [
+        (b"", b""),
+        (WHOLE[:20], b""),
+        (WHOLE[:20], b"X" * 1000),
+        (b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 99\r\n\r\nabc", b""),
+    ],
+)
+def test_half_a_request_is_hung_up_on(monkeypatch: pytest.MonkeyPatch, said: bytes, then: bytes) -> None:
+    monkeypatch.setattr(impatient_http, "WHOLE_REQUEST_S", 0.05)
+    assert b"here" not in asyncio.run(heard(said, then))
+
+
+def test_a_whole_request_is_answered_and_half_of_the_next_one_is_not_waited_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(impatient_http, "WHOLE_REQUEST_S", 0.05)
+    assert asyncio.run(heard(WHOLE + WHOLE, b"GET ")).count(b"here") == 2
