@@ -77,7 +77,7 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
     app = make_metrics_app(Path(options["state"]))
     import uvicorn
 
-    from gateway.processes.impatient_http import ImpatientProtocol
+    from gateway.web.impatient_http import ImpatientProtocol
 
     config = uvicorn.Config(
         app,

@@ -22,8 +22,8 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
 
     from gateway.live.control_link import ControlLink
     from gateway.live.ring_rows import RingRows
-    from gateway.processes.impatient_http import ImpatientProtocol
     from gateway.web.context import WebContext
+    from gateway.web.impatient_http import ImpatientProtocol
     from gateway.web.security import Door
     from gateway.web.server import make_app
 

@@ -1,4 +1,4 @@
-"""HTTP for processes beside control: a connection that does not come to a whole request in time is closed.
+"""HTTP of the page and of the metrics: a connection that does not come to a whole request in time is closed.
 
 uvicorn waits for the rest of a request for ever, and refuses everybody while its bound of connections is full: who opened as
 many and said nothing shut out all others, and the page's Stop with them.
