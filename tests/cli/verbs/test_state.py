@@ -3,6 +3,7 @@
 import fcntl
 import io
 import json
+import os
 import socket
 import tarfile
 import threading
@@ -98,6 +99,19 @@ def test_a_backup_restores_to_the_same_content(state: Path, call, tmp_path: Path
     remaining = {name: data for name, data in content(state).items() if name not in ("lock", "running")}
     assert content(tmp_path / "elsewhere" / "demo") == remaining
     assert len(remaining) == 2
+
+
+def test_what_is_restored_keeps_its_time_and_is_its_owner_s_alone_to_write(call, tmp_path: Path) -> None:
+    with tarfile.open(tmp_path / "b.tar.gz", "w:gz") as archive:
+        manifest = member("backup.json")
+        manifest.size = 13
+        archive.addfile(manifest, io.BytesIO(b'{"format": 1}'))
+        open_to_all = member("state/open")
+        open_to_all.mode, open_to_all.mtime, open_to_all.uid = 0o6777, 1_000_000_000, 12345
+        archive.addfile(open_to_all)
+    assert call("restore", tmp_path / "b.tar.gz", "--state", tmp_path / "new").exit_code == 0
+    found = (tmp_path / "new" / "open").stat()
+    assert (found.st_mode & 0o7777, found.st_mtime, found.st_uid) == (0o744, 1_000_000_000, os.getuid())
 
 
 def test_sockets_stay_behind(state: Path, call, tmp_path: Path, monkeypatch) -> None:
