@@ -51,6 +51,25 @@ def test_a_reset_with_a_lease_needs_a_heartbeat_since_the_fault():
     assert bench.write(control_word=ControlBit.RESET_FAULT, heartbeat=6).state is State.OFF
 
 
+def test_behind_a_defect_of_ours_the_clearing_is_no_heartbeat_either():
+    bench = Bench(settings(lease_s=0.2, lease_action=LeaseAction.FAULT))
+    bench.heartbeat_every_ms = 50
+    bench.run(0.3)
+    bench.enable(12.0)
+    bench.run(0.5)
+    bench.heartbeat_every_ms = 0
+    assert bench.controller.fail_internally(bench.now_s).clear_command
+    bench.run(0.01)
+    bench.command = bench.command._replace(
+        control_word=ControlBit(0), force_setpoint_n=0.0, heartbeat=0, number=bench.command.number + 1
+    )
+    bench.run(0.05)
+    assert bench.write(control_word=ControlBit.RESET_FAULT).state is State.FAULT
+    assert bench.refused and "heartbeat" in bench.refused.text
+    bench.write(control_word=ControlBit(0), heartbeat=5)
+    assert bench.write(control_word=ControlBit.RESET_FAULT, heartbeat=6).state is State.OFF
+
+
 def test_direct_voltage_needs_a_fresh_cell_too():
     bench = Bench(gain_n_per_v=5.0)
     bench.run(0.3)
