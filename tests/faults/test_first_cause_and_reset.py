@@ -27,6 +27,7 @@ def test_a_reset_needs_its_rise_setpoint_zero_and_enable_zero():
     bench.heal()
     assert bench.write(control_word=ControlBit.RESET_FAULT, force_setpoint_n=5.0).state is State.FAULT
     bench.write(control_word=ControlBit(0), force_setpoint_n=0.0)
+    assert bench.write(control_word=ControlBit.RESET_FAULT, voltage_setpoint_v=0.5).state is State.FAULT
     both = ControlBit.RESET_FAULT | ControlBit.ENABLE
     assert bench.write(control_word=both, force_setpoint_n=0.0).state is State.FAULT
     bench.write(control_word=ControlBit(0))
