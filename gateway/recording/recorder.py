@@ -1,5 +1,5 @@
-"""Writes a recording: one os.write per 0.1 s. A gateway does so in a thread beside its control loop, for a disk may keep any
-of these calls waiting.
+"""Writes a recording: one os.write per batch of rows. When, says whoever records: a gateway each 0.1 s, in a thread beside its
+control loop (service/run_recording.py), for a disk may keep any of these calls waiting.
 
 Decisions
 - Rows go into one buffer that is reused; a batch is complete, with its CRC, before its single write. A kill -9 at any
@@ -26,7 +26,6 @@ from typing import Any, Final
 from gateway.processes.durable_file import sync_path
 from gateway.recording.layout import BATCH_PREFIX, MARK, SUFFIX, batch_crc, header_bytes, number_in
 
-FLUSH_S: Final = 0.1
 _BATCH_ROWS: Final = 256  # a batch is written early when it is full: 2.5 kHz still gives one write per 0.1 s
 _FORMAT: Final = 1
 _DELETED: Final = "somebody has deleted its file"
@@ -46,7 +45,6 @@ class Recorder:
         self._view = memoryview(self._buffer)
         self._rows = 0
         self._batch = 0
-        self._next_flush_s: float | None = None
         self.rows_written = 0
         self.failure: str | None = None
         directory.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -77,14 +75,6 @@ class Recorder:
         self._rows += 1
         if self._rows == _BATCH_ROWS:
             self._write_batch()
-
-    def flush(self, now_s: float) -> None:
-        """Write what has been gathered if 0.1 s passed since the last write. now_s: monotonic."""
-        if self._next_flush_s is None:
-            self._next_flush_s = now_s + FLUSH_S
-        elif self._rows and now_s >= self._next_flush_s:
-            self.write()
-            self._next_flush_s = now_s + FLUSH_S
 
     def write(self) -> None:
         """Write what has been gathered now."""

@@ -15,11 +15,12 @@ from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample
 from gateway.processes.disk_worker import DiskWorker
 from gateway.recording import Recorder
-from gateway.recording.recorder import FLUSH_S, sync_recording
+from gateway.recording.recorder import sync_recording
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import row_of
 
 HANGS_S: Final = 30.0
+FLUSH_S: Final = 0.1
 Log = Callable[[str, str], None]
 
 

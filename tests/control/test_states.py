@@ -10,7 +10,7 @@ from gateway.control.controller import Controller
 from gateway.control.state_table import ENABLED_STATES, TRANSITIONS, StateEvent, TransitionError, next_state
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State, StatusBit
-from tests.control.bench import Bench, settings
+from tests.control.bench import Bench, bsfm, settings
 
 
 def ready(**plant: float | bool) -> Bench:
@@ -230,6 +230,15 @@ def test_a_reset_is_for_the_output_s_own_faults_too_whether_one_is_latched_here_
     assert bench.step().state is State.FAULT
     bench.line = bench.line._replace(fault=FaultCode.NONE)
     assert bench.reset().resets_device and bench.last.state is State.OFF
+
+
+def test_a_reset_acknowledges_a_restart_too():
+    bench = ready()
+    bench.controller = Controller(settings(), CalibrationInUse(bsfm(), 1), unclean_restart=True)
+    bench.controller.fail_internally(bench.now_s)
+    assert bench.step().warnings & WarningBit.RESTARTED
+    assert bench.reset().state is State.OFF
+    assert not bench.last.warnings & WarningBit.RESTARTED
 
 
 def test_a_defect_of_ours_latches_and_the_caller_gets_the_safe_voltage():

@@ -40,6 +40,20 @@ def test_a_tare_with_payload_makes_the_contact_force_zero_at_any_tilt():
     assert bench.last.force_measured_n == pytest.approx(0.0, abs=0.2)
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_tare_that_would_leave_no_range_to_measure_is_refused_pressed_or_pulled(way):
+    bench = Bench()
+    rest_n = 0.5 * bench.settings.supervision.saturation_n
+    answers = []
+    for share in (0.9, 1.1):
+        bench.alter_sample = lambda sample, at_n=way * share * rest_n: replace(sample, force_n=sample.force_n + at_n)
+        bench.run(0.3)
+        bench.write(control_word=ControlBit.TARE)
+        answers.append(bench.refused.text if bench.refused else "")
+    assert answers[0] == ""
+    assert "stuck in contact or wrong cell" in answers[1]
+
+
 def test_a_tare_under_force_is_refused():
     bench = enabled()
     bench.force(12.0)

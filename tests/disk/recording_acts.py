@@ -27,11 +27,10 @@ class OneRecording(Act):
         return Recorder(self.state / "recordings", {"rig": "demo", "rig_texts": {"demo.yaml": "é" * 200}}, self.COLUMNS)
 
     def _write(self, recorder: Recorder, say: Say) -> None:
-        recorder.flush(0.0)
         for batch in range(4):
             for row in range(batch * self.ROWS, (batch + 1) * self.ROWS):
                 recorder.append((0.01 * row, 1.0, float(row)))
-            recorder.flush(1.0 + batch)
+            recorder.write()
             if recorder.failure:
                 assert recorder.failure.startswith("E402")
                 raise OSError(recorder.failure)

@@ -27,6 +27,7 @@ def test_a_reset_needs_its_rise_setpoint_zero_and_enable_zero():
     bench.heal()
     assert bench.write(control_word=ControlBit.RESET_FAULT, force_setpoint_n=5.0).state is State.FAULT
     bench.write(control_word=ControlBit(0), force_setpoint_n=0.0)
+    assert bench.write(control_word=ControlBit.RESET_FAULT, voltage_setpoint_v=0.5).state is State.FAULT
     both = ControlBit.RESET_FAULT | ControlBit.ENABLE
     assert bench.write(control_word=both, force_setpoint_n=0.0).state is State.FAULT
     bench.write(control_word=ControlBit(0))
@@ -47,6 +48,25 @@ def test_a_reset_with_a_lease_needs_a_heartbeat_since_the_fault():
     bench.run(0.05)
     assert bench.command.heartbeat == 0
     assert bench.write(control_word=ControlBit.RESET_FAULT).state is State.FAULT
+    bench.write(control_word=ControlBit(0), heartbeat=5)
+    assert bench.write(control_word=ControlBit.RESET_FAULT, heartbeat=6).state is State.OFF
+
+
+def test_behind_a_defect_of_ours_the_clearing_is_no_heartbeat_either():
+    bench = Bench(settings(lease_s=0.2, lease_action=LeaseAction.FAULT))
+    bench.heartbeat_every_ms = 50
+    bench.run(0.3)
+    bench.enable(12.0)
+    bench.run(0.5)
+    bench.heartbeat_every_ms = 0
+    assert bench.controller.fail_internally(bench.now_s).clear_command
+    bench.run(0.01)
+    bench.command = bench.command._replace(
+        control_word=ControlBit(0), force_setpoint_n=0.0, heartbeat=0, number=bench.command.number + 1
+    )
+    bench.run(0.05)
+    assert bench.write(control_word=ControlBit.RESET_FAULT).state is State.FAULT
+    assert bench.refused and "heartbeat" in bench.refused.text
     bench.write(control_word=ControlBit(0), heartbeat=5)
     assert bench.write(control_word=ControlBit.RESET_FAULT, heartbeat=6).state is State.OFF
 

@@ -56,7 +56,7 @@ def test_no_recording_of_ours_breaks_its_reader(tmp_path: Path, examples: Callab
     for k in range(12):
         recorder.append((0.01 * k, 0.5, 1.5 * k))
         if k % 4 == 3:
-            recorder.flush(float(k))
+            recorder.write()
     recorder.close()
     assert_read_or_refused(examples("recordings"), recorder.path.read_bytes(), tmp_path / "bad.fgr")
 

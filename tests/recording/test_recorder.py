@@ -1,4 +1,4 @@
-"""What a recorder promises: whole rows, one write per 0.1 s, its own number, and an end that never takes control with it."""
+"""What a recorder promises: whole rows, one write per batch, its own number, and an end that never takes control with it."""
 
 import errno
 import os
@@ -21,12 +21,11 @@ HEADER = {"rig": "demo", "seed": 7, "rig_texts": {"demo.yaml": "name: demo\n# ü
 
 def record(directory: Path, batches: int, rows: int = 3) -> Path:
     recorder = Recorder(directory, HEADER, COLUMNS)
-    recorder.flush(0.0)
     for batch in range(batches):
         for row in range(rows):
             at = batch * rows + row
             recorder.append((at * 0.01, at * 0.5, float(at)))
-        recorder.flush(1.0 + batch)
+        recorder.write()
     recorder.close()
     return recorder.path
 
@@ -136,26 +135,7 @@ def test_what_is_no_recording_is_called_so(tmp_path: Path, content: bytes) -> No
         read_recording(path)
 
 
-def test_one_write_per_tenth_of_a_second(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    recorder = Recorder(tmp_path, HEADER, COLUMNS)
-    writes: list[int] = []
-    real_write = os.write
-
-    def counted(descriptor: int, data: bytes) -> int:
-        writes.append(len(data))
-        return real_write(descriptor, data)
-
-    monkeypatch.setattr(os, "write", counted)
-    for tick in range(1000):
-        now_s = tick * 0.004
-        recorder.append((now_s, 0.0, 0.0))
-        recorder.flush(now_s)
-    recorder.close()
-    assert 38 <= len(writes) <= 41
-    assert read_recording(recorder.path).rows == 1000
-
-
-def test_rows_that_nobody_flushes_are_not_lost(tmp_path: Path) -> None:
+def test_rows_that_nobody_has_written_are_not_lost(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path, HEADER, COLUMNS)
     for row in range(1000):
         recorder.append((row * 0.001, 0.0, 0.0))
@@ -179,8 +159,7 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(
     """taken: how many bytes of the last batch the disk still takes; None: the write itself fails."""
     recorder = Recorder(tmp_path, HEADER, COLUMNS)
     recorder.append((0.0, 1.0, 2.0))
-    recorder.flush(0.0)
-    recorder.flush(0.1)
+    recorder.write()
     real_write = os.write
 
     def full(descriptor: int, data: bytes) -> int:
@@ -190,13 +169,13 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(
 
     monkeypatch.setattr(os, "write", full)
     recorder.append((0.1, 1.0, 2.0))
-    recorder.flush(0.3)
+    recorder.write()
     assert recorder.failure is not None
     assert recorder.failure.startswith("E402")
     assert "after 1 rows" in recorder.failure
     assert not recorder.is_open
     recorder.append((0.2, 1.0, 2.0))
-    recorder.flush(9.0)
+    recorder.write()
     recorder.close()
     recording = read_recording(recorder.path)
     assert (recording.rows, recording.truncated) == (1, False)
@@ -226,7 +205,7 @@ def test_numbers_are_never_used_twice_even_by_two_at_once(tmp_path: Path) -> Non
 
 def test_a_number_taken_between_look_and_create_is_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     record(tmp_path, batches=1)
-    monkeypatch.setattr(Path, "glob", lambda self, pattern: iter(()))
+    monkeypatch.setattr(Path, "iterdir", lambda self: iter(()))
     recorder = Recorder(tmp_path, HEADER, COLUMNS)
     recorder.close()
     assert recorder.number == 2
@@ -254,11 +233,12 @@ recorder = Recorder(Path(sys.argv[1]), {"rig": "demo"}, ("time_s", "command_v", 
 row, told = 0, 0
 while True:
     recorder.append((row * 0.01, 1.0, float(row)))
-    recorder.flush(row * 0.01)
     row += 1
+    if row % 10 == 0:
+        recorder.write()
     if recorder.rows_written >= told + 200:
         told = recorder.rows_written
-        print(told, row, flush=True)
+        print(told, flush=True)
 """
 
 
@@ -274,10 +254,8 @@ def test_kill_9_in_the_middle_loses_at_most_one_batch(tmp_path: Path, budget: in
             rest = process.stdout.read().splitlines(keepends=True)  # the kill may cut the last line as well
             told = [told, *(line for line in rest if line.endswith("\n"))][-1]
         assert process.wait() == -signal.SIGKILL
-        written, appended = (int(word) for word in told.split())
         recording = read_recording(max(tmp_path.glob("*.fgr")))
-        assert recording.rows >= written
-        assert appended - written <= 20  # 0.1 s at 100 Hz, and the row that opened the next one
+        assert recording.rows >= int(told)
         assert recording.columns["force_n"].tolist() == list(range(recording.rows))
 
 

@@ -32,9 +32,8 @@ def test_a_pipe_or_a_device_among_the_recordings_is_not_read(tmp_path: Path) -> 
 @pytest.mark.parametrize("rows_left", [0, 1])
 def test_who_deletes_a_recording_that_is_written_ends_it_and_it_says_so(rows_left: int, tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "recordings", HEADER, COLUMNS)
-    recorder.flush(0.0)
     recorder.append((0.0, 0.0, 0.0))
-    recorder.flush(1.0)
+    recorder.write()
     shutil.rmtree(tmp_path / "recordings")
     for _ in range(rows_left):
         recorder.append((0.0, 0.0, 0.0))

@@ -116,6 +116,22 @@ def test_a_disk_that_hangs_ends_the_recording_and_it_goes_on_in_another_when_the
     assert second.rows > 200
 
 
+def test_rows_are_handed_over_each_tenth_of_a_second(tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At most so many are lost with the process, and no disk is asked at each tick."""
+    batches: list[int] = []
+    write = Recorder.write
+    monkeypatch.setattr(Recorder, "write", lambda file: (batches.append(file._rows), write(file)))
+    recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())  # type: ignore[arg-type]
+    recordings.start()
+    for tick in range(256):
+        recordings.append(ForceSample(1.0, 1.0, Quality.OK, tick / 256), DECISION, LINE)
+        recordings.flush(tick / 256)
+    recordings.stop()
+    assert batches == [1, *[26] * 9, 21]
+    [recording] = list_recordings(tmp_path)
+    assert recording.rows == 256
+
+
 def test_whoever_ends_one_before_its_file_is_there_gets_it_whole(recordings: Recordings, disk: HangingDisk) -> None:
     begun = recordings.start()
     rows_until(recordings, 1.0)

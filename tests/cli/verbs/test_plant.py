@@ -48,7 +48,6 @@ def record_held(state: Path, error_n: float) -> None:
             at_s = index * 2.0 + step * 0.02
             row |= {"time_s": at_s, "setpoint_n": wanted_n, "force_n": wanted_n + error_n, "state": 3.0}
             recorder.append(tuple(row.values()))
-    recorder.flush(1e9)
     recorder.close()
 
 

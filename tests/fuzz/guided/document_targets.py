@@ -99,7 +99,7 @@ def table_seeds() -> list[bytes]:
     recorder = Recorder(folder, {"rig": "demo", "seed": 7}, ("time_s", "command_v", "force_n"))
     for k in range(3):
         recorder.append((0.01 * k, 0.5, 1.5 * k))
-    recorder.flush(1.0)
+    recorder.write()
     recorder.close()
     rows = "".join(f"{0.01 * k:.2f},{0.5 * k:.3f},{1.5 * k}\n" for k in range(4)).encode()
     ours, german = recorder.path.read_bytes(), rows.replace(b",", b";").replace(b".", b",")

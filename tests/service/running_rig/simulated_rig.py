@@ -20,6 +20,7 @@ from gateway.registers import BankRules, Refusal, RegisterBank
 from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import ControlBit, State
 from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
+from gateway.service.running_rig.lines.output_line import LineState
 from tests.control.bench import SmallPlant, bsfm, settings
 
 OWNER, OTHER = Peer("10.0.0.5", 4001), Peer("10.0.0.6", 4002)
@@ -53,6 +54,10 @@ class Wire:
     @property
     def sent_v(self) -> float:
         return self.voltage_v
+
+    @property
+    def line(self) -> LineState:
+        return LineState(nan, self.voltage_v, nan)
 
     def set_voltage(self, voltage_v: float, now_s: float) -> None:
         self.voltage_v = self.acknowledged_v = voltage_v

@@ -1,6 +1,7 @@
 """A calibration that somebody at this machine asked for, in virtual time: it lasts as long as somebody follows it."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,12 +9,17 @@ import pytest
 from gateway.control.runs.ladder_stairs import QUICK
 from gateway.recording import read_recording
 from gateway.registers.words import CalibrationPhase, State
+from gateway.service.run_recording import HANGS_S
 from gateway.service.running_rig.calibration_runs import FOLLOWED_S, CalibrationRuns
+from gateway.service.running_rig.fit_launcher import Result
 from tests.disk.at_once import AtOnce
+from tests.service.rigs import demo
+from tests.service.running_rig.simulated_rig import SmallRig
 from tests.service.test_run_recording import HangingDisk
 from tests.service.wired import ENABLE, Wired
 
 PLAN = {"step_v": QUICK.step_v, "groups": QUICK.groups, "minor_points": QUICK.minor_points}
+SHORT = {"step_v": 2.0, "groups": 1, "minor_points": 0, "response_steps": 0}
 POLL_S = 0.2  # of `calibrate`
 
 
@@ -122,3 +128,102 @@ def test_the_end_of_a_run_is_told_once_its_file_is_closed(tmp_path: Path) -> Non
     told = runs.status()
     assert not told["running"] and told["phase"] == "stopped"
     assert read_recording(Path(told["recording"])).rows > 80
+
+
+# -- a disk that is slower than the run
+
+
+class Fits(list[Path]):
+    """Stands for `FitLauncher`: the recordings that are to be fitted, and who hears of it."""
+
+    def __call__(self, recording: Path, rig_file: Path, state: Path, on_result: Callable[[Result], None]) -> None:
+        self.append(recording)
+        self.on_result = on_result
+
+
+@pytest.fixture
+def fits(monkeypatch: pytest.MonkeyPatch) -> Fits:
+    fits = Fits()
+    monkeypatch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", fits)
+    return fits
+
+
+def on_a_hanging_disk(state: Path) -> tuple[SmallRig, CalibrationRuns, HangingDisk]:
+    rig = SmallRig()
+    runs = CalibrationRuns(rig.controller, demo(), state, rig.now, rig.note)
+    disk = runs.disk = HangingDisk()  # type: ignore[assignment]
+    rig.loop.calibration_runs = runs
+    return rig, runs, disk
+
+
+def climb(rig: SmallRig, runs: CalibrationRuns) -> None:
+    """To the end of the run, with somebody who follows it."""
+    rig.run(0.5)
+    while rig.controller.active_run.running:
+        runs.answer({})
+        rig.run(1.0)
+
+
+def test_a_run_begun_while_the_last_ones_file_is_being_closed_is_not_taken_for_it(tmp_path: Path, fits: Fits) -> None:
+    rig, runs, disk = on_a_hanging_disk(tmp_path)
+    runs.answer({"plan": SHORT})
+    rig.run(1.0)
+    disk.let_go()
+    Path(runs.status()["recording"]).unlink()
+    runs.answer({"stop": True})
+    rig.until(State.OFF).run(0.1)
+    assert runs.status()["running"], "its file is not closed yet"
+    runs.answer({"plan": SHORT})
+    rig.run(0.5)
+    disk.let_go()
+    told = runs.status()
+    assert (told["running"], told["phase"], told["ended"]) == (True, "zero", ""), "the first one's failure is its own"
+    climb(rig, runs)
+    disk.let_go()
+    told = runs.status()
+    assert (told["running"], told["phase"]) == (False, "fitting")
+    assert fits == [Path(told["recording"])]
+    fits.on_result({"stored": 3, "report": "report.html"})
+    assert (runs.stored, runs.status()["phase"]) == (3, "stored")
+
+
+def delete_its_file(runs: CalibrationRuns, disk: HangingDisk) -> None:
+    disk.let_go()
+    Path(runs.status()["recording"]).unlink()
+
+
+def refuse_its_file(runs: CalibrationRuns, disk: HangingDisk) -> None:
+    (runs._state / "recordings").write_text("no folder")
+
+
+def take_nothing(runs: CalibrationRuns, disk: HangingDisk) -> None:
+    disk.let_go()
+    runs.flush(0.0)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "why"),
+    [
+        (delete_its_file, "somebody has deleted its file"),
+        (refuse_its_file, "the disk took no recording"),
+        (take_nothing, "the disk has taken nothing for 30 s"),
+    ],
+)
+def test_a_ladder_that_the_disk_has_not_taken_whole_is_not_fitted(
+    spoil: Callable[[CalibrationRuns, HangingDisk], None], why: str, tmp_path: Path, fits: Fits
+) -> None:
+    rig, runs, disk = on_a_hanging_disk(tmp_path)
+    runs.answer({"plan": SHORT})
+    rig.run(0.5)
+    spoil(runs, disk)
+    climb(rig, runs)
+    assert runs.status()["phase"] == "fitting", "nobody knows yet what the disk has taken"
+    if spoil is take_nothing:
+        runs.flush(HANGS_S + 1.0)
+        assert runs.status()["phase"] == "stopped"
+    disk.let_go()
+    told = runs.status()
+    assert fits == []
+    assert (told["running"], told["phase"]) == (False, "stopped")
+    assert why in told["ended"]
+    assert rig.controller.refusal_of_run(rig.now(), QUICK) == "", "the next run may begin"

@@ -177,6 +177,22 @@ def test_a_run_shows_what_it_does_and_how_long_it_still_takes() -> None:
     assert rig.word("calibration_time_left") == rig.word("force_accepted") == 0
 
 
+def test_a_run_that_takes_the_zero_first_does_not_begin_where_no_tare_would() -> None:
+    rig = SmallRig().holding(40.0)
+    rig.write(0, 0)
+    rig.run(0.15)
+    assert rig.controller.refusal_of_run(rig.now(), SHORT) == ""
+    assert "still on their way to 0" in rig.controller.refusal_of_run(rig.now(), replace(SHORT, tare=True))
+
+
+def test_no_run_begins_where_the_tool_waits_for_contact_with_a_force() -> None:
+    rig = SmallRig(contact=False)
+    rig.write(0, ENABLE, 1200)
+    rig.until(State.READY).run(0.5)
+    assert rig.wire.voltage_v > 0.0
+    assert "READY with" in rig.controller.refusal_of_run(rig.now(), SHORT)
+
+
 # -- the rig's largest force
 
 
