@@ -11,7 +11,7 @@ from ipaddress import ip_address
 from struct import unpack
 from typing import Final
 
-from gateway import VERSION
+from gateway import VERSION, defaults
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
@@ -65,6 +65,11 @@ class Endpoint:
     def shown_port(self) -> str:
         """The port as pages name it: 0 is none that anybody can ask, but says that one is chosen at each start."""
         return str(self.port or "PORT")
+
+    @property
+    def unit_option(self) -> str:
+        """Return what our own verbs need beside the address where the rig answers other units only."""
+        return "" if self.unit == defaults.UNIT_ID else f" --unit {self.unit}"
 
     def to_fill_in(self, *, from_elsewhere: bool) -> tuple[str, ...]:
         """Return what the integrator has to put in by hand, for no rig can know it. from_elsewhere: on another machine."""

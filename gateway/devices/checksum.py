@@ -23,8 +23,10 @@ def _xor(body: bytes) -> bytes:
 
 
 def _xor_hex(body: bytes) -> bytes:
-    """Exclusive or of all characters but a leading STX, as two digits (Yaohua XK3190-A23p, page 24)."""
-    return b"%02X" % reduce(xor, body.removeprefix(b"\x02"), 0)
+    r"""Exclusive or of what stands between the signs that frame a sentence, as two digits: a leading STX (Yaohua XK3190-A23p,
+    page 24) or `&`, and a `\` behind (Laumas TLB and TLU, continuous transmission), are left out."""
+    inner = body[1:] if body[:1] in (b"\x02", b"&") else body
+    return b"%02X" % reduce(xor, inner.removesuffix(b"\\"), 0)
 
 
 _TRAILERS: Final[dict[ChecksumName, Callable[[bytes], bytes]]] = {

@@ -321,7 +321,9 @@ def _check_reading(template: Template, reading: ForceReading) -> None:
     if isinstance(unit, Choice) and reading.unit and reading.unit not in unit.words:
         raise TemplateError(f"{quote(template.text)} never says {reading.unit}: unit is one of {', '.join(unit.words)}")
     status = template.field(STATUS)
-    if set(status.words if isinstance(status, Choice) else ()) != set(reading.quality):
-        raise TemplateError(f"{quote(template.text)}: quality must name each word of {{status:...}}, and no other")
+    words = set(status.words if isinstance(status, Choice) else ())
+    if odd := sorted(words ^ set(reading.quality)):
+        told = ", ".join(f"{word!r} is {'not named' if word in words else 'no word of it'}" for word in odd)
+        raise TemplateError(f"{quote(template.text)}: quality names the words of {{status:...}}: {told}")
     if reading.quality and set(reading.quality.values()) <= {Quality.OVERLOAD, Quality.REPEATED}:
         raise TemplateError(f"{quote(template.text)}: quality has no word for a good reading (ok, unstable)")

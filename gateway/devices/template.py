@@ -19,6 +19,8 @@ from gateway.devices.fields import Choice, Decimals, Field, TemplateError, Text,
 _NAMES: Final = {"\x02": "<STX>", "\x03": "<ETX>", "\t": "<TAB>"}
 _WITH_NAMES: Final = str.maketrans(_NAMES)
 _TEXT: Final = re.compile(f"[ -~{''.join(_NAMES)}]+")
+_SPELT: Final = re.compile(r"<(STX|ETX|TAB|CR|LF)>|\\(x[0-9A-Fa-f]{2}|[rnt])")
+"""A control character as messages and manuals show it, or as it stands between single quotes: no device says it so."""
 
 
 def quote(text: str) -> str:
@@ -117,6 +119,11 @@ def _pieces(text: str) -> list[str | Field]:
 def _check(text: str, pieces: list[str | Field]) -> None:
     if not _TEXT.fullmatch(text):
         raise TemplateError(f"{text!r} is not printable text, STX, ETX or tab (the terminator is a setting of its own)")
+    if spelt := _SPELT.search(text):
+        raise TemplateError(
+            f"{quote(text)}: {spelt[0]} would be {len(spelt[0])} characters on the wire. Between double quotes STX is "
+            '"\\x02", ETX "\\x03", a tab "\\t"; CR and LF are the terminator'
+        )
     names = [piece.name for piece in pieces if not isinstance(piece, str)]
     if len(set(names)) != len(names):
         raise TemplateError(f"{quote(text)} uses a field twice")

@@ -442,6 +442,7 @@ class MbClient:
         rises, self.was_asked = given["REQ"] and not self.was_asked, given["REQ"]
         if given["DISCONNECT"]:
             assert not given["REQ"], "a request while the connection is closed"
+            self.BUSY = False
             return
         place = {name: given[name] for name in ("MB_MODE", "MB_DATA_ADDR", "MB_DATA_LEN")}
         if not self.BUSY:

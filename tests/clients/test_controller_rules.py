@@ -89,6 +89,21 @@ def test_an_input_that_is_true_when_a_controller_starts_enables_nothing(kind: ty
     assert client.enabled
 
 
+def test_an_mb_client_that_stays_busy_is_a_loss_and_shows_nothing_stale(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While a connection does not come about MB_CLIENT may be BUSY, and say neither DONE nor ERROR."""
+    gateway = GatewayAtHand(MAP)
+    client = S7(TEXTS["scl"], gateway)
+    client.enable(12.0)
+    cycles(client)
+    finish = MbClient.finish
+    monkeypatch.setattr(MbClient, "finish", lambda self, given: setattr(self, "BUSY", True))
+    client.cycle(2.5)
+    assert client.ended and not client.enabled and "lost" in client.text
+    monkeypatch.setattr(MbClient, "finish", finish)
+    client.cycle(5.0)
+    assert commands(gateway) == [command(1, 1200), command(0, 0)]
+
+
 @pytest.mark.parametrize("kind", [S7, TwinCat])
 def test_a_request_that_fails_in_its_own_call_is_tried_again_no_sooner(
     kind: type[Plc], monkeypatch: pytest.MonkeyPatch

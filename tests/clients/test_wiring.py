@@ -79,6 +79,8 @@ def test_a_face_with_certificates_is_told_from_what_the_clients_speak() -> None:
     assert shown["address"].startswith("127.0.0.1:802,")
     assert "ca.crt" in shown["masters need"]
     assert "plain Modbus TCP" in shown["not for"]
+    (line,) = next(each.commands for each in wiring_page(rig, "demo")[1] if each.title == "Face 1: Modbus/TCP Security")
+    assert line.startswith("force-gateway read state --gateway 127.0.0.1:802 --tls ca.crt --cert CLIENT.crt ")
 
 
 def test_a_rig_that_answers_another_unit_only_is_asked_as_that_by_every_line(tmp_path: Path) -> None:
@@ -86,6 +88,7 @@ def test_a_rig_that_answers_another_unit_only_is_asked_as_that_by_every_line(tmp
     (tmp_path / "own.yaml").write_text(text)
     (section,) = [each for each in page_of(tmp_path / "own.yaml")["sections"] if each["title"].startswith("mbpoll")]
     assert all("-a 7 " in line or "--unit 7 " in line for line in section["commands"])
+    assert load_rig(str(tmp_path / "own.yaml")).network.units == (7,)
 
 
 def test_a_rig_without_a_lease_is_told_that_its_force_outlives_the_master() -> None:

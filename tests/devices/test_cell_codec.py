@@ -182,8 +182,8 @@ def test_a_load_cell_is_no_output(indicator: DeviceProfile) -> None:
         ({"frame": "{load:.2f}"}, "has no number"),
         ({"frame": "{force:s}"}, "has no number"),
         ({"frame": "{force:.2f} {unit:kg|oz}"}, "units are N, kg, g, lb; another is text, with `unit`"),
-        ({"frame": "{status:ST|US} {force:.2f}", "quality": {"ST": Quality.OK}}, "quality must name"),
-        ({"frame": "{force:.2f}", "quality": {"ST": Quality.OK}}, "quality must name"),
+        ({"frame": "{status:ST|US} {force:.2f}", "quality": {"ST": Quality.OK}}, "'US' is not named"),
+        ({"frame": "{force:.2f}", "quality": {"ST": Quality.OK}}, "'ST' is no word of it"),
         ({"frame": "{force:.2f}", "blank_is_overload": True}, "fixed width"),
     ],
 )

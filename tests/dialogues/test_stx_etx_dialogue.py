@@ -40,6 +40,10 @@ YAOHUA = replace(  # XK3190-A23p, page 24: STX, address, command, exclusive or o
     cell(terminator="\x03", read_force=ForceReading(ask="\x02AB", frame="\x02AB{force:+07d}2", unit="N", rate_hz=20.0)),
     checksum="xor-hex",
 )
+LAUMAS_FAST = replace(  # TLB, fast continuous transmission, TD: the sum is that of what stands between & and \
+    cell(terminator="\r", stream=ForceReading(frame="&T{force:06d}P{peak:06d}\\", unit="N", rate_hz=300.0)),
+    checksum="xor-hex",
+)
 
 
 def test_a_question_with_an_exclusive_or_in_digits_is_the_manual_s() -> None:
@@ -60,6 +64,8 @@ def test_a_question_with_an_exclusive_or_in_digits_is_the_manual_s() -> None:
         (RICE_LAKE, b"\x02-   0.52KGM\r\n", -0.52, Quality.UNSTABLE),
         (RICE_LAKE, b"\x02   99.99KGO\r\n", 99.99, Quality.OVERLOAD),
         (YAOHUA, b"\x02AB+00123421E\x03", 1234.0, Quality.OK),
+        (LAUMAS_FAST, b"&T000123P000123\\04\r", 123.0, Quality.OK),  # T xor P; the digits cancel out
+        (LAUMAS_FAST, b"&T-00012P000012\\19\r", -12.0, Quality.OK),  # and - xor 0
         (WITH_UNIT, b"\x02------\x03", inf, Quality.OVERLOAD),
         (ENDS_WITH_A_LINE, b"\x02+  12.34 N\x03\r\n", 12.34, Quality.OK),
         (SKETCH, b"one reading:\t12.3\t| average:\t12.34000\r\n", 12.34, Quality.OK),
@@ -77,6 +83,7 @@ def test_a_frame_is_read_as_printed(profile: DeviceProfile, frame: bytes, raw: f
         (RINSTRUM, b"\x02   12.34X\x03"),
         (RICE_LAKE, b"\x02   12.34LG \r\n"),
         (YAOHUA, b"\x02AB+00123521E\x03"),
+        (LAUMAS_FAST, b"&T000124P000123\\04\r"),
         (WITH_UNIT, b"\x02+  12.34\tN\x03"),
         (ENDS_WITH_A_LINE, b"\x02+  12.34 N\r\n"),
         (SKETCH, b"one reading: 12.3 | average: 12.34000\r\n"),
@@ -96,6 +103,7 @@ def test_anything_else_is_garbage_and_counted_whole(profile: DeviceProfile, fram
         (ENDS_WITH_A_LINE, 12.34, b"\x02   12.34 N\x03\r\n"),
         (RICE_LAKE, 12.34, b"\x02   12.34KG \r\n"),
         (YAOHUA, 1234.0, b"\x02AB+00123421E\x03"),
+        (LAUMAS_FAST, 123.0, b"&T000123P000000\\04\r"),
         (SKETCH, 12.34, b"one reading:\t0.0\t| average:\t12.34000\r\n"),
     ],
 )

@@ -33,7 +33,7 @@ def command(*, name: str | None, form: str | None, map_name: str | None, rig: st
 
     NAME: a register such as force_setpoint, its number such as 40002, or its address counted from 0.
     rapid: ABB IRC5 over sockets. scl: S7-1200/1500, MB_CLIENT. st: TwinCAT 3 and CODESYS V3. urscript: Universal Robots. c: C99
-    and POSIX sockets. python: standard library only.
+    and POSIX sockets. python: standard library only. Each begins with how to load it and what it does when things fail.
     """
     from gateway.profiles import load_register_map, load_rig
     from gateway.registers import render_registers

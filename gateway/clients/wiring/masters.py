@@ -236,7 +236,7 @@ def _mbpoll(rig: Rig, table: ExchangeTable) -> Section:
     sentences = ["-r counts from 1: register 1 is address 0."]
     force_n = min(12.0, rig.control.limits.force_max_n)
     counts = round(force_n * table.at("force_setpoint", "command").counts_per_unit)
-    endpoint = f"{where.host}:{where.shown_port}" + ("" if where.unit == defaults.UNIT_ID else f" --unit {where.unit}")
+    endpoint = f"{where.host}:{where.shown_port}{where.unit_option}"
     if rig.control.supervision.lease_s is not None or network.owner or network.require_byte_order_echo:
         sentences.append("mbpoll keeps no heartbeat, so it cannot hold a force here: `hold` does.")
         lines.append(f"force-gateway hold {force_n:g} --gateway {endpoint}    # enable, heartbeat; Ctrl-C ramps to 0")

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import fields
 
+from gateway.clients.rendering import endpoint_of
 from gateway.clients.wiring.device_wires import GENERAL, RS485, wires_of
 from gateway.clients.wiring.section import Section
 from gateway.profiles import Rig
@@ -17,7 +18,7 @@ def serial_sections(rig: Rig) -> Iterator[Section]:
         if isinstance(face, RtuFace):
             yield _face_section(place, face)
         else:
-            yield _tls_section(place, face)
+            yield _tls_section(place, face, endpoint_of(rig).unit_option)
 
 
 def _lines(rig: Rig) -> Iterator[tuple[str, object]]:
@@ -63,7 +64,7 @@ def _face_section(place: int, face: RtuFace) -> Section:
     return Section(f"Serial face {place}: Modbus RTU, masters ask here", rows=rows, commands=commands)
 
 
-def _tls_section(place: int, face: TlsFace) -> Section:
+def _tls_section(place: int, face: TlsFace, unit_option: str) -> Section:
     port = face.port or "a free port, which `run` names when it is ready"
     rows = (
         ("what", "value"),
@@ -73,4 +74,10 @@ def _tls_section(place: int, face: TlsFace) -> Section:
         ("masters need", f"a certificate signed by {face.ca}, with a role: setpoint to command, calibration to upload"),
         ("not for", "the generated clients, which speak plain Modbus TCP: for masters with TLS of their own"),
     )
-    return Section(f"Face {place}: Modbus/TCP Security", rows=rows)
+    where = f"{face.bind}:{face.port or 'PORT'}{unit_option}"
+    try_it = f"force-gateway read state --gateway {where} --tls {face.ca} --cert CLIENT.crt --key CLIENT.key"
+    return Section(
+        f"Face {place}: Modbus/TCP Security",
+        rows=rows,
+        commands=(f"{try_it}    # with the client's own files; `force-gateway certs` makes them",),
+    )
