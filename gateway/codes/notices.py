@@ -88,8 +88,8 @@ NOTICES: Final = (
         "W244",
         "no TLS 1.2 or 1.3",
         "A client spoke something else than TLS on the TLS port, or a version that is not accepted any more.",
-        "Plain Modbus TCP or a browser on the wrong port, or a client that knows TLS 1.0 and 1.1 only.",
-        "Choose Modbus/TCP Security in the client, or connect it to the plain port where the rig has one.",
+        "Plain Modbus TCP or a browser on the wrong port, or a client that knows TLS 1.0 and 1.1 only, or no P-256.",
+        "Choose Modbus/TCP Security in the client and allow it P-256 (secp256r1), or connect it to the plain port.",
     ),
     Explanation(
         "W245",

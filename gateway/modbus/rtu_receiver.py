@@ -43,7 +43,7 @@ SPLIT_S: Final = 0.02
 MOST_BYTES: Final = 512
 """Held without a silence: twice the longest frame. What comes before is dropped, unless frames can be made out in it."""
 
-_STRAY_BYTES: Final = 2  # before or behind a request: a line that floats makes one or two
+_STRAY_BYTES: Final = 2  # before or behind a request that is answered: a line that floats makes one or two
 _DIAGNOSTICS_BYTES: Final = 8  # the usual FC08: a sub-function with one word
 _FRAMED: Final = frozenset(
     function for function in range(256) if has_request_length(function) or has_answer_length(function)
@@ -107,7 +107,7 @@ class RtuReceiver:
         longest_s = max(SPLIT_S, self._silence_s)
         is_final = self._wait_s >= longest_s  # not by the time alone: a program that was late first reads what has come
         found, noise, pending = self._scan(is_final=is_final)
-        is_waiting = pending > (_STRAY_BYTES if any(self._is_ours(at) for at, _ in found) else 0)
+        is_waiting = pending > (_STRAY_BYTES if found and self._burst[found[-1][0]] == self._unit else 0)
         if is_waiting and not is_final:
             self._wait_s = longest_s
             return []

@@ -109,7 +109,20 @@ def test_old_versions_are_refused(face: Face, folder: Folder, version: ssl.TLSVe
     with pytest.raises(ssl.SSLError):
         face.accept().greet(client(folder, "setpoint", version))
     assert face.log == [
-        "W244 127.0.0.1:40000: it offers TLS 1.1 or older, or no cipher of ours: TLS 1.2 or 1.3 is needed"
+        "W244 127.0.0.1:40000: it offers TLS 1.1 or older, or no cipher of ours: TLS 1.2 or 1.3 with P-256 is needed"
+    ]
+
+
+def test_a_stranger_cannot_choose_dear_arithmetic(face: Face, folder: Folder) -> None:
+    """One hello with ffdhe8192 stalled the control loop by a quarter of a second, and its guardian replaced it."""
+    dear, usual = client(folder, "setpoint"), client(folder, "setpoint")
+    dear.set_ecdh_curve("secp521r1")
+    usual.set_ecdh_curve("prime256v1")
+    with pytest.raises(ssl.SSLError):
+        face.accept().greet(dear)
+    assert face.accept().greet(usual) == "TLSv1.3"
+    assert face.log == [
+        "W244 127.0.0.1:40000: it offers no group of ours: allow P-256 (secp256r1) for its key exchange"
     ]
 
 

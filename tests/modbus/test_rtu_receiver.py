@@ -97,6 +97,14 @@ def test_a_broadcast_and_the_next_request_in_one_read_are_two() -> None:
     assert Bus().send(encode_adu(0, WRITE) + OURS).requests() == [RtuRequest(0, WRITE, False), *answered()]
 
 
+def test_a_request_is_heard_whole_whose_first_bytes_come_with_a_broadcast_or_another_s_frame() -> None:
+    """One or two bytes are stray behind a request that is answered, for its master waits; behind others the next may begin."""
+    for before in (encode_adu(0, WRITE), encode_adu(0, READ), COMMAND + encode_adu(7, WRITE)):
+        for first in (1, 2, 3):
+            heard = Bus().send(before + OURS[:first], OURS[first:], pause_s=0.01).requests()
+            assert heard[-1:] == answered(), (before.hex(), first)
+
+
 def test_an_older_request_is_executed_but_only_the_last_is_answered() -> None:
     """Its master has given up: what comes now would be taken for the answer to the other."""
     assert Bus().send(COMMAND + OURS).requests() == [RtuRequest(1, WRITE, False), *answered()]

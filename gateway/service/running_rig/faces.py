@@ -6,6 +6,7 @@ All serve the same bank, so that a command counts whichever face it comes throug
 import os
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from gateway.fieldbus import ModbusRtuServer, ModbusTcpServer, ModbusTlsServer, RtuSettings, TlsSettings
@@ -52,11 +53,8 @@ class Faces:
             for place, face in enumerate(rig.fieldbus, start=1)
             if isinstance(face, RtuFace)
         ]
-        self._tls = [
-            (face, make_tls_server(rig, face, bank, on_peer_closed, log))
-            for face in rig.fieldbus
-            if isinstance(face, TlsFace)
-        ]
+        self._make_tls = partial(make_tls_server, rig, bank=bank, on_peer_closed=on_peer_closed, log=log)
+        self._tls: list[tuple[TlsFace, ModbusTlsServer]] = []
         self.modbus: tuple[str, int] | None = None  # where plain Modbus TCP is bound, once it is
 
     @property
@@ -75,7 +73,9 @@ class Faces:
 
     async def start(self, bind: list[Any] | None, *, is_restart: bool) -> tuple[ServedFace, ...]:
         """Serve on every face; what each is. bind: HOST, PORT of plain Modbus TCP instead of the rig's. StartError says
-        which face cannot be served, and why; a serial port that a restart does not find is a lost one."""
+        which face cannot be served, and why; a serial port that a restart does not find is a lost one, and a TLS face whose
+        files are not good any more is left out by it: ending over either would take the others' faces, too."""
+        self._make_tls_faces(is_restart=is_restart)
         served = []
         if self._tcp:
             network = self._rig.network
@@ -98,6 +98,16 @@ class Faces:
         """Close every face; answers given so far are still sent."""
         for face in self._all:
             await face.close()
+
+    def _make_tls_faces(self, *, is_restart: bool) -> None:
+        for face in self._rig.fieldbus:
+            if isinstance(face, TlsFace):
+                try:
+                    self._tls.append((face, self._make_tls(face)))
+                except StartError as error:
+                    if not is_restart:
+                        raise
+                    self._log("face tls", f"{error}; without this face until a new start")
 
     async def _start_serial(self, face: ModbusRtuServer, *, is_restart: bool) -> None:
         host = face.settings.peer.host

@@ -56,6 +56,23 @@ def test_both_faces_serve_one_bank_and_the_certificate_owns(folder: Folder) -> N
 
 
 def test_files_that_changed_since_check_keep_the_rig_from_starting(folder: Folder) -> None:
+    async def scene() -> None:
+        async with Served(rig_with(folder, "admin")).running():
+            pass
+
     with pytest.raises(StartError, match=r"E174 .*cannot be used") as caught:
-        Served(rig_with(folder, "admin"))
+        asyncio.run(scene())
     assert caught.value.exit_code == 78
+
+
+def test_files_that_changed_since_the_start_cost_a_restart_their_own_face_only(folder: Folder) -> None:
+    """The gateway used up its restarts over them and ended."""
+
+    async def scene() -> None:
+        served = Served(rig_with(folder, "admin"))
+        async with served.running(is_restart=True):
+            (plain,) = served.told
+            assert await ask(plain.facts["port"], pdu.read_request(3, 0, 1)) == bytes((3, 2, 0, 0))
+            assert [line.split()[0] for line in served.log] == ["E174"] and "without this face" in served.log[0]
+
+    asyncio.run(asyncio.wait_for(scene(), 20.0))
