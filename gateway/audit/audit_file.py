@@ -39,7 +39,7 @@ def read_head(folder: Path) -> ChainEnd | None:
     try:
         fields = json.loads((folder / HEAD).read_text("ascii"))
         return ChainEnd(int(fields["n"]), str(fields["sha256"]))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
 
 

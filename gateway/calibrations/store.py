@@ -12,7 +12,7 @@ from typing import Final
 
 from gateway.bsfm.model import Calibration, Response
 from gateway.numbered_documents.store import NumberedStore, StoreError, file_name
-from gateway.processes.durable_file import add_checksum, verify_checksum
+from gateway.processes.durable_file import add_checksum, read_regular, verify_checksum
 from gateway.profiles import ProfileError, Rig
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.strict_yaml.text import parse
@@ -61,7 +61,7 @@ class CalibrationStore(NumberedStore[Calibration]):
         not even parsed. So `load` what is found; files that cannot be read are left out."""
         for number in reversed(self.numbers()):
             with contextlib.suppress(OSError, ValueError, TypeError):
-                text = (self.directory / file_name(number)).read_text(encoding="utf-8")
+                text = read_regular(self.directory / file_name(number)).decode()
                 if _IS_UPLOAD not in text or set_sha256 in text:
                     yield number, _parse_unchecked(text)
 

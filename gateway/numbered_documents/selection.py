@@ -16,7 +16,13 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.processes.durable_file import add_checksum, remove_if_possible, verify_checksum, write_durably
+from gateway.processes.durable_file import (
+    add_checksum,
+    read_regular,
+    remove_if_possible,
+    verify_checksum,
+    write_durably,
+)
 from gateway.registers.upload.staging import SLOTS
 from gateway.registers.upload.staging_block import NO_SLOT
 
@@ -76,7 +82,7 @@ def read_selection(directory: Path, noun: str, *, is_to_change: bool = False) ->
     damaged: list[str] = []
     for generation, name in reversed(_generations(directory)):
         try:
-            pointer = _parse_state((directory / name).read_bytes(), generation)
+            pointer = _parse_state(read_regular(directory / name), generation)
         except OSError as error:
             if is_to_change:
                 raise

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final, Generic, TypeVar
 
 from gateway.numbered_documents.selection import BUILT_IN, Selection, SelectionState, read_selection, write_selection
-from gateway.processes.durable_file import lock_directory, make_directory, write_durably
+from gateway.processes.durable_file import lock_directory, make_directory, read_regular, write_durably
 from gateway.registers.upload.staging import SLOTS
 
 Document = TypeVar("Document")
@@ -103,7 +103,7 @@ class NumberedStore(ABC, Generic[Document]):
         """Return a document by its number, that of the built-in one included. StoreError when it is not there or damaged."""
         path = self.directory / file_name(number)
         try:
-            document = self.decode(path.read_bytes(), path)
+            document = self.decode(read_regular(path), path)
         except FileNotFoundError:
             return self._built_in(number)
         except OSError as error:

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from gateway.audit.audit_file import AuditFile, audit_files
+from gateway.audit.audit_file import AuditFile, audit_files, read_head
 from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.cli.main import command
 
@@ -252,3 +252,9 @@ def find_line(state: Path, number: int) -> tuple[Path, list[bytes], int]:
 
 def swap(lines: list[bytes], place: int) -> list[bytes]:
     return [*lines[:place], lines[place + 1], lines[place], *lines[place + 2 :]]
+
+
+def test_a_head_of_nothing_but_brackets_keeps_no_audit_from_being_stored(tmp_path: Path) -> None:
+    (tmp_path / "audit").mkdir()
+    (tmp_path / "audit" / "head").write_text("[" * 50_000)
+    assert read_head(tmp_path / "audit") is None

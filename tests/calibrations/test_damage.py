@@ -1,6 +1,7 @@
 """What is damaged is named and passed over; what was whole before it is used."""
 
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from random import Random
@@ -109,3 +110,16 @@ def test_only_what_was_sealed_is_unsealed(data):
     with pytest.raises(ValueError, match=r"crc32|empty"):
         verify_checksum(data + b"x" if data.startswith(b"# crc32") else data)
     assert verify_checksum(add_checksum("é\n")) == "é\n".encode()
+
+
+@pytest.mark.parametrize("name", ["0003.yaml", "active.000002"])
+def test_a_pipe_or_a_device_is_no_file_and_is_not_waited_for(used, name):
+    """A pipe kept the start waiting for good, and a device without an end took the memory."""
+    path = used.directory / name
+    assert path.exists()
+    for put_there in (os.mkfifo, lambda path: path.symlink_to("/dev/zero")):
+        path.unlink()
+        put_there(path)
+        selected = used.find_selected()
+        assert selected.document is not None
+        assert name in selected.notes[0] and "no file" in selected.notes[0]

@@ -15,7 +15,10 @@ learned with the same sign in both directions, an offset of that range of forces
 
 A supervisor watches for hunting: corrections that change sign again and again at one target are friction's (or the
 world's), not the model's. Each makes the zone wider and the pace slower; after MOST_TURNS the trim stands still until the
-target has moved by more than NEW_TARGET_N, and says so.
+target has moved by more than NEW_TARGET_N, and says so. A correction that had come to its limit was not friction's, but that
+of air that failed and came back, or the like: the count begins anew. And where the trim turned round it may stand wrong: an
+error of one sign for STOOD_S, wider than the zone has become, is corrected again; behind each further standstill at one target
+after twice as long.
 """
 
 from math import exp, sqrt
@@ -35,6 +38,7 @@ NOISE_S: Final = 2.0  # over which the noise is estimated
 WIDER: Final = 1.5  # zone after each turn
 SLOWER: Final = 0.6  # pace after each turn
 MOST_TURNS: Final = 5
+STOOD_S: Final = 2.0
 NEW_TARGET_N: Final = 1.0
 SAME_WAY_N: Final = 10.0  # steps the same way err alike: friction yields more to a fast slide than to a ladder's stairs
 OTHER_WAY_N: Final = 1.0
@@ -52,6 +56,7 @@ class MeasuredTrim:
         self._before_n: float | None = None
         self._smooth_n = self._seen_s = self._interval_s = 0.0
         self._way = self._last_way = self._turns = 0
+        self._had_reached_limit, self._stood_s, self._patience_s = False, 0.0, STOOD_S
         self.reset()
 
     @property
@@ -94,7 +99,7 @@ class MeasuredTrim:
         """Return what the correction asks for, within the limit of the rig."""
         self.value_v, limited_by = trim_limited(value_v, self._settings.limit_v)
         if limited_by:
-            self.limited_by = limited_by
+            self.limited_by, self._had_reached_limit = limited_by, True
         return self.value_v
 
     def travel(self, moved_n: float) -> None:
@@ -138,10 +143,13 @@ class MeasuredTrim:
     def integrate(self, error_n: float, slope_n_per_v: float, interval_s: float) -> None:
         """Learn from one new sample. error_n: wanted minus what is measured and still comes; slope_n_per_v:
         of the model at the working point, which tells the limit in newtons."""
-        if self.is_off or self.has_hunted:
+        if self.is_off:
             return
         self._smooth(error_n, interval_s)
         zone_n = self._zone_n()
+        if self.has_hunted:
+            self._stand(zone_n, interval_s)
+            return
         if abs(self._smooth_n) > zone_n and self._seen_s >= LEAST_SEEN_S:
             self._turn(1 if self._smooth_n > 0.0 else -1)
         elif self._way * self._smooth_n < LEFT_SHARE * zone_n:
@@ -151,6 +159,7 @@ class MeasuredTrim:
         pace_per_s = self._pace_per_s(interval_s) * SLOWER**self._turns
         wanted_n = self.value_n + pace_per_s * error_n * interval_s
         self.value_n, self.limited_by = trim_limited(wanted_n, self._settings.limit_v * slope_n_per_v)
+        self._had_reached_limit |= self.limited_by is not LimitedBy.NONE
         self._learned_n, self._learned_at_n, self._going_then = self.value_n, self._at_n, self._going
         self._own_n = self.value_n - self._common_here_n()
 
@@ -160,8 +169,19 @@ class MeasuredTrim:
 
     def _turn(self, way: int) -> None:
         if self._last_way and way != self._last_way:
-            self._turns += 1
+            self._turns = 0 if self._had_reached_limit else self._turns + 1
+            self._had_reached_limit = False
         self._way = self._last_way = way
+
+    def _stand(self, zone_n: float, interval_s: float) -> None:
+        """Stand still behind too many turns, unless what is left is an offset."""
+        way = 1 if self._smooth_n > 0.0 else -1
+        is_offset = abs(self._smooth_n) > WIDER * zone_n and way * self._stood_s >= 0.0
+        self._stood_s = self._stood_s + way * interval_s if is_offset else 0.0
+        if abs(self._stood_s) > self._patience_s:
+            patience_s = 2.0 * self._patience_s
+            self._calm()
+            self._patience_s = patience_s
 
     def _smooth(self, error_n: float, interval_s: float) -> None:
         if self._before_n is not None:
@@ -185,4 +205,6 @@ class MeasuredTrim:
 
     def _calm(self) -> None:
         self._turns = self._last_way = 0
+        self._had_reached_limit = False
+        self._stood_s, self._patience_s = 0.0, STOOD_S
         self._calm_at_n = self._at_n

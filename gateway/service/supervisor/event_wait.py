@@ -35,7 +35,11 @@ def wait_readable(descriptors: list[int], timeout_s: float) -> set[int]:
 
 
 class SignalPipe:
-    """SIGINT, SIGTERM and SIGHUP as readable bytes: nothing of ours runs inside a signal handler. Stray signals are ignored."""
+    """SIGINT, SIGTERM and SIGHUP as readable bytes: nothing of ours runs inside a signal handler. Stray signals are ignored.
+
+    Who starts us may have signals blocked (a thread of a Qt or Java program), and that is inherited: nothing but SIGKILL would
+    stop us and our children then.
+    """
 
     def __init__(self) -> None:
         self._reader, self._writer = socket.socketpair()
@@ -59,6 +63,7 @@ class SignalPipe:
         for number in _STRAY:
             signal.signal(number, signal.SIG_IGN)
         signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
+        signal.pthread_sigmask(signal.SIG_SETMASK, ())
         return self
 
     def __exit__(

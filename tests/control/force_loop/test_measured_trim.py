@@ -6,7 +6,7 @@ import pytest
 
 from gateway.bsfm.response.second_order import SecondOrder
 from gateway.control import Trim
-from gateway.control.force_loop.measured_trim import MOST_TURNS, NEW_TARGET_N, MeasuredTrim
+from gateway.control.force_loop.measured_trim import MOST_TURNS, NEW_TARGET_N, STOOD_S, MeasuredTrim
 from gateway.control.settings import LoopTiming
 from gateway.registers.words import LimitedBy
 
@@ -76,17 +76,60 @@ def test_what_both_directions_agree_on_outlives_a_turn():
     assert abs(one.value_n) < 0.05
 
 
-def test_hunting_slows_it_down_and_stops_it_until_there_is_a_new_target():
-    one, way = trim(), 1.0
+def hunt(one: MeasuredTrim) -> MeasuredTrim:
+    """A stuck slide that gives way again and again: within the trim's limit, so that the trim comes to turn round."""
+    way = 1.0
     for _ in range(MOST_TURNS + 1):
-        for _ in range(200):
-            one.integrate(3.0 * way, SLOPE_N_PER_V, SAMPLE_S)
+        for _ in range(80):
+            one.integrate(1.4 * way, SLOPE_N_PER_V, SAMPLE_S)
         way = -way
     assert one.has_hunted
+    return one
+
+
+def test_hunting_slows_it_down_and_stops_it_until_there_is_a_new_target():
+    one = hunt(trim())
     stood_n = one.value_n
     held(one, 2.0, 1.0)
     assert one.value_n == stood_n
     one.travel(NEW_TARGET_N + 0.1)
+    assert not one.has_hunted
+
+
+def test_where_it_stands_wrong_behind_the_hunting_it_corrects_again():
+    """It stands where it turned, which is the furthest from where it should be."""
+    assert abs(held(hunt(trim()), 2.0, 6.0)) < 0.2
+
+
+def test_each_further_standstill_at_one_target_takes_twice_as_long():
+    one, stood_s = trim(limit_v=5.0), []
+    for _ in range(3):
+        hunt(one)
+        samples = 0
+        while one.has_hunted and samples < 2000:
+            one.integrate(2.0, SLOPE_N_PER_V, SAMPLE_S)
+            samples += 1
+        stood_s.append(samples * SAMPLE_S)
+    assert stood_s == pytest.approx([STOOD_S, 2.0 * STOOD_S, 4.0 * STOOD_S], abs=0.7)
+
+
+def test_behind_the_hunting_an_error_to_and_fro_is_left_alone():
+    one, way = hunt(trim()), 1.0
+    for _ in range(10):
+        for _ in range(round(0.8 * STOOD_S / SAMPLE_S)):
+            one.integrate(3.0 * way, SLOPE_N_PER_V, SAMPLE_S)
+        way = -way
+    assert one.has_hunted
+
+
+def test_failures_that_bring_it_to_its_limit_are_no_hunting():
+    """Air that fails ten times at one setpoint, and comes back: it has stood still at its limit, 4 N beside the setpoint."""
+    one = trim()
+    for _ in range(2 * MOST_TURNS):
+        for _ in range(100):
+            one.integrate(11.0, SLOPE_N_PER_V, SAMPLE_S)
+        assert one.limited_by is LimitedBy.TRIM_RANGE
+        assert abs(held(one, -one.value_n, 1.5)) < 0.3
     assert not one.has_hunted
 
 

@@ -42,3 +42,17 @@ def test_a_signal_that_asks_for_a_stop_is_one_byte(number):
     with SignalPipe() as signals:
         os.kill(os.getpid(), number)
         assert signals.take() == 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_that_who_started_us_had_blocked_is_heard(number):
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+    try:
+        with SignalPipe() as signals:
+            os.kill(os.getpid(), number)
+            assert signals.take() == 1
+            assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == set(), "children inherit it"
+    finally:
+        handler = signal.signal(number, signal.SIG_IGN)  # one that still waits is dropped, and ends no test run
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(number, handler)
