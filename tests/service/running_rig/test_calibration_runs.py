@@ -14,7 +14,7 @@ from gateway.service.running_rig.calibration_runs import FOLLOWED_S, Calibration
 from gateway.service.running_rig.fit_launcher import Result
 from tests.disk.at_once import AtOnce
 from tests.service.rigs import demo
-from tests.service.running_rig.simulated_rig import SmallRig
+from tests.service.running_rig.simulated_rig import CALIBRATE, SmallRig
 from tests.service.test_run_recording import HangingDisk
 from tests.service.wired import ENABLE, Wired
 
@@ -185,6 +185,35 @@ def test_a_run_begun_while_the_last_ones_file_is_being_closed_is_not_taken_for_i
     assert fits == [Path(told["recording"])]
     fits.on_result({"stored": 3, "report": "report.html"})
     assert (runs.stored, runs.status()["phase"]) == (3, "stored")
+    assert runs.answer({"plan": SHORT})["result"] == {}, "that of the new run is not known yet"
+
+
+def test_a_masters_run_continues_none_of_this_machines(tmp_path: Path) -> None:
+    rig, runs, disk = on_a_hanging_disk(tmp_path)
+    headers = []
+    for ask in (
+        lambda: runs.answer({"plan": SHORT, "continues": [7], "name": "Monday"}),
+        lambda: rig.write(0, CALIBRATE),
+    ):
+        ask()
+        rig.run(0.5)
+        runs.answer({"stop": True})
+        rig.until(State.OFF).run(0.1)
+        disk.let_go()
+        headers.append(read_recording(Path(runs.status()["recording"])).header)
+    assert [(header["continues"], header["name"]) for header in headers] == [([7], "Monday"), ([], "")]
+
+
+def test_a_ladder_behind_which_no_sample_comes_is_closed_all_the_same(
+    tmp_path: Path, fits: Fits, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig, runs, disk = on_a_hanging_disk(tmp_path)
+    monkeypatch.setattr(runs, "append", lambda *row: None)
+    runs.answer({"plan": SHORT})
+    climb(rig, runs)
+    rig.run(1.0)
+    disk.let_go()
+    assert fits == [Path(runs.status()["recording"])]
 
 
 def delete_its_file(runs: CalibrationRuns, disk: HangingDisk) -> None:
