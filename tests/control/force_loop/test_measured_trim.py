@@ -76,6 +76,26 @@ def test_what_both_directions_agree_on_outlives_a_turn():
     assert abs(one.value_n) < 0.05
 
 
+def test_what_the_directions_do_not_agree_on_does_not_outlive_a_turn():
+    one, way = trim(), 1.0
+    one.travel(20.0)
+    for _ in range(4):
+        one.travel(3.0 * way)
+        held(one, way - one.value_n, 3.0)
+        way = -way
+    one.travel(1.5 * way)
+    assert abs(one.value_n) < 0.3
+
+
+def test_what_another_trim_has_learned_fades_on_the_way_too():
+    one = trim()
+    one.resume(1.0)
+    one.travel(0.0)
+    assert one.value_n == 1.0
+    one.travel(40.0)
+    assert abs(one.value_n) < 0.05
+
+
 def test_hunting_slows_it_down_and_stops_it_until_there_is_a_new_target():
     one, way = trim(), 1.0
     for _ in range(MOST_TURNS + 1):
