@@ -62,18 +62,10 @@ def test_nothing_is_known_before_the_first_readback_which_is_repeated() -> None:
 
 
 def test_an_order_waits_until_the_valve_has_said_where_it_stands() -> None:
-    relay = Relay().run(0.5, PULL)
+    relay = Relay()
+    relay.line.set_direction(PULL, relay.now_s)
+    relay.run(0.5, PULL)
     assert [question for _, question in relay.asked[:2]] == [None, PULL]
-
-
-def test_half_an_answer_from_before_a_time_out_is_no_part_of_the_next() -> None:
-    relay = Relay(PULL)
-    relay.is_deaf = True
-    relay.run(0.05)
-    relay.line.on_bytes(relay.device.reply(None, PUSH)[:3], relay.now_s)
-    relay.is_deaf = False
-    relay.run(PROFILE.reply_timeout_s)
-    assert (relay.line.status.stands, relay.line.garbage_bytes) == (PULL, 0)
 
 
 def test_an_order_goes_out_once_and_its_readback_follows_at_once() -> None:
