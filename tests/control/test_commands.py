@@ -205,6 +205,15 @@ def test_a_lease_that_ramps_ends_in_off_without_a_fault():
     assert any(event.startswith("A310") for event in bench.events)
 
 
+def test_an_enable_right_behind_an_output_that_went_off_by_itself_counts():
+    """Nothing has been decided since the bits were cleared."""
+    bench = enabled(settings(lease_s=0.2, lease_action=LeaseAction.RAMP))
+    bench.write(force_setpoint_n=30.0)
+    bench.seconds_until(lambda output: output.state is State.OFF, 3.0)
+    assert bench.last.clear_command
+    assert bench.enable(12.0, heartbeat=7).state is not State.OFF
+
+
 def test_without_a_lease_a_closed_connection_changes_nothing():
     bench = enabled()
     bench.force(12.0)

@@ -15,8 +15,9 @@ learned with the same sign in both directions, an offset of that range of forces
 
 A supervisor watches for hunting: corrections that change sign again and again at one target are friction's (or the
 world's), not the model's. Each makes the zone wider and the pace slower; after MOST_TURNS the trim stands still until the
-target has moved by more than NEW_TARGET_N, and says so. A correction that had come to its limit was not friction's, but that
-of air that failed and came back, or the like: the count begins anew. And where the trim turned round it may stand wrong: an
+target has moved by more than NEW_TARGET_N, and says so. A correction that has stood at its limit was not friction's, but that
+of air that failed and came back, or the like: the count begins anew. One that only touched it counts, for a trim may swing
+from limit to limit. And where the trim turned round it may stand wrong: an
 error of one sign for STOOD_S, wider than the zone has become, is corrected again; behind each further standstill at one target
 after twice as long.
 """
@@ -39,6 +40,10 @@ WIDER: Final = 1.5  # zone after each turn
 SLOWER: Final = 0.6  # pace after each turn
 MOST_TURNS: Final = 5
 STOOD_S: Final = 2.0
+AT_LIMIT_S: Final = (
+    0.5  # and AT_LIMIT_PACES times what the trim takes for a correction: longer than a swing stays there
+)
+AT_LIMIT_PACES: Final = 2.0
 NEW_TARGET_N: Final = 1.0
 SAME_WAY_N: Final = 10.0  # steps the same way err alike: friction yields more to a fast slide than to a ladder's stairs
 OTHER_WAY_N: Final = 1.0
@@ -56,7 +61,7 @@ class MeasuredTrim:
         self._before_n: float | None = None
         self._smooth_n = self._seen_s = self._interval_s = 0.0
         self._way = self._last_way = self._turns = 0
-        self._had_reached_limit, self._stood_s, self._patience_s = False, 0.0, STOOD_S
+        self._at_limit_s, self._stood_s, self._patience_s = 0.0, 0.0, STOOD_S  # at_limit_s: since it turned last
         self.reset()
 
     @property
@@ -99,7 +104,7 @@ class MeasuredTrim:
         """Return what the correction asks for, within the limit of the rig."""
         self.value_v, limited_by = trim_limited(value_v, self._settings.limit_v)
         if limited_by:
-            self.limited_by, self._had_reached_limit = limited_by, True
+            self.limited_by = limited_by
         return self.value_v
 
     def travel(self, moved_n: float) -> None:
@@ -156,10 +161,10 @@ class MeasuredTrim:
             self._way = 0
         if not self._way:
             return
+        self._at_limit_s += interval_s if self.limited_by is not LimitedBy.NONE else 0.0
         pace_per_s = self._pace_per_s(interval_s) * SLOWER**self._turns
         wanted_n = self.value_n + pace_per_s * error_n * interval_s
         self.value_n, self.limited_by = trim_limited(wanted_n, self._settings.limit_v * slope_n_per_v)
-        self._had_reached_limit |= self.limited_by is not LimitedBy.NONE
         self._learned_n, self._learned_at_n, self._going_then = self.value_n, self._at_n, self._going
         self._own_n = self.value_n - self._common_here_n()
 
@@ -169,9 +174,12 @@ class MeasuredTrim:
 
     def _turn(self, way: int) -> None:
         if self._last_way and way != self._last_way:
-            self._turns = 0 if self._had_reached_limit else self._turns + 1
-            self._had_reached_limit = False
+            self._turns = 0 if self._has_stood_at_limit() else self._turns + 1
+            self._at_limit_s = 0.0
         self._way = self._last_way = way
+
+    def _has_stood_at_limit(self) -> bool:
+        return self._at_limit_s > max(AT_LIMIT_S, AT_LIMIT_PACES / self._timing.integral_per_s)
 
     def _stand(self, zone_n: float, interval_s: float) -> None:
         """Stand still behind too many turns, unless what is left is an offset."""
@@ -205,6 +213,6 @@ class MeasuredTrim:
 
     def _calm(self) -> None:
         self._turns = self._last_way = 0
-        self._had_reached_limit = False
+        self._at_limit_s = 0.0
         self._stood_s, self._patience_s = 0.0, STOOD_S
         self._calm_at_n = self._at_n

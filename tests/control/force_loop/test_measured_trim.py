@@ -76,6 +76,26 @@ def test_what_both_directions_agree_on_outlives_a_turn():
     assert abs(one.value_n) < 0.05
 
 
+def test_what_the_directions_do_not_agree_on_does_not_outlive_a_turn():
+    one, way = trim(), 1.0
+    one.travel(20.0)
+    for _ in range(4):
+        one.travel(3.0 * way)
+        held(one, way - one.value_n, 3.0)
+        way = -way
+    one.travel(1.5 * way)
+    assert abs(one.value_n) < 0.3
+
+
+def test_what_another_trim_has_learned_fades_on_the_way_too():
+    one = trim()
+    one.resume(1.0)
+    one.travel(0.0)
+    assert one.value_n == 1.0
+    one.travel(40.0)
+    assert abs(one.value_n) < 0.05
+
+
 def hunt(one: MeasuredTrim) -> MeasuredTrim:
     """A stuck slide that gives way again and again: within the trim's limit, so that the trim comes to turn round."""
     way = 1.0
@@ -120,6 +140,22 @@ def test_behind_the_hunting_an_error_to_and_fro_is_left_alone():
             one.integrate(3.0 * way, SLOPE_N_PER_V, SAMPLE_S)
         way = -way
     assert one.has_hunted
+
+
+def test_a_swing_from_limit_to_limit_is_hunting():
+    """A plant that answers later than was measured may keep it going: it must become slower, and come to an end."""
+    one, way, waited_s = trim(), 1.0, []
+    while not one.has_hunted and len(waited_s) < 2 * MOST_TURNS:
+        samples = 0
+        while not one.has_hunted and (one.limited_by is LimitedBy.NONE or one.value_n * way < 0.0):
+            one.integrate(3.0 * way, SLOPE_N_PER_V, SAMPLE_S)
+            samples += 1
+        for _ in range(20):
+            one.integrate(3.0 * way, SLOPE_N_PER_V, SAMPLE_S)
+        waited_s.append(samples * SAMPLE_S)
+        way = -way
+    assert len(waited_s) == MOST_TURNS + 1
+    assert waited_s[-2] > 2.0 * waited_s[1]
 
 
 def test_failures_that_bring_it_to_its_limit_are_no_hunting():

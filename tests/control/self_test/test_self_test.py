@@ -76,7 +76,8 @@ def test_each_fault_is_found_by_its_own_item_and_by_no_other(seed: int, name: st
     assert failed == [item], report.sentences
     assert report.result is SelfTestResult.FAILED
     assert rig.peak_n < FORCE_N and rig.took_s < LONGEST_S
-    assert any(sentence.startswith("A354 self-test") for sentence in rig.events)
+    assert rig.controller.state is State.OFF, "no fault of the supervision came first"
+    assert sum(sentence.startswith("A354 self-test") for sentence in rig.events) == 1
 
 
 @pytest.mark.parametrize("factor", [2.5, 8.0])

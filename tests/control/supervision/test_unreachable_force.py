@@ -47,6 +47,18 @@ def test_air_that_fails_while_holding_is_told_by_the_pressure() -> None:
     assert "contact" not in said
 
 
+def test_what_is_reached_again_and_missed_again_is_told_again() -> None:
+    bench = holding(Measured(seed=1))
+    bench.plant.air = False
+    told(bench)
+    bench.plant.air = True
+    bench.run(3.0)
+    assert bench.last.state is State.HOLDING
+    bench.events.clear()
+    bench.plant.air = False
+    told(bench)
+
+
 def test_contact_that_is_lost_while_holding_is_told_by_the_pressure() -> None:
     bench = holding(Measured(seed=2))
     bench.plant.contact = False

@@ -14,7 +14,7 @@ from gateway.service.running_rig.calibration_runs import FOLLOWED_S, Calibration
 from gateway.service.running_rig.fit_launcher import Result
 from tests.disk.at_once import AtOnce
 from tests.service.rigs import demo
-from tests.service.running_rig.simulated_rig import SmallRig
+from tests.service.running_rig.simulated_rig import CALIBRATE, SmallRig
 from tests.service.test_run_recording import HangingDisk
 from tests.service.wired import ENABLE, Wired
 
@@ -185,6 +185,60 @@ def test_a_run_begun_while_the_last_ones_file_is_being_closed_is_not_taken_for_i
     assert fits == [Path(told["recording"])]
     fits.on_result({"stored": 3, "report": "report.html"})
     assert (runs.stored, runs.status()["phase"]) == (3, "stored")
+    assert runs.answer({"plan": SHORT})["result"] == {}, "that of the new run is not known yet"
+
+
+def test_a_dry_run_says_what_it_would_do_and_moves_nothing(tmp_path: Path) -> None:
+    rig, runs, _ = on_a_hanging_disk(tmp_path)
+    told = runs.answer({"plan": SHORT, "dry_run": True})
+    rig.run(1.0)
+    assert told["stairs"] > 10 and told["force_max_n"] > 30.0
+    assert (rig.state, rig.wire.voltage_v, runs.status()["running"]) == (State.OFF, 0.0, False)
+    assert runs.status()["recording"] is None
+
+
+def test_a_fit_that_refuses_leaves_room_for_the_next_run(tmp_path: Path, fits: Fits) -> None:
+    """The payload that hangs on the cell meanwhile is none of the model's force."""
+    rig, runs, disk = on_a_hanging_disk(tmp_path)
+    rig.write(9, 600)
+    runs.answer({"plan": SHORT})
+    climb(rig, runs)
+    disk.let_go()
+    recorded = read_recording(fits[0]).columns["force_n"]
+    assert rig.loop.decision.force_measured_n > 5.0
+    assert abs(recorded[:20]).max() < 1.0 and abs(recorded[-1]) < 3.0
+    assert "being fitted" in rig.controller.refusal_of_run(rig.now(), QUICK)
+    fits.on_result({"refused": "A332 no"})
+    assert (runs.status()["phase"], runs.status()["result"]) == ("refused", {"refused": "A332 no"})
+    assert rig.controller.refusal_of_run(rig.now(), QUICK) == ""
+
+
+def test_a_masters_run_continues_none_of_this_machines(tmp_path: Path) -> None:
+    rig, runs, disk = on_a_hanging_disk(tmp_path)
+    headers = []
+    for ask in (
+        lambda: runs.answer({"plan": SHORT, "continues": [7], "name": "Monday"}),
+        lambda: rig.write(0, CALIBRATE),
+    ):
+        ask()
+        rig.run(0.5)
+        runs.answer({"stop": True})
+        rig.until(State.OFF).run(0.1)
+        disk.let_go()
+        headers.append(read_recording(Path(runs.status()["recording"])).header)
+    assert [(header["continues"], header["name"]) for header in headers] == [([7], "Monday"), ([], "")]
+
+
+def test_a_ladder_behind_which_no_sample_comes_is_closed_all_the_same(
+    tmp_path: Path, fits: Fits, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig, runs, disk = on_a_hanging_disk(tmp_path)
+    monkeypatch.setattr(runs, "append", lambda *row: None)
+    runs.answer({"plan": SHORT})
+    climb(rig, runs)
+    rig.run(1.0)
+    disk.let_go()
+    assert fits == [Path(runs.status()["recording"])]
 
 
 def delete_its_file(runs: CalibrationRuns, disk: HangingDisk) -> None:

@@ -185,6 +185,19 @@ def test_a_run_that_takes_the_zero_first_does_not_begin_where_no_tare_would() ->
     assert "still on their way to 0" in rig.controller.refusal_of_run(rig.now(), replace(SHORT, tare=True))
 
 
+def test_a_run_that_takes_enables_place_ends_with_its_bit_all_the_same() -> None:
+    rig = SmallRig()
+    rig.write(0, ENABLE)
+    rig.until(State.READY)
+    rig.write(0, CALIBRATE)
+    rig.until(State.CALIBRATING).run(1.0)
+    rig.write(0, *rig.block(CALIBRATE, beat=9))
+    assert rig.state is State.CALIBRATING, "a master that writes in cycles"
+    rig.write(0, 0)
+    rig.until(State.OFF, 2.0)
+    assert rig.word("calibration_phase") == CalibrationPhase.STOPPED
+
+
 def test_no_run_begins_where_the_tool_waits_for_contact_with_a_force() -> None:
     rig = SmallRig(contact=False)
     rig.write(0, ENABLE, 1200)

@@ -8,7 +8,7 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
-from gateway.devices import DeviceProfile, cell_device, output_device
+from gateway.devices import DeviceProfile, cell_device, output_device, output_host
 from gateway.devices.device_checks.spelling import CheckSpelling
 from gateway.devices.fields import Value
 from gateway.devices.grammar import Grammar
@@ -205,3 +205,12 @@ def test_a_load_cell_that_says_that_it_is_another_one_is_not_read() -> None:
     wired.world._cell = cell_device(module)
     wired.write(0, RESET)
     wired.until(lambda: wired.loop.samples > 0, 1.0)
+
+
+def test_a_trip_is_that_of_the_device_behind_the_plug_of_then() -> None:
+    """Else the next one is told no voltage, not even the safe one."""
+    checks = DeviceChecks(output_host(device()), is_waived=False)
+    checks.trip()
+    assert checks.level.is_tripped and not checks.is_done
+    checks.begin()
+    assert not checks.level.is_tripped and checks.fault is FaultCode.NONE

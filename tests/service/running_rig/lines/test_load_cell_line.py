@@ -94,6 +94,13 @@ def test_an_answer_that_comes_late_is_a_reading_and_brings_no_third_question(wir
     assert (len(wire.samples), len(wire.asked)) == (2, 3)
 
 
+def test_a_reset_asks_no_second_question_of_the_right_cell(wire: Wire) -> None:
+    wire.tick()
+    wire.exchange.clear_faults()
+    wire.tick()
+    assert wire.asked == [b"W?\r\n"]
+
+
 def test_after_a_lost_answer_the_line_is_back_at_its_rate(wire: Wire) -> None:
     wire.tick()
     wire.tick(TIMEOUT_S + 0.01)

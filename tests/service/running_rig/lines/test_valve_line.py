@@ -1,7 +1,13 @@
 """The valve's line in virtual time: one question is out, the readback decides, an order goes out once, silence has an age."""
 
+from dataclasses import replace
+
+from gateway.codes.faults import FaultCode
+from gateway.control.settings import ValveControl
 from gateway.devices import ValveDevice, ValveDirection, ValveHost
+from gateway.registers.words import State
 from gateway.service.running_rig.lines.valve_line import ValveExchange
+from tests.control.bench import settings
 from tests.profile_files import load_device
 from tests.service.running_rig.simulated_rig import SmallRig
 
@@ -55,6 +61,13 @@ def test_nothing_is_known_before_the_first_readback_which_is_repeated() -> None:
     assert 9 <= len(relay.asked) <= 11
 
 
+def test_an_order_waits_until_the_valve_has_said_where_it_stands() -> None:
+    relay = Relay()
+    relay.line.set_direction(PULL, relay.now_s)
+    relay.run(0.5, PULL)
+    assert [question for _, question in relay.asked[:2]] == [None, PULL]
+
+
 def test_an_order_goes_out_once_and_its_readback_follows_at_once() -> None:
     relay = Relay().run(0.5, PUSH)
     began_s = relay.now_s
@@ -89,6 +102,28 @@ def test_a_port_that_is_back_is_lost_no_more() -> None:
     assert (relay.line.status.lost, relay.line.status.stands) == (True, None)
     rig.loop.on_valve_opened()
     assert (relay.line.status.lost, relay.run(0.5).line.status.stands) == (False, PULL)
+
+
+def test_unplugged_and_replugged_between_two_ticks_is_a_fault_all_the_same() -> None:
+    """Another relay may be behind the name now, and the valve elsewhere under the force."""
+    rig, relay = SmallRig(replace(settings(), valve=ValveControl(pull_area_share=0.75))), Relay()
+    rig.loop.valve = relay.line
+
+    def run(seconds: float) -> None:
+        for _ in range(round(seconds * 100)):
+            relay.now_s = rig.now()
+            while relay.answers and relay.answers[0][0] <= relay.now_s:
+                rig.loop.on_valve_bytes(relay.answers.pop(0)[1], relay.now_s)
+            rig.run(0.01)
+
+    run(1.0)
+    rig.write(0, 1, 1200)
+    run(2.0)
+    assert rig.state is State.HOLDING
+    rig.loop.on_valve_closed()
+    rig.loop.on_valve_opened()
+    assert (rig.state, rig.wire.voltage_v) == (State.FAULT, 0.0)
+    assert rig.word("fault_code") == FaultCode.VALVE_SILENT
 
 
 def test_silence_has_an_age_until_an_answer_ends_it() -> None:
