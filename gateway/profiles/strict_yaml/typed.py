@@ -76,7 +76,9 @@ def _fault(kind: type, document: Document, path: Path, finding: Mapping[str, Any
         return replace(document.fault(place, missing, at_key=True), kind=FaultKind.MISSING)
     if finding["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         known = names(kind_at(kind, place[len(path) : -1], document.at(*place[:-1])) or kind)
-        sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, groups_by_key(kind))
+        here = next((step for step in reversed(place[:-1]) if isinstance(step, str)), "")  # also of its other types
+        elsewhere = {name: group for name, group in groups_by_key(kind).items() if group != here}
+        sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, elsewhere)
         return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=suggestion)
     return document.fault(place, type_sentence(finding, document.at(*place), key))
 
