@@ -15,6 +15,7 @@ from gateway.fieldbus.connection import Connection, ServerState
 from gateway.fieldbus.peers import address_of
 from gateway.fieldbus.rate_limits import RequestRate
 from gateway.fieldbus.tls_settings import (
+    HANDSHAKE_BYTES,
     HANDSHAKE_S,
     HANDSHAKES_PER_S,
     MOST_PENDING,
@@ -66,6 +67,7 @@ class TlsStream(asyncio.BufferedProtocol):
         self._view = memoryview(self._buffer)
         self._connection: Connection | None = None
         self._is_paused = self._is_closing = False
+        self._shaken_bytes = 0
 
     # -- towards the socket
 
@@ -97,6 +99,8 @@ class TlsStream(asyncio.BufferedProtocol):
     def buffer_updated(self, size: int) -> None:
         """Take encrypted bytes on."""
         if self._is_closing:
+            return
+        if self._connection is None and not self._is_short(size):
             return
         self._incoming.write(self._view[:size])
         if self._connection is None:
@@ -179,6 +183,16 @@ class TlsStream(asyncio.BufferedProtocol):
         self._socket.abort()
 
     # -- between the two
+
+    def _is_short(self, size: int) -> bool:
+        """Count what has come before there is a connection; cut who sends too much of it."""
+        self._shaken_bytes += size
+        if self._shaken_bytes > HANDSHAKE_BYTES:
+            self._refuse(
+                "handshake", f"W243 {self.peer}: more than {HANDSHAKE_BYTES} bytes of handshake, a short chain will do"
+            )
+            return False
+        return True
 
     def _shake_hands(self) -> None:
         try:

@@ -2,6 +2,7 @@
 
 import resource
 import ssl
+from contextlib import suppress
 from datetime import UTC, datetime
 from ipaddress import ip_network
 from pathlib import Path
@@ -146,6 +147,25 @@ def test_eight_handshakes_at_a_time_each_at_most_five_seconds(face: Face) -> Non
     assert not face.handshakes.pending
     assert [line.socket.ended for line in lines] == ["aborted"] * MOST_PENDING
     assert face.log[1:] == ["W243 127.0.0.1:40000: the handshake was not finished within 5 s"] * MOST_PENDING
+
+
+def test_who_shows_certificates_without_end_is_cut_before_they_are_judged(
+    face: Face, folder: Folder, tmp_path: Path
+) -> None:
+    """240 of one name took 50 ms of the control loop to lead nowhere, and eight connections may shake hands at a time."""
+    chain, own = tmp_path / "chain.pem", Path(folder.crt("foreign")).read_text()
+    for copies, sentence in (
+        (1, "W240 127.0.0.1:40000: its certificate is not of our CA"),
+        (60, "W243 127.0.0.1:40000: more"),
+    ):
+        chain.write_text(copies * own)
+        context = client(folder)
+        context.load_cert_chain(chain, folder.key("foreign"))
+        line = face.accept()
+        with suppress(ssl.SSLError):
+            line.greet(context)
+        assert line.socket.ended and not face.handshakes.pending
+        assert face.log.pop().startswith(sentence) and not face.log
 
 
 def test_a_stranger_to_the_allow_list_begins_no_handshake(face: Face) -> None:
