@@ -52,9 +52,12 @@ def build_known(kind: type[T], document: Document, path: Path = ()) -> T | None:
 
 
 def _keep_first_findings(error: ValidationError) -> list[Any]:
-    """Return one finding per place, the first: a union reports each of its members. No more than a person
-    reads: a sentence takes half a millisecond, and a hostile document may have thousands."""
+    """Return one finding per place, the first: a union reports each of its members, and a list too few entries where it
+    has left out those with a finding of their own. No more than a person reads: a sentence takes half a millisecond, and a
+    hostile document may have thousands."""
     first = error.errors(include_url=False)[:_MOST_FINDINGS]
+    inside = {finding["loc"][:-1] for finding in first}
+    first = [finding for finding in first if finding["type"] != "too_short" or finding["loc"] not in inside]
     return list({_steps(finding["loc"]): finding for finding in reversed(first)}.values())[::-1]
 
 
