@@ -19,6 +19,7 @@ from gateway.fieldbus.tls_settings import (
     HANDSHAKE_S,
     HANDSHAKES_PER_S,
     MOST_PENDING,
+    MOST_PENDING_OF_ONE,
     certificate_refusal,
     handshake_failure,
 )
@@ -44,6 +45,8 @@ class Handshakes:
             return f"{MOST_PENDING} handshakes are under way, the most allowed"
         if address_of(host).is_loopback:
             return None
+        if sum(stream.peer.host == host for stream in self.pending) >= MOST_PENDING_OF_ONE:
+            return f"{MOST_PENDING_OF_ONE} handshakes of this address are under way, the most allowed"
         rate = self.rates.setdefault(host, RequestRate(HANDSHAKES_PER_S, now_s))
         if rate.wait_s(now_s) > 0.0:
             return f"more than {HANDSHAKES_PER_S:g} handshakes a second"

@@ -11,7 +11,7 @@ import pytest
 
 from gateway.fieldbus import ServerSettings
 from gateway.fieldbus.peers import Peers
-from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING
+from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING, MOST_PENDING_OF_ONE
 from gateway.modbus import Role, pdu
 from gateway.modbus.certificate import ROLES, read_certificate
 from tests.certificates import Folder, serial_of
@@ -174,6 +174,13 @@ def test_a_stranger_to_the_allow_list_begins_no_handshake(face: Face) -> None:
     assert face.handshakes.pending == {friend.stream} and stranger.socket.ended == "aborted"
     assert face.log == ["W230 192.168.1.9:40000: its address is in none of the allowed networks"]
     friend.socket.leave()
+
+
+def test_one_address_that_says_nothing_does_not_keep_the_others_out(face: Face) -> None:
+    silent = [face.accept("10.0.0.7") for _ in range(MOST_PENDING)]
+    assert [line.socket.ended for line in silent].count("aborted") == MOST_PENDING - MOST_PENDING_OF_ONE
+    assert set(face.log) == {"W243 10.0.0.7:40000: 4 handshakes of this address are under way, the most allowed"}
+    assert not face.accept("10.0.0.8").socket.ended
 
 
 def test_one_address_has_twenty_handshakes_a_second(face: Face) -> None:
