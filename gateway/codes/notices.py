@@ -80,8 +80,8 @@ NOTICES: Final = (
     Explanation(
         "W243",
         "TLS handshake not finished",
-        "A client did not finish its handshake in 5 s, or too many began at a time; it was cut.",
-        "A port scanner, a plain Modbus client that waits for an answer, or a very slow network.",
+        "A client did not finish its handshake in 5 s or in 12 KiB, or too many began at a time; it was cut.",
+        "A port scanner, a plain Modbus client that waits for an answer, a very slow network, a chain of many certificates.",
         "Look at what runs at the address in the line; `allow` of the face keeps others out.",
     ),
     Explanation(

@@ -25,7 +25,7 @@ class BindError(Exception):
     code = "E122"
 
     def __init__(self, host: str) -> None:
-        super().__init__(f"E122 {host} can be reached from the network: name the networks that may connect (allow)")
+        super().__init__(f"E122 {host} can be reached from the network: name those that may connect (network.allow)")
 
 
 class ModbusTcpServer:

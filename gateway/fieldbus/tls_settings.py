@@ -19,6 +19,11 @@ from gateway.modbus.certificate import ROLES, PeerCertificate
 
 HANDSHAKE_S: Final = 5.0
 MOST_PENDING: Final = 8
+MOST_PENDING_OF_ONE: Final = 4
+"""Of one address, loopback exempt: one machine that begins handshakes and says nothing must not keep the others out."""
+HANDSHAKE_BYTES: Final = 12288
+"""Of a client: room for two hellos and a chain of three RSA certificates. OpenSSL takes 100 KiB of certificates from anybody,
+and 50 ms of processor in the control loop to find that 240 of one name lead nowhere (measured); eight such make a stall."""
 HANDSHAKES_PER_S: Final = 20.0
 """Of one address; each costs the control loop about a millisecond of processor. Loopback is exempt."""
 CURVE: Final = "prime256v1"

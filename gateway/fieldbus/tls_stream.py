@@ -15,9 +15,11 @@ from gateway.fieldbus.connection import Connection, ServerState
 from gateway.fieldbus.peers import address_of
 from gateway.fieldbus.rate_limits import RequestRate
 from gateway.fieldbus.tls_settings import (
+    HANDSHAKE_BYTES,
     HANDSHAKE_S,
     HANDSHAKES_PER_S,
     MOST_PENDING,
+    MOST_PENDING_OF_ONE,
     certificate_refusal,
     handshake_failure,
 )
@@ -43,6 +45,8 @@ class Handshakes:
             return f"{MOST_PENDING} handshakes are under way, the most allowed"
         if address_of(host).is_loopback:
             return None
+        if sum(stream.peer.host == host for stream in self.pending) >= MOST_PENDING_OF_ONE:
+            return f"{MOST_PENDING_OF_ONE} handshakes of this address are under way, the most allowed"
         rate = self.rates.setdefault(host, RequestRate(HANDSHAKES_PER_S, now_s))
         if rate.wait_s(now_s) > 0.0:
             return f"more than {HANDSHAKES_PER_S:g} handshakes a second"
@@ -66,6 +70,7 @@ class TlsStream(asyncio.BufferedProtocol):
         self._view = memoryview(self._buffer)
         self._connection: Connection | None = None
         self._is_paused = self._is_closing = False
+        self._shaken_bytes = 0
 
     # -- towards the socket
 
@@ -97,6 +102,8 @@ class TlsStream(asyncio.BufferedProtocol):
     def buffer_updated(self, size: int) -> None:
         """Take encrypted bytes on."""
         if self._is_closing:
+            return
+        if self._connection is None and not self._is_short(size):
             return
         self._incoming.write(self._view[:size])
         if self._connection is None:
@@ -179,6 +186,16 @@ class TlsStream(asyncio.BufferedProtocol):
         self._socket.abort()
 
     # -- between the two
+
+    def _is_short(self, size: int) -> bool:
+        """Count what has come before there is a connection; cut who sends too much of it."""
+        self._shaken_bytes += size
+        if self._shaken_bytes > HANDSHAKE_BYTES:
+            self._refuse(
+                "handshake", f"W243 {self.peer}: more than {HANDSHAKE_BYTES} bytes of handshake, a short chain will do"
+            )
+            return False
+        return True
 
     def _shake_hands(self) -> None:
         try:

@@ -2,6 +2,7 @@
 
 import resource
 import ssl
+from contextlib import suppress
 from datetime import UTC, datetime
 from ipaddress import ip_network
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 
 from gateway.fieldbus import ServerSettings
 from gateway.fieldbus.peers import Peers
-from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING
+from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING, MOST_PENDING_OF_ONE
 from gateway.modbus import Role, pdu
 from gateway.modbus.certificate import ROLES, read_certificate
 from tests.certificates import Folder, serial_of
@@ -148,12 +149,38 @@ def test_eight_handshakes_at_a_time_each_at_most_five_seconds(face: Face) -> Non
     assert face.log[1:] == ["W243 127.0.0.1:40000: the handshake was not finished within 5 s"] * MOST_PENDING
 
 
+def test_who_shows_certificates_without_end_is_cut_before_they_are_judged(
+    face: Face, folder: Folder, tmp_path: Path
+) -> None:
+    """240 of one name took 50 ms of the control loop to lead nowhere, and eight connections may shake hands at a time."""
+    chain, own = tmp_path / "chain.pem", Path(folder.crt("foreign")).read_text()
+    for copies, sentence in (
+        (1, "W240 127.0.0.1:40000: its certificate is not of our CA"),
+        (60, "W243 127.0.0.1:40000: more"),
+    ):
+        chain.write_text(copies * own)
+        context = client(folder)
+        context.load_cert_chain(chain, folder.key("foreign"))
+        line = face.accept()
+        with suppress(ssl.SSLError):
+            line.greet(context)
+        assert line.socket.ended and not face.handshakes.pending
+        assert face.log.pop().startswith(sentence) and not face.log
+
+
 def test_a_stranger_to_the_allow_list_begins_no_handshake(face: Face) -> None:
     face.shared.peers = Peers(ServerSettings(allow=(ip_network("10.0.0.0/8"),)), guarded=True)
     stranger, friend = face.accept("192.168.1.9"), face.accept("10.0.0.9")
     assert face.handshakes.pending == {friend.stream} and stranger.socket.ended == "aborted"
     assert face.log == ["W230 192.168.1.9:40000: its address is in none of the allowed networks"]
     friend.socket.leave()
+
+
+def test_one_address_that_says_nothing_does_not_keep_the_others_out(face: Face) -> None:
+    silent = [face.accept("10.0.0.7") for _ in range(MOST_PENDING)]
+    assert [line.socket.ended for line in silent].count("aborted") == MOST_PENDING - MOST_PENDING_OF_ONE
+    assert set(face.log) == {"W243 10.0.0.7:40000: 4 handshakes of this address are under way, the most allowed"}
+    assert not face.accept("10.0.0.8").socket.ended
 
 
 def test_one_address_has_twenty_handshakes_a_second(face: Face) -> None:

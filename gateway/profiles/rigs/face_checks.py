@@ -9,7 +9,7 @@ from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.profiles.rigs.edit_marks import PLACEHOLDER
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
 from gateway.profiles.rigs.line_checks import UNSTABLE_PATHS, lines_of
-from gateway.registers.writes.ownership import serial_place
+from gateway.registers.writes.ownership import LARGEST_SERIAL_PLACE, serial_place
 
 
 def _rtu_faces(parts: Parts) -> Iterator[tuple[str, RtuFace]]:
@@ -35,6 +35,14 @@ def check_serial_owner(parts: Parts) -> Found:
         return
     there = ", ".join(f"serial:{int(path.partition('.')[2]) + 1}" for path, _ in _rtu_faces(parts)) or "none"
     yield "network.owner", f"{owner} is no serial face of this rig; there is {there} (places in `fieldbus`, from 1)"
+
+
+def check_serial_places(parts: Parts) -> Found:
+    """Yield a fault for the first serial face whose place no owner register could show."""
+    for path, _ in _rtu_faces(parts):
+        if int(path.partition(".")[2]) >= LARGEST_SERIAL_PLACE:
+            yield path, f"is a serial face behind the {LARGEST_SERIAL_PLACE}th place, the last that owner_ip can show"
+            return
 
 
 def check_owner_can_come(parts: Parts) -> Found:
@@ -96,5 +104,5 @@ def check_face_ports_stable(parts: Parts) -> Found:
 HARDWARE: Final[tuple[Check, ...]] = (check_face_ports_given, check_face_ports_differ)
 """Faults that a run with simulated devices does not mind: its serial faces are pseudo-terminals."""
 
-FAULTS: Final[tuple[Check, ...]] = (check_any_face, check_serial_owner, check_owner_can_come)
+FAULTS: Final[tuple[Check, ...]] = (check_any_face, check_serial_places, check_serial_owner, check_owner_can_come)
 WARNINGS: Final[tuple[Check, ...]] = (check_face_ports_stable,)

@@ -8,6 +8,7 @@ import ssl
 import stat
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
 
@@ -15,11 +16,17 @@ from gateway.modbus.certificate import KEY_MISMATCH, PeerCertificate, read_certi
 from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.profiles.rigs.faces import TlsFace
 from gateway.profiles.rigs.network_checks import is_loopback
+from gateway.profiles.rigs.rig_file import Network
 
 SOON_DAYS: Final = 30
 _PURPOSE: Final = 26  # X509_V_ERR_INVALID_PURPOSE
 _FLIGHTS: Final = 3  # of a handshake: hello, certificate, end
 _MAKE: Final = "`force-gateway certs DIR` makes a CA, a server and clients"
+_CURES: Final[dict[type[OSError], str]] = {
+    FileNotFoundError: _MAKE,
+    IsADirectoryError: "name the file in it",
+    NotADirectoryError: _MAKE,
+}
 
 
 def tls_faces(parts: Parts) -> Iterator[tuple[str, TlsFace]]:
@@ -36,11 +43,25 @@ def check_tls_exposure(parts: Parts) -> Found:
             reason = "can be reached from other machines: say which may connect, such as `allow: [192.168.125.0/24]`"
             yield f"{path}.bind", f"{face.bind} {reason}"
         network = parts.network
-        if network and network.plain and face.port and (face.bind, face.port) == (network.bind, network.port):
+        if network and network.plain and _meet(face, network):
             yield f"{path}.port", f"{face.port} is the port of plain Modbus TCP too: 802 is that of Modbus/TCP Security"
         for other, first in tls_faces(parts):
-            if other < path and face.port and (face.bind, face.port) == (first.bind, first.port):
+            if other < path and _meet(face, first):
                 yield f"{path}.port", f"{face.port} is the port of another TLS face too: each needs its own"
+
+
+def _meet(one: TlsFace, other: TlsFace | Network) -> bool:
+    """Decide whether two faces want one port of one address: that of all addresses is everybody's."""
+    ours, theirs = ip_address(one.bind), ip_address(other.bind)
+    is_shared = ours == theirs or (ours.version == theirs.version and (ours.is_unspecified or theirs.is_unspecified))
+    return bool(one.port) and one.port == other.port and is_shared
+
+
+def check_tls_allow(parts: Parts) -> Found:
+    """Yield a warning for an allow-list that lets everybody begin a handshake."""
+    for path, face in tls_faces(parts):
+        if any(allowed.prefixlen == 0 for allowed in face.allow):
+            yield f"{path}.allow", "lets every address in the world connect"
 
 
 def check_tls_files(parts: Parts) -> Found:
@@ -65,7 +86,7 @@ def _unreadable(path: str, face: TlsFace) -> Found:
         try:
             text = file.read_bytes()
         except OSError as error:
-            cure = _MAKE if isinstance(error, FileNotFoundError) else "let the gateway's user read it"
+            cure = _CURES.get(type(error), "let the gateway's user read it")
             yield f"{path}.{name}", f"E171 {file}: {error.strerror or error}; {cure}"
             continue
         kind = b"PRIVATE KEY-----" if name == "key" else b"-----BEGIN CERTIFICATE-----"
@@ -156,4 +177,4 @@ def _day(text: str) -> str:
 
 
 FAULTS: Final[tuple[Check, ...]] = (check_tls_exposure, check_tls_files)
-WARNINGS: Final[tuple[Check, ...]] = (check_tls_days,)
+WARNINGS: Final[tuple[Check, ...]] = (check_tls_days, check_tls_allow)

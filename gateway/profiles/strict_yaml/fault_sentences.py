@@ -158,7 +158,7 @@ def _choices(listed: object) -> list[str]:
 
 def _kind_choice(value: Any, context: dict[str, Any], unit: str) -> str:
     """Return the sentence about a group whose `type` is not there, or none of the known."""
-    if "tag" not in context:
+    if "tag" not in context or (isinstance(value, dict) and value.get("type") is None):
         return "has no type: it says what this is"
     return f"type {_choice(context['tag'], {'expected': context['expected_tags']}, unit)}"
 

@@ -52,9 +52,12 @@ def build_known(kind: type[T], document: Document, path: Path = ()) -> T | None:
 
 
 def _keep_first_findings(error: ValidationError) -> list[Any]:
-    """Return one finding per place, the first: a union reports each of its members. No more than a person
-    reads: a sentence takes half a millisecond, and a hostile document may have thousands."""
+    """Return one finding per place, the first: a union reports each of its members, and a list too few entries where it
+    has left out those with a finding of their own. No more than a person reads: a sentence takes half a millisecond, and a
+    hostile document may have thousands."""
     first = error.errors(include_url=False)[:_MOST_FINDINGS]
+    inside = {finding["loc"][:-1] for finding in first}
+    first = [finding for finding in first if finding["type"] != "too_short" or finding["loc"] not in inside]
     return list({_steps(finding["loc"]): finding for finding in reversed(first)}.values())[::-1]
 
 
@@ -76,7 +79,9 @@ def _fault(kind: type, document: Document, path: Path, finding: Mapping[str, Any
         return replace(document.fault(place, missing, at_key=True), kind=FaultKind.MISSING)
     if finding["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         known = names(kind_at(kind, place[len(path) : -1], document.at(*place[:-1])) or kind)
-        sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, groups_by_key(kind))
+        here = next((step for step in reversed(place[:-1]) if isinstance(step, str)), "")  # also of its other types
+        elsewhere = {name: group for name, group in groups_by_key(kind).items() if group != here}
+        sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, elsewhere)
         return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=suggestion)
     return document.fault(place, type_sentence(finding, document.at(*place), key))
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from gateway.fieldbus import ModbusRtuServer, ModbusTcpServer, ModbusTlsServer, RtuSettings, TlsSettings
 from gateway.modbus import Peer, Role
-from gateway.ports import PortError
+from gateway.ports import PortError, SerialPort
 from gateway.processes import exit_codes
 from gateway.profiles import Rig
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
@@ -116,12 +116,21 @@ class Faces:
                 await face.start()
                 self._log(f"face {host}", f"{host} is now {face.path}: a pseudo-terminal ends with its process")
             else:
-                await open_again(face.port)  # what does not open is a lost port, and told as one
+                await _open_again(face.port)
             return
         try:
             await face.start()
         except PortError as error:
             raise StartError(f"{error} (the port of Modbus RTU face {host})", error.exit_code) from error
+
+
+async def _open_again(port: SerialPort) -> None:
+    """Open the port of a face again; one that does not open is a lost one and told as such, a permission taken away, too:
+    the devices' ports are those that no restart can do without."""
+    try:
+        await open_again(port)
+    except PortError as error:
+        port.begin_lost(error)
 
 
 def make_tls_server(

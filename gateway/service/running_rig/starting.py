@@ -1,6 +1,7 @@
 """What can go wrong while a running rig starts, and how it then goes on or ends: ports, the Modbus server, the run before."""
 
 import asyncio
+import errno
 import time
 from typing import Final
 
@@ -87,5 +88,8 @@ async def listen(server: ModbusTcpServer, host: str, port: int, instead: str = "
     except BindError as error:
         raise StartError(str(error), exit_codes.CONFIGURATION) from error
     except OSError as error:
-        sentence = f"E121 cannot listen on {host}:{port}: {error}; another {instead or '--bind HOST:PORT'}?"
+        cure = f"another {instead or '--bind HOST:PORT'}?"
+        if error.errno == errno.EADDRNOTAVAIL:
+            cure = f"{host} is no address of this machine, `ip address` lists them"
+        sentence = f"E121 cannot listen on {host}:{port}: {error}; {cure}"
         raise StartError(sentence, exit_codes.DEVICE) from error

@@ -41,6 +41,15 @@ def test_a_face_is_read_with_modbus_own_defaults(tmp_path: Path) -> None:
         ("[{type: rtu, port: /dev/ttyS9, baud: 19201}]", "fieldbus[0].baud: 19201 is not one of 300, 600"),
         ("[{type: rtu, port: /dev/ttyS9, unti: 3}]", "fieldbus[0].unti: is not a known key; did you mean unit?"),
         ("[{type: rtux, port: /dev/ttyS9}]", "fieldbus[0]: type rtux is not one of rtu, tls; did you mean rtu?"),
+        ("[{type: null, port: /dev/ttyS9}]", "fieldbus[0]: has no type"),
+        (
+            "[{type: rtu, port: /dev/ttyS9, ca: a}]",
+            "fieldbus[0].ca: is not a known key; known are type, port, baud, parity",
+        ),
+        (
+            f"[{', '.join(f'{{type: rtu, port: /dev/ttyS{k}}}' for k in range(256))}]",
+            "fieldbus[255]: is a serial face behind",
+        ),
         ("[{type: rtu}]", "fieldbus[0].port: is missing: `force-gateway ports` lists"),
         ("[{type: rtu, port: ttyS9}]", 'fieldbus[0].port: "ttyS9" is not the path of a device'),
         ("[{type: rtu, port: EDIT}]", "fieldbus[0].port: EDIT is a placeholder"),

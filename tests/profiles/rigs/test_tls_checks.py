@@ -93,6 +93,7 @@ FAULTS = [
         "fieldbus[0].certificate",
         "E175 {folder}/setpoint.crt is not one for a server (a client's?): no client",
     ),
+    (files("."), "fieldbus[0].certificate", "E171 {folder}: Is a directory; name the file in it"),
     (files(more=", port: 5020"), "fieldbus[0].port", "5020 is the port of plain Modbus TCP too"),
     (
         files(more=", bind: 192.168.125.20"),
@@ -138,6 +139,16 @@ def test_an_owner_that_no_face_lets_in_is_told(tmp_path: Path, owner: str, more:
 def test_two_faces_on_one_port_are_told(folder: Path) -> None:
     (fault,) = report(folder, files(), files()).faults
     assert "fieldbus[1].port: 802 is the port of another TLS face too" in str(fault)
+
+
+def test_the_address_of_all_addresses_meets_each_of_its_family(folder: Path) -> None:
+    everywhere = ", bind: 0.0.0.0, allow: [0.0.0.0/0]"
+    (fault,) = report(folder, files(), files(more=everywhere)).faults
+    assert "fieldbus[1].port: 802 is the port of another TLS face too" in str(fault)
+    told = report(folder, files(more=f"{everywhere}, port: 5020"))
+    assert "fieldbus[0].port: 5020 is the port of plain Modbus TCP too" in str(told.faults[0])
+    assert any("fieldbus[0].allow: lets every address" in str(warning) for warning in told.warnings)
+    assert not report(folder, files(), files(more=', bind: "::", allow: ["fd00::/8"]')).faults
 
 
 def test_a_certificate_that_is_about_to_expire_is_a_warning_and_told_at_the_start(folder: Path) -> None:

@@ -30,6 +30,13 @@ def line_of(text: str) -> int:
     return DEMO[: DEMO.index(text)].count("\n") + 1
 
 
+def test_a_list_is_not_too_short_because_of_its_wrong_entries() -> None:
+    (fault,) = told(("units: [0, 1, 255]", "units: [300]"))
+    assert fault.endswith("network.units[0]: 300 is above 255, the most allowed")
+    (fault,) = told(("units: [0, 1, 255]", "units: []"))
+    assert fault.endswith("network.units: has 0 entries, at least 1 are needed")
+
+
 def test_the_example_of_the_first_hour() -> None:
     source = "name: cell\ncalibration: demo\noutput:\n  device: smc-itv-rc\n  baud: 115300\n"
     _, faults = build(RigFile, parse(source.encode(), "rig.yaml"))

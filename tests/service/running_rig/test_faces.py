@@ -14,7 +14,7 @@ import pytest
 from gateway.modbus import Peer
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.rtu import encode_adu
-from gateway.ports import Pty
+from gateway.ports import PortError, Pty, SerialPort
 from gateway.profiles import Rig
 from gateway.profiles.rigs.faces import RtuFace
 from gateway.registers import RegisterBank
@@ -126,6 +126,19 @@ def test_a_serial_port_that_is_not_there_ends_a_start_but_not_a_restart() -> Non
                 pass
         async with Served(serial("/dev/no-such")).running(is_restart=True) as served:
             assert served.faces.peers == () and ["E102" in told for told in served.log] == [True]
+
+    play(scene())
+
+
+def test_a_permission_taken_away_costs_a_restart_the_serial_face_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def forbid(port: SerialPort) -> None:
+        raise PortError("E101", f"{port.path}: permission denied")
+
+    async def scene() -> None:
+        monkeypatch.setattr(SerialPort, "open", forbid)
+        async with Served(serial("/dev/no-such", plain=True)).running(is_restart=True) as served:
+            assert [face.type for face in served.told] == ["tcp", "rtu"]
+            assert ["E101" in told for told in served.log] == [True]
 
     play(scene())
 

@@ -3,6 +3,7 @@
 import asyncio
 import struct
 from dataclasses import replace
+from ipaddress import ip_network
 from typing import Any
 
 import pytest
@@ -63,6 +64,14 @@ def test_files_that_changed_since_check_keep_the_rig_from_starting(folder: Folde
     with pytest.raises(StartError, match=r"E174 .*cannot be used") as caught:
         asyncio.run(scene())
     assert caught.value.exit_code == 78
+
+
+def test_an_address_that_this_machine_has_not_is_told_as_such(folder: Folder) -> None:
+    rig = rig_with(folder)
+    face = replace(rig.fieldbus[0], bind="192.0.2.9", allow=(ip_network("192.0.2.0/24"),))
+    faces = Served(replace(rig, network=replace(rig.network, plain=False), fieldbus=(face,))).faces
+    with pytest.raises(StartError, match=r"^E121 cannot listen on 192\.0\.2\.9:0: .*is no address of this machine"):
+        asyncio.run(faces.start(None, is_restart=False))
 
 
 def test_files_that_changed_since_the_start_cost_a_restart_their_own_face_only(folder: Folder) -> None:
