@@ -134,6 +134,18 @@ def test_a_loop_that_falls_silent_while_it_ramps_down_is_not_waited_for(scene, p
     assert any("stopped as asked" in line and "without a tick" in line for line in one.noted), one.noted
 
 
+def test_a_second_signal_waits_for_nothing(scene, port):
+    one = scene(lives(port))
+    assert_comes_up(one)
+    began_s = one.now_s
+    one.signals.send()
+    assert one.run(lambda: one.guardian.stops == 1) is None
+    one.signals.send()
+    assert one.run() == 0
+    assert one.now_s == began_s
+    assert port.wrote() == SAFE_FRAME
+
+
 def test_a_loop_that_has_sent_the_safe_voltage_may_take_its_time_to_close(scene, port):
     one = scene(lives(port))
     assert_comes_up(one)
