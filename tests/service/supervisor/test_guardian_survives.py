@@ -206,6 +206,8 @@ def test_what_had_come_up_is_started_again_at_once_each_time(scene, port):
     began_s = one.now_s
     one.run(lambda: len(one.starter.started) == 5)
     assert one.now_s == began_s
+    binds = [arguments["bind"] for arguments in one.starter.arguments]
+    assert binds == [None, *[("127.0.0.1", 5020)] * 4], "masters know the port"
 
 
 def test_there_are_never_two_control_processes(scene, port):
