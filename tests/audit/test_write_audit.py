@@ -120,12 +120,12 @@ def test_an_hour_of_setpoints_at_100_hz_is_a_few_lines_that_lose_no_extreme(watc
 
 def test_summaries_come_before_the_edge_that_ends_them(watched: Watched) -> None:
     watched.write(ROBOT, 0, 1, 1000)
-    for k in range(50):
+    for k in (*range(50), 30):
         watched.write(ROBOT, 1, 1000 + k)
     watched.write(ROBOT, 0, 0)
     assert [what for (what,) in watched.told("what")][-3:] == ["force_setpoint", "disable", "owner"]
     (summary,) = [record for record in watched.kept if "count" in record]
-    assert (summary["count"], summary["min"], summary["max"], summary["new"]) == (48 + 1, 10.01, 10.49, 10.49)
+    assert (summary["count"], summary["min"], summary["max"], summary["new"]) == (48 + 2, 10.01, 10.49, 10.30)
 
 
 @pytest.mark.parametrize("words", [(0, 4), (1, 9999), (0, 3, 1000)])
@@ -251,6 +251,29 @@ def test_what_waits_at_the_end_is_written(tmp_path: Path) -> None:
     assert not verify_audit(tmp_path).broken
     with pytest.raises(FileNotFoundError):
         verify_audit(tmp_path / "audit")
+
+
+def test_what_is_refused_and_what_is_uploaded_is_kept_too(tmp_path: Path) -> None:
+    def refuse(request: dict[str, Any]) -> None:
+        raise ValueError("there is no plant 3")
+
+    async def run() -> None:
+        audit = RigAudit(tmp_path, lambda cause, sentence: None)
+        register_map = load_register_map("force-v1")
+        bank = RegisterBank(register_map, BankRules(rig_name="demo", force_max_n=60.0), now=lambda: 0.0)
+        audit.watch(bank)
+        with pytest.raises(ModbusError):
+            bank.write_registers(1, b"\x7f\xff", ROBOT)
+        bank.staging.on_select = lambda slot, peer: None
+        bank.write_registers(register_map.find("slot_select").address, b"\0\2", Peer("::1", 1, role=Role.ADMIN))
+        with pytest.raises(ValueError, match="no plant 3"):
+            audit.watch_handlers({"plant": refuse})["plant"]({"do": "plant", "use": 3})
+        await audit.close()
+
+    asyncio.run(run())
+    told = [(record["what"], record["result"]) for record in read_audit(tmp_path)]
+    assert told[1:] == [("slot_select", "accepted"), ("plant", "there is no plant 3"), ("end", "accepted")]
+    assert told[0][0] == "write" and told[0][1].startswith("W")
 
 
 def test_what_waits_for_a_disk_is_told_with_its_end(tmp_path: Path) -> None:

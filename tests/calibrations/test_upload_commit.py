@@ -222,6 +222,9 @@ def test_while_a_tool_changes_the_calibration_commits_are_refused_and_the_regist
         assert bench.refused(*words).code == 6
     bench.run()
     assert bench.active_words == CoefficientSet.of_calibration(OWN).to_words()
+    bench.upload.use(99)
+    bench.run()
+    assert "99" in bench.log[-1] and bench.outcome == COMMITTED, "its failure is none of the master's"
 
 
 @pytest.mark.parametrize("slot", [0, 4])

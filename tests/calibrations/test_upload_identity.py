@@ -150,6 +150,9 @@ def test_a_set_that_was_in_use_before_or_that_the_rig_names_is_known_too(tmp_pat
     assert bench.upload_of(DEMO, 1) == COMMITTED
     status = bench.upload.status()
     assert (status["active"], status["name"], status["slot"], bench.notice) == (1, "demo", 1, CommitNotice.KNOWN_SET)
+    bench.write(1149, 0)
+    bench.run()
+    assert (bench.upload.status()["active"], bench.notice) == (2, 0), "the notice was the last commit's"
     assert bench.upload_of(replace(DEMO, name="another name"), 1) == COMMITTED
     assert bench.upload.status()["name"] == "demo", "a name is not carried"
 

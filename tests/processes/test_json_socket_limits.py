@@ -100,6 +100,16 @@ def test_who_says_nothing_half_a_line_or_reads_nothing_is_closed_in_time(tmp_pat
             talk(path, b'{"do": "ec'),
             talk(path, b'{"do": "echo", "say": "' + b"x" * 60_000 + b'"}\n' * 2),
         ]
+
+        async def ask() -> None:
+            for _ in range(8):
+                assert await reader.readline(), "who asks again and again stays"
+                await asyncio.sleep(0.05)
+                writer.write(ECHO)
+
+        reader, writer = await asyncio.open_unix_connection(str(path))
+        writer.write(ECHO)
+        asking = asyncio.ensure_future(ask())
         left = [await heard(caller) for caller in callers[:2]]
         assert all(b"no whole request for 0.2 s" in said for said in left)
         deaf = callers[2]
@@ -111,6 +121,8 @@ def test_who_says_nothing_half_a_line_or_reads_nothing_is_closed_in_time(tmp_pat
             except OSError:
                 break
         deaf.close()
+        await asking
+        writer.close()
 
     assert with_server(tmp_path, scene, SocketLimits(idle_s=0.2)) == []
 

@@ -69,6 +69,15 @@ def test_a_thousand_recordings_are_not_read_twice(tmp_path: Path, monkeypatch: p
     assert len(before) == 1000
 
 
+def test_a_file_that_has_changed_is_read_again_although_it_is_as_long(tmp_path: Path) -> None:
+    path = record(tmp_path, days_ago=2.0, force_n=20.0)
+    first = list_summaries(tmp_path)
+    other = record(tmp_path / "other", days_ago=1.0, force_n=30.0)
+    assert other.stat().st_size == path.stat().st_size
+    other.replace(path)
+    assert list_summaries(tmp_path) != first
+
+
 @pytest.mark.parametrize("damage", [b"", b"no JSON", b"[]", b'{"format": 99, "recordings": {}}'])
 def test_a_damaged_cache_costs_time_only(tmp_path: Path, damage: bytes) -> None:
     record(tmp_path)
@@ -126,6 +135,14 @@ def test_bytes_take_the_oldest_first_and_only_as_many_as_it_needs(tmp_path: Path
     gone = prune_recordings(tmp_path, Retention(bytes=2 * size), "")
     assert [one.path.stem for one in gone] == ["0003", "0004"]
     assert numbers(tmp_path) == [1, 2]
+
+
+def test_what_has_just_been_written_to_stays_although_nobody_holds_its_lock(tmp_path: Path) -> None:
+    """Some file systems have no locks."""
+    path = record(tmp_path)
+    limit = Retention(days=None, bytes=1)
+    assert choose_prunable([path], limit, "", NOW_S + 1.0) == []
+    assert [one.path for one in choose_prunable([path], limit, "", NOW_S + 86400.0)] == [path]
 
 
 def test_without_a_limit_everything_stays(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -65,6 +66,32 @@ def test_a_failed_export_leaves_nothing_behind(recording: Recording, tmp_path: P
     with pytest.raises(OSError, match="directory"):
         export_csv(recording, target)
     assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
+
+
+def test_an_export_that_fails_halfway_leaves_what_was_there(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "out.csv"
+    target.write_text("of yesterday")
+
+    def fail(of: Recording, stream: IO[bytes]) -> None:
+        stream.write(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("gateway.recording.export.write_csv", fail)
+    with pytest.raises(OSError, match="No space"):
+        export_csv(recording, target)
+    assert target.read_text() == "of yesterday"
+
+
+def test_a_note_of_several_lines_is_one_line_of_the_csv(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, {"note": "new seals\n1,2,3,4", "name": "a\rb"}, ("time_s", "force_n"))
+    recorder.append((0.0, 1.0))
+    recorder.close()
+    export_csv(read_recording(recorder.path), tmp_path / "out.csv")
+    facts, columns = read_csv(tmp_path / "out.csv")
+    assert (json.loads(facts["note"]), json.loads(facts["name"])) == ("new seals\n1,2,3,4", "a\rb")
+    assert columns == {"time_s": [0.0], "force_n": [1.0]}
 
 
 def test_a_recording_without_rows_exports_its_header(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import pytest
 
 from gateway.recording import Recorder, RecordingError, list_recordings, read_recording
 from gateway.recording.layout import HEADER_PREFIX, MAGIC
+from gateway.recording.recorder import sync_recording
 
 COLUMNS = ("time_s", "command_v", "force_n")
 HEADER = {"rig": "demo", "seed": 7, "rig_texts": {"demo.yaml": "name: demo\n# ü\n"}, "calibration": 3}
@@ -201,6 +202,18 @@ def test_numbers_are_never_used_twice_even_by_two_at_once(tmp_path: Path) -> Non
     assert [first.number, second.number, third.number] == [1, 2, 18]
     assert third.path.name == "0018.fgr"
     assert read_recording(third.path).header["number"] == 18
+
+
+def test_a_recording_is_put_on_the_disk_with_its_name_and_its_folders(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And nobody else's business: it may hold what a customer makes."""
+    path = record(tmp_path / "recordings", batches=1)
+    synced: list[Path] = []
+    monkeypatch.setattr("gateway.recording.recorder.sync_path", synced.append)
+    sync_recording(path)
+    assert synced == [path, path.parent, tmp_path]
+    assert path.stat().st_mode & 0o007 == 0
 
 
 def test_a_number_taken_between_look_and_create_is_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

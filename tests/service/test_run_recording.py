@@ -47,8 +47,8 @@ class HangingDisk:
 
     def close(self) -> None: ...
 
-    def let_go(self) -> None:
-        while self._waiting:
+    def let_go(self, all_but: int = 0) -> None:
+        while len(self._waiting) > all_but:
             self._waiting.pop(0)()
 
 
@@ -209,6 +209,43 @@ def test_a_file_is_put_on_the_disk_once_it_has_begun_and_once_it_has_ended(
     assert synced == [0]
     recordings.stop()
     assert synced == [0, 11]
+
+
+def test_what_may_not_outlive_a_power_cut_is_said(tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(path: Path) -> None:
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr("gateway.service.run_recording.sync_recording", refuse)
+    recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())  # type: ignore[arg-type]
+    recordings.start()
+    assert "0001.fgr may not outlive a power cut: Input/output error" in log[0]
+    assert recordings.status()["recording"]
+    recordings.stop()
+
+
+def test_a_disk_that_is_always_one_batch_behind_does_not_hang(recordings: Recordings, disk: HangingDisk) -> None:
+    recordings.start()
+    disk.let_go()
+    for step in range(round(HANGS_S * 10) + 20):
+        rows_until(recordings, step / 10, step / 10)
+        disk.let_go(all_but=1)
+    assert recordings.status()["rows"] > HANGS_S * 10
+    recordings.stop()
+    disk.let_go()
+
+
+def test_one_whose_time_is_over_while_it_waits_for_the_disk_does_not_come_again(
+    recordings: Recordings, disk: HangingDisk, tmp_path: Path
+) -> None:
+    recordings.start(for_s=HANGS_S + 10.0)
+    disk.let_go()
+    rows_until(recordings, HANGS_S + 1.0)
+    assert "waits" in recordings.status()
+    disk.let_go()
+    rows_until(recordings, 3.0 * HANGS_S, HANGS_S + 1.1)
+    disk.let_go()
+    assert recordings.status() == {"recording": None}
+    assert len(list_recordings(tmp_path)) == 1
 
 
 def test_a_file_that_nobody_waits_for_any_more_is_not_made(

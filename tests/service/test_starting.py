@@ -132,6 +132,16 @@ def test_only_a_run_that_never_ended_is_unclean(tmp_path: Path) -> None:
     flag.clear()  # twice is no trouble
 
 
+def test_a_disk_that_does_not_say_how_the_last_run_ended_counts_as_unclean(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path) -> bool:
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(Path, "exists", refuse)
+    assert CleanShutdownMarker(tmp_path).mark_running()
+
+
 @pytest.mark.parametrize(
     ("restarted", "was_unclean", "cause"),
     [

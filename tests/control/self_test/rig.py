@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import exp, hypot, sqrt
+from math import exp, hypot, nan, sqrt
 from random import Random
 from typing import Any
 
@@ -35,6 +35,8 @@ class SelfTestRig:
         self.lost_answers: float = changes.pop("lost_answers", 0.0)
         self.lost_samples: float = changes.pop("lost_samples", 0.0)
         self.garbled: float = changes.pop("garbled", 0.0)
+        self.pressure_pa_per_v: float = changes.pop("pressure_pa_per_v", nan)
+        self.pressure_pa = nan
         self.is_measured: bool = changes.pop("is_measured", True)
         control: ControlSettings = replace(settings(), self_test=SelfTestSettings(force_n=force_n, **changes))
         response = calibration.response
@@ -90,7 +92,9 @@ class SelfTestRig:
         acting_v = self.sent_v if self.ms >= self._sent_ms else self._last_v
         self.held_s = self.held_s + 0.001 if acting_v == self._acting_v else 0.0
         self._acting_v = acting_v
-        self.slide.step(acting_v * exp(-self.leak_per_s * self.held_s))
+        left_v = acting_v * exp(-self.leak_per_s * self.held_s)
+        self.slide.step(left_v)
+        self.pressure_pa = self.pressure_pa_per_v * left_v
         self.peak_n, self.peak_v = max(self.peak_n, self.slide.force_n), max(self.peak_v, acting_v)
         if self.ms >= self.next_sample:
             self.next_sample += 1000.0 / self.machine.rate_hz
@@ -119,6 +123,7 @@ class SelfTestRig:
             output_counts=self.output_counts,
             cell_counts=self.cell_counts,
             unanswered_since_s=self._unanswered_s,
+            pressure_pa=self.pressure_pa,
         )
         self.output = self.controller.step(self.now_s, self.command, self.sample, line)
         self.events.extend(self.output.events)

@@ -93,6 +93,14 @@ def test_a_machine_that_is_stronger_than_its_calibration_stays_below_the_stated_
     assert report.result in (SelfTestResult.WARNED, SelfTestResult.FAILED)
 
 
+def test_what_the_pressure_loses_counts_from_where_it_is_held() -> None:
+    """Its rise to there would hide a leak."""
+    report = SelfTestRig(5, FORCE_N, leak_per_s=0.1, pressure_pa_per_v=1e5).tested()
+    (leak,) = (found for found in report.findings if found.item is Item.LEAK)
+    lost_percent = float(leak.text.partition("pressure ")[2].partition(" %")[0])
+    assert lost_percent == pytest.approx(10.0, abs=2.0)
+
+
 def test_without_a_force_nothing_moves_and_the_rest_is_tested() -> None:
     rig = SelfTestRig(1, 0.0)
     report = rig.tested()

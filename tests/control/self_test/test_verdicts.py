@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from gateway.codes.faults import FaultCode
-from gateway.control.inputs import WireCounts
+from gateway.control.inputs import LineStatus, WireCounts
 from gateway.control.self_test.items import (
     FAILED,
     FORCE_ITEMS,
@@ -27,6 +27,7 @@ from gateway.control.self_test.judgement import (
     judge_scale,
     judge_zero,
 )
+from gateway.control.self_test.line_watch import LineWatch
 from gateway.control.self_test.measurements import Slope, intervals_of
 from gateway.control.settings import SelfTestSettings
 from gateway.registers.words import SelfTestResult, SelfTestVerdict
@@ -72,6 +73,13 @@ def test_what_was_measured_is_told_in_the_units_that_it_says() -> None:
 def test_the_longest_gap_is_the_longest_wherever_it_was() -> None:
     found = intervals_of([0.0, 0.01, 0.02, 0.06, 0.07, 0.08])
     assert (found.median_s, found.longest_s, found.missing) == (pytest.approx(0.01), pytest.approx(0.04), 3)
+
+
+def test_the_slowest_exchange_is_the_slowest_wherever_it_was() -> None:
+    watch = LineWatch()
+    for asked, wire_s in enumerate((0.01, 0.08, 0.01), start=1):
+        watch.observe(LineStatus(wire_s=wire_s, output_counts=WireCounts(asked, asked, 0)))
+    assert "the slowest within 80 ms of 100 ms" in watch.findings(RIG)[0].text
 
 
 @pytest.mark.parametrize("verdict", [PASSED, WARNED, FAILED])

@@ -8,7 +8,7 @@ from random import Random
 import pytest
 
 from gateway.codes.faults import FaultCode
-from gateway.control import Supervision
+from gateway.control import CalibrationInUse, Controller, Supervision
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision import repeat_law
 from gateway.control.supervision.plausibility import ExpectedForce
@@ -143,6 +143,23 @@ def test_a_noise_that_the_calibration_knows_makes_50_samples_enough(counts: floa
         cell.frozen = True
         soon += watched.after(cell, 2.0) <= 2.0
     assert soon >= 18
+
+
+def test_a_calibration_that_comes_later_brings_its_noise_too() -> None:
+    """As one that the gateway has started with."""
+    frozen_s = []
+    noisy = CalibrationInUse(bsfm(), 2, noise_n=0.12)
+    for began_with, comes_later in ((noisy, None), (CalibrationInUse(bsfm(), 1), noisy)):
+        bench = Bench(seed=3, noise_n=0.12)
+        bench.controller = Controller(bench.settings, began_with)
+        if comes_later:
+            bench.controller.use(comes_later)
+        bench.run(0.3)
+        bench.enable(12.0)
+        bench.run(0.4)
+        bench.cell_frozen = True
+        frozen_s.append(bench.seconds_until(has_fault(FaultCode.SAMPLE_FROZEN), 3.0))
+    assert frozen_s[0] == frozen_s[1] <= 2.0
 
 
 @pytest.mark.parametrize("counts", [0.05, 0.2, 0.3, 0.5])

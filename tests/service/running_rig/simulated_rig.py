@@ -102,7 +102,8 @@ class SmallRig:
             force_max_n=self.settings.limits.force_max_n,
             supported_bits=BASIC_BITS
             | ControlBit.START_CALIBRATION
-            | (ControlBit.START_SELF_TEST if self.settings.self_test else ControlBit(0)),
+            | (ControlBit.START_SELF_TEST if self.settings.self_test else ControlBit(0))
+            | (ControlBit.VALVE_PULL if self.settings.valve else ControlBit(0)),
         )
         self.bank = RegisterBank(MAP, rules, now=self.now)
         self.controller = Controller(self.settings, CalibrationInUse(bsfm(), 1))

@@ -124,10 +124,18 @@ def test_one_that_a_full_disk_has_ended_goes_on_when_there_is_room(
     assert recordings.status()["waits"], "said to whoever asks"
     assert list_recordings(tmp_path) == [], "no file for each try"
     is_full[0] = False
-    for now_s in range(300, 600):
+    for now_s in range(300, 2000):
         recordings.flush(float(now_s))
     assert recordings.status()["recording"]
     assert "it goes on: recording to" in recordings._log[-1]
+    is_full[0] = True
+    recordings._current._gathered.append((0.0,) * len(COLUMNS))
+    for now_s in range(2000, 2040):
+        recordings.flush(float(now_s))
+    assert tries[-1] == 2031, "it went well for long enough: half a minute again"
+    is_full[0] = False
+    for now_s in range(2040, 2100):
+        recordings.flush(float(now_s))
     recordings.flush(7201.0)
     assert recordings.status() == {"recording": None}
     assert [label_of(entry.header).name for entry in list_recordings(tmp_path)] == ["long one"]

@@ -14,6 +14,7 @@ from gateway.processes.exit_cause import EndCause, Ending
 from gateway.processes.scheduler_counters import ProcessorTime
 from tests.service.supervisor.guarded import (
     PTYS,
+    READY,
     SAFE_FRAME,
     FakeChild,
     FakeTurns,
@@ -132,6 +133,30 @@ def test_a_loop_that_falls_silent_while_it_ramps_down_is_not_waited_for(scene, p
     assert one.now_s == pytest.approx(100.1)
     assert port.wrote() == SAFE_FRAME
     assert any("stopped as asked" in line and "without a tick" in line for line in one.noted), one.noted
+
+
+def test_how_long_a_silence_may_last_says_the_rig(scene, port):
+    def script(child: FakeChild) -> None:
+        dies_after(5, port, None)(child)
+        child.say(message_link.READY, READY | {"stall_s": 0.5})
+
+    one = scene(script, lives(port))
+    assert_comes_up(one)
+    began_s = one.now_s
+    one.run(lambda: len(one.starter.started) == 2)
+    assert one.now_s - began_s == pytest.approx(0.5)
+
+
+def test_a_second_signal_waits_for_nothing(scene, port):
+    one = scene(lives(port))
+    assert_comes_up(one)
+    began_s = one.now_s
+    one.signals.send()
+    assert one.run(lambda: one.guardian.stops == 1) is None
+    one.signals.send()
+    assert one.run() == 0
+    assert one.now_s == began_s
+    assert port.wrote() == SAFE_FRAME
 
 
 def test_a_loop_that_has_sent_the_safe_voltage_may_take_its_time_to_close(scene, port):

@@ -189,6 +189,27 @@ def test_only_a_refusal_with_a_sentence_is_an_end(scene, port, code, comes_up_fi
     assert port.wrote().startswith(SAFE_FRAME)
 
 
+def test_a_cause_is_that_of_one_death_and_not_of_the_next(scene, port):
+    def fails(child: FakeChild) -> None:
+        dies_after(8, port, None)(child)
+        child.say(message_link.FIRST_CAUSE, {"text": "internal error: ZeroDivisionError()"})
+        child.dies(1)
+
+    one = scene(fails, dies_after(8, port, -9), lives(port))
+    one.run(lambda: len(one.starter.started) == 3)
+    causes = [Ending.from_json(arguments["restarted"]).cause for arguments in one.starter.arguments[1:]]
+    assert causes == [EndCause.DEFECT, EndCause.DIED]
+
+
+def test_what_had_come_up_is_started_again_at_once_each_time(scene, port):
+    one = scene(*[dies_after(8, port, -9)] * 4, lives(port))
+    began_s = one.now_s
+    one.run(lambda: len(one.starter.started) == 5)
+    assert one.now_s == began_s
+    binds = [arguments["bind"] for arguments in one.starter.arguments]
+    assert binds == [None, *[("127.0.0.1", 5020)] * 4], "masters know the port"
+
+
 def test_there_are_never_two_control_processes(scene, port):
     """One that was killed and does not go may still hold the port; the next one is started once it is gone."""
 

@@ -72,6 +72,36 @@ def client(pty: Pty) -> Iterator[int]:
     os.close(descriptor)
 
 
+def test_a_device_that_never_stops_talking_is_not_listened_to_for_ever(pty: Pty, client: int) -> None:
+    is_over = threading.Event()
+
+    def babble() -> None:
+        while not is_over.wait(0.2 * SHORT_S):
+            os.write(pty.fd, b"7\r\n")
+
+    talker = threading.Thread(target=babble)
+    talker.start()
+    heard: list[bool] = []
+    writer = threading.Thread(target=lambda: heard.append(SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)))
+    writer.start()
+    writer.join(40 * SHORT_S)
+    is_over.set()
+    talker.join()
+    assert heard == [False]
+    writer.join()
+
+
+def test_a_line_that_takes_a_byte_at_a_time_gets_the_whole_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    reader, writer = os.pipe()
+    write = os.write
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", lambda descriptor, data: write(descriptor, data[:1]))
+        assert SafeLine(writer, FRAME, b"").write_safe(SHORT_S)
+    assert os.read(reader, 64) == FRAME
+    os.close(reader)
+    os.close(writer)
+
+
 def test_an_acknowledged_safe_voltage_is_written_once(pty: Pty, client: int) -> None:
     with Regulator(pty) as device:
         assert SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)

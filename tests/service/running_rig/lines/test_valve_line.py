@@ -9,7 +9,7 @@ from gateway.registers.words import State
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from tests.control.bench import settings
 from tests.profile_files import load_device
-from tests.service.running_rig.simulated_rig import SmallRig
+from tests.service.running_rig.simulated_rig import VALVE, SmallRig
 
 PUSH, PULL = ValveDirection
 PROFILE = load_device("waveshare-relay")
@@ -104,26 +104,43 @@ def test_a_port_that_is_back_is_lost_no_more() -> None:
     assert (relay.line.status.lost, relay.run(0.5).line.status.stands) == (False, PULL)
 
 
+class ValveRig(SmallRig):
+    """A rig with this relay at its valve."""
+
+    def __init__(self) -> None:
+        super().__init__(replace(settings(), valve=ValveControl(pull_area_share=0.75)))
+        self.relay = Relay()
+        self.loop.valve = self.relay.line
+
+    def _tick(self) -> None:
+        if hasattr(self, "relay"):
+            relay, relay.now_s = self.relay, self.now()
+            while relay.answers and relay.answers[0][0] <= relay.now_s:
+                self.loop.on_valve_bytes(relay.answers.pop(0)[1], relay.now_s)
+        super()._tick()
+
+
 def test_unplugged_and_replugged_between_two_ticks_is_a_fault_all_the_same() -> None:
     """Another relay may be behind the name now, and the valve elsewhere under the force."""
-    rig, relay = SmallRig(replace(settings(), valve=ValveControl(pull_area_share=0.75))), Relay()
-    rig.loop.valve = relay.line
-
-    def run(seconds: float) -> None:
-        for _ in range(round(seconds * 100)):
-            relay.now_s = rig.now()
-            while relay.answers and relay.answers[0][0] <= relay.now_s:
-                rig.loop.on_valve_bytes(relay.answers.pop(0)[1], relay.now_s)
-            rig.run(0.01)
-
-    run(1.0)
-    rig.write(0, 1, 1200)
-    run(2.0)
-    assert rig.state is State.HOLDING
+    rig = ValveRig().run(1.0).holding()
     rig.loop.on_valve_closed()
     rig.loop.on_valve_opened()
     assert (rig.state, rig.wire.voltage_v) == (State.FAULT, 0.0)
     assert rig.word("fault_code") == FaultCode.VALVE_SILENT
+
+
+def test_what_is_pulled_is_not_shown_to_the_watch_whose_plant_pushes() -> None:
+    rig, rows = ValveRig(), ["not empty"]
+    rig.loop.ring = rows  # type: ignore[assignment]
+    rig.run(1.0)
+    assert len(rows) == 101
+    rig.write(0, 1 | VALVE)
+    rig.run(2.0)
+    assert rig.relay.stands is PULL
+    rows.clear()
+    rows.append("not empty")
+    rig.run(1.0)
+    assert rows == ["not empty"]
 
 
 def test_silence_has_an_age_until_an_answer_ends_it() -> None:
