@@ -255,3 +255,11 @@ class Bench:
 
 def has_fault(code: FaultCode) -> Callable[[Output], bool]:
     return lambda output: output.fault is code
+
+
+def enabled(control: ControlSettings | None = None, seed: int = 1, **plant: float) -> Bench:
+    """A bench whose output is on, at 0 N."""
+    bench = Bench(control, seed, **plant)
+    bench.run(0.1)
+    bench.enable(0.0)
+    return bench

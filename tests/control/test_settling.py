@@ -7,23 +7,16 @@ from math import cos, e, pi, radians
 import pytest
 
 from gateway.codes.warning_bits import WarningBit
-from gateway.control import CalibrationInUse, Trim
+from gateway.control import Trim
 from gateway.control.force_loop.feedforward import Feedforward
 from gateway.control.force_loop.trim import TrimIntegral
 from gateway.registers.words import LimitedBy, Mode, State, StatusBit
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
-from tests.control.bench import Bench, bsfm, settings
+from tests.control.bench import Bench, bsfm, enabled, settings
 
 UP = [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0]
 STAIRS = [*UP, *UP[-2::-1]]
 PARTIAL = [20.0, 12.0, 15.0, 13.0, 14.0, 12.0, 30.0, 26.0, 28.0]
-
-
-def enabled(control=None, seed=1, **plant) -> Bench:
-    bench = Bench(control, seed, **plant)
-    bench.run(0.1)
-    bench.enable(0.0)
-    return bench
 
 
 def settling_s(bench: Bench, target_n: float, seconds: float = 2.0) -> float:
@@ -214,78 +207,6 @@ def test_the_residual_is_measured_minus_model():
     output = bench.run(1.5)
     expected_n = bsfm().force_n(output.voltage_v, 1.0)
     assert output.model_residual_n == pytest.approx(output.force_measured_n - expected_n, abs=0.3)
-
-
-def test_a_calibration_is_swapped_without_a_bump():
-    bench = enabled()
-    bench.force(20.0)
-    bench.run(1.0)
-    before_v, fed_v = bench.last.voltage_v, bench.last.feedforward_v
-    bench.controller.use(CalibrationInUse(bsfm(scale=1.1), 2))
-    assert bench.step().voltage_v == pytest.approx(before_v, abs=0.02)
-    first = len(bench.history)
-    bench.run(2.0)
-    forces = [record.force_n for record in bench.history[first:]]
-    assert max(abs(force_n - 20.0) for force_n in forces) < 1.5
-    assert bench.controller.calibration_id == 2
-    less_v = bsfm().voltage_v(20.0, 1.0)[0] - bsfm(scale=1.1).voltage_v(20.0, 1.0)[0]
-    assert fed_v - bench.last.feedforward_v == pytest.approx(less_v, abs=0.05), "the new set is what feeds forward"
-
-
-def test_what_a_swap_carries_over_ends_with_the_output():
-    """Volts of the set before, added to the next enable's."""
-    swapped, fresh = enabled(), enabled()
-    swapped.force(20.0)
-    swapped.run(1.0)
-    swapped.controller.use(CalibrationInUse(bsfm(scale=1.2), 2))
-    fresh.controller.use(CalibrationInUse(bsfm(scale=1.2), 2))
-    fed_v = []
-    for bench in (swapped, fresh):
-        bench.disable()
-        bench.run(1.0)
-        bench.enable(20.0)
-        bench.seconds_until(lambda output: output.force_applied_n >= 20.0, 3.0)
-        fed_v.append(bench.last.feedforward_v)
-    assert fed_v[0] == pytest.approx(fed_v[1], abs=0.01)
-
-
-def test_the_residual_is_that_of_the_set_in_use():
-    """Also where nothing moves any more: the model's expectation changes with the set and not with the next voltage."""
-    bench = enabled()
-    bench.voltage(3.0)
-    bench.run(2.0)
-    before_n = bench.last.model_residual_n
-    bench.controller.use(CalibrationInUse(bsfm(scale=1.2), 2))
-    after_n = bench.step().model_residual_n
-    changed_n = bsfm().force_n(3.0, 1.0) - bsfm(scale=1.2).force_n(3.0, 1.0)
-    assert after_n - before_n == pytest.approx(changed_n, abs=0.3)
-    assert bench.controller.active_run.model == bsfm(scale=1.2), "the check of the next ladder compares with this one"
-
-
-def test_a_set_with_a_lower_force_limit_is_swapped_in_by_the_ramp_and_out_again():
-    bench = enabled()
-    bench.force(20.0)
-    bench.run(1.0)
-    before_v = bench.last.voltage_v
-    bench.controller.use(CalibrationInUse(replace(bsfm(), limits_n=(1.0, 15.0)), 2))
-    assert bench.step().voltage_v == pytest.approx(before_v, abs=0.5), "2 N of the ramp at most"
-    output = bench.run(1.5)
-    assert output.force_accepted_n == 15.0
-    assert output.limited_by is LimitedBy.FORCE_RANGE
-    assert abs(bench.plant.force_n - 15.0) < 1.0
-    bench.controller.use(CalibrationInUse(bsfm(), 3))
-    output = bench.run(1.5)
-    assert (output.force_accepted_n, output.limited_by) == (20.0, LimitedBy.NONE)
-    assert abs(bench.plant.force_n - 20.0) < 1.0
-
-
-def test_the_smallest_force_of_a_set_does_not_keep_the_tool_from_its_first_contact():
-    bench = enabled()
-    bench.controller.use(CalibrationInUse(replace(bsfm(), limits_n=(5.0, 40.0)), 2))
-    bench.force(10.0)
-    bench.run(1.5)
-    assert bench.last.state is State.HOLDING
-    assert abs(bench.plant.force_n - 10.0) < 1.0
 
 
 def test_chatter_of_the_setpoint_does_not_leave_the_band():

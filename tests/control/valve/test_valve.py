@@ -1,67 +1,16 @@
 """Bit 4: the force goes to 0, the valve is switched without pressure, its readback is awaited, and then the tool pulls."""
 
-from dataclasses import replace
-
 import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
-from gateway.control import Controller
-from gateway.control.compensation.compensation import Compensation, OutsideForce
-from gateway.control.inputs import CalibrationInUse, Output, ValveStatus
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.control.settings import SafeDirection, ValveControl
+from gateway.control.settings import SafeDirection
 from gateway.control.valve.pull_model import scale_forces
 from gateway.devices.valve_profile import ValveDirection
 from gateway.registers.words import ControlBit, State, StatusBit
-from tests.control.bench import Bench, bsfm, settings
-
-PUSH, PULL = ValveDirection
-ENABLE, BIT_4, NONE = ControlBit.ENABLE, ControlBit.VALVE_PULL, ControlBit(0)
-SHARE = 0.75
-MOVES_S = 0.05  # of the valve and its relay
-
-
-class ValveBench(Bench):
-    """A rig with a valve. stands: of the relay; obeys: whether it follows; switched: (s, contact force, voltage) of each
-    move."""
-
-    def __init__(self, stands: ValveDirection = PUSH, **valve: object) -> None:
-        control = replace(settings(), valve=ValveControl(**{"pull_area_share": SHARE, **valve}))  # type: ignore[arg-type]
-        super().__init__(control)
-        self.controller = Controller(control, CalibrationInUse(bsfm(), 1))
-        self.stands, self.obeys, self.is_silent = stands, True, False
-        self.told: ValveDirection | None = stands
-        self.told_s = self.silent_s = 0.0
-        self.kept_v: float | None = None  # what a silent output is known to keep
-        self.switched: list[tuple[float, float, float]] = []
-        self.turn(stands)
-
-    def turn(self, stands: ValveDirection) -> None:
-        self.stands = stands
-        self.plant.sign = -1.0 if stands is PULL else 1.0
-        self.plant.gain_n_per_v = 7.4 * (SHARE if stands is PULL else 1.0)
-
-    def step(self) -> Output:
-        if self.obeys and self.told not in (None, self.stands) and self.now_s - self.told_s >= MOVES_S:
-            self.switched.append((self.now_s, self.plant.force_n, self.voltage_v))
-            self.turn(self.told)  # type: ignore[arg-type]
-        since_s = self.silent_s if self.is_silent else None
-        standing_v = self.kept_v if self.output_silent else self.voltage_v
-        self.line = self.line._replace(valve=ValveStatus(self.stands, since_s), standing_v=standing_v)
-        output = super().step()
-        if output.valve is not self.told:
-            self.told, self.told_s = output.valve, self.now_s
-        return output
-
-    def status(self) -> StatusBit:
-        return self.last.status
-
-    def pulling(self, force_n: float = 12.0) -> "ValveBench":
-        self.run(1.0)
-        self.write(control_word=ENABLE | BIT_4, force_setpoint_n=force_n)
-        self.run(3.0)
-        return self
+from tests.control.bench import bsfm
+from tests.control.valve.valve_bench import BIT_4, ENABLE, MOVES_S, PULL, PUSH, SHARE, ValveBench
 
 
 def test_the_tool_pulls_with_the_setpoint_and_shows_a_negative_force() -> None:
@@ -210,64 +159,6 @@ def test_no_run_begins_before_the_valve_has_read_back() -> None:
     bench.obeys = True
     bench.run(1.0)
     assert bench.controller.refusal_of_run(bench.now_s, CalibrationPlan()) == ""
-
-
-def test_the_payloads_weight_counts_the_other_way() -> None:
-    """A tool that points down with 0.5 kg presses with 4.9 N: pulling 10 N up, the slide gives 14.9 N."""
-    bench = ValveBench()
-    bench.run(1.0)
-    bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=10.0, payload_kg=0.5)
-    bench.run(4.0)
-    assert bench.last.state is State.HOLDING
-    assert bench.plant.force_n == pytest.approx(14.9, abs=1.0)
-    assert bench.last.force_measured_n == pytest.approx(-10.0, abs=1.0)
-
-
-def test_a_compensated_force_from_outside_counts_against_a_pull() -> None:
-    """5 N that press at this tilt: to pull with 10 N the slide gives 15 N, and the cell feels no more than it is told to."""
-    bench = ValveBench()
-    outside = Compensation(outside=OutsideForce(tilt_n=5.0))
-    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1), compensation=outside)
-    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 5.0)
-    bench.pulling(10.0)
-    assert bench.last.state is State.HOLDING
-    assert bench.plant.force_n == pytest.approx(15.0, abs=1.0)
-    assert bench.last.model_residual_n == pytest.approx(0.0, abs=2.5)
-
-
-def test_a_tare_while_the_tool_pulls_takes_the_same_zero_as_one_while_it_pushes() -> None:
-    """The zero is the cell's: 0.5 kg that hang on it weigh the same whichever way the tool acts. It is 1.3 N off."""
-    bench = ValveBench()
-    bench.alter_sample = lambda sample: replace(sample, force_n=1.3 + min(sample.force_n, -4.9))
-    bench.run(1.0)
-    bench.write(control_word=ENABLE | BIT_4, payload_kg=0.5)
-    bench.run(2.0)
-    bench.write(control_word=ENABLE | BIT_4 | ControlBit.TARE)
-    bench.run(0.2)
-    assert bench.refused is None and bench.stands is PULL
-    assert bench.last.force_measured_n == pytest.approx(0.0, abs=0.2)
-    assert bench.controller.zero_n == pytest.approx(1.3, abs=0.1)
-    bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=10.0)
-    bench.run(3.0)
-    assert bench.last.state is State.HOLDING and bench.plant.force_n == pytest.approx(14.9, abs=1.0)
-
-
-def test_a_measured_model_of_pulling_counts_in_place_of_the_derived_one_whichever_set_it_came_with() -> None:
-    measured = [scale_forces(bsfm(), share) for share in (0.5, 0.6)]
-    bench = ValveBench()
-    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1, pull_model=measured[0]))
-    bench.pulling(12.0)
-    assert bench.last.feedforward_v == pytest.approx(measured[0].voltage_v(12.0, 1.0)[0], abs=0.05)
-    bench.controller.use(CalibrationInUse(bsfm(), 2, pull_model=measured[1]))
-    bench.run(2.0)
-    assert bench.last.feedforward_v == pytest.approx(measured[1].voltage_v(12.0, 1.0)[0], abs=0.05)
-
-
-def test_the_derived_model_is_that_of_pushing_by_the_share_of_the_area() -> None:
-    model, pull = bsfm(), scale_forces(bsfm(), SHARE)
-    for share in (-1.0, 0.0, 1.0):
-        assert pull.force_n(4.0, share) == pytest.approx(SHARE * model.force_n(4.0, share))
-    assert pull.force_range_n[1] == pytest.approx(SHARE * model.force_range_n[1])
 
 
 def test_in_voltage_mode_it_is_switched_without_pressure_too() -> None:

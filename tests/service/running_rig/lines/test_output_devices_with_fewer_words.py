@@ -10,7 +10,7 @@ from gateway.devices import output_host
 from gateway.devices.exchange import VoltageExchange, VoltageRange
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from tests.service.rigs import demo
-from tests.service.running_rig.lines.test_output_line import REPLY_TIMEOUT_S, Wire
+from tests.service.running_rig.lines.played_output import REPLY_TIMEOUT_S, Wire
 
 
 def with_words(**words: object) -> Wire:

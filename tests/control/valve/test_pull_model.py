@@ -1,0 +1,71 @@
+"""What a tool that pulls is calculated with: its own model or the share of the area; weights count the other way."""
+
+from dataclasses import replace
+
+import pytest
+
+from gateway.control import Controller
+from gateway.control.compensation.compensation import Compensation, OutsideForce
+from gateway.control.inputs import CalibrationInUse
+from gateway.control.valve.pull_model import scale_forces
+from gateway.registers.words import ControlBit, State
+from tests.control.bench import bsfm
+from tests.control.valve.valve_bench import BIT_4, ENABLE, PULL, SHARE, ValveBench
+
+
+def test_the_payloads_weight_counts_the_other_way() -> None:
+    """A tool that points down with 0.5 kg presses with 4.9 N: pulling 10 N up, the slide gives 14.9 N."""
+    bench = ValveBench()
+    bench.run(1.0)
+    bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=10.0, payload_kg=0.5)
+    bench.run(4.0)
+    assert bench.last.state is State.HOLDING
+    assert bench.plant.force_n == pytest.approx(14.9, abs=1.0)
+    assert bench.last.force_measured_n == pytest.approx(-10.0, abs=1.0)
+
+
+def test_a_compensated_force_from_outside_counts_against_a_pull() -> None:
+    """5 N that press at this tilt: to pull with 10 N the slide gives 15 N, and the cell feels no more than it is told to."""
+    bench = ValveBench()
+    outside = Compensation(outside=OutsideForce(tilt_n=5.0))
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1), compensation=outside)
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 5.0)
+    bench.pulling(10.0)
+    assert bench.last.state is State.HOLDING
+    assert bench.plant.force_n == pytest.approx(15.0, abs=1.0)
+    assert bench.last.model_residual_n == pytest.approx(0.0, abs=2.5)
+
+
+def test_a_tare_while_the_tool_pulls_takes_the_same_zero_as_one_while_it_pushes() -> None:
+    """The zero is the cell's: 0.5 kg that hang on it weigh the same whichever way the tool acts. It is 1.3 N off."""
+    bench = ValveBench()
+    bench.alter_sample = lambda sample: replace(sample, force_n=1.3 + min(sample.force_n, -4.9))
+    bench.run(1.0)
+    bench.write(control_word=ENABLE | BIT_4, payload_kg=0.5)
+    bench.run(2.0)
+    bench.write(control_word=ENABLE | BIT_4 | ControlBit.TARE)
+    bench.run(0.2)
+    assert bench.refused is None and bench.stands is PULL
+    assert bench.last.force_measured_n == pytest.approx(0.0, abs=0.2)
+    assert bench.controller.zero_n == pytest.approx(1.3, abs=0.1)
+    bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=10.0)
+    bench.run(3.0)
+    assert bench.last.state is State.HOLDING and bench.plant.force_n == pytest.approx(14.9, abs=1.0)
+
+
+def test_a_measured_model_of_pulling_counts_in_place_of_the_derived_one_whichever_set_it_came_with() -> None:
+    measured = [scale_forces(bsfm(), share) for share in (0.5, 0.6)]
+    bench = ValveBench()
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1, pull_model=measured[0]))
+    bench.pulling(12.0)
+    assert bench.last.feedforward_v == pytest.approx(measured[0].voltage_v(12.0, 1.0)[0], abs=0.05)
+    bench.controller.use(CalibrationInUse(bsfm(), 2, pull_model=measured[1]))
+    bench.run(2.0)
+    assert bench.last.feedforward_v == pytest.approx(measured[1].voltage_v(12.0, 1.0)[0], abs=0.05)
+
+
+def test_the_derived_model_is_that_of_pushing_by_the_share_of_the_area() -> None:
+    model, pull = bsfm(), scale_forces(bsfm(), SHARE)
+    for share in (-1.0, 0.0, 1.0):
+        assert pull.force_n(4.0, share) == pytest.approx(SHARE * model.force_n(4.0, share))
+    assert pull.force_range_n[1] == pytest.approx(SHARE * model.force_range_n[1])

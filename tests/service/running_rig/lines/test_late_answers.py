@@ -1,0 +1,94 @@
+"""Answers that come late, cut or lost: none is taken for the next one, and no fall of the voltage waits for it."""
+
+import pytest
+
+from gateway.codes.faults import FaultCode
+from tests.service.running_rig.lines.played_output import REPLY_TIMEOUT_S, ROUND_TRIP_S, Wire, wire
+
+__all__ = ["wire"]
+
+
+class SlowDevice:
+    """Obeys at once and answers in order; one answer in `every` takes longer than a host waits."""
+
+    def __init__(self, wire: Wire, every: int, slow_s: float, pressure: str = "7") -> None:
+        self.wire, self.every, self.slow_s, self.pressure = wire, every, slow_s, pressure
+        self.answers: list[tuple[float, str]] = []
+        self.seen = 0
+
+    def advance(self, until_s: float) -> None:
+        """To that time in steps of a millisecond, a tick every ten."""
+        while self.wire.now_s < until_s - 1e-9:
+            self._hear()
+            self.wire.now_s += 0.001
+            while self.answers and self.answers[0][0] <= self.wire.now_s:
+                self.wire.answer(self.answers.pop(0)[1], after_s=0.0)
+                self._hear()
+            if round(self.wire.now_s * 1000) % 10 == 0:
+                self.wire.tick(0.0)
+
+    def _hear(self) -> None:
+        for question in self.wire.written[self.seen :]:
+            self.seen += 1
+            after_s = self.slow_s if self.seen % self.every == 0 else ROUND_TRIP_S
+            word = question.decode().split()[-1]
+            self.answers.append((self.wire.now_s + after_s, self.pressure if word == "MON" else word))
+            self.answers.sort(key=lambda answer: answer[0])
+
+
+@pytest.mark.parametrize("every", [7, 10, 23])
+@pytest.mark.parametrize("slow_s", [0.062, 0.075, 0.09, 0.11])
+def test_a_late_answer_is_not_taken_for_the_next_one(wire: Wire, every: int, slow_s: float) -> None:
+    wire.settle(200)
+    device = SlowDevice(wire, every, slow_s)
+    device.seen = len(wire.written)
+    for index in range(200):  # a setpoint that moves all the time: the wire is never idle
+        wire.set_voltage(200 + (index * 7) % 500)
+        device.advance(wire.now_s + 0.01)
+        assert wire.exchange.fault is FaultCode.NONE
+    device.advance(wire.now_s + 0.4)
+    assert wire.exchange.acknowledged_v == pytest.approx((200 + (199 * 7) % 500) * 10 / 1023)
+    assert {round(pressure_pa) for pressure_pa in wire.pressures_pa} <= {0, round(7 * 0.9e6 / 1023)}
+    assert wire.exchange.pressure_pa == pytest.approx(7 * 0.9e6 / 1023)
+
+
+def test_a_late_answer_costs_one_reply_time_and_no_fall_waits_for_it(wire: Wire) -> None:
+    wire.settle(200)
+    wire.set_voltage(210)
+    wire.set_voltage(220)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    wire.answer("210")  # of the question that was given up
+    wire.set_voltage(230)
+    assert wire.last == "SET 220", "a rise waits until the line is quiet"
+    wire.set_voltage(0)
+    assert wire.last == "SET 0"
+
+
+def test_a_device_that_alters_its_settings_is_found_after_a_lost_answer_too(wire: Wire) -> None:
+    wire.set_voltage(512)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    wire.answer("510")
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    for _ in range(3):
+        assert wire.exchange.fault is FaultCode.NONE
+        wire.answer("510")
+    assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED
+
+
+def test_a_device_whose_answers_are_cut_still_hears_the_safe_voltage(wire: Wire) -> None:
+    """It may have obeyed the question whose answer was lost: what it acknowledged before that does not stand for sure."""
+    wire.settle(0)
+    wire.set_voltage(512)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    wire.set_voltage(0)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    assert wire.last == "SET 0"
+
+
+def test_half_an_answer_from_before_a_time_out_is_no_part_of_the_next(wire: Wire) -> None:
+    wire.set_voltage(512)
+    wire.exchange.on_bytes(b"5", wire.now_s)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    assert wire.written == [b"SET 512\r\n"] * 2
+    wire.answer("512")
+    assert wire.exchange.confirmed_v == pytest.approx(512 * 10 / 1023)
