@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 from gateway.fieldbus.connection import Clock, ServerState
 from gateway.fieldbus.tcp_server import ModbusTcpServer
-from gateway.fieldbus.tls_settings import TlsSettings, make_context
+from gateway.fieldbus.tls_settings import TlsSettings, context_maker
 from gateway.fieldbus.tls_stream import Handshakes, TlsStream
 from gateway.modbus.peer import Peer
 from gateway.modbus.server import DataBank
@@ -25,7 +25,7 @@ class ModbusTlsServer(ModbusTcpServer):
         clock: Clock | None = None,
     ) -> None:
         super().__init__(bank, settings.server, on_peer_closed=on_peer_closed, log=log, clock=clock)
-        self._handshakes = Handshakes(make_context(settings), settings.revoked, _utc_now)
+        self._handshakes = Handshakes(context_maker(settings), settings.revoked, _utc_now)
 
     @property
     def pending(self) -> int:

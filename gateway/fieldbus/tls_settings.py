@@ -10,8 +10,13 @@ for one hello (measured), more than the time after which the guardian takes it f
 cannot show an ECDSA certificate of another curve; one with RSA, or by TLS 1.3, it can.
 """
 
+import os
 import ssl
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
 from typing import Final
 
 from gateway.fieldbus.settings import ServerSettings
@@ -24,6 +29,9 @@ MOST_PENDING_OF_ONE: Final = 4
 HANDSHAKE_BYTES: Final = 12288
 """Of a client: room for two hellos and a chain of three RSA certificates. OpenSSL takes 100 KiB of certificates from anybody,
 and 50 ms of processor in the control loop to find that 240 of one name lead nowhere (measured); eight such make a stall."""
+MOST_SESSIONS: Final = 200
+"""Kept for resumption: a TLS 1.2 client without tickets leaves one of 10 kB with each connection that it closes well, OpenSSL
+keeps 20 480 for two hours, and Python cannot say otherwise. A new context has none."""
 HANDSHAKES_PER_S: Final = 20.0
 """Of one address; each costs the control loop about a millisecond of processor. Loopback is exempt."""
 CURVE: Final = "prime256v1"
@@ -51,17 +59,34 @@ class TlsSettings:
     revoked: frozenset[str] = field(default_factory=frozenset)
 
 
-def make_context(settings: TlsSettings) -> ssl.SSLContext:
-    """Return the server's context. OSError or ssl.SSLError for files that cannot be used."""
+def context_maker(settings: TlsSettings) -> Callable[[], ssl.SSLContext]:
+    """Return what makes the server's context of the files as they are now, and asks no disk. OSError for files that cannot be
+    read; who makes one gets ssl.SSLError for those that are of no use."""
+    return partial(
+        _make_context, *(Path(file).read_bytes() for file in (settings.certificate, settings.key, settings.ca))
+    )
+
+
+def _make_context(certificate: bytes, key: bytes, ca: bytes) -> ssl.SSLContext:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     context.verify_mode = ssl.CERT_REQUIRED
     context.num_tickets = 0
     context.options |= ssl.OP_NO_RENEGOTIATION | ssl.OP_NO_COMPRESSION
     context.set_ecdh_curve(CURVE)
-    context.load_cert_chain(settings.certificate, settings.key)
-    context.load_verify_locations(settings.ca)
+    with _in_memory(certificate) as own, _in_memory(key) as secret, _in_memory(ca) as trusted:
+        context.load_cert_chain(own, secret)
+        context.load_verify_locations(trusted)
     return context
+
+
+@contextmanager
+def _in_memory(data: bytes) -> Iterator[str]:
+    """Lend the path of a file that only this process has: certificates and keys Python loads from files alone."""
+    with os.fdopen(os.memfd_create("tls"), "wb") as file:
+        file.write(data)
+        file.flush()
+        yield f"/proc/self/fd/{file.fileno()}"
 
 
 def certificate_refusal(shown: PeerCertificate, revoked: frozenset[str], now: str) -> str | None:

@@ -20,6 +20,7 @@ from gateway.fieldbus.tls_settings import (
     HANDSHAKES_PER_S,
     MOST_PENDING,
     MOST_PENDING_OF_ONE,
+    MOST_SESSIONS,
     certificate_refusal,
     handshake_failure,
 )
@@ -33,11 +34,15 @@ _BUFFER_BYTES: Final = 4096
 class Handshakes:
     """What all connections of one TLS face share. utc: the time of now as certificates have it (YYYYMMDDHHMMSSZ)."""
 
-    context: ssl.SSLContext
+    make_context: Callable[[], ssl.SSLContext]
     revoked: frozenset[str]
     utc: Callable[[], str]
     pending: set["TlsStream"] = field(default_factory=set)
     rates: dict[str, RequestRate] = field(default_factory=dict)
+    context: ssl.SSLContext = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.context = self.make_context()
 
     def refusal(self, host: str, now_s: float) -> str | None:
         """Return why no further handshake may begin; None: it may."""
@@ -54,7 +59,9 @@ class Handshakes:
         return None
 
     def sweep(self, now_s: float) -> None:
-        """Cut handshakes that last too long, and forget who has been quiet."""
+        """Cut handshakes that last too long, and forget who has been quiet, and sessions where there are many."""
+        if self.context.session_stats()["number"] > MOST_SESSIONS:
+            self.context = self.make_context()
         for stream in tuple(self.pending):
             stream.sweep(now_s)
         for host in [host for host, rate in self.rates.items() if rate.is_full(now_s)]:

@@ -11,7 +11,7 @@ from gateway.fieldbus.connection import ServerState
 from gateway.fieldbus.peers import Peers
 from gateway.fieldbus.rate_limits import LogLimiter
 from gateway.fieldbus.settings import ServerSettings
-from gateway.fieldbus.tls_settings import TlsSettings, make_context
+from gateway.fieldbus.tls_settings import TlsSettings, context_maker
 from gateway.fieldbus.tls_stream import Handshakes, TlsStream
 from gateway.modbus import Peer
 from tests.certificates import Folder, serial_of
@@ -50,7 +50,7 @@ class Face:
         files = TlsSettings(server, folder.crt("gateway"), folder.key("gateway"), folder.crt("ca"), frozenset())
         log = LogLimiter(lambda cause, sentence: self.log.append(sentence))
         self.shared = ServerState(self.bank, server, self.clock, log, Peers(server, guarded=False), self.closed.append)
-        self.handshakes = Handshakes(make_context(files), frozenset((serial_of("thief"),)), self.now)
+        self.handshakes = Handshakes(context_maker(files), frozenset((serial_of("thief"),)), self.now)
 
     def accept(self, host: str = "127.0.0.1") -> "Line":
         return Line(self, SocketInHand(host))
