@@ -225,8 +225,10 @@ def test_another_calibration_or_plant_is_known_everywhere_at_once(devices: OwnDe
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         activation, recordings = rig._calibrations._activation, rig._recordings
         number = activation.store.add(replace(rig._rig.calibration, name="another"))
+        address = rig._rig.register_map.find("calibration_id").address
+        assert int.from_bytes(rig.bank.read_registers(address, 1), "big") != number
         rig._on_calibration(activation.use(number, None))
-        shown = rig.bank.read_registers(rig._rig.register_map.find("calibration_id").address, 1)
+        shown = rig.bank.read_registers(address, 1)
         assert int.from_bytes(shown, "big") == rig.controller.calibration_id == recordings.calibration.number == number
         recordings.plant_in_use = {"number": 99}
         rig._on_plant(rig._rig)
