@@ -145,6 +145,13 @@ def test_a_running_rig_takes_a_plant_when_its_output_is_off_and_tells_so(tmp_pat
     assert RigPlants(demo(), tmp_path).rig.plant_in_use.number == 1, "a restart finds it"
     plants.answer({"do": "plant", "rollback": True})
     assert (plants.status()["active"], used[1].compensation.acts) == (0, ())
+    plants.answer({"do": "plant", "rollback": True})
+    assert plants.status()["active"] == 1
+    assert RigPlants(demo(), tmp_path).rig.plant_in_use.number == 1, "what was gone back to is found, too"
+    plants.run_in_background = lambda do, done: None  # type: ignore[assignment]
+    plants.answer({"do": "plant", "use": 0})
+    with pytest.raises(ValueError, match="plant use 0 is under way"):
+        plants.answer({"do": "plant", "use": 1})
     plants.close()
 
 

@@ -14,7 +14,7 @@ from gateway.service.running_rig.calibration_runs import FOLLOWED_S, Calibration
 from gateway.service.running_rig.fit_launcher import Result
 from tests.disk.at_once import AtOnce
 from tests.service.rigs import demo
-from tests.service.running_rig.simulated_rig import CALIBRATE, SmallRig
+from tests.service.running_rig.simulated_rig import CALIBRATE, TARE, SmallRig
 from tests.service.test_run_recording import HangingDisk
 from tests.service.wired import ENABLE, Wired
 
@@ -188,6 +188,17 @@ def test_a_run_begun_while_the_last_ones_file_is_being_closed_is_not_taken_for_i
     assert runs.answer({"plan": SHORT})["result"] == {}, "that of the new run is not known yet"
 
 
+def test_a_masters_run_needs_nobody_at_this_machine(tmp_path: Path) -> None:
+    rig, _, disk = on_a_hanging_disk(tmp_path)
+    rig.write(0, CALIBRATE)
+    rig.run(FOLLOWED_S + 1.0)
+    assert rig.state is State.CALIBRATING
+    disk.let_go()
+    rig.write(0, 0)
+    rig.until(State.OFF).run(0.1)
+    disk.let_go()
+
+
 def test_a_dry_run_says_what_it_would_do_and_moves_nothing(tmp_path: Path) -> None:
     rig, runs, _ = on_a_hanging_disk(tmp_path)
     told = runs.answer({"plan": SHORT, "dry_run": True})
@@ -215,6 +226,8 @@ def test_a_fit_that_refuses_leaves_room_for_the_next_run(tmp_path: Path, fits: F
 
 def test_a_masters_run_continues_none_of_this_machines(tmp_path: Path) -> None:
     rig, runs, disk = on_a_hanging_disk(tmp_path)
+    rig.write(9, 600)
+    rig.write(0, TARE)
     headers = []
     for ask in (
         lambda: runs.answer({"plan": SHORT, "continues": [7], "name": "Monday"}),
@@ -227,6 +240,7 @@ def test_a_masters_run_continues_none_of_this_machines(tmp_path: Path) -> None:
         disk.let_go()
         headers.append(read_recording(Path(runs.status()["recording"])).header)
     assert [(header["continues"], header["name"]) for header in headers] == [([7], "Monday"), ([], "")]
+    assert headers[0]["zero_n"] == rig.controller.zero_n > 5.0
 
 
 def test_a_ladder_behind_which_no_sample_comes_is_closed_all_the_same(

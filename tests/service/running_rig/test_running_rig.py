@@ -7,14 +7,17 @@ import struct
 import threading
 import time
 from collections.abc import Awaitable, Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from gateway.audit.audit_reader import read_audit
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.devices import SerialSettings
 from gateway.modbus import Peer
+from gateway.plants.in_use import in_use_facts
 from gateway.ports import PortError
 from gateway.ports.opening import open_descriptor
 from gateway.processes import message_link
@@ -182,6 +185,7 @@ def test_a_defect_anywhere_in_the_loop_ends_with_the_safe_voltage(devices: OwnDe
 def test_the_safe_voltage_is_the_first_thing_that_closing_does(devices: OwnDevices, monkeypatch) -> None:
     """Whatever hangs in closing the rest, the final safe-voltage write is on the wire already."""
     seen_v: list[float] = []
+    running = devices.directory / "state" / "running"
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         await pressing(rig, devices)
@@ -190,12 +194,15 @@ def test_the_safe_voltage_is_the_first_thing_that_closing_does(devices: OwnDevic
         async def look_and_close() -> None:
             await asyncio.sleep(0.02)
             seen_v.append(devices.setting_v)
+            assert running.exists(), "until all of it is closed this run has not ended"
             await close()
 
         monkeypatch.setattr(rig._faces, "close", look_and_close)
 
     with_running_rig(devices, scene)
     assert seen_v == [0.0]
+    assert not running.exists()
+    assert [record["what"] for record in read_audit(running.parent)][-1] == "end"
 
 
 def test_a_defect_in_the_step_is_a_fault_and_no_end(devices: OwnDevices, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -210,6 +217,26 @@ def test_a_defect_in_the_step_is_a_fault_and_no_end(devices: OwnDevices, monkeyp
         assert not rig.failed.is_set()
 
     assert any("A499" in line for line in with_running_rig(devices, scene))
+
+
+def test_another_calibration_or_plant_is_known_everywhere_at_once(devices: OwnDevices) -> None:
+    """Control, registers, recordings and audit must not speak of two."""
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        activation, recordings = rig._calibrations._activation, rig._recordings
+        number = activation.store.add(replace(rig._rig.calibration, name="another"))
+        address = rig._rig.register_map.find("calibration_id").address
+        assert int.from_bytes(rig.bank.read_registers(address, 1), "big") != number
+        rig._on_calibration(activation.use(number, None))
+        shown = rig.bank.read_registers(address, 1)
+        assert int.from_bytes(shown, "big") == rig.controller.calibration_id == recordings.calibration.number == number
+        recordings.plant_in_use = {"number": 99}
+        rig._on_plant(rig._rig)
+        assert recordings.plant_in_use == in_use_facts(rig._rig)
+
+    with_running_rig(devices, scene)
+    told = [record["what"] for record in read_audit(devices.directory / "state")]
+    assert told == ["start", "calibration in use", "plant in use", "end"]
 
 
 def test_the_guardian_has_the_line_before_anything_but_safe_is_written(devices: OwnDevices) -> None:
