@@ -36,6 +36,8 @@ _HISTORY_ROWS: Final = 1200
 _MOST_ROWS: Final = 12  # of one event: what a screen can show
 _WAITING: Final = 100  # events of a viewer: six seconds that its line may be busy
 _KEPT_NOTES: Final = 60
+MOST_VIEWERS: Final = 128
+"""Half of the connections that the page's process serves at a time: whoever opens more must not shut out a Stop."""
 LIVE_BLOCKS: Final = ("command", "status")
 
 
@@ -66,6 +68,10 @@ class EventSource:
 
     async def stream(self, name: str) -> AsyncIterator[bytes]:
         """Yield the events of one viewer until it leaves."""
+        if len(self._viewers) >= MOST_VIEWERS:
+            yield b"retry: 10000\n\n"
+            yield _event("gone", {"sentence": f"{MOST_VIEWERS} pages are open, the most that are served: close one."})
+            return
         viewer = Viewer(name)
         self._viewers.add(viewer)
         self._commands.join(name)

@@ -131,6 +131,26 @@ def test_a_browser_that_closes_one_of_two_tabs_is_still_there(tmp_path: Path) ->
     asyncio.run(scene())
 
 
+def test_more_viewers_than_are_served_are_told_so_and_keep_no_connection(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(events, "MOST_VIEWERS", 2)
+
+    async def scene() -> None:
+        source = EventSource(Context(tmp_path), None, Commands())  # type: ignore[arg-type]
+        first = [source.stream(name) for name in "ab"]
+        for one in first:
+            await anext(one)
+        told = [read(event) async for event in source.stream("c")]
+        assert told[-1][0] == "gone" and "close one" in told[-1][1]["sentence"]
+        assert source.viewers == 2
+        for one in first:
+            await one.aclose()
+        await source.close()
+
+    asyncio.run(scene())
+
+
 def test_a_viewer_that_does_not_read_is_dropped_and_the_others_go_on(
     tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch
 ) -> None:

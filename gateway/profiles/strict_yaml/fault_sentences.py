@@ -98,7 +98,7 @@ def unknown_key(
         return f"is not a known key here; it belongs under {elsewhere[key]}", ""
     if (near := closest(key, free)) is not None:
         return f"is not a known key; did you mean {near}?", near
-    return f"is not a known key; known are {one_of(known)}", ""
+    return "is not a known key; " + (f"known are {one_of(known)}" if known else "nothing may stand here"), ""
 
 
 def _other_unit(key: str, value: object, known: list[str]) -> tuple[str, str] | None:

@@ -154,6 +154,16 @@ class Square:
 
 
 @dataclass(frozen=True)
+class Nothing:
+    __pydantic_config__ = STRICT
+
+
+def test_where_no_key_is_known_the_sentence_names_none() -> None:
+    _, faults = build(Nothing, parse(b"a: 1", "a.yaml"))
+    assert "is not a known key; nothing may stand here" in str(faults[0])
+
+
+@dataclass(frozen=True)
 class Shapes:
     __pydantic_config__ = STRICT
     shapes: tuple[Annotated[Round | Square, Discriminator("type")], ...]
