@@ -36,6 +36,11 @@ SIGMAS: Final = 3.5  # of the smoothed error's noise: the least zone
 ZONE_SHARE: Final = 0.5  # of the rig's dead zone
 LEFT_SHARE: Final = 0.33  # of the zone, at which a correction ends
 NOISE_S: Final = 2.0  # over which the noise is estimated
+NOISY_N: Final = (
+    0.6  # from here on a noise that has ceased is forgotten at once: its zone would keep the force out of band
+)
+LATELY_SAMPLES: Final = 10.0
+CEASED: Final = 3.0  # times what the last samples had, squared
 WIDER: Final = 1.5  # zone after each turn
 SLOWER: Final = 0.6  # pace after each turn
 MOST_TURNS: Final = 5
@@ -56,7 +61,7 @@ class MeasuredTrim:
     def __init__(self, settings: Trim, timing: LoopTiming) -> None:
         self._settings = settings
         self._timing = timing
-        self._noise_n2 = self._known_s = 0.0
+        self._noise_n2 = self._lately_n2 = self._known_s = 0.0
         self._same_way_n = min(SAME_WAY_N, settings.memory_n)
         self._before_n: float | None = None
         self._smooth_n = self._seen_s = self._interval_s = 0.0
@@ -194,14 +199,19 @@ class MeasuredTrim:
     def _smooth(self, error_n: float, interval_s: float) -> None:
         if self._before_n is not None:
             self._known_s = min(NOISE_S, self._known_s + interval_s)  # the mean at first, then forgetting
-            share = interval_s / self._known_s
-            self._noise_n2 += share * (0.5 * (error_n - self._before_n) ** 2 - self._noise_n2)
+            self._estimate_noise(0.5 * (error_n - self._before_n) ** 2, interval_s / self._known_s)
             behind_s = min(SMOOTHING_S, self._seen_s)  # the mean at first, then forgetting
             self._smooth_n += (error_n - self._smooth_n) * interval_s / (behind_s + interval_s)
         else:
             self._smooth_n = error_n
         self._interval_s, self._before_n = interval_s, error_n
         self._seen_s += interval_s
+
+    def _estimate_noise(self, now_n2: float, share: float) -> None:
+        self._noise_n2 += share * (now_n2 - self._noise_n2)
+        self._lately_n2 += max(share, 1.0 / LATELY_SAMPLES) * (now_n2 - self._lately_n2)
+        if self._noise_n2 > NOISY_N**2:
+            self._noise_n2 = min(self._noise_n2, max(NOISY_N**2, CEASED * self._lately_n2))
 
     def _zone_n(self) -> float:
         smoothed = sqrt(self._noise_n2 * min(1.0, self._interval_s / min(2.0 * SMOOTHING_S, self._seen_s)))

@@ -169,6 +169,20 @@ def test_failures_that_bring_it_to_its_limit_are_no_hunting():
     assert not one.has_hunted
 
 
+@pytest.mark.parametrize("burst_n", [5.0, 50.0])
+def test_a_burst_of_noise_keeps_no_error_from_being_corrected_for_long(burst_n):
+    one = trim()
+    held(one, 0.0, 3.0, noise_n=burst_n)
+    assert abs(held(one, 1.4, 2.0, noise_n=0.1, seed=2)) < 1.0
+
+
+def test_a_cell_that_is_always_noisy_is_known_as_that():
+    one, rng = trim(), Random(3)
+    for sample in range(6000):
+        one.integrate(rng.gauss(0.0, 2.0), SLOPE_N_PER_V, SAMPLE_S)
+        assert sample < 100 or one.noise_n > 1.0
+
+
 def test_it_stays_within_its_limit_and_says_so():
     one = trim(limit_v=0.2)
     held(one, 10.0, 2.0)
