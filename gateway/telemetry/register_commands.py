@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from gateway.live.control_link import ControlLink
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.registers.map.register_map import RegisterMap
+from gateway.registers.map.register_map import Register, RegisterMap
 
 _LONGEST: Final = 16_384
 """Bytes of a command: far beyond one that names every register, and too few to nest deeply."""
@@ -36,7 +36,7 @@ class RegisterCommands:
     async def _write(self, name: str, value: float) -> None:
         register = self._map.find(name)
         register.check_meant(value)
-        request = P.write_registers_request(register.address, register.encode(value))
+        request = P.write_registers_request(register.address, _encoded(register, value))
         answer = await self._link.ask({"do": "modbus", "via": "mqtt", "unit": self._unit, "pdu": request.hex()})
         if P.is_exception(bytes.fromhex(answer["pdu"])):
             raise ValueError(f"{name}: {answer.get('refusal') or 'refused'}")
@@ -54,6 +54,21 @@ def _registers(payload: bytes) -> dict[str, float]:
     for name, value in content.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise ValueError(f"{name} is no number")
-        if not isfinite(value):
-            raise ValueError(f"{name} = {value}: a finite number is wanted")
+        if not _is_finite(value):
+            raise ValueError(f"{name}: a finite number is wanted")
     return content
+
+
+def _is_finite(value: float) -> bool:
+    """Decide whether a float holds it: JSON has whole numbers of any length."""
+    try:
+        return isfinite(value)
+    except OverflowError:
+        return False
+
+
+def _encoded(register: Register, value: float) -> bytes:
+    try:
+        return register.encode(value)
+    except (ValueError, OverflowError) as error:
+        raise ValueError(f"{register.name}: {error}") from None

@@ -114,7 +114,16 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
         (b'{"force_setpoint": NaN}', None, []),
         (b'{"force_setpoint": -Infinity}', None, []),
         (b'{"force_setpoint": 1e999}', None, []),
-        (b'{"force_setpoint": 1' + b"0" * 400 + b"}", None, []),
+        (
+            b'{"force_setpoint": 1' + b"0" * 400 + b"}",
+            {"ok": False, "written": [], "error": "force_setpoint: a finite number is wanted"},
+            [],
+        ),
+        (
+            b'{"control_word": 65536}',
+            {"ok": False, "written": [], "error": "control_word: 65536 does not fit in uint16: 0 .. 65535"},
+            [],
+        ),
     ],
 )
 def test_a_command_is_written_in_order_until_the_first_refusal(
