@@ -1,6 +1,7 @@
 """Recordings of a running rig: what a user says of one stands in it, and one with a time ends by itself."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,14 @@ def test_name_and_note_stand_in_the_header_and_only_where_they_were_given(
     named, plain = list_recordings(tmp_path)
     assert label_of(named.header) == RecordingLabel("before repair", "new seals tomorrow")
     assert not {"name", "note"} & set(plain.header)
+
+
+def test_a_recording_names_the_calibration_that_is_in_use_now(recordings: Recordings, tmp_path: Path) -> None:
+    recordings.calibration = replace(demo().calibration, number=7, noise_n=0.25)
+    recordings.start()
+    recordings.stop()
+    header = list_recordings(tmp_path)[0].header
+    assert (header["calibration"], header["calibration_noise_n"]) == (7, 0.25)
 
 
 def test_a_recording_with_a_time_ends_by_the_loops_clock(recordings: Recordings) -> None:

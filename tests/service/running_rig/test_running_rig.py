@@ -239,6 +239,19 @@ def test_another_calibration_or_plant_is_known_everywhere_at_once(devices: OwnDe
     assert told == ["start", "calibration in use", "plant in use", "end"]
 
 
+def test_a_port_that_is_gone_is_known_to_be_gone(devices: OwnDevices) -> None:
+    """The cell's before its readings are too old, the output's to whoever asks which watchdogs watch."""
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        assert rig._ports.is_guarded and not rig.loop.cell_lost
+        gone = PortError("E102", "gone")
+        rig._ports.cell._on_lost(gone)
+        rig._ports.output._on_lost(gone)
+        assert rig.loop.cell_lost and not rig._ports.is_guarded
+
+    with_running_rig(devices, scene)
+
+
 def test_the_guardian_has_the_line_before_anything_but_safe_is_written(devices: OwnDevices) -> None:
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         assert {heard.voltage_v for heard in devices.settings_since(0.0)} <= {0.0}
