@@ -232,23 +232,6 @@ def test_a_calibration_is_swapped_without_a_bump():
     assert fed_v - bench.last.feedforward_v == pytest.approx(less_v, abs=0.05), "the new set is what feeds forward"
 
 
-def test_what_a_swap_carries_over_ends_with_the_output():
-    """Volts of the set before, added to the next enable's."""
-    swapped, fresh = enabled(), enabled()
-    swapped.force(20.0)
-    swapped.run(1.0)
-    swapped.controller.use(CalibrationInUse(bsfm(scale=1.2), 2))
-    fresh.controller.use(CalibrationInUse(bsfm(scale=1.2), 2))
-    fed_v = []
-    for bench in (swapped, fresh):
-        bench.disable()
-        bench.run(1.0)
-        bench.enable(20.0)
-        bench.seconds_until(lambda output: output.force_applied_n >= 20.0, 3.0)
-        fed_v.append(bench.last.feedforward_v)
-    assert fed_v[0] == pytest.approx(fed_v[1], abs=0.01)
-
-
 def test_the_residual_is_that_of_the_set_in_use():
     """Also where nothing moves any more: the model's expectation changes with the set and not with the next voltage."""
     bench = enabled()

@@ -384,7 +384,7 @@ DEFECTS = (
     Defect("volts of another calibration outlive the output's end", "control/force_loop/feedforward.py",
            "        self._pace = RateBudget()\n        self._carry_over_v = 0.0\n",
            "        self._pace = RateBudget()\n        self._carry_over_v = getattr(self, \"_carry_over_v\", 0.0)\n",
-           ("control/test_settling.py",)),
+           ("control/test_swapped_set.py",)),
     Defect("an enable right behind a clearing is swallowed", "control/command_edges.py",
            "        self._word = 0\n        self._adopt_heartbeat = True", "        self._adopt_heartbeat = True",
            ("control/test_commands.py",)),
