@@ -1,30 +1,24 @@
 """Modbus/TCP Security: who gets in and as what, what is said of those who do not, and that they leave nothing behind."""
 
-import resource
 import ssl
-from contextlib import suppress
 from datetime import UTC, datetime
 from ipaddress import ip_network
 from pathlib import Path
 
 import pytest
 
-from gateway.fieldbus import ServerSettings, tls_stream
+from gateway.fieldbus import ServerSettings
 from gateway.fieldbus.peers import Peers
-from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING, MOST_PENDING_OF_ONE
 from gateway.modbus import Role, pdu
 from gateway.modbus.certificate import ROLES, read_certificate
 from tests.certificates import Folder, serial_of
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
-from tests.fieldbus.tls_by_hand import Face, client
+from tests.fieldbus.tls_by_hand import Face, client, face
+
+__all__ = ["face"]
 
 READ_TWO = framed(READ, 7)
 VERSIONS = [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3]
-
-
-@pytest.fixture
-def face(folder: Folder) -> Face:
-    return Face(folder, lambda: f"{datetime.now(UTC):%Y%m%d%H%M%S}Z")
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -114,19 +108,6 @@ def test_old_versions_are_refused(face: Face, folder: Folder, version: ssl.TLSVe
     ]
 
 
-def test_a_stranger_cannot_choose_dear_arithmetic(face: Face, folder: Folder) -> None:
-    """One hello with ffdhe8192 stalled the control loop by a quarter of a second, and its guardian replaced it."""
-    dear, usual = client(folder, "setpoint"), client(folder, "setpoint")
-    dear.set_ecdh_curve("secp521r1")
-    usual.set_ecdh_curve("prime256v1")
-    with pytest.raises(ssl.SSLError):
-        face.accept().greet(dear)
-    assert face.accept().greet(usual) == "TLSv1.3"
-    assert face.log == [
-        "W244 127.0.0.1:40000: it offers no group of ours: allow P-256 (secp256r1) for its key exchange"
-    ]
-
-
 def test_a_client_that_does_not_trust_us_is_told(face: Face, folder: Folder) -> None:
     with pytest.raises(ssl.SSLCertVerificationError):
         line = face.accept()
@@ -135,62 +116,12 @@ def test_a_client_that_does_not_trust_us_is_told(face: Face, folder: Folder) -> 
     assert face.log[0].startswith("W240 127.0.0.1:40000: it refused our certificate")
 
 
-def test_eight_handshakes_at_a_time_each_at_most_five_seconds(face: Face) -> None:
-    lines = [face.accept() for _ in range(MOST_PENDING)]
-    face.accept()
-    assert face.log == [f"W243 127.0.0.1:40000: {MOST_PENDING} handshakes are under way, the most allowed"]
-    face.clock.advance(HANDSHAKE_S - 0.01)
-    face.handshakes.sweep(face.clock.time())
-    assert len(face.handshakes.pending) == MOST_PENDING
-    face.clock.advance(0.02)
-    face.handshakes.sweep(face.clock.time())
-    assert not face.handshakes.pending
-    assert [line.socket.ended for line in lines] == ["aborted"] * MOST_PENDING
-    assert face.log[1:] == ["W243 127.0.0.1:40000: the handshake was not finished within 5 s"] * MOST_PENDING
-
-
-def test_who_shows_certificates_without_end_is_cut_before_they_are_judged(
-    face: Face, folder: Folder, tmp_path: Path
-) -> None:
-    """240 of one name took 50 ms of the control loop to lead nowhere, and eight connections may shake hands at a time."""
-    chain, own = tmp_path / "chain.pem", Path(folder.crt("foreign")).read_text()
-    for copies, sentence in (
-        (1, "W240 127.0.0.1:40000: its certificate is not of our CA"),
-        (60, "W243 127.0.0.1:40000: more"),
-    ):
-        chain.write_text(copies * own)
-        context = client(folder)
-        context.load_cert_chain(chain, folder.key("foreign"))
-        line = face.accept()
-        with suppress(ssl.SSLError):
-            line.greet(context)
-        assert line.socket.ended and not face.handshakes.pending
-        assert face.log.pop().startswith(sentence) and not face.log
-
-
 def test_a_stranger_to_the_allow_list_begins_no_handshake(face: Face) -> None:
     face.shared.peers = Peers(ServerSettings(allow=(ip_network("10.0.0.0/8"),)), guarded=True)
     stranger, friend = face.accept("192.168.1.9"), face.accept("10.0.0.9")
     assert face.handshakes.pending == {friend.stream} and stranger.socket.ended == "aborted"
     assert face.log == ["W230 192.168.1.9:40000: its address is in none of the allowed networks"]
     friend.socket.leave()
-
-
-def test_one_address_that_says_nothing_does_not_keep_the_others_out(face: Face) -> None:
-    silent = [face.accept("10.0.0.7") for _ in range(MOST_PENDING)]
-    assert [line.socket.ended for line in silent].count("aborted") == MOST_PENDING - MOST_PENDING_OF_ONE
-    assert set(face.log) == {"W243 10.0.0.7:40000: 4 handshakes of this address are under way, the most allowed"}
-    assert not face.accept("10.0.0.8").socket.ended
-
-
-def test_one_address_has_twenty_handshakes_a_second(face: Face) -> None:
-    for _ in range(30):
-        face.accept("10.0.0.7").socket.leave()
-    assert face.log and all("more than 20 handshakes a second" in told for told in face.log)
-    face.clock.advance(1.0)
-    face.handshakes.sweep(face.clock.time())
-    assert not face.handshakes.rates
-    assert not face.accept("10.0.0.7").socket.ended
 
 
 def test_nobody_renegotiates_and_a_resumed_session_is_judged_anew(face: Face, folder: Folder) -> None:
@@ -210,56 +141,6 @@ def test_nobody_renegotiates_and_a_resumed_session_is_judged_anew(face: Face, fo
         again.exchange()
     assert again.tls.session_reused
     assert face.log[0].startswith("W245 ") and again.socket.ended and len(face.shared.connections) == 1
-
-
-def failures(face: Face, folder: Folder, rounds: int) -> None:
-    """Handshakes that fail in each way, and some that are begun and left."""
-    contexts = [client(folder, name, version) for name, _ in REFUSED for version in VERSIONS]
-    for number in range(rounds):
-        line = face.accept()
-        try:
-            if number % 5 == 4:
-                line.send(b"\x16\x03\x01\x02\x00\x01")
-            else:
-                line.greet(contexts[number % len(contexts)])
-        except ssl.SSLError:
-            pass
-        line.socket.leave()
-
-
-def test_sessions_of_clients_without_tickets_do_not_pile_up(
-    face: Face, folder: Folder, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each took 10 kB for two hours: 76 MB for a PLC that connects anew every second."""
-    monkeypatch.setattr(tls_stream, "MOST_SESSIONS", 10)
-    context = client(folder, "setpoint", ssl.TLSVersion.TLSv1_2)
-    context.options |= ssl.OP_NO_TICKET
-    kept = []
-    for _ in range(25):
-        line = face.accept()
-        line.greet(context)
-        with suppress(ssl.SSLError):
-            line.tls.unwrap()  # a client that closes well: its session is kept
-        line.exchange()
-        kept.append(face.handshakes.context.session_stats()["number"])
-        face.handshakes.sweep(face.clock.time())
-    assert kept == [*range(1, 12), *range(1, 12), 1, 2, 3]
-    assert face.accept().greet(client(folder, "setpoint")) == "TLSv1.3"
-
-
-def test_failed_handshakes_leave_nothing_behind(face: Face, folder: Folder) -> None:
-    before = face.left
-    failures(face, folder, 150)
-    assert (len(face.handshakes.pending), len(face.shared.connections), face.left - before) == (0, 0, 0)
-    assert face.shared.peers._open == {} and face.closed == []
-
-
-@pytest.mark.long
-def test_twenty_thousand_failed_handshakes_take_no_memory(face: Face, folder: Folder) -> None:
-    failures(face, folder, 2000)
-    before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    failures(face, folder, 20_000)
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kib <= 10 * 1024
 
 
 def test_our_reading_of_a_certificate_is_that_of_openssl(folder: Folder) -> None:

@@ -5,7 +5,10 @@ import ssl
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import Any
+
+import pytest
 
 from gateway.fieldbus.connection import ServerState
 from gateway.fieldbus.peers import Peers
@@ -129,3 +132,9 @@ def client(folder: Folder, name: str = "", version: ssl.TLSVersion | None = None
         if version < ssl.TLSVersion.TLSv1_2:
             context.set_ciphers("ALL:@SECLEVEL=0")
     return context
+
+
+@pytest.fixture
+def face(folder: Folder) -> Face:
+    """A TLS face by today's date."""
+    return Face(folder, lambda: f"{datetime.now(UTC):%Y%m%d%H%M%S}Z")

@@ -8,7 +8,7 @@ from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.settings import SafeDirection
 from gateway.control.valve.pull_model import scale_forces
 from gateway.devices.valve_profile import ValveDirection
-from gateway.registers.words import ControlBit, State, StatusBit
+from gateway.registers.words import State, StatusBit
 from tests.control.bench import bsfm
 from tests.control.valve.valve_bench import BIT_4, ENABLE, MOVES_S, PULL, PUSH, SHARE, ValveBench
 
@@ -88,18 +88,6 @@ def test_a_regulator_that_hears_nothing_keeps_its_pressure_and_the_valve_waits_f
     assert bench.stands is PUSH and bench.switched[-1][2] == 0.0
 
 
-def test_a_latched_fault_keeps_the_valve_unless_the_same_write_resets_it() -> None:
-    bench = ValveBench().pulling()
-    bench.cell_silent = True
-    bench.run(1.0)
-    bench.heal()
-    bench.run(1.0)
-    bench.write(control_word=BIT_4)
-    assert bench.refused and bench.refused.reason is RefusalReason.VALVE_REFUSED
-    assert bench.write(control_word=BIT_4 | ControlBit.RESET_FAULT).state is State.OFF
-    assert bench.refused is None
-
-
 def test_a_valve_that_does_not_follow_is_a_fault_within_its_bound() -> None:
     bench = ValveBench(timeout_s=0.5)
     bench.run(1.0)
@@ -147,18 +135,6 @@ def test_no_run_begins_while_the_valve_pulls() -> None:
     bench.disable()
     bench.run(1.0)
     assert "a run is made pushing" in bench.controller.refusal_of_run(bench.now_s, CalibrationPlan())
-
-
-def test_no_run_begins_before_the_valve_has_read_back() -> None:
-    """Its ladder would press while the valve moves."""
-    bench = ValveBench()
-    bench.obeys = False
-    bench.turn(PULL)
-    bench.run(0.2)
-    assert "is switching" in bench.controller.refusal_of_run(bench.now_s, CalibrationPlan())
-    bench.obeys = True
-    bench.run(1.0)
-    assert bench.controller.refusal_of_run(bench.now_s, CalibrationPlan()) == ""
 
 
 def test_in_voltage_mode_it_is_switched_without_pressure_too() -> None:

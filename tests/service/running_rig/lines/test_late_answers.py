@@ -83,12 +83,3 @@ def test_a_device_whose_answers_are_cut_still_hears_the_safe_voltage(wire: Wire)
     wire.set_voltage(0)
     wire.tick(REPLY_TIMEOUT_S + 0.001)
     assert wire.last == "SET 0"
-
-
-def test_half_an_answer_from_before_a_time_out_is_no_part_of_the_next(wire: Wire) -> None:
-    wire.set_voltage(512)
-    wire.exchange.on_bytes(b"5", wire.now_s)
-    wire.tick(REPLY_TIMEOUT_S + 0.001)
-    assert wire.written == [b"SET 512\r\n"] * 2
-    wire.answer("512")
-    assert wire.exchange.confirmed_v == pytest.approx(512 * 10 / 1023)

@@ -3,10 +3,6 @@
 import pytest
 
 from gateway.codes.faults import FaultCode
-from gateway.devices import output_device, output_host
-from gateway.devices.messages import Accepted, SetVoltage
-from gateway.service.running_rig.lines.output_line import OutputExchange
-from tests.profile_files import load_device
 from tests.service.running_rig.lines.played_output import REPLY_TIMEOUT_S, ROUND_TRIP_S, Wire, wire
 
 __all__ = ["wire"]
@@ -203,22 +199,6 @@ def test_an_answer_in_pieces_is_an_answer(wire: Wire) -> None:
     for piece in (b"5", b"1", b"2\r", b"\n"):
         wire.exchange.on_bytes(piece, wire.now_s)
     assert wire.exchange.acknowledged_v == pytest.approx(512 * 10 / 1023)
-
-
-def test_a_bus_has_its_silence_before_the_next_question() -> None:
-    """Without it the device does not see where a frame ends."""
-    wire, profile = Wire(), load_device("waveshare-ao8b")
-    host, device = output_host(profile), output_device(profile)
-    wire.exchange = OutputExchange(host, wire.written.append, REPLY_TIMEOUT_S)
-    wire.set_voltage(0)
-    (question,) = device.receive(wire.written[-1], wire.now_s)
-    assert isinstance(question, SetVoltage) and host.gap_s > 0.001
-    wire.set_voltage(512, after_s=0.01)
-    wire.exchange.on_bytes(device.reply(Accepted(question.voltage_v), question), wire.now_s)
-    wire.tick(0.9 * host.gap_s)
-    assert len(wire.written) == 1
-    wire.tick(0.2 * host.gap_s)
-    assert len(wire.written) == 2
 
 
 def test_opened_again_nothing_said_before_counts(wire: Wire) -> None:

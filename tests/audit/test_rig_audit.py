@@ -1,0 +1,75 @@
+"""The audit of one running rig: who writes, asks and uploads is kept to the end, and what is refused is kept, too."""
+
+import asyncio
+import json
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.audit.audit_reader import read_audit, verify_audit
+from gateway.audit.rig_audit import RigAudit
+from gateway.modbus import ModbusError, Peer, Role
+from gateway.profiles import load_register_map
+from gateway.registers import BankRules, RegisterBank
+from tests.audit.test_write_audit import ROBOT
+
+
+def test_what_waits_at_the_end_is_written(tmp_path: Path) -> None:
+    async def run() -> None:
+        said: list[str] = []
+        audit = RigAudit(tmp_path, lambda cause, sentence: said.append(sentence))
+        bank = RegisterBank(
+            load_register_map("force-v1"), BankRules(rig_name="demo", force_max_n=60.0), now=lambda: 0.0
+        )
+        audit.watch(bank)
+        answers = audit.watch_handlers({"plant": lambda request: {"active": 0}, "health": lambda request: {}})
+        bank.write_registers(0, b"\0\1\4\xb0", ROBOT)
+        answers["plant"]({"do": "plant"})
+        answers["plant"]({"do": "plant", "use": 3})
+        answers["health"]({"do": "health"})
+        await audit.close()
+        assert said == []
+
+    asyncio.run(run())
+    assert [record["what"] for record in read_audit(tmp_path)] == ["enable", "owner", "force_setpoint", "plant", "end"]
+    assert not verify_audit(tmp_path).broken
+    with pytest.raises(FileNotFoundError):
+        verify_audit(tmp_path / "audit")
+
+
+def test_what_is_refused_and_what_is_uploaded_is_kept_too(tmp_path: Path) -> None:
+    def refuse(request: dict[str, Any]) -> None:
+        raise ValueError("there is no plant 3")
+
+    async def run() -> None:
+        audit = RigAudit(tmp_path, lambda cause, sentence: None)
+        register_map = load_register_map("force-v1")
+        bank = RegisterBank(register_map, BankRules(rig_name="demo", force_max_n=60.0), now=lambda: 0.0)
+        audit.watch(bank)
+        with pytest.raises(ModbusError):
+            bank.write_registers(1, b"\x7f\xff", ROBOT)
+        bank.staging.on_select = lambda slot, peer: None
+        bank.write_registers(register_map.find("slot_select").address, b"\0\2", Peer("::1", 1, role=Role.ADMIN))
+        with pytest.raises(ValueError, match="no plant 3"):
+            audit.watch_handlers({"plant": refuse})["plant"]({"do": "plant", "use": 3})
+        await audit.close()
+
+    asyncio.run(run())
+    told = [(record["what"], record["result"]) for record in read_audit(tmp_path)]
+    assert told[1:] == [("slot_select", "accepted"), ("plant", "there is no plant 3"), ("end", "accepted")]
+    assert told[0][0] == "write" and told[0][1].startswith("W")
+
+
+def test_what_waits_for_a_disk_is_told_with_its_end(tmp_path: Path) -> None:
+    async def run() -> None:
+        audit, ends = RigAudit(tmp_path, lambda cause, sentence: None), [Future[Any](), Future[Any]()]
+        watched = audit.watch_handlers({"record": lambda request: ends[request["name"]]})
+        watched["record"]({"do": "record", "name": 0}), watched["record"]({"do": "record", "name": 1})
+        ends[1].set_exception(OSError("recordings: No space left on device"))
+        ends[0].set_result({})
+        await audit.close()
+
+    asyncio.run(run())
+    assert ["No space left" in json.dumps(record) for record in read_audit(tmp_path)] == [True, False, False]

@@ -1,0 +1,30 @@
+"""What the valve refuses: to move under a latched fault, and to have a run begin while it moves."""
+
+from gateway.codes.refusals import RefusalReason
+from gateway.control.runs.ladder_stairs import CalibrationPlan
+from gateway.registers.words import ControlBit, State
+from tests.control.valve.valve_bench import BIT_4, PULL, ValveBench
+
+
+def test_a_latched_fault_keeps_the_valve_unless_the_same_write_resets_it() -> None:
+    bench = ValveBench().pulling()
+    bench.cell_silent = True
+    bench.run(1.0)
+    bench.heal()
+    bench.run(1.0)
+    bench.write(control_word=BIT_4)
+    assert bench.refused and bench.refused.reason is RefusalReason.VALVE_REFUSED
+    assert bench.write(control_word=BIT_4 | ControlBit.RESET_FAULT).state is State.OFF
+    assert bench.refused is None
+
+
+def test_no_run_begins_before_the_valve_has_read_back() -> None:
+    """Its ladder would press while the valve moves."""
+    bench = ValveBench()
+    bench.obeys = False
+    bench.turn(PULL)
+    bench.run(0.2)
+    assert "is switching" in bench.controller.refusal_of_run(bench.now_s, CalibrationPlan())
+    bench.obeys = True
+    bench.run(1.0)
+    assert bench.controller.refusal_of_run(bench.now_s, CalibrationPlan()) == ""
