@@ -23,7 +23,7 @@ from tests.simulation.masters.bus_master import make_master
 from tests.simulation.masters.integrator import Integrator
 from tests.simulation.masters.socket_user import SocketUser
 from tests.simulation.masters.spelling import BITS, DISABLED_BY_BIT, ENABLE, read_pdu
-from tests.simulation.masters.tcp_master import BEATS_S, RUNS, Master
+from tests.simulation.masters.tcp_master import BEATS_S, RESET, RUNS, Master
 from tests.simulation.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
 from tests.simulation.rigs import LEASE_S, draw_rig, store_plants
 
@@ -198,8 +198,8 @@ class Simulation:
         return has_moved
 
     def _on_write(self, control: int | None, is_answered: bool) -> None:
-        if control == DISABLED_BY_BIT:  # which ends no run
-            control = BITS if self.observer.is_run else 0
+        if control == DISABLED_BY_BIT:  # which ends no run; a reset may be among the other bits
+            control = BITS if self.observer.is_run else RESET
         if control is not None and control & (ENABLE | RUN_BIT | SELF_TEST) and control > 0 and is_answered:
             self.person.lose()  # a run that was asked for at the machine excludes that
         note = self.observer.note_accepted if is_answered else self.observer.note_unanswered
