@@ -20,6 +20,7 @@ from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.running_rig.recordings import Recordings
 from tests.control.bench import bsfm
 from tests.disk.at_once import AtOnce
+from tests.disk.threads import join_disk_threads
 from tests.service.rigs import demo
 
 DECISION = Controller(demo().control, CalibrationInUse(bsfm(), 1)).safe_output(FaultCode.NONE)
@@ -193,6 +194,7 @@ def test_the_loop_goes_on_while_a_thread_waits_for_the_disk(tmp_path: Path) -> N
 
     path = asyncio.run(main())
     assert path and read_recording(path).rows == 11
+    join_disk_threads()  # it still syncs the file
 
 
 def test_a_file_is_put_on_the_disk_once_it_has_begun_and_once_it_has_ended(
