@@ -10,26 +10,9 @@ import pytest
 from gateway.fieldbus import tls_stream
 from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING, MOST_PENDING_OF_ONE
 from tests.certificates import Folder
-from tests.fieldbus.by_hand import READ, framed
-from tests.fieldbus.tls_by_hand import Face, client, face
+from tests.fieldbus.tls_by_hand import REFUSED, VERSIONS, Face, client, face
 
 __all__ = ["face"]
-
-READ_TWO = framed(READ, 7)
-VERSIONS = [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3]
-REFUSED = [
-    ("foreign", "W240 127.0.0.1:40000: its certificate is not of our CA"),
-    ("expired", "W241 127.0.0.1:40000: its certificate has expired"),
-    ("roleless", "W242 127.0.0.1:40000: the certificate of 'roleless' names no role"),
-    (
-        "captain",
-        "W242 127.0.0.1:40000: the certificate of 'captain' names the role 'captain', known are monitor, setpoint",
-    ),
-    ("nameless", "W242 127.0.0.1:40000: the certificate has no common name"),
-    ("thief", "W245 127.0.0.1:40000: the certificate of 'thief' (serial "),
-    ("gateway", "W240 127.0.0.1:40000: its certificate is not one for a client"),
-    ("", "W240 127.0.0.1:40000: it showed no certificate"),
-]
 
 
 def test_a_stranger_cannot_choose_dear_arithmetic(face: Face, folder: Folder) -> None:

@@ -13,12 +13,11 @@ from gateway.modbus import Role, pdu
 from gateway.modbus.certificate import ROLES, read_certificate
 from tests.certificates import Folder, serial_of
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
-from tests.fieldbus.tls_by_hand import Face, client, face
+from tests.fieldbus.tls_by_hand import REFUSED, VERSIONS, Face, client, face
 
 __all__ = ["face"]
 
 READ_TWO = framed(READ, 7)
-VERSIONS = [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3]
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -43,21 +42,6 @@ def test_the_role_and_the_name_come_out_of_the_certificate(face: Face, folder: F
     assert face.shared.settings.role is Role.SETPOINT, "what a plain face gives counts for nothing"
     line.socket.leave()
     assert face.closed == [peer] and not face.shared.connections
-
-
-REFUSED = [
-    ("foreign", "W240 127.0.0.1:40000: its certificate is not of our CA"),
-    ("expired", "W241 127.0.0.1:40000: its certificate has expired"),
-    ("roleless", "W242 127.0.0.1:40000: the certificate of 'roleless' names no role"),
-    (
-        "captain",
-        "W242 127.0.0.1:40000: the certificate of 'captain' names the role 'captain', known are monitor, setpoint",
-    ),
-    ("nameless", "W242 127.0.0.1:40000: the certificate has no common name"),
-    ("thief", "W245 127.0.0.1:40000: the certificate of 'thief' (serial "),
-    ("gateway", "W240 127.0.0.1:40000: its certificate is not one for a client"),
-    ("", "W240 127.0.0.1:40000: it showed no certificate"),
-]
 
 
 @pytest.mark.parametrize("version", VERSIONS)

@@ -21,6 +21,21 @@ from tests.certificates import Folder, serial_of
 from tests.fieldbus.conftest import HandClock, HandTransport, NotingBank
 
 NOW = "20270101000000Z"
+VERSIONS = [ssl.TLSVersion.TLSv1_2, ssl.TLSVersion.TLSv1_3]
+REFUSED = [
+    ("foreign", "W240 127.0.0.1:40000: its certificate is not of our CA"),
+    ("expired", "W241 127.0.0.1:40000: its certificate has expired"),
+    ("roleless", "W242 127.0.0.1:40000: the certificate of 'roleless' names no role"),
+    (
+        "captain",
+        "W242 127.0.0.1:40000: the certificate of 'captain' names the role 'captain', known are monitor, setpoint",
+    ),
+    ("nameless", "W242 127.0.0.1:40000: the certificate has no common name"),
+    ("thief", "W245 127.0.0.1:40000: the certificate of 'thief' (serial "),
+    ("gateway", "W240 127.0.0.1:40000: its certificate is not one for a client"),
+    ("", "W240 127.0.0.1:40000: it showed no certificate"),
+]
+"""Whose certificates are turned away, and what is said of it."""
 
 
 @dataclass(eq=False)

@@ -32,8 +32,8 @@ async def heard(said: bytes, then: bytes = b"") -> bytes:
     writer.write(said)
 
     async def drip() -> None:
-        for byte in then:
-            writer.write(bytes((byte,)))
+        while then:
+            writer.write(then)
             await asyncio.sleep(0.002)
 
     dripping = asyncio.create_task(drip())
@@ -52,7 +52,7 @@ async def heard(said: bytes, then: bytes = b"") -> bytes:
     [
         (b"", b""),
         (WHOLE[:20], b""),
-        (WHOLE[:20], b"X" * 1000),
+        (WHOLE[:20], b"X"),
         (b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 99\r\n\r\nabc", b""),
     ],
 )
