@@ -11,24 +11,38 @@ import struct
 import sys
 import time
 from collections.abc import Callable
+from functools import cache
+
+from gateway.processes.phase_lock import PhaseLock
 
 _CLOCK_MONOTONIC = 1
+_ABSOLUTE = 1
 _NONBLOCK_CLOEXEC = os.O_NONBLOCK | getattr(os, "O_CLOEXEC", 0)
 _EXPIRATIONS = struct.Struct("=Q")
 
 
-def _create_timerfd(period_s: float) -> int:
-    """Return a descriptor that becomes readable every period_s; OSError where the kernel has none."""
-    libc = ctypes.CDLL(None, use_errno=True)
-    fd = int(libc.timerfd_create(_CLOCK_MONOTONIC, _NONBLOCK_CLOEXEC))
+@cache
+def _libc() -> ctypes.CDLL:
+    return ctypes.CDLL(None, use_errno=True)
+
+
+def _create_timerfd() -> int:
+    """Return a descriptor for `_set_timer`; OSError where the kernel has none."""
+    fd = int(_libc().timerfd_create(_CLOCK_MONOTONIC, _NONBLOCK_CLOEXEC))
     if fd < 0:
         raise OSError(ctypes.get_errno(), "timerfd_create")
-    seconds, nanoseconds = divmod(round(period_s * 1e9), 1_000_000_000)
-    interval = (ctypes.c_long * 4)(seconds, nanoseconds, seconds, nanoseconds)  # it_interval, it_value
-    if libc.timerfd_settime(fd, 0, interval, None) < 0:
-        os.close(fd)
-        raise OSError(ctypes.get_errno(), "timerfd_settime")
     return fd
+
+
+def _set_timer(fd: int, first_s: float, period_s: float) -> None:
+    """Let the descriptor become readable at first_s, monotonic, and every period_s from there on; what is past counts."""
+    interval = (ctypes.c_long * 4)(*_split(period_s), *_split(first_s))  # it_interval, it_value
+    if _libc().timerfd_settime(fd, _ABSOLUTE, interval, None) < 0:
+        raise OSError(ctypes.get_errno(), "timerfd_settime")
+
+
+def _split(time_s: float) -> tuple[int, int]:
+    return divmod(round(time_s * 1e9), 1_000_000_000)
 
 
 class ClockTick:
@@ -48,6 +62,7 @@ class ClockTick:
         self._fd = -1
         self._timer: asyncio.TimerHandle | None = None
         self._due_s = 0.0
+        self._phase = PhaseLock(period_s)
 
     def start(self) -> None:
         """Start the timer."""
@@ -57,8 +72,20 @@ class ClockTick:
             self._timer = loop.call_later(self.period_s, self._on_fallback)
             return
         self._due_s = time.monotonic()
-        self._fd = _create_timerfd(self.period_s)
+        self._fd = _create_timerfd()
+        _set_timer(self._fd, self._due_s + self.period_s, self.period_s)
         loop.add_reader(self._fd, self._on_expired)
+
+    def follow(self, arrival_s: float) -> None:
+        """Come right behind what arrives as often as the tick, or half as often, and so on: see phase_lock. arrival_s: when the
+        newest came, monotonic; the same one may be told again."""
+        if self._fd < 0:
+            return
+        if shift_s := self._phase.shift_s(arrival_s, self._due_s):
+            self._due_s += shift_s
+            _set_timer(
+                self._fd, self._due_s + self.period_s, self.period_s
+            )  # a tick that is due meanwhile comes at once
 
     def close(self) -> None:
         """Stop the timer."""

@@ -17,7 +17,7 @@ from typing import Any
 from gateway.audit.rig_audit import RigAudit
 from gateway.calibrations.upload import UploadService
 from gateway.modbus import Peer
-from gateway.processes.json_socket import Handler, JsonLineServer
+from gateway.processes.json_socket.server import Handler, JsonLineServer
 from gateway.profiles import Rig
 from gateway.recording.label import RecordingLabel
 from gateway.service.live_answers import LiveAnswers, LiveParts

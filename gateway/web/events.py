@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from gateway.live.ring_rows import Columns, RingRows
 from gateway.processes.event_file import EventReader
-from gateway.processes.json_messages import encode_answer
+from gateway.processes.json_socket.messages import encode_answer
 from gateway.web.commands import Commands
 from gateway.web.context import WebContext
 

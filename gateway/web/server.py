@@ -20,7 +20,7 @@ from starlette.routing import BaseRoute, Route
 
 from gateway import VERSION
 from gateway.live.ring_rows import RingRows
-from gateway.processes.json_messages import encode_answer
+from gateway.processes.json_socket.messages import encode_answer
 from gateway.reports.style import read_style
 from gateway.web import tabs
 from gateway.web.commands import Commands, RefusedCommand

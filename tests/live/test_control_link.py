@@ -10,8 +10,8 @@ import pytest
 
 from gateway.live import control_link
 from gateway.live.control_link import ControlLink, ask_once
-from gateway.processes.json_messages import Answer
-from gateway.processes.json_socket import JsonLineServer
+from gateway.processes.json_socket.messages import Answer
+from gateway.processes.json_socket.server import JsonLineServer
 
 Scene = Callable[[Path], Awaitable[None]]
 

@@ -7,6 +7,7 @@ import time
 import pytest
 
 from gateway.processes.clock_tick import ClockTick
+from gateway.processes.phase_lock import ARRIVALS, BEHIND_S
 from gateway.service.running_rig.published_status import LoopHealth
 
 PERIOD_S = 0.004
@@ -85,6 +86,45 @@ def test_closing_twice_or_before_the_start_is_no_trouble(fallback: bool) -> None
 
     assert asyncio.run(scene()) == b"open"
     assert seen == [], "closed is closed"
+
+
+def test_a_tick_that_follows_moves_behind_the_arrivals_and_loses_none() -> None:
+    """The arrivals are a grid in time, of which each tick tells the newest point."""
+    due_s: list[float] = []
+    periods: list[int] = []
+    began_s = time.monotonic()
+
+    async def scene() -> None:
+        enough = asyncio.Event()
+
+        def on_tick(expirations: int, late_s: float) -> None:
+            now_s = time.monotonic()
+            due_s.append(now_s - late_s)
+            periods.append(expirations)
+            tick.follow(now_s - (now_s - began_s) % PERIOD_S)
+            if len(due_s) >= 8 * ARRIVALS:
+                enough.set()
+
+        tick = ClockTick(PERIOD_S, on_tick)
+        await asyncio.sleep(0.4 * PERIOD_S)
+        tick.start()
+        async with asyncio.timeout(10):
+            await enough.wait()
+        tick.close()
+
+    asyncio.run(scene())
+    assert (due_s[-1] - began_s) % PERIOD_S == pytest.approx(BEHIND_S, abs=3e-4)
+    assert (due_s[-1] - due_s[0]) / PERIOD_S == pytest.approx(sum(periods[1:]), abs=0.6), (
+        "moved by half a period at most"
+    )
+
+
+@pytest.mark.parametrize("fallback", [False, True])
+def test_a_tick_that_has_not_begun_or_has_no_timer_follows_nothing(fallback: bool) -> None:
+    tick = ClockTick(PERIOD_S, lambda expirations, late_s: None, is_fallback=fallback)
+    for k in range(3 * ARRIVALS):
+        tick.follow(k * PERIOD_S)
+    assert tick._due_s == 0.0
 
 
 def test_missed_ticks_and_lateness_are_counted() -> None:

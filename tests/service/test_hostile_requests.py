@@ -15,7 +15,7 @@ import pytest
 
 from gateway.audit.rig_audit import RigAudit
 from gateway.codes.faults import FaultCode
-from gateway.processes.json_socket import JsonLineServer
+from gateway.processes.json_socket.server import JsonLineServer
 from gateway.registers.words import State
 from gateway.service.control_socket import ControlSocket, RunningParts
 from gateway.service.running_rig.calibration_runs import CalibrationRuns

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gateway.live.control_link import ControlLink
-from gateway.processes.json_socket import JsonLineServer
+from gateway.processes.json_socket.server import JsonLineServer
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.telemetry.broker_session import BrokerMessage
 from gateway.telemetry.json_topics import JsonTopics

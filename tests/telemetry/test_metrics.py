@@ -10,7 +10,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families as parse
 from starlette.applications import Starlette
 
-from gateway.processes.json_socket import JsonLineServer
+from gateway.processes.json_socket.server import JsonLineServer
 from gateway.telemetry.exposition import exposition
 from gateway.telemetry.metrics_process import make_metrics_app
 from gateway.telemetry.series import SERIES

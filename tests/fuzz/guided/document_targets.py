@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gateway.audit.audit_file import AuditFile, audit_files
 from gateway.audit.audit_reader import read_audit, verify_audit
-from gateway.processes.json_messages import refuse_constant, why_too_large
+from gateway.processes.json_socket.messages import refuse_constant, why_too_large
 from gateway.profiles import ProfileError, check_file, shipped_profiles_folder
 from gateway.profiles.strict_yaml import text
 from gateway.recording import Recorder, RecordingError, read_table

@@ -8,9 +8,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from gateway.processes.json_connection import SocketLimits
-from gateway.processes.json_socket import JsonLineServer
-from tests.processes.test_json_socket import with_server
+from gateway.processes.json_socket.connection import SocketLimits
+from gateway.processes.json_socket.server import JsonLineServer
+from tests.processes.json_socket.test_server import with_server
 
 
 def talk(path: Path, data: bytes = b"") -> socket.socket:

@@ -8,7 +8,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Protocol
 
-from gateway.processes.json_messages import encode_answer, error_answer
+from gateway.processes.json_socket.messages import encode_answer, error_answer
 
 
 @dataclass(frozen=True, slots=True)

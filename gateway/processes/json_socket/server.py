@@ -22,8 +22,8 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.processes.json_connection import JsonConnection, SocketLimits, close_with_sentence
-from gateway.processes.json_messages import Answer, encode_answer, error_answer, refuse_constant, why_too_large
+from gateway.processes.json_socket.connection import JsonConnection, SocketLimits, close_with_sentence
+from gateway.processes.json_socket.messages import Answer, encode_answer, error_answer, refuse_constant, why_too_large
 
 Handler = Callable[[dict[str, Any]], Answer | Future[Answer]]
 """A future, done in the loop, is for what waits for a disk."""

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from gateway.processes.json_connection import SocketLimits
-from gateway.processes.json_socket import JsonLineServer
+from gateway.processes.json_socket.connection import SocketLimits
+from gateway.processes.json_socket.server import JsonLineServer
 
 OFTEN = SocketLimits(idle_s=0.2)  # looks at its file four times as often
 

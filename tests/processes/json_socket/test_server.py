@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from gateway.processes.json_connection import SocketLimits
-from gateway.processes.json_socket import Handler, JsonLineServer
+from gateway.processes.json_socket.connection import SocketLimits
+from gateway.processes.json_socket.server import Handler, JsonLineServer
 
 
 def refuse(request: dict[str, Any]) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""A local socket that answers one JSON object per line."""
