@@ -74,6 +74,11 @@ class SchedulerCounters:
             self._descriptor = -1
 
 
+def waited_s_of(time: ProcessorTime | None) -> float | None:
+    """Return how long a processor was waited for, s; None where the kernel does not count that."""
+    return time.waited_s if time else None
+
+
 def time_between(before: ProcessorTime | None, now: ProcessorTime | None) -> ProcessorTime | None:
     """Return what a process had between two readings, s; None where one of them is missing."""
     if before is None or now is None:

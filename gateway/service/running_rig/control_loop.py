@@ -22,7 +22,7 @@ from gateway.control import Controller
 from gateway.control.blame_for_silence import NOT_HELD, Held
 from gateway.control.inputs import LineStatus, Output
 from gateway.devices.messages import ForceSample, Garbage
-from gateway.processes.scheduler_counters import ProcessorTime, time_between
+from gateway.processes.scheduler_counters import ProcessorTime, time_between, waited_s_of
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
 from gateway.registers.command import Command, Status
@@ -176,7 +176,12 @@ class ControlLoop:
             self.valve.tick(now_s)
         self._last_tick_s, self._last_processor_time = now_s, self.processor_time()
         if self._lateness:
-            self._lateness.tick(now_s, _waited_s(self._last_processor_time))
+            self._lateness.tick(now_s, waited_s_of(self._last_processor_time))
+
+    @property
+    def streamed_s(self) -> float | None:
+        """Time at which the newest sample came of its own accord, s; None of a cell that is asked: it would follow the tick."""
+        return self.sample.time_s if self.sample and self._cell.is_stream else None
 
     def _begin(self, bit: WarningBit, sentence: str) -> None:
         if sentence:
@@ -186,10 +191,9 @@ class ControlLoop:
     def _end_warnings(self, now_s: float) -> None:
         if not int(self.warnings) & _ENDING:
             return
-        if self.warnings & WarningBit.SERIAL_NOISE:
-            lasts = [line.lasts(now_s) for line in (self._cell_noise, self._output_noise)]
-            if not any(lasts):
-                self.warnings &= ~WarningBit.SERIAL_NOISE
+        lasts = [line.lasts(now_s) for line in (self._cell_noise, self._output_noise)]
+        if self.warnings & WarningBit.SERIAL_NOISE and not any(lasts):
+            self.warnings &= ~WarningBit.SERIAL_NOISE
         if self.warnings & WarningBit.SLOW_LOOP and not self._slow_loop.lasts(now_s):
             self.warnings &= ~WarningBit.SLOW_LOOP
 
@@ -227,11 +231,11 @@ class ControlLoop:
         """Asked of the kernel only once a device has not been heard for a while."""
         if self._lateness is None or since_s is None or not _LONG_SILENCE_S <= now_s - since_s <= _LONGEST_SILENCE_S:
             return NOT_HELD
-        return self._lateness.since(since_s, now_s, _waited_s(self.processor_time()))
+        return self._lateness.since(since_s, now_s, waited_s_of(self.processor_time()))
 
-    def _waited_since_tick(self) -> float | None:
+    def _waited_since_tick(self, late_s: float) -> float | None:
         """Asked of the kernel only where the step is late: a decision has no time for it."""
-        return _waited_s(self._used_since_tick())
+        return waited_s_of(self._used_since_tick()) if late_s >= _LONG_SILENCE_S else None
 
     def _line(self, now_s: float) -> LineStatus:
         late_s, output = self._late_s(now_s), self.output
@@ -246,9 +250,7 @@ class ControlLoop:
             pressure_pa_per_v=self.pressure_pa_per_v,
             owner_connected=self.owner_connected,
             late_s=late_s,
-            waited_s=self._waited_since_tick()
-            if late_s >= _LONG_SILENCE_S
-            else None,  # for which the machine is to blame
+            waited_s=self._waited_since_tick(late_s),  # for which the machine is to blame
             warnings=self.warnings,
             sent_v=output.sent_v,
             wire_s=output.round_trip_s,
@@ -317,14 +319,10 @@ class ControlLoop:
         self.bank.self_test.show(report.number, report.result, verdicts)
 
     def _record(self) -> None:
-        if self.recordings and self.sample and self.decision:
-            self.recordings.append(self.sample, self.decision, self.output.line)
-        if self.calibration_runs and self.sample and self.decision:
-            self.calibration_runs.append(self.sample, self.decision, self.output.line)
-        if self.ring and self.sample and self.decision and not int(self.decision.status) & _PULLING:  # its plant pushes
-            self.ring.append(row_of(self.sample.time_s, self.sample, self.decision, self.output.line))
-
-
-def _waited_s(used: ProcessorTime | None) -> float | None:
-    """Return how long a processor was waited for, s; None where the kernel does not count that."""
-    return used.waited_s if used else None
+        sample, decision, line = self.sample, self.decision, self.output.line
+        if sample and decision:
+            for taker in (self.recordings, self.calibration_runs):
+                if taker:
+                    taker.append(sample, decision, line)
+            if self.ring and not int(decision.status) & _PULLING:  # its plant pushes
+                self.ring.append(row_of(sample.time_s, sample, decision, line))

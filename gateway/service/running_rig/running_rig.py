@@ -294,10 +294,10 @@ class RunningRig:
         self._calibration_runs.flush(now_s)
         self._plants.take_waiting()
         self._audit.flush()
-        if self.loop.sample is not None:
-            self._tick.follow(self.loop.sample.time_s)
-            if self._line.acknowledged_v is not None:
-                self._spoke.set()
+        if (streamed_s := self.loop.streamed_s) is not None:
+            self._tick.follow(streamed_s)
+        if self._line.acknowledged_v is not None and self.loop.sample is not None:
+            self._spoke.set()
 
     def _on_calibration(self, active: ActiveCalibration) -> None:
         """All registers tell of it at once: a master that reads `committed` reads the new number and set as well."""

@@ -6,13 +6,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from gateway.control.blame_for_silence import Held
+from gateway.devices.exchange import ForceReading
 from gateway.processes.scheduler_counters import SchedulerCounters
 from gateway.service.running_rig.lateness import Lateness
+from tests.service.rigs import demo
+from tests.service.wired import Wired
 
 TICK_S = 0.01
 PID = 7
@@ -113,3 +117,16 @@ def test_a_stopped_process_is_told_from_a_silent_one() -> None:
         process.kill()
         process.communicate()
         lateness.close()
+
+
+def test_only_a_cell_that_streams_leads_the_tick() -> None:
+    """One that is asked at a tick answers behind it: followed, it would push the tick on and on."""
+    wired = Wired()
+    assert wired.loop.streamed_s is None
+    wired.ready()
+    assert wired.loop.streamed_s == pytest.approx(wired.now_s, abs=0.011)
+    reading = ForceReading(ask="W?", frame="W {force:+08.2f}", unit="N")
+    polled = replace(demo().load_cell.device, stream=None, read_force=reading)
+    asked = Wired(replace(demo(), load_cell=replace(demo().load_cell, device=polled, unit=None)))
+    asked.until(lambda: asked.loop.sample is not None, 2.0)
+    assert asked.loop.streamed_s is None

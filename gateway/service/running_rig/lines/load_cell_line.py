@@ -33,6 +33,11 @@ class CellExchange:
         self._period_s = 1.0 / min(profile.reading.rate_hz or inf, _FASTEST_HZ)
         self.reset()
 
+    @property
+    def is_stream(self) -> bool:
+        """Decide whether the cell talks by itself."""
+        return not self._question
+
     def reset(self) -> None:
         """Forget all that was received before: the port has been opened (again)."""
         self._host.forget()

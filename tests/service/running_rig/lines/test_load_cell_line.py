@@ -50,10 +50,12 @@ def test_a_stream_is_never_asked() -> None:
     wire.answer(5.0)
     wire.tick(1.0)
     assert wire.asked == []
+    assert wire.exchange.is_stream
     assert wire.samples[0].force_n == pytest.approx(5.0, abs=0.05)
 
 
 def test_the_next_question_follows_the_answer_at_once(wire: Wire) -> None:
+    assert not wire.exchange.is_stream
     wire.tick()
     for count in range(1, 6):
         assert wire.asked == [b"W?\r\n"] * count
