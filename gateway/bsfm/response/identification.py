@@ -11,14 +11,8 @@ from typing import Final
 
 from gateway.bsfm.model import Bsfm, Response
 from gateway.bsfm.response.lag_fit import LagFit, choose_shapes, fit_lags, interval
-from gateway.bsfm.response.step_responses import (
-    LEAST_STEP_N,
-    LONGEST_S,
-    SHORTEST_LAG_S,
-    RecordedRun,
-    StepResponse,
-    step_responses_of,
-)
+from gateway.bsfm.response.response_model import SHORTEST_LAG_S, StepResponse
+from gateway.bsfm.response.step_responses import LEAST_STEP_N, LONGEST_S, RecordedRun, step_responses_of
 
 FEWEST_STEPS: Final = 6
 NOT_MEASURED: Final = "the response was not measured: "

@@ -11,7 +11,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from gateway.bsfm.response.step_responses import SHORTEST_LAG_S, Floats, Lags, StepResponse, tail_rows
+from gateway.bsfm.response.response_model import SHORTEST_LAG_S, Floats, JoinedSteps, Lags, StepResponse
+from gateway.bsfm.response.step_responses import tail_rows
 
 
 class Shape(NamedTuple):
@@ -51,6 +52,11 @@ class LagFit:
     def lags(self) -> Lags:
         """Dead time and both lags."""
         return _split_lags(self.dead_time_s, self.lags_s, self.shape)
+
+    @property
+    def place(self) -> Floats:
+        """Dead time and sum of the lags, s, as the fit moves them."""
+        return np.array([self.dead_time_s, self.lags_s])
 
 
 def fit_lags(steps: Sequence[StepResponse], shapes: Shapes) -> LagFit:
@@ -99,14 +105,14 @@ def _compute_held_out_loss(steps: Sequence[StepResponse], shapes: Shapes) -> _He
     fits = [fit_lags(half, shapes) for half in halves]
     scale_n = _scale_n(steps)
     loss = sum(
-        _loss(np.concatenate(_residuals(half, fit.lags)), scale_n) for half, fit in zip(halves, fits[::-1], strict=True)
+        _loss(_residual_at(half, fit.shape)(fit.place), scale_n) for half, fit in zip(halves, fits[::-1], strict=True)
     )
     return _HeldOut(loss, all(fit.shape.ratio > NEARLY_EQUAL for fit in fits))
 
 
 def interval(fit: LagFit, steps: Sequence[StepResponse]) -> tuple[Floats, Floats]:
     """Return both ends of the 95 % interval of (dead time, sum of lags), s, the shape held."""
-    place = np.array([fit.dead_time_s, fit.lags_s])
+    place = fit.place
     normal, spread = np.zeros((2, 2)), np.zeros((2, 2))
     for step in steps:
         residual = _residual_at((step,), fit.shape)
@@ -125,13 +131,10 @@ def _split_lags(dead_time_s: float, lags_s: float, shape: Shape) -> Lags:
     return Lags(dead_time_s, lag_s, lags_s - lag_s, shape.damping)
 
 
-def _residuals(steps: Sequence[StepResponse], lags: Lags) -> list[Floats]:
-    return [step.force_n - step.expected_n(lags) for step in steps]
-
-
 def _residual_at(steps: Sequence[StepResponse], shape: Shape) -> Callable[[Floats], Floats]:
     """The residuals as a function of (dead time, sum of lags)."""
-    return lambda place: np.concatenate(_residuals(steps, _split_lags(float(place[0]), float(place[1]), shape)))
+    joined = JoinedSteps(steps)
+    return lambda place: joined.force_n - joined.expected_n(_split_lags(float(place[0]), float(place[1]), shape))
 
 
 def _loss(residual_n: Floats, scale_n: float) -> float:

@@ -4,34 +4,25 @@ Of each step the model gives the way from the settled force before to the settle
 neither a bent characteristic nor friction after a reversal passes for a lag); both ends are the measured ones, so an error
 of the model's level does not matter. The voltages are linearized (gateway.bsfm.drive_map), because a regulator's lags carry
 what its command map has bent.
-
-A regulator whose poles are complex passes the end and comes back, and friction keeps a part of that: the force is the model's
-way on to the peak, and its way back from there, and what is settled is what has stayed.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import inf
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gateway.bsfm.drive_map import DriveMap
 from gateway.bsfm.ladder.settled_points import SAME_V, TAIL_SHARE
 from gateway.bsfm.model import Bsfm
-from gateway.bsfm.response.second_order import SecondOrder
+from gateway.bsfm.response.response_model import PATH_POINTS, Floats, Lags, StepResponse, missing_share
 from gateway.bsfm.slip.reversal import Memory
 from gateway.defaults import TICK_S
-
-Floats = NDArray[np.float64]
 
 LEAST_STEP_N: Final = 3.0  # smaller ones tell more of friction than of lags
 NOISE_AT: Final = 12.0  # a step must be so many sigmas
 FEWEST_ROWS: Final = 4
-PATH_POINTS: Final = 25
 LONGEST_S: Final = 2.0  # a lag or dead time beyond it is no response but drift
-SHORTEST_LAG_S: Final = 1.0e-3
 MOST_MISSING: Final = 0.2  # of a step at its end, that is believed to come still
 SHORTEST_HOLD_S: Final = 0.1  # a command held for less is a part of a slew
 BACK_N: Final = (0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 6.0)  # of the way back from a peak, where the model is asked
@@ -49,91 +40,6 @@ class RecordedRun:
     command_v: Floats
     force_n: Floats
     slew_v_per_s: float = inf
-
-
-@dataclass(frozen=True, slots=True)
-class Lags:
-    """Dead time and one or two lags in series, s; with a damping they are a pair of complex poles (SecondOrder)."""
-
-    dead_time_s: float
-    lag_s: float
-    second_lag_s: float = 0.0
-    damping: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class StepResponse:
-    """One step of the command, and what came back.
-
-    changes: (seconds, volts by which the command went) of this step and of those before it whose effect may last; path_v,
-    path_n: what the model makes of each voltage on the way; back_v, back_n: by how much the force goes back, N, where the
-    voltage goes back from the step's end, V.
-    """
-
-    time_s: Floats
-    force_n: Floats
-    changes: tuple[tuple[float, float], ...]
-    end_v: float
-    path_v: Floats
-    path_n: Floats
-    back_v: Floats
-    back_n: Floats
-
-    @property
-    def way(self) -> float:
-        """1 up, -1 down."""
-        return 1.0 if self.changes[-1][1] > 0.0 else -1.0
-
-    def expected_n(self, lags: Lags) -> Floats:
-        """Return the force by the model, N, at the times of the readings."""
-        since_s = self.time_s[:, None] - (self._changes[:, 0] + lags.dead_time_s)
-        share = missing_share(since_s, lags.lag_s, lags.second_lag_s, lags.damping)
-        arrived_v = self.end_v - share @ self._changes[:, 1]
-        on_way_n = np.interp(arrived_v, self.path_v, self.path_n)
-        return self._with_overshoot(arrived_v, on_way_n) if lags.damping else on_way_n
-
-    def _with_overshoot(self, arrived_v: Floats, on_way_n: Floats) -> Floats:
-        """The way beyond the end and back. What friction keeps of it is in the settled force, so the way itself is shorter."""
-        beyond_v = self.way * (arrived_v - self.end_v)
-        peak_v = np.maximum.accumulate(np.maximum(beyond_v, 0.0))
-        start_n, end_n = (self.path_n[0], self.path_n[-1]) if self.way > 0.0 else (self.path_n[-1], self.path_n[0])
-        slope = self._slope_at_end
-        lost_n = np.interp(np.where(peak_v > 0.0, peak_v - beyond_v, 0.0), self.back_v, self.back_n)
-        kept_n = slope * peak_v[-1] - float(np.interp(peak_v[-1], self.back_v, self.back_n))
-        share = (np.where(peak_v > 0.0, end_n, on_way_n) - start_n) / (end_n - start_n)
-        expected_n = start_n + share * (end_n - self.way * kept_n - start_n) + self.way * (slope * peak_v - lost_n)
-        return np.asarray(expected_n, dtype=np.float64)
-
-    @cached_property
-    def _changes(self) -> Floats:
-        """Of shape (changes, 2): a fit asks a thousand times."""
-        return np.array(self.changes)
-
-    @cached_property
-    def _slope_at_end(self) -> float:
-        """N/V over the last third of the way; where the model's range ends there, not more than twice that of the whole."""
-        third = slice(-PATH_POINTS // 3, None) if self.way > 0.0 else slice(0, PATH_POINTS // 3)
-        whole = float(np.ptp(self.path_n) / np.ptp(self.path_v))
-        return min(2.0 * whole, float(np.ptp(self.path_n[third]) / max(np.ptp(self.path_v[third]), SAME_V)))
-
-
-def missing_share(since_s: Floats, lag_s: float, second_lag_s: float, damping: float = 0.0) -> Floats:
-    """Return the share of a step that has not arrived yet behind two lags in series, or behind a pair of complex poles; 1
-    before it begins."""
-    since_s = np.maximum(since_s, 0.0)
-    if damping:
-        pair = SecondOrder(lag_s, second_lag_s, damping)
-        decay_per_s = 0.5 * pair.delay_s / pair.bend_s2
-        swing_per_s = np.sqrt(1.0 - damping**2) / pair.natural_s
-        turn = swing_per_s * since_s
-        swing = np.cos(turn) + decay_per_s / swing_per_s * np.sin(turn)
-        return np.asarray(np.exp(-decay_per_s * since_s) * swing)
-    if second_lag_s < SHORTEST_LAG_S:
-        return np.exp(-since_s / lag_s)
-    if abs(lag_s - second_lag_s) < 1.0e-4 * lag_s:
-        return (1.0 + since_s / lag_s) * np.exp(-since_s / lag_s)
-    slow, fast = lag_s * np.exp(-since_s / lag_s), second_lag_s * np.exp(-since_s / second_lag_s)
-    return (slow - fast) / (lag_s - second_lag_s)
 
 
 def tail_rows(rows: int) -> int:

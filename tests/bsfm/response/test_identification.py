@@ -9,7 +9,8 @@ import pytest
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.bsfm.response.identification import MeasuredResponse, measure_response
-from gateway.bsfm.response.step_responses import RecordedRun, missing_share
+from gateway.bsfm.response.response_model import missing_share
+from gateway.bsfm.response.step_responses import RecordedRun
 
 STANDS_V = 1.0e-5
 """A voltage that has moved by less moves no force: 75 uN, where the force is found to 230 uN. Half of a run stands so."""

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gateway.bsfm.response.lag_fit import TWO_LAGS, choose_shapes, fit_lags
+from gateway.bsfm.response.response_model import JoinedSteps, Lags, StepResponse, missing_share
 from gateway.bsfm.response.second_order import SecondOrder
-from gateway.bsfm.response.step_responses import Lags, StepResponse, missing_share
 
 TRUE = Lags(0.064, 0.092, 0.028)
 
@@ -47,3 +47,44 @@ def test_what_is_left_of_a_step_is_what_the_states_of_the_same_plant_say(pair):
     once, twice = pair.after(0.07), pair.after(0.14)
     assert once.sf * once.ff + once.ss * once.sf == pytest.approx(twice.sf)
     assert once.sf * once.fs + once.ss * once.ss == pytest.approx(twice.ss)
+
+
+def bent_step(rng: Random) -> StepResponse:
+    """A step in several changes, of a plant whose path is bent, with readings at times of their own."""
+    way = rng.choice([-1.0, 1.0])
+    changes = tuple((0.01 * k + rng.uniform(0.0, 0.005), way * rng.uniform(0.1, 0.8)) for k in range(rng.randint(1, 7)))
+    end_v = rng.uniform(3.0, 6.0)
+    from_v = end_v - sum(by_v for _, by_v in changes[-3:])  # of the others a part may still be on its way
+    path_v = np.sort([from_v, end_v, *(rng.uniform(*sorted((from_v, end_v))) for _ in range(5))])
+    path_n = np.sort([rng.uniform(0.0, 40.0) for _ in path_v])
+    time_s = np.sort([rng.uniform(-0.05, 0.6) for _ in range(rng.randint(4, 30))])
+    back_v, back_n = np.array([0.0, 0.3, 0.9]), np.array([0.0, 1.0, 6.0])
+    return StepResponse(time_s, 0.5 * time_s, changes, end_v, path_v, path_n, back_v, back_n)
+
+
+def force_of_one_n(step: StepResponse, lags: Lags) -> list[float]:
+    """Reading by reading, change by change."""
+    arrived_v = [
+        step.end_v
+        - sum(
+            by_v * float(missing_share(np.array([now_s - at_s - lags.dead_time_s]), *sorted_lags(lags))[0])
+            for at_s, by_v in step.changes
+        )
+        for now_s in step.time_s.tolist()
+    ]
+    on_way_n = np.interp(arrived_v, step.path_v, step.path_n)
+    return (step.with_overshoot(np.array(arrived_v), on_way_n) if lags.damping else on_way_n).tolist()
+
+
+def sorted_lags(lags: Lags) -> tuple[float, float, float]:
+    return lags.lag_s, lags.second_lag_s, lags.damping
+
+
+@pytest.mark.parametrize("lags", [TRUE, Lags(0.02, 0.08), Lags(0.0, 0.05, 0.05), Lags(0.04, 0.06, 0.06, 0.4)])
+def test_many_steps_at_once_give_each_the_force_that_it_has_alone(lags: Lags) -> None:
+    rng = Random(5)
+    steps = [bent_step(rng) for _ in range(25)]
+    joined = JoinedSteps(steps)
+    alone_n = [force_n for step in steps for force_n in force_of_one_n(step, lags)]
+    assert joined.expected_n(lags).tolist() == pytest.approx(alone_n, abs=1e-9)
+    assert joined.force_n.tolist() == [force_n for step in steps for force_n in step.force_n.tolist()]
