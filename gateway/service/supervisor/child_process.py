@@ -19,7 +19,7 @@ from gateway.processes.scheduler_counters import SchedulerCounters
 
 _END_BOUND_S: Final = 1.0
 _REAP_BOUND_S: Final = 2.0  # a killed process is gone in milliseconds, unless a driver holds it
-_BLOCKED: Final = (signal.SIGHUP,)  # the guardian's to answer: a service manager sends it to every process
+_BLOCKED: Final = (signal.SIGHUP, signal.SIGINT)  # the guardian's to answer: some send them to every process
 LOST: Final = -1000
 """The exit code of a child that nobody could ask: it does not go, or somebody else has reaped it."""
 
