@@ -4,7 +4,6 @@ import errno
 import json
 import os
 import random
-import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +15,7 @@ from click.testing import CliRunner
 
 from gateway.audit.audit_file import AuditFile, audit_files, read_head
 from gateway.audit.audit_reader import read_audit, verify_audit
+from gateway.audit.chain import open_line, seal_line
 from gateway.cli.main import command
 
 LINES = 14
@@ -88,28 +88,42 @@ def test_a_file_that_is_removed_is_missed(state: Path, place: int) -> None:
     assert verify_audit(state).broken
 
 
-def test_a_tail_that_is_written_anew_is_found_by_the_head(
-    state: Path, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_a_tail_that_is_written_anew_is_found_by_the_head(state: Path) -> None:
     """The chain itself holds: only the head knows another last line."""
-    other = tmp_path_factory.mktemp("other")
-    shutil.copytree(state / "audit", other / "audit")
-    path, lines, place = find_line(other, LINES - 1)
-    path.write_bytes(b"".join(lines[:place]))
-    (other / "audit" / "head").unlink()
-    file = AuditFile(other, FILE_BYTES)
-    file.append([{"what": "force_setpoint", "new": 0.0}])
-    file.close()
-    for each in files_of(other):
-        shutil.copy(each, state / "audit" / each.name)
+    replace_last_line(state)
     broken = verify_audit(state).broken
     assert broken and "written anew" in broken.text
+
+
+def replace_last_line(state: Path) -> None:
+    """Put another line where the last one was, as who knows how would."""
+    path, lines, place = find_line(state, LINES - 1)
+    _, before = open_line(lines[place - 1].rstrip(b"\n"))
+    path.write_bytes(b"".join([*lines[:place], seal_line({"what": "force_setpoint", "new": 0.0}, before)[0]]))
 
 
 def test_a_missing_head_is_told(state: Path) -> None:
     (state / "audit" / "head").unlink()
     broken = verify_audit(state).broken
     assert broken and (broken.file, broken.line) == ("head", 0)
+
+
+@pytest.mark.parametrize("is_rewritten", [False, True])
+def test_a_start_covers_up_no_head_that_is_gone_or_names_another_line(state: Path, is_rewritten: bool) -> None:
+    """The first batch wrote a new head, and the audit held again."""
+    if is_rewritten:
+        replace_last_line(state)
+    else:
+        path, lines, place = find_line(state, LINES - 1)
+        path.write_bytes(b"".join(lines[:place]))
+        (state / "audit" / "head").unlink()
+    for _ in range(2):
+        file = AuditFile(state, 1 << 20)
+        file.append([{"what": "start"}])
+        file.close()
+    told = [fields["text"] for fields in read_audit(state) if fields["what"] == "chain broken"]
+    assert [text[:4] for text in told] == ["A352"]
+    assert verify_audit(state).broken
 
 
 def test_a_line_cut_anywhere_is_told_apart_from_tampering_and_the_chain_goes_on(state: Path) -> None:
