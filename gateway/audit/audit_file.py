@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.audit.chain import NO_HASH, BrokenLine, ChainEnd, open_line, seal_line
-from gateway.processes.durable_file import make_directory, sync_path
+from gateway.processes.durable_file import make_directory, read_object, sync_path
 
 FOLDER: Final = "audit"
 HEAD: Final = "head"
@@ -38,9 +38,9 @@ def audit_files(folder: Path) -> list[Path]:
 def read_head(folder: Path) -> ChainEnd | None:
     """Return what the head says; None where there is none that can be read."""
     try:
-        fields = json.loads((folder / HEAD).read_text("ascii"))
+        fields = read_object(folder / HEAD)
         return ChainEnd(int(fields["n"]), str(fields["sha256"]))
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError):
         return None
 
 

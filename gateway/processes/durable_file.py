@@ -11,12 +11,13 @@ its fsync needs.
 import contextlib
 import errno
 import fcntl
+import json
 import os
 import stat
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 from zlib import crc32
 
 _FRESH: Final = ".new"
@@ -120,6 +121,18 @@ def read_regular(path: Path) -> bytes:
     if status.st_size > LONGEST_DOCUMENT:
         raise OSError(errno.EFBIG, f"it has {status.st_size} bytes, no document has {LONGEST_DOCUMENT}", str(path))
     return path.read_bytes()
+
+
+def read_object(path: Path) -> dict[str, Any]:
+    """Return the JSON object in a file of ours. OSError where it is not to be read, ValueError where it is none, whatever has
+    become of it."""
+    try:
+        content = json.loads(read_regular(path))
+    except RecursionError:
+        raise ValueError(f"{path} is nested too deeply") from None
+    if not isinstance(content, dict):
+        raise ValueError(f"{path} holds no JSON object")
+    return content
 
 
 def remove_if_possible(directory: int, name: str) -> None:
