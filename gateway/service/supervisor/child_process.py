@@ -10,11 +10,11 @@ import os
 import select
 import signal
 import socket
-import sys
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.processes import message_link as guardian_link
+from gateway.processes.module_command import module_command
 from gateway.processes.scheduler_counters import SchedulerCounters
 
 _END_BOUND_S: Final = 1.0
@@ -101,7 +101,7 @@ def spawn_child(module: str, arguments: dict[str, Any], *shared: int, room: int 
     try:
         with theirs:
             words = [str(theirs.fileno()), json.dumps(arguments).ljust(room)]
-            pid = _spawn_process([sys.executable, "-m", module, *words], (theirs.fileno(), *shared))
+            pid = _spawn_process([*module_command(module), *words], (theirs.fileno(), *shared))
         child = Child(ours, pid)
     except OSError:
         ours.close()
