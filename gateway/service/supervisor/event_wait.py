@@ -39,8 +39,8 @@ def wait_readable(descriptors: list[int], timeout_s: float) -> set[int]:
 
 
 class SignalPipe:
-    """SIGINT, SIGTERM and SIGHUP as readable bytes: nothing of ours runs inside a signal handler. Stray signals are ignored, and
-    SIGHUP where who starts us ignores it: nohup says that the end of its terminal is not ours.
+    """SIGINT, SIGTERM and SIGHUP as readable bytes: nothing of ours runs inside a signal handler. Stray signals are ignored,
+    and SIGHUP where who starts us ignores it: nohup says that the end of its terminal is not ours.
 
     Who starts us may have signals blocked (a thread of a Qt or Java program), and that is inherited: nothing but SIGKILL would
     stop us and our children then.
