@@ -31,8 +31,12 @@ Fields = Mapping[str, Any]
 
 
 def audit_files(folder: Path) -> list[Path]:
-    """Return the files of the chain, oldest first."""
-    return sorted(path for path in folder.glob("*.jsonl") if path.stem.isdecimal())
+    """Return the files of the chain, oldest first. OSError for a folder that may not be read: it is not an empty one."""
+    try:
+        paths = sorted(folder.iterdir())
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+    return [path for path in paths if path.suffix == ".jsonl" and path.stem.isdecimal()]
 
 
 def read_head(folder: Path) -> ChainEnd | None:
@@ -89,12 +93,11 @@ class AuditFile:
     def _start(self) -> tuple[str, ...]:
         """Continue the chain that is there: what is torn goes, and a line tells of it. Return what is broken."""
         make_directory(self._folder)
-        files = audit_files(self._folder)
+        files, head = audit_files(self._folder), self._head_of_before()
         found: list[Fields] = []
         self._end = ChainEnd(first_number(files[-1]) - 1 if files else 0)
         if files:
             found = self._continue(files[-1])
-        head = read_head(self._folder)
         if (text := self._doubt(head, files)) and not any(each["what"] == BROKEN for each in found):
             found.append({"what": BROKEN, "text": f"A352 {text}"})
             # number and hash that were there, or none: verify finds the gap
@@ -109,11 +112,21 @@ class AuditFile:
             self._add(found)
         return tuple(str(each["text"]) for each in found if each["what"] == BROKEN)
 
+    def _head_of_before(self) -> ChainEnd | None:
+        """Return the head. OSError where the disk does not give it now: it may be whole, and is asked again."""
+        with contextlib.suppress(FileNotFoundError):
+            os.close(os.open(self._folder / HEAD, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC))
+        return read_head(self._folder)
+
     def _doubt(self, head: ChainEnd | None, files: list[Path]) -> str:
         """Return what the head does not find; empty where the files hold what it names, and perhaps more. The next batch
         replaces it, so it is asked now."""
         if head is None:
-            return "the audit has lines and no head: lines at its end may have been removed" if files else ""
+            return (
+                "the audit has lines and no head that can be read: lines at its end may have been removed"
+                if files
+                else ""
+            )
         if head.number > self._end.number:
             return f"the audit ends with line {self._end.number}, it had {head.number}: lines at its end were removed"
         holding = [path for path in files if first_number(path) <= head.number]

@@ -108,24 +108,6 @@ def test_a_missing_head_is_told(state: Path) -> None:
     assert broken and (broken.file, broken.line) == ("head", 0)
 
 
-@pytest.mark.parametrize("is_rewritten", [False, True])
-def test_a_start_covers_up_no_head_that_is_gone_or_names_another_line(state: Path, is_rewritten: bool) -> None:
-    """The first batch wrote a new head, and the audit held again."""
-    if is_rewritten:
-        replace_last_line(state)
-    else:
-        path, lines, place = find_line(state, LINES - 1)
-        path.write_bytes(b"".join(lines[:place]))
-        (state / "audit" / "head").unlink()
-    for _ in range(2):
-        file = AuditFile(state, 1 << 20)
-        file.append([{"what": "start"}])
-        file.close()
-    told = [fields["text"] for fields in read_audit(state) if fields["what"] == "chain broken"]
-    assert [text[:4] for text in told] == ["A352"]
-    assert verify_audit(state).broken
-
-
 def test_a_line_cut_anywhere_is_told_apart_from_tampering_and_the_chain_goes_on(state: Path) -> None:
     """As a killed writer or a power cut leaves it: the head does not know that line yet."""
     path = files_of(state)[-1]
@@ -252,6 +234,12 @@ def test_the_verbs_show_and_verify(state: Path) -> None:
     bad = run(command, ["audit", "verify", "--state", str(state)])
     assert bad.exit_code == 1
     assert bad.stderr.startswith(f"E170 {path.name} line {place + 1} was changed: its own hash does not fit")
+
+
+def test_a_folder_without_an_audit_is_told_and_no_internal_error(tmp_path: Path) -> None:
+    (tmp_path / "audit").mkdir()
+    told = CliRunner().invoke(command, ["audit", "verify", "--state", str(tmp_path)])
+    assert (told.exit_code, "no audit there yet" in told.stderr) == (65, True)
 
 
 def find_line(state: Path, number: int) -> tuple[Path, list[bytes], int]:
