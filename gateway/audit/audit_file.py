@@ -18,34 +18,48 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.audit.chain import NO_HASH, BrokenLine, ChainEnd, open_line, seal_line
-from gateway.processes.durable_file import make_directory, sync_path
+from gateway.processes.durable_file import make_directory, read_object, sync_path
 
 FOLDER: Final = "audit"
 HEAD: Final = "head"
 LONGEST_BYTES: Final = 8 << 20
 KEPT: Final = 32
 """Files, the one that is written among them: 256 MiB, years of a cell's edges and of summaries of its setpoints."""
+BROKEN: Final = "chain broken"
 _LONGEST_QUOTE: Final = 400
 Fields = Mapping[str, Any]
 
 
 def audit_files(folder: Path) -> list[Path]:
-    """Return the files of the chain, oldest first."""
-    return sorted(path for path in folder.glob("*.jsonl") if path.stem.isdecimal())
+    """Return the files of the chain, oldest first. OSError for a folder that may not be read: it is not an empty one."""
+    try:
+        paths = sorted(folder.iterdir())
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+    return [path for path in paths if path.suffix == ".jsonl" and path.stem.isdecimal()]
 
 
 def read_head(folder: Path) -> ChainEnd | None:
     """Return what the head says; None where there is none that can be read."""
     try:
-        fields = json.loads((folder / HEAD).read_text("ascii"))
+        fields = read_object(folder / HEAD)
         return ChainEnd(int(fields["n"]), str(fields["sha256"]))
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError):
         return None
 
 
 def first_number(path: Path) -> int:
     """Return the number of a file's first line, which is its name."""
     return int(path.stem)
+
+
+def _line_at(path: Path, number: int) -> ChainEnd | None:
+    """Return number and hash of a line of this file; None where it is not there, or not as it was written."""
+    lines = path.read_bytes().splitlines()
+    try:
+        return open_line(lines[number - first_number(path)])[1]
+    except (BrokenLine, IndexError):
+        return None
 
 
 class AuditFile:
@@ -58,13 +72,17 @@ class AuditFile:
         self._descriptor = -1
         self._good_bytes = 0
         self._is_open = self._is_torn = False
+        self._found: tuple[str, ...] = ()
 
-    def append(self, records: Iterable[Fields]) -> None:
-        """Put these records at the end, durably, all or none. OSError when the disk does not take them."""
+    def append(self, records: Iterable[Fields]) -> tuple[str, ...]:
+        """Put these records at the end, durably, all or none; return what was found broken, the first time. OSError when the
+        disk does not take them."""
         if not self._is_open:
-            self._start()
+            self._found = self._start()
         self._add(records)
         self._rotate_if_full()
+        found, self._found = self._found, ()
+        return found
 
     def close(self) -> None:
         """Close the file."""
@@ -72,21 +90,18 @@ class AuditFile:
             os.close(self._descriptor)
             self._descriptor = -1
 
-    def _start(self) -> None:
-        """Continue the chain that is there: what is torn goes, and a line tells of it."""
+    def _start(self) -> tuple[str, ...]:
+        """Continue the chain that is there: what is torn goes, and a line tells of it. Return what is broken."""
         make_directory(self._folder)
-        files = audit_files(self._folder)
+        files, head = audit_files(self._folder), self._head_of_before()
         found: list[Fields] = []
         self._end = ChainEnd(first_number(files[-1]) - 1 if files else 0)
         if files:
             found = self._continue(files[-1])
-        head = read_head(self._folder)
-        if head and head.number > self._end.number:
-            text = (
-                f"A352 the audit ends with line {self._end.number}, it had {head.number}: lines at its end were removed"
-            )
-            found.append({"what": "chain broken", "text": text})
-            self._end = head  # number and hash that were there: verify finds the gap
+        if (text := self._doubt(head, files)) and not any(each["what"] == BROKEN for each in found):
+            found.append({"what": BROKEN, "text": f"A352 {text}"})
+            # number and hash that were there, or none: verify finds the gap
+            self._end = head if head and head.number >= self._end.number else ChainEnd(self._end.number, NO_HASH)
         if not files and head is None:
             self._write_head()
             sync_path(self._folder)
@@ -95,6 +110,29 @@ class AuditFile:
         self._is_open = True
         if found:
             self._add(found)
+        return tuple(str(each["text"]) for each in found if each["what"] == BROKEN)
+
+    def _head_of_before(self) -> ChainEnd | None:
+        """Return the head. OSError where the disk does not give it now: it may be whole, and is asked again."""
+        with contextlib.suppress(FileNotFoundError):
+            os.close(os.open(self._folder / HEAD, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC))
+        return read_head(self._folder)
+
+    def _doubt(self, head: ChainEnd | None, files: list[Path]) -> str:
+        """Return what the head does not find; empty where the files hold what it names, and perhaps more. The next batch
+        replaces it, so it is asked now."""
+        if head is None:
+            return (
+                "the audit has lines and no head that can be read: lines at its end may have been removed"
+                if files
+                else ""
+            )
+        if head.number > self._end.number:
+            return f"the audit ends with line {self._end.number}, it had {head.number}: lines at its end were removed"
+        holding = [path for path in files if first_number(path) <= head.number]
+        if not holding or _line_at(holding[-1], head.number) == head:
+            return ""  # or of a file that is not kept any more
+        return f"line {head.number} of the audit is another than its head names: it was written anew"
 
     def _continue(self, path: Path) -> list[Fields]:
         """Find the end of the chain in its newest file. What is found wrong there comes back as records."""
@@ -112,7 +150,7 @@ class AuditFile:
             except BrokenLine as broken:
                 count = whole.count(b"\n") + 1
                 text = f"A352 {path.name} line {count} {broken}"
-                found.append({"what": "chain broken", "text": text})
+                found.append({"what": BROKEN, "text": text})
                 self._end = ChainEnd(first_number(path) + count - 1, NO_HASH)
         elif first_number(path) > 1:  # begun, and killed before its first line: the end is in the file before
             before = audit_files(self._folder)[:-1]

@@ -100,9 +100,8 @@ class AuditLog:
         if self._has_failed and not isinstance(result, Exception):
             self._has_failed = False
             self._log("audit", f"A351 the audit is stored again, {len(batch)} records of meanwhile with it")
-        for record in batch if not isinstance(result, Exception) else ():
-            if str(record.get("text", "")).startswith("A352"):
-                self._log("audit", record["text"])
+        for found in () if isinstance(result, Exception) else result or ():
+            self._log("audit", found)
 
     def _put_back(self, batch: list[dict[str, Any]]) -> None:
         for record in reversed(batch):

@@ -34,6 +34,22 @@ def endpoint(context: click.Context, parameter: click.Parameter, value: str | No
     return host or defaults.HOST, int(port)
 
 
+def bind_endpoint(context: click.Context, parameter: click.Parameter, value: str | None) -> Endpoint | None:
+    """Return what `endpoint` does, of an address to listen on: a number, for a name may lead elsewhere tomorrow."""
+    found = endpoint(context, parameter, value)
+    return found and (_own_address(found[0]), found[1])
+
+
+def _own_address(host: str) -> str:
+    from ipaddress import ip_address
+
+    try:
+        return defaults.HOST if host == "localhost" else str(ip_address(host))
+    except ValueError:
+        sentence = f"{host} is no IP address of this machine such as {defaults.HOST} or 192.168.125.10"
+        raise click.BadParameter(f"{sentence}; it is HOST:PORT, PORT alone is :PORT") from None
+
+
 def http_endpoint(context: click.Context, parameter: click.Parameter, value: str | None) -> Endpoint | None:
     """Return HOST:PORT, :PORT or PORT as (host, port); an empty host for an option that stands alone."""
     if value is None:
@@ -41,11 +57,10 @@ def http_endpoint(context: click.Context, parameter: click.Parameter, value: str
     if not value:
         return "", 0
     host, port = ("", value) if value.isdecimal() else _split(value)
-    host = defaults.HOST if host in ("", "localhost") else host
     if not port.isdecimal() or int(port) > 65535:
         hint = f"; RIG goes before --{parameter.name}" if context.info_name == "run" and not port else ""
         raise click.BadParameter(f"{value} is not HOST:PORT such as {defaults.HOST}:{defaults.WEB_PORT}{hint}")
-    return host, int(port)
+    return _own_address(host or defaults.HOST), int(port)
 
 
 def _split(text: str) -> tuple[str, str]:

@@ -26,12 +26,17 @@ _MANIFEST: Final = "backup.json"
 _TOP: Final = "state"
 _LEFT_OUT: Final = {"control.sock", "lock", "running"}
 _FORMAT: Final = 1
+_LONGEST_MANIFEST: Final = 1 << 16
 _OWNER_READS: Final = 0o600
 _MOST_MODE: Final = 0o744  # nobody else writes, whatever the archive says
 
 
 class ArchiveError(Exception):
     """A file that is no backup, or a damaged one."""
+
+
+_DAMAGE: Final = (tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError, ValueError, OverflowError)
+"""What reading a damaged archive raises: numbers, times and names that cannot be are the last two."""
 
 
 def pack(state: Path, target: Path) -> list[str]:
@@ -125,7 +130,7 @@ def _put_in_place(fresh: Path, state: Path) -> Path | None:
 def _damage_told(source: Path) -> Iterator[None]:
     try:
         yield
-    except (tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError) as error:
+    except _DAMAGE as error:
         raise ArchiveError(f"{source} is damaged, or no archive of `force-gateway backup` (tar.gz): {error}") from None
 
 
@@ -154,16 +159,36 @@ def _add_manifest(archive: tarfile.TarFile, state: Path) -> None:
 
 
 def _check(archive: tarfile.TarFile, members: list[tarfile.TarInfo]) -> None:
+    """ArchiveError for what `pack` does not write; each name stands for one thing, so that each can be extracted."""
     first = archive.extractfile(members[0]) if members and members[0].name == _MANIFEST else None
-    if first is None:
+    form = None if first is None else _format_of(first.read(_LONGEST_MANIFEST))
+    if form is None:
         raise ArchiveError(f"{archive.name!s} was not made by `force-gateway backup`")
-    form = json.loads(first.read()).get("format")
     if form != _FORMAT:
         raise ArchiveError(f"{archive.name!s} has format {form}; this version reads {_FORMAT}")
+    folders, seen = {_TOP}, set[str]()
     for member in members[1:]:
-        parts = member.name.split("/")
-        if parts[0] != _TOP or ".." in parts or not (member.isfile() or member.isdir()):
+        parent, _, name = member.name.rpartition("/")
+        is_new = member.name not in seen and bool(name) and parent in folders
+        if not is_new or name in (".", "..") or not (member.isfile() or member.isdir()) or _is_left_out(parent, name):
             raise ArchiveError(f"{archive.name!s} holds {member.name}, which no backup does: refused as a whole")
+        seen.add(member.name)
+        if member.isdir():
+            folders.add(member.name)
+
+
+def _format_of(manifest: bytes) -> object:
+    """Return what a manifest says its format is; None for one that is none."""
+    try:
+        facts = json.loads(manifest)
+    except (ValueError, RecursionError):
+        return None
+    return facts.get("format") if isinstance(facts, dict) else None
+
+
+def _is_left_out(parent: str, name: str) -> bool:
+    """Decide whether a running gateway makes it: from an archive it would say that one runs, or did not end well."""
+    return parent == _TOP and name in _LEFT_OUT
 
 
 def _set_aside(state: Path) -> Path | None:

@@ -99,6 +99,14 @@ ALARMS: Final = (
         is_warning=True,
     ),
     Explanation(
+        "A353",
+        "no memory for the newest samples",
+        "Control shares the last minutes with the residual watch and the page, and got no memory for it. Control goes on.",
+        "A small limit on the size of files (ulimit -f), which counts for such memory too, a container's limit, or no memory.",
+        "Start it again with ulimit -f unlimited (8 MB are enough), or with more memory.",
+        is_warning=True,
+    ),
+    Explanation(
         "A354",
         "self-test item failed",
         "An item of a self-test is so far off that this machine should not press; the line has the numbers and the bounds.",

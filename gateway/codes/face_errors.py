@@ -16,8 +16,8 @@ FACE_ERRORS: Final = (
     Explanation(
         "E121",
         "the Modbus port cannot be opened",
-        "Listening on the wanted address failed.",
-        "Another program (an earlier gateway?) listens there, or the address is not one of this machine.",
+        "Listening on the wanted address failed. After a restart of control it goes on without this face and tries again.",
+        "Another program (an earlier gateway?) listens there, or the address is not one of this machine, or not any more.",
         "ss -ltnp shows who listens; --bind 127.0.0.1:0 takes any free port.",
     ),
     Explanation(

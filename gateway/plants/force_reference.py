@@ -12,7 +12,7 @@ from typing import Final
 from gateway.control.compensation.cell_map import CellMap
 from gateway.diagnosis.force_error import FEWEST_BLOCKS, ErrorBlock
 from gateway.plants.recorded_force import read_recorded_force
-from gateway.processes.durable_file import lock_directory, make_directory, replace_durably
+from gateway.processes.durable_file import lock_directory, make_directory, read_object, replace_durably
 from gateway.recording import Recording, RecordingError, list_recordings, read_recording
 
 _FILE: Final = "reference.json"
@@ -62,7 +62,7 @@ def keep_reference(state: Path, reference: ForceReference | None) -> None:
 def read_reference(state: Path, plant: int) -> ForceReference | None:
     """Return the reference that was kept for this plant; None where there is none, or a damaged one."""
     try:
-        facts = json.loads((state / "plants" / _FILE).read_text(encoding="utf-8"))
+        facts = read_object(state / "plants" / _FILE)
         blocks = tuple(ErrorBlock(**block) for block in facts.pop("blocks"))
         reference = ForceReference(**facts, blocks=blocks)
     except (OSError, ValueError, TypeError, KeyError):

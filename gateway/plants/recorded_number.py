@@ -9,6 +9,6 @@ def header_in_use(header: dict[str, Any]) -> dict[str, Any]:
     in_use = header.get("plant_in_use") or {}
     try:
         in_use = json.loads(in_use) if isinstance(in_use, str) else in_use
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return in_use if isinstance(in_use, dict) else {}

@@ -11,12 +11,13 @@ its fsync needs.
 import contextlib
 import errno
 import fcntl
+import json
 import os
 import stat
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 from zlib import crc32
 
 _FRESH: Final = ".new"
@@ -24,6 +25,8 @@ _READER_BOUND_S: Final = 2.0
 _WRITER_BOUND_S: Final = 10.0  # the fsyncs of another one on a slow disk
 _LOCK_POLL_S: Final = 0.01
 _SEAL: Final = b"# crc32 %08x of all that follows\n"
+LONGEST_DOCUMENT: Final = 16 << 20
+"""Bytes; a calibration with all its points has a hundredth of that."""
 
 
 @contextlib.contextmanager
@@ -110,11 +113,26 @@ def replace_text(target: Path, text: str) -> None:
 
 
 def read_regular(path: Path) -> bytes:
-    """Return what a file holds. OSError for what else may have its name: a pipe would be waited for, a device has no end."""
-    mode = path.stat().st_mode
-    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # of a folder the reading tells
+    """Return what a document's file holds. OSError for what else may have its name: a pipe would be waited for, a device has no
+    end, and a file of gigabytes (a hole that a broken file system has left) would be all of a start's time and memory."""
+    status = path.stat()
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):  # of a folder the reading tells
         raise OSError(errno.EINVAL, "it is a pipe or a device, and no file", str(path))
+    if status.st_size > LONGEST_DOCUMENT:
+        raise OSError(errno.EFBIG, f"it has {status.st_size} bytes, no document has {LONGEST_DOCUMENT}", str(path))
     return path.read_bytes()
+
+
+def read_object(path: Path) -> dict[str, Any]:
+    """Return the JSON object in a file of ours. OSError where it is not to be read, ValueError where it is none, whatever has
+    become of it."""
+    try:
+        content = json.loads(read_regular(path))
+    except RecursionError:
+        raise ValueError(f"{path} is nested too deeply") from None
+    if not isinstance(content, dict):
+        raise ValueError(f"{path} holds no JSON object")
+    return content
 
 
 def remove_if_possible(directory: int, name: str) -> None:

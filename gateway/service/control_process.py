@@ -7,6 +7,7 @@ feeds its heartbeat from the tick, and ends with the safe voltage on the wire wh
 
 import asyncio
 import contextlib
+import errno
 import gc
 import json
 import socket
@@ -28,6 +29,7 @@ from gateway.service import banner
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.optional_children import Listeners, optional_children
+from gateway.service.running_rig.control_loop import Log
 from gateway.service.running_rig.faces import with_rtu_face
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.running_rig.running_rig import RunningRig
@@ -86,12 +88,20 @@ def describe_change(rig: Rig, options: dict[str, Any]) -> str:
     return f"W247 the files of rig {rig.name} {now}: it goes on as it was started, a new start takes them"
 
 
-def sample_ring(descriptor: int | None) -> SampleRing | None:
-    """Return the ring in the guardian's memory; None without one: nothing but the processes beside control needs it."""
-    if descriptor is None:
-        return None
-    with contextlib.suppress(OSError):
-        return SampleRing(descriptor, COLUMNS)
+def sample_ring(descriptor: int | None, log: Log) -> SampleRing | None:
+    """Return the ring in the guardian's memory; None without one, which is said: nothing but the processes beside control
+    needs it."""
+    why = "the kernel has none to share"
+    if descriptor is not None:
+        try:
+            return SampleRing(descriptor, COLUMNS)
+        except OSError as error:
+            limit = "; a limit on files (ulimit -f) counts for it" if error.errno == errno.EFBIG else ""
+            why = f"{error.strerror or error}{limit}"
+    log(
+        "ring",
+        f"A353 no memory for the newest samples: {why}. Neither residual watch nor trend of the page; control goes on",
+    )
     return None
 
 
@@ -120,7 +130,7 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
     listeners = Listeners(options["listening"])
     notes += listeners.open(rig, {name: options[name] for name in ("web", "metrics")})
     running = RunningRig(rig, ports, Path(options["state"]), guardian, log)
-    running.ring = sample_ring(options["ring"])
+    running.ring = sample_ring(options["ring"], log)
     guardian.on_ports = running.move_ports
     try:
         ready = await running.start(

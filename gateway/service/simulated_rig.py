@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import json
 import os
+import signal
 import socket
 import sys
 import time
@@ -146,7 +147,7 @@ def _in_words(settings: SimulationSettings) -> str:
 
 
 async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog) -> None:
-    """Run until the guardian's end of the link closes."""
+    """Run until the guardian asks for the end (SIGTERM) or its end of the link closes; either leaves no socket behind."""
     loop = asyncio.get_running_loop()
     ended = asyncio.Event()
     lines = SimulatedLines(rig)
@@ -162,6 +163,7 @@ async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog
     if unserved := await server.start():
         log("socket", f"E152 {unserved}")
     loop.add_reader(link.fileno(), ended.set)
+    loop.add_signal_handler(signal.SIGTERM, ended.set)
     tell_ports()
     lines.plug(lines.world.settings)
     await ended.wait()

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Final, Literal, TypeVar
 
 from annotated_types import Ge, Le, MaxLen
+from pydantic import AfterValidator
 
 from gateway import defaults
 from gateway.control.runs.experiment_plan import ExperimentPlan
@@ -25,6 +26,16 @@ Number = Annotated[int, Ge(0), Le(999_999)]
 _STRICT: Final = defaults.STRICT | {"allow_inf_nan": False}
 
 
+def _check_text(text: str) -> str:
+    if not all(sign.isprintable() or sign == "\n" for sign in text):
+        raise ValueError(f'"{printable(text)}" has signs that cannot be printed')
+    return text
+
+
+Text = AfterValidator(_check_text)
+"""What a user says, and others read on a terminal."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EmptyRequest:
     """Nothing but the verb."""
@@ -38,8 +49,8 @@ class RecordRequest:
 
     __pydantic_config__ = _STRICT
     on: bool | None = None
-    name: Annotated[str, MaxLen(LONGEST_NAME)] = ""
-    note: Annotated[str, MaxLen(LONGEST_NOTE)] = ""
+    name: Annotated[str, MaxLen(LONGEST_NAME), Text] = ""
+    note: Annotated[str, MaxLen(LONGEST_NOTE), Text] = ""
     for_s: Annotated[float, Ge(0), Le(31 * 86400)] = 0.0
 
 
@@ -70,7 +81,7 @@ class CalibrateRequest:
     __pydantic_config__ = _STRICT
     plan: dict[str, Any] | None = None
     continues: Annotated[tuple[Number, ...], MaxLen(1000)] = ()
-    name: Annotated[str, MaxLen(200)] = ""
+    name: Annotated[str, MaxLen(200), Text] = ""
     dry_run: bool = False
     stop: bool = False
 

@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 from typing import Final
 
-from gateway.processes.durable_file import lock_directory, replace_durably
+from gateway.processes.durable_file import lock_directory, read_object, replace_durably
 
 _FILE: Final = "sparkplug.json"
 _ROUND: Final = 256
@@ -31,7 +31,7 @@ class KeptBdSeq:
 
     def _read(self) -> int:
         try:
-            last = json.loads(self._path.read_text(encoding="ascii"))["bdSeq"]
+            last = read_object(self._path)["bdSeq"]
             return int(last) % _ROUND
-        except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
+        except (OSError, ValueError, KeyError, TypeError, OverflowError):
             return _ROUND - 1

@@ -19,12 +19,12 @@ from gateway.live.control_link import ControlLink
 from gateway.live.live_state import LiveState
 from gateway.processes.beside_control import serve_until_guardian_ends
 from gateway.processes.event_log import EventLog
+from gateway.telemetry.opcua_connections import bound_connections
 from gateway.telemetry.sparkplug_metrics import NODE_METRICS, values_of
 from gateway.telemetry.sparkplug_payload import DataType, Value
 
 NAMESPACE: Final = "urn:force-gateway"
 LOOK_S: Final = 0.2
-_LONGEST_REQUEST: Final = 1 << 20  # bytes: a request for every variable has a hundredth of that
 _EMPTY: Final[dict[DataType, Value]] = {
     DataType.UINT64: 0,
     DataType.DOUBLE: 0.0,
@@ -77,29 +77,11 @@ class GatewayNodes:
         )
 
 
-def bound_requests(wire: Any) -> None:
-    """Have the library cut a client whose request is longer than any could be: it waits for as many bytes as a header says,
-    which may be 2 GB. wire: the module of its protocol."""
-
-    class BoundedProtocol(wire.OPCUAProtocol):  # type: ignore[misc]
-        _buffer: bytes
-
-        def data_received(self, data: bytes) -> None:
-            if len(self._buffer) + len(data) > _LONGEST_REQUEST:
-                self._buffer = b""
-                if self.transport is not None:
-                    self.transport.abort()
-                return
-            super().data_received(data)
-
-    wire.OPCUAProtocol = BoundedProtocol
-
-
 async def serve(options: dict[str, Any], log: EventLog) -> None:
     """Serve until the process ends. options: as the guardian gives them; settings: rig's name and where to listen."""
     asyncua = import_library("asyncua")
     logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # its log is for its developers
-    bound_requests(import_module("asyncua.server.binary_server_asyncio"))
+    bound_connections(import_module("asyncua.server.binary_server_asyncio"), log)
     server = asyncua.Server()
     await server.init()
     settings = options["settings"]

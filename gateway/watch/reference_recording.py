@@ -17,6 +17,7 @@ from gateway.numbered_documents.selection import read_selection
 from gateway.processes.durable_file import (
     lock_directory,
     make_directory,
+    read_object,
     remove_if_possible,
     replace_durably,
     sync_path,
@@ -54,7 +55,7 @@ def reference_path(state: Path, reference: ReferenceRecording) -> Path:
 def read_reference_recording(state: Path) -> ReferenceRecording | None:
     """Return the rig's reference; None where none was kept, or its file is gone."""
     try:
-        reference = ReferenceRecording(**json.loads((state / _FOLDER / _FACTS).read_text(encoding="utf-8")))
+        reference = ReferenceRecording(**read_object(state / _FOLDER / _FACTS))
     except (OSError, ValueError, TypeError):
         return None
     return reference if reference_path(state, reference).is_file() else None

@@ -4,7 +4,6 @@ import errno
 import json
 import os
 import random
-import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +15,7 @@ from click.testing import CliRunner
 
 from gateway.audit.audit_file import AuditFile, audit_files, read_head
 from gateway.audit.audit_reader import read_audit, verify_audit
+from gateway.audit.chain import open_line, seal_line
 from gateway.cli.main import command
 
 LINES = 14
@@ -88,22 +88,18 @@ def test_a_file_that_is_removed_is_missed(state: Path, place: int) -> None:
     assert verify_audit(state).broken
 
 
-def test_a_tail_that_is_written_anew_is_found_by_the_head(
-    state: Path, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_a_tail_that_is_written_anew_is_found_by_the_head(state: Path) -> None:
     """The chain itself holds: only the head knows another last line."""
-    other = tmp_path_factory.mktemp("other")
-    shutil.copytree(state / "audit", other / "audit")
-    path, lines, place = find_line(other, LINES - 1)
-    path.write_bytes(b"".join(lines[:place]))
-    (other / "audit" / "head").unlink()
-    file = AuditFile(other, FILE_BYTES)
-    file.append([{"what": "force_setpoint", "new": 0.0}])
-    file.close()
-    for each in files_of(other):
-        shutil.copy(each, state / "audit" / each.name)
+    replace_last_line(state)
     broken = verify_audit(state).broken
     assert broken and "written anew" in broken.text
+
+
+def replace_last_line(state: Path) -> None:
+    """Put another line where the last one was, as who knows how would."""
+    path, lines, place = find_line(state, LINES - 1)
+    _, before = open_line(lines[place - 1].rstrip(b"\n"))
+    path.write_bytes(b"".join([*lines[:place], seal_line({"what": "force_setpoint", "new": 0.0}, before)[0]]))
 
 
 def test_a_missing_head_is_told(state: Path) -> None:
@@ -238,6 +234,12 @@ def test_the_verbs_show_and_verify(state: Path) -> None:
     bad = run(command, ["audit", "verify", "--state", str(state)])
     assert bad.exit_code == 1
     assert bad.stderr.startswith(f"E170 {path.name} line {place + 1} was changed: its own hash does not fit")
+
+
+def test_a_folder_without_an_audit_is_told_and_no_internal_error(tmp_path: Path) -> None:
+    (tmp_path / "audit").mkdir()
+    told = CliRunner().invoke(command, ["audit", "verify", "--state", str(tmp_path)])
+    assert (told.exit_code, "no audit there yet" in told.stderr) == (65, True)
 
 
 def find_line(state: Path, number: int) -> tuple[Path, list[bytes], int]:

@@ -62,6 +62,23 @@ def test_what_is_refused_and_what_is_uploaded_is_kept_too(tmp_path: Path) -> Non
     assert told[0][0] == "write" and told[0][1].startswith("W")
 
 
+def test_an_audit_that_was_altered_is_said_once_and_not_only_kept(tmp_path: Path) -> None:
+    """It stood in the audit alone, which nobody reads before something has happened."""
+    said: list[str] = []
+
+    async def run() -> None:
+        audit = RigAudit(tmp_path, lambda cause, sentence: said.append(sentence))
+        audit.note_gateway("start", rig="demo")
+        await audit.close()
+
+    asyncio.run(run())
+    assert said == []
+    (tmp_path / "audit" / "head").unlink()
+    asyncio.run(run())
+    asyncio.run(run())
+    assert [sentence[:4] for sentence in said] == ["A352"]
+
+
 def test_what_waits_for_a_disk_is_told_with_its_end(tmp_path: Path) -> None:
     async def run() -> None:
         audit, ends = RigAudit(tmp_path, lambda cause, sentence: None), [Future[Any](), Future[Any]()]

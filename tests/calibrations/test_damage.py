@@ -123,3 +123,13 @@ def test_a_pipe_or_a_device_is_no_file_and_is_not_waited_for(used, name):
         selected = used.find_selected()
         assert selected.document is not None
         assert name in selected.notes[0] and "no file" in selected.notes[0]
+
+
+@pytest.mark.parametrize("name", ["0003.yaml", "active.000002"])
+def test_a_file_of_gigabytes_is_no_document_and_is_not_read(used, name):
+    """3 GB of nothing kept a start from coming up within its 30 s, again and again."""
+    path = used.directory / name
+    os.truncate(path, 3 << 30)
+    selected = used.find_selected()
+    assert selected.document is not None
+    assert name in selected.notes[0] and "no document has" in selected.notes[0]

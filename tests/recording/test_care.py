@@ -78,7 +78,20 @@ def test_a_file_that_has_changed_is_read_again_although_it_is_as_long(tmp_path: 
     assert list_summaries(tmp_path) != first
 
 
-@pytest.mark.parametrize("damage", [b"", b"no JSON", b"[]", b'{"format": 99, "recordings": {}}'])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        b"",
+        b"no JSON",
+        b"[]",
+        b"[" * 60_000,
+        b'{"format": 99, "recordings": {}}',
+        b'{"format": 1}',
+        b'{"format": 1, "recordings": [3]}',
+        b'{"format": 1, "recordings": {"0001.fgr": 3}}',
+    ],
+    ids=range(8),
+)
 def test_a_damaged_cache_costs_time_only(tmp_path: Path, damage: bytes) -> None:
     record(tmp_path)
     before = list_summaries(tmp_path)

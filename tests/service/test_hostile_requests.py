@@ -189,6 +189,7 @@ def test_no_line_ends_or_stops_control(stage: Stage) -> None:
         (b'{"do":"calibration","use":1e3}', "use"),
         (b'{"do":"calibration","use":-1}', "use"),
         (b'{"do":"health","x":1}', "x"),
+        (b'{"do": "record", "on": true, "name": "a\\u001b[2J"}', r'name "a\x1b[2J" has signs that cannot be printed'),
     ],
 )
 def test_a_wrong_type_is_told_by_its_key(line: bytes, told: str, stage: Stage) -> None:

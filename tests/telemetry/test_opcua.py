@@ -5,14 +5,13 @@ import contextlib
 import socket
 from collections.abc import Iterator
 from datetime import UTC, datetime
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
-from gateway.telemetry.opcua_process import NAMESPACE, GatewayNodes, bound_requests
+from gateway.telemetry.opcua_process import NAMESPACE, GatewayNodes
 from gateway.telemetry.sparkplug_metrics import NODE_METRICS
 from gateway.telemetry.sparkplug_payload import DataType
 from tests.end_to_end.conftest import start, stop
@@ -31,39 +30,6 @@ def test_a_port_that_no_client_could_know_is_refused(tmp_path: Path) -> None:
         load_rig(rig_with(tmp_path, "127.0.0.1:0"))
     opcua = load_rig(rig_with(tmp_path, "127.0.0.1:4840")).opcua
     assert opcua and opcua.listen == "127.0.0.1:4840"
-
-
-class Wire(asyncio.Transport):
-    """What the library has of a client."""
-
-    is_cut = False
-
-    def get_extra_info(self, name: str, default: Any = None) -> Any:
-        return ("10.0.0.9", 40000) if name == "peername" else default
-
-    def abort(self) -> None:
-        self.is_cut = True
-
-
-@pytest.mark.parametrize("header", [b"HELF\xff\xff\xff\x7f", b"OPNF\xff\xff\xff\x7f"])
-def test_a_request_that_has_no_end_is_cut_and_holds_no_memory(monkeypatch: pytest.MonkeyPatch, header: bytes) -> None:
-    """The library waited for the 2 GB that a header promises: 120 MB sent were 120 MB held, of anybody who connects."""
-    asyncua = pytest.importorskip("asyncua")
-    wire = import_module("asyncua.server.binary_server_asyncio")
-    monkeypatch.setattr(wire, "OPCUAProtocol", wire.OPCUAProtocol)
-    bound_requests(wire)
-
-    async def scene() -> None:
-        inner, transport = asyncua.Server().iserver, Wire()
-        one = wire.BinaryServer(inner, "127.0.0.1", 0, None)._make_protocol()
-        one.transport = transport
-        one.data_received(header)
-        for _ in range(16):
-            one.data_received(bytes(65536))
-            assert len(one._buffer) <= 1 << 20
-        assert transport.is_cut
-
-    asyncio.run(scene())
 
 
 @pytest.mark.parametrize(

@@ -5,15 +5,18 @@ from collections.abc import Iterable
 from textwrap import wrap
 from typing import Final
 
+from gateway.profiles.strict_yaml.faults import printable
+
 _ENTRY: Final = " " * 6
+_SPACE: Final = "\t\n\r "
 
 
 def fold(line: str, indent: int, *, widest: int | None = None) -> list[str]:
     """Return the line in as many as the terminal's width asks for; the later ones hang behind `indent` spaces. widest: bound
-    of characters also on a wider terminal."""
+    of characters also on a wider terminal. What a file names itself cannot write on the terminal otherwise (escape codes)."""
     width = shutil.get_terminal_size().columns - 1
     return wrap(
-        line,
+        "".join(sign if sign in _SPACE else printable(sign) for sign in line),
         min(width, widest or width),
         subsequent_indent=" " * indent,
         break_on_hyphens=False,

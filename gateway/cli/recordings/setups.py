@@ -4,6 +4,7 @@ from pathlib import Path
 
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice
+from gateway.plants.recorded_number import header_in_use
 from gateway.processes import exit_codes
 from gateway.profiles import Rig, list_shipped, load_calibration, load_rig
 from gateway.recording import Recording
@@ -23,7 +24,7 @@ def own_setup(recording: Recording, state: StateChoice) -> tuple[ReplaySetup, li
     notes = []
     if recording.header.get("rig_fingerprint") not in (None, rig.fingerprint):
         notes.append(f"the files of rig {rig.name} have changed since it was recorded, or were not read from here")
-    if number := (recording.header.get("plant_in_use") or {}).get("number"):
+    if number := header_in_use(recording.header).get("number"):
         notes.append(f"plant {number} was in use; what was compensated of it is not replayed")
     return _with_calibration(rig, recording.header.get("calibration"), state, notes), notes
 
@@ -32,9 +33,10 @@ def _with_calibration(rig: Rig, number: object, state: StateChoice, notes: list[
     from gateway.cli.calibration.store_access import find_calibration, open_store
 
     calibration = rig.calibration
-    if isinstance(number, int) and number and number != calibration.number:
+    named = str(number)  # of a CSV: its text
+    if named.isdecimal() and int(named) not in (0, calibration.number):
         try:
-            calibration = find_calibration(open_store(state.directory, rig.name), str(number))
+            calibration = find_calibration(open_store(state.directory, rig.name), named)
         except CliError:
             notes.append(f"calibration {number}, with which it was made, is not stored here: the rig's own is taken")
     return ReplaySetup(f"rig {rig.name}, calibration {calibration.number} {calibration.name}", rig, calibration)

@@ -52,7 +52,10 @@ def verify_command(*, as_json: bool, state: StateChoice) -> None:
     told apart. Who may write the directory can write a whole new chain: keep the last hash elsewhere where that matters.
     """
     _directory_of(state)
-    verdict = verify_audit(state.directory)
+    try:
+        verdict = verify_audit(state.directory)
+    except FileNotFoundError:
+        raise _no_audit(state) from None
     if as_json:
         broken = verdict.broken._asdict() if verdict.broken else None
         facts = {"lines": verdict.lines, "last": verdict.end._asdict(), "broken": broken, "notes": verdict.notes}
@@ -96,4 +99,8 @@ def _directory_of(state: StateChoice) -> None:
     if not state.directory.is_dir():
         raise no_state_directory(state.directory)
     if not (state.directory / "audit").is_dir():
-        raise CliError(f"E106 {state.directory}: no audit there yet; a gateway that runs keeps one", exit_codes.DATA)
+        raise _no_audit(state)
+
+
+def _no_audit(state: StateChoice) -> CliError:
+    return CliError(f"E106 {state.directory}: no audit there yet; a gateway that runs keeps one", exit_codes.DATA)

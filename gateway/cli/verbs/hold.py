@@ -148,12 +148,15 @@ def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bo
 
 @contextmanager
 def _handle_signals(beat: "HeartbeatThread") -> Iterator[None]:
-    """The first of Ctrl-C, SIGTERM and a closed terminal ramps down, the second drops the force at once."""
+    """The first of Ctrl-C, SIGTERM and a closed terminal (not with nohup) ramps down, the second drops the force at once."""
 
     def on_signal(number: int, frame: object) -> None:
         (beat.dropping if beat.stopping.is_set() else beat.stopping).set()
 
-    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    heard = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        heard.append(signal.SIGHUP)
+    before = {number: signal.signal(number, on_signal) for number in heard}
     try:
         yield
     finally:

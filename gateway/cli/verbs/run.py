@@ -7,7 +7,7 @@ import click
 
 from gateway import defaults
 from gateway.cli.command_line.completion_words import complete_rigs
-from gateway.cli.options import endpoint, http_endpoint, serial_port
+from gateway.cli.options import bind_endpoint, http_endpoint, serial_port
 
 EXAMPLES = ("run demo --sim", "run irc5-cell --sim --bind 127.0.0.1:0 --record")
 
@@ -17,7 +17,7 @@ EXAMPLES = ("run demo --sim", "run irc5-cell --sim --bind 127.0.0.1:0 --record")
 @click.option("--sim", "simulate", is_flag=True, help="Simulate the rig's devices, whatever its file says.")
 @click.option(
     "--bind",
-    callback=endpoint,
+    callback=bind_endpoint,
     metavar="HOST:PORT",
     help="Listen here instead of where the rig says; port 0: any free one.",
 )

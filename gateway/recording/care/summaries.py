@@ -11,6 +11,7 @@ import tempfile
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.processes.durable_file import read_object
 from gateway.progress import report
 from gateway.recording.care.what_happened import tell_happened
 from gateway.recording.errors import RecordingError
@@ -83,11 +84,16 @@ _NOTHING_KNOWN: Final[Summary] = {
 
 
 def _read_cache(folder: Path) -> dict[str, list[Any]]:
-    with contextlib.suppress(OSError, ValueError):
-        cache = json.loads((folder / _CACHE).read_bytes())
-        if isinstance(cache, dict) and cache.get("format") == _FORMAT:
-            return dict(cache["recordings"])
+    with contextlib.suppress(OSError, ValueError, KeyError, AttributeError):
+        cache = read_object(folder / _CACHE)
+        if cache.get("format") == _FORMAT:
+            return {name: known for name, known in cache["recordings"].items() if _is_known(known)}
     return {}
+
+
+def _is_known(entry: Any) -> bool:
+    """Decide whether an entry is key and summary."""
+    return isinstance(entry, list) and len(entry) == 2 and isinstance(entry[1], dict)
 
 
 def _write_cache(folder: Path, recordings: dict[str, list[Any]]) -> None:

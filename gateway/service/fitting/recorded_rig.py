@@ -59,7 +59,7 @@ def rig_texts(recording: Recording) -> dict[str, str]:
     texts = recording.header.get("rig_texts", {})
     try:
         texts = json.loads(texts) if isinstance(texts, str) else texts
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return {str(file): str(text) for file, text in texts.items()} if isinstance(texts, Mapping) else {}
 

@@ -20,6 +20,7 @@ from gateway.registers.writes.ownership import serial_host
 from gateway.service.banner import ServedFace, tcp_face, tls_face
 from gateway.service.running_rig.bank_rules import plain_role, server_settings
 from gateway.service.running_rig.control_loop import Log
+from gateway.service.running_rig.faces_to_come import FacesToCome, Serve
 from gateway.service.running_rig.starting import StartError, listen, open_again
 
 
@@ -54,8 +55,10 @@ class Faces:
             if isinstance(face, RtuFace)
         ]
         self._make_tls = partial(make_tls_server, rig, bank=bank, on_peer_closed=on_peer_closed, log=log)
-        self._tls: list[tuple[TlsFace, ModbusTlsServer]] = []
+        self._tls: list[ModbusTlsServer] = []
         self.modbus: tuple[str, int] | None = None  # where plain Modbus TCP is bound, once it is
+        self.on_served: Callable[[], None] = lambda: None  # one that a restart could not serve is served
+        self._to_come = FacesToCome(log, lambda: self.on_served())
 
     @property
     def peers(self) -> tuple[Peer, ...]:
@@ -69,26 +72,25 @@ class Faces:
 
     @property
     def _all(self) -> list[ModbusTcpServer | ModbusRtuServer]:
-        return [*([self._tcp] if self._tcp else []), *(server for _, server in self._tls), *self._serial]
+        return [*([self._tcp] if self._tcp else []), *self._tls, *self._serial]
 
     async def start(self, bind: list[Any] | None, *, is_restart: bool) -> tuple[ServedFace, ...]:
         """Serve on every face; what each is. bind: HOST, PORT of plain Modbus TCP instead of the rig's. StartError says
-        which face cannot be served, and why; a serial port that a restart does not find is a lost one, and a TLS face whose
-        files are not good any more is left out by it: ending over either would take the others' faces, too."""
-        self._make_tls_faces(is_restart=is_restart)
-        served = []
-        if self._tcp:
-            network = self._rig.network
-            self.modbus = await listen(self._tcp, *(bind or (network.bind, network.port)))
-            served.append(tcp_face(*self.modbus, network.units))
-        elif bind and not is_restart:
+        which face cannot be served, and why. A restart ends over none: a serial port that it does not find is a lost one, and
+        what cannot listen is tried again."""
+        if bind and not self._tcp and not is_restart:
             raise StartError(
                 f"E125 --bind: rig {self._rig.name} has no plain Modbus TCP (network.plain: false)",
                 exit_codes.CONFIGURATION,
             )
-        for tls, server in self._tls:
-            host, port = await listen(server, tls.bind, tls.port, "`port:` of the tls face, such as 8802")
-            served.append(tls_face(host, port, self._rig.network.units))
+        served = []
+        for name, serve in self._listening(bind):
+            try:
+                served.append(await serve())
+            except StartError as error:
+                if not is_restart:
+                    raise
+                self._to_come.add(name, serve, error)
         for face in self._serial:
             await self._start_serial(face, is_restart=is_restart)
             served.append(_rtu_face(face))
@@ -96,18 +98,27 @@ class Faces:
 
     async def close(self) -> None:
         """Close every face; answers given so far are still sent."""
+        await self._to_come.close()
         for face in self._all:
             await face.close()
 
-    def _make_tls_faces(self, *, is_restart: bool) -> None:
-        for face in self._rig.fieldbus:
-            if isinstance(face, TlsFace):
-                try:
-                    self._tls.append((face, self._make_tls(face)))
-                except StartError as error:
-                    if not is_restart:
-                        raise
-                    self._log("face tls", f"{error}; without this face until a new start")
+    def _listening(self, bind: list[Any] | None) -> list[tuple[str, Serve]]:
+        """Return the faces that listen on an address, by name, each with what serves it."""
+        plain: list[tuple[str, Serve]] = [("tcp", partial(self._serve_tcp, bind))] if self._tcp else []
+        secure = (face for face in self._rig.fieldbus if isinstance(face, TlsFace))
+        return [*plain, *(("tls", partial(self._serve_tls, face)) for face in secure)]
+
+    async def _serve_tcp(self, bind: list[Any] | None) -> ServedFace:
+        assert self._tcp
+        network = self._rig.network
+        self.modbus = await listen(self._tcp, *(bind or (network.bind, network.port)))
+        return tcp_face(*self.modbus, network.units)
+
+    async def _serve_tls(self, face: TlsFace) -> ServedFace:
+        server = self._make_tls(face)
+        host, port = await listen(server, face.bind, face.port, "`port:` of the tls face, such as 8802")
+        self._tls.append(server)
+        return tls_face(host, port, self._rig.network.units)
 
     async def _start_serial(self, face: ModbusRtuServer, *, is_restart: bool) -> None:
         host = face.settings.peer.host

@@ -9,10 +9,11 @@ import asyncio
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+from gateway.processes.module_command import module_command
 
 Result = dict[str, Any]
 _LONGEST = 1 << 16
@@ -24,7 +25,7 @@ class FitLauncher:
 
     def __init__(self, recording: Path, rig_file: Path, state: Path, on_result: Callable[[Result], None]) -> None:
         arguments = json.dumps({"recording": str(recording), "rig": str(rig_file), "state": str(state)})
-        command = [sys.executable, "-m", "gateway.service.fitting.fit_process", arguments]
+        command = [*module_command("gateway.service.fitting.fit_process"), arguments]
         self._process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, start_new_session=True
         )

@@ -106,6 +106,7 @@ class RunningRig:
         self._calibration_runs = CalibrationRuns(self.controller, rig, self._state, time.monotonic, self._log)
         self.loop.calibration_runs = self._calibration_runs
         self._faces = Faces(rig, self.bank, self._on_peer_closed, self._log)
+        self._faces.on_served = self._show_faces
         self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
         self._plants.serve(
             PlantEdges(
@@ -182,10 +183,7 @@ class RunningRig:
             self._log.note("start", note)
         self._note_start(restarted)
         faces = await self._faces.start(bind, is_restart=bool(restarted))
-        self._running |= {
-            "port": self._faces.modbus[1] if self._faces.modbus else None,
-            "serial": self._faces.serial_paths,
-        }
+        self._show_faces()
         return banner.Ready(
             rig=self._rig,
             modbus=self._faces.modbus,
@@ -197,6 +195,10 @@ class RunningRig:
             faces=faces,
             valve_port=self._ports.valve.path if self._ports.valve else "",
         )
+
+    def _show_faces(self) -> None:
+        modbus = self._faces.modbus
+        self._running |= {"port": modbus[1] if modbus else None, "serial": self._faces.serial_paths}
 
     def _note_start(self, restarted: Ending | None) -> None:
         """So that the audit shows what was changed while no gateway ran."""

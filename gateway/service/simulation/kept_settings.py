@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from gateway.processes.durable_file import read_object
 from gateway.service.simulation.settings import SimulationSettings, restore_settings
 
 _FILE: Final = "simulation.json"
@@ -20,7 +21,7 @@ class KeptSettings:
     def read(self) -> SimulationSettings:
         """Return what this run has set; nothing where it is not there or makes no sense."""
         try:
-            document = json.loads((self.state / _FILE).read_text(encoding="utf-8"))
+            document = read_object(self.state / _FILE)
             return restore_settings(document["set"]) if document["run"] == self.run else SimulationSettings()
         except (OSError, ValueError, KeyError, TypeError):
             return SimulationSettings()

@@ -10,16 +10,16 @@ import os
 import select
 import signal
 import socket
-import sys
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.processes import message_link as guardian_link
+from gateway.processes.module_command import module_command
 from gateway.processes.scheduler_counters import SchedulerCounters
 
 _END_BOUND_S: Final = 1.0
 _REAP_BOUND_S: Final = 2.0  # a killed process is gone in milliseconds, unless a driver holds it
-_BLOCKED: Final = (signal.SIGHUP,)  # the guardian's to answer: a service manager sends it to every process
+_BLOCKED: Final = (signal.SIGHUP, signal.SIGINT)  # the guardian's to answer: some send them to every process
 LOST: Final = -1000
 """The exit code of a child that nobody could ask: it does not go, or somebody else has reaped it."""
 
@@ -101,7 +101,7 @@ def spawn_child(module: str, arguments: dict[str, Any], *shared: int, room: int 
     try:
         with theirs:
             words = [str(theirs.fileno()), json.dumps(arguments).ljust(room)]
-            pid = _spawn_process([sys.executable, "-m", module, *words], (theirs.fileno(), *shared))
+            pid = _spawn_process([*module_command(module), *words], (theirs.fileno(), *shared))
         child = Child(ours, pid)
     except OSError:
         ours.close()

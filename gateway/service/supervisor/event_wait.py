@@ -17,9 +17,13 @@ _STRAY: Final = (
     signal.SIGPROF,
     signal.SIGPOLL,
     signal.SIGPWR,
+    signal.SIGTSTP,
+    signal.SIGTTIN,
+    signal.SIGTTOU,
 )
 """Mean nothing to us, come from tools that rotate logs or ask other programs to reload, and would end who does not ignore them,
-without the safe voltage. Children inherit it."""
+without the safe voltage; or stop him (Ctrl-Z, a word from the background): then the force goes on and nobody watches it.
+Children inherit it."""
 _LONGEST_S: Final = 3600.0
 _MOST_SIGNALS: Final = 64
 
@@ -35,7 +39,8 @@ def wait_readable(descriptors: list[int], timeout_s: float) -> set[int]:
 
 
 class SignalPipe:
-    """SIGINT, SIGTERM and SIGHUP as readable bytes: nothing of ours runs inside a signal handler. Stray signals are ignored.
+    """SIGINT, SIGTERM and SIGHUP as readable bytes: nothing of ours runs inside a signal handler. Stray signals are ignored,
+    and SIGHUP where who starts us ignores it: nohup says that the end of its terminal is not ours.
 
     Who starts us may have signals blocked (a thread of a Qt or Java program), and that is inherited: nothing but SIGKILL would
     stop us and our children then.
@@ -59,7 +64,8 @@ class SignalPipe:
 
     def __enter__(self) -> Self:
         for number in _SIGNALS:
-            signal.signal(number, lambda *_: None)
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+                signal.signal(number, lambda *_: None)
         for number in _STRAY:
             signal.signal(number, signal.SIG_IGN)
         signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)

@@ -172,7 +172,7 @@ class Guardian:
         info, banner = message.body["info"], message.body["banner"]
         heartbeat = self.control.heartbeat
         heartbeat.stall_s = float(message.body["stall_s"])
-        where = "no plain modbus tcp"
+        where = "plain modbus tcp is not served"
         if info["modbus"]:
             host, port = info["modbus"]
             self.bound = (host, port)  # a restart keeps the port that masters already know

@@ -9,13 +9,13 @@ import contextlib
 import json
 import shutil
 import socket
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.processes.module_command import module_command
 from gateway.web.context import WebContext
 from gateway.web.tabs.answers import NOT_FOUND, TabRefusedError
 from gateway.web.tabs.own_command import child_environment, last_sentence
@@ -95,10 +95,11 @@ class DiagnosisJobs:
         words = ["diagnose", str(job.recording), "--state", str(self._state)]
         words += ["--report", str(folder / "report.html"), "--json", str(folder / "document.json")]
         words += ["--save"] if job.keeps_plant else []
-        module = ("-m", "gateway.web.tabs.diagnosis_process", str(far_end.fileno()), PROGRAM)
+        module = module_command("gateway.web.tabs.diagnosis_process")
         return await asyncio.create_subprocess_exec(
-            sys.executable,
             *module,
+            str(far_end.fileno()),
+            PROGRAM,
             *words,
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,

@@ -8,9 +8,9 @@ import asyncio
 import json
 import os
 import subprocess
-import sys
 from typing import Any, Final
 
+from gateway.processes.module_command import module_command
 from gateway.web.context import WebContext
 from gateway.web.tabs.answers import CONFLICT, UNAVAILABLE, TabRefusedError
 
@@ -46,7 +46,7 @@ def child_environment() -> dict[str, str]:
 
 
 def _run(words: tuple[str, ...]) -> str:
-    command = [sys.executable, "-m", "gateway", *words]
+    command = [*module_command("gateway"), *words]
     try:
         done = subprocess.run(
             command,

@@ -1,12 +1,15 @@
 """`replay` on a recording of the gateway: against itself, another calibration, and what cannot be replayed."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from gateway.calibrations.store import CalibrationStore
 from gateway.profiles import load_calibration
+from gateway.recording import read_recording
+from gateway.recording.export import export_csv
 from tests.service.test_replayed_control import record_work, scaled
 
 
@@ -49,6 +52,20 @@ def test_another_calibration_is_told_by_signal(state: Path, call) -> None:
 
 def test_alone_it_is_compared_with_what_was_recorded(state: Path, call) -> None:
     assert differences(call, state)["applied_n"]["rms"] < 1e-6
+
+
+def test_an_exported_table_is_replayed_with_the_calibration_that_it_was_made_with(
+    state: Path, call, tmp_path: Path
+) -> None:
+    """A table holds its facts as text: the plant in use was an internal error, and the calibration silently the rig's own."""
+    number = max(int(path.stem) for path in (state / "calibrations").glob("*.yaml") if path.stem.isdecimal())
+    recording = read_recording(state / "recordings" / "0001.fgr")
+    facts = {"calibration": number, "plant_in_use": {"number": 3, "compensated": [], "cell": None}}
+    export_csv(replace(recording, header=recording.header | facts), tmp_path / "exported.csv")
+    answer = call("replay", tmp_path / "exported.csv", "--state", state, "--rig", "demo")
+    assert answer.exit_code == 0, answer.output
+    assert f"calibration {number} " in answer.stdout
+    assert "plant 3 was in use" in answer.stderr
 
 
 @pytest.mark.parametrize(("words", "code", "why"), [(("7",), 65, "E403"), (("1", "--against", "nothing-such"), 78, "")])

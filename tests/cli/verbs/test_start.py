@@ -73,7 +73,7 @@ def test_options_of_run_are_the_fields_of_run_options() -> None:
     [
         ("127.0.0.1:502", ("127.0.0.1", 502)),
         (":0", ("127.0.0.1", 0)),
-        ("robot", ("robot", 5020)),
+        ("192.168.125.20", ("192.168.125.20", 5020)),
         ("[::1]:5020", ("::1", 5020)),
         ("::1", ("::1", 5020)),
     ],
@@ -166,3 +166,21 @@ def test_an_alias_is_the_subcommand_and_no_verb_of_the_help(call) -> None:
     assert alias.exit_code == 0
     assert alias.output.split("[OPTIONS]")[1] == meant.output.split("[OPTIONS]")[1]
     assert "install-service" not in call("--help").output
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "told"),
+    [
+        ("--bind", "nonsense", "nonsense is no IP address of this machine such as 127.0.0.1"),
+        ("--bind", "5020", "it is HOST:PORT, PORT alone is :PORT"),
+        ("--web", "cell.local:8080", "cell.local is no IP address"),
+        ("--metrics", "cell.local:9100", "cell.local is no IP address"),
+    ],
+)
+def test_an_address_to_listen_on_that_is_none_is_told_before_anything_starts(
+    option: str, value: str, told: str, call
+) -> None:
+    """As `--web` it ended control with a traceback, five times; as `--bind` it was called reachable from the network."""
+    answer = call("run", "demo", "--sim", option, value)
+    assert answer.exit_code == 2
+    assert told in " ".join(answer.output.split())

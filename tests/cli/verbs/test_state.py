@@ -162,8 +162,9 @@ def test_a_dry_run_restores_nothing(state: Path, call, tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
 
 
-def member(name: str, kind: bytes = tarfile.REGTYPE, link: str = "") -> tarfile.TarInfo:
+def member(name: str, kind: bytes = tarfile.REGTYPE, link: str = "", **header: str) -> tarfile.TarInfo:
     info = tarfile.TarInfo(name)
+    info.pax_headers = header
     info.type, info.linkname = kind, link
     return info
 
@@ -177,6 +178,12 @@ def member(name: str, kind: bytes = tarfile.REGTYPE, link: str = "") -> tarfile.
         member("state/link", tarfile.SYMTYPE, "/etc"),
         member("state/hard", tarfile.LNKTYPE, "/etc/passwd"),
         member("state/device", tarfile.CHRTYPE),
+        member("state"),
+        member("state/good"),
+        member("state/good/below"),
+        member("state//good"),
+        member("state/running"),
+        member("state/without-an-end", mtime="inf"),
     ],
     ids=lambda evil: evil.name,
 )
@@ -208,6 +215,17 @@ def test_a_foreign_archive_is_not_taken_for_a_backup(call, tmp_path: Path) -> No
     with tarfile.open(tmp_path / "x.tar.gz", "w:gz") as archive:
         archive.addfile(member("state/good"))
     assert "was not made by" in call("restore", tmp_path / "x.tar.gz", "--state", tmp_path / "new").stderr
+
+
+@pytest.mark.parametrize("manifest", [b"nonsense", b"[1]", b"\xff\xfe", b"[" * 60_000], ids=len)
+def test_an_archive_whose_manifest_is_none_is_no_backup(manifest: bytes, call, tmp_path: Path) -> None:
+    """It was an internal error, to be reported."""
+    with tarfile.open(tmp_path / "x.tar.gz", "w:gz") as archive:
+        first = member("backup.json")
+        first.size = len(manifest)
+        archive.addfile(first, io.BytesIO(manifest))
+    answer = call("restore", tmp_path / "x.tar.gz", "--state", tmp_path / "new")
+    assert (answer.exit_code, "was not made by" in answer.stderr) == (65, True)
 
 
 def test_a_backup_of_nothing_says_so(call, tmp_path: Path) -> None:

@@ -176,7 +176,8 @@ def test_control_that_stands_still_on_the_last_ramp_is_answered_as_at_any_time(r
 
 
 def test_what_a_careless_hand_sends_to_a_process_does_not_drop_the_force(real, devices):
-    """`systemctl kill -s HUP`, `pkill -USR1`: as they come from log rotation and habit."""
+    """`systemctl kill -s HUP`, `pkill -USR1`, `killall -INT`: as they come from log rotation and habit. What is meant for the
+    gateway is the guardian's to answer."""
     pressing(real)
     began_s, pids = time.monotonic(), real.ready["pids"]
     assert len(pids) >= 3
@@ -184,6 +185,7 @@ def test_what_a_careless_hand_sends_to_a_process_does_not_drop_the_force(real, d
         os.kill(pid, signal.SIGUSR1)
         if name != "guardian":
             os.kill(pid, signal.SIGHUP)
+            os.kill(pid, signal.SIGINT)
     assert real.status()["state"] == HOLDING
     time.sleep(3 * STALL_S)  # a process that has died of it would be missed by now
     assert real.status()["state"] == HOLDING

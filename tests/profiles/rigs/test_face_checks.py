@@ -40,6 +40,10 @@ def test_a_face_is_read_with_modbus_own_defaults(tmp_path: Path) -> None:
         ("[{type: rtu, port: /dev/ttyS9, parity: evn}]", "fieldbus[0].parity: evn is not one of none, even, odd; did"),
         ("[{type: rtu, port: /dev/ttyS9, baud: 19201}]", "fieldbus[0].baud: 19201 is not one of 300, 600"),
         ("[{type: rtu, port: /dev/ttyS9, unti: 3}]", "fieldbus[0].unti: is not a known key; did you mean unit?"),
+        (
+            "[{type: tcp, port: 5021}]",
+            "fieldbus[0]: plain Modbus TCP has its keys under network: (bind, port, allow); here stand",
+        ),
         ("[{type: rtux, port: /dev/ttyS9}]", "fieldbus[0]: type rtux is not one of rtu, tls; did you mean rtu?"),
         ("[{type: null, port: /dev/ttyS9}]", "fieldbus[0]: has no type"),
         (

@@ -2,6 +2,8 @@
 
 import asyncio
 import os
+import re
+import socket
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -19,6 +21,7 @@ from gateway.profiles import Rig
 from gateway.profiles.rigs.faces import RtuFace
 from gateway.registers import RegisterBank
 from gateway.service.banner import Ready, format_banner, ready_fields
+from gateway.service.running_rig import faces_to_come
 from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.faces import Faces, with_rtu_face
 from gateway.service.running_rig.starting import StartError
@@ -39,8 +42,8 @@ class Served:
 
     @asynccontextmanager
     async def running(self, bind: list[Any] | None = None, *, is_restart: bool = False) -> AsyncIterator["Served"]:
-        self.told = await self.faces.start(bind, is_restart=is_restart)
         try:
+            self.told = await self.faces.start(bind, is_restart=is_restart)
             yield self
         finally:
             await self.faces.close()
@@ -139,6 +142,42 @@ def test_a_permission_taken_away_costs_a_restart_the_serial_face_only(monkeypatc
         async with Served(serial("/dev/no-such", plain=True)).running(is_restart=True) as served:
             assert [face.type for face in served.told] == ["tcp", "rtu"]
             assert ["E101" in told for told in served.log] == [True]
+
+    play(scene())
+
+
+def test_an_address_that_is_gone_or_held_costs_a_restart_its_face_only_until_it_is_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Five restarts found it gone within a minute, and the gateway ended."""
+
+    async def scene() -> None:
+        monkeypatch.setattr(faces_to_come, "AGAIN_S", 0.001)
+        line, holder = Pty(), socket.create_server(("127.0.0.1", 0))
+        host, port = holder.getsockname()
+        is_served = asyncio.Event()
+        served = Served(serial(line.path, plain=True))
+        served.faces.on_served = is_served.set
+        async with served.running([host, port], is_restart=True):
+            assert [face.type for face in served.told] == ["rtu"] and served.faces.modbus is None
+            assert len(await ask(line, 1, P.read_request(3, 100, 2))) == 6
+            assert re.fullmatch(r"E121 cannot listen on .* without this face, tried again every .* s", served.log[0])
+            holder.close()
+            await is_served.wait()
+            assert served.faces.modbus == (host, port)
+            assert served.log[1:] == [f"modbus tcp {host}:{port} is served again"]
+            with socket.create_connection((host, port)):
+                pass
+        line.close()
+
+    play(scene())
+
+
+def test_a_face_that_never_comes_is_told_once_and_ends_with_the_others() -> None:
+    async def scene() -> None:
+        served = Served(serial(plain=True))
+        async with served.running(["192.0.2.9", 5020], is_restart=True):
+            assert served.told == () and len(served.log) == 1
 
     play(scene())
 

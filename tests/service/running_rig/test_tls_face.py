@@ -1,15 +1,18 @@
 """A TLS face of a running rig: on the same bank as the plain one, the owner known by its certificate, told when ready."""
 
 import asyncio
+import re
 import struct
 from dataclasses import replace
 from ipaddress import ip_network
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gateway.modbus import pdu
 from gateway.profiles.rigs.faces import TlsFace
+from gateway.service.running_rig import faces_to_come
 from gateway.service.running_rig.starting import StartError
 from tests.certificates import Folder, store_all
 from tests.fieldbus.by_hand import framed
@@ -83,5 +86,22 @@ def test_files_that_changed_since_the_start_cost_a_restart_their_own_face_only(f
             (plain,) = served.told
             assert await ask(plain.facts["port"], pdu.read_request(3, 0, 1)) == bytes((3, 2, 0, 0))
             assert [line.split()[0] for line in served.log] == ["E174"] and "without this face" in served.log[0]
+
+    asyncio.run(asyncio.wait_for(scene(), 20.0))
+
+
+def test_a_face_whose_files_are_good_again_is_served_without_another_start(
+    folder: Folder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scene() -> None:
+        monkeypatch.setattr(faces_to_come, "AGAIN_S", 0.001)
+        is_served, rig, key = asyncio.Event(), rig_with(folder), tmp_path / "gateway.key"
+        key.write_text("half a k")
+        served = Served(replace(rig, fieldbus=(replace(rig.fieldbus[0], key=key),)))
+        served.faces.on_served = is_served.set
+        async with served.running(is_restart=True):
+            key.write_bytes(Path(folder.key("gateway")).read_bytes())
+            await is_served.wait()
+            assert re.fullmatch(r"modbus tls 127\.0\.0\.1:\d+ is served again", served.log[-1])
 
     asyncio.run(asyncio.wait_for(scene(), 20.0))

@@ -1,0 +1,85 @@
+"""Who may hold a connection to the OPC UA server, how many and for how long: by the bounds of the Modbus faces.
+
+The library has bounds of its own since 2.0 only, and wide ones: a thousand connections, ten minutes of silence.
+"""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any, Final
+
+from gateway.fieldbus.peers import Peers
+from gateway.fieldbus.settings import ServerSettings
+
+LONGEST_REQUEST: Final = 1 << 20
+"""Bytes: a request for every variable has a hundredth of that."""
+
+Log = Callable[[str, str], None]
+
+
+class Silence:
+    """Calls back once when nothing has been heard for longest_s; to be made in a running loop."""
+
+    def __init__(self, longest_s: float, on_silence: Callable[[], None]) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._longest_s, self._on_silence = longest_s, on_silence
+        self.note_heard()
+        self._timer = self._loop.call_later(longest_s, self._look)
+
+    def note_heard(self) -> None:
+        """Note that something has been heard now. No timer moves for it."""
+        self._heard_s = self._loop.time()
+
+    def close(self) -> None:
+        """Wait no longer."""
+        self._timer.cancel()
+
+    def _look(self) -> None:
+        left_s = self._heard_s + self._longest_s - self._loop.time()
+        if left_s <= 0.0:
+            self._on_silence()
+        else:
+            self._timer = self._loop.call_later(left_s, self._look)
+
+
+def bound_connections(wire: Any, log: Log, settings: ServerSettings | None = None) -> None:
+    """Have the library refuse connections beyond the most allowed, cut those that are silent, and a client whose request is
+    longer than any could be: it waits for as many bytes as a header says, which may be 2 GB. wire: its protocol's module."""
+    bounds = settings or ServerSettings()
+    peers = Peers(bounds, guarded=False)
+
+    class BoundedProtocol(wire.OPCUAProtocol):  # type: ignore[misc]
+        _buffer: bytes
+        _silence: Silence | None = None  # of an admitted client
+
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            host, port = (transport.get_extra_info("peername") or ("", 0))[:2]
+            if refusal := peers.refusal(host) if host else "it has left already":
+                log("refused", f"W230 {host}:{port}: {refusal} (OPC UA)")
+                transport.close()
+                return
+            self._host = host
+            peers.join(host)
+            super().connection_made(transport)
+            self._silence = Silence(bounds.idle_s, self._cut)
+
+        def connection_lost(self, ex: BaseException | None) -> None:
+            if self._silence:
+                self._silence.close()
+                peers.leave(self._host)
+                super().connection_lost(ex)
+
+        def data_received(self, data: bytes) -> None:
+            if self._silence is None:
+                return
+            self._silence.note_heard()
+            if len(self._buffer) + len(data) > LONGEST_REQUEST:
+                self._buffer = b""
+                self._cut()
+                return
+            super().data_received(data)
+
+        def _cut(self) -> None:
+            if self.transport is not None:
+                self.transport.abort()
+
+    wire.OPCUAProtocol = BoundedProtocol

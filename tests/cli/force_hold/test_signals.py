@@ -1,0 +1,27 @@
+"""Which signals end a held force."""
+
+import os
+import signal
+import threading
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gateway.cli.verbs.hold import _handle_signals
+
+
+@pytest.mark.parametrize(("is_ignored", "stops"), [(False, True), (True, False)])
+def test_a_closed_terminal_ends_a_hold_unless_nohup_says_otherwise(is_ignored: bool, stops: bool) -> None:
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    handler = signal.SIG_IGN if is_ignored else signal.SIG_DFL
+    before = signal.signal(signal.SIGHUP, handler)
+    try:
+        with _handle_signals(beat):
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert beat.stopping.is_set() == stops
+            os.kill(os.getpid(), signal.SIGTERM)
+            assert beat.stopping.is_set() and beat.dropping.is_set() == stops
+        assert signal.getsignal(signal.SIGHUP) is handler
+    finally:
+        signal.signal(signal.SIGHUP, before)

@@ -1,0 +1,101 @@
+"""Connections to the OPC UA server are bounded in number, silence and length, whatever the library's own bounds are."""
+
+import asyncio
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import pytest
+
+from gateway.fieldbus.settings import ServerSettings
+from gateway.telemetry.opcua_connections import bound_connections
+
+
+class Wire(asyncio.Transport):
+    """What the library has of a client."""
+
+    is_cut = False
+
+    def __init__(self, host: str = "10.0.0.9") -> None:
+        super().__init__()
+        self._host = host
+
+    def get_extra_info(self, name: str, default: Any = None) -> Any:
+        return (self._host, 40000) if name == "peername" else default
+
+    def abort(self) -> None:
+        self.is_cut = True
+
+    close = abort
+
+
+@pytest.fixture
+def connect(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    """Return what makes a bounded protocol; its server is one for all."""
+    asyncua = pytest.importorskip("asyncua")
+    wire = import_module("asyncua.server.binary_server_asyncio")
+    monkeypatch.setattr(wire, "OPCUAProtocol", wire.OPCUAProtocol)
+    said: list[str] = []
+    bound_connections(wire, lambda _, sentence: said.append(sentence), ServerSettings(connections=6, idle_s=0.02))
+    inner = asyncua.Server().iserver
+
+    def make(transport: Wire) -> Any:
+        one = wire.BinaryServer(inner, "127.0.0.1", 0, None)._make_protocol()
+        one.connection_made(transport)
+        return one
+
+    make.said = said  # type: ignore[attr-defined]
+    return make
+
+
+async def leave(*protocols: Any) -> None:
+    """As the loop does it for a transport that is closed; the library's tasks end."""
+    for one in protocols:
+        one.connection_lost(None)
+    for task in {task for one in protocols for task in one.closing_tasks}:
+        await task
+    await asyncio.sleep(0)
+
+
+@pytest.mark.parametrize("header", [b"HELF\xff\xff\xff\x7f", b"OPNF\xff\xff\xff\x7f"])
+def test_a_request_that_has_no_end_is_cut_and_holds_no_memory(connect: Callable[..., Any], header: bytes) -> None:
+    """The library waited for the 2 GB that a header promises: 120 MB sent were 120 MB held, of anybody who connects."""
+
+    async def scene() -> None:
+        transport = Wire()
+        one = connect(transport)
+        one.data_received(header)
+        for _ in range(16):
+            one.data_received(bytes(65536))
+            assert len(one._buffer) <= 1 << 20
+        assert transport.is_cut
+        await leave(one)
+
+    asyncio.run(scene())
+
+
+def test_one_address_has_four_connections_and_all_have_the_most_allowed(connect: Callable[..., Any]) -> None:
+    async def scene() -> None:
+        transports = [Wire("10.0.0.9" if place < 5 else f"10.0.1.{place}") for place in range(8)]
+        all_of_them = [connect(transport) for transport in transports]
+        assert [transport.is_cut for transport in transports] == [False] * 4 + [True, False, False, True]
+        assert [sentence.split(":")[0] for sentence in connect.said] == ["W230 10.0.0.9", "W230 10.0.1.7"]  # type: ignore[attr-defined]
+        await leave(*all_of_them)
+        again = connect(Wire())
+        assert not again.transport.is_cut, "places are given back"
+        await leave(again)
+
+    asyncio.run(scene())
+
+
+def test_who_is_silent_is_cut_and_who_speaks_is_not(connect: Callable[..., Any]) -> None:
+    async def scene() -> None:
+        silent, speaking = Wire("10.0.0.1"), Wire("10.0.0.2")
+        first, second = connect(silent), connect(speaking)
+        while not silent.is_cut:
+            second.data_received(b"H")
+            await asyncio.sleep(0.001)
+        assert not speaking.is_cut
+        await leave(first, second)
+
+    asyncio.run(asyncio.wait_for(scene(), 20.0))
