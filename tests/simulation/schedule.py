@@ -225,9 +225,8 @@ class Simulation:
 
     _was_watched = False
 
-    def _follow_person(self) -> None:
+    def _follow_person(self, is_watched: bool) -> None:
         """A run that somebody has started at the machine presses without a master, as long as that person looks at it."""
-        is_watched = self.person.watched_s is not None
         if is_watched:
             self.observer.note_accepted(RUN_BIT, self.clock.now_s)
         elif self._was_watched and self.observer.is_run:
@@ -241,9 +240,12 @@ class Simulation:
             self.observer.cell_lost_s = strange_s
 
     def _look(self) -> None:
-        self._follow_person()
-        self._note_strange_words()
-        if self.service.is_serving:
+        is_watched = self.person.watched_s is not None
+        if is_watched or self._was_watched:
+            self._follow_person(is_watched)
+        if self.observer.cell_lost_s is not None:
+            self._note_strange_words()
+        if self.observer.control_lost_s is not None and self.service.is_serving:
             self.observer.control_lost_s = None
         self.observer.look(self.clock.now_s)
         self.outside.call_later(LOOK_S, self._look)

@@ -1,7 +1,6 @@
 """Modbus TCP without a kernel: connections between two loops, whose bytes arrive after a delay, in pieces, in order."""
 
 import asyncio
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -31,22 +30,6 @@ class MemoryListener:
         return
 
 
-class Delay:
-    """Calls what it is given after DELAY_S, in order: of timers that are due at one time asyncio keeps none."""
-
-    def __init__(self, loop: VirtualLoop) -> None:
-        self._loop = loop
-        self._waiting: deque[tuple[Callable[..., Any], tuple[Any, ...]]] = deque()
-
-    def __call__(self, what: Callable[..., Any], *arguments: Any) -> None:
-        self._waiting.append((what, arguments))
-        self._loop.call_later(DELAY_S, self._do_next)
-
-    def _do_next(self) -> None:
-        what, arguments = self._waiting.popleft()
-        what(*arguments)
-
-
 class MemoryTransport(asyncio.Transport):
     """The server's end of one connection."""
 
@@ -54,7 +37,7 @@ class MemoryTransport(asyncio.Transport):
         self, inside: VirtualLoop, outside: VirtualLoop, peer: tuple[str, int], hear: Callable[[bytes], None]
     ) -> None:
         super().__init__({"peername": peer})
-        self._inside, self._after_delay, self._hear = inside, Delay(outside), hear
+        self._inside, self._outside, self._hear = inside, outside, hear
         self._protocol: Any = None
         self._is_closing = self._is_paused = False
         self._waiting = bytearray()
@@ -76,7 +59,7 @@ class MemoryTransport(asyncio.Transport):
 
     def write(self, data: Any) -> None:
         if not self._is_closing:
-            self._after_delay(self._hear, bytes(data))
+            self._outside.call_later(DELAY_S, self._hear, bytes(data))
 
     def get_write_buffer_size(self) -> int:
         return 0
@@ -90,7 +73,7 @@ class MemoryTransport(asyncio.Transport):
         if not self._is_closing:
             self._is_closing = True
             self._inside.call_soon(self._protocol.connection_lost, None)
-            self._after_delay(self._hear, b"")
+            self._outside.call_later(DELAY_S, self._hear, b"")
 
     def abort(self) -> None:
         self.close()
@@ -120,13 +103,13 @@ class Line:
     def __init__(
         self, inside: VirtualLoop, outside: VirtualLoop, peer: tuple[str, int], hear: Callable[[bytes], None]
     ) -> None:
-        self._inside, self._after_delay = inside, Delay(outside)
+        self._inside = inside
         self._transport = MemoryTransport(inside, outside, peer, hear)
         (server,) = inside.servers.values()
         inside.call_soon(lambda: self._transport.attach(server.make()))
 
     def send(self, data: bytes) -> None:
-        self._after_delay(self._inside.call_soon, self._transport.feed, data)
+        self._inside.call_later(DELAY_S, self._transport.feed, data)
 
     def close(self) -> None:
-        self._after_delay(self._inside.call_soon, self._transport.end)
+        self._inside.call_later(DELAY_S, self._transport.end)
