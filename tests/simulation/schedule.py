@@ -1,8 +1,10 @@
 """One schedule: what masters, people and fate do to a gateway (events.py), run in virtual time and judged."""
 
+import json
 import struct
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, nan
 from pathlib import Path
@@ -10,9 +12,10 @@ from random import Random
 from typing import Any
 
 from gateway.control import LeaseAction
+from gateway.devices import output_device
 from gateway.profiles import Rig
 from gateway.service.simulation.world import SimulatedRig
-from tests.simulation.events import Event
+from tests.simulation.event import Event
 from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, heal
 from tests.simulation.kernel.cables import CABLES, lay_cables
@@ -20,12 +23,12 @@ from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_
 from tests.simulation.kernel.processes import SimulatedService
 from tests.simulation.kernel.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 from tests.simulation.masters.bus_master import make_master
-from tests.simulation.masters.integrator import Integrator
+from tests.simulation.masters.integrator import Integrator, Sets
 from tests.simulation.masters.socket_user import SocketUser
 from tests.simulation.masters.spelling import BITS, DISABLED_BY_BIT, ENABLE, read_pdu
 from tests.simulation.masters.tcp_master import BEATS_S, RESET, RUNS, Master
 from tests.simulation.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
-from tests.simulation.rigs import LEASE_S, draw_rig, store_plants
+from tests.simulation.rigs import LEASE_S, draw_badges, draw_rig, store_plants
 
 RUN_BIT, SELF_TEST = RUNS.values()
 PLANTS_EVERY = 8
@@ -69,7 +72,8 @@ class Simulation:
         )
         self._move_valve, self.world.valve.move = self.world.valve.move, self._judge_valve  # type: ignore[method-assign]
         lay_cables(self.outside, rig, self._on_output, self.world.on_cell_bytes, self._on_valve)
-        SimulatedDisk.is_full = SimulatedDisk.is_gone = SimulatedDisk.is_hung = False
+        SimulatedDisk.is_gone = SimulatedDisk.is_hung = False
+        SimulatedDisk.fails = ""
         SimulatedDisk.folder = folder
         SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(*DISK_S))
         if seed % PLANTS_EVERY == 0:
@@ -87,11 +91,20 @@ class Simulation:
             for place, name in enumerate(("worker", "rival", "fool", "villain", "healer"), start=1)
         }
         self.reader = Master("10.0.0.9", self.outside, lambda: self.service.inside, lambda *_: None)
-        self.integrator = Integrator("10.0.0.8", self.outside, lambda: self.service.inside, lambda *_: None)
+        self.sets = Sets()
+        self.integrators = {
+            name: Integrator(f"10.0.0.{place}", self.outside, lambda: self.service.inside, lambda *_: None)
+            for place, name in ((8, "integrator"), (7, "designer"))
+        }
+        for one in self.integrators.values():
+            one.sets = self.sets
+        self.integrator = self.integrators["integrator"]
         self.person = SocketUser(lambda: self.service.inside, self.service.answer_socket)
         self.person.on_write = lambda control: self._on_write(control, True)
-        self.person.on_model = self.integrator.expect_any
-        self.clients = (*self.masters.values(), self.reader, self.integrator)
+        self.person.on_model = self._expect_any_model
+        self.clients = (*self.masters.values(), self.reader, *self.integrators.values())
+        for name, badge in draw_badges(seed).items():
+            ({"reader": self.reader} | self.masters | self.integrators)[name].badge = badge
         if self.cell_s:
             self.outside.call_later(0.3 * self.cell_s, self._stream)
         self.outside.call_later(LOOK_S, self._look)
@@ -126,7 +139,7 @@ class Simulation:
             self.observer.fingerprint.hexdigest(),
             self.observer.settings,
             self.observer.largest_v,
-            self.integrator.committed,
+            sum(one.committed for one in self.integrators.values()),
         )
 
     def close(self) -> None:
@@ -151,6 +164,36 @@ class Simulation:
         self.world.fault({"do": "fault", "name": name, "on": on})
         if name == "cell-cut":
             self._judge_cell(is_cut=on)
+
+    def set_in_world(self, line: bytes) -> None:
+        """As the verb `sim` does: control is asked first, then the simulated rig."""
+        if self.service.is_serving:
+            self.person.say(line)
+            self._simulate(json.loads(line))
+
+    def _simulate(self, request: dict[str, Any]) -> None:
+        with suppress(ValueError):
+            self.world.simulate(request)
+        self._judge_cell(is_cut=self.world.settings.is_on("cell.silent"))
+
+    def lose_power(self, dark_s: float, power_on_v: float) -> None:
+        """The output device alone goes dark, and comes back as one that has just been switched on."""
+        self.world.advance(self.clock.now_s)
+        self.world._output = output_device(self.world._rig.output.device)
+        self._dark_until_s = self.clock.now_s + dark_s
+        self._set_output(0.0)
+        self.outside.call_later(dark_s, self._set_output, power_on_v)
+
+    _dark_until_s = 0.0
+
+    def _set_output(self, voltage_v: float) -> None:
+        self.world._setting_v = voltage_v
+        self.world.twin.command(voltage_v)
+
+    def _expect_any_model(self) -> None:
+        self.sets.expect_any()
+        for one in self.integrators.values():
+            one.forget()
 
     def _pull(self, line: str) -> None:
         CABLES[line].pull()
@@ -184,7 +227,8 @@ class Simulation:
             self._back_s = self._back_s or now_s
             if self.observer.settings > settings or now_s - self._back_s > FIRST_SETTING_S:
                 self.observer.output_lost_s, self._back_s = None, 0.0
-        self.world.on_output_bytes(chunk, now_s)
+        if now_s > self._dark_until_s:
+            self.world.on_output_bytes(chunk, now_s)
 
     _back_s = 0.0  # when a line that was lost has brought its first byte
 
@@ -218,10 +262,12 @@ class Simulation:
         if self.observer.control_lost_s is None:
             self.observer.control_lost_s = self.clock.now_s
 
+    cell_pace = 1.0
+
     def _stream(self) -> None:
         if CABLES["load_cell"].backlog_s < 0.01:
             self.world.stream(self.clock.now_s)
-        self.outside.call_later(self.cell_s or self.period_s, self._stream)
+        self.outside.call_later(self.cell_pace * (self.cell_s or self.period_s), self._stream)
 
     _was_watched = False
 

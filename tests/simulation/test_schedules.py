@@ -8,7 +8,8 @@ import os
 
 import pytest
 
-from tests.simulation.events import Event, draw_events
+from tests.simulation.event import Event
+from tests.simulation.events import draw_events
 from tests.simulation.schedule import Outcome, run_schedule
 from tests.simulation.shrinking import shrink
 

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.simulation.events import Event, draw_events
+from tests.simulation.event import Event
+from tests.simulation.events import draw_events
 from tests.simulation.kernel.edges import simulated_edges
 from tests.simulation.schedule import Simulation
 

@@ -16,7 +16,6 @@ from gateway.profiles.rigs.faces import RtuFace
 from tests.simulation.kernel.spoiled import Spoil, spoiled
 from tests.simulation.kernel.virtual_time import VirtualLoop
 
-
 MOST_QUEUED = 4096
 """Characters on one direction of a wire; a UART's driver drops what is more."""
 
@@ -41,6 +40,8 @@ class Cable:
         self.is_plugged = True
         self._spoils: deque[Spoil] = deque()
         self.strange_s = 0.0  # when something strange was said last
+        self.heard_s = 0.0  # when the host has got something last
+        self.reworded = (b"", b"")  # what the device says, and from now on says instead
         self._character_s = settings.character_s
         self._to_device, self._to_host = Direction(), Direction()
 
@@ -67,6 +68,8 @@ class Cable:
 
     def send_to_host(self, data: bytes) -> None:
         """Put a device's bytes on the wire, or what becomes of them."""
+        if self.reworded[0]:
+            data = data.replace(*self.reworded)
         if self._spoils and data:
             self._send_spoiled(data)
         elif self.is_plugged:
@@ -111,6 +114,7 @@ class Cable:
 
     def _reach_host(self, direction: Direction, data: bytes) -> None:
         if self.port and not direction.is_cut:
+            self.heard_s = self._outside.time()
             self.port.hear(data)
 
 

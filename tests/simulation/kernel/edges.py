@@ -32,10 +32,12 @@ _SUPERVISOR = "gateway.service.supervisor"
 class SimulatedDisk:
     """Stands for `DiskWorker`: one thing after the other, which takes as long as the chance of the schedule says. Half of the
     time it is done as it begins, else as it ends: where the process is killed in between it has happened, or not at all.
-    is_hung: nothing is done, until somebody lets it `go_on`. is_gone: the schedule is over."""
+    fails: how, of FailingDisk.KINDS, "": it does not. is_hung: nothing is done, until somebody lets it `go_on`. is_gone: the
+    schedule is over."""
 
     delay_s: Callable[[], float] = staticmethod(lambda: 0.005)
-    is_full = is_gone = is_hung = False
+    fails = ""
+    is_gone = is_hung = False
     folder = Path()
     hung: ClassVar[WeakSet["SimulatedDisk"]] = WeakSet()
 
@@ -91,7 +93,7 @@ class SimulatedDisk:
         if type(self).is_gone:
             return OSError(errno.EIO, os.strerror(errno.EIO))
         try:
-            with watching(FailingDisk(self.folder, "full", 0)) if type(self).is_full else nullcontext():
+            with watching(FailingDisk(self.folder, kind, 0)) if (kind := type(self).fails) else nullcontext():
                 return work()
         except Exception as error:
             return error

@@ -2,8 +2,10 @@
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
+from gateway.modbus import Peer, Role
 from tests.simulation.kernel.virtual_time import VirtualLoop
 
 DELAY_S = 0.0002
@@ -30,13 +32,31 @@ class MemoryListener:
         return
 
 
+@dataclass(frozen=True)
+class Caller:
+    """Who connects. name, role: of the certificate that a TLS face has checked, for which it stands here; "": a plain face."""
+
+    host: str
+    port: int
+    name: str = ""
+    role: str = ""
+
+    @property
+    def shown(self) -> dict[str, Any]:
+        """What the transport tells of the far end, as `TlsStream` does where there is a certificate."""
+        peername = {"peername": (self.host, self.port)}
+        if not self.name:
+            return peername
+        return peername | {"modbus_peer": Peer(self.host, self.port, self.name, Role[self.role.upper()])}
+
+
 class MemoryTransport(asyncio.Transport):
     """The server's end of one connection."""
 
     def __init__(
-        self, inside: VirtualLoop, outside: VirtualLoop, peer: tuple[str, int], hear: Callable[[bytes], None]
+        self, inside: VirtualLoop, outside: VirtualLoop, caller: "Caller", hear: Callable[[bytes], None]
     ) -> None:
-        super().__init__({"peername": peer})
+        super().__init__(caller.shown)
         self._inside, self._outside, self._hear = inside, outside, hear
         self._protocol: Any = None
         self._is_closing = self._is_paused = False
@@ -101,10 +121,10 @@ class Line:
     """A master's end of one connection. hear(b"") tells that the other end has closed."""
 
     def __init__(
-        self, inside: VirtualLoop, outside: VirtualLoop, peer: tuple[str, int], hear: Callable[[bytes], None]
+        self, inside: VirtualLoop, outside: VirtualLoop, caller: Caller, hear: Callable[[bytes], None]
     ) -> None:
         self._inside = inside
-        self._transport = MemoryTransport(inside, outside, peer, hear)
+        self._transport = MemoryTransport(inside, outside, caller, hear)
         (server,) = inside.servers.values()
         inside.call_soon(lambda: self._transport.attach(server.make()))
 

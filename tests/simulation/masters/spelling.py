@@ -105,6 +105,11 @@ WAYS: dict[str, Way] = {
 }
 
 
+def written_address(pdu: bytes) -> int:
+    """The first address that a write changes."""
+    return int.from_bytes(pdu[5:7] if pdu[0] == 23 else pdu[1:3])
+
+
 def control_of(pdu: bytes) -> int | None:
     """The control word that a write would set, None where it is not among what it writes; BITS where it changes single bits,
     DISABLED_BY_BIT where enable is cleared among them."""
