@@ -133,8 +133,10 @@ def _cell(chance: Random) -> Drawn:
 
 
 def _power(chance: Random) -> Drawn:
-    dark_s = chance.choice((0.01, 0.06, 0.3, 1.5)) * chance.uniform(0.5, 1.5)
-    return [(0.0, Event(0.0, "output", "power", (round(dark_s, 4), chance.choice((0.0, 0.0, 0.0, 1.5)))))]
+    """Most often it begins at 0 V; where it does not, it was away for longer than two polls: sooner nobody can notice."""
+    power_on_v = chance.choice((0.0, 0.0, 0.0, 1.5))
+    dark_s = chance.choice((0.3, 1.5) if power_on_v else (0.01, 0.06, 0.3, 1.5)) * chance.uniform(0.8, 1.5)
+    return [(0.0, Event(0.0, "output", "power", (round(dark_s, 4), power_on_v)))]
 
 
 def _recorded(chance: Random) -> Drawn:
