@@ -20,6 +20,7 @@ from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, heal
 from tests.simulation.kernel.cables import CABLES, lay_cables
 from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_edges
+from tests.simulation.kernel.network import DELAY_S
 from tests.simulation.kernel.processes import SimulatedService
 from tests.simulation.kernel.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 from tests.simulation.masters.bus_master import make_master
@@ -29,6 +30,7 @@ from tests.simulation.masters.spelling import BITS, DISABLED_BY_BIT, ENABLE, rea
 from tests.simulation.masters.tcp_master import BEATS_S, RESET, RUNS, Master
 from tests.simulation.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
 from tests.simulation.rigs import LEASE_S, draw_badges, draw_rig, store_plants
+from tests.simulation.status_witness import StatusWitness
 
 RUN_BIT, SELF_TEST = RUNS.values()
 PLANTS_EVERY = 8
@@ -78,6 +80,7 @@ class Simulation:
         SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(*DISK_S))
         if seed % PLANTS_EVERY == 0:
             store_plants(rig, folder)
+        self.status = StatusWitness(self.observer, lambda: CABLES["load_cell"].heard_s)
         self.service = SimulatedService(rig, folder, self.outside, self.log, self.clock)
         self.service.on_death = self._on_death
         self.masters = {
@@ -102,6 +105,8 @@ class Simulation:
         self.person = SocketUser(lambda: self.service.inside, self.service.answer_socket)
         self.person.on_write = lambda control: self._on_write(control, True)
         self.person.on_model = self._expect_any_model
+        for client in (*self.masters.values(), self.person):
+            client.on_setpoint = lambda pdu: self.status.note_write(pdu, self.clock.now_s)
         self.clients = (*self.masters.values(), self.reader, *self.integrators.values())
         for name, badge in draw_badges(seed).items():
             ({"reader": self.reader} | self.masters | self.integrators)[name].badge = badge
@@ -121,6 +126,7 @@ class Simulation:
             LEASE_S if supervision.lease_s and supervision.lease_action is not LeaseAction.HOLD else inf,
             self.period_s,
             DOWN_S if supervision.lease_action is LeaseAction.RAMP else 0.0,
+            supervision.output_timeout_s + rig.output.device.reply_timeout_s,
         )
 
     def run(self, events: Iterable[Event], duration_s: float) -> Outcome:
@@ -164,6 +170,7 @@ class Simulation:
         self.world.fault({"do": "fault", "name": name, "on": on})
         if name == "cell-cut":
             self._judge_cell(is_cut=on)
+        self._judge_answers()
 
     def set_in_world(self, line: bytes) -> None:
         """As the verb `sim` does: control is asked first, then the simulated rig."""
@@ -175,6 +182,13 @@ class Simulation:
         with suppress(ValueError):
             self.world.simulate(request)
         self._judge_cell(is_cut=self.world.settings.is_on("cell.silent"))
+        self._judge_answers()
+
+    def _judge_answers(self) -> None:
+        """The output device has stopped answering, or begins to answer again."""
+        is_silent = self.world.settings.is_on("output.silent") or self.clock.now_s < self._dark_until_s
+        lost_s = self.observer.answers_lost_s
+        self.observer.answers_lost_s = (self.clock.now_s if lost_s is None else lost_s) if is_silent else None
 
     def lose_power(self, dark_s: float, power_on_v: float) -> None:
         """The output device alone goes dark, and comes back as one that has just been switched on."""
@@ -182,9 +196,14 @@ class Simulation:
         self.world._output = output_device(self.world._rig.output.device)
         self._dark_until_s = self.clock.now_s + dark_s
         self._set_output(0.0)
-        self.outside.call_later(dark_s, self._set_output, power_on_v)
+        self._judge_answers()
+        self.outside.call_later(dark_s, self._return_power, power_on_v)
 
     _dark_until_s = 0.0
+
+    def _return_power(self, voltage_v: float) -> None:
+        self._set_output(voltage_v)
+        self._judge_answers()
 
     def _set_output(self, voltage_v: float) -> None:
         self.world._setting_v = voltage_v
@@ -284,22 +303,27 @@ class Simulation:
         lost_s, strange_s = self.observer.cell_lost_s, CABLES["load_cell"].strange_s
         if lost_s is not None and strange_s > lost_s:
             self.observer.cell_lost_s = strange_s
+        lost_s, strange_s = self.observer.answers_lost_s, CABLES["output"].strange_s
+        if lost_s is not None and strange_s > lost_s:
+            self.observer.answers_lost_s = strange_s
 
     def _look(self) -> None:
         is_watched = self.person.watched_s is not None
         if is_watched or self._was_watched:
             self._follow_person(is_watched)
-        if self.observer.cell_lost_s is not None:
+        if self.observer.cell_lost_s is not None or self.observer.answers_lost_s is not None:
             self._note_strange_words()
         if self.observer.control_lost_s is not None and self.service.is_serving:
             self.observer.control_lost_s = None
+        self.observer.cell_heard_s = CABLES["load_cell"].heard_s
         self.observer.look(self.clock.now_s)
         self.outside.call_later(LOOK_S, self._look)
 
     def _read_status(self) -> None:
         for at_s, pdu in self.reader.heard:
-            if pdu[0] == 3:
+            if pdu[0] == 3 and len(pdu) == 2 + 2 * STATUS_WORDS:
                 self.observer.note_status(pdu, at_s)
+                self.status.note(pdu[2:], at_s - DELAY_S)
         self.reader.heard.clear()
         self.reader.ask(read_pdu(STATUS_FIRST, STATUS_WORDS))
         self.outside.call_later(READ_S, self._read_status)

@@ -25,6 +25,8 @@ TWIN_STEP_S = 10e-3
 """The period of the fastest loop. At its own step of 1 ms the twin takes a third of the processor's time."""
 DISK_S = (0.001, 0.08)
 DONE_AT_ONCE_S = 0.04
+MOST_CAUSES = 200
+"""The lines of each are limited, so none may be named by what a client chooses."""
 _RIG = "gateway.service.running_rig.running_rig"
 _SUPERVISOR = "gateway.service.supervisor"
 
@@ -156,15 +158,20 @@ class SimulatedSafeLine:
 
 
 class Log:
-    """Stands for `EventLog`: keeps what was said last, and every internal error."""
+    """Stands for `EventLog`: keeps what was said last, every internal error, and whether there are too many
+    causes (I12)."""
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock
         self.lines: deque[tuple[float, str]] = deque(maxlen=1000)
         self.internal_errors: list[str] = []
+        self._causes: set[str] = set()
 
     def __call__(self, cause: str, sentence: str) -> None:
         self.lines.append((self._clock.now_s, sentence))
+        self._causes.add(cause)
+        if len(self._causes) == MOST_CAUSES + 1:
+            self.internal_errors.append(f"I12 at {self._clock.now_s:.4f}: one more cause, {cause}: {sentence}")
         if "A499" in sentence:
             self.internal_errors.append(f"internal: {sentence}")
 

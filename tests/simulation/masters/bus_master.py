@@ -86,8 +86,7 @@ class BusMaster(Master):
         self._queue.clear()
         if question is None:
             return
-        if question.pdu[0] in WRITES:
-            self._on_write(question.control, False)
+        self._tell(question, False)
         self._is_pausing = True
         self._outside.call_later(PAUSE_S, self._go_on)
 
@@ -115,7 +114,7 @@ class BusMaster(Master):
         self.heard.append((now_s, pdu))
         del self.heard[:-64]
         if pdu[0] in WRITES:
-            self._on_write(question.control, True)
+            self._tell(question, True)
         self._ask_next()
 
 

@@ -45,6 +45,7 @@ class Master:
     taken, or nobody will hear whether it was; complaints: broken answers. badge: name and role of its certificate."""
 
     badge: tuple[str, str] = ("", "")
+    on_setpoint: Callable[[bytes], None] = staticmethod(lambda pdu: None)
 
     def __init__(
         self,
@@ -95,8 +96,7 @@ class Master:
     def disconnect(self) -> None:
         if self._line:
             for asked in self._waiting:
-                if asked.pdu[0] in WRITES:
-                    self._on_write(asked.control, False)
+                self._tell(asked, False)
             self._line.close()
         self.lose()
 
@@ -237,8 +237,14 @@ class Master:
         del self.heard[:-64]
         if pdu[0] in WRITES:
             self._judge_role(asked.pdu)
-            self._on_write(asked.control, True)
+            self._tell(asked, True)
         self.note_answer(asked.pdu, pdu)
+
+    def _tell(self, asked: Asked, is_answered: bool) -> None:
+        """A write was taken, or nobody will hear whether it was."""
+        if asked.pdu[0] in WRITES:
+            self.on_setpoint(asked.pdu)
+            self._on_write(asked.control, is_answered)
 
     def _judge_role(self, asked: bytes) -> None:
         """What its certificate does not let it write must not be taken (I7)."""
