@@ -20,7 +20,7 @@ from tests.simulation.masters.spelling import (
     write_one_pdu,
     write_pdu,
 )
-from tests.simulation.rare_events import draw_rare_events
+from tests.simulation.rare_events import LADDER_S, draw_ladder, draw_rare_events
 
 FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "cell-frozen", "output-cut")
 VALVE_FAULTS = ("valve-cut", "valve-stuck")
@@ -53,7 +53,10 @@ SAID = {
 
 def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
     """What happens, in its order: a little more than two events a second, and what is rare (rare_events.py)."""
-    return merge(_draw_usual(seed, duration_s), draw_rare_events(seed, duration_s), key=attrgetter("at_s"))
+    usual = merge(_draw_usual(seed, duration_s), draw_rare_events(seed, duration_s), key=attrgetter("at_s"))
+    ladder = tuple(draw_ladder(seed))
+    quiet_s = LADDER_S if ladder else 0.0  # nearly everything else would end it
+    return merge(ladder, (event for event in usual if event.at_s >= quiet_s), key=attrgetter("at_s"))
 
 
 def _draw_usual(seed: int, duration_s: float) -> Iterator[Event]:

@@ -13,6 +13,8 @@ from typing import Any
 from tests.simulation.event import Event
 
 EVERY_S = 8.0
+LADDER_SHARE, LADDER_S = 0.04, 14.0
+"""Of the schedules, and until when nothing else happens in these."""
 SWITCHES = (
     "cell.silent",
     "cell.frozen",
@@ -49,6 +51,23 @@ UNITS = (b" N", b" t", b"lb", b" g", b"kg")
 PAUSES_S = (0.0003, 0.0012, 0.003, 0.012, 0.03, 0.2, 1.0, 6.0)
 """Shorter and longer than 1.5 and 3.5 characters of a bus, than a lease, and than half a frame is waited for."""
 DISKS = ("disk_full", "disk_broken", "disk_read_only", "disk_stumbles", "disk_hung")
+
+
+def draw_ladder(seed: int) -> Iterator[Event]:
+    """In few schedules a person lets a short ladder climb to its end, whose fit somebody then takes into use."""
+    chance = Random(f"ladder {seed}")
+    if chance.random() > LADDER_SHARE:
+        return
+    plan = {"v_max_v": 1.5, "step_v": 0.5, "groups": 1, "minor_points": 0, "response_steps": 0}
+    yield _say(0.2, do="calibrate", plan=plan, name="60")
+    if chance.random() < 0.2:
+        yield Event(round(chance.uniform(1.0, LADDER_S), 4), "machine", chance.choice(DISKS), (0.0, 0.0))
+    for at_s in sorted(round(chance.uniform(LADDER_S - 2.0, 24.0), 4) for _ in range(4)):
+        yield _say(at_s, do="calibration", use=chance.randrange(1, 3), force=chance.random() < 0.3)
+
+
+def _say(at_s: float, **fields: Any) -> Event:
+    return Event(at_s, "person", "say", data=json.dumps(fields).encode())
 
 
 def draw_rare_events(seed: int, duration_s: float) -> Iterator[Event]:
@@ -153,7 +172,7 @@ def _recorded(chance: Random) -> Drawn:
 
 
 def _record(*, on: bool) -> Event:
-    return Event(0.0, "person", "say", data=json.dumps({"do": "record", "on": on}).encode())
+    return _say(0.0, do="record", on=on)
 
 
 KINDS = (_split, _split, _burst, _uploads, _simulate, _simulate, _cell, _power, _recorded)

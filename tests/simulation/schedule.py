@@ -20,6 +20,7 @@ from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, heal
 from tests.simulation.kernel.cables import CABLES, lay_cables
 from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_edges
+from tests.simulation.kernel.fits import SimulatedFit
 from tests.simulation.kernel.network import DELAY_S
 from tests.simulation.kernel.processes import SimulatedService
 from tests.simulation.kernel.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
@@ -80,6 +81,12 @@ class Simulation:
         SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(*DISK_S))
         if seed % PLANTS_EVERY == 0:
             store_plants(rig, folder)
+        SimulatedFit.outside, SimulatedFit.chance, SimulatedFit.built_in = (
+            self.outside,
+            Random(f"fit {seed}"),
+            rig.calibration,
+        )
+        SimulatedFit.on_stored, SimulatedFit.ended = staticmethod(lambda mark: self.sets.expect_mark(mark)), []
         self.status = StatusWitness(self.observer, lambda: CABLES["load_cell"].heard_s)
         self.service = SimulatedService(rig, folder, self.outside, self.log, self.clock)
         self.service.on_death = self._on_death
@@ -347,7 +354,7 @@ class Simulation:
 def run_schedule(seed: int, events: Sequence[Event], duration_s: float) -> Outcome:
     """Run one schedule by itself, in a directory of its own."""
     base: Any = "/dev/shm" if Path("/dev/shm").is_dir() else None
-    with tempfile.TemporaryDirectory(dir=base) as folder, simulated_edges():
+    with tempfile.TemporaryDirectory(dir=base) as folder, simulated_edges(SimulatedFit):
         simulation = Simulation(seed, Path(folder))
         with simulation.clock.as_the_kernels():
             try:

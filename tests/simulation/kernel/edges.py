@@ -91,12 +91,17 @@ class SimulatedDisk:
             if is_wanted:
                 self._results.append(result)
 
+    @classmethod
+    def do(cls, work: Callable[[], Any]) -> Any:
+        """Do this now, as the disk is."""
+        with watching(FailingDisk(cls.folder, cls.fails, 0)) if cls.fails else nullcontext():
+            return work()
+
     def _result(self, work: Callable[[], Any]) -> Any:
         if type(self).is_gone:
             return OSError(errno.EIO, os.strerror(errno.EIO))
         try:
-            with watching(FailingDisk(self.folder, kind, 0)) if (kind := type(self).fails) else nullcontext():
-                return work()
+            return self.do(work)
         except Exception as error:
             return error
 
@@ -217,13 +222,9 @@ class NotedRecorder(Recorder):
             cls.of.pop()._release()
 
 
-def _no_fit(*_: Any) -> None:
-    raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
-
-
 @contextmanager
-def simulated_edges() -> Any:
-    """Everything that reaches for the kernel, replaced."""
+def simulated_edges(fit: type) -> Any:
+    """Everything that reaches for the kernel, replaced. fit: what stands for `FitLauncher`."""
     with pytest.MonkeyPatch.context() as patch:
         for maker in ("calibration_runs", "recordings"):
             patch.setattr(f"gateway.service.running_rig.{maker}.Recorder", NotedRecorder)
@@ -236,7 +237,7 @@ def simulated_edges() -> Any:
         NotedRunningRig.of.clear()
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
         patch.setattr(f"{_RIG}.explain_silent_device", _explain)
-        patch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", _no_fit)
+        patch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", fit)
         for user in (
             "gateway.calibrations.upload",
             "gateway.service.running_rig.rig_plants",

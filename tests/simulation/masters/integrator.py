@@ -61,6 +61,11 @@ class Sets:
         """Nobody knows now how it went."""
         self._under_way.pop(who, None)
 
+    def expect_mark(self, mark: int) -> None:
+        """A set with this mark is stored, so that somebody may take it into use."""
+        if self.first is not None:
+            self.known.add(with_mark(self.first, mark))
+
     def expect_any(self) -> None:
         """Somebody takes one of the sets that there are into use."""
         self.allowed = set(self.known)
