@@ -113,7 +113,7 @@ class Simulation:
         self.person.on_write = lambda control: self._on_write(control, True)
         self.person.on_model = self._expect_any_model
         for client in (*self.masters.values(), self.person):
-            client.on_setpoint = lambda pdu: self.status.note_write(pdu, self.clock.now_s)
+            client.on_setpoint = lambda pdu, who=client.name: self.status.note_write(who, pdu, self.clock.now_s)
         self.clients = (*self.masters.values(), self.reader, *self.integrators.values())
         for name, badge in draw_badges(seed).items():
             ({"reader": self.reader} | self.masters | self.integrators)[name].badge = badge

@@ -1,14 +1,17 @@
 """Whether what the status registers say is true (I10), asked of the wires themselves, and whether the force that is requested
-is one that a master has written whole (I7). No code of the gateway is used here."""
+is one that a master has written whole (I7), by whoever owns it (I4). No code of the gateway is used here."""
 
 import struct
 from collections import deque
 from collections.abc import Callable
+from ipaddress import ip_address
 
-from tests.simulation.masters.spelling import setpoints_of
+from tests.simulation.masters.spelling import control_of, setpoints_of
 from tests.simulation.observer import FAULT, STATUS_WORDS, Observer
 
 UNAVAILABLE = 0x8000
+LARGEST_PLACE, TAKE, MARGIN_S = 255, 8, 0.005
+"""Of serial faces, which are shown as an owner, too; who takes over; how late an answer tells of its write."""
 FAULT_BIT, ENABLED_BIT = 16, 1
 AGE_SLACK_S = 0.012
 """And two periods: a tick that finds a fresh sample decides nothing, and the age is that of the last decision."""
@@ -25,6 +28,7 @@ class StatusWitness:
     def __init__(self, observer: Observer, heard_s: Callable[[], float]) -> None:
         self._observer, self._heard_s = observer, heard_s
         self._last_s, self._known = 0.0, 0
+        self._owner, self._commands = 0, list[tuple[float, str, int]]()
         self._requested: deque[tuple[float, int]] = deque()
         self._written: deque[tuple[float, float]] = deque()
 
@@ -34,13 +38,16 @@ class StatusWitness:
         self._judge_state(words, at_s)
         self._judge_age(words[12], at_s)
         self._judge_voltage(words[6], at_s)
+        self._judge_owner(words[16] << 16 | words[17], at_s)
         self._requested.append((at_s, words[3]))
         if len(self._requested) > LATE_LOOKS:
             self._judge_requested()
         self._last_s = at_s
 
-    def note_write(self, pdu: bytes, now_s: float) -> None:
+    def note_write(self, host: str, pdu: bytes, now_s: float) -> None:
         """A write was taken, or nobody knows whether it was."""
+        if (control := control_of(pdu)) is not None:
+            self._commands.append((now_s, host, control))
         self._written += ((now_s, counts) for counts in setpoints_of(pdu))
 
     def _judge_requested(self) -> None:
@@ -53,6 +60,18 @@ class StatusWitness:
         if not is_known:
             self._observer.complain("I7", f"{0.01 * signed:.2f} N are requested, which nobody has written", at_s)
         self._known = counts
+
+    def _judge_owner(self, owner: int, at_s: float) -> None:
+        """Where one owns the setpoint before and after, and nobody has taken over or let go between, nobody else enables."""
+        commands, self._commands = self._commands, []
+        was, self._owner = self._owner, owner
+        if not was == owner > LARGEST_PLACE or any(
+            control & TAKE or not control & ENABLED_BIT for _, _, control in commands
+        ):
+            return
+        for command_s, host, control in commands:
+            if "." in host and int(ip_address(host)) != owner and self._last_s + MARGIN_S < command_s < at_s - MARGIN_S:
+                self._observer.complain("I4", f"{host} commands {control:#x}, owner is {ip_address(owner)}", at_s)
 
     def _judge_state(self, words: tuple[int, ...], at_s: float) -> None:
         if bool(words[0] & FAULT_BIT) != (words[1] == FAULT):

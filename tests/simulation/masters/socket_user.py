@@ -25,6 +25,7 @@ class SocketUser:
     complaints: broken answers. watched_s: when a run of this person's was looked at last, None where there is none."""
 
     watched_s: float | None = None
+    name = "person"
 
     def __init__(
         self, inside: Callable[[], VirtualLoop | None], answer: Callable[[bytes], bytes | Future[bytes]]
