@@ -63,7 +63,8 @@ class StatusWitness:
 
     def _judge_owner(self, owner: int, at_s: float) -> None:
         """Where one owns the setpoint before and after, and nobody has taken over or let go between, nobody else enables."""
-        commands, self._commands = self._commands, []
+        commands = [one for one in self._commands if one[0] <= at_s]
+        self._commands = self._commands[len(commands) :]
         was, self._owner = self._owner, owner
         if not was == owner > LARGEST_PLACE or any(
             control & TAKE or not control & ENABLED_BIT for _, _, control in commands
