@@ -30,9 +30,10 @@ def happen(simulation: "Simulation", event: Event) -> None:
     elif event.whom == "person":
         simulation.person.say(event.data)
     elif event.whom == "world" and event.what == "sim":
-        simulation.set_in_world(event.data)
+        if simulation.service.is_serving:
+            simulation.around.set_as_asked(event.data, simulation.person.say)
     elif event.whom == "world":
-        simulation._set_fault(event.what, on=bool(event.numbers[0]))
+        simulation.around.set_fault(event.what, on=bool(event.numbers[0]))
     elif event.whom == "machine":
         _shake(simulation, event)
     else:
@@ -89,15 +90,15 @@ def _touch_line(simulation: "Simulation", event: Event) -> None:
     if event.whom not in CABLES:
         return  # a rig without a valve
     if event.what == "pull":
-        simulation._pull(event.whom)
+        simulation.around.pull(event.whom)
     elif event.what == "push":
-        simulation._push(event.whom)
+        simulation.around.push(event.whom)
     elif event.what == "say":
         CABLES[event.whom].say(event.data)
     elif event.what == "power":
-        simulation.lose_power(*event.numbers)
+        simulation.around.lose_power(*event.numbers)
     elif event.what == "pace":
-        simulation.cell_pace = event.numbers[0]
+        simulation.around.cell_pace = event.numbers[0]
     elif event.what == "unit":
         CABLES[event.whom].reworded = (b"kg", event.data)
     else:

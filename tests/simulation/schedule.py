@@ -1,10 +1,8 @@
 """One schedule: what masters, people and fate do to a gateway (events.py), run in virtual time and judged."""
 
-import json
 import struct
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, nan
 from pathlib import Path
@@ -12,13 +10,11 @@ from random import Random
 from typing import Any
 
 from gateway.control import LeaseAction
-from gateway.devices import output_device
 from gateway.profiles import Rig
-from gateway.service.simulation.world import SimulatedRig
 from tests.simulation.event import Event
 from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, heal
-from tests.simulation.kernel.cables import CABLES, lay_cables
+from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_edges
 from tests.simulation.kernel.fits import SimulatedFit
 from tests.simulation.kernel.network import DELAY_S
@@ -32,12 +28,11 @@ from tests.simulation.masters.tcp_master import BEATS_S, RESET, RUNS, Master
 from tests.simulation.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
 from tests.simulation.rigs import LEASE_S, draw_badges, draw_rig, store_plants
 from tests.simulation.status_witness import StatusWitness
+from tests.simulation.surroundings import Surroundings
 
 RUN_BIT, SELF_TEST = RUNS.values()
 PLANTS_EVERY = 8
 """Of so many rigs one has numbered plants stored, which somebody may take into use."""
-FIRST_SETTING_S = 0.3
-"""On a line that is back: a watchdog is fed before the safe voltage goes out."""
 LOOK_S = 0.02
 READ_S = 0.1
 
@@ -61,20 +56,13 @@ class Simulation:
     def __init__(self, seed: int, folder: Path) -> None:
         drawn = draw_rig(seed)
         rig = drawn.rig
-        self.period_s, self.cell_s = 1.0 / rig.loop_hz, drawn.cell_s
+        self.period_s = 1.0 / rig.loop_hz
         self.clock, self.chance = VirtualClock(), Random(~seed)
         self.observer = drawn.observer(self._bounds_of(rig))
         self.outside = VirtualLoop(self.clock)
         self.outside.set_exception_handler(self._on_error)
         self.log = Log(self.clock)
-        self.world = SimulatedRig(
-            rig,
-            send_output=lambda data: CABLES["output"].send_to_host(data),
-            send_cell=lambda data: CABLES["load_cell"].send_to_host(data),
-            now_s=self.clock.now_s,
-        )
-        self._move_valve, self.world.valve.move = self.world.valve.move, self._judge_valve  # type: ignore[method-assign]
-        lay_cables(self.outside, rig, self._on_output, self.world.on_cell_bytes, self._on_valve)
+        self.around = Surroundings(rig, self.outside, self.observer, drawn.cell_s)
         SimulatedDisk.is_gone = SimulatedDisk.is_hung = False
         SimulatedDisk.fails = ""
         SimulatedDisk.folder = folder
@@ -117,8 +105,6 @@ class Simulation:
         self.clients = (*self.masters.values(), self.reader, *self.integrators.values())
         for name, badge in draw_badges(seed).items():
             ({"reader": self.reader} | self.masters | self.integrators)[name].badge = badge
-        if self.cell_s:
-            self.outside.call_later(0.3 * self.cell_s, self._stream)
         self.outside.call_later(LOOK_S, self._look)
         self.outside.call_later(READ_S, self._read_status)
         self.outside.call_later(READ_S, self.integrator.watch)
@@ -173,99 +159,12 @@ class Simulation:
         happen(self, event)
         self._happen_next(events)
 
-    def _set_fault(self, name: str, *, on: bool) -> None:
-        self.world.fault({"do": "fault", "name": name, "on": on})
-        if name == "cell-cut":
-            self._judge_cell(is_cut=on)
-        self._judge_answers()
-
-    def set_in_world(self, line: bytes) -> None:
-        """As the verb `sim` does: control is asked first, then the simulated rig."""
-        if self.service.is_serving:
-            self.person.say(line)
-            self._simulate(json.loads(line))
-
-    def _simulate(self, request: dict[str, Any]) -> None:
-        with suppress(ValueError):
-            self.world.simulate(request)
-        self._judge_cell(is_cut=self.world.settings.is_on("cell.silent"))
-        self._judge_answers()
-
-    def _judge_answers(self) -> None:
-        """The output device has stopped answering, or begins to answer again."""
-        is_silent = self.world.settings.is_on("output.silent") or self.clock.now_s < self._dark_until_s
-        lost_s = self.observer.answers_lost_s
-        self.observer.answers_lost_s = (self.clock.now_s if lost_s is None else lost_s) if is_silent else None
-
-    def lose_power(self, dark_s: float, power_on_v: float) -> None:
-        """The output device alone goes dark, and comes back as one that has just been switched on."""
-        self.world.advance(self.clock.now_s)
-        self.world._output = output_device(self.world._rig.output.device)
-        self._dark_until_s = self.clock.now_s + dark_s
-        self._set_output(0.0)
-        self._judge_answers()
-        self.outside.call_later(dark_s, self._return_power, power_on_v)
-
-    _dark_until_s = 0.0
-
-    def _return_power(self, voltage_v: float) -> None:
-        self._set_output(voltage_v)
-        self._judge_answers()
-
-    def _set_output(self, voltage_v: float) -> None:
-        self.world._setting_v = voltage_v
-        self.world.twin.command(voltage_v)
-
     def _expect_any_model(self) -> None:
         self.sets.expect_any()
         for one in self.integrators.values():
             one.forget()
 
-    def _pull(self, line: str) -> None:
-        CABLES[line].pull()
-        if line == "valve":
-            return
-        if line == "output":
-            self.observer.note_cut(self.clock.now_s)
-            self.observer.output_lost_s, self._back_s = self.clock.now_s, 0.0
-        else:
-            self._judge_cell(is_cut=None)
-
-    def _push(self, line: str) -> None:
-        CABLES[line].push()
-        if line == "load_cell":
-            self._judge_cell(is_cut=None)
-
-    _is_cell_cut = False
-
-    def _judge_cell(self, *, is_cut: bool | None) -> None:
-        self._is_cell_cut = self._is_cell_cut if is_cut is None else is_cut
-        is_heard = not self._is_cell_cut and CABLES["load_cell"].is_plugged
-        lost_s = self.observer.cell_lost_s
-        self.observer.cell_lost_s = None if is_heard else self.clock.now_s if lost_s is None else lost_s
-
     # -- what goes on
-
-    def _on_output(self, chunk: bytes, now_s: float) -> None:
-        settings = self.observer.settings
-        self.observer.hear(chunk, now_s)
-        if self.observer.output_lost_s is not None:
-            self._back_s = self._back_s or now_s
-            if self.observer.settings > settings or now_s - self._back_s > FIRST_SETTING_S:
-                self.observer.output_lost_s, self._back_s = None, 0.0
-        if now_s > self._dark_until_s:
-            self.world.on_output_bytes(chunk, now_s)
-
-    _back_s = 0.0  # when a line that was lost has brought its first byte
-
-    def _on_valve(self, chunk: bytes, now_s: float) -> None:
-        CABLES["valve"].send_to_host(self.world.on_valve_bytes(chunk, now_s))
-
-    def _judge_valve(self, now_s: float) -> bool:
-        """The valve is moved without pressure, whatever its relay was told and when."""
-        if (has_moved := self._move_valve(now_s)) and self.observer.voltage_v > 0.0:
-            self.observer.broken.append(f"valve at {now_s:.4f}: it moves under {self.observer.voltage_v:.3f} V")
-        return has_moved
 
     def _on_write(self, control: int | None, is_answered: bool) -> None:
         if control == DISABLED_BY_BIT:  # which ends no run; a reset may be among the other bits
@@ -288,13 +187,6 @@ class Simulation:
         if self.observer.control_lost_s is None:
             self.observer.control_lost_s = self.clock.now_s
 
-    cell_pace = 1.0
-
-    def _stream(self) -> None:
-        if CABLES["load_cell"].backlog_s < 0.01:
-            self.world.stream(self.clock.now_s)
-        self.outside.call_later(self.cell_pace * (self.cell_s or self.period_s), self._stream)
-
     _was_watched = False
 
     def _follow_person(self, is_watched: bool) -> None:
@@ -305,24 +197,13 @@ class Simulation:
             self.observer.note_accepted(0, self.clock.now_s)
         self._was_watched = is_watched
 
-    def _note_strange_words(self) -> None:
-        """A sentence that fits is a sample, whoever says it: the cell is lost from then on."""
-        lost_s, strange_s = self.observer.cell_lost_s, CABLES["load_cell"].strange_s
-        if lost_s is not None and strange_s > lost_s:
-            self.observer.cell_lost_s = strange_s
-        lost_s, strange_s = self.observer.answers_lost_s, CABLES["output"].strange_s
-        if lost_s is not None and strange_s > lost_s:
-            self.observer.answers_lost_s = strange_s
-
     def _look(self) -> None:
         is_watched = self.person.watched_s is not None
         if is_watched or self._was_watched:
             self._follow_person(is_watched)
-        if self.observer.cell_lost_s is not None or self.observer.answers_lost_s is not None:
-            self._note_strange_words()
         if self.observer.control_lost_s is not None and self.service.is_serving:
             self.observer.control_lost_s = None
-        self.observer.cell_heard_s = CABLES["load_cell"].heard_s
+        self.around.look()
         self.observer.look(self.clock.now_s)
         self.outside.call_later(LOOK_S, self._look)
 

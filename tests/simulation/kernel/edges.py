@@ -222,8 +222,12 @@ class NotedRecorder(Recorder):
             cls.of.pop()._release()
 
 
+def _no_fit(*_: Any) -> None:
+    raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+
+
 @contextmanager
-def simulated_edges(fit: type) -> Any:
+def simulated_edges(fit: Any = _no_fit) -> Any:
     """Everything that reaches for the kernel, replaced. fit: what stands for `FitLauncher`."""
     with pytest.MonkeyPatch.context() as patch:
         for maker in ("calibration_runs", "recordings"):
