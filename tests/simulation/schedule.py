@@ -33,6 +33,8 @@ from tests.simulation.surroundings import Surroundings
 RUN_BIT, SELF_TEST = RUNS.values()
 PLANTS_EVERY = 8
 """Of so many rigs one has numbered plants stored, which somebody may take into use."""
+POLL_S = 0.1
+"""Until an output device is asked something where nothing changes."""
 LOOK_S = 0.02
 READ_S = 0.1
 
@@ -119,7 +121,7 @@ class Simulation:
             LEASE_S if supervision.lease_s and supervision.lease_action is not LeaseAction.HOLD else inf,
             self.period_s,
             DOWN_S if supervision.lease_action is LeaseAction.RAMP else 0.0,
-            supervision.output_timeout_s + rig.output.device.reply_timeout_s,
+            supervision.output_timeout_s + rig.output.device.reply_timeout_s + POLL_S,
         )
 
     def run(self, events: Iterable[Event], duration_s: float) -> Outcome:
