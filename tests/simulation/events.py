@@ -4,9 +4,11 @@ machine. Each event is whole by itself, so that any of them can be left out.
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from heapq import merge
+from operator import attrgetter
 from random import Random
 
+from tests.simulation.event import Event
 from tests.simulation.kernel.spoiled import KINDS
 from tests.simulation.masters.socket_lines import draw_line
 from tests.simulation.masters.spelling import (
@@ -18,6 +20,7 @@ from tests.simulation.masters.spelling import (
     write_one_pdu,
     write_pdu,
 )
+from tests.simulation.rare_events import LADDER_S, draw_ladder, draw_rare_events
 
 FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "cell-frozen", "output-cut")
 VALVE_FAULTS = ("valve-cut", "valve-stuck")
@@ -48,20 +51,15 @@ SAID = {
 """What a device may say at another time, or another device at its place."""
 
 
-@dataclass(frozen=True)
-class Event:
-    """At at_s after READY, `what` happens to `whom`, with these numbers. way: how a master spells it (spelling.py)."""
-
-    at_s: float
-    whom: str
-    what: str
-    numbers: tuple[float, ...] = ()
-    data: bytes = b""
-    way: str = "block"
-
-
 def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
-    """What happens, in its order: a little more than two events a second."""
+    """What happens, in its order: a little more than two events a second, and what is rare (rare_events.py)."""
+    usual = merge(_draw_usual(seed, duration_s), draw_rare_events(seed, duration_s), key=attrgetter("at_s"))
+    ladder = tuple(draw_ladder(seed))
+    quiet_s = LADDER_S if ladder else 0.0  # nearly everything else would end it
+    return merge(ladder, (event for event in usual if event.at_s >= quiet_s), key=attrgetter("at_s"))
+
+
+def _draw_usual(seed: int, duration_s: float) -> Iterator[Event]:
     chance, at_s = Random(seed), 0.0
     while (at_s := at_s + chance.expovariate(2.4)) < duration_s:
         event = _draw_one(chance, round(at_s, 4))

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from tests.simulation.events import Event
+from tests.simulation.event import Event
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import SimulatedDisk
 from tests.simulation.kernel.spoiled import Spoil
@@ -12,18 +12,28 @@ from tests.simulation.masters.tcp_master import PULL, RUNS, TAKE, Master
 if TYPE_CHECKING:
     from tests.simulation.schedule import Simulation
 
+DISKS = {
+    "disk_free": "",
+    "disk_full": "full",
+    "disk_broken": "broken",
+    "disk_read_only": "read-only",
+    "disk_stumbles": "once",
+}
 COMMANDS = {"hold": ENABLE, "take": ENABLE | TAKE, "pull": ENABLE | PULL}
 
 
 def happen(simulation: "Simulation", event: Event) -> None:
     if event.whom in simulation.masters:
         _command(simulation.masters[event.whom], event)
-    elif event.whom == "integrator":
-        simulation.integrator.upload()
+    elif event.whom in simulation.integrators:
+        simulation.integrators[event.whom].upload(*event.numbers)
     elif event.whom == "person":
         simulation.person.say(event.data)
+    elif event.whom == "world" and event.what == "sim":
+        if simulation.service.is_serving:
+            simulation.around.set_as_asked(event.data, simulation.person.say)
     elif event.whom == "world":
-        simulation._set_fault(event.what, on=bool(event.numbers[0]))
+        simulation.around.set_fault(event.what, on=bool(event.numbers[0]))
     elif event.whom == "machine":
         _shake(simulation, event)
     else:
@@ -45,7 +55,7 @@ def _command(master: Master, event: Event) -> None:
     elif event.data:
         getattr(master, event.what)(event.data)
     else:
-        getattr(master, event.what)()
+        getattr(master, event.what)(*event.numbers)
 
 
 def _shake(simulation: "Simulation", event: Event) -> None:
@@ -63,8 +73,8 @@ def _shake(simulation: "Simulation", event: Event) -> None:
         simulation.clock.jump_s += event.numbers[1]
     elif event.what == "disk_hung":
         SimulatedDisk.is_hung = True
-    else:
-        SimulatedDisk.is_full = event.what == "disk_full"
+    elif event.what in DISKS:
+        SimulatedDisk.fails = DISKS[event.what]
         SimulatedDisk.go_on()
 
 
@@ -80,11 +90,17 @@ def _touch_line(simulation: "Simulation", event: Event) -> None:
     if event.whom not in CABLES:
         return  # a rig without a valve
     if event.what == "pull":
-        simulation._pull(event.whom)
+        simulation.around.pull(event.whom)
     elif event.what == "push":
-        simulation._push(event.whom)
+        simulation.around.push(event.whom)
     elif event.what == "say":
         CABLES[event.whom].say(event.data)
+    elif event.what == "power":
+        simulation.around.lose_power(*event.numbers)
+    elif event.what == "pace":
+        simulation.around.cell_pace = event.numbers[0]
+    elif event.what == "unit":
+        CABLES[event.whom].reworded = (b"kg", event.data)
     else:
         count, number = event.numbers
         CABLES[event.whom].spoil(Spoil(event.what, int(count), number, event.data))

@@ -48,11 +48,14 @@ def heal(simulation: "Simulation") -> None:
 
 def _repair(simulation: "Simulation") -> None:
     for name in (*FAULTS, *VALVE_FAULTS):
-        simulation._set_fault(name, on=False)
+        simulation.around.set_fault(name, on=False)
+    simulation.around.simulate({"do": "sim", "clear_all": True})
+    simulation.around.cell_pace = 1.0
+    CABLES["load_cell"].reworded = (b"", b"")
     for line, cable in CABLES.items():
-        simulation._push(line)
+        simulation.around.push(line)
         cable.spoil()
-    SimulatedDisk.is_full = False
+    SimulatedDisk.fails = ""
     SimulatedDisk.go_on()
     for master in simulation.masters.values():
         master.fall_silent()

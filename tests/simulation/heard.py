@@ -58,7 +58,7 @@ class LineObserver(Observer):
             elif (
                 not re.fullmatch(before + rb"(?:" + self.sentences.others + rb")", line, re.DOTALL) and not self._is_cut
             ):
-                self._complain("I7", f"{line!r} is no sentence", now_s)
+                self.complain("I7", f"{line!r} is no sentence", now_s)
             self._is_cut = False
 
 
@@ -72,7 +72,7 @@ class RtuObserver(Observer):
             frame = self._line[:8]
             if crc16(frame[:6]) != int.from_bytes(frame[6:], "little") or frame[0] != 1 or frame[1] not in (3, 6):
                 if not self._is_cut:
-                    self._complain("I7", f"{self._line.hex()} is no request", now_s)
+                    self.complain("I7", f"{self._line.hex()} is no request", now_s)
                 self._line, self._is_cut = self._line[1:], True
                 continue
             self._line, self._is_cut = self._line[8:], False

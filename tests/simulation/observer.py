@@ -1,8 +1,10 @@
 """An observer beside the gateway, which shares no code with it: it hears the bytes on the output's wire, knows what was done to
 the world, and reads the status registers as any master could. What it finds broken is a line of `broken`.
 
-I1 range, I2 slew, I3 the safe voltage in time after the loss of cell, master or control, I4 none without an enable, I5 faults
-latch, I6 the safe voltage first, I7 whole sentences, I11 one first cause; I8 is told by the masters, I13 by the schedule.
+I1 range, I2 slew, I3 the safe voltage in time after the loss of cell, output, master or control, I4 none without an enable, I5
+faults latch, I6 the safe voltage first, I7 whole sentences, I11 one first cause. What registers say besides is judged by
+status_witness.py (I7, I10), I8 and roles (I7) by the masters, I9 by the integrator, I12 by the log and the soak, I13 by the
+schedule.
 """
 
 import re
@@ -14,7 +16,7 @@ from typing import Any
 
 COUNT_V = 10.0 / 1023
 FAULT = 4
-STATUS_FIRST, STATUS_WORDS = 100, 11
+STATUS_FIRST, STATUS_WORDS = 100, 18
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,7 @@ class Bounds:
     lease_s: float
     period_s: float
     lost_down_s: float = 0.0
+    output_timeout_s: float = inf
 
 
 ENABLE, RESET, RUN_BITS = 1, 2, 32 | 64
@@ -48,6 +51,8 @@ class Observer:
     largest_v: float = 0.0
     fingerprint: Any = field(default_factory=sha256)
     cell_lost_s: float | None = None
+    cell_heard_s: float = 0.0
+    answers_lost_s: float | None = None
     output_lost_s: float | None = None
     control_lost_s: float | None = None
     write_s: float = 0.0
@@ -71,7 +76,7 @@ class Observer:
             if found := re.fullmatch(rb"(.*)SET (\d+)", line) if self._is_cut else re.fullmatch(rb"()SET (\d+)", line):
                 self._note_setting(int(found[2]) * COUNT_V, now_s)
             elif line != b"MON" and not self._is_cut:
-                self._complain("I7", f"{line!r} is no sentence", now_s)
+                self.complain("I7", f"{line!r} is no sentence", now_s)
             self._is_cut = False
 
     def note_cut(self, until_s: float) -> None:
@@ -82,17 +87,17 @@ class Observer:
 
     def _note_setting(self, voltage_v: float, now_s: float) -> None:
         if not -1e-9 <= voltage_v <= self.bounds.voltage_max_v + COUNT_V:
-            self._complain("I1", f"{voltage_v:.3f} V", now_s)
+            self.complain("I1", f"{voltage_v:.3f} V", now_s)
         if self._must_be_safe and now_s > self._begun_s:
             if voltage_v > 0.0:
-                self._complain("I6", f"{voltage_v:.3f} V comes first", now_s)
+                self.complain("I6", f"{voltage_v:.3f} V comes first", now_s)
             self._must_be_safe = False
         before_s, before_v = self.setting_s, self.voltage_v
         if before_v <= 0.0 < voltage_v:
             self._pressing_s = now_s
         allowed_v = self.bounds.slew_v_per_s * (now_s - before_s + 0.02) + COUNT_V
         if self.settings and voltage_v - before_v > allowed_v + 1e-9:
-            self._complain("I2", f"{before_v:.3f} -> {voltage_v:.3f} V in {now_s - before_s:.4f} s", now_s)
+            self.complain("I2", f"{before_v:.3f} -> {voltage_v:.3f} V in {now_s - before_s:.4f} s", now_s)
         self.setting_s, self.voltage_v, self.largest_v = now_s, voltage_v, max(self.largest_v, voltage_v)
         self.settings += 1
         self.fingerprint.update(f"{now_s:.6f} {voltage_v:.4f}\n".encode())
@@ -129,17 +134,15 @@ class Observer:
 
     def note_status(self, pdu: bytes, now_s: float) -> None:
         """The status block, as a master has read it."""
-        if len(pdu) != 2 + 2 * STATUS_WORDS:
-            return
         words = struct.unpack(f">{STATUS_WORDS}H", pdu[2:])
         state, fault = words[1], words[10]
         if state == FAULT and not fault:
-            self._complain("I11", "a fault without a cause", now_s)
+            self.complain("I11", "a fault without a cause", now_s)
         if self._fault and now_s - self._reset_s > 0.2:
             if state != FAULT:
-                self._complain("I5", f"fault {self._fault} is gone without a reset", now_s)
+                self.complain("I5", f"fault {self._fault} is gone without a reset", now_s)
             elif fault != self._fault:
-                self._complain("I11", f"fault {self._fault} became {fault}", now_s)
+                self.complain("I11", f"fault {self._fault} became {fault}", now_s)
         self._fault = fault if state == FAULT else None  # in OFF it says why control was started again
 
     def note_death(self, now_s: float, until_s: float) -> None:
@@ -162,6 +165,8 @@ class Observer:
         down_s = DOWN_S if self.is_run or now_s - self.run_ended_s < DOWN_S else 0.0
         limits = (
             ("I3 cell", self.cell_lost_s, self.bounds.sample_timeout_s),
+            ("I3 cell unheard", self.cell_heard_s, self.bounds.sample_timeout_s),
+            ("I3 output", self.answers_lost_s, self.bounds.output_timeout_s),
             ("I3 control", self.control_lost_s, self.bounds.stall_s),
             ("I3 master", self.write_s, self.bounds.lease_s + max(down_s, self.bounds.lost_down_s)),
             ("I4", self.disabled_s, down_s),
@@ -172,10 +177,10 @@ class Observer:
             if law in ("I4", "I3 master") and now_s - self._pressing_s <= GRACE_S:
                 continue  # the answer to the write that has begun it is still on its way
             if since_s is not None and now_s - since_s > bound_s + GRACE_S + 2.0 * self.bounds.period_s:
-                self._complain(
+                self.complain(
                     law, f"{self.voltage_v:.3f} V for {standing_s:.3f} s, {now_s - since_s:.3f} s after", now_s
                 )
 
-    def _complain(self, law: str, words: str, now_s: float) -> None:
+    def complain(self, law: str, words: str, now_s: float) -> None:
         if len(self.broken) < 20:
             self.broken.append(f"{law} at {now_s:.4f}: {words}")

@@ -52,6 +52,7 @@ VALVES = (
 )
 """What switches it, and where it goes while the output is off."""
 KINDS = ("plain",) * 28 + ("rate",) + ("cell",) * 4 + ("valve",) * 3 + ("devices",) * 4 + ("bus",) * 3
+TLS_SHARE = 0.08
 BOW = 0.005
 RIG = """name: pair
 plant: paper-slide
@@ -110,6 +111,24 @@ def draw_rig(seed: int) -> Drawn:
         asked = replace(device, read_force=replace(reading, rate_hz=2.0 * cell_hz))  # so that each tick finds it due
         rig = replace(rig, load_cell=replace(rig.load_cell, device=asked))
     return Drawn(_strict(rig, seed, loop_hz, cell_hz), 1.0 / cell_hz if device.stream else None, output)
+
+
+def draw_badges(seed: int) -> dict[str, tuple[str, str]]:
+    """Name and role of everybody's certificate, for the few whose masters come by TLS."""
+    chance = Random(f"certificates {seed}")
+    if chance.random() > TLS_SHARE:
+        return {}
+    roles = {
+        "worker": "setpoint",
+        "rival": chance.choice(("monitor", "setpoint")),
+        "fool": chance.choice(("monitor", "setpoint", "calibration")),
+        "villain": "monitor",
+        "healer": chance.choice(("setpoint", "admin")),
+        "reader": "monitor",
+        "integrator": chance.choice(("setpoint", "calibration", "admin")),
+        "designer": "calibration",
+    }
+    return {name: (f"the {name}", role) for name, role in roles.items()}
 
 
 def _strict(rig: Rig, seed: int, loop_hz: float, cell_hz: float) -> Rig:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from tests.simulation.events import Event
+from tests.simulation.event import Event
 
 
 def shrink(events: Sequence[Event], is_broken: Callable[[Sequence[Event]], bool]) -> list[Event]:

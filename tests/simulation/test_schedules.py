@@ -8,7 +8,8 @@ import os
 
 import pytest
 
-from tests.simulation.events import Event, draw_events
+from tests.simulation.event import Event
+from tests.simulation.events import draw_events
 from tests.simulation.schedule import Outcome, run_schedule
 from tests.simulation.shrinking import shrink
 
@@ -44,6 +45,7 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(13.6262, "output", "replaced", (12.0, 0.4523), b"OUT OF RANGE\r\n"),
         ],
     ),
+    (20044, [Event(22.6287, "output", "power", (1.5, 1.5))]),
     (
         419,
         [Event(11.3621, "worker", "hold", (19.73,), way="mask"), Event(11.9957, "output", "pull")],

@@ -14,8 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.simulation.events import Event, draw_events
+from tests.simulation.event import Event
+from tests.simulation.events import draw_events
 from tests.simulation.kernel.edges import simulated_edges
+from tests.simulation.kernel.fits import SimulatedFit
 from tests.simulation.schedule import Simulation
 
 PUSH_S, LONG_S = 200.0, float(os.environ.get("SOAK_SECONDS", "86400"))
@@ -51,7 +53,7 @@ def measure(simulation: Simulation, folder: Path, at_s: float) -> Held:
 
 @pytest.fixture
 def simulation(tmp_path: Path) -> Iterator[Simulation]:
-    with simulated_edges():
+    with simulated_edges(SimulatedFit):
         simulation = Simulation(SEED, tmp_path)
         with simulation.clock.as_the_kernels():
             yield simulation

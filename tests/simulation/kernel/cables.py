@@ -9,12 +9,24 @@ import os
 from collections import deque
 from collections.abc import Callable
 
-from gateway.devices import PacedWire, SerialSettings
+from gateway.devices import SerialSettings
 from gateway.ports import PortError, PortEvents
 from gateway.profiles import Rig
 from gateway.profiles.rigs.faces import RtuFace
 from tests.simulation.kernel.spoiled import Spoil, spoiled
 from tests.simulation.kernel.virtual_time import VirtualLoop
+
+MOST_QUEUED = 4096
+"""Characters on one direction of a wire; a UART's driver drops what is more."""
+
+
+class Direction:
+    """One direction of a wire. through_s: when its last byte is through; is_cut: what is on it arrives nowhere."""
+
+    __slots__ = ("is_cut", "through_s")
+
+    def __init__(self) -> None:
+        self.through_s, self.is_cut = 0.0, False
 
 
 class Cable:
@@ -23,29 +35,31 @@ class Cable:
     def __init__(
         self, outside: VirtualLoop, settings: SerialSettings, on_device: Callable[[bytes, float], None]
     ) -> None:
-        self._outside, self._settings, self.on_device = outside, settings, on_device
+        self._outside, self.on_device = outside, on_device
         self.port: SimulatedPort | None = None
         self.is_plugged = True
         self._spoils: deque[Spoil] = deque()
         self.strange_s = 0.0  # when something strange was said last
-        self.cut()
+        self.heard_s = 0.0  # when the host has got something last
+        self.reworded = (b"", b"")  # what the device says, and from now on says instead
+        self._character_s = settings.character_s
+        self._to_device, self._to_host = Direction(), Direction()
 
     def cut(self) -> None:
         """What was on the wire is lost."""
-        baud, bits = self._settings.baud, self._settings.bits_per_character
-        self._to_device, self._to_host = PacedWire(baud, bits), PacedWire(baud, bits)
+        for direction in (self._to_device, self._to_host):
+            direction.is_cut = True
+        self._to_device, self._to_host = Direction(), Direction()
 
     @property
     def backlog_s(self) -> float:
         """Time until the device's last byte is through."""
-        last_s = self._to_host.last_through_s
-        return 0.0 if last_s is None else max(0.0, last_s - self._outside.time())
+        return max(0.0, self._to_host.through_s - self._outside.time())
 
     @property
     def through_s(self) -> float:
         """When the host's last byte will have arrived."""
-        last_s = self._to_device.last_through_s
-        return self._outside.time() if last_s is None else last_s + 2e-9
+        return max(self._outside.time(), self._to_device.through_s + 2e-9)
 
     def send_to_device(self, data: bytes) -> None:
         """Put a host's bytes on the wire."""
@@ -54,6 +68,8 @@ class Cable:
 
     def send_to_host(self, data: bytes) -> None:
         """Put a device's bytes on the wire, or what becomes of them."""
+        if self.reworded[0]:
+            data = data.replace(*self.reworded)
         if self._spoils and data:
             self._send_spoiled(data)
         elif self.is_plugged:
@@ -84,18 +100,22 @@ class Cable:
         """Put it back; whoever looks for the port finds it."""
         self.is_plugged = True
 
-    def _put(self, wire: PacedWire, data: bytes, take: Callable[[PacedWire], None]) -> None:
-        wire.send(data, self._outside.time())
-        if wire.last_through_s is not None:
-            self._outside.call_at(wire.last_through_s + 1e-9, take, wire)
+    def _put(self, direction: Direction, data: bytes, take: Callable[[Direction, bytes], None]) -> None:
+        now_s = self._outside.time()
+        begin_s = max(now_s, direction.through_s)
+        data = data[: max(0, MOST_QUEUED - int((begin_s - now_s) / self._character_s))]
+        if data:
+            direction.through_s = through_s = begin_s + len(data) * self._character_s
+            self._outside.call_at(through_s + 1e-9, take, direction, data)
 
-    def _arrive(self, wire: PacedWire) -> None:
-        if wire is self._to_device and (chunk := wire.bytes_through(self._outside.time())):
-            self.on_device(chunk, self._outside.time())
+    def _arrive(self, direction: Direction, data: bytes) -> None:
+        if not direction.is_cut:
+            self.on_device(data, self._outside.time())
 
-    def _reach_host(self, wire: PacedWire) -> None:
-        if wire is self._to_host and (chunk := wire.bytes_through(self._outside.time())) and self.port:
-            self.port.hear(chunk)
+    def _reach_host(self, direction: Direction, data: bytes) -> None:
+        if self.port and not direction.is_cut:
+            self.heard_s = self._outside.time()
+            self.port.hear(data)
 
 
 CABLES: dict[str, Cable] = {}

@@ -25,6 +25,8 @@ TWIN_STEP_S = 10e-3
 """The period of the fastest loop. At its own step of 1 ms the twin takes a third of the processor's time."""
 DISK_S = (0.001, 0.08)
 DONE_AT_ONCE_S = 0.04
+MOST_CAUSES = 200
+"""The lines of each are limited, so none may be named by what a client chooses."""
 _RIG = "gateway.service.running_rig.running_rig"
 _SUPERVISOR = "gateway.service.supervisor"
 
@@ -32,10 +34,12 @@ _SUPERVISOR = "gateway.service.supervisor"
 class SimulatedDisk:
     """Stands for `DiskWorker`: one thing after the other, which takes as long as the chance of the schedule says. Half of the
     time it is done as it begins, else as it ends: where the process is killed in between it has happened, or not at all.
-    is_hung: nothing is done, until somebody lets it `go_on`. is_gone: the schedule is over."""
+    fails: how, of FailingDisk.KINDS, "": it does not. is_hung: nothing is done, until somebody lets it `go_on`. is_gone: the
+    schedule is over."""
 
     delay_s: Callable[[], float] = staticmethod(lambda: 0.005)
-    is_full = is_gone = is_hung = False
+    fails = ""
+    is_gone = is_hung = False
     folder = Path()
     hung: ClassVar[WeakSet["SimulatedDisk"]] = WeakSet()
 
@@ -87,12 +91,17 @@ class SimulatedDisk:
             if is_wanted:
                 self._results.append(result)
 
+    @classmethod
+    def do(cls, work: Callable[[], Any]) -> Any:
+        """Do this now, as the disk is."""
+        with watching(FailingDisk(cls.folder, cls.fails, 0)) if cls.fails else nullcontext():
+            return work()
+
     def _result(self, work: Callable[[], Any]) -> Any:
         if type(self).is_gone:
             return OSError(errno.EIO, os.strerror(errno.EIO))
         try:
-            with watching(FailingDisk(self.folder, "full", 0)) if type(self).is_full else nullcontext():
-                return work()
+            return self.do(work)
         except Exception as error:
             return error
 
@@ -157,15 +166,20 @@ class SimulatedSafeLine:
 
 
 class Log:
-    """Stands for `EventLog`: keeps what was said last, and every internal error."""
+    """Stands for `EventLog`: keeps what was said last, every internal error, and whether there are too many
+    causes (I12)."""
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock
         self.lines: deque[tuple[float, str]] = deque(maxlen=1000)
         self.internal_errors: list[str] = []
+        self._causes: set[str] = set()
 
     def __call__(self, cause: str, sentence: str) -> None:
         self.lines.append((self._clock.now_s, sentence))
+        self._causes.add(cause)
+        if len(self._causes) == MOST_CAUSES + 1:
+            self.internal_errors.append(f"I12 at {self._clock.now_s:.4f}: one more cause, {cause}: {sentence}")
         if "A499" in sentence:
             self.internal_errors.append(f"internal: {sentence}")
 
@@ -216,8 +230,8 @@ def _no_fit(*_: Any) -> None:
 
 
 @contextmanager
-def simulated_edges() -> Any:
-    """Everything that reaches for the kernel, replaced."""
+def simulated_edges(fit: Any = _no_fit) -> Any:
+    """Everything that reaches for the kernel, replaced. fit: what stands for `FitLauncher`."""
     with pytest.MonkeyPatch.context() as patch:
         for maker in ("calibration_runs", "recordings"):
             patch.setattr(f"gateway.service.running_rig.{maker}.Recorder", NotedRecorder)
@@ -230,7 +244,7 @@ def simulated_edges() -> Any:
         NotedRunningRig.of.clear()
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
         patch.setattr(f"{_RIG}.explain_silent_device", _explain)
-        patch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", _no_fit)
+        patch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", fit)
         for user in (
             "gateway.calibrations.upload",
             "gateway.service.running_rig.rig_plants",

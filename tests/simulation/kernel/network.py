@@ -1,10 +1,11 @@
 """Modbus TCP without a kernel: connections between two loops, whose bytes arrive after a delay, in pieces, in order."""
 
 import asyncio
-from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
+from gateway.modbus import Peer, Role
 from tests.simulation.kernel.virtual_time import VirtualLoop
 
 DELAY_S = 0.0002
@@ -31,30 +32,32 @@ class MemoryListener:
         return
 
 
-class Delay:
-    """Calls what it is given after DELAY_S, in order: of timers that are due at one time asyncio keeps none."""
+@dataclass(frozen=True)
+class Caller:
+    """Who connects. name, role: of the certificate that a TLS face has checked, for which it stands here; "": a plain face."""
 
-    def __init__(self, loop: VirtualLoop) -> None:
-        self._loop = loop
-        self._waiting: deque[tuple[Callable[..., Any], tuple[Any, ...]]] = deque()
+    host: str
+    port: int
+    name: str = ""
+    role: str = ""
 
-    def __call__(self, what: Callable[..., Any], *arguments: Any) -> None:
-        self._waiting.append((what, arguments))
-        self._loop.call_later(DELAY_S, self._do_next)
-
-    def _do_next(self) -> None:
-        what, arguments = self._waiting.popleft()
-        what(*arguments)
+    @property
+    def shown(self) -> dict[str, Any]:
+        """What the transport tells of the far end, as `TlsStream` does where there is a certificate."""
+        peername = {"peername": (self.host, self.port)}
+        if not self.name:
+            return peername
+        return peername | {"modbus_peer": Peer(self.host, self.port, self.name, Role[self.role.upper()])}
 
 
 class MemoryTransport(asyncio.Transport):
     """The server's end of one connection."""
 
     def __init__(
-        self, inside: VirtualLoop, outside: VirtualLoop, peer: tuple[str, int], hear: Callable[[bytes], None]
+        self, inside: VirtualLoop, outside: VirtualLoop, caller: "Caller", hear: Callable[[bytes], None]
     ) -> None:
-        super().__init__({"peername": peer})
-        self._inside, self._after_delay, self._hear = inside, Delay(outside), hear
+        super().__init__(caller.shown)
+        self._inside, self._outside, self._hear = inside, outside, hear
         self._protocol: Any = None
         self._is_closing = self._is_paused = False
         self._waiting = bytearray()
@@ -76,7 +79,7 @@ class MemoryTransport(asyncio.Transport):
 
     def write(self, data: Any) -> None:
         if not self._is_closing:
-            self._after_delay(self._hear, bytes(data))
+            self._outside.call_later(DELAY_S, self._hear, bytes(data))
 
     def get_write_buffer_size(self) -> int:
         return 0
@@ -90,7 +93,7 @@ class MemoryTransport(asyncio.Transport):
         if not self._is_closing:
             self._is_closing = True
             self._inside.call_soon(self._protocol.connection_lost, None)
-            self._after_delay(self._hear, b"")
+            self._outside.call_later(DELAY_S, self._hear, b"")
 
     def abort(self) -> None:
         self.close()
@@ -118,15 +121,15 @@ class Line:
     """A master's end of one connection. hear(b"") tells that the other end has closed."""
 
     def __init__(
-        self, inside: VirtualLoop, outside: VirtualLoop, peer: tuple[str, int], hear: Callable[[bytes], None]
+        self, inside: VirtualLoop, outside: VirtualLoop, caller: Caller, hear: Callable[[bytes], None]
     ) -> None:
-        self._inside, self._after_delay = inside, Delay(outside)
-        self._transport = MemoryTransport(inside, outside, peer, hear)
+        self._inside = inside
+        self._transport = MemoryTransport(inside, outside, caller, hear)
         (server,) = inside.servers.values()
         inside.call_soon(lambda: self._transport.attach(server.make()))
 
     def send(self, data: bytes) -> None:
-        self._after_delay(self._inside.call_soon, self._transport.feed, data)
+        self._inside.call_later(DELAY_S, self._transport.feed, data)
 
     def close(self) -> None:
-        self._after_delay(self._inside.call_soon, self._transport.end)
+        self._inside.call_later(DELAY_S, self._transport.end)

@@ -7,10 +7,11 @@ microsecond. Nothing comes from real descriptors: they can be opened and closed 
 
 import asyncio
 import contextvars
-import heapq
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from heapq import heappop, heappush
+from itertools import count
 from typing import Any
 
 import pytest
@@ -44,14 +45,15 @@ class Handle(asyncio.TimerHandle):
 
 
 class VirtualClock:
-    """Stands for the kernel's clocks, and runs what is due by them. jump_s: what an operator has set the wall clock by."""
+    """Stands for the kernel's clocks, and runs what is due by them: ready, in the order of its asking, and timers, in the order
+    of their times, then of their places. jump_s: what an operator has set the wall clock by."""
 
     def __init__(self) -> None:
         self.now_s = BEGIN_S
         self.jump_s = 0.0
-        self._ready: deque[Handle] = deque()
-        self._timers: list[tuple[float, int, Handle]] = []
-        self._asked = 0
+        self.ready: deque[Handle] = deque()
+        self.timers: list[tuple[float, int, Handle]] = []
+        self.places = count()
 
     def monotonic(self) -> float:
         return self.now_s
@@ -67,26 +69,17 @@ class VirtualClock:
             patch.setattr("time.time", self.wall)
             yield
 
-    def add(self, handle: Handle) -> None:
-        """Have this done as soon as everything is done that was asked for before."""
-        self._ready.append(handle)
-
-    def add_timer(self, handle: Handle) -> None:
-        """Have this done at its time."""
-        self._asked += 1
-        heapq.heappush(self._timers, (handle._when, self._asked, handle))
-
     def run_until(self, end_s: float) -> None:
         """Do everything that is due until then, and let the clock show end_s. What a halted loop has to do waits until it goes
         on. (asyncio shows a handle's loop nowhere.)"""
-        ready, timers = self._ready, self._timers
+        ready, timers = self.ready, self.timers
         running: VirtualLoop | None = None
         try:
             while True:
                 if ready:
                     handle = ready.popleft()
                 elif timers and timers[0][0] <= end_s:
-                    when_s, _, handle = heapq.heappop(timers)
+                    when_s, _, handle = heappop(timers)
                     self.now_s = max(self.now_s, when_s)
                 else:
                     self.now_s = max(self.now_s, end_s)
@@ -129,13 +122,12 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def go_on(self) -> None:
         """Do what has become due meanwhile, in its order, and go on."""
         self.is_halted = False
-        for handle in self.waiting:
-            self._virtual_clock.add(handle)
+        self._virtual_clock.ready.extend(self.waiting)
         self.waiting.clear()
 
     def call_soon(self, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None) -> Handle:
         handle = Handle(0.0, callback, args, self, context)
-        self._virtual_clock.add(handle)
+        self._virtual_clock.ready.append(handle)
         return handle
 
     call_soon_threadsafe = call_soon  # there are no threads
@@ -143,13 +135,16 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def call_later(
         self, delay: float, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
     ) -> Handle:
-        handle = Handle(self._virtual_clock.now_s + delay, callback, args, self, context)
-        self._virtual_clock.add_timer(handle)
+        clock = self._virtual_clock
+        when_s = clock.now_s + delay
+        handle = Handle(when_s, callback, args, self, context)
+        heappush(clock.timers, (when_s, next(clock.places), handle))
         return handle
 
     def call_at(
         self, when: float, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
     ) -> Handle:
+        clock = self._virtual_clock
         handle = Handle(when, callback, args, self, context)
-        self._virtual_clock.add_timer(handle)
+        heappush(clock.timers, (when, next(clock.places), handle))
         return handle

@@ -19,6 +19,8 @@ PAUSE_S = 0.7
 STRANGE_S = 1.0
 """After a request was doubled on its way, who was answered twice need not wonder."""
 MOST_WAITING = 3
+LONGEST_GAP_S = 0.05
+"""Inside of a request: who waits longer has given it up."""
 UNIT = 1
 
 
@@ -60,8 +62,19 @@ class BusMaster(Master):
         self._stream, self._number = b"", self._number + 1
         self._question = Asked(self._number, pdu, control_of(pdu))
         frame = bytes((unit,)) + pdu
-        CABLES["bus"].send_to_host(frame + crc16(frame).to_bytes(2, "little"))
+        self._put(frame + crc16(frame).to_bytes(2, "little"))
         self._outside.call_later(PATIENCE_S, self._on_silence, self._number)
+
+    def _put(self, frame: bytes) -> None:
+        """Put a request on the bus, with a gap inside where it is to be split."""
+        (first, gap_s), *rest = self._pieces(frame)
+        CABLES["bus"].send_to_host(first)
+        gap_s = min(gap_s, LONGEST_GAP_S) + CABLES["bus"].backlog_s
+        for piece, _ in rest:
+            self._outside.call_later(gap_s, CABLES["bus"].send_to_host, piece)
+
+    def burst(self, count: float, is_read_wrong: float) -> None:
+        """A bus has one question at a time."""
 
     def _on_silence(self, number: int) -> None:
         if self._question is not None and self._number == number:
@@ -73,8 +86,7 @@ class BusMaster(Master):
         self._queue.clear()
         if question is None:
             return
-        if question.pdu[0] in WRITES:
-            self._on_write(question.control, False)
+        self._tell(question, False)
         self._is_pausing = True
         self._outside.call_later(PAUSE_S, self._go_on)
 
@@ -102,7 +114,7 @@ class BusMaster(Master):
         self.heard.append((now_s, pdu))
         del self.heard[:-64]
         if pdu[0] in WRITES:
-            self._on_write(question.control, True)
+            self._tell(question, True)
         self._ask_next()
 
 

@@ -1,8 +1,8 @@
 """A person who uploads models while the robot works, and the witness of what is then in use (I9).
 
 The set in use is read back, one number of it is changed and the whole committed, each time with another number. Whatever
-happens meanwhile: what is in use is one of the sets that were committed, whole; and once a commit was acknowledged, that one,
-after a kill, too.
+happens meanwhile, another one's upload, too: what is in use is one of the sets that were committed, whole; and once a commit
+was acknowledged, that one, after a kill, too.
 """
 
 import struct
@@ -22,43 +22,96 @@ LOOK_S, ASK_S = 1.0, 0.1
 _HALVES = (read_pdu(ACTIVE, 100), read_pdu(ACTIVE + 100, 100))
 
 
+class Sets:
+    """What everybody who uploads knows together. allowed: sets one of which must be in use; known: all that were ever sent;
+    first: what was in use in the beginning; under_way: who uploads what now, with all that it may be mixed up with."""
+
+    def __init__(self) -> None:
+        self.allowed: set[bytes] = set()
+        self.known: set[bytes] = set()
+        self.first: bytes | None = None
+        self.mark = 0
+        self._under_way: dict[str, set[bytes]] = {}
+
+    def next_set(self) -> bytes:
+        """A set that differs in one number from the MARKS - 1 before."""
+        assert self.first is not None
+        self.mark = self.mark % MARKS + 1
+        return with_mark(self.first, self.mark)
+
+    def begin(self, who: str, words: bytes) -> None:
+        """Somebody begins to stage a set: whoever commits meanwhile may commit this one, if it is whole by then."""
+        self.known.add(words)
+        self._before = set(self.allowed)
+        self.allowed.add(words)
+        self._under_way[who] = {words}
+        everything = set().union(*self._under_way.values())
+        for name in self._under_way:
+            self._under_way[name] = set(everything)
+
+    def end(self, who: str, *, is_committed: bool) -> None:
+        """It is told as committed, or not. While somebody else uploads, too, either may be in use."""
+        may_be = self._under_way.pop(who, set())
+        if is_committed:
+            self.allowed = may_be
+        elif len(may_be) == 1:
+            self.allowed = self._before
+
+    def forget(self, who: str) -> None:
+        """Nobody knows now how it went."""
+        self._under_way.pop(who, None)
+
+    def expect_mark(self, mark: int) -> None:
+        """A set with this mark is stored, so that somebody may take it into use."""
+        if self.first is not None:
+            self.known.add(with_mark(self.first, mark))
+
+    def expect_any(self) -> None:
+        """Somebody takes one of the sets that there are into use."""
+        self.allowed = set(self.known)
+        self._under_way.clear()
+
+
 class Integrator(Master):
     """complaints: broken answers, and what was in use although nobody had committed it. committed: how many were."""
 
     committed = 0
-    _first: bytes | None = None
+    sets: Sets
     _sent: bytes | None = None
-    _mark = 0
 
     def watch(self) -> None:
         """Look at what is in use, from now on."""
-        self._allowed: set[bytes] = set()
-        self._known: set[bytes] = set()
         self._seen: list[bytes] = []
         self._look()
 
-    def upload(self) -> None:
-        """Commit a set of which one number is another one than in the MARKS - 1 before."""
-        if self._first is None or self._sent is not None or not self.connect():
+    def upload(self, pause_s: float = 0.0) -> None:
+        """Commit a set of which one number is another one than in those before; pause_s: between its requests."""
+        if self.sets.first is None or self._sent is not None or not self.connect():
             return
-        self._mark = self._mark % MARKS + 1
-        words = with_mark(self._first, self._mark)
+        words = self._sent = self.sets.next_set()
         block = words[: 2 * HEAD_WORDS] + struct.pack(">H2xI", len(words) // 2, crc32(words)) + bytes(2)
-        for address, part in ((0, block[:200]), (100, block[200:]), (TAIL_FROM, words[2 * HEAD_WORDS :])):
-            self.ask(write_pdu(STAGING + address, *struct.unpack(f">{len(part) // 2}H", part)))
-        self._sent, self._before = words, self._allowed
-        self._known.add(words)
-        self._allowed = self._allowed | {words}
-        self.ask(write_pdu(COMMIT, 1))
+        parts = ((0, block[:200]), (100, block[200:]), (TAIL_FROM, words[2 * HEAD_WORDS :]))
+        asked = [write_pdu(STAGING + at, *struct.unpack(f">{len(part) // 2}H", part)) for at, part in parts]
+        self.sets.begin(self.name, words)
+        self._stage([*asked, write_pdu(COMMIT, 1)], words, pause_s)
 
-    def expect_any(self) -> None:
-        """Somebody else takes one of the sets that there are into use."""
-        self._allowed, self._sent = set(self._known), None
+    def _stage(self, requests: list[bytes], words: bytes, pause_s: float) -> None:
+        """Ask one after the other, unless the connection was lost meanwhile, or somebody has taken another set into use."""
+        while requests and self._sent is words:
+            self.ask(requests.pop(0))
+            if pause_s:
+                self._outside.call_later(pause_s, self._stage, requests, words, pause_s)
+                return
+
+    def forget(self) -> None:
+        """Somebody else takes a set into use: how an upload ends then tells nothing."""
+        self._sent = None
 
     def lose(self) -> None:
         """Nobody knows now how a commit went: either set may be in use."""
         super().lose()
         self._sent = None
+        self.sets.forget(self.name)
 
     def _look(self) -> None:
         for pdu in (*_HALVES, _HALVES[0]):
@@ -71,6 +124,9 @@ class Integrator(Master):
         """Follow the commit, and judge what is in use."""
         if asked in _HALVES:
             self._note_half(asked, answer)
+        elif self._sent is not None and answer[0] == 0x90 and asked[1:3] != write_pdu(COMMIT, 1)[1:3]:
+            self._sent = None  # what is staged is not this set: a person stops here, or has committed already
+            self.sets.forget(self.name)
         elif self._sent is not None and asked in (write_pdu(COMMIT, 1), read_pdu(STATUS, 1)):
             self._note_commit(self._sent, answer)
 
@@ -86,21 +142,21 @@ class Integrator(Master):
             self._seen = []
 
     def _judge(self, block: bytes) -> None:
-        words = block[: 2 * HEAD_WORDS] + block[2 * TAIL_FROM :]
-        if self._first is None:
-            self._first = words
-            self._allowed.add(words)
-            self._known.add(words)
-        elif words not in self._allowed:
+        words, sets = block[: 2 * HEAD_WORDS] + block[2 * TAIL_FROM :], self.sets
+        if sets.first is None:
+            sets.first = words
+            sets.allowed.add(words)
+            sets.known.add(words)
+        elif words not in sets.allowed:
             which = f"the set with the CRC-32 {crc32(words):08x}"
             self.complaints.append(f"I9 at {self._outside.time():.4f}: {which} is in use, which nobody committed")
 
     def _note_commit(self, sent: bytes, answer: bytes) -> None:
-        if answer[0] == 3 and answer[3] == COMMITTED:
-            self._allowed, self._sent = {sent}, None
-            self.committed += 1
-        elif answer[0] & 0x80 or (answer[0] == 3 and answer[3] == FAILED):
-            self._allowed, self._sent = self._before, None
+        is_committed = answer[0] == 3 and answer[3] == COMMITTED
+        if is_committed or answer[0] & 0x80 or (answer[0] == 3 and answer[3] == FAILED):
+            self._sent = None
+            self.sets.end(self.name, is_committed=is_committed)
+            self.committed += is_committed
         else:
             self._outside.call_later(ASK_S, lambda: self._sent is sent and self.ask(read_pdu(STATUS, 1)))
 

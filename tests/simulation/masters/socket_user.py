@@ -25,6 +25,7 @@ class SocketUser:
     complaints: broken answers. watched_s: when a run of this person's was looked at last, None where there is none."""
 
     watched_s: float | None = None
+    name = "person"
 
     def __init__(
         self, inside: Callable[[], VirtualLoop | None], answer: Callable[[bytes], bytes | Future[bytes]]
@@ -33,6 +34,7 @@ class SocketUser:
         self.complaints: list[str] = []
         self.answers = 0
         self.on_write: Callable[[int | None], None] = lambda control: None
+        self.on_setpoint: Callable[[bytes], None] = lambda pdu: None
         self.on_model: Callable[[], None] = lambda: None
         self._patience = self._run = 0
 
@@ -72,6 +74,7 @@ class SocketUser:
                 self._patience = int(request.get("name", "0") or 0)
                 self._watch(inside)
             case "modbus" if int(answer["pdu"][:2], 16) < 0x80:
+                self.on_setpoint(bytes.fromhex(request["pdu"]))
                 self.on_write(control_of(bytes.fromhex(request["pdu"])))
 
     def _watch(self, inside: VirtualLoop) -> None:

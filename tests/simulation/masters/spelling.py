@@ -6,7 +6,7 @@ A way gives the requests that begin a command, in their order, and the one that 
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 
 WRITES = frozenset((5, 6, 15, 16, 22, 23))
 ENABLE = 1
@@ -103,6 +103,27 @@ WAYS: dict[str, Way] = {
     "coil": Way(lambda wish: (write_pdu(1, *wish.words[1:]), coil_pdu(0, on=bool(wish.control & ENABLE))), _beat),
     "coils": Way(lambda wish: (write_pdu(1, *wish.words[1:]), coils_pdu(0, wish.control, 5)), _beat),
 }
+
+
+def written_address(pdu: bytes) -> int:
+    """The first address that a write changes."""
+    return int.from_bytes(pdu[5:7] if pdu[0] == 23 else pdu[1:3])
+
+
+def setpoints_of(pdu: bytes) -> tuple[float, ...]:
+    """What a write would set force_setpoint to, in its counts; not a number where that cannot be told from the request."""
+    if pdu[0] == 22 and pdu[1:3] == b"\x00\x01":
+        return (nan,)
+    data = {6: pdu[3:5], 16: pdu[6:], 23: pdu[10:]}.get(pdu[0], b"")
+    address = written_address(pdu)
+    if data and address <= 1 and len(data) >= 2 * (2 - address):
+        return struct.unpack_from(">h", data, 2 * (1 - address))
+    for first in (202, 302):
+        if data and first - 2 <= address <= first and len(data) >= 2 * (first - address) + 4:
+            four = data[2 * (first - address) :][:4]
+            number = struct.unpack(">f", four if first == 202 else four[2:] + four[:2])[0]
+            return (100.0 * number,) if isfinite(number) else ()
+    return ()
 
 
 def control_of(pdu: bytes) -> int | None:

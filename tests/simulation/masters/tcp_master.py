@@ -8,9 +8,19 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from tests.simulation.kernel.network import Line
+from tests.simulation.kernel.network import Caller, Line
 from tests.simulation.kernel.virtual_time import VirtualLoop
-from tests.simulation.masters.spelling import ENABLE, WAYS, WRITES, Wish, control_of, write_one_pdu, write_pdu
+from tests.simulation.masters.spelling import (
+    ENABLE,
+    WAYS,
+    WRITES,
+    Wish,
+    control_of,
+    read_and_write_pdu,
+    write_one_pdu,
+    write_pdu,
+    written_address,
+)
 
 RESET, TARE, TAKE, PULL = 2, 4, 8, 16
 RUNS = {"calibrate": 32, "self_test": 64}
@@ -32,7 +42,10 @@ class Asked:
 
 class Master:
     """One program on one address. on_write(control word or None, is_answered): a write was
-    taken, or nobody will hear whether it was; complaints: broken answers."""
+    taken, or nobody will hear whether it was; complaints: broken answers. badge: name and role of its certificate."""
+
+    badge: tuple[str, str] = ("", "")
+    on_setpoint: Callable[[bytes], None] = staticmethod(lambda pdu: None)
 
     def __init__(
         self,
@@ -54,6 +67,8 @@ class Master:
         self._beating = 0
         self._is_framed = True
         self._beat_s = beat_s
+        self._cut: list[tuple[float, float]] = []
+        self._free_s = 0.0  # when what waits to be sent is sent
 
     # -- connection
 
@@ -62,7 +77,7 @@ class Master:
         inside = self._inside()
         if self._line is None and inside is not None and inside.servers:
             self._port += 1
-            self._stream, self._is_framed = b"", True
+            self._stream, self._is_framed, self._free_s = b"", True, 0.0
             self._waiting.clear()
             line: Line | None = None
 
@@ -70,7 +85,7 @@ class Master:
                 if self._line is line:
                     self._hear(data)
 
-            line = self._line = Line(inside, self._outside, (self.name, 40000 + self._port), hear)
+            line = self._line = Line(inside, self._outside, Caller(self.name, 40000 + self._port, *self.badge), hear)
         return self._line is not None
 
     def lose(self) -> None:
@@ -81,8 +96,7 @@ class Master:
     def disconnect(self) -> None:
         if self._line:
             for asked in self._waiting:
-                if asked.pdu[0] in WRITES:
-                    self._on_write(asked.control, False)
+                self._tell(asked, False)
             self._line.close()
         self.lose()
 
@@ -90,17 +104,56 @@ class Master:
 
     def ask(self, pdu: bytes, unit: int = 1) -> None:
         if self.connect():
-            assert self._line
-            self._transaction = (self._transaction + 1) & 0xFFFF
-            self._waiting.append(Asked(self._transaction, pdu, control_of(pdu)))
-            self._line.send(struct.pack(">HHHB", self._transaction, 0, len(pdu) + 1, unit) + pdu)
+            self._send(self._frame(pdu, unit))
+
+    def _frame(self, pdu: bytes, unit: int = 1) -> bytes:
+        self._transaction = (self._transaction + 1) & 0xFFFF
+        self._waiting.append(Asked(self._transaction, pdu, control_of(pdu)))
+        return struct.pack(">HHHB", self._transaction, 0, len(pdu) + 1, unit) + pdu
+
+    def _send(self, data: bytes) -> None:
+        """Send bytes, behind whatever of this connection still waits for its time."""
+        assert self._line
+        now_s = self._outside.time()
+        if not self._cut and self._free_s <= now_s:
+            self._line.send(data)
+            return
+        self._free_s = max(self._free_s, now_s)
+        for piece, pause_s in self._pieces(data):
+            self._outside.call_at(self._free_s, self._send_piece, self._line, piece)
+            self._free_s += pause_s
+
+    def _send_piece(self, line: Line, piece: bytes) -> None:
+        if self._line is line:
+            line.send(piece)
+
+    def _pieces(self, data: bytes) -> tuple[tuple[bytes, float], ...]:
+        if not self._cut:
+            return ((data, 0.0),)
+        share, pause_s = self._cut.pop()
+        place = 1 + int(share * (len(data) - 1))
+        return (data[:place], pause_s), (data[place:], 0.0)
+
+    def split(self, share: float, pause_s: float, count: float) -> None:
+        """Each of the next `count` requests arrives in two pieces, cut at this share of its length, with a pause between."""
+        self._cut = [(share, pause_s)] * int(count)
+
+    def burst(self, count: float, is_read_wrong: float) -> None:
+        """Send its command by FC23, so often in one segment; where the read is wrong, every other one must write nothing."""
+        frames = []
+        for number in range(int(count) if self.connect() else 0):
+            self._beat += 1
+            self._wish = replace(self._wish, beat=self._beat)
+            first = 90 if is_read_wrong and number % 2 else 100
+            frames.append(self._frame(read_and_write_pdu(first, 11, 0, *self._wish.words)))
+        if frames:
+            self._send(b"".join(frames))
 
     def send_raw(self, data: bytes) -> None:
         """Bytes that are no request, perhaps: answers are not counted from now on."""
         if self.connect():
-            assert self._line
             self._is_framed = False
-            self._line.send(data)
+            self._send(data)
 
     # -- one that works
 
@@ -183,8 +236,23 @@ class Master:
         self.heard.append((self._outside.time(), pdu))
         del self.heard[:-64]
         if pdu[0] in WRITES:
-            self._on_write(asked.control, True)
+            self._judge_role(asked.pdu)
+            self._tell(asked, True)
         self.note_answer(asked.pdu, pdu)
+
+    def _tell(self, asked: Asked, is_answered: bool) -> None:
+        """A write was taken, or nobody will hear whether it was."""
+        if asked.pdu[0] in WRITES:
+            self.on_setpoint(asked.pdu)
+            self._on_write(asked.control, is_answered)
+
+    def _judge_role(self, asked: bytes) -> None:
+        """What its certificate does not let it write must not be taken (I7)."""
+        name, role = self.badge
+        address = written_address(asked)
+        is_coil = asked[0] in (5, 15)
+        if role == "monitor" or (role == "setpoint" and 1000 <= address < 1200 and not is_coil):
+            self.complaints.append(f"I7: {name} with the role {role} wrote {asked.hex()}, which was taken")
 
     def note_answer(self, asked: bytes, answer: bytes) -> None:
         """For those who want to know."""

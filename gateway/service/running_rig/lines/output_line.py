@@ -9,6 +9,7 @@ An answer may come after its time has run out, when the next question is already
 it answers. Taken for the next question's, each following answer would be one behind for as long as the setpoint moves, and
 an honest device would look like one that alters its settings. So after a time-out an answer that is no echo of what was
 asked last is believed by nobody: the line is left alone for one reply time, then asked anew. A falling voltage never waits.
+After any of them the setting is read or sent anew: the device may have lost its power, and stand where it then begins.
 
 Between the first setting, which is the safe one, and any other stand the questions of device_checks. A watchdog is fed by a
 sentence that nobody answers; a device whose watchdog has tripped obeys no setting, so none is sent until it is cleared.
@@ -29,6 +30,7 @@ from gateway.devices.messages import (
     OutputReply,
     OutputRequest,
     Pressure,
+    ReadVoltage,
     Refused,
     SetVoltage,
     WatchdogTripped,
@@ -141,6 +143,8 @@ class OutputExchange:
         """Give up waiting for an overdue answer and ask again; unanswered_since_s keeps the age of the silence."""
         if self._in_flight is not None and now_s - self._sent_s > self._reply_timeout_s:
             self._host.forget()
+            if not isinstance(self._in_flight, ReadVoltage):  # which tells anew what stands
+                self.standing_v = None
             self._in_flight, self._is_overdue = None, True
             self._next_poll_s = now_s  # ask again at once: three tries fit into the bound on silence
         self._send_next(now_s)

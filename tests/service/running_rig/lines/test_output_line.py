@@ -72,6 +72,17 @@ def test_a_setpoint_goes_before_a_pressure_poll(wire: Wire) -> None:
     assert wire.last == "SET 600"
 
 
+def test_after_a_question_without_an_answer_the_setting_goes_out_anew(wire: Wire) -> None:
+    """A device that was without power stands where it begins then, and no pressure tells which setting that is."""
+    wire.settle(0)
+    wire.tick(0.2)
+    assert wire.last == "MON"
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    assert wire.last == "SET 0"
+    wire.answer("0")
+    assert wire.last == "MON", "and once it is confirmed, it stands"
+
+
 def test_before_the_first_wish_nothing_is_asked(wire: Wire) -> None:
     """I6: the first thing a device hears after an opening is control's voltage, not a poll."""
     for _ in range(50):

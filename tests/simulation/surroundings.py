@@ -1,0 +1,135 @@
+"""What is around the gateway: the simulated rig and its wires, what is done to them, and what the observer is told of it."""
+
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from gateway.devices import output_device
+from gateway.profiles import Rig
+from gateway.service.simulation.world import SimulatedRig
+from tests.simulation.kernel.cables import CABLES, lay_cables
+from tests.simulation.kernel.virtual_time import VirtualLoop
+from tests.simulation.observer import Observer
+
+FIRST_SETTING_S = 0.3
+"""On a line that is back: a watchdog is fed before the safe voltage goes out."""
+
+
+class Surroundings:
+    """cell_s: between two readings of a load cell that talks by itself; cell_pace: how many times longer it takes now."""
+
+    cell_pace = 1.0
+    _is_cell_cut = False
+    _dark_until_s = 0.0
+    _back_s = 0.0  # when a line that was lost has brought its first byte
+
+    def __init__(self, rig: Rig, outside: VirtualLoop, observer: Observer, cell_s: float | None) -> None:
+        self._rig, self._outside, self._observer, self._cell_s = rig, outside, observer, cell_s
+        self.world = SimulatedRig(
+            rig,
+            send_output=lambda data: CABLES["output"].send_to_host(data),
+            send_cell=lambda data: CABLES["load_cell"].send_to_host(data),
+            now_s=outside.time(),
+        )
+        self._move_valve, self.world.valve.move = self.world.valve.move, self._judge_valve  # type: ignore[method-assign]
+        lay_cables(outside, rig, self._on_output, self.world.on_cell_bytes, self._on_valve)
+        if cell_s:
+            outside.call_later(0.3 * cell_s, self._stream)
+
+    # -- what is done to them
+
+    def set_fault(self, name: str, *, on: bool) -> None:
+        """By the verb `fault` of rig.sock."""
+        self.world.fault({"do": "fault", "name": name, "on": on})
+        self._judge()
+
+    def simulate(self, request: dict[str, Any]) -> None:
+        """By the verb `sim` of rig.sock; what no rig has is refused."""
+        with suppress(ValueError):
+            self.world.simulate(request)
+        self._judge()
+
+    def set_as_asked(self, line: bytes, ask: Callable[[bytes], None]) -> None:
+        """As the tools do: control is asked first, then the simulated rig."""
+        ask(line)
+        self.simulate(json.loads(line))
+
+    def lose_power(self, dark_s: float, power_on_v: float) -> None:
+        """The output device alone goes dark, and comes back as one that has just been switched on."""
+        now_s = self._outside.time()
+        self.world.advance(now_s)
+        self.world._output = output_device(self._rig.output.device)
+        self._dark_until_s = now_s + dark_s
+        self._stand_at(0.0)
+        self._outside.call_later(dark_s, self._stand_at, power_on_v)
+
+    def _stand_at(self, voltage_v: float) -> None:
+        self.world._setting_v = voltage_v
+        self.world.twin.command(voltage_v)
+        self._judge()
+
+    def pull(self, line: str) -> None:
+        """Pull the plug of this line."""
+        CABLES[line].pull()
+        if line == "output":
+            now_s = self._outside.time()
+            self._observer.note_cut(now_s)
+            self._observer.output_lost_s, self._back_s = now_s, 0.0
+        self._judge()
+
+    def push(self, line: str) -> None:
+        """Put it back."""
+        CABLES[line].push()
+        self._judge()
+
+    # -- what the observer is told
+
+    def _judge(self) -> None:
+        """Whether cell and output can be heard now, and since when they cannot."""
+        now_s, observer, settings = self._outside.time(), self._observer, self.world.settings
+        is_cell_lost = settings.is_on("cell.silent") or not CABLES["load_cell"].is_plugged
+        observer.cell_lost_s = _since(observer.cell_lost_s, is_cell_lost, now_s)
+        is_silent = settings.is_on("output.silent") or now_s < self._dark_until_s
+        observer.answers_lost_s = _since(observer.answers_lost_s, is_silent, now_s)
+
+    def look(self) -> None:
+        """A sentence that fits is a sample, or an answer, whoever says it: cell and output are lost from then on."""
+        observer = self._observer
+        observer.cell_heard_s = CABLES["load_cell"].heard_s
+        if observer.cell_lost_s is not None:
+            observer.cell_lost_s = max(observer.cell_lost_s, CABLES["load_cell"].strange_s)
+        if observer.answers_lost_s is not None:
+            observer.answers_lost_s = max(observer.answers_lost_s, CABLES["output"].strange_s)
+
+    def _judge_valve(self, now_s: float) -> bool:
+        """The valve is moved without pressure, whatever its relay was told and when."""
+        if (has_moved := self._move_valve(now_s)) and self._observer.voltage_v > 0.0:
+            self._observer.broken.append(f"valve at {now_s:.4f}: it moves under {self._observer.voltage_v:.3f} V")
+        return has_moved
+
+    # -- their wires
+
+    def _on_output(self, chunk: bytes, now_s: float) -> None:
+        observer = self._observer
+        settings = observer.settings
+        observer.hear(chunk, now_s)
+        if observer.output_lost_s is not None:
+            self._back_s = self._back_s or now_s
+            if observer.settings > settings or now_s - self._back_s > FIRST_SETTING_S:
+                observer.output_lost_s, self._back_s = None, 0.0
+        if now_s > self._dark_until_s:
+            self.world.on_output_bytes(chunk, now_s)
+
+    def _on_valve(self, chunk: bytes, now_s: float) -> None:
+        CABLES["valve"].send_to_host(self.world.on_valve_bytes(chunk, now_s))
+
+    def _stream(self) -> None:
+        assert self._cell_s
+        if CABLES["load_cell"].backlog_s < 0.01:
+            self.world.stream(self._outside.time())
+        self._outside.call_later(self.cell_pace * self._cell_s, self._stream)
+
+
+def _since(lost_s: float | None, is_lost: bool, now_s: float) -> float | None:
+    return None if not is_lost else now_s if lost_s is None else lost_s
