@@ -1,0 +1,56 @@
+"""A run below the rig's largest force: which readings end it, and which it goes on with."""
+
+from dataclasses import replace
+
+from gateway.control import LineStatus
+from gateway.control.runs.active_run import ActiveRun
+from gateway.control.runs.ladder_run import LadderRow
+from gateway.control.runs.ladder_stairs import stairs_of
+from gateway.control.sample_conditioning import Reading
+from tests.control.bench import bsfm, settings
+from tests.control.runs.test_ladder_run import SHORT
+
+LIMITS = replace(settings().limits, force_max_n=60.0, over_force_n=70.0)
+UP_AND_DOWN = replace(SHORT, minor_points=0)
+CONTROL = replace(settings(), limits=LIMITS)
+
+
+class Obedient:
+    """Stands for the force loop: what the run wants is put out."""
+
+    voltage_v = 0.0
+
+    def drive_run(self, voltage_v: float, branch_share: float) -> None:
+        self.voltage_v = voltage_v
+
+
+def climb(direction: float) -> tuple[list[LadderRow], str]:
+    """Climb the whole ladder on a machine that presses as the calibration says, and with the rig's largest force on each stair
+    that is gone to in this direction: the rows, and the sentence of the end."""
+    active, loop, rows = ActiveRun(CONTROL, bsfm()), Obedient(), list[LadderRow]()
+    active.begin(UP_AND_DOWN, is_local=True)
+    for k in range(100_000):
+        run = active.run
+        assert run
+        force_n = run.model.force_n(loop.voltage_v, run.branch_share)
+        if loop.voltage_v > 0.0 and run.branch_share == direction:
+            force_n = LIMITS.force_max_n
+        reading = Reading(force_n, force_n, 0.0, 0.01, True, True, True)
+        ended = active.step(0.01 * k, reading, loop, LineStatus())  # type: ignore[arg-type]
+        if active.last_row and active.last_row not in rows[-1:]:
+            rows.append(active.last_row)
+        if ended:
+            return rows, ended.sentence
+    raise AssertionError("the ladder never ends")
+
+
+def test_the_largest_force_on_the_way_down_leaves_no_stair_out() -> None:
+    """Where friction keeps it pressed, each stair below lowers it: stopping half way wins nothing, and half a loop is lost."""
+    rows, end = climb(-1.0)
+    assert end.startswith("calibration ladder done")
+    assert [row.stair for row in rows] == list(stairs_of(UP_AND_DOWN, LIMITS, bsfm()))
+
+
+def test_the_largest_force_on_the_way_up_is_not_climbed_beyond() -> None:
+    rows, _ = climb(1.0)
+    assert len(rows) < len(stairs_of(UP_AND_DOWN, LIMITS, bsfm()))
