@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import pytest
+
 from gateway.control import LineStatus
 from gateway.control.runs.active_run import ActiveRun
 from gateway.control.runs.ladder_run import LadderRow
@@ -24,15 +26,16 @@ class Obedient:
         self.voltage_v = voltage_v
 
 
-def climb(direction: float) -> tuple[list[LadderRow], str]:
-    """Climb the whole ladder on a machine that presses as the calibration says, and with the rig's largest force on each stair
-    that is gone to in this direction: the rows, and the sentence of the end."""
-    active, loop, rows = ActiveRun(CONTROL, bsfm()), Obedient(), list[LadderRow]()
+def climb(direction: float, strength: float = 1.0) -> tuple[list[LadderRow], str, float]:
+    """Climb the whole ladder on a machine that presses so much stronger than the calibration says, and with the rig's largest
+    force on each stair that is gone to in this direction: the rows, the sentence of the end, and the largest force."""
+    active, loop, rows, most_n = ActiveRun(CONTROL, bsfm()), Obedient(), list[LadderRow](), 0.0
     active.begin(UP_AND_DOWN, is_local=True)
     for k in range(100_000):
         run = active.run
         assert run
-        force_n = run.model.force_n(loop.voltage_v, run.branch_share)
+        force_n = strength * run.model.force_n(loop.voltage_v, run.branch_share)
+        most_n = max(most_n, force_n)
         if loop.voltage_v > 0.0 and run.branch_share == direction:
             force_n = LIMITS.force_max_n
         reading = Reading(force_n, force_n, 0.0, 0.01, True, True, True)
@@ -40,17 +43,26 @@ def climb(direction: float) -> tuple[list[LadderRow], str]:
         if active.last_row and active.last_row not in rows[-1:]:
             rows.append(active.last_row)
         if ended:
-            return rows, ended.sentence
+            return rows, ended.sentence, most_n
     raise AssertionError("the ladder never ends")
 
 
 def test_the_largest_force_on_the_way_down_leaves_no_stair_out() -> None:
     """Where friction keeps it pressed, each stair below lowers it: stopping half way wins nothing, and half a loop is lost."""
-    rows, end = climb(-1.0)
+    rows, end, _ = climb(-1.0)
     assert end.startswith("calibration ladder done")
     assert [row.stair for row in rows] == list(stairs_of(UP_AND_DOWN, LIMITS, bsfm()))
 
 
 def test_the_largest_force_on_the_way_up_is_not_climbed_beyond() -> None:
-    rows, _ = climb(1.0)
+    rows, _, _ = climb(1.0)
+    assert len(rows) < len(stairs_of(UP_AND_DOWN, LIMITS, bsfm()))
+
+
+@pytest.mark.parametrize("strength", [1.3, 1.7, 2.5])
+def test_a_machine_that_is_stronger_than_it_was_calibrated_never_passes_the_largest_force(strength: float) -> None:
+    """Not for a moment: the stair that would is left out before its voltage goes out."""
+    rows, end, most_n = climb(0.0, strength)
+    assert end.startswith("calibration ladder done")
+    assert 0.5 * LIMITS.force_max_n < most_n <= LIMITS.force_max_n
     assert len(rows) < len(stairs_of(UP_AND_DOWN, LIMITS, bsfm()))
