@@ -1,4 +1,4 @@
-"""A program that uses the generated client of Python as the page says: one exchange a cycle, in virtual time, without a socket."""
+"""A program that uses the generated client of Python as the page says: one exchange a cycle, in virtual time, no socket."""
 
 import socket
 from types import SimpleNamespace

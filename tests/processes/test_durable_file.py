@@ -61,6 +61,6 @@ def test_who_would_change_something_does_not_go_on_without_the_lock_and_a_reader
     with lock_directory(tmp_path):
         with pytest.raises(OSError, match="another program has kept it locked") as refused, lock_directory(tmp_path):
             raise AssertionError("two change it at once")
-        with lock_directory(tmp_path, shared=True) as descriptor:
-            assert os.listdir(descriptor) == []
+        with lock_directory(tmp_path, shared=True):
+            assert list(tmp_path.iterdir()) == []
     assert refused.value.errno == errno.EBUSY
