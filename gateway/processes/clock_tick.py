@@ -76,16 +76,14 @@ class ClockTick:
         _set_timer(self._fd, self._due_s + self.period_s, self.period_s)
         loop.add_reader(self._fd, self._on_expired)
 
-    def follow(self, arrival_s: float) -> None:
+    def follow(self, arrival_s: float | None) -> None:
         """Come right behind what arrives as often as the tick, or half as often, and so on: see phase_lock. arrival_s: when the
-        newest came, monotonic; the same one may be told again."""
-        if self._fd < 0:
+        newest came, monotonic, which may be told again; None: nothing comes of its own accord."""
+        if self._fd < 0 or arrival_s is None:
             return
         if shift_s := self._phase.shift_s(arrival_s, self._due_s):
             self._due_s += shift_s
-            _set_timer(
-                self._fd, self._due_s + self.period_s, self.period_s
-            )  # a tick that is due meanwhile comes at once
+            _set_timer(self._fd, self._due_s + self.period_s, self.period_s)  # one that is due by then comes at once
 
     def close(self) -> None:
         """Stop the timer."""

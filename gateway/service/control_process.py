@@ -30,7 +30,7 @@ from gateway.service.guardian_line import GuardianLine
 from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.control_loop import Log
-from gateway.service.running_rig.faces import with_rtu_face
+from gateway.service.running_rig.faces.faces import with_rtu_face
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.running_rig.running_rig import RunningRig
 from gateway.service.running_rig.starting import StartError

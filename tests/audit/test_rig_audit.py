@@ -51,15 +51,22 @@ def test_what_is_refused_and_what_is_uploaded_is_kept_too(tmp_path: Path) -> Non
         with pytest.raises(ModbusError):
             bank.write_registers(1, b"\x7f\xff", ROBOT)
         bank.staging.on_select = lambda slot, peer: None
+        bank.staging.on_commit = lambda action, words, peer: None
+        bank.write_registers(register_map.find("commit").address, b"\0\3", Peer("::1", 1, role=Role.ADMIN))
         bank.write_registers(register_map.find("slot_select").address, b"\0\2", Peer("::1", 1, role=Role.ADMIN))
         with pytest.raises(ValueError, match="no plant 3"):
             audit.watch_handlers({"plant": refuse})["plant"]({"do": "plant", "use": 3})
         await audit.close()
 
     asyncio.run(run())
-    told = [(record["what"], record["result"]) for record in read_audit(tmp_path)]
-    assert told[1:] == [("slot_select", "accepted"), ("plant", "there is no plant 3"), ("end", "accepted")]
-    assert told[0][0] == "write" and told[0][1].startswith("W")
+    told = [(record["what"], record.get("text") or record["result"]) for record in read_audit(tmp_path)]
+    assert told[1:] == [
+        ("commit", "rollback"),
+        ("slot_select", "slot 2"),
+        ("plant", "there is no plant 3"),
+        ("end", "accepted"),
+    ]
+    assert told[0][0] == "write" and "force_setpoint" in told[0][1]
 
 
 def test_an_audit_that_was_altered_is_said_once_and_not_only_kept(tmp_path: Path) -> None:

@@ -8,9 +8,10 @@ from random import Random
 import pytest
 
 from gateway.bsfm import CoefficientReason, Response
+from gateway.bsfm.slip.slip_stops import STOPS_MAX
 from gateway.calibrations.store import UNKNOWN_N
 from gateway.codes.refusals import RefusalReason
-from gateway.registers.upload.coefficients import CoefficientSet, model_hash, words_of_block
+from gateway.registers.upload.coefficients import HEAD_WORDS, CoefficientSet, model_hash, words_of_block
 from gateway.registers.words import CommitNotice, CommitStatus, UploadReason
 from tests.calibrations.coefficients import calibration, staged, swapped
 from tests.calibrations.failing_disk import disk
@@ -126,7 +127,8 @@ CHECKS = [
     (staged(changed(force_low_n=-1.0)), -1, UploadReason.FORCE_LIMITS),
     (bytes(400), -1, UploadReason.LENGTH),
     (slipping(stops=12), -1, UploadReason.STOPS_CUT),
-    (slipping(stops=17), -1, CoefficientReason.SLIP_STOPS),
+    (slipping(stops=STOPS_MAX), -1, UploadReason.STOPS_CUT),
+    (slipping(stops=STOPS_MAX + 1), -1, CoefficientReason.SLIP_STOPS),
     (slipping(stops=2), 66, UploadReason.UNUSED_NOT_ZERO),
     (slipping(slip_shares=(0.25, 0.5, 0.25, 0.125)), 83, UploadReason.UNUSED_NOT_ZERO),
     (slipping(slip_radii_v=(0.25, 0.25, 1.0)), 65, CoefficientReason.SLIP_RADIUS),
@@ -245,6 +247,15 @@ def test_whatever_call_of_the_disk_fails_the_active_set_stays(bench, slot):
         if len(there.calls) < n:
             break
     assert n > 10
+
+
+def test_what_is_told_of_a_success_is_not_told_of_a_failure(bench):
+    short = staged(GOOD, length=HEAD_WORDS)
+    with disk(1, lasting=True):
+        assert bench.commit(short) == (FAILED, -1, UploadReason.STORAGE)
+    assert bench.notice == CommitNotice(0), "nothing is in use without slip stops"
+    assert bench.commit(short) == COMMITTED
+    assert bench.notice == CommitNotice.WITHOUT_STOPS
 
 
 def test_a_defect_of_ours_ends_the_commit_and_nothing_else(bench, monkeypatch):

@@ -6,6 +6,7 @@ import pytest
 
 from tests.clients.controllers import S7, Codesys, Irc5, TwinCat, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.python_program import PythonProgram
 from tests.clients.scenes import MAP, TEXTS
 
 CONTROLLERS: dict[str, Any] = {
@@ -14,6 +15,7 @@ CONTROLLERS: dict[str, Any] = {
     "urscript": UniversalRobot,
     "twincat": TwinCat,
     "codesys": Codesys,
+    "python": PythonProgram,
 }
 
 

@@ -173,7 +173,7 @@ def test_a_loss_while_enabled_ends_in_off_and_stays_there(client: Any, gateway: 
     assert client.enabled
 
 
-@pytest.mark.parametrize("language", ["rapid", "scl", "twincat", "codesys"], indirect=True)
+@pytest.mark.parametrize("language", ["rapid", "scl", "twincat", "codesys", "python"], indirect=True)
 def test_attempts_to_connect_again_become_rarer(language: str, gateway: GatewayAtHand) -> None:
     client = CONTROLLERS[language](TEXTS[language], gateway)
     gateway.is_cut = True

@@ -47,6 +47,30 @@ def test_who_never_reached_a_gateway_stops_no_other_master_there(client: Any, ga
     assert client.ended and gateway.bank.command.force_setpoint_n == 7.0
 
 
+def test_an_off_that_is_refused_behind_a_loss_is_not_asked_for_again_and_again(
+    client: Any, gateway: GatewayAtHand
+) -> None:
+    """Another master may have the setpoint by now: its refusal registers and its log would fill for as long as we run."""
+    client.enable(12.0)
+    cycles(client)
+    gateway.is_cut = True
+    cycles(client, 3)
+    gateway.is_cut = False
+    answer, asked = gateway.answer, list[bytes]()
+
+    def refuse(request: bytes) -> bytes:
+        if request[0] == 23 or (request[0] in (6, 16) and int.from_bytes(request[1:3], "big") < 16):
+            asked.append(request)
+            return bytes((request[0] | 0x80, 6))
+        return answer(request)
+
+    gateway.answer = refuse  # type: ignore[method-assign]
+    client.CYCLE_S = 0.05
+    for _ in range(8):
+        client.cycle(1.0)
+    assert len(asked) == 1 and client.ended
+
+
 def test_the_python_client_takes_an_enable_back_whose_answer_was_lost(gateway: GatewayAtHand) -> None:
     python: dict[str, Any] = {}
     exec(render_client(MAP, "python", WHERE), python)

@@ -66,6 +66,22 @@ def test_a_server_cuts_who_connects_and_says_nothing(folder: Folder) -> None:
     asyncio.run(asyncio.wait_for(main(), 20.0))
 
 
+def test_an_end_of_the_face_cuts_who_is_shaking_hands(folder: Folder) -> None:
+    async def main() -> None:
+        files = TlsSettings(ServerSettings(), folder.crt("gateway"), folder.key("gateway"), folder.crt("ca"))
+        server = ModbusTlsServer(NotingBank(), files, on_peer_closed=list[Peer]().append, log=lambda *_: None)
+        reader, writer = await asyncio.open_connection(*await server.start("127.0.0.1", 0))
+        while not server.pending:
+            await asyncio.sleep(0.001)
+        await server.close()
+        with contextlib.suppress(ConnectionResetError):
+            assert await reader.read() == b""
+        assert server.pending == 0
+        writer.close()
+
+    asyncio.run(asyncio.wait_for(main(), 5.0))
+
+
 def unnamed(context: ssl.SSLContext) -> Any:
     context.check_hostname = False
     return context

@@ -89,6 +89,19 @@ def test_flushing_drops_what_was_not_read_yet(ear: Any, line: Pty) -> None:
     asyncio.run(scene())
 
 
+def test_flushing_drops_all_of_it_however_long_it_is(ear: Any, line: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gateway.ports.serial_port._CHUNK_BYTES", 2)
+
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        os.write(line.fd, b"stale")
+        assert port.flush_input() == 5
+        port.close()
+
+    asyncio.run(scene())
+
+
 def test_the_second_opener_is_told_who_holds_the_port(ear: Any, line: Pty) -> None:
     async def scene() -> None:
         first, second = ear.port(line.path), ear.port(line.path)

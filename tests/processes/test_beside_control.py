@@ -1,6 +1,7 @@
 """What a process beside control has to say is an event like any other: with its time, severity, code, and from where."""
 
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -58,3 +59,13 @@ def test_what_it_says_and_why_it_ends_are_events(tmp_path: Path) -> None:
         ("mqtt", "broker", "E181"),
         ("mqtt", "start", None),
     ]
+
+
+def test_it_gives_way_to_control_and_goes_first_when_memory_runs_out() -> None:
+    code = (
+        "import os; from pathlib import Path; from gateway.processes.beside_control import serve_behind_control\n"
+        "serve_behind_control(); print(Path('/proc/self/oom_score_adj').read_text(), os.nice(0))"
+    )
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    score, nice = map(int, said.split())
+    assert score == 900 and nice > os.nice(0) - 1

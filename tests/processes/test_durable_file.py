@@ -1,12 +1,27 @@
-"""A file is whole on the disk before anybody finds it under its name."""
+"""A file is whole on the disk before anybody finds it under its name, its owner's alone, and changed by one at a time."""
 
+import errno
 import os
+import stat
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from gateway.processes import durable_file
-from gateway.processes.durable_file import read_object
+from gateway.processes.durable_file import lock_directory, make_directory, read_object, write_durably
+
+
+def mode_of(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+@pytest.fixture
+def generous_umask() -> Iterator[None]:
+    """Takes nothing away: what is seen is what was asked for."""
+    previous = os.umask(0)
+    yield
+    os.umask(previous)
 
 
 def test_a_text_has_its_name_once_it_is_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -34,3 +49,36 @@ def test_a_file_of_gigabytes_is_not_read(tmp_path: Path) -> None:
     os.truncate(path, 3 << 30)
     with pytest.raises(OSError, match="no document has"):
         read_object(path)
+
+
+@pytest.mark.usefixtures("generous_umask")
+def test_what_is_made_is_for_its_owner_and_no_stranger(tmp_path: Path) -> None:
+    folder = tmp_path / "state" / "calibrations"
+    make_directory(folder)
+    with lock_directory(folder) as descriptor:
+        write_durably(descriptor, "0001.yaml", b"number: 1\n")
+    assert [mode_of(path) for path in (folder.parent, folder)] == [0o700, 0o700]
+    assert mode_of(folder / "0001.yaml") == 0o640
+
+
+def test_a_disk_that_takes_half_has_taken_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It says so by what `write` returns, and by no error."""
+    write = os.write
+    monkeypatch.setattr(durable_file.os, "write", lambda descriptor, data: write(descriptor, data[: len(data) // 2]))
+    with lock_directory(tmp_path) as descriptor, pytest.raises(OSError, match="No space left"):
+        write_durably(descriptor, "0001.yaml", b"number: 1\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_who_would_change_something_does_not_go_on_without_the_lock_and_a_reader_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its holder may be stopped by Ctrl-Z, or hang in a disk, for good."""
+    monkeypatch.setattr(durable_file, "_WRITER_BOUND_S", 0.0)
+    monkeypatch.setattr(durable_file, "_READER_BOUND_S", 0.0)
+    with lock_directory(tmp_path):
+        with pytest.raises(OSError, match="another program has kept it locked") as refused, lock_directory(tmp_path):
+            raise AssertionError("two change it at once")
+        with lock_directory(tmp_path, shared=True):
+            assert list(tmp_path.iterdir()) == []
+    assert refused.value.errno == errno.EBUSY

@@ -190,3 +190,13 @@ def test_every_fault_is_an_error_and_every_refusal_a_warning() -> None:
 def test_alarms_that_are_only_warnings_are_those_of_the_catalogue() -> None:
     only_warnings = {bit.code for bit in WarningBit} - {fault.code for fault in FaultCode} - {"A401"}
     assert only_warnings <= WARNING_ALARMS <= set(CATALOGUE)
+
+
+def test_what_was_left_out_is_told_once_however_often_it_is_looked_at() -> None:
+    clock, lines = Clock(), list[str]()
+    with EventLog(lines.append, clock) as log:
+        for _ in range(25):
+            log("flood", "x")
+        for clock.now_s in (1.1, 1.2, 1.9):
+            log._tell_left_out()
+    assert texts(lines)[10:] == ["15 more lines of 'flood' left out"]

@@ -1,5 +1,6 @@
 """The line between guardian and control: messages stay whole, a descriptor arrives open, an end is an end."""
 
+import array
 import asyncio
 import contextlib
 import os
@@ -273,3 +274,13 @@ def test_control_learns_that_its_simulated_ports_have_moved(ends: Pair) -> None:
         return moved
 
     assert asyncio.run(scene()) == [{"output": "/dev/pts/2"}]
+
+
+def test_a_descriptor_that_came_with_no_message_is_closed(ends: Pair) -> None:
+    reader, writer = os.pipe()
+    os.set_blocking(reader, False)
+    ends[0].sendmsg([b""], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [writer]))])
+    os.close(writer)
+    assert message_link.receive(ends[1]) is None
+    assert os.read(reader, 1) == b"", "nobody holds the other end any more"
+    os.close(reader)

@@ -110,6 +110,7 @@ def test_every_value_fits_where_the_map_puts_it(bank, master, register_map):
         ((1151, 5), RefusalReason.RESERVED),
         ((1146, 3), RefusalReason.READ_ONLY),
         ((1145, 1), RefusalReason.COEFFICIENTS),
+        ((1145, max(CommitAction) + 1), RefusalReason.OUT_OF_RANGE),
         ((1145, 9), RefusalReason.OUT_OF_RANGE),
         ((1144, 2, 1), RefusalReason.COEFFICIENTS),
         ((1149, 3), RefusalReason.COEFFICIENTS),

@@ -38,11 +38,6 @@ class ValveSwitch:
         return self.direction is PULL
 
     @property
-    def is_known(self) -> bool:
-        """Decide whether the device has said where it stands, and answers."""
-        return self._status.stands is not None and not self._status.lost
-
-    @property
     def order(self) -> ValveDirection | None:
         """Direction that the device may be told now; None while there is pressure: then nobody moves it."""
         return self.commanded if self._vented_s < inf else None

@@ -31,7 +31,7 @@ from gateway.service.guardian_line import GuardianLine
 from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
-from gateway.service.running_rig.faces import Faces
+from gateway.service.running_rig.faces.faces import Faces
 from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.lines.baud_probe import explain_silent_device
 from gateway.service.running_rig.lines.device_checks import DeviceChecks
@@ -296,8 +296,7 @@ class RunningRig:
         self._calibration_runs.flush(now_s)
         self._plants.take_waiting()
         self._audit.flush()
-        if (streamed_s := self.loop.streamed_s) is not None:
-            self._tick.follow(streamed_s)
+        self._tick.follow(self.loop.streamed_s)
         if self._line.acknowledged_v is not None and self.loop.sample is not None:
             self._spoke.set()
 

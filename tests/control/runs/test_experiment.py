@@ -155,3 +155,10 @@ def test_a_silent_cell_is_a_fault_here_too() -> None:
     bench.run(0.5)
     assert bench.last.fault is FaultCode.SAMPLE_STALE
     assert bench.last.voltage_v == 0.0
+
+
+def test_a_plan_without_end_is_refused_by_the_number_of_its_turns() -> None:
+    many = [Move(do=MoveKind.REVERSALS, size_v=0.1, times=1000, over_s=0.01, hold_s=0.0)] * 10
+    start = Move(do=MoveKind.STEP, to_v=3.0, hold_s=0.5)
+    with pytest.raises(ValueError, match="20011 stairs and turns, at most 20000"):
+        segments_of(plan(start, *many), LIMITS, bsfm())

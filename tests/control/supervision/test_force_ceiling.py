@@ -1,5 +1,7 @@
 """A run stays below the rig's largest contact force: what the cell feels, and what the payload's weight adds to it."""
 
+from math import nan
+
 import pytest
 
 from gateway.control.runs.ladder_run import LadderRow
@@ -31,3 +33,40 @@ def test_a_stair_is_judged_with_the_payloads_weight(weight_n: float, is_beyond: 
 @pytest.mark.parametrize(("weight_n", "is_reached"), [(0.0, False), (20.0, True)])
 def test_the_force_of_now_is_judged_with_it_too(weight_n: float, is_reached: bool) -> None:
     assert ceiling_at(35.0, weight_n).is_reached(0.0) is is_reached
+
+
+def reading(contact_n: float, *, is_usable: bool = True) -> Reading:
+    return Reading(cell_n=contact_n, contact_n=contact_n, is_new=True, is_usable=is_usable)
+
+
+def test_one_spike_is_not_the_force_of_now() -> None:
+    ceiling = ceiling_at(35.0, 0.0)
+    ceiling.observe(reading(MOST_N + 10.0))
+    assert not ceiling.is_reached(0.0)
+    ceiling.observe(reading(MOST_N + 10.0))
+    ceiling.observe(reading(MOST_N + 10.0))
+    assert ceiling.is_reached(0.0)
+
+
+def test_what_the_cell_could_not_measure_is_no_force() -> None:
+    ceiling = ceiling_at(MOST_N, 0.0)
+    ceiling.observe(reading(nan, is_usable=False))
+    assert ceiling.is_reached(0.0)
+
+
+@pytest.mark.parametrize(("noise_n", "is_reached"), [(0.0, False), (0.2, False), (0.5, True)])
+def test_a_cell_with_noise_needs_more_room_below_the_largest_force(noise_n: float, is_reached: bool) -> None:
+    """Else single readings would pass it: three sigma of 0.5 N are 1.5 N."""
+    ceiling = ceiling_at(MOST_N - 1.0, 0.0)
+    assert ceiling.is_reached(noise_n) is is_reached
+    assert ceiling.is_beyond(3.0, noise_n) is False, "a stair that stands there is no higher one"
+
+
+def test_a_stair_on_the_way_down_says_nothing_of_how_the_force_rises() -> None:
+    """It presses with what friction has kept: from there to the next stair the force seems to rise by little."""
+    model, ceiling = bsfm(), ForceCeiling(MOST_N, bsfm(), 0.0)
+    for voltage_v, way in ((2.0, -1), (3.0, 1)):
+        force_n = 2.0 * model.force_n(voltage_v, float(way))  # of a machine twice as strong as it was calibrated
+        ceiling.observe_row(LadderRow(PlannedStair(voltage_v, way, 0, CalibrationPhase.LADDER), force_n, 1.0, True))
+    assert 2.0 * model.force_n(4.0, 1.0) > MOST_N
+    assert ceiling.is_beyond(4.0, 0.0)

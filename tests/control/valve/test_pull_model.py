@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.bsfm import LinearBlend
 from gateway.control import Controller
 from gateway.control.compensation.compensation import Compensation, OutsideForce
 from gateway.control.inputs import CalibrationInUse
@@ -69,3 +70,12 @@ def test_the_derived_model_is_that_of_pushing_by_the_share_of_the_area() -> None
     for share in (-1.0, 0.0, 1.0):
         assert pull.force_n(4.0, share) == pytest.approx(SHARE * model.force_n(4.0, share))
     assert pull.force_range_n[1] == pytest.approx(SHARE * model.force_range_n[1])
+
+
+def test_what_happens_when_a_pull_turns_round_is_that_of_pushing_by_the_share_of_the_area() -> None:
+    """A span in newtons and limits of the set's own are forces like any other."""
+    model = replace(bsfm(span_n=6.0), limits_n=(2.0, 40.0))
+    pull = scale_forces(model, SHARE)
+    assert isinstance(pull.reversal, LinearBlend)
+    assert pull.reversal.span_n == pytest.approx(SHARE * 6.0)
+    assert pull.limits_n == pytest.approx((SHARE * 2.0, SHARE * 40.0))

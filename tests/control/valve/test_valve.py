@@ -1,5 +1,7 @@
 """Bit 4: the force goes to 0, the valve is switched without pressure, its readback is awaited, and then the tool pulls."""
 
+from dataclasses import replace
+
 import pytest
 
 from gateway.codes.faults import FaultCode
@@ -170,3 +172,29 @@ def test_under_pressure_nobody_is_told_to_move_the_valve() -> None:
     bench.enable(12.0)
     bench.run(2.0)
     assert bench.last.voltage_v > 0.0 and bench.last.valve is None
+
+
+def turned(bench: ValveBench) -> ValveBench:
+    """From a push of 12 N until the tool pulls, and no step further."""
+    bench.run(1.0)
+    bench.enable(12.0)
+    bench.run(2.0)
+    bench.write(control_word=ENABLE | BIT_4)
+    while "the valve pulls" not in bench.events:
+        bench.run(0.001)
+        assert bench.now_s < 10.0
+    return bench
+
+
+def test_what_was_measured_before_the_turn_counts_the_other_way_behind_it() -> None:
+    """1.5 N of zero error are -1.5 N of a pull: else 3 N seem to come or go with the turn, in a check that begins there."""
+    bench = ValveBench()
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 1.5)
+    assert turned(bench).controller._faults.measured_n == pytest.approx(-1.5, abs=0.2)
+
+
+def test_a_scale_that_was_right_pushing_is_looked_at_again_pulling() -> None:
+    bench = turned(ValveBench())
+    bench.plant.unit = 9.80665
+    bench.run(2.0)
+    assert bench.last.fault is FaultCode.GAIN_WRONG

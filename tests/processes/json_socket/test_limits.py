@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 import random
 import socket
 import time
@@ -180,3 +181,89 @@ def test_a_flood_of_requests_leaves_nine_tenths_of_the_loop(tmp_path: Path) -> N
         await server.close()
 
     asyncio.run(play())
+
+
+def test_who_has_just_spoken_is_not_the_one_that_has_been_silent_for_longest(tmp_path: Path) -> None:
+    async def scene(path: Path) -> None:
+        first, second = talk(path, ECHO), talk(path, ECHO)
+        for caller in (first, second):
+            assert (await line_from(caller))["ok"]
+        first.send(ECHO)
+        assert (await line_from(first))["ok"]
+        third = talk(path, ECHO)
+        assert (await line_from(third))["ok"]
+        assert b"others are waiting" in await heard(second)
+        first.send(ECHO)
+        assert (await line_from(first))["ok"]
+        for caller in (first, third):
+            caller.close()
+
+    assert with_server(tmp_path, scene, SocketLimits(callers=2, spared_s=0.0)) == []
+
+
+def test_an_answer_that_no_buffer_holds_arrives_whole(tmp_path: Path) -> None:
+    """Its rest waits until the caller reads: not a byte of it is lost or comes twice."""
+    rows = list(range(100_000))
+
+    async def scene() -> None:
+        server = JsonLineServer(tmp_path / "control.sock", {"all": lambda request: {"rows": rows}})
+        await server.start()
+        caller = talk(tmp_path / "control.sock", b'{"do": "all"}\n')
+        assert (await line_from(caller))["rows"] == rows
+        caller.close()
+        await server.close()
+
+    asyncio.run(scene())
+
+
+def test_a_caller_that_was_told_to_stop_is_forgotten_when_it_leaves(tmp_path: Path) -> None:
+    async def scene() -> None:
+        server = JsonLineServer(tmp_path / "control.sock", {})
+        await server.start()
+        caller = talk(tmp_path / "control.sock", b"x" * 100_000)
+        assert b"65536 bytes" in await heard(caller)
+        async with asyncio.timeout(5.0):
+            while server._callers:
+                await asyncio.sleep(0.001)
+        await server.close()
+
+    asyncio.run(scene())
+
+
+def test_an_answer_without_end_is_a_sentence(tmp_path: Path) -> None:
+    async def scene() -> None:
+        server = JsonLineServer(tmp_path / "control.sock", {"all": lambda request: {"rows": "x" * (1 << 20)}})
+        await server.start()
+        caller = talk(tmp_path / "control.sock", b'{"do": "all"}\n')
+        answer = await line_from(caller)
+        assert answer["ok"] is False and "the answer would have 10" in answer["error"]
+        caller.close()
+        await server.close()
+
+    asyncio.run(scene())
+
+
+def test_a_number_that_is_none_is_no_request(tmp_path: Path) -> None:
+    """NaN passes every bound that is asked as `too large?`."""
+
+    async def scene(path: Path) -> None:
+        for number in (b"NaN", b"-Infinity"):
+            caller = talk(path, b'{"do": "echo", "say": ' + number + b"}\n")
+            assert (await line_from(caller))["ok"] is False
+            caller.close()
+
+    assert with_server(tmp_path, scene) == []
+
+
+def test_a_server_leaves_umask_and_clock_as_it_has_found_them(tmp_path: Path) -> None:
+    """What other parts of the process make afterwards would have other rights; a sweep behind the end would make a new file."""
+
+    async def scene() -> None:
+        server = JsonLineServer(tmp_path / "control.sock", {})
+        before = os.umask(0o027)
+        await server.start()
+        assert os.umask(before) == 0o027
+        await server.close()
+        assert server._sweep_timer and server._sweep_timer.cancelled()
+
+    asyncio.run(scene())

@@ -1,6 +1,8 @@
 """What is behind a port: found at the speed and in the words that it has, told in numbers, and never driven."""
 
+import asyncio
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -8,13 +10,14 @@ from click.testing import CliRunner
 
 from gateway.cli.main import command
 from gateway.cli.port_probing import tell_report
-from gateway.devices import ValveDevice, cell_device
+from gateway.devices import SerialSettings, ValveDevice, cell_device
 from gateway.devices.messages import AskDevice, DeviceStep, Garbage, ReadPressure, ReadVoltage
 from gateway.devices.profile import DeviceRole
+from gateway.ports import Pty
 from gateway.processes import exit_codes
 from gateway.profiles import list_shipped, load_device
-from gateway.service.probing.harmless_questions import harmless_questions
-from gateway.service.probing.port_probe import PortReport, ProbeAnswer, show_bytes
+from gateway.service.probing.harmless_questions import HarmlessQuestion, harmless_questions
+from gateway.service.probing.port_probe import PortReport, ProbeAnswer, _Ear, show_bytes
 from tests.service.probing.far_ends import FarEnd, behind_ptys
 
 RIG = """
@@ -183,3 +186,23 @@ def test_a_device_at_another_speed_than_its_file_says_is_told(tmp_path: Path) ->
         file = "profiles/devices/icpdas-702x.yaml"
         result = CliRunner().invoke(command, ["check", file, "--probe", "--port", paths[0]])
     assert "the file says 9600 8N1: correct it, or say `baud: 19200` in the rig" in result.output, result.output
+
+
+def test_a_probe_takes_no_answer_to_a_question_of_before_it() -> None:
+    """At each speed and in each profile's words it asks anew: a late answer to the last ones proves nothing of these."""
+    pty = Pty()
+    question = HarmlessQuestion(b"?", lambda received: received.decode())
+
+    async def ask() -> str:
+        ear = _Ear(pty.path, SerialSettings(baud=9600))
+        await ear.port.open()
+        asyncio.get_running_loop().add_reader(pty.fd, lambda: (os.read(pty.fd, 16), os.write(pty.fd, b"fresh")))
+        try:
+            os.write(pty.fd, b"late")
+            return await ear.ask(question, 5.0)
+        finally:
+            asyncio.get_running_loop().remove_reader(pty.fd)
+            ear.port.close()
+
+    assert asyncio.run(ask()) == "fresh"
+    pty.close()

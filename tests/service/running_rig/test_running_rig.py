@@ -23,7 +23,7 @@ from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.profiles import load_rig
 from gateway.service.guardian_line import GuardianLine
-from gateway.service.running_rig.faces import Faces
+from gateway.service.running_rig.faces.faces import Faces
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.end_to_end.own_devices import OwnDevices

@@ -120,7 +120,7 @@ class SimulatedTick:
         self._due_s = self._loop.time() + self.period_s
         self._timer = self._loop.call_at(self._due_s, self._fire)
 
-    def follow(self, arrival_s: float) -> None:
+    def follow(self, arrival_s: float | None) -> None:
         """Here a wake-up costs nothing."""
 
     def close(self) -> None:

@@ -79,6 +79,7 @@ class DeviceChecks:
         """Clear a tripped watchdog and arm it again: somebody has asked for it, by a reset."""
         if self.fault is FaultCode.WATCHDOG_TRIPPED and DeviceStep.CLEAR in self._known:
             self.fault = FaultCode.NONE  # is_tripped lasts until the device has answered: before, it obeys nothing
+            self._tries = 0
             self._waiting = self._known_of(DeviceStep.CLEAR, DeviceStep.STATUS, *self._arming)
         elif self.fault in _ASKED_AGAIN:
             self.begin()

@@ -1,0 +1,72 @@
+"""What no generated client may do to a force: begin it by itself, believe another one's answer, send one below 0."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.clients.conftest import CONTROLLERS
+from tests.clients.controllers import Irc5
+from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.scenes import TEXTS, command, commands, cycles
+
+OWN_SOCKETS = ["rapid", "urscript", "python"]
+"""Languages whose client reads the header of an answer; the others leave it to a library."""
+
+
+def test_a_reset_ends_the_enable_before_it(client: Any, gateway: GatewayAtHand) -> None:
+    """A reset needs force 0; an enable that stood beside it would be a new rise behind it."""
+    client.enable(12.0)
+    cycles(client)
+    client.reset()
+    cycles(client)
+    assert [words[0] for words in gateway.words][:2] == [1, 2]
+    assert not gateway.bank.command.control_word & 1 and not client.enabled
+
+
+def test_a_force_below_0_is_not_sent(client: Any, gateway: GatewayAtHand) -> None:
+    client.enable(12.0)
+    cycles(client)
+    client.force(-1.0)
+    cycles(client)
+    assert commands(gateway) == [command(1, 1200)]
+    assert "0.00 .. 327.67" in client.text
+
+
+@pytest.mark.parametrize(
+    "place", [pytest.param(1, id="transaction"), pytest.param(2, id="protocol"), pytest.param(6, id="unit")]
+)
+@pytest.mark.parametrize("language", OWN_SOCKETS)
+def test_an_answer_to_another_question_is_a_loss(language: str, place: int, gateway: GatewayAtHand) -> None:
+    """A late one, or another unit's behind the same bridge: its status would be taken for this gateway's."""
+    client = CONTROLLERS[language](TEXTS[language], gateway)
+    cycles(client)
+    assert not client.text
+    ask = gateway.ask
+
+    def alter(frame: bytes) -> bytes:
+        answer = bytearray(ask(frame))
+        answer[place] ^= 0x10
+        return bytes(answer)
+
+    gateway.ask = alter  # type: ignore[method-assign]
+    client.cycle()
+    assert "lost" in client.text
+
+
+def test_a_robot_that_starts_again_remembers_no_force(gateway: GatewayAtHand) -> None:
+    """PERS data keep their values over a restart of the controller, and over a stop of the program."""
+    client = Irc5(TEXTS["rapid"], gateway)
+    client.enable(12.0)
+    client.machine.start("FgInit")
+    cycles(client)
+    assert gateway.writes == [] and not client.enabled
+
+
+def test_a_robot_that_stops_its_timer_lets_go(gateway: GatewayAtHand) -> None:
+    client = Irc5(TEXTS["rapid"], gateway)
+    client.enable(12.0)
+    cycles(client)
+    client.machine.start("FgTimerStop")
+    assert commands(gateway) == [command(1, 1200), command(0, 0)]

@@ -1,0 +1,138 @@
+"""How a TLS connection ends, and its handshake: places are given back at once, nobody is served or judged behind the end."""
+
+import ssl
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from gateway.fieldbus.tls_server import _utc_now
+from gateway.fieldbus.tls_settings import HANDSHAKE_S
+from tests.certificates import Folder
+from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
+from tests.fieldbus.tls_by_hand import VERSIONS, Face, Line, SocketInHand, client, face
+
+__all__ = ["face"]
+
+
+class SlowSocket(SocketInHand):
+    """Takes its time to end, as one does whose far end reads nothing."""
+
+    def _end(self, how: str) -> None:
+        self.ended = how
+
+
+def greeted(face: Face, folder: Folder, name: str = "setpoint") -> Line:
+    line = Line(face, SlowSocket("127.0.0.1"))
+    try:
+        line.greet(client(folder, name))
+    except ssl.SSLError:
+        pass
+    return line
+
+
+def deliver(line: Line, data: bytes) -> None:
+    """As a socket does that was told to stop too late."""
+    room = line.stream.get_buffer(-1)
+    room[: len(data)] = data
+    line.stream.buffer_updated(len(data))
+
+
+@pytest.mark.parametrize("name", ["setpoint", "roleless"])
+def test_a_handshake_that_is_over_holds_no_place_however_slowly_its_socket_goes(
+    face: Face, folder: Folder, name: str
+) -> None:
+    """Eight that linger would keep everybody out."""
+    line = greeted(face, folder, name)
+    assert bool(line.socket.ended) is (name == "roleless")
+    assert not face.handshakes.pending
+
+
+def test_a_handshake_that_is_cut_holds_no_place_either(face: Face) -> None:
+    line = Line(face, SlowSocket("127.0.0.1"))
+    assert face.handshakes.pending
+    line.stream.abort()
+    assert not face.handshakes.pending
+
+
+def test_the_bound_of_a_handshake_is_none_of_a_connection(face: Face, folder: Folder) -> None:
+    line = greeted(face, folder)
+    face.clock.advance(2.0 * HANDSHAKE_S)
+    face.handshakes.sweep(face.clock.time())
+    assert not line.socket.ended
+    assert line.ask(framed(READ)) == framed(READ_ANSWER)
+
+
+def test_behind_its_end_nobody_is_judged_again(face: Face, folder: Folder) -> None:
+    line = greeted(face, folder, "roleless")
+    told = list(face.log)
+    deliver(line, b"\x16\x03\x03\x00\x02\x00\x00")
+    assert face.log == told and len(told) == 1
+
+
+def test_a_face_that_closes_begins_no_handshake(face: Face) -> None:
+    face.shared.closing = True
+    assert face.accept().socket.ended == "aborted"
+    assert not face.handshakes.pending
+
+
+def test_who_does_not_read_its_handshake_is_cut(face: Face) -> None:
+    line = face.accept()
+    line.stream.pause_writing()
+    assert line.socket.ended == "aborted"
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_an_end_is_told_to_the_far_end(face: Face, folder: Folder, version: ssl.TLSVersion) -> None:
+    """Else it cannot tell an end from somebody who has cut the wire (truncation)."""
+    line = face.accept()
+    line.greet(client(folder, "setpoint", version))
+    line.stream.close()
+    line.incoming.write(line.socket.take())
+    assert line.tls.read(1) == b""
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_who_says_goodbye_is_let_go_though_its_socket_stays_open(
+    face: Face, folder: Folder, version: ssl.TLSVersion
+) -> None:
+    line = face.accept()
+    line.greet(client(folder, "setpoint", version))
+    with pytest.raises(ssl.SSLWantReadError):
+        line.tls.unwrap()
+    line.exchange()
+    assert line.socket.ended and not face.shared.connections
+
+
+def test_no_ticket_is_given_out_that_would_save_a_client_its_next_handshake(face: Face, folder: Folder) -> None:
+    line = face.accept()
+    line.greet(client(folder, "setpoint", ssl.TLSVersion.TLSv1_3))
+    assert line.ask(framed(READ)) == framed(READ_ANSWER)
+    assert not line.tls.session.has_ticket
+
+
+def test_what_comes_while_a_connection_gives_way_waits_until_it_goes_on(face: Face, folder: Folder) -> None:
+    """A limit of requests would else be none by TLS: what the socket had taken already was served."""
+    line = greeted(face, folder)
+    line.stream.pause_reading()
+    line.tls.write(framed(READ))
+    deliver(line, line.outgoing.read())
+    assert not line.socket.take()
+    line.stream.resume_reading()
+    line.incoming.write(line.socket.take())
+    assert line.tls.read(100) == framed(READ_ANSWER)
+
+
+@pytest.fixture
+def far_east(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setenv("TZ", "XST-9")
+    time.tzset()
+    yield
+    monkeypatch.undo()
+    time.tzset()
+
+
+@pytest.mark.usefixtures("far_east")
+def test_certificates_are_judged_by_utc_wherever_the_machine_stands() -> None:
+    before, now, after = time.gmtime(), _utc_now(), time.gmtime()
+    assert f"{time.strftime('%Y%m%d%H%M%S', before)}Z" <= now <= f"{time.strftime('%Y%m%d%H%M%S', after)}Z"
