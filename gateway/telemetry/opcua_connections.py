@@ -16,7 +16,7 @@ LONGEST_REQUEST: Final = 1 << 20
 Log = Callable[[str, str], None]
 
 
-class Silence:
+class SilenceTimer:
     """Calls back once when nothing has been heard for longest_s; to be made in a running loop."""
 
     def __init__(self, longest_s: float, on_silence: Callable[[], None]) -> None:
@@ -41,6 +41,13 @@ class Silence:
             self._timer = self._loop.call_later(left_s, self._look)
 
 
+def _judge(transport: asyncio.BaseTransport, peers: Peers) -> tuple[str, str]:
+    """Return the client's address, and why it may not connect now; empty: it may."""
+    host, port = (transport.get_extra_info("peername") or ("", 0))[:2]
+    refusal = peers.refusal(host) if host else "it has left already"
+    return host, f"W230 {host}:{port}: {refusal} (OPC UA)" if refusal else ""
+
+
 def bound_connections(wire: Any, log: Log, settings: ServerSettings | None = None) -> None:
     """Have the library refuse connections beyond the most allowed, cut those that are silent, and a client whose request is
     longer than any could be: it waits for as many bytes as a header says, which may be 2 GB. wire: its protocol's module."""
@@ -49,18 +56,18 @@ def bound_connections(wire: Any, log: Log, settings: ServerSettings | None = Non
 
     class BoundedProtocol(wire.OPCUAProtocol):  # type: ignore[misc]
         _buffer: bytes
-        _silence: Silence | None = None  # of an admitted client
+        transport: Any
+        _silence: SilenceTimer | None = None  # of an admitted client
 
-        def connection_made(self, transport: asyncio.BaseTransport) -> None:
-            host, port = (transport.get_extra_info("peername") or ("", 0))[:2]
-            if refusal := peers.refusal(host) if host else "it has left already":
-                log("refused", f"W230 {host}:{port}: {refusal} (OPC UA)")
+        def connection_made(self, transport: Any) -> None:
+            self._host, refusal = _judge(transport, peers)
+            if refusal:
+                log("refused", refusal)
                 transport.close()
-                return
-            self._host = host
-            peers.join(host)
-            super().connection_made(transport)
-            self._silence = Silence(bounds.idle_s, self._cut)
+            else:
+                peers.join(self._host)
+                super().connection_made(transport)
+                self._silence = SilenceTimer(bounds.idle_s, transport.abort)
 
         def connection_lost(self, ex: BaseException | None) -> None:
             if self._silence:
@@ -74,12 +81,8 @@ def bound_connections(wire: Any, log: Log, settings: ServerSettings | None = Non
             self._silence.note_heard()
             if len(self._buffer) + len(data) > LONGEST_REQUEST:
                 self._buffer = b""
-                self._cut()
+                self.transport.abort()
                 return
             super().data_received(data)
-
-        def _cut(self) -> None:
-            if self.transport is not None:
-                self.transport.abort()
 
     wire.OPCUAProtocol = BoundedProtocol

@@ -18,9 +18,9 @@ from gateway.profiles.rigs.faces import RtuFace, TlsFace
 from gateway.registers import RegisterBank
 from gateway.registers.writes.ownership import serial_host
 from gateway.service.banner import ServedFace, tcp_face, tls_face
+from gateway.service.faces_to_come import FacesToCome, Serve
 from gateway.service.running_rig.bank_rules import plain_role, server_settings
 from gateway.service.running_rig.control_loop import Log
-from gateway.service.running_rig.faces_to_come import FacesToCome, Serve
 from gateway.service.running_rig.starting import StartError, listen, open_again
 
 

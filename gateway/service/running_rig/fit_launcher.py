@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from gateway.processes.module_command import module_command
+from gateway.module_command import module_command
 
 Result = dict[str, Any]
 _LONGEST = 1 << 16

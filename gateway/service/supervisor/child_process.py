@@ -13,8 +13,8 @@ import socket
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from gateway.module_command import module_command
 from gateway.processes import message_link as guardian_link
-from gateway.processes.module_command import module_command
 from gateway.processes.scheduler_counters import SchedulerCounters
 
 _END_BOUND_S: Final = 1.0

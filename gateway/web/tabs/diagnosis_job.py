@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.processes.module_command import module_command
+from gateway.module_command import module_command
 from gateway.web.context import WebContext
 from gateway.web.tabs.answers import NOT_FOUND, TabRefusedError
 from gateway.web.tabs.own_command import child_environment, last_sentence

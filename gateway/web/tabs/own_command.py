@@ -10,7 +10,7 @@ import os
 import subprocess
 from typing import Any, Final
 
-from gateway.processes.module_command import module_command
+from gateway.module_command import module_command
 from gateway.web.context import WebContext
 from gateway.web.tabs.answers import CONFLICT, UNAVAILABLE, TabRefusedError
 

@@ -20,8 +20,8 @@ from gateway.ports import PortError, Pty, SerialPort
 from gateway.profiles import Rig
 from gateway.profiles.rigs.faces import RtuFace
 from gateway.registers import RegisterBank
+from gateway.service import faces_to_come
 from gateway.service.banner import Ready, format_banner, ready_fields
-from gateway.service.running_rig import faces_to_come
 from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.faces import Faces, with_rtu_face
 from gateway.service.running_rig.starting import StartError

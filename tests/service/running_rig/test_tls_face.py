@@ -12,7 +12,7 @@ import pytest
 
 from gateway.modbus import pdu
 from gateway.profiles.rigs.faces import TlsFace
-from gateway.service.running_rig import faces_to_come
+from gateway.service import faces_to_come
 from gateway.service.running_rig.starting import StartError
 from tests.certificates import Folder, store_all
 from tests.fieldbus.by_hand import framed

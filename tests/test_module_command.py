@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from gateway.processes.module_command import module_command
+from gateway.module_command import module_command
 from gateway.service.supervisor.child_process import spawn_child
 from gateway.service.supervisor.event_wait import wait_readable
 
-_STARTER = "from gateway.processes.module_command import module_command as m; print(*m('json.tool')[1:])"
+_STARTER = "from gateway.module_command import module_command as m; print(*m('json.tool')[1:])"
 
 
 @pytest.fixture
