@@ -47,7 +47,7 @@ def pack(state: Path, target: Path) -> list[str]:
         try:
             with tarfile.open(fileobj=stream, mode="w:gz") as archive:
                 _add_manifest(archive, state)
-                for path in _files(state):
+                for path in (path for path in _files(state) if _is_kept(path, state)):
                     with contextlib.suppress(FileNotFoundError):  # an event file that has got its next name meanwhile
                         archive.add(path, f"{_TOP}/{path.relative_to(state)}", recursive=False)
                         files.append(path)
@@ -142,12 +142,20 @@ def _read_to_the_end(source: Path) -> None:
 
 
 def _files(state: Path) -> Iterator[Path]:
-    """Directories and plain files, parents first; links and sockets stay behind."""
-    for path in sorted(state.rglob("*")):
-        if path.name in _LEFT_OUT and path.parent == state:
+    """Directories and plain files, parents first; links and sockets stay behind. OSError for a directory that may not be read:
+    a backup without it would be taken for a whole one."""
+    for path in sorted(state.iterdir()):
+        if path.is_symlink() or not (path.is_dir() or path.is_file()):
             continue
-        if not path.is_symlink() and (path.is_dir() or path.is_file()):
-            yield path
+        yield path
+        if path.is_dir():
+            with contextlib.suppress(FileNotFoundError):  # removed meanwhile
+                yield from _files(path)
+
+
+def _is_kept(path: Path, state: Path) -> bool:
+    """Decide whether a file is of the state, and not of a gateway that runs on it."""
+    return path.parent != state or path.name not in _LEFT_OUT
 
 
 def _add_manifest(archive: tarfile.TarFile, state: Path) -> None:

@@ -4,6 +4,7 @@ What is dropped is said: a torn tail is the normal end after kill -9, and batche
 disk) cost themselves only. numpy is imported when a file is read, not with the room: the recorder's process needs none.
 """
 
+import contextlib
 import json
 import struct
 from collections.abc import Iterator, Sequence
@@ -79,8 +80,11 @@ def list_recordings(state_directory: Path) -> list[RecordingEntry]:
 
 
 def recording_paths(state_directory: Path) -> list[Path]:
-    """Return the files of the recordings of one state directory by number."""
-    paths = (state_directory / "recordings").glob(f"*{SUFFIX}")
+    """Return the files of the recordings of one state directory by number. OSError for a folder that may not be read: it is not
+    an empty one."""
+    paths: list[Path] = []
+    with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+        paths = [path for path in (state_directory / "recordings").iterdir() if path.suffix == SUFFIX]
     numbered = ((number, path) for path in paths if (number := number_in(path)) is not None)
     return [path for _, path in sorted(numbered) if path.is_file()]  # a pipe or a device would be read for ever
 

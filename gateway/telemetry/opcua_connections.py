@@ -16,7 +16,7 @@ LONGEST_REQUEST: Final = 1 << 20
 Log = Callable[[str, str], None]
 
 
-class IdleTimer:
+class SilenceTimer:
     """Calls back once when nothing has been heard for longest_s; to be made in a running loop."""
 
     def __init__(self, longest_s: float, on_silence: Callable[[], None]) -> None:
@@ -41,58 +41,48 @@ class IdleTimer:
             self._timer = self._loop.call_later(left_s, self._look)
 
 
-class _Admission:
-    """Knows who is connected, and refuses more than the bounds allow."""
-
-    def __init__(self, bounds: ServerSettings, log: Log) -> None:
-        self._peers, self._log = Peers(bounds, guarded=False), log
-        self.leave = self._peers.leave
-
-    def admit(self, transport: asyncio.BaseTransport) -> str:
-        """Return the host of a client that may stay; empty for another one, which is told and closed."""
-        host, port = (transport.get_extra_info("peername") or ("", 0))[:2]
-        if refusal := self._peers.refusal(host) if host else "it has left already":
-            self._log("refused", f"W230 {host}:{port}: {refusal} (OPC UA)")
-            transport.close()
-            return ""
-        self._peers.join(host)
-        return str(host)
+def _judge(transport: asyncio.BaseTransport, peers: Peers) -> tuple[str, str]:
+    """Return the client's address, and why it may not connect now; empty: it may."""
+    host, port = (transport.get_extra_info("peername") or ("", 0))[:2]
+    refusal = peers.refusal(host) if host else "it has left already"
+    return host, f"W230 {host}:{port}: {refusal} (OPC UA)" if refusal else ""
 
 
 def bound_connections(wire: Any, log: Log, settings: ServerSettings | None = None) -> None:
     """Have the library refuse connections beyond the most allowed, cut those that are silent, and a client whose request is
     longer than any could be: it waits for as many bytes as a header says, which may be 2 GB. wire: its protocol's module."""
     bounds = settings or ServerSettings()
-    admission = _Admission(bounds, log)
+    peers = Peers(bounds, guarded=False)
 
     class BoundedProtocol(wire.OPCUAProtocol):  # type: ignore[misc]
         _buffer: bytes
-        _idle_timer: IdleTimer | None = None  # of an admitted client
+        transport: Any
+        _silence: SilenceTimer | None = None  # of an admitted client
 
-        def connection_made(self, transport: asyncio.BaseTransport) -> None:
-            self._host = admission.admit(transport)
-            if self._host:
+        def connection_made(self, transport: Any) -> None:
+            self._host, refusal = _judge(transport, peers)
+            if refusal:
+                log("refused", refusal)
+                transport.close()
+            else:
+                peers.join(self._host)
                 super().connection_made(transport)
-                self._idle_timer = IdleTimer(bounds.idle_s, self._cut)
+                self._silence = SilenceTimer(bounds.idle_s, transport.abort)
 
         def connection_lost(self, ex: BaseException | None) -> None:
-            if self._idle_timer:
-                self._idle_timer.close()
-                admission.leave(self._host)
+            if self._silence:
+                self._silence.close()
+                peers.leave(self._host)
                 super().connection_lost(ex)
 
         def data_received(self, data: bytes) -> None:
-            if self._idle_timer is None:
+            if self._silence is None:
                 return
-            self._idle_timer.note_heard()
+            self._silence.note_heard()
             if len(self._buffer) + len(data) > LONGEST_REQUEST:
                 self._buffer = b""
-                self._cut()
+                self.transport.abort()
                 return
             super().data_received(data)
-
-        def _cut(self) -> None:
-            if self.transport is not None:
-                self.transport.abort()
 
     wire.OPCUAProtocol = BoundedProtocol

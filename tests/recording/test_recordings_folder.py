@@ -1,5 +1,6 @@
 """What others put into the folder of the recordings, or take out of it, neither stops a recorder nor passes for a recording."""
 
+import errno
 import os
 import shutil
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from gateway.recording import Recorder, RecordingError, find_recording, list_recordings
+from gateway.recording.reader import recording_paths
 from tests.recording.test_recorder import COLUMNS, HEADER, record
 
 
@@ -42,3 +44,17 @@ def test_who_deletes_a_recording_that_is_written_ends_it_and_it_says_so(rows_lef
     assert recorder.failure.startswith("E402")
     assert "stopped after 1 rows: somebody has deleted its file; control goes on" in recorder.failure
     assert not recorder.is_open
+
+
+def test_a_folder_that_may_not_be_read_is_not_an_empty_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its list said that there were no recordings, and how to make one."""
+    (tmp_path / "recordings").mkdir()
+
+    def refuse(path: object) -> list[str]:
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    assert recording_paths(tmp_path) == recording_paths(tmp_path / "none") == []
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "listdir", refuse)
+        with pytest.raises(PermissionError):
+            recording_paths(tmp_path)

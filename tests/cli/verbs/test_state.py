@@ -1,5 +1,6 @@
 """Recordings, backup and restore: nothing is lost, nothing is overwritten, nothing gets outside its directory."""
 
+import errno
 import fcntl
 import io
 import json
@@ -7,6 +8,7 @@ import os
 import socket
 import tarfile
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -117,6 +119,23 @@ def test_sockets_stay_behind(state: Path, call, tmp_path: Path, monkeypatch) -> 
         assert call("backup", tmp_path / "b.tar.gz", "--state", state).exit_code == 0
     with tarfile.open(tmp_path / "b.tar.gz") as archive:
         assert not any("sock" in name for name in archive.getnames())
+
+
+def test_a_backup_without_a_part_that_may_not_be_read_is_none(
+    state: Path, call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It packed the rest and said so many files: restored, it took the calibrations away."""
+    listdir = os.listdir
+
+    def refuse(path: Any) -> list[str]:
+        if Path(path).name == "calibrations":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return listdir(path)
+
+    monkeypatch.setattr(os, "listdir", refuse)
+    answer = call("backup", tmp_path / "b.tar.gz", "--state", state)
+    assert (answer.exit_code, answer.stderr[:4]) == (77, "E105")
+    assert not (tmp_path / "b.tar.gz").exists()
 
 
 def test_a_backup_overwrites_only_by_force(state: Path, call, tmp_path: Path) -> None:
