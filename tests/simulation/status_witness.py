@@ -45,7 +45,7 @@ class StatusWitness:
         self._last_s = at_s
 
     def note_write(self, host: str, pdu: bytes, now_s: float) -> None:
-        """A write was taken, or nobody knows whether it was."""
+        """A write was taken, or nobody knows whether it was. host: where it is known, and that it was taken."""
         if (control := control_of(pdu)) is not None:
             self._commands.append((now_s, host, control))
         self._written += ((now_s, counts) for counts in setpoints_of(pdu))
@@ -71,7 +71,7 @@ class StatusWitness:
         ):
             return
         for command_s, host, control in commands:
-            if "." in host and int(ip_address(host)) != owner and self._last_s + MARGIN_S < command_s < at_s - MARGIN_S:
+            if host and int(ip_address(host)) != owner and self._last_s + MARGIN_S < command_s < at_s - MARGIN_S:
                 self._observer.complain("I4", f"{host} commands {control:#x}, owner is {ip_address(owner)}", at_s)
 
     def _judge_state(self, words: tuple[int, ...], at_s: float) -> None:
