@@ -10,6 +10,7 @@ from tests.simulation.masters.spelling import control_of, setpoints_of
 from tests.simulation.observer import FAULT, STATUS_WORDS, Observer
 
 UNAVAILABLE = 0x8000
+LONGEST_MS = 32767  # a register holds no more
 LARGEST_PLACE, TAKE, MARGIN_S = 255, 8, 0.005
 """Of serial faces, which are shown as an owner, too; who takes over; how late an answer tells of its write."""
 FAULT_BIT, ENABLED_BIT = 16, 1
@@ -85,7 +86,7 @@ class StatusWitness:
         if not 0.05 < at_s - self._last_s < 0.15:
             return
         silent_s = at_s - self._heard_s()
-        if age_ms != UNAVAILABLE and age_ms * 1e-3 < silent_s - AGE_SLACK_S - 2.0 * self._observer.bounds.period_s:
+        if age_ms < LONGEST_MS and age_ms * 1e-3 < silent_s - AGE_SLACK_S - 2.0 * self._observer.bounds.period_s:
             self._observer.complain("I10", f"a sample of {age_ms} ms, after {silent_s:.3f} s of silence", at_s)
 
     def _judge_voltage(self, asked_mv: int, at_s: float) -> None:
