@@ -83,7 +83,7 @@ class StatusWitness:
 
     def _judge_age(self, age_ms: int, at_s: float) -> None:
         """No sample is younger than the last byte that has come. What is read first after a standstill is as it was before."""
-        if not 0.05 < at_s - self._last_s < 0.15:
+        if not 0.09 < at_s - self._last_s < 0.11:
             return
         silent_s = at_s - self._heard_s()
         if age_ms < LONGEST_MS and age_ms * 1e-3 < silent_s - AGE_SLACK_S - 2.0 * self._observer.bounds.period_s:
