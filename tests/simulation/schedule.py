@@ -4,6 +4,7 @@ import struct
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf, nan
 from pathlib import Path
 from random import Random
@@ -103,7 +104,7 @@ class Simulation:
         self.person.on_write = lambda control: self._on_write(control, True)
         self.person.on_model = self._expect_any_model
         for client in (*self.masters.values(), self.person):
-            client.on_setpoint = lambda pdu, who=client.name: self.status.note_write(who, pdu, self.clock.now_s)
+            client.on_pdu = partial(self._note_pdu, client.name if type(client) is Master else "")
         self.clients = (*self.masters.values(), self.reader, *self.integrators.values())
         for name, badge in draw_badges(seed).items():
             ({"reader": self.reader} | self.masters | self.integrators)[name].badge = badge
@@ -167,6 +168,9 @@ class Simulation:
             one.forget()
 
     # -- what goes on
+
+    def _note_pdu(self, host: str, pdu: bytes, is_answered: bool) -> None:
+        self.status.note_write(host if is_answered else "", pdu, self.clock.now_s)
 
     def _on_write(self, control: int | None, is_answered: bool) -> None:
         if control == DISABLED_BY_BIT:  # which ends no run; a reset may be among the other bits

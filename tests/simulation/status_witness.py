@@ -10,6 +10,7 @@ from tests.simulation.masters.spelling import control_of, setpoints_of
 from tests.simulation.observer import FAULT, STATUS_WORDS, Observer
 
 UNAVAILABLE = 0x8000
+LONGEST_MS = 32767  # a register holds no more
 LARGEST_PLACE, TAKE, MARGIN_S = 255, 8, 0.005
 """Of serial faces, which are shown as an owner, too; who takes over; how late an answer tells of its write."""
 FAULT_BIT, ENABLED_BIT = 16, 1
@@ -45,7 +46,7 @@ class StatusWitness:
         self._last_s = at_s
 
     def note_write(self, host: str, pdu: bytes, now_s: float) -> None:
-        """A write was taken, or nobody knows whether it was."""
+        """A write was taken, or nobody knows whether it was. host: where it is known, and that it was taken."""
         if (control := control_of(pdu)) is not None:
             self._commands.append((now_s, host, control))
         self._written += ((now_s, counts) for counts in setpoints_of(pdu))
@@ -71,7 +72,7 @@ class StatusWitness:
         ):
             return
         for command_s, host, control in commands:
-            if "." in host and int(ip_address(host)) != owner and self._last_s + MARGIN_S < command_s < at_s - MARGIN_S:
+            if host and int(ip_address(host)) != owner and self._last_s + MARGIN_S < command_s < at_s - MARGIN_S:
                 self._observer.complain("I4", f"{host} commands {control:#x}, owner is {ip_address(owner)}", at_s)
 
     def _judge_state(self, words: tuple[int, ...], at_s: float) -> None:
@@ -82,10 +83,10 @@ class StatusWitness:
 
     def _judge_age(self, age_ms: int, at_s: float) -> None:
         """No sample is younger than the last byte that has come. What is read first after a standstill is as it was before."""
-        if not 0.05 < at_s - self._last_s < 0.15:
+        if not 0.09 < at_s - self._last_s < 0.11:
             return
         silent_s = at_s - self._heard_s()
-        if age_ms != UNAVAILABLE and age_ms * 1e-3 < silent_s - AGE_SLACK_S - 2.0 * self._observer.bounds.period_s:
+        if age_ms < LONGEST_MS and age_ms * 1e-3 < silent_s - AGE_SLACK_S - 2.0 * self._observer.bounds.period_s:
             self._observer.complain("I10", f"a sample of {age_ms} ms, after {silent_s:.3f} s of silence", at_s)
 
     def _judge_voltage(self, asked_mv: int, at_s: float) -> None:

@@ -25,7 +25,6 @@ class SocketUser:
     complaints: broken answers. watched_s: when a run of this person's was looked at last, None where there is none."""
 
     watched_s: float | None = None
-    name = "person"
 
     def __init__(
         self, inside: Callable[[], VirtualLoop | None], answer: Callable[[bytes], bytes | Future[bytes]]
@@ -34,7 +33,7 @@ class SocketUser:
         self.complaints: list[str] = []
         self.answers = 0
         self.on_write: Callable[[int | None], None] = lambda control: None
-        self.on_setpoint: Callable[[bytes], None] = lambda pdu: None
+        self.on_pdu: Callable[[bytes, bool], None] = lambda pdu, is_answered: None
         self.on_model: Callable[[], None] = lambda: None
         self._patience = self._run = 0
 
@@ -74,7 +73,7 @@ class SocketUser:
                 self._patience = int(request.get("name", "0") or 0)
                 self._watch(inside)
             case "modbus" if int(answer["pdu"][:2], 16) < 0x80:
-                self.on_setpoint(bytes.fromhex(request["pdu"]))
+                self.on_pdu(bytes.fromhex(request["pdu"]), True)
                 self.on_write(control_of(bytes.fromhex(request["pdu"])))
 
     def _watch(self, inside: VirtualLoop) -> None:

@@ -45,7 +45,7 @@ class Master:
     taken, or nobody will hear whether it was; complaints: broken answers. badge: name and role of its certificate."""
 
     badge: tuple[str, str] = ("", "")
-    on_setpoint: Callable[[bytes], None] = staticmethod(lambda pdu: None)
+    on_pdu: Callable[[bytes, bool], None] = staticmethod(lambda pdu, is_answered: None)
 
     def __init__(
         self,
@@ -243,7 +243,7 @@ class Master:
     def _tell(self, asked: Asked, is_answered: bool) -> None:
         """A write was taken, or nobody will hear whether it was."""
         if asked.pdu[0] in WRITES:
-            self.on_setpoint(asked.pdu)
+            self.on_pdu(asked.pdu, is_answered)
             self._on_write(asked.control, is_answered)
 
     def _judge_role(self, asked: bytes) -> None:

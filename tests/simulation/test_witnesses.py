@@ -1,0 +1,148 @@
+"""Those who judge a schedule see what they are there for: each lie of the registers, each mixed set, each right overstepped."""
+
+import struct
+from dataclasses import replace
+from math import inf
+
+import pytest
+
+from tests.simulation.event import Event
+from tests.simulation.masters.integrator import Sets
+from tests.simulation.masters.spelling import floats_pdu, mask_pdu, setpoints_of, write_one_pdu, write_pdu
+from tests.simulation.masters.tcp_master import Master
+from tests.simulation.observer import STATUS_WORDS, Bounds, Observer
+from tests.simulation.rare_events import draw_rare_events
+from tests.simulation.status_witness import StatusWitness
+
+BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05, output_timeout_s=0.2)
+OWNER, OTHER = "10.0.0.1", "10.0.0.2"
+
+
+@pytest.fixture
+def observer() -> Observer:
+    return Observer(BOUNDS)
+
+
+def look(witness: StatusWitness, at_s: float, **registers: int) -> None:
+    places = {"status_word": 0, "state": 1, "requested": 3, "voltage": 6, "age": 12, "owner": 17}
+    words = [0] * STATUS_WORDS
+    words[16] = 0x0A00
+    for name, value in registers.items():
+        words[places[name]] = value
+    witness.note(struct.pack(f">{STATUS_WORDS}H", *words), at_s)
+
+
+@pytest.mark.parametrize(
+    ("law", "registers"),
+    [
+        ("I10", {"state": 4}),
+        ("I10", {"state": 4, "status_word": 17}),
+        ("I10", {"age": 100}),
+        ("I10", {"age": 1000, "voltage": 300}),
+    ],
+)
+def test_a_register_that_does_not_say_what_is_is_seen(observer: Observer, law: str, registers: dict[str, int]) -> None:
+    witness = StatusWitness(observer, lambda: 1.0)
+    for at_s in (1.9, 2.0):
+        look(witness, at_s, **registers)
+    assert observer.broken and all(line.startswith(law) for line in observer.broken)
+
+
+def test_true_registers_are_left_alone(observer: Observer) -> None:
+    witness = StatusWitness(observer, lambda: 1.0)
+    witness.note_write(OWNER, write_pdu(0, 1, 1200), 1.85)
+    for number in range(20):
+        look(witness, 1.9 + 0.1 * number, state=3, status_word=1, age=900 + 100 * number, requested=1200, owner=1)
+    assert observer.broken == []
+
+
+def test_a_setpoint_that_nobody_has_written_is_seen(observer: Observer) -> None:
+    witness = StatusWitness(observer, lambda: inf)
+    witness.note_write(OWNER, write_one_pdu(1, 1100), 1.85)
+    for number in range(5):
+        look(witness, 1.9 + 0.1 * number, requested=1200)
+    assert observer.broken == ["I7 at 1.9000: 12.00 N are requested, which nobody has written"]
+
+
+def test_an_enable_of_another_than_the_owner_is_seen_and_a_takeover_is_none(observer: Observer) -> None:
+    witness = StatusWitness(observer, lambda: inf)
+    look(witness, 1.9, owner=1)
+    witness.note_write(OTHER, write_one_pdu(0, 1), 1.95)
+    look(witness, 2.0, owner=1)
+    assert [line[:2] for line in observer.broken] == ["I4"]
+    for control in (9, 0):
+        witness.note_write(OTHER, write_one_pdu(0, control), 2.05)
+    look(witness, 2.1, owner=1)
+    assert len(observer.broken) == 1
+
+
+def test_a_force_that_stands_while_the_output_or_the_cell_says_nothing_is_seen(observer: Observer) -> None:
+    observer.voltage_v, observer.disabled_s, observer.write_s = 3.0, None, 2.0
+    observer.cell_heard_s = 2.0
+    observer.look(2.1)
+    assert observer.broken == []
+    observer.answers_lost_s = 1.5
+    observer.look(2.1)
+    observer.answers_lost_s, observer.cell_heard_s = None, 1.7
+    observer.look(2.1)
+    assert [line.partition(" at ")[0] for line in observer.broken] == ["I3 output", "I3 cell unheard"]
+
+
+@pytest.mark.parametrize(
+    ("pdu", "counts"),
+    [
+        (write_pdu(0, 1, 1200), 1200),
+        (write_one_pdu(1, -300), -300),
+        (floats_pdu(200, 1.0, 12.5, is_swapped=False), 1250),
+        (floats_pdu(300, 1.0, 12.5, is_swapped=True), 1250),
+    ],
+)
+def test_a_setpoint_is_read_from_every_spelling(pdu: bytes, counts: float) -> None:
+    assert setpoints_of(pdu) == (counts,)
+
+
+def test_what_writes_no_setpoint_has_none_and_a_mask_may_be_any() -> None:
+    assert setpoints_of(write_one_pdu(0, 1)) == setpoints_of(floats_pdu(200, 1.0, is_swapped=False)) == ()
+    (counts,) = setpoints_of(mask_pdu(1, 0, 5))
+    assert counts != counts
+
+
+@pytest.mark.parametrize(
+    ("role", "address", "is_seen"), [("monitor", 0, True), ("setpoint", 1000, True), ("setpoint", 0, False)]
+)
+def test_a_write_beyond_a_certificates_role_is_seen(role: str, address: int, is_seen: bool) -> None:
+    master = Master(OWNER, None, lambda: None, lambda *_: None)  # type: ignore[arg-type]
+    master.badge = ("robot", role)
+    master._judge_role(write_one_pdu(address, 0))
+    assert bool(master.complaints) is is_seen
+
+
+def test_of_two_uploads_at_a_time_either_may_be_in_use_and_of_one_alone_only_that_one() -> None:
+    sets = Sets()
+    sets.first, sets.allowed = b"old", {b"old"}
+    sets.begin("one", b"first")
+    sets.begin("other", b"second")
+    sets.end("one", is_committed=True)
+    assert sets.allowed == {b"first", b"second"}
+    sets.end("other", is_committed=False)
+    assert sets.allowed == {b"first", b"second"}
+    sets.begin("one", b"third")
+    sets.end("one", is_committed=True)
+    assert sets.allowed == {b"third"}
+
+
+def test_rare_events_come_in_their_order_and_each_is_whole_by_itself() -> None:
+    drawn = [event for seed in range(200) for event in draw_rare_events(seed, 24.0)]
+    for seed in range(200):
+        times = [event.at_s for event in draw_rare_events(seed, 24.0)]
+        assert times == sorted(times) and all(0.0 <= at_s < 24.0 for at_s in times)
+    kinds = {(event.whom, event.what) for event in drawn}
+    assert kinds >= {
+        ("worker", "split"),
+        ("worker", "burst"),
+        ("designer", "upload"),
+        ("world", "sim"),
+        ("output", "power"),
+    }
+    assert kinds >= {("load_cell", "unit"), ("load_cell", "pace"), ("person", "say"), ("machine", "disk_broken")}
+    assert all(replace(event) == event and isinstance(event, Event) for event in drawn)
