@@ -5,15 +5,20 @@ import json
 import socket
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from gateway.cli import change_in_use, control_socket
-from gateway.cli.calibration import store_access
+from gateway.cli.calibration import resume, store_access
 from gateway.cli.change_in_use import ask_until_done, not_running
 from gateway.cli.errors import CliError
+from gateway.cli.master.client import Assignment, GatewayClient
+from gateway.cli.system_service.installation import plan_installation
+from gateway.cli.system_service.unit_file import STOP_S
 from gateway.processes import exit_codes
+from gateway.profiles import load_register_map, load_rig
 from gateway.registers.words import UploadReason
 from gateway.service.supervisor.control_child import STOP_BOUND_S
 
@@ -69,6 +74,60 @@ def test_two_that_change_what_is_in_use_are_not_both_alone(tmp_path: Path) -> No
 
 def test_the_service_may_take_as_long_to_stop_as_a_ramp_does() -> None:
     """systemd would else kill it while the tool still presses."""
-    from gateway.cli.system_service.unit_file import STOP_S
-
     assert STOP_S >= STOP_BOUND_S + 5.0
+
+
+def test_no_more_registers_are_written_at_once_than_a_request_carries() -> None:
+    register_map = load_register_map("force-v1")
+    client = GatewayClient(SimpleNamespace(where=""), 1, register_map)  # type: ignore[arg-type]
+    staged = [each for each in register_map.registers_of("staging") if 1002 <= each.address < 1140]
+    frames = client.frames([Assignment(each, bytes(2 * each.words)) for each in staged])
+    assert sum(len(frame.words) for frame in frames) == 138
+    assert max(len(frame.words) for frame in frames) <= 123
+
+
+def test_what_control_refuses_of_a_simulated_rig_does_not_happen(call: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It judges and audits first; the rig's own process would do it all the same."""
+    asked = list[str]()
+
+    def ask(state: Path, request: dict[str, Any], name: str = "control.sock") -> dict[str, Any]:
+        asked.append(name)
+        if len(asked) == 1:
+            return {"rig": "demo", "set": {}, "notes": []}
+        raise CliError("E141 this rig is not simulated")
+
+    monkeypatch.setattr(control_socket, "ask", ask)
+    assert call("sim", "set", "cell.silent=true").exit_code == 1
+    assert asked == ["control.sock", "rig.sock"]
+    assert call("sim", "set", "cell.silent=true").exit_code == 1
+    assert asked[2:] == ["control.sock"]
+
+
+@pytest.mark.parametrize("hidden", ["/home/me", "/root", "/run/user/1000", "/tmp", "/var/tmp/x"])
+def test_a_rig_where_the_service_cannot_see_it_is_refused(hidden: str) -> None:
+    with pytest.raises(CliError, match=r"E107 .* the service sees nothing below"):
+        plan_installation(f"{hidden}/cell.yaml", load_rig("demo"), networks=(), command=Path("/opt/fg/force-gateway"))
+
+
+def recorded(number: int, groups: int, **header: Any) -> Any:
+    ladder = {"groups": 2, "minor_points": 0, "v_max_v": None, "tare": True, "stairs": 40, "top_v": 7.0}
+    return SimpleNamespace(
+        number=number, path=Path(f"{number:04d}.fgr"), header={"ladder": ladder, **header}, climbed=groups
+    )
+
+
+def test_what_is_gone_of_a_ladder_is_climbed_again_and_no_zero_is_taken_under_force(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The slide has pressed since: what rests on it now is friction's, and the zero is that of the first part."""
+    last = recorded(2, 1, continues=[1])
+    monkeypatch.setattr(resume, "list_recordings", lambda state: [recorded(1, 1), last])
+    monkeypatch.setattr(resume, "read_recording", lambda path: last)
+    monkeypatch.setattr(resume, "_whole_groups", lambda recording: recording.climbed if recording else 0)
+    monkeypatch.setattr(resume, "_is_finished", lambda recording: True)
+    for beside, is_whole in ((recorded(1, 1), True), (None, False)):
+        monkeypatch.setattr(resume, "_beside", lambda path, number, beside=beside: beside)
+        rest = resume.find_rest_of_ladder(Path())
+        assert rest.plan["tare"] is False and rest.plan["v_max_v"] == 7.0
+        assert (rest.groups, rest.finished) == (2 if is_whole else 1, is_whole)
+        assert rest.is_whole(rest.plan_with({})) is is_whole

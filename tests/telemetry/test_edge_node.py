@@ -126,6 +126,9 @@ def test_only_a_rebirth_that_is_asked_for_is_answered() -> None:
     assert decoded(birth.payload).seq == 0 and values(birth.payload)["bdSeq"] == 0
     command.metrics[0].boolean_value = False
     assert asked(command.SerializeToString()) == asked(b"\xff\xff") == asked(b"") == []
+    other = Payload(timestamp=5)
+    other.metrics.add(name=REBIRTH, datatype=10, double_value=1.0)
+    assert asked(other.SerializeToString()) == [], "a number is no wish"
 
 
 def test_where_control_does_not_answer_nothing_old_is_told() -> None:

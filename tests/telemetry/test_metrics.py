@@ -5,6 +5,7 @@ import json
 import re
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families as parse
@@ -12,7 +13,7 @@ from starlette.applications import Starlette
 
 from gateway.processes.json_socket.server import JsonLineServer
 from gateway.telemetry.exposition import exposition
-from gateway.telemetry.metrics_process import make_metrics_app
+from gateway.telemetry.metrics_process import make_metrics_app, read_gateway
 from gateway.telemetry.series import SERIES
 from tests.telemetry.readings import HEALTH, holding, reading, without_sample
 from tests.web.asgi import call
@@ -108,3 +109,11 @@ def test_the_dashboard_is_one_that_grafana_can_import() -> None:
     places = [tuple(panel["gridPos"].values()) for panel in board["panels"]]
     assert len(set(places)) == len(places) and board["schemaVersion"] >= 36
     assert all(panel["targets"] for panel in board["panels"])
+
+
+def test_a_control_that_refuses_to_say_is_one_that_does_not_answer() -> None:
+    class Refusing:
+        async def ask(self, request: dict[str, Any]) -> dict[str, Any]:
+            raise ValueError("too many questions")
+
+    assert asyncio.run(read_gateway(Refusing())) is None  # type: ignore[arg-type]

@@ -55,3 +55,18 @@ def test_another_plant_is_not_blamed_for_the_one_before(watch: ForceWatch) -> No
         looked(watch, held(100.0, 60.0, 0.9))
     watch.follow(PlantSince(4, 170.0))
     assert looked(watch, held(170.0, 60.0, 0.9)) == ""
+
+
+def test_what_is_long_ago_is_no_witness_either(watch: ForceWatch) -> None:
+    """A machine that was repaired must not be called worse for as long as the ring remembers."""
+    for _ in range(3):
+        assert looked(watch, held(100.0, 120.0, 2.0), held(220.0, 310.0, 0.2)) == ""
+
+
+def test_what_was_counted_against_one_plant_is_not_held_against_the_next(watch: ForceWatch, tmp_path: Path) -> None:
+    assert looked(watch, held(100.0, 60.0, 0.9)) == ""
+    rows = dict(zip(COLUMNS, held(0.0, 60.0, 0.2).T, strict=True))
+    keep_reference(tmp_path, ForceReference(4, "0001.rec", 0, error_blocks(commanded_force(rows))))
+    watch.follow(PlantSince(4, 170.0))
+    assert looked(watch, held(170.0, 60.0, 0.9)) == "", "one look is none"
+    assert looked(watch, held(170.0, 60.0, 0.9)) != ""

@@ -15,6 +15,7 @@ from gateway.processes import exit_codes
 from gateway.processes.durable_file import lock_directory, make_directory
 from gateway.recording import Recorder
 from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.watch import reference_recording
 from gateway.watch.reference_recording import (
     FirstGoodRecording,
     keep_reference_recording,
@@ -130,3 +131,15 @@ def test_a_damaged_note_is_no_reference(tmp_path):
     keep_reference_recording(tmp_path, record(tmp_path))
     (tmp_path / "reference" / "reference.json").write_text("{")
     assert read_reference_recording(tmp_path) is None
+
+
+def test_the_copy_is_on_the_disk_before_anything_says_that_it_is_the_reference(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A power cut between the two would else take the new one and the one before."""
+    recording, done = tmp_path / "0007.fgr", list[str]()
+    recording.write_bytes(b"rows")
+    monkeypatch.setattr(reference_recording, "sync_path", lambda path: done.append(path.name))
+    monkeypatch.setattr(reference_recording, "replace_durably", lambda descriptor, name, data: done.append(name))
+    keep_reference_recording(tmp_path, recording)
+    assert done == [".0007.fgr", "reference", "reference.json"]

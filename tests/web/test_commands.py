@@ -177,7 +177,7 @@ def test_behind_a_stop_nobody_beats_any_more(tmp_path: Path) -> None:
             commands.note_alive("me")
             await asyncio.sleep(0)
             beats.append(stage.wired.word("heartbeat"))
-        assert beats == beats[:1] * 20
+        assert beats == beats[:1] * 20 and commands.commander == ""
 
     play(tmp_path, scene, leased())
 

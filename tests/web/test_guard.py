@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 
 from gateway.web import security
+from gateway.web.security import Door
+from gateway.web.server import _file
 from tests.web.asgi import Answer, call, page
 
 TOKEN = "a-token-of-some-length"
@@ -202,3 +204,16 @@ def test_who_leaves_within_its_request_makes_no_error_of_ours(app: Any) -> None:
 
     asyncio.run(app(scope, receive, send))
     assert not sent
+
+
+def test_the_token_of_a_session_s_commands_makes_no_session() -> None:
+    """The page's script may read it, and so may a report in a frame that gets out of it."""
+    door = Door("127.0.0.1", 8080)
+    assert door.is_session(door.new_session())
+    assert not door.is_session(f"name.{door.csrf_token('name')}")
+
+
+@pytest.mark.parametrize("path", ["../static/page.css", "./page.css", "a/../page.css", "/page.css"])
+def test_a_way_out_of_the_folder_is_no_file_though_it_comes_back(path: str) -> None:
+    assert _file("page.css").status_code == 200
+    assert _file(path).status_code == 404

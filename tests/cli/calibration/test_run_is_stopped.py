@@ -1,0 +1,154 @@
+"""A calibration from a terminal: nothing moves without a yes, and whatever ends the terminal takes the force to 0."""
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.cli.calibration import follow as following
+from gateway.cli.calibration import runs
+from gateway.cli.calibration.follow import follow
+from gateway.cli.calibration.remote_run import RemoteRun
+from gateway.cli.calibration.resume import RestOfLadder
+from gateway.cli.calibration.runs import RunStatus
+from gateway.cli.master.client import Frame, RefusedError
+from gateway.registers.words import CalibrationPhase, ControlBit
+
+PREVIEW = {
+    "rig": "demo", "stairs": 20, "v_max_v": 7.0, "force_max_n": 49.0, "eta_s": 60.0, "simulated": True, "notes": [],
+    "experiment": "", "questions": [], "check": True, "rig_fingerprint": "",
+}  # fmt: skip
+
+
+class Climbing:
+    """A run that climbs until it is told to stop; `end_of_terminal` comes with the first look."""
+
+    def __init__(self, end_of_terminal: Callable[[], object]) -> None:
+        self.did: list[str] = []
+        self.looks = 0
+        self._end_of_terminal = end_of_terminal
+
+    def begin(self) -> None:
+        self.did.append("begin")
+
+    def look(self) -> RunStatus:
+        self.looks += 1
+        assert self.looks < 100, "it climbs on"
+        if self.did == ["begin"]:
+            self.did.append("look")
+            self._end_of_terminal()
+        return RunStatus("stopped" if "stop" in self.did else "ladder", 0.5, 1.0, 10.0, 2.0)
+
+    def stop(self) -> None:
+        self.did.append("stop")
+
+    def end(self) -> dict[str, Any]:
+        return {"phase": "stopped"}
+
+    def close(self) -> None: ...
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_whatever_ends_the_terminal_stops_the_run(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(following, "_POLL_S", 0.0)
+    run = Climbing(lambda: os.kill(os.getpid(), number))
+
+    def kill(*_: object) -> None:
+        raise AssertionError("it would have been killed")
+
+    before = signal.signal(number, kill if number != signal.SIGINT else signal.default_int_handler)
+    own = signal.getsignal(number)
+    try:
+        assert follow(run) == {"phase": "stopped"}
+        assert run.did == ["begin", "look", "stop"]
+        assert signal.getsignal(number) is own
+    finally:
+        signal.signal(number, before)
+
+
+@pytest.mark.parametrize("yes", [0, 1, 2])
+def test_without_a_yes_to_each_question_nothing_is_begun(
+    call: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, yes: int
+) -> None:
+    asked = list[dict[str, Any]]()
+    monkeypatch.setattr(runs, "ask", lambda state, request: asked.append(request) or PREVIEW)
+    answer = call("calibrate", "--quick", "--state", tmp_path, input="y\n" * yes + "n\n")
+    assert answer.exit_code == 1 and "not begun: nothing has moved" in answer.stderr
+    assert [request.get("dry_run") for request in asked] == [True]
+
+
+class Registers:
+    """The client of a remote run. What it does is done in turn: one connection, two threads."""
+
+    def __init__(self) -> None:
+        self.run: RemoteRun | None = None
+        self.words: list[int] = []
+        self.beats = 0
+        self.phase = CalibrationPhase.STORED
+
+    def _in_turn(self) -> None:
+        assert self.run and self.run._turn.locked(), "both speak at once"
+
+    def read_values(self, registers: list[Any]) -> list[Any]:
+        self._in_turn()
+        values = {"calibration_phase": float(self.phase), "calibration_stored": 3.0}
+        return [type("Reading", (), {"value": values.get(register.name, 0.0)}) for register in registers]
+
+    def frames(self, assignments: list[Any]) -> list[Frame]:
+        return [Frame(each.register.address, (int.from_bytes(each.data, "big"),)) for each in assignments]
+
+    def write(self, frame: Frame) -> None:
+        self._in_turn()
+        self.words += frame.words
+
+    def write_values(self, assignments: list[Any]) -> None:
+        self._in_turn()
+        self.beats += 1
+        if self.beats == 3:
+            raise RefusedError(6, "write 1 at 4")
+        assert self.beats < 3, "another master has it, and is disturbed"
+
+    def close(self) -> None: ...
+
+
+@pytest.fixture
+def remote(monkeypatch: pytest.MonkeyPatch) -> Registers:
+    registers = Registers()
+    monkeypatch.setattr("gateway.cli.calibration.remote_run.GatewayClient", lambda *_: registers)
+    monkeypatch.setattr("gateway.cli.calibration.remote_run.DEFAULT_PERIOD_S", 0.001)
+    registers.run = RemoteRun(None, 1)  # type: ignore[arg-type]
+    return registers
+
+
+def test_a_remote_run_is_begun_and_stopped_by_its_bit_and_leaves_another_masters_lease_alone(remote: Registers) -> None:
+    run = remote.run
+    assert run
+    run.begin()
+    run._beat.join(5.0)
+    assert not run._beat.is_alive() and remote.beats == 3
+    run.stop()
+    run.close()
+    assert remote.words == [int(ControlBit.START_CALIBRATION), 0]
+
+
+def test_the_end_of_the_run_before_is_not_taken_for_this_ones(remote: Registers) -> None:
+    run = remote.run
+    assert run
+    run.begin()
+    assert run.look().phase == "idle"
+    remote.phase = CalibrationPhase.LADDER
+    assert run.look().phase == "ladder"
+    remote.phase = CalibrationPhase.STORED
+    assert run.look().phase == "stored"
+    run.close()
+
+
+@pytest.mark.parametrize(("minor_points", "first_group"), [(0, 1), (32, 2)])
+def test_a_resumed_ladder_whose_groups_are_climbed_begins_where_it_may(minor_points: int, first_group: int) -> None:
+    """With a walk behind it only that is left; without, the last group is climbed again: a run has a group at least."""
+    plan = {"groups": 2, "minor_points": minor_points}
+    rest = RestOfLadder(plan, 2, [1], "", "", Path("0001.fgr"), finished=False)
+    assert rest.plan_with({})["first_group"] == first_group

@@ -1,0 +1,74 @@
+"""The ends of a hold: how a person ends it, when it lets go on the way down, and that a fault is an error."""
+
+import os
+import signal
+import threading
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gateway.cli.errors import CliError
+from gateway.cli.force_hold.heartbeat import HeartbeatThread
+from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, StatusReading, status_reading_of
+from gateway.cli.verbs.hold import _handle_signals, _report_end
+from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
+from gateway.codes.warning_bits import WarningBit
+from gateway.registers.words import State
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_the_first_signal_ramps_down_and_the_second_drops(number: int) -> None:
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    with _handle_signals(beat):
+        os.kill(os.getpid(), number)
+        assert beat.stopping.is_set() and not beat.dropping.is_set()
+        os.kill(os.getpid(), number)
+        assert beat.dropping.is_set()
+
+
+def ended(end: HoldEnd) -> Any:
+    status = StatusReading(State.FAULT, FaultCode.SAMPLE_STALE)
+    run = SimpleNamespace(end=end, force_n=12.0, is_pressing=True)
+    return SimpleNamespace(hold=run, failure=None, status=status, warned=WarningBit(0))
+
+
+def test_only_an_end_as_asked_is_none_to_tell_a_script_of() -> None:
+    _report_end(ended(HoldEnd.STOPPED), "127.0.0.1:5020", as_json=False)
+    with pytest.raises(CliError, match="A311"):
+        _report_end(ended(HoldEnd.FAULT), "127.0.0.1:5020", as_json=True)
+    with pytest.raises(CliError, match="W336"):
+        _report_end(ended(HoldEnd.DISABLED), "127.0.0.1:5020", as_json=True)
+
+
+def test_it_lets_go_when_the_force_is_down_and_no_sooner() -> None:
+    """A disable drops what is left at once: a newton that falls away marks the part."""
+    run = HoldRun(12.0, heartbeat=0, resets=False)
+    run.next(StatusReading(State.OFF), 0.0, stops=False)
+    words = []
+    for k, applied_n in enumerate((12.0, 6.0, 1.0, 0.4, 0.0)):
+        write = run.next(StatusReading(State.HOLDING, applied_n=applied_n), 0.1 * k, stops=True)
+        words.append(write and write.control_word)
+    assert words == [1, None, None, None, 0] and run.end is HoldEnd.STOPPED
+
+
+def test_the_voltage_is_told_in_volts() -> None:
+    names = "state fault_code status_word limited_by warning_word force_measured force_requested force_applied"
+    values = dict.fromkeys(names.split(), 0.0)
+    assert status_reading_of(values | {"output_voltage": 1500.0}).voltage_v == 1.5
+
+
+@pytest.mark.parametrize("reason", [RefusalReason.BYTE_ORDER_UNPROVEN, RefusalReason.FAULT_LATCHED])
+def test_a_byte_order_is_shown_where_that_was_asked_for_and_else_the_refusal_stands(reason: RefusalReason) -> None:
+    written = list[Any]()
+    beat = HeartbeatThread.__new__(HeartbeatThread)
+    register = SimpleNamespace(encode=lambda value: value)
+    beat._client = SimpleNamespace(  # type: ignore[assignment]
+        register_map=SimpleNamespace(find=lambda name: register),
+        read_values=lambda registers: [SimpleNamespace(value=float(reason))],
+        write_values=written.extend,
+    )
+    is_proof = reason is RefusalReason.BYTE_ORDER_UNPROVEN
+    assert beat._proves_byte_order() is is_proof
+    assert bool(written) is is_proof

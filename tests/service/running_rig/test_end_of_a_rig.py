@@ -1,0 +1,53 @@
+"""The end of a running rig: what it has opened is closed, what it has begun for the disk ends, and nothing begins any more."""
+
+import asyncio
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gateway.processes.disk_worker import THREAD_NAME
+from gateway.recording import list_recordings
+from gateway.service.running_rig.running_rig import RunningRig
+from tests.disk.threads import join_disk_threads
+from tests.end_to_end.own_devices import OwnDevices
+from tests.service.running_rig.test_running_rig import with_running_rig
+
+
+@pytest.fixture
+def devices(tmp_path: Path) -> Iterator[OwnDevices]:
+    with OwnDevices(tmp_path) as devices:
+        yield devices
+
+
+def open_below(folder: Path) -> list[str]:
+    found = []
+    for path in Path("/proc/self/fd").iterdir():
+        try:
+            found.append(str(path.readlink()))
+        except OSError:  # that of the listing
+            continue
+    return [name for name in found if name.startswith(str(folder))]
+
+
+def test_behind_its_end_nothing_of_a_rig_is_open_or_under_way(devices: OwnDevices) -> None:
+    """A recording and the audit are on the disk, their files are closed, and each thread that waits for it ends."""
+    state = devices.directory / "state"
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        await asyncio.wrap_future(rig._recordings.start())
+        for part in (rig._recordings._disk, rig._calibration_runs.disk, rig._upload._thread, rig._plants._thread):
+            part.begin(lambda: None)
+        rig._recordings._retention._worker.begin(lambda: None)
+        while not rig._recordings.status()["rows"]:
+            await asyncio.sleep(0.005)
+        assert open_below(state)
+
+    with_running_rig(devices, scene)
+    assert open_below(state) == []
+    join_disk_threads()
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith(THREAD_NAME)]
+    (recording,) = list_recordings(state)
+    assert recording.rows > 0 and not recording.truncated

@@ -1,0 +1,185 @@
+"""A connection to a broker, without one: what is sent is not lost, what was sent before is not obeyed, and nobody spins."""
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gateway.telemetry import broker_connection
+from gateway.telemetry.broker_connection import Broker, keep_connected
+from gateway.telemetry.broker_session import BrokerMessage
+
+
+class MqttError(Exception):
+    """The library's."""
+
+
+class Session:
+    """Says what is in `waiting`; answers every command with itself."""
+
+    name, subscriptions = "cell", ("cell/command",)
+
+    def __init__(self, *payloads: bytes) -> None:
+        self.ready = asyncio.Event()
+        self.waiting = deque(BrokerMessage("cell/state", payload) for payload in payloads)
+        self.lost = self.asked = 0
+        self.answered: list[bytes] = []
+
+    def begin(self) -> BrokerMessage:
+        return BrokerMessage("cell/online", b"false", retain=True)
+
+    def greet(self) -> Sequence[BrokerMessage]:
+        return ()
+
+    def next_message(self) -> BrokerMessage | None:
+        self.asked += 1
+        assert self.asked < 1000, "it spins"
+        return self.waiting[0] if self.waiting else None
+
+    def drop_sent(self) -> None:
+        self.waiting.popleft()
+
+    def lose(self) -> None:
+        self.lost += 1
+
+    async def answer(self, topic: str, payload: bytes) -> Sequence[BrokerMessage]:
+        self.answered.append(payload)
+        return (BrokerMessage("cell/result", payload),)
+
+
+class Library:
+    """Stands for aiomqtt. publish: what becomes of what is said; heard: messages that the broker brings."""
+
+    MqttError = MqttError
+
+    def __init__(self, publish: Callable[[bytes], Awaitable[None]]) -> None:
+        self.heard: asyncio.Queue[Any] = asyncio.Queue()
+        self._publish = publish
+
+    def Will(self, *words: Any, **more: Any) -> None: ...  # noqa: N802  the library's name
+
+    def Client(self, *words: Any, **more: Any) -> "Library":  # noqa: N802
+        return self
+
+    async def __aenter__(self) -> "Library":
+        return self
+
+    async def __aexit__(self, *_: object) -> None: ...
+
+    async def subscribe(self, topic: str, qos: int) -> None: ...
+
+    async def publish(self, topic: str, payload: bytes, qos: int, retain: bool) -> None:
+        await self._publish(payload)
+
+    @property
+    async def messages(self) -> AsyncIterator[Any]:
+        while True:
+            yield await self.heard.get()
+
+    def bring(self, payload: bytes, *, retain: bool) -> None:
+        self.heard.put_nowait(SimpleNamespace(topic="cell/command", payload=payload, retain=retain))
+
+
+Scene = Callable[[Session, Library, list[bytes]], Awaitable[None]]
+
+
+def play(
+    monkeypatch: pytest.MonkeyPatch,
+    scene: Scene,
+    *payloads: bytes,
+    publish: Callable[[bytes], Awaitable[None]] | None = None,
+) -> Session:
+    """Keep a connection while the scene is played. publish: instead of noting what is said."""
+
+    async def run() -> Session:
+        said = list[bytes]()
+
+        async def note(payload: bytes) -> None:
+            if publish:
+                await publish(payload)
+            said.append(payload)
+
+        session, library = Session(*payloads), Library(note)
+        monkeypatch.setattr(broker_connection, "import_library", lambda name: library)
+        keeping = asyncio.create_task(keep_connected(Broker("b", 1883), session, lambda text: None, again_s=0.0))
+        async with asyncio.timeout(5.0):
+            await scene(session, library, said)
+        keeping.cancel()
+        await asyncio.gather(keeping, return_exceptions=True)
+        return session
+
+    return asyncio.run(run())
+
+
+async def turns(count: int = 50) -> None:
+    for _ in range(count):
+        await asyncio.sleep(0)
+
+
+def test_a_command_of_yesterday_is_not_carried_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that waits in the broker, retained, would enable at each start of ours."""
+
+    async def scene(session: Session, library: Library, said: list[bytes]) -> None:
+        library.bring(b"yesterday", retain=True)
+        library.bring(b"now", retain=False)
+        await turns()
+        assert session.answered == [b"now"] and said == [b"now"]
+
+    play(monkeypatch, scene)
+
+
+def test_what_the_broker_has_not_taken_is_said_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    failures = [MqttError("broken pipe")]
+
+    async def publish(payload: bytes) -> None:
+        if failures:
+            raise failures.pop()
+
+    async def scene(session: Session, library: Library, said: list[bytes]) -> None:
+        await turns()
+        assert said == [b"1", b"2"]
+        assert session.lost == 1, "and the session knows that there was none meanwhile"
+
+    play(monkeypatch, scene, b"1", b"2", publish=publish)
+
+
+def test_between_the_making_of_a_message_and_its_sending_nobody_speaks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Messages carry numbers in order: a host would take the gap for a loss."""
+    gate = asyncio.Event()
+
+    async def publish(payload: bytes) -> None:
+        if payload == b"slow":
+            await gate.wait()
+
+    async def scene(session: Session, library: Library, said: list[bytes]) -> None:
+        await turns()
+        library.bring(b"command", retain=False)
+        await turns()
+        assert session.answered == []
+        gate.set()
+        await turns()
+        assert said == [b"slow", b"command"]
+
+    play(monkeypatch, scene, b"slow", publish=publish)
+
+
+def test_who_has_nothing_to_say_waits_until_there_is_something(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(session: Session, library: Library, said: list[bytes]) -> None:
+        session.ready.set()
+        await turns()
+        asked = session.asked
+        await turns(500)
+        assert session.asked == asked
+        session.waiting.append(BrokerMessage("cell/state", b"later"))
+        session.ready.set()
+        await turns()
+        assert said == [b"1", b"later"]
+
+    play(monkeypatch, scene, b"1")
+
+
+def test_a_password_is_shown_to_nobody() -> None:
+    assert "secret" not in repr(Broker("b", 1883, "me", "secret"))

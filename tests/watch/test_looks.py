@@ -1,0 +1,89 @@
+"""What the residual watch does with its looks: what it searches in, how often, and what it takes for usual."""
+
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gateway.registers.residual_cause import ResidualCause
+from gateway.twin.plant import Plant, with_value
+from gateway.watch.reference import WatchReference
+from gateway.watch.residual_watch import Watch, WatchSettings
+from gateway.watch.warning_filter import WindowVerdict
+from gateway.watch.window import Window
+
+WINDOW_S, EVERY_S = 60.0, 30.0
+
+
+class Bench(Watch):
+    """Windows of an hour that has been; is_off: what the cheap look sees; searched: how long the windows that were judged."""
+
+    def __init__(self) -> None:
+        self.now_s, self.is_off, self.searched = 3600.0, False, list[float]()
+        comparison: Any = SimpleNamespace(
+            why_unsuitable=lambda window: "", rms_n=lambda window: 1.0, floor_n=lambda window: 0.1,
+            is_exceeded=lambda window, rms_n: self.is_off, judge=self.judge,
+        )  # fmt: skip
+        super().__init__(None, comparison, WatchSettings(WINDOW_S, EVERY_S), lambda: self.now_s)  # type: ignore[arg-type]
+
+    def _window(self, window_s: float) -> Window:
+        return Window(window_s, self.now_s, 1.0, 9)  # type: ignore[arg-type]
+
+    def judge(self, window: Window) -> WindowVerdict:
+        self.searched.append(window.measurement)  # type: ignore[arg-type]
+        return WindowVerdict(ResidualCause.COULOMB_FRICTION, "friction", 1.0)
+
+    def look_again(self, after_s: float = EVERY_S) -> None:
+        self.now_s += after_s
+        self.check_newest_window()
+
+
+def test_only_what_is_younger_than_the_last_healthy_look_is_searched_in() -> None:
+    bench = Bench()
+    bench.check_newest_window()
+    bench.is_off = True
+    bench.look_again(0.5 * WINDOW_S)
+    assert bench.searched == [], "half old and half new has a wrong name"
+    bench.look_again(0.2 * WINDOW_S)
+    assert bench.searched == [pytest.approx(0.7 * WINDOW_S)]
+    bench.look_again(0.5 * WINDOW_S)
+    assert bench.searched[1:] == [WINDOW_S]
+
+
+def test_a_cause_that_stands_is_searched_for_less_and_less_and_never_given_up() -> None:
+    bench = Bench()
+    bench.is_off = True
+    searches_s = []
+    for _ in range(600):
+        count = len(bench.searched)
+        bench.look_again()
+        if len(bench.searched) > count:
+            searches_s.append(bench.now_s)
+    gaps_s = [after - before for before, after in pairwise(searches_s)]
+    assert gaps_s == sorted(gaps_s)
+    assert gaps_s[0] == EVERY_S and gaps_s[-1] == 600.0
+
+
+def window(excitation_v: float) -> Window:
+    return Window(None, 0.0, excitation_v, 9)  # type: ignore[arg-type]
+
+
+def test_a_quieter_window_does_not_make_the_usual_an_excess() -> None:
+    """The floor is what the noisiest of such windows had in which nothing was found."""
+    reference = WatchReference(Plant())
+    for rms_n in (0.4, 0.1):
+        reference.raise_floor(window(1.1), rms_n)
+    assert reference.floor_n(window(1.9)) == 0.4
+    assert not reference.is_exceeded(window(1.1), 0.45)
+    assert reference.floor_n(window(2.1)) is None
+
+
+@pytest.mark.parametrize(("delay_s", "is_taken"), [(0.02, True), (-0.02, True), (0.1, False), (-0.1, False)])
+def test_only_a_delay_of_the_size_of_a_serial_line_is_the_lines(delay_s: float, is_taken: bool) -> None:
+    """Anything larger, either way, is a change of the machine that has to be told."""
+    plant = with_value(Plant(), "regulator", "delay_s", 0.15)
+    reference = WatchReference(plant)
+    found: Any = SimpleNamespace(plant=with_value(plant, "regulator", "delay_s", 0.15 + delay_s))
+    reference.take_line_delays(found)
+    assert reference.plant.regulator.delay_s == pytest.approx(0.15 + delay_s if is_taken else 0.15)

@@ -1,0 +1,30 @@
+"""What the process of the watch tells control, and what it hears from it."""
+
+from math import inf, nan
+from types import SimpleNamespace
+from typing import Any
+
+from gateway.registers.residual_cause import ResidualCause
+from gateway.watch.force_watch import PlantSince
+from gateway.watch.memory import resident_mb
+from gateway.watch.warning_filter import WindowVerdict
+from gateway.watch.watch_process import _plant_of, _report
+
+
+def test_what_is_no_number_is_not_told() -> None:
+    """JSON has none: control would refuse the whole report, and the warning with it."""
+    watch: Any = SimpleNamespace(
+        counters={"looks": 3, "rms_n": nan}, published=WindowVerdict(ResidualCause.UNKNOWN, "x")
+    )
+    force: Any = SimpleNamespace(sentence="")
+    assert _report(watch, force, {"memory_mb": inf, "cpu_s": 1.0})["counters"] == {"looks": 3, "cpu_s": 1.0}
+
+
+def test_a_plant_is_in_use_since_control_says_so() -> None:
+    """Rows of before it were commanded otherwise."""
+    assert _plant_of({"plant": 3, "plant_since_s": 170.0}) == PlantSince(3, 170.0)
+    assert _plant_of({}) is None
+
+
+def test_memory_is_told_in_megabytes() -> None:
+    assert 5.0 < resident_mb() < 20_000.0
