@@ -146,10 +146,9 @@ def _in_words(settings: SimulationSettings) -> str:
     return ", ".join(told) or "nothing, it is as its files say"
 
 
-async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog) -> None:
-    """Run until the guardian asks for the end (SIGTERM) or its end of the link closes; either leaves no socket behind."""
+async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog, ended: asyncio.Event) -> None:
+    """Run until the guardian's end of the link closes, or something else has set `ended`; either leaves no socket behind."""
     loop = asyncio.get_running_loop()
-    ended = asyncio.Event()
     lines = SimulatedLines(rig)
 
     def tell_ports() -> None:
@@ -163,13 +162,19 @@ async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog
     if unserved := await server.start():
         log("socket", f"E152 {unserved}")
     loop.add_reader(link.fileno(), ended.set)
-    loop.add_signal_handler(signal.SIGTERM, ended.set)
     tell_ports()
     lines.plug(lines.world.settings)
     await ended.wait()
     loop.remove_reader(link.fileno())
     await server.close()
     lines.close()
+
+
+async def _serve_process(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog) -> None:
+    """The same as a process of its own, which the guardian asks to end by SIGTERM."""
+    ended = asyncio.Event()
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
+    await serve(rig, link, kept, log, ended)
 
 
 def main(arguments: list[str]) -> int:
@@ -185,7 +190,7 @@ def main(arguments: list[str]) -> int:
         except ProfileError as error:  # edited since
             log("rig", "E151 the rig file has faults:\n" + "\n".join(map(str, error.faults)))
             return exit_codes.CONFIGURATION
-        asyncio.run(serve(rig, link, kept, log))
+        asyncio.run(_serve_process(rig, link, kept, log))
     return 0
 
 

@@ -48,7 +48,7 @@ def test_what_is_restored_is_on_the_disk_before_it_is_the_state(
     assert synced == [*((name, False) for name in names), (tmp_path.name, True)]
 
 
-@pytest.mark.parametrize("manifest", [b"{}", b'{"format": 2}', b'{"format": "1"}'])
+@pytest.mark.parametrize("manifest", [b'{"format": 2}', b'{"format": "1"}', b'{"format": []}'])
 def test_an_archive_of_another_form_is_not_guessed_at(tmp_path: Path, manifest: bytes) -> None:
     source = archive_of(tmp_path / "b.tar.gz", manifest, "state/0001.yaml")
     with pytest.raises(ArchiveError, match="this version reads 1"):

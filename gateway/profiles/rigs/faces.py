@@ -5,10 +5,10 @@ A further kind is one more dataclass here and one more member of `Face`, with it
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from annotated_types import Ge, Le, MinLen
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, Field, WithJsonSchema
 
 from gateway import defaults
 from gateway.defaults import STRICT
@@ -85,11 +85,4 @@ class TlsFace:
         return replace(self, certificate=certificate, key=key, ca=ca)
 
 
-def _is_none_of_network(face: Any) -> Any:
-    if isinstance(face, dict) and face.get("type") in ("tcp", "modbus-tcp", "plain"):
-        kept = "here stand the faces beside it (rtu, tls)"
-        raise ValueError(f"plain Modbus TCP has its keys under network: (bind, port, allow); {kept}")
-    return face
-
-
-Face = Annotated[RtuFace | TlsFace, Field(discriminator="type"), BeforeValidator(_is_none_of_network)]
+Face = Annotated[RtuFace | TlsFace, Field(discriminator="type")]

@@ -25,6 +25,10 @@ _SCALES: Final = (
 )
 _DECIMAL: Final = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
+_TYPES_ELSEWHERE: Final = dict.fromkeys(
+    ("tcp", "modbus-tcp"), "; plain Modbus TCP has its keys under network: (bind, port, allow)"
+)
+"""What is written as a `type` and has a place of its own."""
 _PLAIN: Final = re.compile(r"[\w.:/+ -]+")  # what reads well without quotes
 
 
@@ -160,7 +164,8 @@ def _kind_choice(value: Any, context: dict[str, Any], unit: str) -> str:
     """Return the sentence about a group whose `type` is not there, or none of the known."""
     if "tag" not in context or (isinstance(value, dict) and value.get("type") is None):
         return "has no type: it says what this is"
-    return f"type {_choice(context['tag'], {'expected': context['expected_tags']}, unit)}"
+    elsewhere = _TYPES_ELSEWHERE.get(str(context["tag"]), "")
+    return f"type {_choice(context['tag'], {'expected': context['expected_tags']}, unit)}{elsewhere}"
 
 
 def _choice(value: Any, context: dict[str, Any], unit: str) -> str:

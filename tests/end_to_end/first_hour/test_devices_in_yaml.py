@@ -64,7 +64,8 @@ def far_ends(folder: Path) -> Iterator[None]:
     """The devices of rig.yaml on two ptys, behind the names that the rig gives; in a thread of the test."""
     ours, theirs = message_link.create_link()
     rig = load_rig(folder / "rig.yaml", simulated=True)
-    thread = threading.Thread(target=lambda: asyncio.run(serve(rig, theirs, KeptSettings(folder, ""), EventLog())))
+    kept = KeptSettings(folder, "")
+    thread = threading.Thread(target=lambda: asyncio.run(serve(rig, theirs, kept, EventLog(), asyncio.Event())))
     thread.start()
     try:
         assert select.select([ours], [], [], 20.0)[0], "the simulated rig tells its ptys"

@@ -42,7 +42,7 @@ def test_a_face_is_read_with_modbus_own_defaults(tmp_path: Path) -> None:
         ("[{type: rtu, port: /dev/ttyS9, unti: 3}]", "fieldbus[0].unti: is not a known key; did you mean unit?"),
         (
             "[{type: tcp, port: 5021}]",
-            "fieldbus[0]: plain Modbus TCP has its keys under network: (bind, port, allow); here stand",
+            "fieldbus[0]: type tcp is not one of rtu, tls; plain Modbus TCP has its keys under network: (bind",
         ),
         ("[{type: rtux, port: /dev/ttyS9}]", "fieldbus[0]: type rtux is not one of rtu, tls; did you mean rtu?"),
         ("[{type: null, port: /dev/ttyS9}]", "fieldbus[0]: has no type"),
