@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from tests.clients.c_program import CProgram
 from tests.clients.controllers import S7, Codesys, Irc5, TwinCat, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.python_program import PythonProgram
@@ -16,6 +17,7 @@ CONTROLLERS: dict[str, Any] = {
     "twincat": TwinCat,
     "codesys": Codesys,
     "python": PythonProgram,
+    "c": CProgram,
 }
 
 

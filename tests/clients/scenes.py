@@ -8,7 +8,8 @@ from tests.clients.gateway_at_hand import GatewayAtHand
 
 MAP = load_register_map("force-v1")
 WHERE = Endpoint("192.168.125.20", 502, 1)
-TEXTS = {language: render_client(MAP, language, WHERE) for language in ("rapid", "scl", "st", "urscript", "python")}
+LANGUAGES = ("rapid", "scl", "st", "urscript", "python", "c")
+TEXTS = {language: render_client(MAP, language, WHERE) for language in LANGUAGES}
 TEXTS |= dict.fromkeys(("twincat", "codesys"), TEXTS["st"])  # its two transports
 MODEL: dict[str, Any] = {
     "order": 2,

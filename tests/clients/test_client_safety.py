@@ -11,7 +11,7 @@ from tests.clients.controllers import Irc5
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.scenes import TEXTS, command, commands, cycles
 
-OWN_SOCKETS = ["rapid", "urscript", "python"]
+OWN_SOCKETS = ["rapid", "urscript", "python", "c"]
 """Languages whose client reads the header of an answer; the others leave it to a library."""
 
 
@@ -51,6 +51,24 @@ def test_an_answer_to_another_question_is_a_loss(language: str, place: int, gate
         return bytes(answer)
 
     gateway.ask = alter  # type: ignore[method-assign]
+    client.cycle()
+    assert "lost" in client.text
+
+
+@pytest.mark.parametrize("language", OWN_SOCKETS)
+def test_an_answer_of_another_length_is_a_loss(language: str, gateway: GatewayAtHand) -> None:
+    """Whole by its header, and one register short: the words behind it would be those of the answer before."""
+    client = CONTROLLERS[language](TEXTS[language], gateway)
+    cycles(client)
+    assert not client.text
+    ask = gateway.ask
+
+    def cut(frame: bytes) -> bytes:
+        answer = bytearray(ask(frame)[:-2])
+        answer[5], answer[8] = answer[5] - 2, answer[8] - 2
+        return bytes(answer)
+
+    gateway.ask = cut  # type: ignore[method-assign]
     client.cycle()
     assert "lost" in client.text
 
