@@ -6,7 +6,10 @@ and effects that are switched on.
 
 import json
 import os
+from math import sqrt
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -15,11 +18,13 @@ from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT
 from gateway.registers.residual_cause import ResidualCause
 from gateway.watch import described_machine as room
+from gateway.watch import machine_comparison
 from gateway.watch.machine_comparison import MachineComparison
 from gateway.watch.reference_recording import keep_reference_recording
 from gateway.watch.residual_watch import Watch, WatchSettings
 from gateway.watch.warning_filter import WindowVerdict
 from gateway.watch.window import Window
+from gateway.watch.window_verdict import EXCESS_WITHOUT_A_NAME
 from tests.diagnosis.changes.foreign_rig import Wish
 from tests.watch.foreign_course import CourseRing, recorded
 
@@ -119,3 +124,32 @@ def test_ten_quiet_minutes_have_no_name(seed, tmp_path):
         watch.check_newest_window()
         assert watch.published.cause is ResidualCause.NONE, watch.published.sentence
     assert watch.counters["skipped"] == 0
+
+
+@pytest.mark.parametrize(
+    ("excess_n", "told"),
+    [
+        (0.09, "nothing is off"),
+        (0.11, "no verdict"),
+        (0.99 * EXCESS_WITHOUT_A_NAME * 0.1, "no verdict"),
+        (2.0, "unknown"),
+    ],
+)
+def test_what_no_change_explains_is_told_only_where_it_is_much(
+    excess_n: float, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In between a look neither accuses nor acquits: a warning that stands would be cleared by it."""
+    left_n, least_n = 0.3, 0.1
+    found = SimpleNamespace(causes=(), baseline=SimpleNamespace(rms_n=sqrt(left_n**2 + excess_n**2)))
+    monkeypatch.setattr(machine_comparison, "compare_with_machine", lambda *_: found)
+    monkeypatch.setattr(machine_comparison, "describe_leftover", lambda _: "drifts")
+    machine: Any = SimpleNamespace(error=SimpleNamespace(left_n=left_n))
+    plant: Any = None
+    window: Any = SimpleNamespace(measurement=None, excitation_v=1.0)
+    verdict = MachineComparison(machine, "0003.fgr", plant, least_n).judge(window)
+    if told == "no verdict":
+        assert verdict is None
+    else:
+        assert verdict is not None
+        assert (verdict.cause is ResidualCause.UNKNOWN) == (told == "unknown")
+        assert verdict.excitation_v == 1.0
