@@ -181,6 +181,7 @@ class Simulation:
         note(control, self.clock.now_s)
 
     def _on_death(self) -> None:
+        self.status.forget_owner()
         self.observer.note_death(self.clock.now_s, CABLES["output"].through_s)
         self._lose_control()
         self.person.lose()

@@ -51,6 +51,10 @@ class StatusWitness:
             self._commands.append((now_s, host, control))
         self._written += ((now_s, counts) for counts in setpoints_of(pdu))
 
+    def forget_owner(self) -> None:
+        """Another gateway begins: it has none, whoever had the one before."""
+        self._owner = 0
+
     def _judge_requested(self) -> None:
         """A look of some time ago: who hears no answer tells so late."""
         at_s, counts = self._requested.popleft()

@@ -64,6 +64,16 @@ def test_a_setpoint_that_nobody_has_written_is_seen(observer: Observer) -> None:
     assert observer.broken == ["I7 at 1.9000: 12.00 N are requested, which nobody has written"]
 
 
+def test_a_gateway_that_begins_has_no_owner(observer: Observer) -> None:
+    """As seed 23090 drew it: between two looks it began, another one enabled and was lost, and the first one owned it again."""
+    witness = StatusWitness(observer, lambda: inf)
+    look(witness, 1.9, owner=1)
+    witness.forget_owner()
+    witness.note_write(OTHER, write_one_pdu(0, 1), 1.95)
+    look(witness, 2.0, owner=1)
+    assert observer.broken == []
+
+
 def test_an_enable_of_another_than_the_owner_is_seen_and_a_takeover_is_none(observer: Observer) -> None:
     witness = StatusWitness(observer, lambda: inf)
     look(witness, 1.9, owner=1)
