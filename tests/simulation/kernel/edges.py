@@ -219,10 +219,15 @@ class NotedRecorder(Recorder):
         super().__init__(*arguments)
         self.of.append(self)
 
+    def _release(self) -> None:
+        super()._release()
+        if self in self.of:  # in a week there are many
+            self.of.remove(self)
+
     @classmethod
     def close_all(cls) -> None:
-        while cls.of:
-            cls.of.pop()._release()
+        for recorder in tuple(cls.of):
+            recorder._release()
 
 
 def _no_fit(*_: Any) -> None:

@@ -115,7 +115,7 @@ class Master:
         """Send bytes, behind whatever of this connection still waits for its time."""
         assert self._line
         now_s = self._outside.time()
-        if not self._cut and self._free_s <= now_s:
+        if not self._cut and self._free_s < now_s:  # at the same moment a piece may still wait for its turn
             self._line.send(data)
             return
         self._free_s = max(self._free_s, now_s)
