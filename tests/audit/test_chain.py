@@ -29,15 +29,6 @@ def records(count: int, first: int = 1) -> list[dict]:
     ]
 
 
-@pytest.fixture
-def state(tmp_path: Path) -> Path:
-    file = AuditFile(tmp_path, FILE_BYTES)
-    for record in records(LINES):
-        file.append([record])
-    file.close()
-    return tmp_path
-
-
 def files_of(state: Path) -> list[Path]:
     return audit_files(state / "audit")
 

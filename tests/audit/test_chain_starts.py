@@ -10,16 +10,7 @@ import pytest
 
 from gateway.audit.audit_file import AuditFile
 from gateway.audit.audit_reader import read_audit, verify_audit
-from tests.audit.test_chain import FILE_BYTES, LINES, find_line, records, replace_last_line
-
-
-@pytest.fixture
-def state(tmp_path: Path) -> Path:
-    file = AuditFile(tmp_path, FILE_BYTES)
-    for record in records(LINES):
-        file.append([record])
-    file.close()
-    return tmp_path
+from tests.audit.test_chain import FILE_BYTES, LINES, find_line, replace_last_line
 
 
 @pytest.mark.parametrize("is_rewritten", [False, True])

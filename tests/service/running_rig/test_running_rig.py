@@ -263,6 +263,16 @@ def test_the_heartbeat_comes_from_the_loop_itself(devices: OwnDevices) -> None:
     with_running_rig(devices, scene)
 
 
+def test_the_tick_is_told_of_each_sample_that_streams(devices: OwnDevices, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        told: list[tuple[float | None, float | None]] = []
+        monkeypatch.setattr(rig._tick, "follow", lambda at_s: told.append((at_s, rig.loop.streamed_s)))
+        await until(lambda: len(set(told)) > 3)
+        assert all(at_s == newest_s is not None for at_s, newest_s in told)
+
+    with_running_rig(devices, scene)
+
+
 def test_a_leaving_master_is_lost_if_it_is_the_owner_and_until_it_commands_again(devices: OwnDevices) -> None:
     """A panel that closes its connection drops no force; a robot that connects anew in time has lost none."""
 

@@ -1,0 +1,17 @@
+"""A state directory with an audit of several files."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.audit.audit_file import AuditFile
+from tests.audit.test_chain import FILE_BYTES, LINES, records
+
+
+@pytest.fixture
+def state(tmp_path: Path) -> Path:
+    file = AuditFile(tmp_path, FILE_BYTES)
+    for record in records(LINES):
+        file.append([record])
+    file.close()
+    return tmp_path
