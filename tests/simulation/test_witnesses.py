@@ -7,6 +7,8 @@ from math import inf
 import pytest
 
 from tests.simulation.event import Event
+from tests.simulation.kernel.edges import Log
+from tests.simulation.kernel.virtual_time import VirtualClock
 from tests.simulation.masters.integrator import Sets
 from tests.simulation.masters.spelling import floats_pdu, mask_pdu, setpoints_of, write_one_pdu, write_pdu
 from tests.simulation.masters.tcp_master import Master
@@ -156,3 +158,12 @@ def test_rare_events_come_in_their_order_and_each_is_whole_by_itself() -> None:
     }
     assert kinds >= {("load_cell", "unit"), ("load_cell", "pace"), ("person", "say"), ("machine", "disk_broken")}
     assert all(replace(event) == event and isinstance(event, Event) for event in drawn)
+
+
+def test_a_cause_that_is_named_by_what_a_client_has_chosen_is_seen() -> None:
+    log = Log(VirtualClock())
+    for cause in ("accepted 10.0.0.1", "noise serial:1", "refusal 10.0.0.2 out_of_range", "accepted 10.0.0.1"):
+        log(cause, "")
+    assert log.internal_errors == []
+    log("accepted force_setpoint 12.5", "")
+    assert log.internal_errors[0].startswith("I12")
