@@ -9,8 +9,8 @@ wire costs nothing. Prints
 - what the control process takes of a core and of memory at 100 Hz while nobody asks;
 - loop lateness and missed ticks at 250 Hz while masters ask 2000 times a second.
 
-Beside latency and idle cost stands an empty loop of the same wake-ups (`empty_loop.py`): what is left above it is the gateway's
-own work, what it takes itself no Python program on this machine gets below.
+Beside latency and idle cost stands an empty loop of the same wake-ups (`harness/empty_loop.py`): what is left above it is the
+gateway's own work, what it takes itself no Python program on this machine gets below.
 
 Goals: p99 at most 250 us above that of a bare pty hop into the same process in the same run; missed ticks at most 0.5 %.
 """
@@ -34,7 +34,7 @@ from functools import partial
 from pathlib import Path
 
 import psutil
-from running_gateway import RunningGateway, running_gateway
+from harness.running_gateway import RunningGateway, running_gateway
 
 from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.progress import report
@@ -141,7 +141,7 @@ class EmptyLoop:
 @contextlib.contextmanager
 def empty_loop(loop_hz: int) -> Iterator[EmptyLoop]:
     """Run one until the block ends."""
-    script = Path(__file__).parent / "empty_loop.py"
+    script = Path(__file__).parent / "harness" / "empty_loop.py"
     with contextlib.closing(Devices()) as devices:
         process = subprocess.Popen(
             [sys.executable, str(script), *devices.paths, str(loop_hz)], stdout=subprocess.PIPE, text=True

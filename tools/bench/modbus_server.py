@@ -2,7 +2,7 @@
 
     python tools/bench/modbus_server.py [--seconds 3] [--rounds 5] [--connections 16] [--bank real|simple] [--json]
 
-Same load generator for all (modbus_load.c: one outstanding request per connection, one epoll), same run, rounds
+Same load generator for all (harness/modbus_load.c: one outstanding request per connection, one epoll), same run, rounds
 interleaved so that a busy machine hurts all alike; rates are medians over rounds, CPU is the server process's user + system
 time over all its requests. Only ratios mean something: read them, not the absolute numbers.
 With the real bank (the default) our FC16 checks thirteen values, owner and state and makes a Command, where the others copy
@@ -140,7 +140,7 @@ class Contender:
 def compile_c(source: str, into: Path, *libraries: str) -> Path | None:
     """Compile a C program with gcc; where that fails, say so and return None."""
     program = into / source.removesuffix(".c")
-    command = ["gcc", "-O2", "-o", str(program), str(HERE / source), *libraries]
+    command = ["gcc", "-O2", "-o", str(program), str(HERE / "harness" / source), *libraries]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         print(f"SKIPPED {source}: {done.stderr.strip().splitlines()[0]}", file=sys.stderr)

@@ -2,11 +2,11 @@
 """What is on the wire when a process dies, stands still, or a plug is pulled: `tools/bench/process_faults.py [--rounds 50]`.
 
 A gateway on a real rig's file presses with 4 V; both devices are a program at the far ends of two ptys, which shares no code
-with it and notes when the last byte of each setting has come. Each round does one thing to it (pressing_gateway.py): SIGKILL
-or SIGSTOP of control, of control while it records, of the guardian, of the residual watch; a pulled plug. Printed: from then
-until the safe voltage is on the wire whole, and until the gateway presses again where that is its promise; of what must not
-be felt, that it was not. Bounds are those of gateway/control/supervision; the peer is the bound itself, and how long a bare
-pty takes on this machine stands beside it.
+with it and notes when the last byte of each setting has come. Each round does one thing to it (harness/pressing_gateway.py):
+SIGKILL or SIGSTOP of control, of control while it records, of the guardian, of the residual watch; a pulled plug. Printed: from
+then until the safe voltage is on the wire whole, and until the gateway presses again where that is its promise; of what
+must not be felt, that it was not. Bounds are those of gateway/control/supervision; the peer is the bound itself, and how long
+a bare pty takes on this machine stands beside it.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from tools.bench.pressing_gateway import (
+from tools.bench.harness.pressing_gateway import (
     Scene,
     Times,
     fault_control,

@@ -19,8 +19,8 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from harness.running_gateway import running_gateway
 from pymodbus.client import ModbusTcpClient
-from running_gateway import running_gateway
 
 from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.progress import reported

@@ -22,7 +22,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from running_gateway import running_gateway
+from harness.running_gateway import running_gateway
 
 import gateway.diagnosis  # noqa: F401  # all steps, before the first loop is compiled
 from gateway.cli.diagnosis.progress_line import show_progress

@@ -1,4 +1,4 @@
-"""A gateway that presses on a real rig's file, and what can be done to its processes; for process_faults.py beside it.
+"""A gateway that presses on a real rig's file, and what can be done to its processes; for process_faults.py.
 
 Each function does one thing to a scene and returns two times: until the wire was safe (0: it was, or nothing had to become
 so), and until the gateway was ready again. What must not happen is asserted.

@@ -1,6 +1,6 @@
 """A loop of the gateway's wake-ups with nothing in them: what the machine and the interpreter take of each by themselves.
 
-    python tools/bench/empty_loop.py OUTPUT_PTY CELL_PTY LOOP_HZ
+    python tools/bench/harness/empty_loop.py OUTPUT_PTY CELL_PTY LOOP_HZ
 
 Reads each sentence of the cell and each tick of the clock, and drops them; writes one sentence to the output for each request
 on its TCP port, which it prints first. No bank, no control, no codec: a peer of the gateway in `loop.py`, not a part of it.
