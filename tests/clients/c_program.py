@@ -90,6 +90,9 @@ class CProgram:
     def reset(self) -> None:
         self._library.fg_reset_fault(self._client)
 
+    def tare(self) -> None:
+        self._library.fg_tare(self._client)
+
     def pull(self, *, pulls: bool) -> None:
         self._library.fg_pull(self._client, int(pulls))
 

@@ -178,6 +178,9 @@ class Irc5:
     def reset(self) -> None:
         self.set(fgReset=True)
 
+    def tare(self) -> None:
+        self.set(fgTare=True)
+
     def pull(self, *, pulls: bool) -> None:
         self.set(fgPull=pulls)
 
@@ -258,6 +261,9 @@ class UniversalRobot:
         data, self.received = self.received[:count], self.received[count:]
         return [len(data), *data]
 
+    def set(self, **values: Any) -> None:
+        self.machine.global_names |= values
+
     def get(self, name: str) -> Any:
         return self.machine.global_names[name]
 
@@ -272,6 +278,9 @@ class UniversalRobot:
 
     def reset(self) -> None:
         self.machine.start("fg_reset_fault")
+
+    def tare(self) -> None:
+        self.machine.start("fg_tare")
 
     def pull(self, *, pulls: bool) -> None:
         self.machine.start("fg_pull", pulls)
@@ -331,7 +340,7 @@ class Plc:
         self.machine.begin()
         self.block = self.machine.fresh(block)
         self.inputs: dict[str, Any] = dict.fromkeys(
-            [self.NAMES[each] for each in ("enable", "reset", "upload", "pull")], False
+            [self.NAMES[each] for each in ("enable", "reset", "tare", "take", "upload", "pull")], False
         )
         self.inputs[self.NAMES["force"]] = 0.0
         self.structures = {
@@ -379,6 +388,11 @@ class Plc:
         self.inputs[self.NAMES["reset"]] = True
         self.scan()
         self.inputs[self.NAMES["reset"]] = False
+
+    def tare(self) -> None:
+        self.inputs[self.NAMES["tare"]] = True
+        self.scan()
+        self.inputs[self.NAMES["tare"]] = False
 
     def pull(self, *, pulls: bool) -> None:
         self.inputs[self.NAMES["pull"]] = pulls
@@ -434,7 +448,7 @@ class MbClient:
 
     def set_static(self, name: str, value: float) -> None:
         """Set what a program may set of the instance (S7-1200 system manual, static variables of MB_CLIENT)."""
-        assert (name == "RCV_TIMEOUT" and value == 0.5) or (name == "MB_Unit_ID" and 0 <= value <= 255)
+        assert name == "RCV_TIMEOUT" or (name == "MB_Unit_ID" and 0 <= value <= 255)
         setattr(self, name, value)
 
     def call(self, given: dict[str, Any]) -> None:
@@ -459,6 +473,7 @@ class MbClient:
     def finish(self, given: dict[str, Any]) -> None:
         address, count, words = given["MB_DATA_ADDR"] - 40001, given["MB_DATA_LEN"], given["MB_DATA_PTR"]
         assert words == self.data and len(words) >= count and 0 <= address < 9999
+        assert self.RCV_TIMEOUT == 0.5, "with its own 2 s the status of a gateway that is gone would look fresh"
         assert given["CONNECT"]["CONNECTIONTYPE"] == 11 and given["CONNECT"]["ACTIVEESTABLISHED"]
         if given["MB_MODE"] == 0:
             request = struct.pack(">BHH", 3, address, count)
@@ -486,7 +501,8 @@ class S7(Plc):
     TYPES = ('"FG_Command"', '"FG_Model"')
     NAMES: ClassVar[dict[str, str]] = {
         **{name: name for name in ("enable", "reset", "force", "upload", "slot", "command", "model", "pull")},
-        **{name: name for name in ("text", "status", "ended", "uploadBusy")},
+        **{name: name for name in ("tare", "text", "status", "ended", "uploadBusy")},
+        "take": "takeOwnership",
         "uploaded": "uploadDone",
     }
 
@@ -502,7 +518,7 @@ class S7(Plc):
     def scan(self) -> None:
         self.now_s += self.CYCLE_S
         self.machine.steps = 0
-        given = {"tare": False, "takeOwnership": False, "slot": 0} | self.inputs | self.structures
+        given = {"slot": 0} | self.inputs | self.structures
         self.block.call(given)
 
 
@@ -515,6 +531,8 @@ class StructuredText(Plc):
     NAMES: ClassVar[dict[str, str]] = {
         "enable": "bEnable",
         "reset": "bReset",
+        "tare": "bTare",
+        "take": "bTakeOwnership",
         "force": "fForce",
         "upload": "bUpload",
         "pull": "bPull",

@@ -69,6 +69,9 @@ class PythonProgram:
     def reset(self) -> None:
         self.client.reset_fault()
 
+    def tare(self) -> None:
+        self.client.tare()
+
     def pull(self, *, pulls: bool) -> None:
         self.client.pull(pulls)
 

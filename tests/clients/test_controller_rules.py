@@ -80,13 +80,27 @@ def test_a_task_beside_a_motion_program_that_shows_no_life_enables_nothing() -> 
 def test_an_input_that_is_true_when_a_controller_starts_enables_nothing(kind: type[Plc]) -> None:
     gateway = GatewayAtHand(MAP)
     client = kind(TEXTS["scl" if kind is S7 else "st"], gateway)
-    client.inputs |= dict.fromkeys([client.NAMES[each] for each in ("enable", "reset", "upload")], True)
+    names = ("enable", "reset", "tare", "take", "upload")
+    client.inputs |= dict.fromkeys([client.NAMES[each] for each in names], True)
     client.inputs[client.NAMES["force"]] = 12.0
     cycles(client)
-    assert gateway.requests and gateway.writes == []
+    assert gateway.requests and gateway.writes == [] and gateway.uploads == []
     client.enable(12.0)
     cycles(client)
     assert client.enabled
+
+
+@pytest.mark.parametrize("kind", [S7, TwinCat, Codesys])
+def test_a_reset_disables_though_its_input_still_asks_for_the_force(kind: type[Plc]) -> None:
+    """Else it would be refused, for it needs force 0."""
+    gateway = GatewayAtHand(MAP)
+    client = kind(TEXTS["scl" if kind is S7 else "st"], gateway)
+    client.enable(12.0)
+    cycles(client)
+    client.inputs[client.NAMES["reset"]] = True
+    cycles(client)
+    assert [words[:2] for words in gateway.words if words[0] != 1] == [(2, 0)] and not gateway.exceptions
+    assert not client.enabled
 
 
 def test_an_mb_client_that_stays_busy_is_a_loss_and_shows_nothing_stale(monkeypatch: pytest.MonkeyPatch) -> None:

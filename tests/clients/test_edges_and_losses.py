@@ -1,0 +1,149 @@
+"""What a program asks for once is done once: edges, uploads, and what of them a loss leaves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.clients.conftest import CONTROLLERS
+from tests.clients.controllers import UniversalRobot
+from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.scenes import MODEL, TEXTS, command, commands, cycles
+
+TARE = 4
+OF_A_PROGRAM = ("rapid", "urscript", "python", "c")
+"""Languages whose client a program calls, and which read answers themselves; the others are blocks with inputs."""
+
+
+def tares(gateway: GatewayAtHand) -> list[int]:
+    return [words[0] for words in gateway.words if words[0] & ~1]
+
+
+def test_a_force_is_sent_as_the_nearest_count(client: Any, gateway: GatewayAtHand) -> None:
+    client.enable(12.346)
+    cycles(client)
+    assert commands(gateway) == [command(1, 1235)]
+
+
+@pytest.mark.parametrize("language", OF_A_PROGRAM)
+def test_a_tare_that_is_asked_for_twice_before_it_is_sent_is_one(language: str, gateway: GatewayAtHand) -> None:
+    client = CONTROLLERS[language](TEXTS[language], gateway)
+    client.tare()
+    client.tare()
+    cycles(client)
+    assert set(tares(gateway)) == {TARE}
+
+
+def test_a_tare_that_was_lost_is_not_taken_when_nobody_expects_it_any_more(client: Any, gateway: GatewayAtHand) -> None:
+    """A tool may press by then, and its force would be the new zero."""
+    cycles(client)
+    gateway.is_cut = True
+    client.tare()
+    cycles(client, 3)
+    gateway.is_cut = False
+    for _ in range(6):
+        client.cycle(1.0)
+    assert gateway.requests and tares(gateway) == []
+
+
+@pytest.mark.parametrize("language", ["urscript"])
+def test_a_tare_asked_for_between_a_question_and_its_answer_is_not_lost(language: str, gateway: GatewayAtHand) -> None:
+    """The program's thread runs beside the client's."""
+    client = CONTROLLERS[language](TEXTS[language], gateway)
+    client.enable(12.0)
+    answer = gateway.answer
+
+    def tare_meanwhile(request: bytes) -> bytes:
+        gateway.answer = answer  # type: ignore[method-assign]
+        client.tare()
+        return answer(request)
+
+    client.cycle()
+    gateway.answer = tare_meanwhile  # type: ignore[method-assign]
+    client.force(13.0)
+    cycles(client)
+    assert tares(gateway) == [TARE | 1]
+
+
+def test_a_second_upload_is_staged_as_the_first_was(client: Any, gateway: GatewayAtHand) -> None:
+    for _ in range(2):
+        client.begin_upload(MODEL, 3)
+        cycles(client, 8)
+        assert client.uploaded, client.text
+    assert gateway.uploads[:5] == gateway.uploads[5:]
+
+
+def test_an_upload_that_a_loss_has_cut_does_not_go_on_by_itself(client: Any, gateway: GatewayAtHand) -> None:
+    """What was staged before may be another master's by then."""
+    client.begin_upload(MODEL, 3)
+    answer = gateway.answer
+
+    def lose_the_second_part(request: bytes) -> bytes:
+        gateway.is_cut = gateway.is_cut or request[:3] == b"\x10\x04\x2e"  # FC16 to 1070
+        return answer(request)
+
+    gateway.answer = lose_the_second_part  # type: ignore[method-assign]
+    cycles(client, 8)
+    assert gateway.is_cut and not client.uploaded
+    gateway.is_cut, gateway.answer = False, answer  # type: ignore[method-assign]
+    for _ in range(6):
+        client.cycle(1.0)
+    assert len(gateway.uploads) == 1 and not client.uploaded
+
+
+def test_an_upload_that_is_refused_ends_and_says_why(client: Any, gateway: GatewayAtHand) -> None:
+    answer, asked = gateway.answer, list[bytes]()
+
+    def refuse_the_second_part(request: bytes) -> bytes:
+        if request[:3] != b"\x10\x04\x2e":
+            return answer(request)
+        asked.append(request)
+        return b"\x90\x03"
+
+    gateway.answer = refuse_the_second_part  # type: ignore[method-assign]
+    client.begin_upload(MODEL, 3)
+    cycles(client, 8)
+    assert len(asked) == 1 and len(gateway.uploads) == 1
+    assert not client.uploaded and client.text
+
+
+@pytest.mark.parametrize("language", OF_A_PROGRAM)
+def test_an_answer_of_another_function_is_a_loss(language: str, gateway: GatewayAtHand) -> None:
+    client = CONTROLLERS[language](TEXTS[language], gateway)
+    cycles(client)
+    ask = gateway.ask
+
+    def alter(frame: bytes) -> bytes:
+        answer = bytearray(ask(frame))
+        answer[7] ^= 0x07  # FC03 -> FC04
+        return bytes(answer)
+
+    gateway.ask = alter  # type: ignore[method-assign]
+    client.cycle()
+    assert "lost" in client.text
+
+
+def test_a_robot_that_has_reached_its_gateway_waits_no_longer_between_cycles(gateway: GatewayAtHand) -> None:
+    gateway.is_cut = True
+    robot = UniversalRobot(TEXTS["urscript"], gateway)
+    cycles(robot, 6)
+    assert robot.get("fg_backoff") == 4.0
+    gateway.is_cut = False
+    cycles(robot)
+    assert robot.get("fg_backoff") == 0.0
+
+
+def test_a_robot_s_program_waits_for_a_force_that_stands_and_for_no_other(gateway: GatewayAtHand) -> None:
+    robot = UniversalRobot(TEXTS["urscript"], gateway)
+    wait = lambda: robot.machine.start("fg_wait_in_band", 1.0)  # noqa: E731
+    robot.enable(12.0)
+    cycles(robot)
+    robot.set(fg_in_band=True)
+    assert wait() is True
+    robot.set(fg_enabled=False)
+    assert wait() is False, "of a force that is off"
+    slept: list[float] = []
+    robot.machine.library["sleep"] = lambda machine, arguments, frame: slept.append(0.0)
+    robot.set(fg_ended=True, fg_enabled=False)
+    assert wait() is False and not slept, "nobody waits for a gateway that has switched off"
