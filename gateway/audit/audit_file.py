@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.audit.chain import NO_HASH, BrokenLine, ChainEnd, open_line, seal_line
+from gateway.plain_file import open_plain, open_plain_stream, other_kind, read_plain
 from gateway.processes.durable_file import make_directory, read_object, sync_path
 
 FOLDER: Final = "audit"
@@ -55,7 +56,7 @@ def first_number(path: Path) -> int:
 
 def _line_at(path: Path, number: int) -> ChainEnd | None:
     """Return number and hash of a line of this file; None where it is not there, or not as it was written."""
-    lines = path.read_bytes().splitlines()
+    lines = read_plain(path).splitlines()
     try:
         return open_line(lines[number - first_number(path)])[1]
     except (BrokenLine, IndexError):
@@ -114,8 +115,10 @@ class AuditFile:
 
     def _head_of_before(self) -> ChainEnd | None:
         """Return the head. OSError where the disk does not give it now: it may be whole, and is asked again."""
+        head = self._folder / HEAD
         with contextlib.suppress(FileNotFoundError):
-            os.close(os.open(self._folder / HEAD, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC))
+            if not other_kind(head):
+                os.close(open_plain(head))
         return read_head(self._folder)
 
     def _doubt(self, head: ChainEnd | None, files: list[Path]) -> str:
@@ -136,7 +139,7 @@ class AuditFile:
 
     def _continue(self, path: Path) -> list[Fields]:
         """Find the end of the chain in its newest file. What is found wrong there comes back as records."""
-        data = path.read_bytes()
+        data = read_plain(path)
         whole, newline, torn = data.rpartition(b"\n")
         found: list[Fields] = []
         if torn:
@@ -185,8 +188,8 @@ class AuditFile:
     def _write_head(self) -> None:
         text = json.dumps({"n": self._end.number, "sha256": self._end.sha256})
         fresh = self._folder / f"{HEAD}.new"
-        with fresh.open("w", encoding="ascii") as stream:
-            stream.write(text)
+        with open_plain_stream(fresh, "wb") as stream:
+            stream.write(text.encode("ascii"))
             stream.flush()
             os.fsync(stream.fileno())
         fresh.replace(self._folder / HEAD)
@@ -203,7 +206,7 @@ class AuditFile:
         files = [path for path in full if path.stat().st_size] + [newest]  # none that was begun only, and could not go
         for path in files[: max(0, len(files) - self._kept)]:
             try:
-                _, end = open_line(path.read_bytes().rstrip(b"\n").rpartition(b"\n")[2])
+                _, end = open_line(read_plain(path).rstrip(b"\n").rpartition(b"\n")[2])
             except BrokenLine:  # somebody has altered it: it stays, as evidence
                 continue
             text = (
@@ -217,8 +220,8 @@ class AuditFile:
 
     def _open(self, path: Path) -> None:
         is_new = not path.exists()
-        flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
-        descriptor = os.open(path, flags, 0o600)
+        flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT
+        descriptor = open_plain(path, flags, 0o600)
         try:
             if is_new:
                 sync_path(self._folder)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from gateway.audit.audit_file import FOLDER, HEAD, audit_files, first_number, read_head
 from gateway.audit.chain import BrokenLine, ChainEnd, check_link, open_line
+from gateway.plain_file import open_plain_stream
 
 
 class AuditBreak(NamedTuple):
@@ -31,7 +32,7 @@ class AuditVerdict(NamedTuple):
 def read_audit(state: Path) -> Iterator[dict[str, Any]]:
     """Yield what the lines say, oldest first, whether or not the chain holds; what is no line is passed over."""
     for path in audit_files(state / FOLDER):
-        with path.open("rb") as stream:
+        with open_plain_stream(path) as stream:
             for line in stream:
                 try:
                     fields, _ = open_line(line.rstrip(b"\n"))
@@ -71,7 +72,7 @@ class _ChainWalk:
     def read(self, path: Path, *, is_last: bool) -> None:
         """Follow one file."""
         self.file, self.line = path.name, 0
-        with path.open("rb") as stream:
+        with open_plain_stream(path) as stream:
             for line in stream:
                 self.line += 1
                 if line.endswith(b"\n"):

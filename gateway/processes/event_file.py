@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Final, Self
 
+from gateway.plain_file import open_plain, open_plain_stream
 from gateway.processes.event import EventRecord, parse_event
 
 NAME: Final = "events.jsonl"
@@ -53,8 +54,7 @@ class EventFile:
     def _current(self) -> int:
         if self._descriptor < 0 or not self._is_named():
             self.close()
-            flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
-            self._descriptor = os.open(self._path, flags, 0o600)
+            self._descriptor = open_plain(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
         return self._descriptor
 
     def _is_named(self) -> bool:
@@ -127,7 +127,7 @@ class EventReader:
     def _fresh(self) -> IO[bytes] | None:
         """Return the file at the path, where it is not the one that is open."""
         try:
-            fresh = self._path.open("rb")
+            fresh = open_plain_stream(self._path)
         except FileNotFoundError:
             return None
         if self._stream is None or not os.path.sameopenfile(fresh.fileno(), self._stream.fileno()):
@@ -148,7 +148,7 @@ def _open_files(path: Path) -> list[IO[bytes]]:
     opened: dict[tuple[int, int], IO[bytes]] = {}
     for number in range(KEPT + 1):
         with contextlib.suppress(FileNotFoundError):
-            stream = _rotated_path(path, number).open("rb")
+            stream = open_plain_stream(_rotated_path(path, number))
             status = os.fstat(stream.fileno())
             if opened.setdefault((status.st_dev, status.st_ino), stream) is not stream:
                 stream.close()

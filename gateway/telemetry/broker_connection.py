@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.extras import import_library
+from gateway.plain_file import check_plain
 from gateway.telemetry.broker_session import BrokerMessage, BrokerSession
 
 AGAIN_S: Final = 2.0
@@ -54,6 +55,8 @@ async def keep_connected(
 
 
 def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage) -> Any:
+    for file in filter(None, (broker.ca, broker.certificate, broker.key)):
+        check_plain(file)
     return aiomqtt.Client(
         broker.host,
         broker.port,
