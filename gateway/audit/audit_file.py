@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.audit.chain import NO_HASH, BrokenLine, ChainEnd, open_line, seal_line
-from gateway.plain_file import open_plain, open_plain_stream, other_kind, read_plain
+from gateway.audit.file_lines import count_lines, read_end, read_line
+from gateway.plain_file import open_plain, open_plain_stream, other_kind
 from gateway.processes.durable_file import make_directory, read_object, sync_path
 
 FOLDER: Final = "audit"
@@ -56,9 +57,8 @@ def first_number(path: Path) -> int:
 
 def _line_at(path: Path, number: int) -> ChainEnd | None:
     """Return number and hash of a line of this file; None where it is not there, or not as it was written."""
-    lines = read_plain(path).splitlines()
     try:
-        return open_line(lines[number - first_number(path)])[1]
+        return open_line(read_line(path, number - first_number(path)))[1]
     except (BrokenLine, IndexError):
         return None
 
@@ -139,19 +139,20 @@ class AuditFile:
 
     def _continue(self, path: Path) -> list[Fields]:
         """Find the end of the chain in its newest file. What is found wrong there comes back as records."""
-        data = read_plain(path)
-        whole, newline, torn = data.rpartition(b"\n")
+        end = read_end(path)
         found: list[Fields] = []
-        if torn:
-            os.truncate(path, len(whole) + len(newline))
-            quote = torn[:_LONGEST_QUOTE].decode("ascii", "backslashreplace")
-            text = f"{len(torn)} bytes of an incomplete line were cut off: a writer was killed, or the power failed"
+        if end.torn:
+            os.truncate(path, end.whole_bytes)
+            quote = end.torn[:_LONGEST_QUOTE].decode("ascii", "backslashreplace")
+            text = (
+                f"{end.torn_bytes} bytes of an incomplete line were cut off: a writer was killed, or the power failed"
+            )
             found.append({"what": "torn line", "text": text, "torn": quote})
-        if whole:
+        if end.whole_bytes:
             try:
-                _, self._end = open_line(whole.rpartition(b"\n")[2])
+                _, self._end = open_line(end.last)
             except BrokenLine as broken:
-                count = whole.count(b"\n") + 1
+                count = count_lines(path)
                 text = f"A352 {path.name} line {count} {broken}"
                 found.append({"what": BROKEN, "text": text})
                 self._end = ChainEnd(first_number(path) + count - 1, NO_HASH)
@@ -206,7 +207,7 @@ class AuditFile:
         files = [path for path in full if path.stat().st_size] + [newest]  # none that was begun only, and could not go
         for path in files[: max(0, len(files) - self._kept)]:
             try:
-                _, end = open_line(read_plain(path).rstrip(b"\n").rpartition(b"\n")[2])
+                _, end = open_line(read_end(path).last)
             except BrokenLine:  # somebody has altered it: it stays, as evidence
                 continue
             text = (
