@@ -12,8 +12,9 @@ ERRORS: Final = (
         "E110",
         "bytes arrive, no valid line",
         "The line carries bytes, none of which form a message of this device at this baud rate.",
-        "The wrong baud rate, or the wrong device profile; seldom inverted or missing ground.",
-        "Set `baud:` in the rig file to what the device's own menu says; 9600 and 115200 are the usual ones.",
+        "The wrong baud rate, the wrong device profile, or another unit or format; seldom inverted or missing ground.",
+        "Set `baud:` in the rig file to what the device's menu says (mostly 9600 or 115200); where it is quoted, set it to "
+        "speak as its profile reads.",
     ),
     Explanation(
         "E111",

@@ -20,6 +20,10 @@ LEAST: Final = 3
 SHARE: Final = 0.01
 LATE_PERIODS: Final = 0.5  # a tick this late is nearer to the next one's time than to its own
 _BIN_S: Final = 1.0
+_NOISE: Final = (
+    "a motor cable beside it, no ground, a marginal baud rate? separate the cables, ground the shield at one end"
+)
+_NONE_READ: Final = "none could be read: another speed, another device or profile? force-gateway check the rig"
 _HALF: Final = 0.5
 
 
@@ -58,18 +62,19 @@ class _RateWarning:
 
 
 class LineNoise(_RateWarning):
-    """Messages of one serial line, and those of them that nobody can read. line: as sentences name it."""
+    """Messages of one serial line, and those of them that nobody can read. line: whose it is; explain: what one that
+    nobody can read does say, empty where it is no text."""
 
-    def __init__(self, line: str) -> None:
+    def __init__(self, line: str, explain: Callable[[bytes], str] = lambda line: "") -> None:
         super().__init__()
-        self._line = line
+        self._line, self._explain = line, explain
         self._recent = _RecentSums(3)
 
     def hear(self, messages: Sequence[object], now_s: float) -> str:
         """Return a sentence where noise begins with these messages, else an empty one."""
-        dropped = [len(one.data) for one in messages if isinstance(one, Garbage)]
+        dropped = [one.data for one in messages if isinstance(one, Garbage)]
         if messages:
-            self._recent.add(now_s, len(dropped), len(messages), sum(dropped))
+            self._recent.add(now_s, len(dropped), len(messages), sum(map(len, dropped)))
         if not dropped:
             return ""
         self._last_s = now_s
@@ -78,13 +83,10 @@ class LineNoise(_RateWarning):
             return ""
         self.is_on = True
         observation = f"{count:.0f} of {total:.0f} messages ({size:.0f} bytes) within {WINDOW_S:g} s could not be read"
-        return f"A341 {self._line}: {observation} and were dropped; {_cause_of_noise(total - count)}"
+        return f"A341 {self._line} line: {observation} and were dropped; {self._cause(total - count, dropped[-1])}"
 
-
-def _cause_of_noise(whole: float) -> str:
-    if not whole:
-        return "none could be read: another speed, another device or profile? force-gateway check the rig"
-    return "a motor cable beside it, no ground, a marginal baud rate? separate the cables, ground the shield at one end"
+    def _cause(self, whole: float, line: bytes) -> str:
+        return _NOISE if whole else self._explain(line) or _NONE_READ
 
 
 class SlowLoop(_RateWarning):
