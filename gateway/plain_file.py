@@ -1,4 +1,5 @@
 """Opening what must be a plain file: whatever else has its name is refused at once, never waited for and never read to its end.
+And writing one: what a disk refuses is told by its cause.
 
 A pipe is waited for until somebody writes, a device may have no end (/dev/zero), and some act on being opened (a watchdog
 begins to count). So a name is asked what it is before it is opened, and what was opened is asked again: it may have been
@@ -13,6 +14,14 @@ from pathlib import Path
 from typing import BinaryIO, Final, Literal
 
 DIRECTORY: Final = "a directory"
+_REASONS: Final = {
+    errno.ENOSPC: "the disk is full",
+    errno.EDQUOT: "this user may store no more there",
+    errno.EFBIG: "longer than a process may write here (ulimit -f, LimitFSIZE=) or this file system takes (FAT: 4 GiB)",
+    errno.EROFS: "mounted so, or by the kernel after errors (dmesg)",
+    errno.EIO: "the disk is broken, or gone (dmesg)",
+}
+_WITH_PLACE: Final = frozenset((errno.EINVAL, errno.EISDIR))
 _KINDS: Final = {
     stat.S_IFDIR: DIRECTORY,
     stat.S_IFIFO: "a pipe",
@@ -60,6 +69,25 @@ def read_plain(path: Path | str) -> bytes:
     """Return all that a plain file holds. OSError for what else has its name."""
     with open_plain_stream(path) as stream:
         return stream.read()
+
+
+def write_whole(descriptor: int, data: bytes | memoryview) -> None:
+    """Write all of it. OSError says why where only a part is taken: a disk that is full, a quota and a limit on files all take
+    what still fits, and say which they are when they are asked for the rest."""
+    written = os.write(descriptor, data)
+    if written < len(data):
+        written += os.write(descriptor, data[written:])
+    if written < len(data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def tell_refusal(error: OSError) -> str:
+    """Return why a disk refuses, in the system's words and in ours, and of what is no plain file where it stands."""
+    words = error.strerror or str(error)
+    if error.errno in _WITH_PLACE and error.filename:
+        return f"{error.filename}: {words}"
+    reason = _REASONS.get(error.errno or 0, "")
+    return f"{words}: {reason}" if reason else words
 
 
 def _other_kind(status: os.stat_result) -> str:

@@ -97,7 +97,7 @@ ERRORS: Final = (
         "E150",
         "events are not kept",
         "The disk did not take a line of events.jsonl. Control goes on; the lines are still on the gateway's stderr.",
-        "The disk is full, read-only or gone, or the state directory was removed.",
+        "The disk is full, read-only or gone; a quota or a limit on files; or the state directory was removed.",
         "df -h on the state directory; once lines are taken again, the next one says how many are missing.",
     ),
     Explanation(
@@ -170,7 +170,7 @@ ERRORS: Final = (
         "E402",
         "recording stopped",
         "The disk did not take a batch of the recording, or a sync of it. Control goes on, rows before that are whole.",
-        "The disk is full, read-only or broken, or it was removed.",
+        "The disk is full, read-only, broken or gone; a quota; or a limit on the length of files.",
         "Free space (df -h on the state directory): it goes on by itself within an hour, by force-gateway record on at once.",
     ),
     Explanation(

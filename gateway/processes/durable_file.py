@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 from zlib import crc32
 
-from gateway.plain_file import open_plain, open_plain_stream
+from gateway.plain_file import open_plain, open_plain_stream, write_whole
 
 _FRESH: Final = ".new"
 _READER_BOUND_S: Final = 2.0
@@ -163,9 +163,7 @@ def _write(directory: int, name: str, data: bytes) -> None:
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC
     descriptor = open_plain(name, flags, 0o640, directory=directory)
     try:
-        written = os.write(descriptor, data)
-        if written < len(data):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write_whole(descriptor, data)
         os.fsync(descriptor)
     finally:
         os.close(descriptor)

@@ -9,14 +9,13 @@ Standard library only: the guardian imports this.
 """
 
 import contextlib
-import errno
 import fcntl
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Final, Self
 
-from gateway.plain_file import open_plain, open_plain_stream
+from gateway.plain_file import open_plain, open_plain_stream, write_whole
 from gateway.processes.event import EventRecord, parse_event
 
 NAME: Final = "events.jsonl"
@@ -39,8 +38,7 @@ class EventFile:
         descriptor = self._current()
         data = b"\n" + line if self._is_torn else line
         self._is_torn = True  # until all of it is written
-        if os.write(descriptor, data) < len(data):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write_whole(descriptor, data)
         self._is_torn = False
         if os.fstat(descriptor).st_size >= self._longest_bytes:
             self._rotate()

@@ -54,7 +54,7 @@ def test_a_log_waits_for_no_file_that_is_none_and_says_so(kind: str, tmp_path: P
     lines: queue.Queue[str] = queue.Queue()
     with EventLog(lines.put, file=EventFile(tmp_path)) as log:
         log.note("start", "ready")
-        assert f"E150 events are not kept: it is {kind}" in lines.get(timeout=5)
+        assert f"E150 events are not kept: {tmp_path}/events.jsonl: it is {kind}" in lines.get(timeout=5)
 
 
 def test_what_is_noted_is_not_on_the_terminal(tmp_path: Path) -> None:
