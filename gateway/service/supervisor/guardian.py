@@ -29,6 +29,7 @@ from gateway.service.supervisor import guardian_sentences as words
 from gateway.service.supervisor.child_process import Child, create_shared_memory, describe_exit, reap_orphans
 from gateway.service.supervisor.child_starter import ChildStarter
 from gateway.service.supervisor.control_child import START_GRACE_S, STOP_BOUND_S, ControlChild
+from gateway.service.supervisor.descriptor_limit import raise_descriptor_limit
 from gateway.service.supervisor.event_wait import SignalPipe, wait_readable
 from gateway.service.supervisor.other_children import OtherChildren
 from gateway.service.supervisor.restart_policy import RestartPolicy
@@ -51,7 +52,10 @@ def run(options: RunOptions) -> int:
             )
             return exit_codes.DEVICE
         priority.set_nice(priority.LOOP_NICE)
+        too_few = raise_descriptor_limit()
         with EventLog(source="guardian", file=EventFile(state)) as log, SignalPipe() as signals:
+            if too_few:
+                log("limit", too_few)
             starter = ChildStarter(options.rig, simulate=options.simulate, state=state, say=partial(log, "children"))
             return Guardian(options, state, starter, signals, log, manager=service_manager()).watch()
 
