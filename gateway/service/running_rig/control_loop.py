@@ -141,7 +141,7 @@ class ControlLoop:
     def on_output_bytes(self, chunk: bytes, now_s: float) -> None:
         """Take bytes of the output device."""
         replies = self.output.on_bytes(chunk, now_s)
-        self._begin(WarningBit.SERIAL_NOISE, self._output_noise.hear(replies, now_s))
+        self._begin(WarningBit.SERIAL_NOISE, self._output_noise.hear(replies, now_s, self._slow_loop.is_on))
 
     def on_valve_bytes(self, chunk: bytes, now_s: float) -> None:
         """Take bytes of the valve's relay."""

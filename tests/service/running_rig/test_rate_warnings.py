@@ -175,6 +175,16 @@ def test_the_loop_asks_the_kernel_what_the_time_since_the_last_tick_went_to() ->
     assert "the machine is too busy" in sentence
 
 
+def test_answers_that_a_slow_loop_has_torn_are_not_blamed_on_cables() -> None:
+    wired = Wired().pressing(20.0)
+    wired.lateness = late_ticks(20)
+    wired.run(4.0)
+    assert wired.warnings & SLOW
+    broken(wired, on_output, 8, 0.1)
+    (sentence,) = wired.said("A341")
+    assert "our own loop is late (A342)" in sentence and "cable" not in sentence
+
+
 # -- A343
 
 
