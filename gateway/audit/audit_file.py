@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.audit.chain import NO_HASH, BrokenLine, ChainEnd, open_line, seal_line
+from gateway.audit.file_lines import count_lines, read_end, read_line
+from gateway.plain_file import open_plain, open_plain_stream, other_kind
 from gateway.processes.durable_file import make_directory, read_object, sync_path
 
 FOLDER: Final = "audit"
@@ -55,9 +57,8 @@ def first_number(path: Path) -> int:
 
 def _line_at(path: Path, number: int) -> ChainEnd | None:
     """Return number and hash of a line of this file; None where it is not there, or not as it was written."""
-    lines = path.read_bytes().splitlines()
     try:
-        return open_line(lines[number - first_number(path)])[1]
+        return open_line(read_line(path, number - first_number(path)))[1]
     except (BrokenLine, IndexError):
         return None
 
@@ -114,8 +115,10 @@ class AuditFile:
 
     def _head_of_before(self) -> ChainEnd | None:
         """Return the head. OSError where the disk does not give it now: it may be whole, and is asked again."""
+        head = self._folder / HEAD
         with contextlib.suppress(FileNotFoundError):
-            os.close(os.open(self._folder / HEAD, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC))
+            if not other_kind(head):
+                os.close(open_plain(head))
         return read_head(self._folder)
 
     def _doubt(self, head: ChainEnd | None, files: list[Path]) -> str:
@@ -136,19 +139,20 @@ class AuditFile:
 
     def _continue(self, path: Path) -> list[Fields]:
         """Find the end of the chain in its newest file. What is found wrong there comes back as records."""
-        data = path.read_bytes()
-        whole, newline, torn = data.rpartition(b"\n")
+        end = read_end(path)
         found: list[Fields] = []
-        if torn:
-            os.truncate(path, len(whole) + len(newline))
-            quote = torn[:_LONGEST_QUOTE].decode("ascii", "backslashreplace")
-            text = f"{len(torn)} bytes of an incomplete line were cut off: a writer was killed, or the power failed"
+        if end.torn:
+            os.truncate(path, end.whole_bytes)
+            quote = end.torn[:_LONGEST_QUOTE].decode("ascii", "backslashreplace")
+            text = (
+                f"{end.torn_bytes} bytes of an incomplete line were cut off: a writer was killed, or the power failed"
+            )
             found.append({"what": "torn line", "text": text, "torn": quote})
-        if whole:
+        if end.whole_bytes:
             try:
-                _, self._end = open_line(whole.rpartition(b"\n")[2])
+                _, self._end = open_line(end.last)
             except BrokenLine as broken:
-                count = whole.count(b"\n") + 1
+                count = count_lines(path)
                 text = f"A352 {path.name} line {count} {broken}"
                 found.append({"what": BROKEN, "text": text})
                 self._end = ChainEnd(first_number(path) + count - 1, NO_HASH)
@@ -185,8 +189,8 @@ class AuditFile:
     def _write_head(self) -> None:
         text = json.dumps({"n": self._end.number, "sha256": self._end.sha256})
         fresh = self._folder / f"{HEAD}.new"
-        with fresh.open("w", encoding="ascii") as stream:
-            stream.write(text)
+        with open_plain_stream(fresh, "wb") as stream:
+            stream.write(text.encode("ascii"))
             stream.flush()
             os.fsync(stream.fileno())
         fresh.replace(self._folder / HEAD)
@@ -203,7 +207,7 @@ class AuditFile:
         files = [path for path in full if path.stat().st_size] + [newest]  # none that was begun only, and could not go
         for path in files[: max(0, len(files) - self._kept)]:
             try:
-                _, end = open_line(path.read_bytes().rstrip(b"\n").rpartition(b"\n")[2])
+                _, end = open_line(read_end(path).last)
             except BrokenLine:  # somebody has altered it: it stays, as evidence
                 continue
             text = (
@@ -217,8 +221,8 @@ class AuditFile:
 
     def _open(self, path: Path) -> None:
         is_new = not path.exists()
-        flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
-        descriptor = os.open(path, flags, 0o600)
+        flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT
+        descriptor = open_plain(path, flags, 0o600)
         try:
             if is_new:
                 sync_path(self._folder)

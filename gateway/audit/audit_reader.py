@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from gateway.audit.audit_file import FOLDER, HEAD, audit_files, first_number, read_head
 from gateway.audit.chain import BrokenLine, ChainEnd, check_link, open_line
+from gateway.audit.file_lines import iterate_lines
 
 
 class AuditBreak(NamedTuple):
@@ -31,13 +32,12 @@ class AuditVerdict(NamedTuple):
 def read_audit(state: Path) -> Iterator[dict[str, Any]]:
     """Yield what the lines say, oldest first, whether or not the chain holds; what is no line is passed over."""
     for path in audit_files(state / FOLDER):
-        with path.open("rb") as stream:
-            for line in stream:
-                try:
-                    fields, _ = open_line(line.rstrip(b"\n"))
-                except BrokenLine:
-                    continue
-                yield fields
+        for line in iterate_lines(path):
+            try:
+                fields, _ = open_line(line.text)
+            except BrokenLine:
+                continue
+            yield fields
 
 
 def verify_audit(state: Path) -> AuditVerdict:
@@ -71,16 +71,15 @@ class _ChainWalk:
     def read(self, path: Path, *, is_last: bool) -> None:
         """Follow one file."""
         self.file, self.line = path.name, 0
-        with path.open("rb") as stream:
-            for line in stream:
-                self.line += 1
-                if line.endswith(b"\n"):
-                    self._take(line[:-1], path)
-                elif is_last:
-                    cause = "a kill, a power cut, or it is being written"
-                    self.notes.append(f"{path.name} ends in an incomplete line ({len(line)} bytes): {cause}")
-                else:
-                    raise BrokenLine("is incomplete, and a file follows")
+        for line in iterate_lines(path):
+            self.line += 1
+            if line.is_whole:
+                self._take(line.text, path)
+            elif is_last:
+                cause = "a kill, a power cut, or it is being written"
+                self.notes.append(f"{path.name} ends in an incomplete line ({line.length} bytes): {cause}")
+            else:
+                raise BrokenLine("is incomplete, and a file follows")
 
     def check_ends(self, first_file: str) -> None:
         """Check that nothing is missing before the first line that is kept, and after the last."""

@@ -18,6 +18,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from gateway.modbus import Role
 from gateway.modbus.certificate import ROLE_OID, encode_role
+from gateway.plain_file import read_plain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,8 +62,8 @@ def make_client(ca: Signed, name: str, role: Role | str, days: int) -> Signed:
 
 def load_ca(folder: Path) -> Signed:
     """Return the CA of a folder. ValueError or OSError where it cannot be read."""
-    certificate = x509.load_pem_x509_certificate((folder / "ca.crt").read_bytes())
-    key = serialization.load_pem_private_key((folder / "ca.key").read_bytes(), None)
+    certificate = x509.load_pem_x509_certificate(read_plain(folder / "ca.crt"))
+    key = serialization.load_pem_private_key(read_plain(folder / "ca.key"), None)
     if not isinstance(key, ec.EllipticCurvePrivateKey) or key.public_key() != certificate.public_key():
         raise ValueError("ca.key does not fit ca.crt")
     return Signed(certificate, key)

@@ -1,6 +1,5 @@
 """Changing which calibration or plant is in use, with or without a gateway that runs on the state directory."""
 
-import fcntl
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,6 +9,7 @@ from typing import Any, Final
 from gateway import defaults
 from gateway.cli.control_socket import ask
 from gateway.cli.errors import disk_hangs
+from gateway.processes.state_lock import hold_state_lock
 
 _PATIENCE_S: Final = defaults.COMMIT_PATIENCE_S
 _POLL_S: Final = 0.02
@@ -33,10 +33,5 @@ def not_running(directory: Path) -> Iterator[bool]:
     if not directory.is_dir():
         yield True
         return
-    with (directory / "lock").open("a") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            yield False
-            return
-        yield True
+    with hold_state_lock(directory) as is_ours:
+        yield is_ours

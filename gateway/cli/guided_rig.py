@@ -119,7 +119,7 @@ def own_profiles(role: str) -> "Iterator[DeviceProfile]":
     """Yield the device files of this folder that are of a role and have no fault."""
     from gateway.profiles import check_file
 
-    for path in sorted((*Path().glob("*.yaml"), *Path().glob("devices/*.yaml"))):
+    for path in sorted(own_files()):
         if re.search(r"^role:", path.read_text(encoding="utf-8", errors="replace"), re.MULTILINE):
             checked = check_file(str(path))
             if checked.kind == "device" and not checked.faults and checked.value.role.value == role:
@@ -198,7 +198,7 @@ def faults_of(rig: GuidedRig) -> Iterator[tuple[str, str]]:
 
 def own_files() -> list[Path]:
     """Return the YAML files of this folder, which a rig may name."""
-    return [*Path().glob("*.yaml"), *Path().glob("devices/*.yaml")]
+    return [path for path in (*Path().glob("*.yaml"), *Path().glob("devices/*.yaml")) if path.is_file()]
 
 
 def set_in(text: str, section: str, key: str, value: Any) -> str:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway import VERSION
+from gateway.plain_file import check_plain
 from gateway.processes.durable_file import sync_path
 
 _MANIFEST: Final = "backup.json"
@@ -62,6 +63,7 @@ def pack(state: Path, target: Path) -> list[str]:
 
 def names_in(source: Path) -> list[str]:
     """Return the files of an archive, after every check that `unpack` makes; ArchiveError with the reason."""
+    check_plain(source)
     with _damage_told(source):
         _read_to_the_end(source)
         with tarfile.open(source, "r:gz") as archive:

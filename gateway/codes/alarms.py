@@ -66,6 +66,14 @@ ALARMS: Final = (
         "dmesg names the disk or driver; unplug the adapter, or restart the machine. It goes on by itself once that ends.",
     ),
     Explanation(
+        "A411",
+        "too few files may be open",
+        "The limit on files, ports and connections that a process may have open is below what the gateway needs.",
+        "A small `ulimit -n` in the shell that starts it, LimitNOFILE= of a unit, or a container's limit.",
+        "Raise the hard limit and start again; until then ports, masters, recordings or restarts may fail for want of one.",
+        is_warning=True,
+    ),
+    Explanation(
         "A330",
         "calibration stopped",
         "A calibration run ended before its last stair; the force went to 0 and the data are kept.",

@@ -12,8 +12,9 @@ ERRORS: Final = (
         "E110",
         "bytes arrive, no valid line",
         "The line carries bytes, none of which form a message of this device at this baud rate.",
-        "The wrong baud rate, or the wrong device profile; seldom inverted or missing ground.",
-        "Set `baud:` in the rig file to what the device's own menu says; 9600 and 115200 are the usual ones.",
+        "The wrong baud rate, the wrong device profile, or another unit or format; seldom inverted or missing ground.",
+        "Set `baud:` in the rig file to what the device's menu says (mostly 9600 or 115200); where it is quoted, set it to "
+        "speak as its profile reads.",
     ),
     Explanation(
         "E111",
@@ -96,7 +97,7 @@ ERRORS: Final = (
         "E150",
         "events are not kept",
         "The disk did not take a line of events.jsonl. Control goes on; the lines are still on the gateway's stderr.",
-        "The disk is full, read-only or gone, or the state directory was removed.",
+        "The disk is full, read-only or gone; a quota or a limit on files; or the state directory was removed.",
         "df -h on the state directory; once lines are taken again, the next one says how many are missing.",
     ),
     Explanation(
@@ -169,7 +170,7 @@ ERRORS: Final = (
         "E402",
         "recording stopped",
         "The disk did not take a batch of the recording, or a sync of it. Control goes on, rows before that are whole.",
-        "The disk is full, read-only or broken, or it was removed.",
+        "The disk is full, read-only, broken or gone; a quota; or a limit on the length of files.",
         "Free space (df -h on the state directory): it goes on by itself within an hour, by force-gateway record on at once.",
     ),
     Explanation(

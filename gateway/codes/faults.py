@@ -41,7 +41,8 @@ class FaultCode(IntEnum):
             "A311",
             "no fresh force sample",
             "The last sample of the load cell is older than the bound.",
-            "A loose cable, a power cut at the amplifier, a rate too low for sample_timeout_s; or we were late (see the line).",
+            "A loose cable, no power at the amplifier, another unit or format than its profile reads, a rate too low for "
+            "sample_timeout_s; or we were late.",
             "Look at sample_age; check the amplifier's power and its output rate.",
         ),
     )

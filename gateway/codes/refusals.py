@@ -185,8 +185,9 @@ class RefusalReason(IntEnum):
             "W215",
             "the load cell is silent",
             "Enable was asked for without a fresh sample of the load cell.",
-            "No power, a cable, or an amplifier that has stopped streaming.",
-            "Check its power, its cable and its stream mode; `force-gateway explain E111` for a silent line.",
+            "No power, a cable, an amplifier that has stopped streaming, or one that speaks otherwise (unit, decimals).",
+            "Check its power, its cable and its stream mode; `force-gateway explain E111` for a silent line; the log quotes "
+            "what it says where that is text.",
         ),
     )
     RESET_NEEDS_ZERO = (

@@ -67,7 +67,7 @@ class LineStatus(NamedTuple):
     let, None where the machine does not count that; cell_held, output_held: what kept us from hearing a
     device that has not been heard for a while; temperature_c, feed_mm_s: of the load cell and under the tool, for
     compensation; nan: nobody knows. output_counts, cell_counts: of the two lines, growing; None where nobody counts. valve: of
-    the directional valve, None on a rig without one.
+    the directional valve, None on a rig without one. cell_says: what the cell says in place of readings, empty where nothing.
     """
 
     acknowledged_v: float | None = None
@@ -91,6 +91,7 @@ class LineStatus(NamedTuple):
     cell_counts: WireCounts | None = None
     valve: ValveStatus | None = None
     standing_v: float | None = None
+    cell_says: str = ""
 
 
 class LoopInputs(NamedTuple):

@@ -16,11 +16,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import Final
 
 from gateway.fieldbus.settings import ServerSettings
 from gateway.modbus.certificate import ROLES, PeerCertificate
+from gateway.plain_file import read_plain
 
 HANDSHAKE_S: Final = 5.0
 MOST_PENDING: Final = 8
@@ -62,9 +62,7 @@ class TlsSettings:
 def context_maker(settings: TlsSettings) -> Callable[[], ssl.SSLContext]:
     """Return what makes the server's context of the files as they are now, and asks no disk. OSError for files that cannot be
     read; who makes one gets ssl.SSLError for those that are of no use."""
-    return partial(
-        _make_context, *(Path(file).read_bytes() for file in (settings.certificate, settings.key, settings.ca))
-    )
+    return partial(_make_context, *(read_plain(file) for file in (settings.certificate, settings.key, settings.ca)))
 
 
 def _make_context(certificate: bytes, key: bytes, ca: bytes) -> ssl.SSLContext:

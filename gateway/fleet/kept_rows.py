@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 from gateway.fleet.tasks import Row, Task
+from gateway.plain_file import read_plain
 
 FORMAT: Final = 1
 
@@ -54,7 +55,7 @@ class KeptRows:
 
     def _read(self) -> list[Row]:
         try:
-            lines = self._path.read_text(encoding="utf-8", errors="replace").split("\n")[:-1]
+            lines = read_plain(self._path).decode(errors="replace").split("\n")[:-1]
         except FileNotFoundError:
             return []
         read: list[Row] = []

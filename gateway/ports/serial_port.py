@@ -25,6 +25,8 @@ from gateway.ports.port import WRITE_DEADLINE_S, PortEvents, monotonic_s
 MOST_UNSENT_BYTES: Final = 4096  # beyond it the line is stuck: no command here is longer than 40 bytes
 _CHUNK_BYTES: Final = 4096
 _FIRST_BACKOFF_S, _LONGEST_BACKOFF_S = 0.1, 2.0
+_REFUSALS: Final = ("E101", "E103")  # permission, another program: somebody must do something
+_REFUSALS_TOLD: Final = 3  # in a row: 0.6 s after the first
 _CLOSE_DEADLINE_S: Final = 0.25
 
 
@@ -38,6 +40,7 @@ class SerialPort:
         self._path = path
         self._settings = settings
         self._on_bytes, self._on_lost, self._on_open = events.on_bytes, events.on_lost, events.on_open
+        self._on_refused, self._refusals = events.on_refused, 0
         self._descriptor = -1
         self._is_wanted = False  # from `open` to `close`
         self._identity = PtyIdentity(is_kept=is_simulated)
@@ -148,7 +151,7 @@ class SerialPort:
 
     def _open(self) -> None:
         self._descriptor = open_descriptor(self._path, self._settings)
-        self._failure, self._unsent, self._backoff_s = None, b"", _FIRST_BACKOFF_S
+        self._failure, self._unsent, self._backoff_s, self._refusals = None, b"", _FIRST_BACKOFF_S, 0
         self.warning = set_low_latency(self._descriptor, self._path)
         asyncio.get_running_loop().add_reader(self._descriptor, self._on_readable)
         self._on_open(self._descriptor)
@@ -222,9 +225,17 @@ class SerialPort:
             return
         try:
             self._open()
-        except PortError:
+        except PortError as error:
             self._backoff_s = min(2.0 * self._backoff_s, _LONGEST_BACKOFF_S)
             self._reopen_after(self._backoff_s)
+            self._note_refusal(error)
+
+    def _note_refusal(self, error: PortError) -> None:
+        """It is there again and does not open: told once, and not at the first time, for udev gives permissions a moment after
+        the name."""
+        self._refusals = self._refusals + 1 if error.code in _REFUSALS else 0
+        if self._refusals == _REFUSALS_TOLD:
+            self._on_refused(error)
 
     def _still_unsent(self) -> int:
         if not self.is_open:

@@ -13,12 +13,13 @@ import errno
 import fcntl
 import json
 import os
-import stat
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 from zlib import crc32
+
+from gateway.plain_file import open_plain, open_plain_stream, write_whole
 
 _FRESH: Final = ".new"
 _READER_BOUND_S: Final = 2.0
@@ -115,12 +116,10 @@ def replace_text(target: Path, text: str) -> None:
 def read_regular(path: Path) -> bytes:
     """Return what a document's file holds. OSError for what else may have its name: a pipe would be waited for, a device has no
     end, and a file of gigabytes (a hole that a broken file system has left) would be all of a start's time and memory."""
-    status = path.stat()
-    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):  # of a folder the reading tells
-        raise OSError(errno.EINVAL, "it is a pipe or a device, and no file", str(path))
-    if status.st_size > LONGEST_DOCUMENT:
-        raise OSError(errno.EFBIG, f"it has {status.st_size} bytes, no document has {LONGEST_DOCUMENT}", str(path))
-    return path.read_bytes()
+    with open_plain_stream(path) as stream:
+        if (size := os.fstat(stream.fileno()).st_size) > LONGEST_DOCUMENT:
+            raise OSError(errno.EFBIG, f"it has {size} bytes, no document has {LONGEST_DOCUMENT}", str(path))
+        return stream.read()
 
 
 def read_object(path: Path) -> dict[str, Any]:
@@ -161,12 +160,10 @@ def verify_checksum(data: bytes) -> bytes:
 
 def _write(directory: int, name: str, data: bytes) -> None:
     """A whole new file on the disk, under a name that nobody reads; what a killed writer left there goes."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC
-    descriptor = os.open(name, flags, 0o640, dir_fd=directory)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC
+    descriptor = open_plain(name, flags, 0o640, directory=directory)
     try:
-        written = os.write(descriptor, data)
-        if written < len(data):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write_whole(descriptor, data)
         os.fsync(descriptor)
     finally:
         os.close(descriptor)

@@ -9,13 +9,13 @@ Standard library only: the guardian imports this.
 """
 
 import contextlib
-import errno
 import fcntl
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Final, Self
 
+from gateway.plain_file import open_plain, open_plain_stream, write_whole
 from gateway.processes.event import EventRecord, parse_event
 
 NAME: Final = "events.jsonl"
@@ -38,8 +38,7 @@ class EventFile:
         descriptor = self._current()
         data = b"\n" + line if self._is_torn else line
         self._is_torn = True  # until all of it is written
-        if os.write(descriptor, data) < len(data):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write_whole(descriptor, data)
         self._is_torn = False
         if os.fstat(descriptor).st_size >= self._longest_bytes:
             self._rotate()
@@ -53,8 +52,7 @@ class EventFile:
     def _current(self) -> int:
         if self._descriptor < 0 or not self._is_named():
             self.close()
-            flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
-            self._descriptor = os.open(self._path, flags, 0o600)
+            self._descriptor = open_plain(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
         return self._descriptor
 
     def _is_named(self) -> bool:
@@ -127,7 +125,7 @@ class EventReader:
     def _fresh(self) -> IO[bytes] | None:
         """Return the file at the path, where it is not the one that is open."""
         try:
-            fresh = self._path.open("rb")
+            fresh = open_plain_stream(self._path)
         except FileNotFoundError:
             return None
         if self._stream is None or not os.path.sameopenfile(fresh.fileno(), self._stream.fileno()):
@@ -148,7 +146,7 @@ def _open_files(path: Path) -> list[IO[bytes]]:
     opened: dict[tuple[int, int], IO[bytes]] = {}
     for number in range(KEPT + 1):
         with contextlib.suppress(FileNotFoundError):
-            stream = _rotated_path(path, number).open("rb")
+            stream = open_plain_stream(_rotated_path(path, number))
             status = os.fstat(stream.fileno())
             if opened.setdefault((status.st_dev, status.st_ino), stream) is not stream:
                 stream.close()

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Final
 
 import gateway
+from gateway.plain_file import DIRECTORY, other_kind
 from gateway.profiles.strict_yaml.faults import closest, one_of
 
 FOLDERS: Final = {
@@ -46,8 +47,9 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
     for candidate in (path, folder / f"{name}.yaml", folder / FOLDERS[kind] / f"{name}.yaml"):
         if _is_file(candidate):
             return candidate
-    if _is_directory(path):
-        raise FileNotFoundError("is a directory: name the file in it")
+    if other := _other_kind(path):
+        cure = ": name the file in it" if other == DIRECTORY else f", and no {kind} file"
+        raise FileNotFoundError(f"is {other}{cure}")
     if "/" in name or name.endswith(_SUFFIXES):
         raise FileNotFoundError(f"is no file (looked for {display(path)}){_near(path)}")
     near = closest(name, known)
@@ -62,11 +64,11 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def _is_directory(path: Path) -> bool:
+def _other_kind(path: Path) -> str:
     try:
-        return path.is_dir()
+        return other_kind(path)
     except (OSError, ValueError):
-        return False
+        return ""
 
 
 def _near(path: Path) -> str:

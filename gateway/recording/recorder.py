@@ -13,7 +13,6 @@ Decisions
 """
 
 import contextlib
-import errno
 import fcntl
 import json
 import os
@@ -23,6 +22,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.plain_file import tell_refusal, write_whole
 from gateway.processes.durable_file import sync_path
 from gateway.recording.layout import BATCH_PREFIX, MARK, SUFFIX, batch_crc, header_bytes, number_in
 
@@ -93,8 +93,7 @@ class Recorder:
         """Return its length. A file without one could not be read: it goes."""
         assert self._descriptor is not None
         try:
-            if os.write(self._descriptor, data) < len(data):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
+            write_whole(self._descriptor, data)
         except OSError:
             self._release()
             with contextlib.suppress(OSError):
@@ -112,18 +111,16 @@ class Recorder:
             self.rows_written += rows
 
     def _write(self, data: bytes | memoryview) -> bool:
-        """One write; False, and the recording ends, when the disk did not take all of it."""
+        """Write it; False, and the recording ends, when the disk did not take all of it."""
         if self._descriptor is None:
             return False
         try:
-            written = os.write(self._descriptor, data)
+            write_whole(self._descriptor, data)
             if self._is_deleted(self._descriptor):
                 return self._stop(_DELETED)
         except OSError as error:
-            return self._stop(error.strerror or str(error))
-        if written < len(data):
-            return self._stop("the disk is full")
-        self._length += written
+            return self._stop(tell_refusal(error))
+        self._length += len(data)
         return True
 
     @staticmethod

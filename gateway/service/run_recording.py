@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample
+from gateway.plain_file import tell_refusal
 from gateway.processes.disk_worker import DiskWorker
 from gateway.recording import Recorder
 from gateway.recording.recorder import sync_recording
@@ -165,5 +166,6 @@ class RunRecording:
             return
         except OSError as error:
             self._log(
-                "recording", f"E402 recording {path} may not outlive a power cut: {error.strerror}; control goes on"
+                "recording",
+                f"E402 recording {path} may not outlive a power cut: {tell_refusal(error)}; control goes on",
             )

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.extras import import_library
+from gateway.plain_file import check_plain
 from gateway.telemetry.broker_session import BrokerMessage, BrokerSession
 
 AGAIN_S: Final = 2.0
@@ -33,6 +34,7 @@ async def keep_connected(
     MissingExtraError without aiomqtt.
     """
     aiomqtt = import_library("aiomqtt")
+    _tell_no_loss_twice(asyncio.get_running_loop(), aiomqtt.MqttError)
     is_away = False
     while True:
         will = session.begin()
@@ -53,7 +55,21 @@ async def keep_connected(
         await asyncio.sleep(again_s)
 
 
+def _tell_no_loss_twice(loop: asyncio.AbstractEventLoop, loss: type[Exception]) -> None:
+    """Where the broker goes away in a subscription, or right behind its acceptance, aiomqtt leaves the loss on a future that
+    nobody asks any more, and asyncio tells that as a traceback. It is told as E181."""
+
+    def handle(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        is_forgotten = str(context.get("message", "")).startswith("Future exception was never retrieved")
+        if not (is_forgotten and isinstance(context.get("exception"), loss)):
+            loop.default_exception_handler(context)
+
+    loop.set_exception_handler(handle)
+
+
 def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage) -> Any:
+    for file in filter(None, (broker.ca, broker.certificate, broker.key)):
+        check_plain(file)
     return aiomqtt.Client(
         broker.host,
         broker.port,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gateway.live.control_link import ControlLink
 from gateway.live.live_state import LiveState
+from gateway.plain_file import read_plain
 from gateway.processes.beside_control import serve_until_guardian_ends
 from gateway.processes.event_log import EventLog
 from gateway.telemetry.broker_connection import Broker, keep_connected
@@ -71,7 +72,7 @@ async def publish(options: dict[str, Any], log: EventLog) -> None:
 
     rig = load_rig(options["rig"], simulated=options["simulated"])
     assert rig.mqtt is not None
-    password = Path(rig.mqtt.password_file).read_text().strip() if rig.mqtt.password_file else None
+    password = read_plain(rig.mqtt.password_file).decode().strip() if rig.mqtt.password_file else None
     tls = rig.mqtt.tls
     certificates = (tls.ca, tls.certificate, tls.key) if tls else ()
     broker = Broker(rig.mqtt.host, rig.mqtt.port, rig.mqtt.username, password, *certificates)

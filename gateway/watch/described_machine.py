@@ -18,7 +18,7 @@ from gateway.diagnosis.diagnose import Options
 from gateway.diagnosis.excerpt import take_excerpt
 from gateway.diagnosis.measurement import Measurement
 from gateway.plants.recorded_number import header_in_use
-from gateway.processes.durable_file import add_checksum, lock_directory, replace_durably, verify_checksum
+from gateway.processes.durable_file import add_checksum, lock_directory, read_regular, replace_durably, verify_checksum
 from gateway.recording import read_table
 from gateway.recording.measurement import measurement_of
 from gateway.twin.plant import Plant, values
@@ -37,7 +37,7 @@ def described_machine(state: Path, reference: ReferenceRecording, plant: Plant) 
     folder, key = reference_path(state, reference).parent, _key(reference, plant)
     old = reference_measurement(state, reference)
     try:
-        kept = json.loads(verify_checksum((folder / _FILE).read_bytes()))
+        kept = json.loads(verify_checksum(read_regular(folder / _FILE)))
         if kept["key"] == key:
             return read_machine(kept["machine"], [old])
     except (OSError, ValueError, KeyError, TypeError):

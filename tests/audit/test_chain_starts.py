@@ -11,6 +11,7 @@ import pytest
 from gateway.audit.audit_file import AuditFile
 from gateway.audit.audit_reader import read_audit, verify_audit
 from tests.audit.test_chain import FILE_BYTES, LINES, find_line, replace_last_line
+from tests.other_kinds import MAKERS, never_waiting, put
 
 
 @pytest.mark.parametrize("is_rewritten", [False, True])
@@ -29,6 +30,22 @@ def test_a_start_covers_up_no_head_that_is_gone_or_names_another_line(state: Pat
     told = [fields["text"] for fields in read_audit(state) if fields["what"] == "chain broken"]
     assert [text[:4] for text in told] == ["A352"]
     assert verify_audit(state).broken
+
+
+@pytest.mark.parametrize("kind", MAKERS)
+@pytest.mark.parametrize("name", ["newest", "head", "head.new"])
+def test_no_audit_waits_for_what_is_no_file(state: Path, name: str, kind: str) -> None:
+    """Its thread stood for ever, and nobody was told that nothing was kept."""
+    newest = max(path for path in (state / "audit").iterdir() if path.suffix == ".jsonl")
+    file = AuditFile(state, 1 << 20)
+    put(kind, newest if name == "newest" else state / "audit" / name)
+    with never_waiting():
+        if name == "newest":
+            with pytest.raises(OSError, match=f"it is {kind}"):
+                file.append([{"what": "start"}])
+        else:
+            file.append([{"what": "start"}])  # an old head promises less than there is
+    file.close()
 
 
 @pytest.mark.parametrize("name", ["audit", "audit/head"])

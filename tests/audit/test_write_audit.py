@@ -187,7 +187,7 @@ def test_a_full_disk_is_an_alarm_and_nothing_is_lost_that_memory_holds() -> None
         log.put({"k": k})
         log.flush()
     assert len(said) == 1 and said[0].startswith(
-        "A351 the audit is not stored: No space left on device; kept in memory"
+        "A351 the audit is not stored: No space left on device: the disk is full; kept in memory"
     )
     file.is_full = False
     now[0] += 10.0

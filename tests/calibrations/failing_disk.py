@@ -65,7 +65,16 @@ def disk(*arguments: Any, kind: type[Disk] = Disk, **options: Any) -> Iterator[D
         there.count("mkdir", path.name)
         make(path, *rest, **more)
 
+    def open_plain(name: str, flags: int, mode: int, *, directory: int) -> Any:
+        return there.open(name, flags, mode, dir_fd=directory)
+
+    def write_whole(descriptor: int, data: bytes) -> None:
+        if there.write(descriptor, data) < len(data):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(durable_file, "write_whole", write_whole)
         patch.setattr(durable_file, "os", there)
+        patch.setattr(durable_file, "open_plain", open_plain)
         patch.setattr(pathlib.Path, "mkdir", mkdir)
         yield there

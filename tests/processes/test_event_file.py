@@ -2,6 +2,7 @@
 
 import json
 import os
+import queue
 import subprocess
 import sys
 import threading
@@ -20,6 +21,7 @@ from gateway.processes.event import (
 )
 from gateway.processes.event_file import KEPT, EventFile, EventReader
 from gateway.processes.event_log import EventLog, QueuedWriter
+from tests.other_kinds import MAKERS, put
 from tests.processes.test_event_log import NOON_S, kept
 
 
@@ -43,6 +45,16 @@ def test_the_file_has_one_json_object_per_line(tmp_path: Path) -> None:
         "source": "guardian",
     }
     assert (tmp_path / "events.jsonl").stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.parametrize("kind", MAKERS)
+def test_a_log_waits_for_no_file_that_is_none_and_says_so(kind: str, tmp_path: Path) -> None:
+    """A pipe kept its thread for ever, unsaid, and the end of the log waited for it."""
+    put(kind, tmp_path / "events.jsonl")
+    lines: queue.Queue[str] = queue.Queue()
+    with EventLog(lines.put, file=EventFile(tmp_path)) as log:
+        log.note("start", "ready")
+        assert f"E150 events are not kept: {tmp_path}/events.jsonl: it is {kind}" in lines.get(timeout=5)
 
 
 def test_what_is_noted_is_not_on_the_terminal(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from gateway.cli.errors import CliError
 from gateway.cli.master.wires import TIMEOUT_S, TcpWire
 from gateway.modbus.certificate import KEY_MISMATCH
+from gateway.plain_file import check_plain
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ class TlsWire(TcpWire):
         context.minimum_version = ssl.TLSVersion.TLSv1_2
         for file in (self.files.ca, self.files.certificate, self.files.key):
             try:
+                check_plain(file)
                 file.read_bytes()
             except OSError as error:
                 raise CliError(f"E171 {file}: {error.strerror or error}", exit_codes.DATA) from None

@@ -172,10 +172,11 @@ def _compute(
 def _question(verb: str, options: dict[str, Any]) -> dict[str, Any]:
     """Everything besides the file that an answer depends on."""
     from gateway import VERSION
+    from gateway.plain_file import read_plain
     from gateway.profiles import load_rig
 
     rig = load_rig(options["rig"]).fingerprint if options["rig"] else ""
-    mapping = Path(options["columns"]).read_text(encoding="utf-8") if options["columns"] else ""
+    mapping = read_plain(options["columns"]).decode() if options["columns"] else ""
     return {"verb": verb, "version": VERSION, "rig": rig, "columns": mapping}
 
 

@@ -1,6 +1,5 @@
 """`restore`: a backup back into a state directory, wholly or not at all."""
 
-import fcntl
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,7 +8,7 @@ import click
 
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, count_of, state_options
-from gateway.processes import exit_codes
+from gateway.processes import exit_codes, state_lock
 
 EXAMPLES = ("restore kept.tar.gz --state elsewhere --dry-run", "restore kept.tar.gz --state copy")
 
@@ -47,13 +46,10 @@ def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> No
 @contextmanager
 def _not_running(directory: Path) -> Iterator[None]:
     """Holds the lock that a running gateway holds; E104 when one does."""
-    lock = directory / "lock"
-    if not lock.exists():
+    if not (directory / state_lock.NAME).exists():
         yield
         return
-    with lock.open("a") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise CliError(f"E104 a gateway runs on {directory}; stop it first", exit_codes.DEVICE) from None
+    with state_lock.hold_state_lock(directory) as is_ours:
+        if not is_ours:
+            raise CliError(f"E104 a gateway runs on {directory}; stop it first", exit_codes.DEVICE)
         yield

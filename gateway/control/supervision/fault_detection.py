@@ -148,9 +148,9 @@ class FaultDetector:
         return RefusalReason.NONE
 
     def excuse(self, block: RefusalReason, now_s: float, reading: Reading, line: LineStatus) -> str:
-        """Return why the machine, and not the device, keeps an enable back; empty where it does not."""
+        """Return why it is not the device that keeps an enable back, or what a cell says in place of readings; else empty."""
         if block is RefusalReason.CELL_SILENT:
-            return cause_of_silence(FaultCode.SAMPLE_STALE, reading.age_s, line.cell_held, "")[1]
+            return cause_of_silence(FaultCode.SAMPLE_STALE, reading.age_s, line.cell_held, line.cell_says)[1]
         if block is RefusalReason.OUTPUT_FAULT and line.unanswered_since_s is not None and not line.fault:
             silent_s = now_s - line.unanswered_since_s
             return cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, "")[1]
@@ -190,7 +190,7 @@ class FaultDetector:
             observation = (
                 f"last sample {reading.age_s * 1e3:.0f} ms old, allowed {self._bounds.sample_timeout_s * 1e3:.0f} ms"
             )
-            suspects = "power, wires or stream mode of the amplifier"
+            suspects = line.cell_says or "power, wires or stream mode of the amplifier"
             fault, blamed = cause_of_silence(FaultCode.SAMPLE_STALE, reading.age_s, line.cell_held, suspects)
             return stop_cause(fault, f"{observation}: {blamed}")
         if not (reading.is_usable or reading.overload):

@@ -4,6 +4,7 @@ The files are looked at as the gateway will load them: a key that does not fit i
 expired, a key that others may read. All of it is told before the gateway starts.
 """
 
+import errno
 import ssl
 import stat
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.modbus.certificate import KEY_MISMATCH, PeerCertificate, read_certificate
+from gateway.plain_file import read_plain
 from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.profiles.rigs.faces import TlsFace
 from gateway.profiles.rigs.network_checks import is_loopback
@@ -24,7 +26,6 @@ _FLIGHTS: Final = 3  # of a handshake: hello, certificate, end
 _MAKE: Final = "`force-gateway certs DIR` makes a CA, a server and clients"
 _CURES: Final[dict[type[OSError], str]] = {
     FileNotFoundError: _MAKE,
-    IsADirectoryError: "name the file in it",
     NotADirectoryError: _MAKE,
 }
 
@@ -84,10 +85,9 @@ def _unreadable(path: str, face: TlsFace) -> Found:
     for name in ("certificate", "key", "ca"):
         file = Path(getattr(face, name))
         try:
-            text = file.read_bytes()
+            text = read_plain(file)
         except OSError as error:
-            cure = _CURES.get(type(error), "let the gateway's user read it")
-            yield f"{path}.{name}", f"E171 {file}: {error.strerror or error}; {cure}"
+            yield f"{path}.{name}", f"E171 {file}: {error.strerror or error}{_cure(error)}"
             continue
         kind = b"PRIVATE KEY-----" if name == "key" else b"-----BEGIN CERTIFICATE-----"
         if kind not in text:
@@ -101,6 +101,12 @@ def _unreadable(path: str, face: TlsFace) -> Found:
         if name == "key" and file.stat().st_mode & (stat.S_IRWXO | stat.S_IWGRP):
             mode = f"{stat.S_IMODE(file.stat().st_mode):03o}"
             yield f"{path}.key", f"E172 {file} can be used by everybody on this machine (mode {mode}): chmod 600 {file}"
+
+
+def _cure(error: OSError) -> str:
+    if error.errno in (errno.EINVAL, errno.EISDIR):  # no plain file: it says so itself
+        return ""
+    return "; " + _CURES.get(type(error), "let the gateway's user read it")
 
 
 def _unfit(path: str, face: TlsFace) -> Found:
@@ -155,7 +161,7 @@ def _refusal(server: ssl.SSLContext, client: ssl.SSLContext) -> str:
 def _certificate(file: str) -> PeerCertificate | None:
     """Return the first certificate of a PEM file; None where there is none that can be read."""
     try:
-        text = Path(file).read_text("ascii")
+        text = read_plain(file).decode("ascii")
         begin, end = "-----BEGIN CERTIFICATE-----", "-----END CERTIFICATE-----"
         return read_certificate(ssl.PEM_cert_to_DER_cert(begin + text.split(begin, 1)[1].split(end, 1)[0] + end))
     except (OSError, ValueError, IndexError):

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from gateway.plain_file import other_kind
 from gateway.recording.errors import RecordingError
 from gateway.recording.foreign.table_text import ZIP, refuse_other_kinds
 from gateway.recording.layout import MAGIC
@@ -20,6 +21,10 @@ def read_table(path: Path, mapping: ColumnMapping | None = None, *, lenient: boo
     """
     if path.is_dir():
         raise RecordingError(f"{path} is a directory: name the recording in it")
+    if other := other_kind(path):
+        raise RecordingError(
+            f"{path} is {other}, not a recording (.fgr, CSV, Parquet or .xlsx): save it in a file first"
+        )
     with path.open("rb") as stream:
         start = stream.read(len(MAGIC))
     if start == MAGIC or (path.suffix == ".fgr" and start):

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.plain_file import read_plain
 from gateway.profiles.strict_yaml.faults import ProfileError
 from gateway.profiles.strict_yaml.text import Document, parse
 from gateway.recording.errors import RecordingError
@@ -32,7 +33,7 @@ def column_mapping(text: str | None) -> ColumnMapping | None:
 def read_mapping(path: Path) -> ColumnMapping:
     """Return the mapping in a file. A value is a number, a header, either with `:unit`, or `{column: 7, unit: n}`."""
     try:
-        document = parse(path.read_bytes(), str(path))
+        document = parse(read_plain(path), str(path))
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
     except ProfileError as error:

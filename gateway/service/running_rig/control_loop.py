@@ -104,7 +104,7 @@ class ControlLoop:
         self._fresh_s = _FRESH_PERIODS * process.period_s
         self._last_processor_time: ProcessorTime | None = None
         self._slow_loop = SlowLoop(process.period_s)
-        self._cell_noise, self._output_noise = LineNoise("load cell's line"), LineNoise("output's line")
+        self._cell_noise, self._output_noise = LineNoise("load cell's", cell.unread.explain), LineNoise("output's")
         bank.on_command = self._on_command
         bank.on_asked = self._on_asked
 
@@ -141,7 +141,7 @@ class ControlLoop:
     def on_output_bytes(self, chunk: bytes, now_s: float) -> None:
         """Take bytes of the output device."""
         replies = self.output.on_bytes(chunk, now_s)
-        self._begin(WarningBit.SERIAL_NOISE, self._output_noise.hear(replies, now_s))
+        self._begin(WarningBit.SERIAL_NOISE, self._output_noise.hear(replies, now_s, self._slow_loop.is_on))
 
     def on_valve_bytes(self, chunk: bytes, now_s: float) -> None:
         """Take bytes of the valve's relay."""
@@ -258,6 +258,7 @@ class ControlLoop:
             output_held=self._processor_held(output.unanswered_since_s, now_s),
             output_counts=output.counts,
             cell_counts=self.cell_counts,
+            cell_says=self._cell.unread.words(now_s),
             valve=self.valve.status if self.valve else None,
         )
 

@@ -20,6 +20,13 @@ LEAST: Final = 3
 SHARE: Final = 0.01
 LATE_PERIODS: Final = 0.5  # a tick this late is nearer to the next one's time than to its own
 _BIN_S: Final = 1.0
+_NOISE: Final = (
+    "a motor cable beside it, no ground, a marginal baud rate? separate the cables, ground the shield at one end"
+)
+_BUSY: Final = (
+    "our own loop is late (A342), which tears answers, too: end other programs, or `run --realtime`, then look again"
+)
+_NONE_READ: Final = "none could be read: another speed, another device or profile? force-gateway check the rig"
 _HALF: Final = 0.5
 
 
@@ -58,18 +65,21 @@ class _RateWarning:
 
 
 class LineNoise(_RateWarning):
-    """Messages of one serial line, and those of them that nobody can read. line: as sentences name it."""
+    """Messages of one serial line, and those of them that nobody can read. line: whose it is; explain: what one that
+    nobody can read does say, empty where it is no text."""
 
-    def __init__(self, line: str) -> None:
+    def __init__(self, line: str, explain: Callable[[bytes], str] = lambda line: "") -> None:
         super().__init__()
-        self._line = line
+        self._line, self._explain = line, explain
         self._recent = _RecentSums(3)
 
-    def hear(self, messages: Sequence[object], now_s: float) -> str:
-        """Return a sentence where noise begins with these messages, else an empty one."""
-        dropped = [len(one.data) for one in messages if isinstance(one, Garbage)]
+    def hear(self, messages: Sequence[object], now_s: float, is_late: bool = False) -> str:
+        """Return a sentence where noise begins with these messages, else an empty one. is_late: they are answers, and our loop
+        is slow: what it gave up as overdue, and comes then, is read from its middle on.
+        """
+        dropped = [one.data for one in messages if isinstance(one, Garbage)]
         if messages:
-            self._recent.add(now_s, len(dropped), len(messages), sum(dropped))
+            self._recent.add(now_s, len(dropped), len(messages), sum(map(len, dropped)))
         if not dropped:
             return ""
         self._last_s = now_s
@@ -78,13 +88,11 @@ class LineNoise(_RateWarning):
             return ""
         self.is_on = True
         observation = f"{count:.0f} of {total:.0f} messages ({size:.0f} bytes) within {WINDOW_S:g} s could not be read"
-        return f"A341 {self._line}: {observation} and were dropped; {_cause_of_noise(total - count)}"
+        cause = _BUSY if is_late else self._cause(total - count, dropped[-1])
+        return f"A341 {self._line} line: {observation} and were dropped; {cause}"
 
-
-def _cause_of_noise(whole: float) -> str:
-    if not whole:
-        return "none could be read: another speed, another device or profile? force-gateway check the rig"
-    return "a motor cable beside it, no ground, a marginal baud rate? separate the cables, ground the shield at one end"
+    def _cause(self, whole: float, line: bytes) -> str:
+        return _NOISE if whole else self._explain(line) or _NONE_READ
 
 
 class SlowLoop(_RateWarning):

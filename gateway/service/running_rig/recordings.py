@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample
+from gateway.plain_file import tell_refusal
 from gateway.plants.in_use import in_use_facts
 from gateway.processes.disk_worker import DiskWorker
 from gateway.processes.event_log import EventLog
@@ -70,7 +71,7 @@ class Recordings:
 
         def opened(fresh: RunRecording, error: OSError | None) -> None:
             if error:
-                answer.set_exception(OSError(f"{self._directory}: {error.strerror or error}"))
+                answer.set_exception(OSError(f"{self._directory}: {tell_refusal(error)}"))
             else:
                 self._again.forget()
                 answer.set_result(_facts_of(fresh))
@@ -98,7 +99,7 @@ class Recordings:
             if error and self._current is recording:
                 self._current = None
                 if waits_for_room:
-                    self._again.ask(str(error))
+                    self._again.ask(tell_refusal(error))
             opened(recording, error)
 
         self._current, self._began_s = recording, None
@@ -114,7 +115,9 @@ class Recordings:
     def _go_on_in_another(self, ended: RunRecording, why: str) -> None:
         def opened(fresh: RunRecording, error: OSError | None) -> None:
             if error:
-                self._log("recording", f"E402 {ended.path} ends {why}, not recording: {error}; control goes on")
+                self._log(
+                    "recording", f"E402 {ended.path} ends {why}, not recording: {tell_refusal(error)}; control goes on"
+                )
             else:
                 self._log("recording", f"{ended.path} ends {why}, {fresh.path} goes on")
 

@@ -9,7 +9,6 @@ owners of one truth).
 """
 
 import contextlib
-import fcntl
 import os
 import time
 from collections.abc import Callable
@@ -17,18 +16,20 @@ from dataclasses import dataclass, field
 from functools import partial
 from math import inf
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import Any, Final
 
 from gateway.processes import exit_codes, message_link, priority
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes.state_lock import hold_state_lock
 from gateway.processes.systemd.service_manager import ServiceManager, service_manager
 from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.supervisor import guardian_sentences as words
 from gateway.service.supervisor.child_process import Child, create_shared_memory, describe_exit, reap_orphans
 from gateway.service.supervisor.child_starter import ChildStarter
 from gateway.service.supervisor.control_child import START_GRACE_S, STOP_BOUND_S, ControlChild
+from gateway.service.supervisor.descriptor_limit import raise_descriptor_limit
 from gateway.service.supervisor.event_wait import SignalPipe, wait_readable
 from gateway.service.supervisor.other_children import OtherChildren
 from gateway.service.supervisor.restart_policy import RestartPolicy
@@ -44,28 +45,19 @@ def run(options: RunOptions) -> int:
     """Run one rig until it is told to stop; the process's exit code."""
     state = options.state_directory
     state.mkdir(parents=True, exist_ok=True, mode=0o700)
-    with _open_lock(state / "lock") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+    with hold_state_lock(state) as is_ours:
+        if not is_ours:
             words.print_error(
                 f"E104 another gateway already runs on {state}; stop it, or give this one its own --state DIR"
             )
             return exit_codes.DEVICE
         priority.set_nice(priority.LOOP_NICE)
+        too_few = raise_descriptor_limit()
         with EventLog(source="guardian", file=EventFile(state)) as log, SignalPipe() as signals:
+            if too_few:
+                log("limit", too_few)
             starter = ChildStarter(options.rig, simulate=options.simulate, state=state, say=partial(log, "children"))
             return Guardian(options, state, starter, signals, log, manager=service_manager()).watch()
-
-
-def _open_lock(path: Path) -> IO[str]:
-    """Open the file that says who runs here. A disk that has become read-only still has it, and is no reason not to control."""
-    try:
-        return path.open("a")
-    except OSError:
-        if not path.exists():
-            raise
-        return path.open()
 
 
 @dataclass

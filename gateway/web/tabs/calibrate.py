@@ -5,7 +5,6 @@ was. Using the new calibration is a step of its own (tab Calibrations).
 """
 
 import asyncio
-import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -17,6 +16,7 @@ from starlette.routing import Route
 from gateway import defaults
 from gateway.control.runs.ladder_stairs import QUICK, CalibrationPlan
 from gateway.control.runs.preconditions import preconditions
+from gateway.processes.durable_file import read_object
 from gateway.web.context import WebContext
 from gateway.web.tabs.answers import Nothing, TabRefusedError, answers, read_body
 from gateway.web.tabs.run_follower import RunFollower
@@ -98,7 +98,7 @@ def _read_fit(state: Path, document: str) -> dict[str, Any] | None:
     """Return the fit's document; None for one that is gone, or is not in this state directory."""
     path = state / "calibrations" / Path(document).name
     try:
-        fit: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        fit: dict[str, Any] = read_object(path)
     except (OSError, ValueError):
         return None
     return fit

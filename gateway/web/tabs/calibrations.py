@@ -5,7 +5,6 @@ terminal say the same and a running gateway is asked in the same way.
 """
 
 import asyncio
-import json
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,6 +13,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from gateway.processes.durable_file import read_object, read_regular
 from gateway.web.context import WebContext
 from gateway.web.tabs.answers import (
     NOT_FOUND,
@@ -96,8 +96,8 @@ def _read_report(state: Path, number: int) -> str:
     """Return the report of a calibration; the document beside it says whose it is."""
     folder = state / "calibrations"
     try:
-        document = json.loads((folder / f"{number:04d}.json").read_text(encoding="utf-8"))
-        text = (folder / f"{number:04d}.html").read_text(encoding="utf-8")
+        document = read_object(folder / f"{number:04d}.json")
+        text = read_regular(folder / f"{number:04d}.html").decode()
     except (OSError, ValueError):
         raise TabRefusedError(f"calibration {number} has no report: it was not fitted here", NOT_FOUND) from None
     if document.get("calibration") != number:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.processes.durable_file import read_regular
 from gateway.processes.module_command import module_command
 from gateway.web.context import WebContext
 from gateway.web.tabs.answers import NOT_FOUND, TabRefusedError
@@ -142,14 +143,14 @@ def kept_diagnoses(state: Path) -> list[dict[str, Any]]:
 def read_report(state: Path, recording: int) -> str:
     """Return the report of a recording. TabRefusedError where it was not diagnosed here."""
     try:
-        return (state / FOLDER / f"{recording:04d}.html").read_text(encoding="utf-8")
+        return read_regular(state / FOLDER / f"{recording:04d}.html").decode()
     except OSError:
         raise TabRefusedError(f"recording {recording} was not diagnosed on this page", NOT_FOUND) from None
 
 
 def _headline(path: Path) -> dict[str, Any]:
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(read_regular(path))
         causes = [{"name": cause["name"], "confidence": cause.get("confidence")} for cause in document["causes"]]
         return {"verdict": document["verdict"], "causes": causes}
     except (OSError, ValueError, KeyError, TypeError):

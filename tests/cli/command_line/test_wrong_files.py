@@ -8,6 +8,7 @@ import pytest
 from click.testing import Result
 
 from gateway.recording import Recorder
+from tests.other_kinds import never_waiting, put
 
 Call = Callable[..., Result]
 PROFILES = Path(__file__).parents[3] / "profiles"
@@ -21,6 +22,9 @@ WHAT = {
     "report.json": "",
     "report.html": "is a web page (HTML)",
     "table.tdms": "is a TDMS file (LabVIEW, DIAdem)",
+    "pipe": "is a pipe",
+    "socket": "is a socket",
+    "zeros": "is a device",
 }
 RECORDING_VERBS = ("diagnose", "fit", "simulate", "recordings reference --state state")
 PROFILE_VERBS = {
@@ -43,6 +47,8 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "report.json").write_text(json.dumps({"format": 1, "verdict": "partial", "causes": []}, indent=2))
     (tmp_path / "report.html").write_text("<!doctype html><html></html>")
     (tmp_path / "table.tdms").write_bytes(b"TDSm\x0e\x00\x00\x00\x69\x12" + bytes(40))
+    for name, kind in (("pipe", "a pipe"), ("socket", "a socket"), ("zeros", "a device")):
+        put(kind, tmp_path / name)
     return tmp_path
 
 
@@ -57,7 +63,8 @@ def whole_recording(folder: Path) -> bytes:
 @pytest.mark.parametrize("verb", RECORDING_VERBS)
 @pytest.mark.parametrize("name", WHAT)
 def test_a_verb_that_wants_a_recording_says_what_it_got(verb: str, name: str, files: Path, call: Call) -> None:
-    answer = call(*verb.split(), name)
+    with never_waiting():
+        answer = call(*verb.split(), name)
     (sentence,) = [line for line in answer.output.splitlines() if line.startswith("E")]
     assert answer.exit_code == 65
     assert name in sentence
@@ -75,7 +82,8 @@ RIGHT = {("check", "calibration.yaml"), ("calibration show --state state", "cali
 )
 def test_a_verb_that_wants_a_profile_says_what_it_got(verb: str, name: str, files: Path, call: Call) -> None:
     wanted = PROFILE_VERBS[verb]
-    answer = call(*verb.split(), name)
+    with never_waiting():
+        answer = call(*verb.split(), name)
     sentences = [line for line in answer.output.splitlines() if name in line and not line.startswith(("Usage", "Try"))]
     assert len(sentences) == 1, answer.output
     assert answer.exit_code in (2, 78)

@@ -8,6 +8,7 @@ from cryptography.hazmat.primitives import serialization
 from gateway.profiles import Report, check_report
 from gateway.profiles.rigs.faces import TlsFace
 from tests.certificates import store_all
+from tests.other_kinds import never_waiting, put
 
 DEMO = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
 
@@ -93,7 +94,11 @@ FAULTS = [
         "fieldbus[0].certificate",
         "E175 {folder}/setpoint.crt is not one for a server (a client's?): no client",
     ),
-    (files("."), "fieldbus[0].certificate", "E171 {folder}: Is a directory; name the file in it"),
+    (
+        files("."),
+        "fieldbus[0].certificate",
+        "E171 {folder}: it is a directory, and no file: move it away, or name another",
+    ),
     (files(more=", port: 5020"), "fieldbus[0].port", "5020 is the port of plain Modbus TCP too"),
     (
         files(more=", bind: 192.168.125.20"),
@@ -111,6 +116,16 @@ def test_what_cannot_work_is_told_with_its_place(folder: Path, face: str, place:
     line = DEMO.count("\n") + 3
     assert f"rig.yaml:{line}:" in str(fault)
     assert str(fault).split(" ", 1)[1].startswith(f"{place}: {sentence.format(folder=folder)}")
+
+
+@pytest.mark.parametrize("kind", ["a pipe", "a socket", "a device"])
+@pytest.mark.parametrize("name", ["certificate", "key", "ca"])
+def test_no_check_waits_for_what_is_no_file(name: str, kind: str, folder: Path, tmp_path: Path) -> None:
+    face = {"certificate": folder / "gateway.crt", "key": folder / "gateway.key", "ca": folder / "ca.crt"}
+    face[name] = put(kind, tmp_path / "other")
+    with never_waiting():
+        (fault,) = report(folder, ", ".join(f"{key}: {file}" for key, file in face.items())).faults
+    assert f"fieldbus[0].{name}: E171 {tmp_path}/other: it is {kind}, and no file" in str(fault)
 
 
 @pytest.mark.parametrize(

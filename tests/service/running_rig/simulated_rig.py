@@ -69,6 +69,7 @@ class Samples:
     """Stands for the load cell's line: what is put here comes out at the next bytes."""
 
     identity = SimpleNamespace(fault=FaultCode.NONE, said="")
+    unread = SimpleNamespace(words=lambda now_s: "", explain=lambda line: "")
 
     def __init__(self) -> None:
         self.next: ForceSample | None = None

@@ -74,7 +74,7 @@ def test_the_sentence_counts_what_was_dropped() -> None:
     ids=["a port opened amid a message", "every 1.5 s", "a burst"],
 )
 def test_now_and_then_a_broken_frame_is_no_noise(broken_frames: range) -> None:
-    noise, whole, bad = LineNoise("load cell's line"), [object()], [Garbage(BROKEN_FRAME)]
+    noise, whole, bad = LineNoise("load cell's"), [object()], [Garbage(BROKEN_FRAME)]
     for frame in range(3000):
         assert not noise.hear(bad if frame in broken_frames else whole, 0.01 * frame)
     assert not noise.is_on
@@ -93,7 +93,7 @@ def test_the_bit_stands_while_either_line_is_noisy() -> None:
 
 
 def test_a_line_of_which_nothing_can_be_read_is_not_blamed_on_a_motor() -> None:
-    noise, garbage = LineNoise("output's line"), Wired().exchange.on_bytes(BROKEN_ECHO, 0.0)
+    noise, garbage = LineNoise("output's"), Wired().exchange.on_bytes(BROKEN_ECHO, 0.0)
     told = [noise.hear(garbage, 0.1 * k) for k in range(5)]
     assert told[:2] == ["", ""] and told[3:] == ["", ""]
     assert "another speed" in told[2] and "3 of 3 messages (15 bytes)" in told[2]
@@ -173,6 +173,16 @@ def test_the_loop_asks_the_kernel_what_the_time_since_the_last_tick_went_to() ->
     wired.run(4.0)
     (sentence,) = wired.said("A342")
     assert "the machine is too busy" in sentence
+
+
+def test_answers_that_a_slow_loop_has_torn_are_not_blamed_on_cables() -> None:
+    wired = Wired().pressing(20.0)
+    wired.lateness = late_ticks(20)
+    wired.run(4.0)
+    assert wired.warnings & SLOW
+    broken(wired, on_output, 8, 0.1)
+    (sentence,) = wired.said("A341")
+    assert "our own loop is late (A342)" in sentence and "cable" not in sentence
 
 
 # -- A343

@@ -179,7 +179,7 @@ def test_whoever_begins_one_in_vain_leaves_it_waiting_for_room(
     with monkeypatch.context() as patch:
         patch.setattr(os, "write", lambda descriptor, data: 3)
         recordings.try_start()
-        with pytest.raises(OSError, match=r"recordings: No space left on device$"):
+        with pytest.raises(OSError, match=r"recordings: No space left on device: the disk is full$"):
             recordings.start().result()
         recordings.flush(0.0)
     recordings.flush(1000.0)

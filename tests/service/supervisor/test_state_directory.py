@@ -28,7 +28,7 @@ def test_the_state_directory_is_for_its_owner_alone(tmp_path: Path, monkeypatch:
     def stop(path: Path) -> None:
         raise _EnoughSeenError(path)
 
-    monkeypatch.setattr(guardian, "_open_lock", stop)
+    monkeypatch.setattr(guardian, "hold_state_lock", stop)
     state = tmp_path / "force-gateway" / "demo"
     with pytest.raises(_EnoughSeenError):
         guardian.run(RunOptions(state=state))

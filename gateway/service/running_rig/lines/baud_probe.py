@@ -5,6 +5,7 @@ Opens the port by itself, so the caller closes its own first. Used when a line s
 
 import asyncio
 import contextlib
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -13,6 +14,7 @@ from gateway.devices import DeviceProfile, SerialSettings, cell_host, output_hos
 from gateway.devices.messages import Accepted, ForceSample, OutputRequest, Pressure, Refused, SetVoltage
 from gateway.ports import PortError, PortEvents, SerialPort
 from gateway.profiles import CellLine, OutputLine
+from gateway.service.running_rig.lines.unread_lines import UnreadLines
 
 BAUDS: Final = (9600, 19200, 38400, 57600, 115200)
 _LISTEN_S: Final = 0.4  # forty frames of a 100 Hz stream, or several questions and answers at 9600 baud
@@ -24,11 +26,12 @@ _VALID: Final = (Accepted, Pressure, Refused, ForceSample)  # a device that refu
 
 @dataclass(frozen=True, slots=True)
 class ProbeResult:
-    """Answer at one speed: bytes in all, and lines that the device's grammar knows."""
+    """Answer at one speed: bytes in all, lines that the device's grammar knows, and what another line says where it is text."""
 
     baud: int
     bytes: int
     valid: int
+    says: str = ""
 
 
 async def explain_silent_device(line: OutputLine | CellLine, path: str) -> str:
@@ -47,6 +50,9 @@ def _sentence(path: str, here: ProbeResult, elsewhere: list[ProbeResult]) -> str
     best = max(elsewhere, key=lambda probe: probe.valid)
     if best.valid:
         return f"E110 {path}: {saw}; at {best.baud} the same device gives valid lines: set baud: {best.baud} in the rig"
+    if text := next((probe for probe in (here, *elsewhere) if probe.says), None):
+        where = "" if text is here else f"at {text.baud} "
+        return f"E110 {path}: {saw}; {where}{text.says}"
     if here.bytes or any(probe.bytes for probe in elsewhere):
         tried = ", ".join(str(probe.baud) for probe in elsewhere)
         return f"E110 {path}: {saw}, nor at {tried}: another device on this port, or another parity?"
@@ -55,14 +61,17 @@ def _sentence(path: str, here: ProbeResult, elsewhere: list[ProbeResult]) -> str
 
 async def listen_at(line: OutputLine | CellLine, path: str, baud: int) -> ProbeResult:
     """Open the port, ask or listen at this speed, and return what came. PortError where it does not open."""
-    ask, count = _question_and_counter(line)
+    ask, receive = _question_and_receiver(line)
     enough = asyncio.Event()
     total = valid = 0
+    unread = UnreadLines(line.device)
 
     def on_bytes(chunk: bytes, now_s: float) -> None:
         nonlocal total, valid
         total += len(chunk)
-        valid += count(chunk, now_s)
+        messages = receive(chunk, now_s)
+        valid += sum(isinstance(message, _VALID) for message in messages)
+        unread.hear(messages, now_s)
         if valid >= _ENOUGH:
             enough.set()
 
@@ -76,7 +85,7 @@ async def listen_at(line: OutputLine | CellLine, path: str, baud: int) -> ProbeR
                 await asyncio.wait_for(enough.wait(), _LISTEN_S / _QUESTIONS + _LONG_TALK * settings.character_s)
     finally:
         port.close()
-    return ProbeResult(baud, total, valid)
+    return ProbeResult(baud, total, valid, unread.words(time.monotonic()))
 
 
 def _question(device: DeviceProfile) -> OutputRequest:
@@ -84,14 +93,12 @@ def _question(device: DeviceProfile) -> OutputRequest:
     return output_host(device).idle_question or SetVoltage(device.voltage_range_v[0])
 
 
-def _question_and_counter(line: OutputLine | CellLine) -> tuple[Callable[[], bytes], Callable[[bytes, float], int]]:
-    """Return how to ask this device for a word (a stream is not asked), and how many valid ones a chunk completes."""
+def _question_and_receiver(
+    line: OutputLine | CellLine,
+) -> tuple[Callable[[], bytes], Callable[[bytes, float], Sequence[object]]]:
+    """Return how to ask this device for a word (a stream is not asked), and what a chunk completes."""
     if isinstance(line, OutputLine):
         output, question = output_host(line.device), _question(line.device)
-        return lambda: output.request(question), lambda chunk, now_s: _count_valid(output.receive(chunk, now_s))
+        return lambda: output.request(question), output.receive
     cell = cell_host(line.device, line.sign, line.unit)
-    return cell.poll, lambda chunk, now_s: _count_valid(cell.receive(chunk, now_s))
-
-
-def _count_valid(messages: Sequence[object]) -> int:
-    return sum(isinstance(message, _VALID) for message in messages)
+    return cell.poll, cell.receive

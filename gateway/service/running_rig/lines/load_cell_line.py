@@ -15,6 +15,7 @@ from gateway.control.inputs import WireCounts
 from gateway.devices import CellHost, DeviceProfile
 from gateway.devices.messages import ForceSample, Garbage, RepeatedSample
 from gateway.service.running_rig.lines.cell_identity import CellIdentity
+from gateway.service.running_rig.lines.unread_lines import UnreadLines
 
 _FASTEST_HZ: Final = 250.0  # the loop's fastest tick: more readings would only cost processor time
 
@@ -25,6 +26,7 @@ class CellExchange:
 
     def __init__(self, host: CellHost, write: Callable[[bytes], None], profile: DeviceProfile) -> None:
         self._host = host
+        self.unread = UnreadLines(profile)
         self.identity = CellIdentity(profile)
         self._write = write
         self.counts = WireCounts()
@@ -56,6 +58,7 @@ class CellExchange:
         if self.identity.is_due:
             return self._receive_identity(chunk, now_s)
         messages = self._host.receive(chunk, now_s)
+        self.unread.hear(messages, now_s)
         if not self._question:
             return messages  # a stream
         if any(not isinstance(one, Garbage) for one in messages):

@@ -152,3 +152,14 @@ def test_what_is_heard_is_told_in_numbers(cell: CellLine) -> None:
 def test_a_port_that_is_not_there_is_told_as_such(cell: CellLine) -> None:
     sentence = asyncio.run(explain_silent_device(replace(cell, port="/dev/none"), "/dev/none"))
     assert sentence.startswith("E102 /dev/none is not there")
+
+
+@pytest.mark.parametrize("right", [115200, 38400])
+def test_a_cell_in_another_unit_is_quoted_and_the_unit_told(cell: CellLine, right: int) -> None:
+    sentence = asked(
+        SpeakingCell(cell.device, right, frame=b"ST,GS,+0012.34kN\r\n", period_s=0.025),
+        lambda path: explain_silent_device(cell, path),
+    )
+    assert sentence.startswith("E110 ")
+    where = "" if right == 115200 else "at 38400 "
+    assert f"; {where}it says 'ST,GS,+0012.34kN', in kN: stream-st-gs reads kg or lb or g or N; set the" in sentence

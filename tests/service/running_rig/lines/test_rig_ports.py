@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from gateway.ports import Pty
+from gateway.ports import PortError, Pty
 from gateway.profiles import load_rig
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 
@@ -71,3 +71,13 @@ def test_what_came_before_a_question_is_no_answer_to_it(far_ends: dict[str, Pty]
 
     asyncio.run(scene())
     assert os.read(here.fd, 16) == b"?"
+
+
+def test_a_port_that_is_there_and_does_not_open_is_told_in_the_log(far_ends: dict[str, Pty]) -> None:
+    said: list[str] = []
+    paths = {name: pty.path for name, pty in far_ends.items()}
+    ports = RigPorts(load_rig("paper-pull"), paths, lambda descriptor: None, lambda cause, text: said.append(text))
+    for port in (ports.output, ports.cell, ports.valve):
+        assert port
+        port._on_refused(PortError("E101", f"{port.path}: user anna may not open it"))
+    assert said == [f"E101 {path}: user anna may not open it; tried again until it opens" for path in paths.values()]

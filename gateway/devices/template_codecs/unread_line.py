@@ -1,0 +1,53 @@
+"""What a line that nobody can read does show: text of another grammar, with another unit or other decimals, or nothing.
+
+A device that talks in other words than its profile says is no silent one, and its wires are well: what it says is the answer.
+What another speed or noise makes of a line is no text, and nothing is said of it here.
+"""
+
+import re
+from typing import Final
+
+from gateway.devices.exchange import FORCE, UNIT
+from gateway.devices.fields import Choice, Field
+from gateway.devices.profile import TEMPLATE, DeviceProfile, DeviceRole
+from gateway.devices.template import Template, quote
+
+_TEXT: Final = re.compile(rb"[ -~\x02\x03\t]{4,80}")
+
+
+def explain_unread(profile: DeviceProfile, line: bytes) -> str:
+    """Return what an unread line of a load cell says, how the profile reads it, and what to do; empty where it is no text."""
+    body = line.removesuffix(profile.terminator_bytes)
+    if profile.role is not DeviceRole.LOAD_CELL or profile.codec != TEMPLATE or not _TEXT.fullmatch(body):
+        return ""
+    said, frame = f"it says {quote(body.decode('ascii'))}", profile.reading.template
+    if unit := _other_unit(frame, body):
+        other, known = unit
+        return f"{said}, in {other}: {profile.name} reads {known}; set the device to that unit, or copy the profile"
+    cure = "other decimals, another format, or noise? set the device so, or copy the profile and write what it says"
+    return f"{said}, {profile.name} reads {quote(frame.text)}: {cure}"
+
+
+def _other_unit(frame: Template, body: bytes) -> tuple[str, str] | None:
+    """Return the unit in this sentence and those that the template knows, where all else is as in the template."""
+    at = next((k for k, piece in enumerate(frame.pieces) if _is_unit(frame, k, piece)), None)
+    if at is None:
+        return None
+    piece = frame.pieces[at]
+    words = piece.words if isinstance(piece, Choice) else (str(piece).strip(),)
+    around = [_pattern(one) if k != at else r" *([A-Za-z]{1,4}) *" for k, one in enumerate(frame.pieces)]
+    found = re.fullmatch("".join(around).encode("ascii"), body)
+    other = found[1].decode("ascii") if found else words[0]
+    return None if other in words else (other, " or ".join(words))
+
+
+def _is_unit(frame: Template, k: int, piece: str | Field) -> bool:
+    """Decide whether it is the field of the unit, or a word behind the force."""
+    if not isinstance(piece, str):
+        return piece.name == UNIT
+    before = frame.pieces[k - 1] if k else ""
+    return not isinstance(before, str) and before.name == FORCE and piece.strip().isalpha()
+
+
+def _pattern(piece: str | Field) -> str:
+    return re.escape(piece) if isinstance(piece, str) else f"(?:{piece.pattern})"

@@ -1,0 +1,72 @@
+"""A cell that speaks otherwise than its profile is quoted, with the unit where only that differs; what is no text is not."""
+
+from dataclasses import replace
+from random import Random
+
+import pytest
+
+from gateway.devices import cell_host
+from gateway.devices.messages import ForceSample
+from gateway.devices.template_codecs.unread_line import explain_unread
+from gateway.devices.wire import resample_at_baud
+from gateway.profiles import list_shipped, load_device
+
+STREAM = load_device("stream-st-gs")
+
+
+def in_newtons():
+    assert STREAM.stream
+    return replace(
+        STREAM, stream=replace(STREAM.stream, frame="{status:ST|US|OL},{mode:GS|NT},{force:+08.2f} N", unit="N")
+    )
+
+
+@pytest.mark.parametrize("unit", ["kN", "t", "oz", " daN"])
+def test_another_unit_is_told_with_those_that_are_read(unit: str) -> None:
+    line = f"ST,GS,+0012.34{unit}\r\n".encode()
+    words = explain_unread(STREAM, line)
+    assert words.startswith(
+        f"it says 'ST,GS,+0012.34{unit}', in {unit.strip()}: stream-st-gs reads kg or lb or g or N;"
+    )
+
+
+def test_kilograms_are_told_where_a_profile_reads_newtons_only() -> None:
+    words = explain_unread(in_newtons(), b"ST,GS,+0012.34 kg\r\n")
+    assert words.startswith("it says 'ST,GS,+0012.34 kg', in kg: stream-st-gs reads N; set the device to that unit")
+
+
+@pytest.mark.parametrize("line", [b"ST,GS,+00123.4kg\r\n", b"+12.34\r\n", b"$GPGGA,123519\r\n"])
+def test_another_format_is_quoted_beside_what_is_read(line: bytes) -> None:
+    words = explain_unread(STREAM, line)
+    assert words.startswith(f"it says {line.decode().strip()!r}, stream-st-gs reads '{{status:ST|US|OL}}")
+    assert "other decimals, another format" in words
+
+
+@pytest.mark.parametrize("heard_baud", [9600, 19200, 38400, 57600])
+def test_what_another_speed_makes_of_a_line_is_no_text(heard_baud: int) -> None:
+    """Seldom it looks like some: then only as one line among many."""
+    rng, told = Random(1), 0
+    for _ in range(200):
+        frame = b"ST,GS,%+08.2fkg\r\n" % rng.uniform(-20.0, 60.0)
+        told += bool(explain_unread(STREAM, resample_at_baud(frame, 115200, heard_baud)))
+    assert told <= 2
+
+
+@pytest.mark.parametrize("line", [b"\r\n", b"", b"\x00\xff\x80abc", b"ST,\x01", b"A" * 200])
+def test_what_is_no_sentence_is_not_quoted(line: bytes) -> None:
+    assert explain_unread(STREAM, line) == ""
+
+
+@pytest.mark.parametrize("name", list_shipped("device"))
+def test_no_profile_and_no_bytes_are_too_odd(name: str) -> None:
+    rng, profile = Random(2), load_device(name)
+    for length in range(60):
+        assert isinstance(explain_unread(profile, rng.randbytes(length)), str)
+        assert isinstance(explain_unread(profile, bytes(rng.choices(range(32, 127), k=length))), str)
+
+
+def test_what_is_read_is_never_said_to_be_in_another_unit() -> None:
+    host = cell_host(STREAM)
+    for unit in ("kg", "lb", "g", "N"):
+        (message,) = host.receive(f"ST,GS,+0012.34{unit}\r\n".encode(), 0.0)
+        assert isinstance(message, ForceSample)

@@ -1,0 +1,67 @@
+"""A permission that is withdrawn changes nothing while the port is open; after a replug it is told, and given back it opens."""
+
+import asyncio
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.devices import SerialSettings
+from gateway.ports import PortError, PortEvents, Pty, SerialPort
+from tests.ports.raw_bytes import gather
+from tests.ports.test_port_failures import denying
+
+
+def test_an_open_port_works_on_without_permission(ear: Any, line: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        os.chmod(line.path, 0)  # noqa: PTH101
+        monkeypatch.setattr("serial.serialposix.os.open", denying(line.path))
+        os.write(line.fd, b"5\r\n")
+        await ear.until(lambda: bool(ear.data == b"5\r\n"))
+        assert port.write(b"SET 0\r\n")
+        assert await gather(line.fd, 7) == b"SET 0\r\n"
+        assert (port.is_open, ear.losses) == (True, [])
+        port.close()
+
+    asyncio.run(scene())
+
+
+def test_a_replug_without_permission_is_told_once_and_opens_when_it_is_given(
+    ear: Any, line: Pty, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """For as long as it took the log said "unplugged?" of a plug that was in."""
+    name = tmp_path / "usb-FTDI-port0"
+    name.symlink_to(line.path)
+    refusals: list[PortError] = []
+
+    async def scene() -> None:
+        loop, at_once = asyncio.get_running_loop(), lambda delay_s: loop.call_later(0.001, port._reopen)
+        events = PortEvents(ear.on_bytes, ear.on_lost, ear.on_open, refusals.append)
+        port = SerialPort(str(name), SerialSettings(baud=9600), events)
+        await port.open()
+        other = Pty()
+        os.chmod(other.path, 0o600)  # noqa: PTH101
+        tries: list[None] = []
+        with monkeypatch.context() as denied:
+            denied.setattr("serial.serialposix.os.open", denying(str(name)))
+            denied.setattr(port, "_reopen_after", lambda delay_s: (tries.append(None), at_once(delay_s)))
+            name.unlink()
+            name.symlink_to(other.path)
+            line.close()
+            async with asyncio.timeout(10):
+                while len(tries) < 12:
+                    await asyncio.sleep(0)
+        (refusal,) = refusals
+        assert refusal.code == "E101"
+        assert "may not open it" in str(refusal) and "udev rule" in str(refusal)
+        await ear.until(lambda: len(ear.opened) == 2)
+        assert port.write(b"SET 0\r\n")
+        assert await gather(other.fd, 7) == b"SET 0\r\n"
+        assert len(ear.losses) == 1
+        port.close()
+        other.close()
+
+    asyncio.run(scene())

@@ -1,0 +1,66 @@
+"""Why a disk ends a recording is told by its cause: full, a quota, a limit on files, read-only, broken."""
+
+import errno
+import os
+import resource
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from gateway.recording import Recorder, read_recording
+from tests.recording.test_recorder import COLUMNS, HEADER
+
+
+@pytest.fixture
+def limited() -> Iterator[Callable[[int], None]]:
+    """limited(bytes): no file of this process gets longer, as under `ulimit -f` or on a FAT file system."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda size_bytes: resource.setrlimit(resource.RLIMIT_FSIZE, (size_bytes, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("more_bytes", [0, 10])
+def test_a_limit_on_the_length_of_files_is_told_as_one(
+    tmp_path: Path, limited: Callable[[int], None], more_bytes: int
+) -> None:
+    """It said that the disk is full: of the batch that reaches the limit a part still fits."""
+    recorder = Recorder(tmp_path, HEADER, COLUMNS)
+    recorder.append((0.0, 1.0, 2.0))
+    recorder.write()
+    limited(recorder.size_bytes + more_bytes)
+    recorder.append((0.1, 1.0, 2.0))
+    recorder.write()
+    assert recorder.failure is not None
+    assert "after 1 rows: File too large: longer than a process may write here (ulimit -f" in recorder.failure
+    assert "full" not in recorder.failure
+    recorder.close()
+    assert read_recording(recorder.path).rows == 1
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (errno.ENOSPC, "the disk is full"),
+        (errno.EDQUOT, "Disk quota exceeded: this user may store no more"),
+        (errno.EFBIG, "ulimit -f"),
+        (errno.EROFS, "Read-only file system"),
+        (errno.EIO, "the disk is broken, or gone"),
+    ],
+)
+def test_what_ends_a_recording_is_told_by_its_cause(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, words: str
+) -> None:
+    """A part is taken first, and the cause is told by the call for the rest."""
+    recorder = Recorder(tmp_path, HEADER, COLUMNS)
+    write, calls = os.write, [10]
+
+    def refuse(descriptor: int, data: bytes) -> int:
+        if calls:
+            return write(descriptor, data[: calls.pop()])
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "write", refuse)
+    recorder.append((0.1, 1.0, 2.0))
+    recorder.write()
+    assert recorder.failure is not None and words in recorder.failure

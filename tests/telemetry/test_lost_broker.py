@@ -1,0 +1,107 @@
+"""A broker that goes away at a bad moment of a connection is told once, as E181: futures that the library forgets are not."""
+
+import asyncio
+import gc
+import logging
+from typing import Any
+
+import pytest
+
+from gateway.telemetry import broker_connection
+from gateway.telemetry.broker_connection import Broker, keep_connected
+from tests.telemetry.test_broker_connection import Session
+
+aiomqtt = pytest.importorskip("aiomqtt")
+
+CONNACK, SUBACK = b"\x20\x02\x00\x00", b"\x90\x03\x00\x01\x01"
+MOMENTS = {
+    "at the subscription": [CONNACK, b""],
+    "while the first message waits for its acknowledgement": [CONNACK, SUBACK, b""],
+}
+"""What the broker answers to each packet, before it closes."""
+
+
+async def meet_once(answers: list[bytes]) -> list[str]:
+    """Let a session meet a broker that goes away like this; return what is said until the loss is told."""
+    said: list[str] = []
+    told = asyncio.Event()
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        for answer in answers:
+            await reader.read(1024)
+            writer.write(answer)
+        writer.close()
+
+    def say(sentence: str) -> None:
+        said.append(sentence)
+        told.set()
+
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    host, port = server.sockets[0].getsockname()
+    keeping = asyncio.create_task(keep_connected(Broker(host, port), Session(b"one"), say, again_s=60.0))  # type: ignore[arg-type]
+    async with asyncio.timeout(20):
+        await told.wait()
+    server.close()
+    keeping.cancel()
+    await asyncio.gather(keeping, return_exceptions=True)
+    return said
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The library waits for an acknowledgement for 10 s."""
+    make = broker_connection._client
+
+    def make_impatient(*words: Any) -> Any:
+        client = make(*words)
+        client.timeout = 0.3
+        return client
+
+    monkeypatch.setattr(broker_connection, "_client", make_impatient)
+
+
+@pytest.mark.usefixtures("impatient")
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_no_loss_is_told_a_second_time_by_a_future_that_nobody_asked(
+    moment: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A traceback stood in the log: Future exception was never retrieved."""
+    with caplog.at_level(logging.ERROR, "asyncio"):
+        (sentence,) = asyncio.run(meet_once(MOMENTS[moment]))
+        gc.collect()
+    assert sentence.startswith("E181")
+    assert "never retrieved" not in caplog.text
+
+
+def test_any_other_forgotten_exception_is_told_as_ever(caplog: pytest.LogCaptureFixture) -> None:
+    async def forget() -> None:
+        loop = asyncio.get_running_loop()
+        broker_connection._tell_no_loss_twice(loop, aiomqtt.MqttError)
+        loop.create_future().set_exception(KeyError("ours"))
+        loop.call_exception_handler({"message": "Task was destroyed", "exception": aiomqtt.MqttError("its own")})
+
+    with caplog.at_level(logging.ERROR, "asyncio"):
+        asyncio.run(forget())
+        gc.collect()
+    assert "Future exception was never retrieved" in caplog.text and "ours" in caplog.text
+    assert "Task was destroyed" in caplog.text
+
+
+@pytest.mark.parametrize("kind", ["a pipe", "a device"])
+def test_a_certificate_that_is_no_file_is_told_and_not_waited_for(kind: str, tmp_path: Any) -> None:
+    from tests.other_kinds import put
+
+    put(kind, tmp_path / "ca.crt")
+
+    async def meet() -> str:
+        said: asyncio.Queue[str] = asyncio.Queue()
+        broker = Broker("127.0.0.1", 1, ca=str(tmp_path / "ca.crt"))
+        keeping = asyncio.create_task(keep_connected(broker, Session(), said.put_nowait, again_s=60.0))  # type: ignore[arg-type]
+        async with asyncio.timeout(10):
+            sentence = await said.get()
+        keeping.cancel()
+        await asyncio.gather(keeping, return_exceptions=True)
+        return sentence
+
+    sentence = asyncio.run(meet())
+    assert sentence.startswith("E181") and f"it is {kind}" in sentence

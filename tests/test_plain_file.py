@@ -1,0 +1,71 @@
+"""Whatever stands where a plain file belongs is refused at once, by what it is, and neither made, changed nor waited for."""
+
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gateway.plain_file import check_plain, open_plain, open_plain_stream, other_kind, read_plain
+from tests.other_kinds import MAKERS, never_waiting, put
+
+DOORS: dict[str, Callable[[Path], object]] = {
+    "check": check_plain,
+    "read": read_plain,
+    "stream": open_plain_stream,
+    "append": lambda path: open_plain(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT),
+    "anew": lambda path: open_plain(path, os.O_WRONLY | os.O_TRUNC | os.O_CREAT),
+}
+
+
+@pytest.mark.parametrize("door", DOORS)
+@pytest.mark.parametrize("kind", MAKERS)
+def test_what_is_no_plain_file_is_refused_by_its_kind_and_place(door: str, kind: str, tmp_path: Path) -> None:
+    path = put(kind, tmp_path / "file")
+    with never_waiting(), pytest.raises(OSError, match=kind) as refused:
+        DOORS[door](path)
+    assert refused.value.filename == str(path)
+    assert isinstance(refused.value, IsADirectoryError) == (kind == "a directory")
+    assert other_kind(path) == kind
+
+
+@pytest.mark.parametrize("kind", MAKERS)
+def test_what_takes_a_files_place_behind_its_check_is_refused_and_let_go(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"whole")
+    opened, count = os.open, len(list(Path("/proc/self/fd").iterdir()))
+
+    def exchange(name: Path, flags: int, *rest: int, **where: int | None) -> int:
+        put(kind, path)
+        return opened(name, flags, *rest, **where)
+
+    monkeypatch.setattr(os, "open", exchange)
+    with never_waiting(), pytest.raises(OSError, match=f"{kind}|No such device"):
+        open_plain(path)
+    assert len(list(Path("/proc/self/fd").iterdir())) == count
+
+
+def test_a_plain_file_is_read_written_and_made_as_ever(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    with pytest.raises(FileNotFoundError):
+        read_plain(path)
+    descriptor = open_plain(path, os.O_WRONLY | os.O_CREAT, 0o640)
+    os.write(descriptor, b"whole")
+    assert not os.get_inheritable(descriptor)
+    os.close(descriptor)
+    assert stat.S_IMODE(path.stat().st_mode) & ~0o640 == 0
+    assert read_plain(path) == b"whole"
+    assert other_kind(path) == ""
+    check_plain(path)
+
+
+def test_a_name_in_an_open_folder_is_opened_there(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"whole")
+    folder = os.open(tmp_path, os.O_RDONLY | os.O_DIRECTORY)
+    descriptor = open_plain("file", directory=folder)
+    assert os.read(descriptor, 9) == b"whole"
+    os.close(descriptor)
+    os.close(folder)
