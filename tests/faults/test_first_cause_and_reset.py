@@ -94,3 +94,15 @@ def test_a_reset_may_have_the_value_of_the_beat_before_it():
     bench.run(0.3)
     assert bench.last.state is State.FAULT
     assert bench.write(control_word=ControlBit.RESET_FAULT).state is State.OFF, bench.refused
+
+
+def test_a_reset_by_the_value_of_an_old_beat_is_refused():
+    """The master has beaten behind the fault, and is silent for longer than its lease since."""
+    bench = enabled(settings(lease_s=0.2))
+    bench.line = bench.line._replace(fault=FaultCode.OUTPUT_LOST)
+    bench.run(0.1)
+    bench.line = bench.line._replace(fault=FaultCode.NONE)
+    bench.write(heartbeat=7)
+    bench.run(0.3)
+    bench.write(control_word=ControlBit.RESET_FAULT)
+    assert bench.refused and bench.refused.reason is RefusalReason.HEARTBEAT_STALE

@@ -54,3 +54,11 @@ def test_under_force_none_is_taken() -> None:
     bench.run(0.6)
     with pytest.raises(ValueError, match="only while the output is disabled"):
         bench.controller.compensate(bench.settings, PARTS["cell"], IN_USE)
+
+
+def test_readings_straightened_otherwise_are_no_zero() -> None:
+    bench = Bench()
+    bench.run(0.3)
+    bench.controller.compensate(bench.settings, PARTS["cell"], IN_USE)
+    bench.write(control_word=ControlBit.TARE)
+    assert bench.refused and "usable samples" in bench.refused.text
