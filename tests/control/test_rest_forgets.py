@@ -9,7 +9,7 @@ import pytest
 from gateway.bsfm.model import Response
 from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse, Controller
-from gateway.registers.words import ControlBit, Mode, State
+from gateway.registers.words import ControlBit, LimitedBy, Mode, State, StatusBit
 from tests.control.bench import Bench, SmallPlant, bsfm
 from tests.control.runs.test_ladder_run import SHORT
 
@@ -107,3 +107,26 @@ def test_behind_whatever_was_before_an_enable_begins_as_behind_a_start(life: Cal
 @pytest.mark.parametrize("life", [_ramp, _drive_a_voltage], ids=lambda life: life.__name__.strip("_"))
 def test_it_does_so_by_a_measured_response_where_the_trim_has_learned_no_noise(life: Callable[[Bench], None]) -> None:
     assert course(RESPONSE, life) == pytest.approx(course(RESPONSE, None), abs=5.0e-3)
+
+
+def test_an_enable_right_behind_a_disable_begins_its_contact_ramp_anew() -> None:
+    """The tool is in contact still: what began with the contact of before is over."""
+    bench = Bench()
+    bench.run(0.5)
+    bench.enable(30.0, contact_ramp_s=1.0)
+    bench.run(2.0)
+    bench.disable()
+    bench.run(0.05)
+    bench.enable(30.0)
+    assert bench.last.status & StatusBit.CONTACT
+    bench.run(0.5)
+    assert 12.0 < bench.last.force_applied_n < 18.0
+
+
+def test_what_limited_the_voltage_limits_nothing_behind_a_disable() -> None:
+    bench = Bench()
+    bench.run(0.5)
+    bench.voltage(9.0)
+    assert bench.last.limited_by is LimitedBy.VOLTAGE_SLEW
+    output = bench.disable()
+    assert output.limited_by is LimitedBy.NONE and not output.status & StatusBit.LIMITED

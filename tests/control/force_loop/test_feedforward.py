@@ -1,12 +1,15 @@
 """The applied target and what the reversal remembers where it leaves its ramp: a loss, a swap, another mode."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
 from gateway.bsfm import FALLING, RISING, Bsfm
 from gateway.control import CalibrationInUse, Controller
-from gateway.control.force_loop.feedforward import Feedforward
+from gateway.control.demand import demand_of
+from gateway.control.force_loop.feedforward import Approach, Feedforward
+from gateway.registers.command import Command
 from gateway.registers.words import State
 from tests.control.bench import Bench, bsfm, settings
 from tests.control.test_rest_forgets import RESPONSE
@@ -68,3 +71,52 @@ def test_a_force_taken_over_is_where_the_target_its_delay_and_the_slide_are(bran
     assert (law.applied_n, law.aimed_n, law.branch_share) == (25.0, 25.0, branch_share)
     assert law.reference_n == pytest.approx(25.0)
     assert law.correction_v(0.0) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_another_pace_leaves_what_was_reached() -> None:
+    law = Feedforward(bsfm(), settings().limits, 0.1, delay_s=0.05)
+    law.take_over(25.0)
+    law.retime(0.1, 0.3, 0.0)
+    for _ in range(10):
+        law.advance(25.0, 100.0, 0.01)
+    assert law.reference_n == pytest.approx(25.0)
+
+
+@pytest.mark.parametrize(("begin_n", "end_n"), [(30.0, 49.5), (12.0, 0.5)])
+def test_a_path_is_continued_to_no_force_that_may_not_be_or_cannot_be_commanded(begin_n: float, end_n: float) -> None:
+    law, limits = Feedforward(bsfm(), settings().limits, 0.1, ahead_s=0.15), settings().limits
+    law.take_over(begin_n)
+    aimed_n, goal_n = [], begin_n
+    for tick in range(80):
+        if tick % 3 == 0:
+            goal_n += max(-0.9, min(0.9, end_n - goal_n))
+        law.advance(goal_n, 60.0, 0.01)
+        aimed_n.append(law.aimed_n)
+    assert max(abs(aim_n - goal_n) for aim_n in aimed_n) > 1.0
+    assert limits.smallest_force_n <= min(aimed_n) <= max(aimed_n) <= limits.force_max_n
+
+
+def contact(ramp_s: float, *ticks: tuple[bool, float]) -> list[float]:
+    """Goals and rates come from the approach, and the target follows: what is applied after each tick of 10 ms."""
+    law, approach, applied_n = Feedforward(bsfm(), settings().limits, 0.1), Approach(), []
+    for at, (touching, force_n) in enumerate(ticks):
+        demand = demand_of(Command(force_setpoint_n=force_n, contact_ramp_s=ramp_s), settings())
+        law.advance(*approach.goal(0.01 * at, demand, touching, law), 0.01)
+        applied_n.append(law.applied_n)
+    return applied_n
+
+
+def test_each_contact_has_its_own_ramp_and_none_is_faster_than_the_force_ramp() -> None:
+    applied_n = contact(1.0, *[(False, 22.0)] * 20, *[(True, 22.0)] * 51)
+    assert applied_n[-1] == pytest.approx((applied_n[19] + 22.0) / 2.0, abs=0.3), "half of the way in half of the time"
+    twice = contact(1.0, *[(False, 22.0)] * 20, *[(True, 22.0)] * 90, *[(False, 22.0)] * 200, *[(True, 22.0)] * 51)
+    assert twice[-1] == pytest.approx(applied_n[-1], abs=0.3)
+    fast = contact(0.05, *[(False, 42.0)] * 20, *[(True, 42.0)] * 60)
+    steepest_n = max(later - earlier for earlier, later in pairwise(fast))
+    assert steepest_n <= settings().defaults.force_ramp_n_per_s * 0.01 + 1e-9
+
+
+def test_a_smaller_force_within_the_contact_ramp_is_gone_down_to_by_the_force_ramp() -> None:
+    applied_n = contact(2.0, *[(False, 40.0)] * 20, *[(True, 40.0)] * 100, *[(True, 5.0)] * 60)
+    assert applied_n[119] > 15.0 and applied_n[-1] == pytest.approx(5.0)
+    assert all(later <= earlier for earlier, later in pairwise(applied_n[119:]))
