@@ -10,7 +10,7 @@ from gateway.bsfm.model import Response
 from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse, Controller
 from gateway.registers.words import ControlBit, LimitedBy, Mode, State, StatusBit
-from tests.control.bench import Bench, SmallPlant, bsfm
+from tests.control.bench import Bench, SmallPlant, bsfm, settings
 from tests.control.runs.test_ladder_run import SHORT
 
 RESPONSE = Response(dead_time_s=0.02, lag_s=0.08)
@@ -130,3 +130,25 @@ def test_what_limited_the_voltage_limits_nothing_behind_a_disable() -> None:
     assert bench.last.limited_by is LimitedBy.VOLTAGE_SLEW
     output = bench.disable()
     assert output.limited_by is LimitedBy.NONE and not output.status & StatusBit.LIMITED
+
+
+def test_equal_readings_before_an_enable_are_no_frozen_cell_behind_it() -> None:
+    """A quiet cell in free air rightly repeats itself, also where the rig says how often is too often."""
+    bench = Bench(settings(frozen_equal_samples=20), noise_n=0.0)
+    bench.run(1.0)
+    bench.enable(20.0)
+    assert bench.run(0.1).fault is FaultCode.NONE
+
+
+def test_an_overload_before_an_enable_does_not_count_behind_it() -> None:
+    bench = Bench()
+    bench.run(0.5)
+    bench.alter_sample = lambda sample: replace(sample, force_n=70.0)
+    bench.run(0.025)
+    bench.alter_sample = lambda sample: replace(sample, force_n=0.0, time_s=bench.now_s)
+    bench.enable(0.0)
+    assert bench.refused is None
+    bench.alter_sample = lambda sample: replace(sample, force_n=70.0)
+    bench.run(0.01)
+    assert bench.last.fault is FaultCode.NONE
+    assert bench.run(0.05).fault is FaultCode.OVER_FORCE
