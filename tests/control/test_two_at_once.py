@@ -66,7 +66,7 @@ def test_wherever_a_run_is_stopped_the_voltage_only_falls_from_where_it_is(stopp
     assert all(later_v <= earlier_v for earlier_v, later_v in pairwise(volts))
     applied_n = next(one.output.force_applied_n for one in bench.history if not bench.controller.active_run.running)
     assert applied_n <= bsfm().branches.falling.value(before_v) + 0.1
-    assert bench.last.force_accepted_n == 0.0
+    assert {one.output.force_accepted_n for one in bench.history} == {0.0}
 
 
 def test_a_release_goes_along_its_ramp_in_volts_and_is_not_led() -> None:
@@ -164,6 +164,28 @@ def test_a_new_setpoint_ends_the_band_of_the_one_before_in_its_own_step() -> Non
     assert bench.last.status & StatusBit.IN_BAND
     output = bench.force(40.0)
     assert not output.status & StatusBit.IN_BAND and output.state is State.RAMPING
+
+
+def test_a_run_begins_with_nothing_of_the_one_before_and_keeps_its_own_ceiling_under_another_calibration() -> None:
+    bench = begun(Bench())
+    run = bench.controller.active_run
+    bench.run(4.0)
+    assert run.last_row is not None
+    ceiling = run._ceiling
+    bench.controller.use(CalibrationInUse(bsfm(1.1), 2))
+    assert run._ceiling is ceiling
+    run.ask_stop("calibration stopped by a person")
+    bench.run(1.0)
+    bench.enable(12.0)
+    run.ask(SHORT)
+    bench.run(0.1)
+    assert run.refused and not run.running
+    bench.disable()
+    bench.run(1.0)
+    run.ask(SHORT)
+    assert run.refused == ""
+    bench.run(0.05)
+    assert run.running and run.last_row is None
 
 
 def test_that_the_trim_hunts_is_told_once_each_time_it_begins() -> None:
