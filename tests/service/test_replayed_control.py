@@ -99,8 +99,12 @@ def test_a_lease_is_no_matter_of_a_replay_and_an_overload_is_one(recording: Reco
     assert not fault[: recording.rows // 2].any() and FaultCode.OVER_FORCE in fault[recording.rows // 2 :]
 
 
-def test_a_recording_of_a_run_is_refused(recording: Recording, own: ReplaySetup) -> None:
-    columns = recording.columns | {"state": np.full(recording.rows, float(State.CALIBRATING))}
+@pytest.mark.parametrize("rows", [1, None])
+def test_a_recording_of_a_run_is_refused(recording: Recording, own: ReplaySetup, rows: int | None) -> None:
+    """Also of one that is a part of it."""
+    state = recording.columns["state"].copy()
+    state[:rows] = State.CALIBRATING
+    columns = recording.columns | {"state": state}
     with pytest.raises(RecordingError, match="ladder, a plan or a self-test"):
         replay_control(replace(recording, columns=columns), own)
 
