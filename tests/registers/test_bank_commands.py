@@ -237,6 +237,7 @@ def test_a_setpoint_lowered_twice_is_told_as_it_was_asked_for_first(make_bank, m
     master.write(4, 8)  # a heartbeat changes nothing of what was asked for
     assert (bank.command.force_setpoint_n, bank.command.force_requested_n) == (30.0, 50.0)
     master.write(1, 1000)
+    master.write(4, 9)
     assert (bank.command.force_setpoint_n, bank.command.force_requested_n) == (10.0, 10.0)
 
 
