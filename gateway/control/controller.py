@@ -263,6 +263,7 @@ class Controller:
 
     def _tare(self) -> None:
         self._faults.shift_zero(self._conditioner.take_zero(self._commands.gravity_n))
+        self._contact.restart()
         self._machine.tell(f"tare: zero at {self.zero_n:.2f} N")
 
     def _supervise(self, now_s: float, line: LineStatus) -> None:

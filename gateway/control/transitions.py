@@ -140,7 +140,6 @@ class Transitions:
 
     def _let_go(self, sentence: str) -> None:
         self._rest()
-        self._parts.one_shot.forget_unreachable()
         self.is_ramping_down = self.is_master_lost = False
         self.tell(sentence, *self._parts.run.take_report())
         self.outcome.clear_command = True

@@ -114,6 +114,8 @@ def _decide_all(recording: Recording, controller: Controller) -> Iterator[Output
 
 def _next_command(command: Command, setpoint_n: float, enabled: bool, controller: Controller, now_s: float) -> Command:
     """Return the command that the master had written by then, by what the row shows."""
+    if enabled and command.control_word and controller.state is State.FAULT:
+        return command  # which the recording has not seen: nothing more is done until it is enabled anew there
     word, force_n = (ControlBit.ENABLE, setpoint_n) if enabled else (ControlBit(0), 0.0)
     if enabled and not command.control_word and controller.state is State.FAULT:
         word |= ControlBit.RESET_FAULT

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from gateway.audit.audit_file import AuditFile
+from gateway.audit.audit_file import AuditFile, audit_files
 from gateway.audit.audit_reader import read_audit, verify_audit
-from tests.audit.test_chain import FILE_BYTES, LINES, find_line, replace_last_line
+from tests.audit.test_chain import FILE_BYTES, LINES, find_line, records, replace_last_line
 from tests.other_kinds import MAKERS, never_waiting, put
 
 
@@ -71,3 +71,51 @@ def test_what_the_disk_does_not_give_now_is_neither_gone_nor_altered(
     assert file.append([{"what": "start"}]) == ()
     file.close()
     assert not verify_audit(state).broken
+
+
+def test_a_writer_killed_between_a_new_file_and_its_first_line_leaves_the_chain_whole(state: Path) -> None:
+    """The end of the chain is in the file before then."""
+    (state / "audit" / f"{LINES + 1:012d}.jsonl").touch()
+    file = AuditFile(state, FILE_BYTES)
+    assert file.append(records(1, LINES + 1)) == ()
+    file.close()
+    verdict = verify_audit(state)
+    assert (verdict.broken, verdict.end.number) == (None, LINES + 1)
+
+
+@pytest.mark.parametrize("removed", [1, 2, 5])
+def test_lines_removed_at_the_end_are_told_at_the_next_start_once(tmp_path: Path, removed: int) -> None:
+    file = AuditFile(tmp_path)
+    file.append(records(LINES))
+    file.close()
+    path, lines, _ = find_line(tmp_path, 0)
+    path.write_bytes(b"".join(lines[:-removed]))
+    file = AuditFile(tmp_path)
+    told = [file.append(records(1, LINES + k)) for k in range(3)]
+    file.close()
+    assert [len(each) for each in told] == [1, 0, 0]
+    assert told[0][0].startswith("A352 ") and "lines at its end were removed" in told[0][0]
+    assert verify_audit(tmp_path).broken
+
+
+def test_a_next_file_that_the_disk_refuses_costs_no_line_and_doubles_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was written is written: a batch that is called failed would be put down again."""
+    file, real_open = AuditFile(tmp_path, FILE_BYTES), os.open
+    file.append(records(1))
+
+    def refuse(path: Any, flags: int, *more: Any, **others: Any) -> int:
+        if flags & os.O_APPEND:
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        return real_open(path, flags, *more, **others)
+
+    with monkeypatch.context() as full:
+        full.setattr(os, "open", refuse)
+        for record in records(LINES, 2):
+            file.append([record])
+    file.append(records(1, LINES + 2))
+    file.close()
+    assert [record["old"] for record in read_audit(tmp_path)] == list(range(1, LINES + 3))
+    assert not verify_audit(tmp_path).broken
+    assert [len(path.read_bytes()) > FILE_BYTES for path in audit_files(tmp_path / "audit")] == [True, False]

@@ -2,7 +2,9 @@
 
 import asyncio
 import json
+import struct
 from concurrent.futures import Future
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -97,3 +99,42 @@ def test_what_waits_for_a_disk_is_told_with_its_end(tmp_path: Path) -> None:
 
     asyncio.run(run())
     assert ["No space left" in json.dumps(record) for record in read_audit(tmp_path)] == [True, False, False]
+
+
+def test_every_verb_that_changes_something_is_kept_and_no_question_or_rehearsal(tmp_path: Path) -> None:
+    verbs = ("record", "calibration", "plant", "calibrate", "sim")
+
+    async def run() -> None:
+        audit = RigAudit(tmp_path, lambda cause, sentence: None)
+        watched = audit.watch_handlers(dict.fromkeys((*verbs, "health"), lambda request: {}))
+        for verb in (*verbs, "health"):
+            watched[verb]({"do": verb})
+            watched[verb]({"do": verb, "use": 1, "dry_run": True})
+            watched[verb]({"do": verb, "use": 1})
+        await audit.close()
+
+    asyncio.run(run())
+    told = [(record["what"], record.get("new")) for record in read_audit(tmp_path)]
+    assert told == [*((verb, '{"use": 1}') for verb in verbs), ("end", None)]
+
+
+def test_a_number_that_is_none_and_what_was_only_counted_reach_the_disk(tmp_path: Path) -> None:
+    """NaN is no JSON: a line with it would be refused, and all of its batch again and again."""
+
+    async def run() -> None:
+        audit = RigAudit(tmp_path, lambda cause, sentence: None)
+        register_map = load_register_map("force-v1")
+        bank = RegisterBank(register_map, BankRules(rig_name="demo", force_max_n=60.0), now=lambda: 0.0)
+        audit.watch(bank)
+        setpoint = next(one for one in register_map.registers_of("float_abcd") if one.name == "force_setpoint")
+        for value in (nan, inf):
+            with pytest.raises(ModbusError):
+                bank.write_registers(setpoint.address, struct.pack(">f", value), ROBOT)
+        for counts in range(1, 8):
+            bank.write_registers(1, struct.pack(">H", counts), ROBOT)
+        await audit.close()
+
+    asyncio.run(run())
+    told = [(record["what"], record.get("count"), record.get("new")) for record in read_audit(tmp_path)]
+    assert told[:2] == [("write", None, None)] * 2
+    assert told[-2:] == [("force_setpoint", 6, 0.07), ("end", None, None)]

@@ -1,20 +1,12 @@
-"""What the audit keeps of a bank's writes: every edge, every refusal, setpoints in few lines, and a disk that takes nothing."""
+"""What the audit keeps of a bank's writes: every edge, every refusal, and setpoints in few lines."""
 
-import asyncio
-import errno
 import struct
-from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from gateway.audit.audit_file import AuditFile
-from gateway.audit.audit_log import MOST_WAITING, AuditLog
-from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.audit.write_audit import WriteAudit
 from gateway.modbus import ModbusError, Peer, Role
-from gateway.processes.event import utc_text
 from gateway.profiles import load_register_map
 from gateway.registers import BankRules, RegisterBank
 from gateway.registers.command import Status
@@ -117,12 +109,13 @@ def test_an_hour_of_setpoints_at_100_hz_is_a_few_lines_that_lose_no_extreme(watc
 
 def test_summaries_come_before_the_edge_that_ends_them(watched: Watched) -> None:
     watched.write(ROBOT, 0, 1, 1000)
-    for k in (*range(50), 30):
+    for k in (*range(50), -5, 30):
         watched.write(ROBOT, 1, 1000 + k)
     watched.write(ROBOT, 0, 0)
     assert [what for (what,) in watched.told("what")][-3:] == ["force_setpoint", "disable", "owner"]
     (summary,) = [record for record in watched.kept if "count" in record]
-    assert (summary["count"], summary["min"], summary["max"], summary["new"]) == (48 + 2, 10.01, 10.49, 10.30)
+    assert (summary["count"], summary["old"], summary["new"]) == (49 + 2, 10.00, 10.30)
+    assert (summary["min"], summary["max"]) == (9.95, 10.49)
 
 
 @pytest.mark.parametrize("words", [(0, 4), (1, 9999), (0, 3, 1000)])
@@ -138,124 +131,51 @@ def test_a_flood_of_edges_or_refusals_is_counted(watched: Watched, words: tuple[
     assert sum(counts) == 5000
 
 
+def test_a_window_is_told_when_it_ends_and_each_is_twice_as_long_up_to_ten_minutes(watched: Watched) -> None:
+    """However long after the start it began; one in which nothing came ends the series, and the next write is a first one."""
+    watched.now_s = 5000.0
+    watched.write(ROBOT, 1, 1000)
+    for k, window_s in enumerate((10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 600.0, 600.0)):
+        watched.write(ROBOT, 1, 1100 + k)
+        for share, count in ((0.9, 0), (1.0, 1)):
+            watched.kept.clear()
+            end_s = 5000.0 + sum((10.0 * 2**j if j < 6 else 600.0) for j in range(k))
+            watched.now_s = end_s + share * window_s
+            watched.audit.flush()
+            assert watched.told("count", "seconds") == [(1, window_s)] * count, (k, share)
+    watched.now_s += 600.0
+    watched.audit.flush()
+    watched.now_s += 1.0
+    watched.write(ROBOT, 1, 1000)
+    assert watched.told("what", "new", "count")[1:] == [("force_setpoint", 10.0, None)]
+
+
+def test_two_reasons_of_one_peer_are_counted_apart_and_each_ends_with_its_last_sentence(watched: Watched) -> None:
+    for k in range(20):
+        watched.write(ROBOT, 1, 7000 + k)
+        watched.write(ROBOT, 100, k)
+    watched.audit.close()
+    told = [(record["result"], record["count"], record["text"]) for record in watched.kept if "count" in record]
+    assert [(result, count) for result, count, _ in told] == [("W204", 15), ("W205", 15)]
+    assert "70.19 N" in told[0][2]
+
+
+def test_an_edge_ends_the_summaries_of_its_own_peer_only(watched: Watched) -> None:
+    watched.write(ROBOT, 0, 1, 1000)
+    for k in range(5):
+        watched.write(ROBOT, 1, 1000 + k)
+    watched.write(OTHER, 0, 0)
+    assert ("10.0.0.6:4712", "disable") in watched.told("peer", "what")
+    assert not [record for record in watched.kept if "count" in record]
+
+
+def test_a_change_of_the_owner_is_kept_where_no_bit_changes(watched: Watched) -> None:
+    watched.write(ROBOT, 1, 1000)
+    assert watched.told("what", "old", "new") == [("owner", None, "certificate robot"), ("force_setpoint", 0.0, 10.0)]
+
+
 def test_many_peers_do_not_fill_the_memory(watched: Watched) -> None:
     for k in range(3000):
         watched.write(Peer(f"fe80::{k:x}", 1, role=Role.MONITOR), 1, 100)
     assert len(watched.kept) == 3000
     assert len(watched.audit._series) <= 1000
-
-
-# -- the disk
-
-
-class FailingFile:
-    """Takes records while `is_full` is not set."""
-
-    def __init__(self) -> None:
-        self.is_full = self.is_closed = False
-        self.taken: list[dict[str, Any]] = []
-
-    def append(self, records: Iterable[dict[str, Any]]) -> None:
-        if self.is_full:
-            raise OSError(errno.ENOSPC, "No space left on device")
-        self.taken.extend(records)
-
-    def close(self) -> None:
-        self.is_closed = True
-
-
-def audit_log(file: Any, said: list[str], now: Callable[[], float]) -> AuditLog:
-    log = AuditLog(file, lambda cause, sentence: said.append(sentence), now, lambda: 1.7e9 + now())
-
-    def at_once(work: Callable[[], Any], done: Callable[[Any], None]) -> None:
-        try:
-            result = work()
-        except OSError as error:
-            result = error
-        done(result)
-
-    log.run_in_background = at_once
-    return log
-
-
-def test_a_full_disk_is_an_alarm_and_nothing_is_lost_that_memory_holds() -> None:
-    file, said, now = FailingFile(), list[str](), [0.0]
-    log = audit_log(file, said, lambda: now[0])
-    file.is_full = True
-    for k in range(MOST_WAITING + 300):
-        now[0] += 0.01
-        log.put({"k": k})
-        log.flush()
-    assert len(said) == 1 and said[0].startswith(
-        "A351 the audit is not stored: No space left on device: the disk is full; kept in memory"
-    )
-    file.is_full = False
-    now[0] += 10.0
-    log.flush()
-    lost, *kept = file.taken
-    assert (lost["what"], lost["count"]) == ("lost", 300)
-    assert [record["k"] for record in kept] == list(range(300, MOST_WAITING + 300))
-    assert said[-1].startswith("A351 the audit is stored again")
-
-
-def test_what_a_full_disk_kept_back_is_written_at_the_end_where_it_is_free_again() -> None:
-    """Found by tests/simulation: the file stayed open, and what came after the failure was lost."""
-
-    async def run() -> FailingFile:
-        file = FailingFile()
-        log = audit_log(file, [], lambda: 0.0)
-
-        def later(work: Callable[[], Any], done: Callable[[Any], None]) -> None:
-            at_once = asyncio.get_running_loop().call_later
-            try:
-                at_once(0.01, done, work())
-            except OSError as error:
-                at_once(0.01, done, error)
-
-        log.run_in_background = later
-        file.is_full = True
-        log.put({"k": 1})
-        log.flush()
-        await asyncio.sleep(0.02)
-        log.put({"k": 2})
-        file.is_full = False
-        await log.close()
-        return file
-
-    file = asyncio.run(run())
-    assert [record["k"] for record in file.taken] == [1, 2]
-    assert file.is_closed
-
-
-def test_a_write_that_fails_halfway_leaves_the_chain_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = AuditFile(tmp_path)
-    file.append([{"what": "enable"}])
-    monkeypatch.setattr(
-        "gateway.audit.audit_file.os.fsync", lambda descriptor: (_ for _ in ()).throw(OSError(28, "full"))
-    )
-    with pytest.raises(OSError, match="full"):
-        file.append([{"what": "disable"}])
-    monkeypatch.undo()
-    file.append([{"what": "disable"}])
-    file.close()
-    assert [record["what"] for record in read_audit(tmp_path)] == ["enable", "disable"]
-    assert not verify_audit(tmp_path).broken
-
-
-def test_each_loss_is_told_with_its_own_times() -> None:
-    """A full disk in spring, and one in autumn: nothing was lost between them."""
-    file, said, now = FailingFile(), list[str](), [0.0]
-    log = audit_log(file, said, lambda: now[0])
-    for begin_s in (0.0, 1.0e7):
-        file.is_full, now[0] = True, begin_s
-        for _ in range(MOST_WAITING + 10):
-            log.put({})
-        for is_full in (True, False):
-            now[0] += 10.0
-            file.is_full = is_full
-            log.flush()
-    lost = [record for record in file.taken if record.get("what") == "lost"]
-    spans = [" ".join(f"to {utc_text(1.7e9 + at_s)}" for at_s in (begin_s, begin_s))[3:] for begin_s in (0.0, 1.0e7)]
-    assert [record["text"] for record in lost] == [
-        f"10 records from {span} were lost: the disk took none, and memory is bounded" for span in spans
-    ]

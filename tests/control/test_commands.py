@@ -251,3 +251,11 @@ def test_a_number_that_is_none_is_named_and_the_next_command_is_whole_again():
     tracker.take(0.2, Command(number=2, force_setpoint_n=6.0))
     assert not tracker.not_finite
     assert tracker.demand == demand_of(Command(number=2, force_setpoint_n=6.0), settings())
+
+
+def test_turning_round_counts_the_weight_of_the_command_in_use_the_other_way_at_once():
+    tracker = CommandTracker(settings())
+    tracker.take(0.1, Command(number=1, payload_kg=1.0))
+    pressing_n = tracker.gravity_n
+    tracker.turn(-1.0)
+    assert tracker.gravity_n == tracker.demand.gravity_n == -pressing_n < 0.0

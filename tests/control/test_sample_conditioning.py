@@ -49,3 +49,30 @@ def test_a_zero_is_made_of_no_sample_from_before_a_gap() -> None:
     for k in range(3):
         conditioner.read(9.0, sample(1.2, 9.0 + 0.01 * k), 0.0)
     assert conditioner.why_no_zero(0.0).startswith("3 usable samples")
+
+
+def test_an_overload_is_no_part_of_a_zero() -> None:
+    conditioner = SampleConditioner(BOUNDS)
+    for k in range(12):
+        force_n = 120.0 if k == 6 else 1.0
+        conditioner.read(1.0, sample(force_n, 1.0 + 0.01 * k), 0.0)
+    assert conditioner.why_no_zero(0.0) == ""
+    conditioner.take_zero(0.0)
+    assert conditioner.zero_n == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize("hung_n", [45.0, 50.0])
+def test_a_zero_and_its_refusal_count_the_weight_the_same_way_pressed_or_pulled(
+    direction: float, hung_n: float
+) -> None:
+    """A payload that hangs on the cell is taken off, whichever way is positive; what is left may be half of the range."""
+    conditioner = SampleConditioner(BOUNDS)
+    conditioner.direction = direction
+    for k in range(12):
+        conditioner.read(1.0, sample(hung_n - 5.0, 1.0 + 0.01 * k), direction * 5.0)
+    assert (conditioner.why_no_zero(direction * 5.0) == "") == (hung_n < 48.0)
+    before_n = conditioner.read(1.2, sample(hung_n - 5.0, 1.2), direction * 5.0).contact_n
+    moved_n = conditioner.take_zero(direction * 5.0)
+    after_n = conditioner.read(1.21, sample(hung_n - 5.0, 1.21), direction * 5.0).contact_n
+    assert (after_n, before_n - moved_n) == (pytest.approx(0.0), pytest.approx(0.0))

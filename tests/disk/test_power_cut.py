@@ -1,11 +1,12 @@
 """The power is cut behind any write: whoever reads the directory afterwards finds the old or the new, and all that was told."""
 
+from itertools import product
 from pathlib import Path
 from random import Random
 
 import pytest
 
-from tests.disk.acts import Act
+from tests.disk.acts import Act, AuditedWrites
 from tests.disk.all_acts import SYNCED
 from tests.disk.power_cut import JournaledDisk
 from tests.disk.test_failing_calls import try_once
@@ -53,3 +54,23 @@ def test_after_a_power_cut_it_is_the_old_or_the_new_and_what_was_said_stays(
                     raise AssertionError(f"cut behind change {cut} ({place}), {mode}, {said} were told") from error
     print(f"{count} states after cuts behind {len(disk.changes)} changes")
     assert count >= len(cuts)
+
+
+class FirstAuditedWrite(AuditedWrites):
+    BATCHES = 1
+
+
+def test_a_power_cut_while_an_audit_begins_is_not_called_tampering(fast_folder: Path) -> None:
+    """Its head, its first file's name and its first line come about one after the other, and any of them may be lost."""
+    (fast_folder / "state").mkdir()
+    disk = journal(FirstAuditedWrite(fast_folder / "state"))
+    for cut, seed in product(range(len(disk.changes) + 1), range(8)):
+        for mode, tree in disk.states(cut, seed):
+            if seed and mode != "some":
+                continue
+            after = FirstAuditedWrite(fast_folder / f"{seed}-{cut}-{mode}")
+            tree.write_to(after.state)
+            after.check(disk.said_before(cut))
+            again: list[object] = []
+            assert try_once(after, again) is None, (cut, mode)
+            after.check(again)

@@ -4,7 +4,7 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control import LeaseAction
 from gateway.registers.words import ControlBit, Mode, State
-from tests.control.bench import Bench, has_fault, settings
+from tests.control.bench import Bench, enabled, has_fault, settings
 from tests.faults.test_control_reactions import SAMPLE_S, TICK_S, assert_faulted, pressing
 
 
@@ -79,3 +79,30 @@ def test_direct_voltage_needs_a_fresh_cell_too():
     assert bench.command.mode is Mode.VOLTAGE
     bench.cell_silent = True
     assert_faulted(bench, FaultCode.SAMPLE_STALE, 0.05 + SAMPLE_S + TICK_S)
+
+
+def test_a_reset_may_have_the_value_of_the_beat_before_it():
+    """A master that beats by a write of its own, behind the clearing of its command, has beaten since the fault."""
+    bench = enabled(settings(lease_s=0.2))
+    bench.heartbeat_every_ms = 50
+    bench.clearing_zeroes_heartbeat = True
+    bench.force(12.0)
+    bench.run(0.5)
+    bench.line = bench.line._replace(fault=FaultCode.OUTPUT_LOST)
+    bench.run(0.1)
+    bench.line = bench.line._replace(fault=FaultCode.NONE)
+    bench.run(0.3)
+    assert bench.last.state is State.FAULT
+    assert bench.write(control_word=ControlBit.RESET_FAULT).state is State.OFF, bench.refused
+
+
+def test_a_reset_by_the_value_of_an_old_beat_is_refused():
+    """The master has beaten behind the fault, and is silent for longer than its lease since."""
+    bench = enabled(settings(lease_s=0.2))
+    bench.line = bench.line._replace(fault=FaultCode.OUTPUT_LOST)
+    bench.run(0.1)
+    bench.line = bench.line._replace(fault=FaultCode.NONE)
+    bench.write(heartbeat=7)
+    bench.run(0.3)
+    bench.write(control_word=ControlBit.RESET_FAULT)
+    assert bench.refused and bench.refused.reason is RefusalReason.HEARTBEAT_STALE

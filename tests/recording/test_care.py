@@ -1,6 +1,8 @@
 """Care for recordings: summaries are read once, and what must stay stays, whatever the limits say."""
 
+import errno
 import os
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +10,7 @@ import pytest
 
 from gateway.profiles.recordings_section import Retention
 from gateway.recording import Recorder, recording_paths
-from gateway.recording.care import summaries
+from gateway.recording.care import keeping, summaries
 from gateway.recording.care.keeping import (
     choose_prunable,
     delete_recording,
@@ -198,3 +200,39 @@ def test_what_is_said_to_be_deleted_is_gone_after_a_power_cut_too(
     monkeypatch.setattr(os, "fsync", lambda descriptor: (acts.append("fsync"), sync(descriptor)))
     assert delete_recording(path, "") == ""
     assert acts == ["unlink", "fsync"]
+
+
+def test_one_recording_that_the_disk_does_not_let_go_keeps_no_other_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for days_ago in (40.0, 30.0, 20.0):
+        record(tmp_path, days_ago=days_ago)
+    delete, refusing = keeping.delete_recording, {1}
+
+    def refuse(path: Path, reference: str) -> str:
+        if int(path.stem) in refusing:
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return delete(path, reference)
+
+    monkeypatch.setattr(keeping, "delete_recording", refuse)
+    gone = prune_recordings(tmp_path, Retention(days=10.0), "")
+    assert ([int(one.path.stem) for one in gone], numbers(tmp_path)) == ([2, 3], [1])
+    with pytest.raises(PermissionError):
+        prune_recordings(tmp_path, Retention(days=10.0), "")
+
+
+def test_a_cache_of_another_format_is_not_believed(tmp_path: Path) -> None:
+    path = record(tmp_path, name="mine")
+    list_summaries(tmp_path)
+    cache = path.with_name(".summaries.json")
+    cache.write_text(cache.read_text().replace('"format": 1', '"format": 2').replace("mine", "another's"))
+    assert [summary["name"] for summary in list_summaries(tmp_path)] == ["mine"]
+
+
+def test_rows_without_a_setpoint_are_no_changes_of_it(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "recordings", {}, ("time_s", "setpoint_n"))
+    for row, setpoint_n in enumerate((0.0, nan, nan, 0.0, 12.0, nan, 12.0)):
+        recorder.append((0.1 * row, setpoint_n))
+    recorder.close()
+    (summary,) = list_summaries(tmp_path)
+    assert summary["facts"]["setpoint_changes"] == 1

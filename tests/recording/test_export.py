@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from gateway.recording import Recorder, Recording, export_csv, export_parquet, read_recording
+from gateway.recording import Recorder, Recording, export, export_csv, export_parquet, read_recording
 
 
 @pytest.fixture
@@ -102,3 +102,14 @@ def test_a_recording_without_rows_exports_its_header(tmp_path: Path) -> None:
     export_parquet(empty, tmp_path / "out.parquet")
     assert read_csv(tmp_path / "out.csv")[1] == {"time_s": [], "force_n": []}
     assert pq.read_table(tmp_path / "out.parquet").num_rows == 0
+
+
+def test_without_pyarrow_a_csv_gives_every_number_back_too(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(export, "is_installed", lambda name: False)
+    export_csv(recording, tmp_path / "plain.csv")
+    _, columns = read_csv(tmp_path / "plain.csv")
+    assert list(columns) == list(recording.columns)
+    for name, values in columns.items():
+        np.testing.assert_array_equal(values, recording.columns[name])

@@ -58,3 +58,11 @@ def test_a_folder_that_may_not_be_read_is_not_an_empty_one(tmp_path: Path, monke
         patched.setattr(os, "listdir", refuse)
         with pytest.raises(PermissionError):
             recording_paths(tmp_path)
+
+
+def test_recordings_are_listed_by_number_and_not_by_the_letters_of_their_names(tmp_path: Path) -> None:
+    first = record(tmp_path / "recordings", 1)
+    for number in (9999, 10000, 123456):
+        shutil.copy(first, first.with_name(f"{number:04d}.fgr"))
+    assert [entry.number for entry in list_recordings(tmp_path)] == [1, 9999, 10000, 123456]
+    assert record(tmp_path / "recordings", 1).name == "123457.fgr"

@@ -70,6 +70,15 @@ def test_other_columns_begin_a_new_ring(descriptor):
     assert (reader.rows_written, len(reader.columns)) == (0, 4)
 
 
+def test_other_columns_that_take_as_much_room_begin_a_new_ring_too(descriptor):
+    filled(descriptor, 5).close()
+    ring = SampleRing(descriptor, ("time_s", "force_n", "temperature_c"), 16)
+    reader = RingReader(descriptor)
+    assert (reader.rows_written, reader.columns) == (0, ("time_s", "force_n", "temperature_c"))
+    reader.close()
+    ring.close()
+
+
 def test_before_there_is_a_ring_a_reader_waits(descriptor):
     reader = RingReader(descriptor)
     assert (reader.is_ready, reader.rows_written, reader.newest(5)) == (False, 0, b"")

@@ -210,7 +210,8 @@ def test_an_enumeration_is_told_by_its_name(bank, master):
 
 @pytest.mark.parametrize(("bit", "name"), [(32, "start_calibration"), (64, "start_self_test")])
 def test_a_bit_that_was_held_beyond_its_run_begins_none_until_it_was_0(make_bank, master_of, bit, name):
-    """Held by its owner's cyclic writes; neither a write beside the control word nor another master's lets it go."""
+    """Held by its owner's cyclic writes; neither a write beside the control word, nor another coil of it, nor another master's
+    lets it go."""
     bank = make_bank(supported_bits=ControlBit(127))
     master, other = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
     master.write(0, bit)
@@ -218,6 +219,7 @@ def test_a_bit_that_was_held_beyond_its_run_begins_none_until_it_was_0(make_bank
     bank.clear_command()  # the run is over
     master.write(4, 99)
     other.write(4, 7)
+    bank.write_bits(4, [False], master.peer)
     refusal = master.refusal(master.write, 0, bit)
     assert (refusal.code, refusal.reason) == (4, RefusalReason.CALIBRATION_HELD)
     assert refusal.sentence.endswith(f"{name} was kept at 1 beyond the end of its run: write it as 0 once, then as 1")
@@ -237,6 +239,7 @@ def test_a_setpoint_lowered_twice_is_told_as_it_was_asked_for_first(make_bank, m
     master.write(4, 8)  # a heartbeat changes nothing of what was asked for
     assert (bank.command.force_setpoint_n, bank.command.force_requested_n) == (30.0, 50.0)
     master.write(1, 1000)
+    master.write(4, 9)
     assert (bank.command.force_setpoint_n, bank.command.force_requested_n) == (10.0, 10.0)
 
 
@@ -245,6 +248,14 @@ def test_words_that_were_taken_once_are_judged_anew_by_other_limits(bank, master
     master.write(0, 1, 5000)
     bank.set_active_model(calibration(force_limits_n=(0.0, 40.0)))
     assert master.refusal(master.write, 0, 1, 5000).reason is RefusalReason.OUT_OF_RANGE
+
+
+def test_the_same_words_at_another_address_are_another_value(bank, master):
+    master.write(4, 1200)
+    master.write(1, 1200)
+    assert (bank.command.heartbeat, bank.command.force_setpoint_n) == (1200, 12.0)
+    master.write(4, 9999)
+    assert master.refusal(master.write, 1, 9999).reason is RefusalReason.OUT_OF_RANGE
 
 
 def test_what_was_asked_for_before_control_cleared_is_no_request_any_more(bank, master):

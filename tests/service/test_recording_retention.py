@@ -3,6 +3,7 @@
 import asyncio
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -71,3 +72,28 @@ def test_a_disk_that_refuses_is_told_and_is_not_the_loops_business(
     monkeypatch.setattr(recording_retention, "prune_recordings", refuse)
     assert asyncio.run(prune_at(tmp_path, 1.0)) == ["recordings were not pruned: read-only file system"]
     assert threads != [threading.main_thread().name]
+
+
+@pytest.mark.parametrize("is_reference", [True, False])
+def test_the_rigs_reference_stays_however_old_it_is(
+    tmp_path: Path, is_reference: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = record(tmp_path, days_ago=1_000)
+    reference = SimpleNamespace(name=path.name) if is_reference else None
+    monkeypatch.setattr(recording_retention, "read_reference_recording", lambda state: reference)
+    retention = RecordingRetention(tmp_path, Retention(days=30.0), Said())
+    gone = retention._prune()
+    retention.close()
+    assert [one.path for one in gone] == ([] if is_reference else [path])
+
+
+def test_without_a_limit_and_behind_its_end_a_recording_that_has_ended_begins_nothing(tmp_path: Path) -> None:
+    begun: list[object] = []
+    for limit in (Retention(), Retention(days=30.0)):
+        retention = RecordingRetention(tmp_path, limit, Said())
+        if not limit.is_unlimited:
+            retention.close()
+        retention._worker = lambda work, done: begun.append(work)  # type: ignore[assignment]
+        retention.hasten()
+        retention.tick(1e6)
+    assert begun == []

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gateway.bsfm.model import Calibration
+from gateway.codes.faults import FaultCode
 from gateway.recording import Recording, RecordingError, list_recordings, read_recording
 from gateway.registers.words import State
 from gateway.service.replayed_control import ReplaySetup, SignalDifference, compare_decisions, replay_control
@@ -85,8 +86,25 @@ def test_another_calibration_differs_in_what_it_decides_and_not_in_what_it_was_a
     assert found["model_residual_n"].rms > 0.5
 
 
-def test_a_recording_of_a_run_is_refused(recording: Recording, own: ReplaySetup) -> None:
-    columns = recording.columns | {"state": np.full(recording.rows, float(State.CALIBRATING))}
+def test_a_lease_is_no_matter_of_a_replay_and_an_overload_is_one(recording: Recording, own: ReplaySetup) -> None:
+    """No recording holds a heartbeat; what the cell said of a reading stands beside it. Behind a fault that the recording has
+    not seen its next setpoint, as of a master that enables no more, ended the replay with an internal error."""
+    supervision = replace(own.rig.control.supervision, lease_s=0.2)
+    leased = replace(own.rig, control=replace(own.rig.control, supervision=supervision))
+    assert not replay_control(recording, replace(own, rig=leased))["fault_code"].any()
+    quality = np.zeros(recording.rows)
+    quality[recording.rows // 2 :] = 2.0
+    overloaded = replace(recording, columns=recording.columns | {"quality": quality})
+    fault = replay_control(overloaded, own)["fault_code"]
+    assert not fault[: recording.rows // 2].any() and FaultCode.OVER_FORCE in fault[recording.rows // 2 :]
+
+
+@pytest.mark.parametrize("rows", [1, None])
+def test_a_recording_of_a_run_is_refused(recording: Recording, own: ReplaySetup, rows: int | None) -> None:
+    """Also of one that is a part of it."""
+    state = recording.columns["state"].copy()
+    state[:rows] = State.CALIBRATING
+    columns = recording.columns | {"state": state}
     with pytest.raises(RecordingError, match="ladder, a plan or a self-test"):
         replay_control(replace(recording, columns=columns), own)
 

@@ -130,3 +130,26 @@ def test_a_shorter_delay_lets_nothing_old_arrive_after_what_is_new() -> None:
     direct.command(2.0)
     direct.advance(2.0)
     assert twin.pressure_pa == pytest.approx(direct.pressure_pa, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["drift_n_per_s", "warm_up_n"])
+def test_a_drift_and_a_warm_up_go_on_where_something_else_is_changed(name: str) -> None:
+    drifting = with_value(plant(), "cell", name, 2.0)
+    courses = []
+    for others in ((), ("hardening", "creep_share")):
+        twin = Twin(drifting, 3)
+        twin.advance(3.0)
+        for other in others:
+            twin.change_plant(with_value(drifting, "contact", other, 0.2))
+        twin.advance(1.0)
+        courses.append(twin.read())
+    assert courses[1] == pytest.approx(courses[0], abs=1e-9) and abs(courses[0]) > 0.1
+
+
+def test_a_machine_that_has_worked_before_stands_still() -> None:
+    twin = Twin(plant(), 3)
+    twin.press_and_vent()
+    assert twin.speed_m_per_s == 0.0 and twin.force_n > 0.0
+    before_n = twin.force_n
+    twin.advance(0.1)
+    assert twin.force_n == pytest.approx(before_n, abs=1e-3)

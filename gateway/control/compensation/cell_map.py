@@ -37,10 +37,10 @@ class CellMap:
         return self._straight_n(bent_n) + self.zero_n
 
     def reading_n(self, force_n: float, temperature_c: float, voltage_v: float) -> float:
-        """Return what the cell makes of a force, N: the other way."""
+        """Return the reading of which `force_n` makes this force, N: the other way, its constant zero in the force as well."""
         away_k = self._away_k(temperature_c)
         disturbed_n = self.zero_n + self.zero_n_per_k * away_k + self.crosstalk_n_per_v * voltage_v
-        return self._bent_n(force_n) * (1.0 + self.span_per_k * away_k) + disturbed_n
+        return self._bent_n(force_n - self.zero_n) * (1.0 + self.span_per_k * away_k) + disturbed_n
 
     def _away_k(self, temperature_c: float) -> float:
         return temperature_c - self.reference_c if isfinite(temperature_c) else 0.0

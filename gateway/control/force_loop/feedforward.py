@@ -181,7 +181,9 @@ class Feedforward:
 
     def fall_back(self, goal_n: float) -> None:
         """Drop to the goal at once when contact is lost, and stay on the rising branch for the next contact."""
+        before_n = self.aimed_n
         self.applied_n = self.aimed_n = min(self.applied_n, goal_n)
+        self._slid_n += self.aimed_n - before_n  # no movement of the slide, which friction would turn round with
         self._remember(self.model.reversal.at(RISING))
         self._slide = self._memory
 

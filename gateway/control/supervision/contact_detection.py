@@ -18,9 +18,13 @@ class ContactDetector:
     """threshold_n: contact force from which the tool counts as touching (rig default contact_threshold_n)."""
 
     def __init__(self, threshold_n: float) -> None:
-        self.touching = False
         self._touch_n = threshold_n
         self._release_n = threshold_n * _RELEASE_SHARE
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin without contact: what was read before counted from another zero."""
+        self.touching = False
         self._above = 0
         self._below_s = 0.0
 

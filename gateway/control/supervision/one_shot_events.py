@@ -31,10 +31,6 @@ class OneShotEvents:
         """Begin a new enable: nothing has been in band since."""
         self._was_in_band = False
 
-    def forget_unreachable(self) -> None:
-        """Let an unreachable target be told anew, after the output went off."""
-        self._was_unreachable = False
-
     def observe_line(self, line: LineStatus) -> None:
         """Take over the pressure that the output device measures."""
         self._pressure_pa, self._profile_pa_per_v = line.pressure_pa, line.pressure_pa_per_v

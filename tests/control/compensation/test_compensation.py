@@ -62,9 +62,10 @@ def test_the_null_compensation_hands_the_same_model_and_settings_back():
     cubic=st.floats(-1.0e-5, 1.0e-4),
     warmer_k=st.floats(-20.0, 30.0),
     voltage_v=st.floats(0.0, 10.0),
+    zero_n=st.floats(-3.0, 3.0),
 )
 def test_the_cell_gives_back_the_force_that_it_bent_warmed_and_disturbed(
-    force_n, quadratic, cubic, warmer_k, voltage_v
+    force_n, quadratic, cubic, warmer_k, voltage_v, zero_n
 ):
     cell = CellMap(
         quadratic_per_n=quadratic,
@@ -73,6 +74,7 @@ def test_the_cell_gives_back_the_force_that_it_bent_warmed_and_disturbed(
         zero_n_per_k=-0.2,
         crosstalk_n_per_v=0.3,
         reference_c=21.0,
+        zero_n=zero_n,
     )
     reading_n = cell.reading_n(force_n, 21.0 + warmer_k, voltage_v)
     assert cell.force_n(reading_n, 21.0 + warmer_k, voltage_v) == pytest.approx(force_n, abs=1e-6)
@@ -81,7 +83,7 @@ def test_the_cell_gives_back_the_force_that_it_bent_warmed_and_disturbed(
 def test_the_constant_zero_is_left_to_the_tare():
     cell = CellMap(quadratic_per_n=0.002, zero_n=1.5)
     assert cell.force_n(1.5, nan, 0.0) == pytest.approx(1.5)
-    assert cell.force_n(cell.reading_n(30.0, nan, 0.0), nan, 0.0) == pytest.approx(31.5)
+    assert cell.force_n(30.0 + 0.002 * 30.0**2 + 1.5, nan, 0.0) == pytest.approx(31.5)
 
 
 def test_without_a_thermometer_a_warm_cell_is_taken_as_it_reads():

@@ -145,6 +145,7 @@ def test_a_fault_of_the_supervision_is_the_verdict_on_what_it_is_about() -> None
     assert rig.controller.state is State.FAULT and report.result is SelfTestResult.FAILED
     assert [found.item for found in report.findings if found.verdict is FAILED] == [Item.CELL_LINE]
     assert "A311" in next(found.text for found in report.findings if found.item is Item.CELL_LINE)
+    assert set(report.sentences) <= set(rig.events)
 
 
 def test_a_second_self_test_has_the_next_number() -> None:

@@ -1,12 +1,17 @@
 """The first rise of the force, as it is measured: from the force at rest, whenever the output was enabled."""
 
+from dataclasses import replace
+from math import exp, nan
+
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.control import LeadSettings, LineStatus
+from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.sample_conditioning import Reading
-from gateway.control.supervision.plausibility import RiseCheck
+from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
 from gateway.registers.words import State
-from tests.control.bench import Bench
+from tests.control.bench import Bench, bsfm, settings
 
 RESTING = Reading(cell_n=1.0, interval_s=0.01, is_new=True, is_fresh=True, is_usable=True)
 
@@ -33,3 +38,24 @@ def test_a_scale_that_was_right_is_looked_at_again_at_the_next_enable() -> None:
     bench.enable(12.0)
     bench.run(2.0)
     assert bench.last.fault is FaultCode.GAIN_WRONG
+
+
+def test_an_overload_leaves_what_was_smoothed_and_no_nan() -> None:
+    check = RiseCheck(0.5)
+    check.smooth(Reading(5.0, 5.0, 0.0, 0.01, is_new=True, is_fresh=True, is_usable=True))
+    check.smooth(Reading(nan, nan, 0.0, 0.01, is_new=True, is_fresh=True, overload=True))
+    assert check.smooth_n == 5.0
+
+
+def test_another_model_brings_its_own_force_at_rest() -> None:
+    expected = ExpectedForce(bsfm(), 0.1, rest_v=1.0)
+    expected.use(bsfm(1.5))
+    assert expected.rise_n(1.0) == 0.0 and expected.kept_n == bsfm(1.5).force_n(1.0, 1.0)
+
+
+def test_the_lags_are_driven_by_what_the_wire_has_taken() -> None:
+    loop = ForceLoop(replace(settings(), lead=LeadSettings(lag_s=0.1)), bsfm())
+    loop.elapse(0.1, LineStatus(sent_v=2.0))
+    assert loop._lead.first_v == pytest.approx(2.0 * (1.0 - exp(-1.0)))
+    loop.elapse(0.1, LineStatus())
+    assert loop._lead.first_v == pytest.approx(2.0 * (1.0 - exp(-1.0)) * exp(-1.0))

@@ -1,8 +1,10 @@
 """What the valve refuses: to move under a latched fault, and to have a run begin while it moves."""
 
 from gateway.codes.refusals import RefusalReason
+from gateway.control.inputs import ValveStatus
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.registers.words import ControlBit, State
+from gateway.registers.writes.proposed_write import ProposedWrite
 from tests.control.valve.valve_bench import BIT_4, PULL, ValveBench
 
 
@@ -28,3 +30,12 @@ def test_no_run_begins_before_the_valve_has_read_back() -> None:
     bench.obeys = True
     bench.run(1.0)
     assert bench.controller.refusal_of_run(bench.now_s, CalibrationPlan()) == ""
+
+
+def test_where_the_valves_port_is_lost_nothing_is_enabled_however_it_stood() -> None:
+    bench = ValveBench()
+    bench.run(1.0)
+    line = bench.line._replace(valve=ValveStatus(bench.stands, None, lost=True))
+    enable = bench.command._replace(control_word=ControlBit.ENABLE, number=bench.command.number + 1)
+    refused = bench.controller.refusal_of(bench.now_s, ProposedWrite(enable, lambda: ()), line)
+    assert refused and refused.reason is RefusalReason.VALVE_UNKNOWN

@@ -20,3 +20,12 @@ def test_only_what_the_relay_has_read_back_can_differ(stands: ValveDirection | N
         switch.step(0.01 * k, PUSH, ValveStatus(stands), is_vented=True)
     cause = switch.first_cause(1.0)
     assert (cause and cause.fault) == fault
+
+
+def test_a_readback_that_is_wrong_for_less_than_the_bound_is_none_of_its_faults_however_long_ago_it_was_told() -> None:
+    switch, faults = ValveSwitch(SETTINGS), []
+    for k in range(900):
+        differs = 300 <= k < 340 or k >= 600
+        switch.step(0.01 * k, PUSH, ValveStatus(PULL if differs else PUSH), is_vented=False)
+        faults.append(switch.first_cause(0.01 * k) is not None)
+    assert faults.index(True) == pytest.approx(650, abs=2) and all(faults[652:])

@@ -89,3 +89,24 @@ def test_what_would_be_a_near_thing_is_a_warning(
     faults, warnings = told(tmp_path, **changes)
     assert not faults
     assert warnings.get(path, f"nothing, but {warnings}").startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("changes", "path"),
+    [
+        ({"rig__load_cell__baud": 9600, "cell__serial__baud": 9600}, "supervision.sample_timeout_s"),
+        ({"cell__stream__rate_hz": 2, "rig__supervision__sample_timeout_s": 2.0}, "load_cell.baud"),
+    ],
+)
+def test_of_a_devices_rate_and_its_wires_the_slower_one_counts(
+    changes: dict[str, Any], path: str, tmp_path: Path
+) -> None:
+    faults, _ = told(tmp_path, **{"rig__supervision__sample_timeout_s": 0.03, **changes})
+    assert path in faults, faults
+
+
+def test_half_a_step_of_an_output_must_fit_into_the_band_and_no_whole_one(tmp_path: Path) -> None:
+    coarse = {"ask": "V{volts:d}", "answer": ">", "range": {"device": [0, 10], "voltage_v": [0, 10]}}
+    steps = {f"dac__set_voltage__{key}": value for key, value in coarse.items()}
+    faults, _ = told(tmp_path, **steps, rig__defaults__in_band_tolerance_n=5.0)
+    assert "output.device" not in faults

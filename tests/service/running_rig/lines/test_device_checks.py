@@ -63,3 +63,24 @@ def test_a_reset_gives_a_watchdog_that_has_tripped_all_its_tries() -> None:
     checks.clear()
     arm(checks, fails=MOST_TRIES - 1)
     assert checks.is_armed
+
+
+def test_a_clearing_that_is_refused_leaves_the_watchdog_tripped() -> None:
+    checks = checks_of("icpdas-702x")
+    arm(checks)
+    checks.trip()
+    checks.clear()
+    assert checks.next_step(0.0) is DeviceStep.CLEAR
+    checks.refuse(DeviceStep.CLEAR, "no")
+    assert (checks.fault, checks.is_tripped, checks.next_step(0.0)) == (
+        FaultCode.WATCHDOG_TRIPPED,
+        True,
+        DeviceStep.STATUS,
+    )
+
+
+def test_another_device_is_asked_nothing_more_until_somebody_resets() -> None:
+    checks = checks_of("icpdas-702x")
+    checks.take(DeviceAnswer(DeviceStep.IDENTITY, is_right=False, text="a lamp"))
+    assert checks.fault is FaultCode.WRONG_DEVICE
+    assert [checks.next_step(float(now_s)) for now_s in range(10)] == [None] * 10

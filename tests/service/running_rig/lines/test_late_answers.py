@@ -83,3 +83,30 @@ def test_a_device_whose_answers_are_cut_still_hears_the_safe_voltage(wire: Wire)
     wire.set_voltage(0)
     wire.tick(REPLY_TIMEOUT_S + 0.001)
     assert wire.last == "SET 0"
+
+
+def given_up(wire: Wire) -> Wire:
+    """A question was given up and the next one is out: the answer to the first may still come."""
+    wire.settle(200)
+    wire.set_voltage(210)
+    wire.set_voltage(220)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    assert wire.last == "SET 220"
+    return wire
+
+
+def test_a_fall_that_does_not_wait_believes_no_answer_but_its_own_echo(wire: Wire) -> None:
+    """It is out while a later answer may still be on its way, as any question behind a silence is."""
+    given_up(wire).answer("210")
+    wire.set_voltage(0)
+    wire.answer("220")
+    assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    wire.answer("0")
+    assert wire.exchange.standing_v == 0.0
+
+
+def test_garbage_before_a_late_answer_makes_it_none_of_the_next_question(wire: Wire) -> None:
+    given_up(wire).answer("#?#")
+    wire.answer("210", after_s=0.001)
+    assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)

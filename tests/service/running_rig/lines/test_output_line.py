@@ -226,3 +226,15 @@ def test_opened_again_nothing_said_before_counts(wire: Wire) -> None:
     assert len(wire.written) == before, "the old wish is not sent to a device behind a new opening"
     wire.answer("900")  # of a question asked before
     assert exchange.acknowledged_v is None
+
+
+def test_a_device_whose_watchdog_has_tripped_is_told_no_setting_and_asked_for_none(wire: Wire) -> None:
+    wire.settle(512)
+    wire.tick(0.1)
+    wire.answer("0")
+    wire.exchange.checks.trip()
+    before = len(wire.written)
+    for counts in range(500, 510):
+        wire.set_voltage(counts, after_s=0.1)
+        wire.tick(0.1)
+    assert wire.written[before:] == []

@@ -1,0 +1,68 @@
+"""What the reader of an audit calls tampering, and what it does not: pieces of lines, other names, another past, growth."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from gateway.audit import audit_reader
+from gateway.audit.audit_file import AuditFile
+from gateway.audit.audit_reader import verify_audit
+from gateway.audit.chain import open_line, seal_line
+from tests.audit.test_chain import FILE_BYTES, LINES, files_of, records
+
+
+def test_a_piece_of_a_line_is_a_note_at_the_end_of_the_last_file_only(state: Path) -> None:
+    """In the middle no kill leaves one, although the chain goes on around it."""
+    for path in files_of(state):
+        data = path.read_bytes()
+        path.write_bytes(data + b'{"n": 5, "prev"')
+        verdict = verify_audit(state)
+        assert (verdict.broken is None, len(verdict.notes)) == (
+            (True, 1) if path == files_of(state)[-1] else (False, 0)
+        )
+        path.write_bytes(data)
+
+
+def test_an_audit_that_grows_while_it_is_verified_holds(state: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A next file, whose lines the new head knows, begun between two looks."""
+    file = AuditFile(state, FILE_BYTES)
+    listing = audit_reader.audit_files
+
+    def list_late(folder: Path) -> list[Path]:
+        found = listing(folder)
+        for record in records(LINES, LINES + 1):
+            file.append([record])
+        return found
+
+    monkeypatch.setattr(audit_reader, "audit_files", list_late)
+    assert verify_audit(state).broken is None
+    file.close()
+
+
+def test_a_file_under_another_number_is_found(state: Path) -> None:
+    path = files_of(state)[1]
+    path.rename(path.with_name(f"{int(path.stem) + 1:012d}.jsonl"))
+    broken = verify_audit(state).broken
+    assert broken and "its file is named by" in broken.text
+
+
+def test_a_chain_that_is_written_anew_behind_what_was_dropped_is_found(tmp_path: Path) -> None:
+    """Its lines hold, and its head too: only the hash of what was dropped tells."""
+    file = AuditFile(tmp_path, FILE_BYTES, kept=3)
+    for record in records(40):
+        file.append([record])
+    file.close()
+    end = None
+    for path in files_of(tmp_path):
+        anew = b""
+        for line in path.read_bytes().splitlines():
+            fields, own = open_line(line)
+            end = end or own._replace(number=own.number - 1, sha256="f" * 64)
+            written, end = seal_line({name: fields[name] for name in fields if name not in ("n", "prev")}, end)
+            anew += written
+        path.write_bytes(anew)
+    assert end
+    (tmp_path / "audit" / "head").write_text(json.dumps({"n": end.number, "sha256": end.sha256}))
+    broken = verify_audit(tmp_path).broken
+    assert broken and "no line says that those before it were dropped" in broken.text

@@ -1,0 +1,217 @@
+"""Each check of a rig at its bound: what just fits has no word, what just does not is told at its own place."""
+
+from dataclasses import replace
+from ipaddress import ip_network
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gateway.control.settings import Defaults, Limits, SelfTestSettings, Supervision, Trim
+from gateway.devices import DeviceRole
+from gateway.devices.device_checks.watchdog import FEEDS_PER_TIME
+from gateway.profiles import load_rig
+from gateway.profiles.rigs import checks, face_checks, line_checks, network_checks, valve_checks
+from gateway.profiles.rigs.checks import Check, Parts
+from gateway.profiles.rigs.rig_file import CellFile, Network, ValveFile
+
+LIMITS = Limits(force_max_n=50.0, over_force_n=60.0, smallest_force_n=0.2, voltage_max_v=9.0)
+LOOP_HZ = 100.0
+
+
+def parts(**changes: Any) -> Parts:
+    whole: dict[str, Any] = {
+        "limits": LIMITS,
+        "defaults": Defaults(),
+        "supervision": Supervision(),
+        "load_cell": CellFile(device="stream-st-gs", range_n=98.0),
+    }
+    facts = {"name": "own", "simulated": False, "names_plant": True, "accept_no_device_watchdog": True}
+    return Parts(**facts, loop_hz=LOOP_HZ, **(whole | changes))
+
+
+def limits(**changes: float) -> Parts:
+    return parts(limits=replace(LIMITS, **changes))
+
+
+def defaults(least_n: float = 0.2, **changes: float) -> Parts:
+    return parts(defaults=replace(Defaults(), **changes), limits=replace(LIMITS, smallest_force_n=least_n))
+
+
+def supervision(**changes: float) -> Parts:
+    return parts(supervision=replace(Supervision(), **changes))
+
+
+def calibration(**changes: Any) -> Parts:
+    """Without limits where the handles are changed: these may be no model, and are not asked for one."""
+    others: dict[str, Any] = {"limits": None} if changes else {}
+    return parts(calibration=replace(load_rig("demo").calibration, **changes), **others)
+
+
+def output(**facts: Any) -> SimpleNamespace:
+    return SimpleNamespace(role=DeviceRole.OUTPUT, name="dac", **facts)
+
+
+def watched(time_s: float, feed: str) -> Parts:
+    return parts(output_device=output(own_watchdog=SimpleNamespace(ticks=10, tick_s=time_s / 10.0, feed=feed)))
+
+
+def network(**facts: Any) -> Parts:
+    return parts(network=Network(**facts), fieldbus=(SimpleNamespace(),))
+
+
+HANDLES = load_rig("demo").calibration.falling_handles_n
+TEN = (ip_network("10.0.0.0/8"),)
+BOUNDS: tuple[tuple[Check, str, Parts, Parts], ...] = (
+    (
+        checks.check_voltages,
+        "limits.safe_voltage_v",
+        limits(safe_voltage_v=1.0, voltage_min_v=1.0),
+        limits(voltage_min_v=1.0),
+    ),
+    (checks.check_voltages, "limits.safe_voltage_v", limits(safe_voltage_v=9.0), limits(safe_voltage_v=9.01)),
+    (
+        checks.check_voltages,
+        "limits.voltage_min_v",
+        limits(voltage_min_v=8.9, safe_voltage_v=9.0),
+        limits(voltage_min_v=9.0),
+    ),
+    (checks.check_forces, "limits.over_force_n", limits(over_force_n=50.1), limits(over_force_n=50.0)),
+    (checks.check_forces, "limits.over_force_n", limits(over_force_n=98.0), limits(over_force_n=98.1)),
+    (checks.check_forces, "limits.smallest_force_n", limits(smallest_force_n=49.9), limits(smallest_force_n=50.0)),
+    (
+        checks.check_saturation,
+        "supervision.saturation_n",
+        supervision(saturation_n=98.0),
+        supervision(saturation_n=98.1),
+    ),
+    (
+        checks.check_saturation,
+        "supervision.saturation_n",
+        supervision(saturation_n=50.1),
+        supervision(saturation_n=50.0),
+    ),
+    (
+        checks.check_defaults,
+        "defaults.precontact_force_n",
+        defaults(precontact_force_n=50.0),
+        defaults(precontact_force_n=50.1),
+    ),
+    (
+        checks.check_defaults,
+        "defaults.in_band_tolerance_n",
+        defaults(in_band_tolerance_n=50.0),
+        defaults(in_band_tolerance_n=51.0),
+    ),
+    (
+        checks.check_defaults,
+        "defaults.precontact_force_n",
+        defaults(3.0, precontact_force_n=3.0),
+        defaults(3.0, precontact_force_n=2.9),
+    ),
+    (
+        checks.check_defaults,
+        "defaults.precontact_force_n",
+        defaults(3.0, precontact_force_n=0.0),
+        defaults(3.0, precontact_force_n=0.1),
+    ),
+    (
+        checks.check_self_test,
+        "self_test.force_n",
+        parts(self_test=SelfTestSettings(force_n=50.0)),
+        parts(self_test=SelfTestSettings(force_n=50.1)),
+    ),
+    *(
+        (checks.check_times, f"supervision.{key}", supervision(**{key: 0.02}), supervision(**{key: 0.019}))
+        for key in ("lease_s", "stall_s", "sample_timeout_s", "output_timeout_s")
+    ),
+    (
+        checks.check_contact_threshold,
+        "defaults.precontact_force_n",
+        defaults(precontact_force_n=0.51),
+        defaults(precontact_force_n=0.5),
+    ),
+    (
+        checks.check_calibration_against_cell,
+        "calibration",
+        calibration(),
+        calibration(falling_handles_n=(*HANDLES[:-1], 98.1)),
+    ),
+    (
+        checks.check_calibration_against_cell,
+        "calibration",
+        calibration(),
+        calibration(rising_handles_n=(-98.1, *HANDLES[1:])),
+    ),
+    (
+        checks.check_calibration_against_cell,
+        "supervision.stuck_n",
+        calibration(),
+        replace(calibration(), limits=replace(LIMITS, safe_voltage_v=7.0)),
+    ),
+    (
+        checks.check_calibration_range,
+        "limits.force_max_n",
+        replace(calibration(), trim=Trim(gain_v_per_n_s=0.0, limit_v=3.0)),
+        replace(calibration(), trim=Trim(gain_v_per_n_s=0.1, limit_v=3.0)),
+    ),
+    (
+        line_checks.check_output_range,
+        "limits.safe_voltage_v",
+        parts(output_device=output(voltage_range_v=(0.0, 9.0))),
+        parts(output_device=output(voltage_range_v=(1.0, 9.0)), limits=replace(LIMITS, voltage_min_v=1.0)),
+    ),
+    (
+        line_checks.check_output_range,
+        "limits.voltage_max_v",
+        parts(output_device=output(voltage_range_v=(0.0, 9.0))),
+        parts(output_device=output(voltage_range_v=(0.0, 8.9))),
+    ),
+    (
+        line_checks.check_watchdog_time,
+        "output.watchdog_s",
+        watched(FEEDS_PER_TIME / LOOP_HZ, "~**"),
+        watched(0.9 * FEEDS_PER_TIME / LOOP_HZ, "~**"),
+    ),
+    (line_checks.check_watchdog_time, "output.watchdog_s", watched(0.31, ""), watched(0.29, "")),
+    (
+        network_checks.check_allow_list,
+        "network.owner",
+        network(owner="10.0.0.1", allow=TEN),
+        network(owner="192.168.0.1", allow=TEN),
+    ),
+    (
+        network_checks.check_allow_list,
+        "network.bind",
+        network(bind="10.0.0.2", allow=TEN, owner="certificate robot"),
+        network(bind="10.0.0.2"),
+    ),
+    (network_checks.check_unit_ids, "network.units.1", network(units=(1, 2)), network(units=(1, 1))),
+    (network_checks.check_network_exposure, "network.port", network(port=1024), network(port=1023)),
+    (network_checks.check_network_exposure, "network.port", network(port=0), network(port=1)),
+    (
+        face_checks.check_owner_can_come,
+        "network.owner",
+        network(owner="10.0.0.1"),
+        network(owner="10.0.0.1", plain=False),
+    ),
+    (face_checks.check_any_face, "network.plain", network(plain=False), parts(network=Network(plain=False))),
+    *(
+        (
+            valve_checks.check_valve_pressure,
+            f"limits.{key}",
+            parts(valve=ValveFile(device="relay", pull_area_share=0.8)),
+            parts(valve=ValveFile(device="relay", pull_area_share=0.8), limits=replace(LIMITS, **{key: 0.1})),
+        )
+        for key in ("safe_voltage_v", "voltage_min_v")
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("check", "path", "fits", "does_not"), BOUNDS, ids=lambda one: one if isinstance(one, str) else ""
+)
+def test_what_just_fits_has_no_word_and_what_just_does_not_is_told_in_its_place(
+    check: Check, path: str, fits: Parts, does_not: Parts
+) -> None:
+    assert (list(check(fits)), [place for place, _ in check(does_not)]) == ([], [path])
