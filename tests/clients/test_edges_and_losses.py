@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.clients.conftest import CONTROLLERS
-from tests.clients.controllers import UniversalRobot
+from tests.clients.controllers import S7, Codesys, Plc, TwinCat, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.scenes import MODEL, TEXTS, command, commands, cycles
 
@@ -147,3 +147,72 @@ def test_a_robot_s_program_waits_for_a_force_that_stands_and_for_no_other(gatewa
     robot.machine.library["sleep"] = lambda machine, arguments, frame: slept.append(0.0)
     robot.set(fg_ended=True, fg_enabled=False)
     assert wait() is False and not slept, "nobody waits for a gateway that has switched off"
+
+
+def control_word_of(request: bytes) -> int:
+    """Of a request that writes from address 0 on; else 0."""
+    at = {16: 6, 23: 10}.get(request[0], 0)
+    return int.from_bytes(request[at : at + 2], "big") if at and request[at - 5 : at - 3] == b"\0\0" else 0
+
+
+def test_a_tare_that_is_refused_is_asked_for_once(client: Any, gateway: GatewayAtHand) -> None:
+    answer, asked = gateway.answer, list[bytes]()
+
+    def refuse(request: bytes) -> bytes:
+        if not control_word_of(request) & TARE:
+            return answer(request)
+        asked.append(request)
+        return bytes((request[0] | 0x80, 3))
+
+    cycles(client)
+    gateway.answer = refuse  # type: ignore[method-assign]
+    client.tare()
+    cycles(client, 8)
+    assert len(asked) == 1
+
+
+def test_an_upload_that_is_refused_costs_no_force(client: Any, gateway: GatewayAtHand) -> None:
+    answer = gateway.answer
+    client.enable(12.0)
+    cycles(client)
+    gateway.answer = lambda request: b"\x90\x03" if request[:3] == b"\x10\x04\x2e" else answer(request)  # type: ignore[method-assign]
+    client.begin_upload(MODEL, 3)
+    cycles(client, 8)
+    assert client.enabled and not client.ended
+    assert commands(gateway) == [command(1, 1200)]
+
+
+def test_behind_a_refused_enable_nothing_is_written(client: Any, gateway: GatewayAtHand) -> None:
+    """Not even a heartbeat: this master commands nothing."""
+    client.enable(65.0)
+    cycles(client)
+    assert len(gateway.exceptions) == 1 and not client.enabled
+    count = len(gateway.requests)
+    cycles(client)
+    assert {request[0] for request in gateway.requests[count:]} == {3}
+
+
+@pytest.mark.parametrize("kind", [S7, TwinCat, Codesys])
+def test_a_block_shows_nothing_stale_behind_a_loss_and_tries_soon_each_time(
+    kind: type[Plc], gateway: GatewayAtHand
+) -> None:
+    client = kind(TEXTS["scl" if kind is S7 else "st"], gateway)
+    for _ in range(2):
+        client.enable(12.0)
+        cycles(client)
+        gateway.publish(12.0, on=True)
+        cycles(client)
+        shown = client.output("status")
+        flags = ("enabled", "ready", "in_band")
+        assert all(client.machine.member(shown, name) for name in flags)
+        gateway.is_cut = True
+        client.cycle(1.5)
+        assert not any(client.machine.member(client.output("status"), name) for name in flags)
+        gateway.is_cut = False
+        client.cycle(4.0)
+    gateway.is_cut = True
+    client.cycle(0.3)
+    gateway.is_cut = False
+    count = len(gateway.requests)
+    client.cycle(0.6)
+    assert len(gateway.requests) > count, "the pause begins anew with each loss"
