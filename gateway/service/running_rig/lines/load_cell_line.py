@@ -43,6 +43,7 @@ class CellExchange:
     def reset(self) -> None:
         """Forget all that was received before: the port has been opened (again)."""
         self._host.forget()
+        self.unread.forget()
         self.identity.begin()
         self._sent_s: float | None = None
         self._next_s = -inf

@@ -17,6 +17,10 @@ class UnreadLines:
 
     def __init__(self, profile: DeviceProfile) -> None:
         self._profile = profile
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew: another device may be behind the port."""
         self._count, self._last, self._last_s = 0, b"", -inf
 
     def hear(self, messages: Sequence[object], now_s: float) -> None:

@@ -53,7 +53,7 @@ def live(exchange: Any, profile: DeviceProfile, written: list[bytes], rng: Rando
 
 def state_of(part: Any) -> dict[str, Any]:
     own = {name: value for name, value in vars(part).items() if name not in KEPT}
-    return {name: vars(value) if "_lines" in name else repr(value) for name, value in own.items()}
+    return {name: vars(value) if name == "unread" or "_lines" in name else repr(value) for name, value in own.items()}
 
 
 @pytest.mark.parametrize("name", PROFILES)
