@@ -17,7 +17,7 @@ FAULT_BIT, ENABLED_BIT = 16, 1
 AGE_SLACK_S = 0.012
 """And two periods: a tick that finds a fresh sample decides nothing, and the age is that of the last decision."""
 SETTLED_S = 0.5
-"""A voltage that has not changed for so long is the one that was asked for, wherever the wire works."""
+"""A voltage that has not changed for so long is the one that has been asked for as long, wherever the wire works."""
 COUNT_V = 0.012
 LATE_LOOKS, WRITTEN_S = 3, 0.6
 """A written setpoint is looked for in this time before it is seen, and until so many looks later."""
@@ -29,6 +29,7 @@ class StatusWitness:
     def __init__(self, observer: Observer, heard_s: Callable[[], float]) -> None:
         self._observer, self._heard_s = observer, heard_s
         self._last_s, self._known = 0.0, 0
+        self._asked_mv, self._asked_s = 0, 0.0
         self._owner, self._commands = 0, list[tuple[float, str, int]]()
         self._requested: deque[tuple[float, int]] = deque()
         self._written: deque[tuple[float, float]] = deque()
@@ -94,7 +95,12 @@ class StatusWitness:
             self._observer.complain("I10", f"a sample of {age_ms} ms, after {silent_s:.3f} s of silence", at_s)
 
     def _judge_voltage(self, asked_mv: int, at_s: float) -> None:
+        """Another voltage than before waits where an answer is late; as the week's soak drew it."""
         observer = self._observer
+        if asked_mv != self._asked_mv:
+            self._asked_mv, self._asked_s = asked_mv, at_s
+        if at_s - self._asked_s < SETTLED_S:
+            return
         lost = (observer.output_lost_s, observer.answers_lost_s, observer.control_lost_s)
         if at_s - observer.setting_s < SETTLED_S or any(since_s is not None for since_s in lost):
             return

@@ -45,6 +45,14 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(13.6262, "output", "replaced", (12.0, 0.4523), b"OUT OF RANGE\r\n"),
         ],
     ),
+    (
+        15,
+        [
+            Event(11.9921, "worker", "drive", (7.04,)),
+            Event(15.4276, "output", "late", (1.0, 0.3342), b"\r\n"),
+            Event(15.4978, "worker", "take", (45.54,)),
+        ],
+    ),
     (20044, [Event(22.6287, "output", "power", (1.5, 1.5))]),
     (
         419,

@@ -45,8 +45,8 @@ def look(witness: StatusWitness, at_s: float, **registers: int) -> None:
 )
 def test_a_register_that_does_not_say_what_is_is_seen(observer: Observer, law: str, registers: dict[str, int]) -> None:
     witness = StatusWitness(observer, lambda: 1.0)
-    for at_s in (1.9, 2.0):
-        look(witness, at_s, **registers)
+    for tenths in range(13, 21):
+        look(witness, 0.1 * tenths, **registers)
     assert observer.broken and all(line.startswith(law) for line in observer.broken)
 
 
@@ -55,6 +55,13 @@ def test_true_registers_are_left_alone(observer: Observer) -> None:
     witness.note_write(OWNER, write_pdu(0, 1, 1200), 1.85)
     for number in range(20):
         look(witness, 1.9 + 0.1 * number, state=3, status_word=1, age=900 + 100 * number, requested=1200, owner=1)
+    assert observer.broken == []
+
+
+def test_a_voltage_that_is_asked_for_now_may_wait_for_a_late_answer(observer: Observer) -> None:
+    witness = StatusWitness(observer, lambda: inf)
+    for tenths in range(10, 30):
+        look(witness, 0.1 * tenths, voltage=300 if tenths in (20, 21) else 0)
     assert observer.broken == []
 
 
