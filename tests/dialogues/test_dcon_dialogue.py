@@ -132,6 +132,13 @@ def test_a_tripped_module_answers_a_setting_with_a_bang() -> None:
     assert host.receive(b"!\r", 0.0) == [WatchdogTripped()]
 
 
+def test_half_an_answer_to_a_reading_is_no_trip() -> None:
+    """`!01+06.708` that is cut behind its first sign, as seed 30130 drew it."""
+    host = output_host(I7021)
+    host.request(ReadVoltage())
+    assert host.receive(b"!\r", 0.0) == [Garbage(b"!\r")]
+
+
 def test_a_number_out_of_range_is_refused_with_the_address() -> None:
     host, device = output_host(I7021), output_device(I7021)
     host.request(SetVoltage(5.0))

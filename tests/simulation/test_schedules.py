@@ -55,6 +55,10 @@ KEPT: list[tuple[int, list[Event]]] = [
     ),
     (20044, [Event(22.6287, "output", "power", (1.5, 1.5))]),
     (
+        30130,
+        [Event(1.1277, "worker", "hold", (54.71,)), Event(5.3508, "output", "cut_end", (1.0, 0.135))],
+    ),
+    (
         419,
         [Event(11.3621, "worker", "hold", (19.73,), way="mask"), Event(11.9957, "output", "pull")],
     ),

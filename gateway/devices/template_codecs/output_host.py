@@ -140,7 +140,7 @@ class TemplateOutputHost:
         if isinstance(request, AskDevice):
             answer = self._checks.answer(request.step, body)
             return answer if answer or body is None else self._refusal(body)
-        if body is not None and body == self._tripped:
+        if body is not None and body == self._tripped and isinstance(request, SetVoltage):
             return WatchdogTripped()
         if body is not None and (refused := self._refusal(body)):
             return refused

@@ -68,6 +68,19 @@ def test_a_trip_is_a_fault_of_its_own_that_only_a_reset_clears() -> None:
     wired.pressing(8.0)
 
 
+def test_a_device_that_only_seems_to_have_tripped_hears_the_safe_voltage() -> None:
+    """A spoiled answer says so of one that still stands where it was."""
+    wired = Wired(rig_with(device())).pressing(12.0)
+    wired.exchange.checks.trip()
+    wired.run(0.5)
+    assert wired.state is State.FAULT
+    assert heard_by(wired)[-1] in (b"#0100.000", b"~**", b"~010")
+    assert wired.twin.pressure_pa < 1e5, "the device still obeys"
+    wired.write(0, RESET)
+    wired.until(lambda: wired.exchange.checks.is_armed, 1.0)
+    wired.pressing(8.0)
+
+
 def test_a_latched_trip_at_the_start_refuses_an_enable_until_the_reset() -> None:
     wired = Wired(rig_with(device()))
     simulated = wired.world._output.watchdog  # type: ignore[attr-defined]

@@ -45,7 +45,7 @@ class DeviceChecks:
         self._next_status_s = 0.0
         self.fault = FaultCode.NONE
         self.said = ""
-        self.is_armed = self.is_tripped = False
+        self.is_armed = self.is_tripped = self._is_said = False
         self._settle()
 
     def _settle(self) -> None:
@@ -69,7 +69,10 @@ class DeviceChecks:
         return None
 
     def trip(self) -> None:
-        """Note that the device's watchdog has tripped: it said so in place of an answer."""
+        """Note that the device's watchdog has tripped: it said so in place of an answer. Where its clearing waits already, that
+        was a setting of before the reset."""
+        if DeviceStep.CLEAR in self._waiting:
+            return
         self.is_armed, self.is_tripped = False, True
         self.fault, self.said = FaultCode.WATCHDOG_TRIPPED, ""
         self._waiting.clear()
@@ -77,8 +80,11 @@ class DeviceChecks:
 
     def clear(self) -> None:
         """Clear a tripped watchdog and arm it again: somebody has asked for it, by a reset."""
-        if self.fault is FaultCode.WATCHDOG_TRIPPED and DeviceStep.CLEAR in self._known:
-            self.fault = FaultCode.NONE  # is_tripped lasts until the device has answered: before, it obeys nothing
+        if self.fault is FaultCode.WATCHDOG_TRIPPED:
+            self.fault = FaultCode.NONE
+            self.is_tripped = (
+                DeviceStep.CLEAR in self._known
+            )  # lasts until that is answered; without it any setting ends it
             self._tries = 0
             self._waiting = self._known_of(DeviceStep.CLEAR, DeviceStep.STATUS, *self._arming)
         elif self.fault in _ASKED_AGAIN:
@@ -87,7 +93,8 @@ class DeviceChecks:
 
     def take(self, answer: DeviceAnswer) -> None:
         """Follow an answer."""
-        if self._waiting and self._waiting[0] is answer.step:
+        is_due = bool(self._waiting) and self._waiting[0] is answer.step
+        if is_due:
             self._waiting.popleft()
         if answer.step is DeviceStep.IDENTITY and not answer.is_right:
             self.fault, self.said = FaultCode.WRONG_DEVICE, answer.text
@@ -96,7 +103,7 @@ class DeviceChecks:
             self.is_tripped = False
         elif answer.step is DeviceStep.STATUS:
             if DeviceStep.CLEAR not in self._waiting:  # else it was asked before the reset
-                self._take_state(WatchdogState(answer.text))
+                self._take_state(WatchdogState(answer.text), is_due=is_due)
         elif answer.step is DeviceStep.VERIFY:
             self._take_proof(is_armed=answer.is_right)
         self._settle()
@@ -114,9 +121,14 @@ class DeviceChecks:
             self._take_proof(is_armed=False, words=words)
         self._settle()
 
-    def _take_state(self, state: WatchdogState) -> None:
-        if state is WatchdogState.TRIPPED:
+    def _take_state(self, state: WatchdogState, *, is_due: bool) -> None:
+        """One spoiled digit makes a trip of an armed one: it is believed when it is said twice."""
+        was_said, self._is_said = self._is_said, state is WatchdogState.TRIPPED
+        if self._is_said and was_said:
             self.trip()
+        elif self._is_said:
+            self._waiting.extendleft([DeviceStep.STATUS] if is_due else [])
+            self._next_status_s = 0.0
         elif not self._waiting and not self.is_tripped and DeviceStep.VERIFY not in self._known:
             self._take_proof(is_armed=state is WatchdogState.ARMED)  # after arming, and whenever it is looked at
 

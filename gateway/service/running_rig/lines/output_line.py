@@ -12,7 +12,8 @@ asked last is believed by nobody: the line is left alone for one reply time, the
 After any of them the setting is read or sent anew: the device may have lost its power, and stand where it then begins.
 
 Between the first setting, which is the safe one, and any other stand the questions of device_checks. A watchdog is fed by a
-sentence that nobody answers; a device whose watchdog has tripped obeys no setting, so none is sent until it is cleared.
+sentence that nobody answers. A device whose watchdog has tripped obeys no setting until it is cleared; it is told the safe
+voltage all the same, for one that only seems to have tripped, by a spoiled answer, still stands where it was.
 """
 
 from collections.abc import Callable, Sequence
@@ -158,10 +159,10 @@ class OutputExchange:
         if self._host.sign_of_life and now_s >= self._next_feed_s:
             self._next_feed_s, self._free_s = now_s + self._host.feed_period_s, now_s + _AFTER_SIGN_OF_LIFE_S
             self._write(self._host.sign_of_life)
-        elif not self._is_confirmed(wanted_v) and not self.checks.is_tripped:
+        elif not self._is_confirmed(wanted_v) and self._may_obey(wanted_v, now_s):
             self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
             self._asked_v, self.standing_v = wanted_v, None
-            if self._host.idle_question is None:  # this is what a poll would say
+            if self._host.idle_question is None or self.checks.is_tripped:  # this is what a poll would say
                 self._next_poll_s = now_s + _POLL_PERIOD_S
             self._sent_v, self._setting_s = wanted_v, now_s
             self._send(SetVoltage(wanted_v), now_s)
@@ -176,6 +177,10 @@ class OutputExchange:
         surely stands: a device whose answer was lost may have obeyed, and must hear the safe voltage."""
         standing_v = self.standing_v
         return standing_v is not None and abs(voltage_v - standing_v) <= 0.5 * self._host.resolution_v
+
+    def _may_obey(self, voltage_v: float, now_s: float) -> bool:
+        """Where the watchdog is said to have tripped, the same setting is tried no more often than a poll would be."""
+        return not self.checks.is_tripped or voltage_v != self._asked_v or now_s >= self._next_poll_s
 
     def _send(self, request: OutputRequest, now_s: float) -> None:
         self._in_flight, self._sent_s = request, now_s

@@ -79,6 +79,54 @@ def test_a_clearing_that_is_refused_leaves_the_watchdog_tripped() -> None:
     )
 
 
+def state(checks: DeviceChecks, text: str, now_s: float) -> FaultCode:
+    assert checks.next_step(now_s) is DeviceStep.STATUS
+    checks.take(DeviceAnswer(DeviceStep.STATUS, is_right=text == "armed", text=text))
+    return checks.fault
+
+
+def test_a_trip_is_believed_when_it_is_said_twice_and_asked_again_at_once() -> None:
+    """`!0184` is a spoiled digit away from `!0180`: an armed one."""
+    checks = checks_of("icpdas-7024")
+    arm(checks)
+    assert [state(checks, text, 10.0) for text in ("tripped", "armed")] == 2 * [FaultCode.NONE]
+    assert checks.is_done and checks.next_step(10.5) is None
+    assert state(checks, "tripped", 12.0) is FaultCode.NONE
+    assert state(checks, "tripped", 12.0) is FaultCode.WATCHDOG_TRIPPED
+
+
+def test_before_it_is_armed_a_trip_is_asked_for_twice_too() -> None:
+    checks = checks_of("icpdas-7024")
+    checks.take(DeviceAnswer(DeviceStep.IDENTITY, is_right=True))
+    assert state(checks, "tripped", 0.0) is FaultCode.NONE
+    assert not checks.is_done
+    assert state(checks, "tripped", 0.0) is FaultCode.WATCHDOG_TRIPPED
+
+
+def test_a_trip_that_no_word_clears_ends_with_the_reset() -> None:
+    """Such a device obeys the next setting."""
+    profile = load_device("icpdas-702x")
+    watchdog = profile.own_watchdog
+    assert watchdog
+    checks = DeviceChecks(output_host(replace(profile, watchdog=replace(watchdog, clear=None))), is_waived=False)
+    arm(checks)
+    checks.trip()
+    checks.clear()
+    assert (checks.is_tripped, checks.fault, checks.is_done) == (False, FaultCode.NONE, False)
+    arm(checks)
+    assert checks.is_armed and checks.is_done
+
+
+def test_a_setting_of_before_the_reset_does_not_undo_it() -> None:
+    """Its answer says `tripped` when the clearing waits for the wire."""
+    checks = checks_of("icpdas-702x")
+    arm(checks)
+    checks.trip()
+    checks.clear()
+    checks.trip()
+    assert (checks.fault, checks.next_step(0.0)) == (FaultCode.NONE, DeviceStep.CLEAR)
+
+
 def test_another_device_is_asked_nothing_more_until_somebody_resets() -> None:
     checks = checks_of("icpdas-702x")
     checks.take(DeviceAnswer(DeviceStep.IDENTITY, is_right=False, text="a lamp"))

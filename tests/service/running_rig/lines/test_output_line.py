@@ -228,13 +228,28 @@ def test_opened_again_nothing_said_before_counts(wire: Wire) -> None:
     assert exchange.acknowledged_v is None
 
 
-def test_a_device_whose_watchdog_has_tripped_is_told_no_setting_and_asked_for_none(wire: Wire) -> None:
+def test_a_device_that_seems_to_have_tripped_is_told_the_safe_voltage_and_asked_for_no_reading(wire: Wire) -> None:
     wire.settle(512)
     wire.tick(0.1)
     wire.answer("0")
     wire.exchange.checks.trip()
     before = len(wire.written)
-    for counts in range(500, 510):
-        wire.set_voltage(counts, after_s=0.1)
-        wire.tick(0.1)
-    assert wire.written[before:] == []
+    wire.set_voltage(0)
+    assert wire.written[before:] == [b"SET 0\r\n"]
+    wire.answer("0")
+    for _ in range(20):
+        wire.set_voltage(0, after_s=0.05)
+        wire.tick(0.05)
+    assert wire.written[before:] == [b"SET 0\r\n"]
+
+
+def test_a_tripped_device_hears_the_same_setting_no_more_often_than_a_poll(wire: Wire) -> None:
+    wire.settle(512)
+    wire.exchange.checks.trip()
+    before, began_s = len(wire.written), wire.now_s
+    while wire.now_s < began_s + 1.0:
+        wire.set_voltage(0)
+        wire.answer("UNKNOWN COMMAND", after_s=0.005)
+        wire.tick(0.005)
+    assert set(wire.written[before:]) == {b"SET 0\r\n"}
+    assert 8 <= len(wire.written) - before <= 12
