@@ -177,6 +177,8 @@ class Simulation:
             control = BITS if self.observer.is_run else RESET
         if control is not None and control & (ENABLE | RUN_BIT | SELF_TEST) and control > 0 and is_answered:
             self.person.lose()  # a run that was asked for at the machine excludes that
+            self._was_watched = False
+        self._has_set_bits |= control == BITS and is_answered
         note = self.observer.note_accepted if is_answered else self.observer.note_unanswered
         note(control, self.clock.now_s)
 
@@ -194,14 +196,17 @@ class Simulation:
         if self.observer.control_lost_s is None:
             self.observer.control_lost_s = self.clock.now_s
 
-    _was_watched = False
+    _was_watched = _has_set_bits = False
 
     def _follow_person(self, is_watched: bool) -> None:
         """A run that somebody has started at the machine presses without a master, as long as that person looks at it."""
+        self._has_set_bits &= self._was_watched
         if is_watched:
             self.observer.note_accepted(RUN_BIT, self.clock.now_s)
         elif self._was_watched and self.observer.is_run:
             self.observer.note_accepted(0, self.clock.now_s)
+            if self._has_set_bits:  # by a master that perhaps enables, since the run is over: that person sees it later
+                self.observer.note_accepted(BITS, self.clock.now_s)
         self._was_watched = is_watched
 
     def _look(self) -> None:

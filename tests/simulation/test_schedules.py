@@ -62,8 +62,26 @@ KEPT: list[tuple[int, list[Event]]] = [
         419,
         [Event(11.3621, "worker", "hold", (19.73,), way="mask"), Event(11.9957, "output", "pull")],
     ),
+    (
+        15,
+        [
+            Event(
+                2.0, "person", "say", data=b'{"do": "calibrate", "name": "0", "plan": {"groups": 1, "step_v": 0.25}}'
+            ),
+            Event(4.9, "person", "say", data=b'{"do": "calibrate"}'),
+            Event(7.8, "person", "say", data=b'{"do": "calibrate"}'),
+        ],
+    ),
+    (
+        15,
+        [
+            Event(2.0, "person", "say", data=b'{"do": "calibrate", "name": "20", "plan": {"groups": 1}}'),
+            Event(2.06, "person", "say", data=b'{"do": "calibrate", "stop": true}'),
+            Event(2.1, "rival", "hold", (20.0,), way="coil"),
+        ],
+    ),
 ]
-"""Schedules that once broke a law: the seed of the machine, and what happened to it."""
+"""Schedules that once broke a law, or were said to: the seed of the machine, and what happened to it."""
 
 
 def laws(outcome: Outcome) -> set[str]:

@@ -72,6 +72,8 @@ class SocketUser:
             case "calibrate" if request.get("plan") is not None and not request.get("dry_run"):
                 self._patience = int(request.get("name", "0") or 0)
                 self._watch(inside)
+            case "calibrate" if answer.get("running") and self.watched_s is not None:
+                self.watched_s = inside.time()  # a question is a look, too
             case "modbus" if int(answer["pdu"][:2], 16) < 0x80:
                 self.on_pdu(bytes.fromhex(request["pdu"]), True)
                 self.on_write(control_of(bytes.fromhex(request["pdu"])))
