@@ -10,6 +10,7 @@ it answers. Taken for the next question's, each following answer would be one be
 an honest device would look like one that alters its settings. So after a time-out an answer that is no echo of what was
 asked last is believed by nobody: the line is left alone for one reply time, then asked anew. A falling voltage never waits.
 After any of them the setting is read or sent anew: the device may have lost its power, and stand where it then begins.
+An answer that comes twice has the same effect: where an echo repeats the setting before, the line is left alone as well.
 
 Between the first setting, which is the safe one, and any other stand the questions of device_checks. A watchdog is fed by a
 sentence that nobody answers. A device whose watchdog has tripped obeys no setting until it is cleared; it is told the safe
@@ -86,7 +87,7 @@ class OutputExchange:
         self._free_s = self._next_feed_s = 0.0
         self._wanted_v: float | None = None
         self._in_flight: OutputRequest | None = None
-        self._asked_v = inf
+        self._asked_v = self._before_v = inf
         self.standing_v: float | None = None
         self._is_overdue = False  # a question was given up, its answer may still come
         self._quiet_until_s = 0.0
@@ -161,6 +162,8 @@ class OutputExchange:
             self._write(self._host.sign_of_life)
         elif not self._is_confirmed(wanted_v) and self._may_obey(wanted_v, now_s):
             self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
+            if wanted_v != self._asked_v:
+                self._before_v = self._asked_v
             self._asked_v, self.standing_v = wanted_v, None
             if self._host.idle_question is None or self.checks.is_tripped:  # this is what a poll would say
                 self._next_poll_s = now_s + _POLL_PERIOD_S
@@ -213,7 +216,7 @@ class OutputExchange:
         elif isinstance(reply, Refused):
             self._count_failure(type(request), FaultCode.OUTPUT_REFUSED)
         elif request is not None and isinstance(reply, Accepted):
-            self._check_setting(request, reply)
+            self._check_setting(request, reply, now_s)
 
     def _take_check(self, request: AskDevice, reply: OutputReply) -> None:
         if isinstance(reply, DeviceAnswer):
@@ -228,12 +231,14 @@ class OutputExchange:
             and self._host.confirms(request.voltage_v, reply, request)
         )
 
-    def _check_setting(self, request: OutputRequest, reply: Accepted) -> None:
+    def _check_setting(self, request: OutputRequest, reply: Accepted, now_s: float) -> None:
         """The echo of a setting, or the setting as it was read: another one than was sent is set anew, and counted. What then
         stands is not known: an echo that lost its first digits says 0, and the safe voltage must go out all the same."""
         self.acknowledged_v, self.standing_v = reply.voltage_v, None
         if not self._host.confirms(self._asked_v, reply, request):
             self._count_failure(type(request), FaultCode.OUTPUT_ALTERED)
+            if self._host.confirms(self._before_v, reply, request):  # perhaps it came twice, and all behind it are late
+                self._quiet_until_s = now_s + self._reply_timeout_s
             return
         self.standing_v = reply.voltage_v
         if abs(reply.voltage_v - self._asked_v) > self._host.resolution_v:

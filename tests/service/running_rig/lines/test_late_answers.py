@@ -52,6 +52,23 @@ def test_a_late_answer_is_not_taken_for_the_next_one(wire: Wire, every: int, slo
     assert wire.exchange.pressure_pa == pytest.approx(7 * 0.9e6 / 1023)
 
 
+@pytest.mark.parametrize("rounds", [20, 21, 22, 23])
+def test_an_answer_that_comes_twice_makes_no_honest_device_one_that_alters(wire: Wire, rounds: int) -> None:
+    """While the setpoint moves each answer behind it would be taken for the next question's, for as long as it moves."""
+    wire.settle(200)
+    device = SlowDevice(wire, every=1_000_000, slow_s=0.0)
+    device.seen = len(wire.written)
+    for index in range(120):
+        wire.set_voltage(200 + 3 * index)
+        device.advance(wire.now_s + 0.004)
+        if index == rounds:
+            answered_s, word = device.answers[0]
+            device.answers.insert(1, (answered_s + 0.005, word))
+        assert wire.exchange.fault is FaultCode.NONE
+    device.advance(wire.now_s + 0.2)
+    assert wire.exchange.standing_v == pytest.approx((200 + 3 * 119) * 10 / 1023)
+
+
 def test_a_late_answer_costs_one_reply_time_and_no_fall_waits_for_it(wire: Wire) -> None:
     wire.settle(200)
     wire.set_voltage(210)
