@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from tests.simulation.event import Event
+from tests.simulation.draws.event import Event
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import SimulatedDisk
 from tests.simulation.kernel.spoiled import Spoil
@@ -19,11 +19,13 @@ DISKS = {
     "disk_read_only": "read-only",
     "disk_stumbles": "once",
 }
-COMMANDS = {"hold": ENABLE, "take": ENABLE | TAKE, "pull": ENABLE | PULL}
+COMMANDS = {"hold": ENABLE, "hold_on": ENABLE, "take": ENABLE | TAKE, "pull": ENABLE | PULL}
 
 
 def happen(simulation: "Simulation", event: Event) -> None:
     if event.whom in simulation.masters:
+        if event.what == "hold_on":
+            simulation.held_force.expect(event.numbers[0], simulation.clock.now_s)
         _command(simulation.masters[event.whom], event)
     elif event.whom in simulation.integrators:
         simulation.integrators[event.whom].upload(*event.numbers)

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from tests.simulation.events import FAULTS, VALVE_FAULTS
+from tests.simulation.draws.events import FAULTS, VALVE_FAULTS
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import SimulatedDisk
 from tests.simulation.masters.spelling import write_one_pdu

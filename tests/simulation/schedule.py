@@ -1,4 +1,4 @@
-"""One schedule: what masters, people and fate do to a gateway (events.py), run in virtual time and judged."""
+"""One schedule: what masters, people and fate do to a gateway (draws/events.py), run in virtual time and judged."""
 
 import struct
 import tempfile
@@ -12,9 +12,13 @@ from typing import Any
 
 from gateway.control import LeaseAction
 from gateway.profiles import Rig
-from tests.simulation.event import Event
+from tests.simulation.draws.event import Event
+from tests.simulation.draws.rigs import LEASE_S, draw_badges, draw_rig, store_plants
 from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, heal
+from tests.simulation.judges.held_force import HeldForce
+from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
+from tests.simulation.judges.status_witness import StatusWitness
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_edges
 from tests.simulation.kernel.fits import SimulatedFit
@@ -26,9 +30,6 @@ from tests.simulation.masters.integrator import Integrator, Sets
 from tests.simulation.masters.socket_user import SocketUser
 from tests.simulation.masters.spelling import BITS, DISABLED_BY_BIT, ENABLE, read_pdu
 from tests.simulation.masters.tcp_master import BEATS_S, RESET, RUNS, Master
-from tests.simulation.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
-from tests.simulation.rigs import LEASE_S, draw_badges, draw_rig, store_plants
-from tests.simulation.status_witness import StatusWitness
 from tests.simulation.surroundings import Surroundings
 
 RUN_BIT, SELF_TEST = RUNS.values()
@@ -79,6 +80,7 @@ class Simulation:
         )
         SimulatedFit.on_stored, SimulatedFit.ended = staticmethod(lambda mark: self.sets.expect_mark(mark)), []
         self.status = StatusWitness(self.observer, lambda: CABLES["load_cell"].heard_s)
+        self.held_force = HeldForce(self.observer, BEGIN_S + 2.0)
         self.service = SimulatedService(rig, folder, self.outside, self.log, self.clock)
         self.service.on_death = self._on_death
         self.masters = {
@@ -131,6 +133,7 @@ class Simulation:
         self.rest_n = self._read_force_n()
         self._happen_next(iter(events))
         self._run_for(duration_s)
+        self.held_force.end(self.clock.now_s)
         self._heal()
         for client in (*self.clients, self.person):
             self.observer.broken += client.complaints
@@ -224,6 +227,7 @@ class Simulation:
             if pdu[0] == 3 and len(pdu) == 2 + 2 * STATUS_WORDS:
                 self.observer.note_status(pdu, at_s)
                 self.status.note(pdu[2:], at_s - DELAY_S)
+                self.held_force.note(pdu[2:], at_s - DELAY_S)
         self.reader.heard.clear()
         self.reader.ask(read_pdu(STATUS_FIRST, STATUS_WORDS))
         self.outside.call_later(READ_S, self._read_status)

@@ -8,9 +8,9 @@ from typing import Any
 from gateway.devices import output_device
 from gateway.profiles import Rig
 from gateway.service.simulation.world import SimulatedRig
+from tests.simulation.judges.observer import Observer
 from tests.simulation.kernel.cables import CABLES, lay_cables
 from tests.simulation.kernel.virtual_time import VirtualLoop
-from tests.simulation.observer import Observer
 
 FIRST_SETTING_S = 0.3
 """On a line that is back: a watchdog is fed before the safe voltage goes out."""

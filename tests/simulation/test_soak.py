@@ -16,8 +16,8 @@ import pytest
 
 from gateway.profiles.strict_yaml.text import parse
 from tests.conftest import READERS
-from tests.simulation.event import Event
-from tests.simulation.events import draw_events
+from tests.simulation.draws.event import Event
+from tests.simulation.draws.events import draw_events
 from tests.simulation.kernel.edges import simulated_edges
 from tests.simulation.kernel.fits import SimulatedFit
 from tests.simulation.schedule import Simulation

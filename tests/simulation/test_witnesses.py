@@ -6,15 +6,16 @@ from math import inf
 
 import pytest
 
-from tests.simulation.event import Event
+from tests.simulation.draws.event import Event
+from tests.simulation.draws.rare_events import draw_rare_events
+from tests.simulation.judges.held_force import HeldForce
+from tests.simulation.judges.observer import STATUS_WORDS, Bounds, Observer
+from tests.simulation.judges.status_witness import StatusWitness
 from tests.simulation.kernel.edges import Log
 from tests.simulation.kernel.virtual_time import VirtualClock
 from tests.simulation.masters.integrator import Sets
 from tests.simulation.masters.spelling import floats_pdu, mask_pdu, setpoints_of, write_one_pdu, write_pdu
 from tests.simulation.masters.tcp_master import Master
-from tests.simulation.observer import STATUS_WORDS, Bounds, Observer
-from tests.simulation.rare_events import draw_rare_events
-from tests.simulation.status_witness import StatusWitness
 
 BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05, output_timeout_s=0.2)
 OWNER, OTHER = "10.0.0.1", "10.0.0.2"
@@ -48,6 +49,41 @@ def test_a_register_that_does_not_say_what_is_is_seen(observer: Observer, law: s
     for tenths in range(13, 21):
         look(witness, 0.1 * tenths, **registers)
     assert observer.broken and all(line.startswith(law) for line in observer.broken)
+
+
+HELD_N = 20.0
+
+
+def look_at_held(observer: Observer, begun_s: float, *looks: tuple[int, float]) -> None:
+    """A force is held from 1 s on; looks: state and force, every second from 3 s on; the end."""
+    held = HeldForce(observer, begun_s)
+    held.expect(HELD_N, 1.0)
+    for number, (state, force_n) in enumerate(looks):
+        words = [0, state, round(100 * force_n)] + [0] * (STATUS_WORDS - 3)
+        held.note(struct.pack(f">{STATUS_WORDS}h", *words), 3.0 + number)
+    held.end(10.0)
+
+
+@pytest.mark.parametrize(
+    "looks",
+    [
+        ((3, HELD_N), (4, HELD_N), (3, HELD_N)),
+        ((3, HELD_N), (0, HELD_N), (3, HELD_N)),
+        ((3, HELD_N), (3, 9.9), (3, HELD_N)),
+        ((3, HELD_N), (3, HELD_N), (3, HELD_N - 1.1)),
+    ],
+)
+def test_a_force_that_is_dropped_without_a_cause_is_seen(
+    observer: Observer, looks: tuple[tuple[int, float], ...]
+) -> None:
+    look_at_held(observer, 2.0, *looks)
+    assert [line.partition(" at ")[0] for line in observer.broken] == ["held force"]
+
+
+def test_a_held_force_in_its_band_is_left_alone_and_so_is_one_that_has_begun_late(observer: Observer) -> None:
+    look_at_held(observer, 2.0, (2, 1.0), (2, 15.0), (3, -HELD_N + 0.9))
+    look_at_held(observer, 0.5, (4, 0.0), (0, 0.0))
+    assert observer.broken == []
 
 
 def test_true_registers_are_left_alone(observer: Observer) -> None:

@@ -1,6 +1,6 @@
 """What becomes of an answer on its way from a device to its host: cut, altered, doubled, late, lost, or something else instead.
 
-Pure: what is spoiled, and how, is drawn with the events (events.py); a `Cable` asks here what then arrives, and when.
+Pure: what is spoiled, and how, is drawn with the events (draws/events.py); a `Cable` asks here what then arrives, and when.
 """
 
 from dataclasses import dataclass

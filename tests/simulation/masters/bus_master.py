@@ -8,7 +8,7 @@ been done all the same.
 from collections.abc import Callable
 from typing import Any
 
-from tests.simulation.heard import crc16
+from tests.simulation.judges.heard import crc16
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.masters.spelling import WRITES, control_of
 from tests.simulation.masters.tcp_master import Asked, Master

@@ -8,7 +8,8 @@ from heapq import merge
 from operator import attrgetter
 from random import Random
 
-from tests.simulation.event import Event
+from tests.simulation.draws.event import Event
+from tests.simulation.draws.rare_events import LADDER_S, draw_ladder, draw_rare_events
 from tests.simulation.kernel.spoiled import KINDS
 from tests.simulation.masters.socket_lines import draw_line
 from tests.simulation.masters.spelling import (
@@ -20,7 +21,6 @@ from tests.simulation.masters.spelling import (
     write_one_pdu,
     write_pdu,
 )
-from tests.simulation.rare_events import LADDER_S, draw_ladder, draw_rare_events
 
 FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "cell-frozen", "output-cut")
 VALVE_FAULTS = ("valve-cut", "valve-stuck")
@@ -53,14 +53,15 @@ SAID = {
 
 def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
     """What happens, in its order: a little more than two events a second, and what is rare (rare_events.py)."""
-    usual = merge(_draw_usual(seed, duration_s), draw_rare_events(seed, duration_s), key=attrgetter("at_s"))
+    usual = merge(draw_usual(Random(seed), duration_s), draw_rare_events(seed, duration_s), key=attrgetter("at_s"))
     ladder = tuple(draw_ladder(seed))
     quiet_s = LADDER_S if ladder else 0.0  # nearly everything else would end it
     return merge(ladder, (event for event in usual if event.at_s >= quiet_s), key=attrgetter("at_s"))
 
 
-def _draw_usual(seed: int, duration_s: float) -> Iterator[Event]:
-    chance, at_s = Random(seed), 0.0
+def draw_usual(chance: Random, duration_s: float) -> Iterator[Event]:
+    """A little more than two events a second, in their order."""
+    at_s = 0.0
     while (at_s := at_s + chance.expovariate(2.4)) < duration_s:
         event = _draw_one(chance, round(at_s, 4))
         yield event

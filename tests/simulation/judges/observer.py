@@ -36,6 +36,7 @@ class Bounds:
 
 ENABLE, RESET, RUN_BITS = 1, 2, 32 | 64
 DOWN_S = 4.0  # a run's end, whoever ends it, is a ramp down that needs no master; it takes this long at the most
+UNHEARD_S = 0.1  # so late a write may be taken whose master has hung up, or fallen silent on a bus
 GRACE_S = 0.05  # and two periods: a tick decides nothing within one of a sample
 
 
@@ -66,6 +67,7 @@ class Observer:
     _pressing_s: float = 0.0
     _fault: int | None = None
     _reset_s: float = -1.0
+    _unheard_s: float = -1.0
 
     # -- the wire
 
@@ -116,9 +118,14 @@ class Observer:
         if control == -1 or self.is_run or control & ENABLE:
             self.disabled_s = None
         elif self.disabled_s is None:
-            self.disabled_s = now_s
+            self.disabled_s = self._lease_end_s(now_s) if now_s - self._unheard_s < UNHEARD_S else now_s
         if control & RESET:
             self._reset_s = now_s
+
+    def _lease_end_s(self, now_s: float) -> float | None:
+        """When who perhaps presses must have stopped; None for never."""
+        until_s = max(self.disabled_s or 0.0, now_s + self.bounds.lease_s)
+        return None if until_s == inf else until_s
 
     def note_unanswered(self, control: int | None, now_s: float) -> None:
         """A master has hung up before it heard whether its write was taken: it may press until its lease has run out, if
@@ -126,9 +133,10 @@ class Observer:
         self.write_s = now_s
         if control is None:
             return
-        if self.disabled_s is not None and control & (ENABLE | RUN_BITS):
-            until_s = max(self.disabled_s, now_s + self.bounds.lease_s)
-            self.disabled_s = None if until_s == inf else until_s
+        if control & (ENABLE | RUN_BITS):
+            self._unheard_s = now_s
+            if self.disabled_s is not None:
+                self.disabled_s = self._lease_end_s(now_s)
         if control & RESET:
             self._reset_s = now_s
 

@@ -18,8 +18,8 @@ from gateway.profiles.rigs.faces import RtuFace
 from gateway.profiles.rigs.rig import ValveLine
 from gateway.twin.plant import with_value
 from tests.service.rigs import demo, with_supervision
-from tests.simulation.heard import OUTPUTS, RTU_OUTPUT, SENTENCES, LineObserver, RtuObserver
-from tests.simulation.observer import Bounds, Observer
+from tests.simulation.judges.heard import OUTPUTS, RTU_OUTPUT, SENTENCES, LineObserver, RtuObserver
+from tests.simulation.judges.observer import Bounds, Observer
 
 LEASE_S, STALL_S = 0.2, 0.1
 LEASES = ((LEASE_S, LeaseAction.FAULT),) * 20 + (
@@ -134,9 +134,11 @@ def draw_badges(seed: int) -> dict[str, tuple[str, str]]:
 def _strict(rig: Rig, seed: int, loop_hz: float, cell_hz: float) -> Rig:
     if rig.load_cell.device.read_force:  # it is asked at a tick
         cell_hz = 1.0 / (1.0 / cell_hz + 1.0 / loop_hz)
+    is_fed = getattr(rig.output.device.watchdog, "feed", None) is not None
+    ticks = 4.0 if is_fed else 3.0  # a watchdog is fed at a tick of its own
     bounds = {
         "sample_timeout_s": max(0.05, 2.5 / min(loop_hz, cell_hz)),
-        "output_timeout_s": max(0.1, 3.0 / loop_hz, 1.7 * rig.output.device.reply_timeout_s),
+        "output_timeout_s": max(0.1, ticks / loop_hz, 1.7 * rig.output.device.reply_timeout_s),
     }
     lease_s, action = Random(f"lease {seed}").choice(LEASES)
     if loop_hz < LEAST_HZ:

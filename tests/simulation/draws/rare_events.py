@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from random import Random
 from typing import Any
 
-from tests.simulation.event import Event
+from tests.simulation.draws.event import Event
 
 EVERY_S = 8.0
 LADDER_SHARE, LADDER_S = 0.04, 14.0
@@ -70,7 +70,7 @@ def _say(at_s: float, **fields: Any) -> Event:
     return Event(at_s, "person", "say", data=json.dumps(fields).encode())
 
 
-def draw_rare_events(seed: int, duration_s: float) -> Iterator[Event]:
+def draw_rare_events(seed: int | str, duration_s: float) -> Iterator[Event]:
     """Return them in their order."""
     chance, at_s = Random(f"rare {seed}"), 0.0
     waiting: list[Event] = []

@@ -6,8 +6,8 @@ from collections import deque
 from collections.abc import Callable
 from ipaddress import ip_address
 
+from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Observer
 from tests.simulation.masters.spelling import control_of, setpoints_of
-from tests.simulation.observer import FAULT, STATUS_WORDS, Observer
 
 UNAVAILABLE = 0x8000
 LONGEST_MS = 32767  # a register holds no more

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, field
 from struct import unpack_from
 
-from tests.simulation.observer import Observer
+from tests.simulation.judges.observer import Observer
 
 
 @dataclass(frozen=True)

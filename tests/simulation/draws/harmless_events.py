@@ -1,0 +1,109 @@
+"""What may not cost a force that a master holds: of everything that is drawn (events.py, rare_events.py) that which leaves its
+master, its cell and its output at work, more densely than usual.
+
+Others ask, write, upload and send nonsense; people at the machine question, record and use sets; disks fail, clocks jump; one
+answer now and then is spoiled on its wire.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from heapq import merge
+from operator import attrgetter
+from random import Random
+
+from tests.simulation.draws.event import Event
+from tests.simulation.draws.events import draw_usual
+from tests.simulation.draws.rare_events import DISKS, draw_rare_events
+from tests.simulation.masters.spelling import WAYS, control_of
+
+BEGIN_S = 0.1
+FORCE_N = 8.0, 40.0
+HELD_S = 7.0
+"""Until the master wants another force, on average."""
+STREAMS = 3
+LONGEST_STOP_S = 0.03
+LONGEST_LATE_S = 0.04
+APART_S = 1.0
+"""Between two moments in which a sample or an answer is lost: more than one in a row may cost the force."""
+TRUTHFUL = ("late", "lost", "doubled")
+"""What may happen to a reading of the cell: of a cut one some cells' protocols cannot tell that it is another number."""
+QUIET = ("calibrate", "self_test", "reset", "let_go", "tare", "burst")
+"""What another master may do to stop the force, by right."""
+ENABLE, TAKE = 1, 8
+
+
+def draw_harmless_events(seed: int, duration_s: float) -> Iterator[Event]:
+    """A master that holds, and what happens beside it, in its order."""
+    streams = [draw_usual(Random(f"held {seed} {number}"), duration_s) for number in range(STREAMS)]
+    drawn = merge(*streams, draw_rare_events(f"held {seed}", duration_s), key=attrgetter("at_s"))
+    return merge(_draw_holds(seed, duration_s), _keep_harmless(drawn), key=attrgetter("at_s"))
+
+
+def _draw_holds(seed: int, duration_s: float) -> Iterator[Event]:
+    chance, at_s = Random(f"held {seed}"), BEGIN_S
+    way = chance.choice(tuple(WAYS)) if chance.random() < 0.4 else "block"
+    while at_s < duration_s:
+        yield Event(round(at_s, 4), "worker", "hold_on", (round(chance.uniform(*FORCE_N), 2),), way=way)
+        at_s += chance.expovariate(1.0 / HELD_S)
+
+
+def _keep_harmless(drawn: Iterator[Event]) -> Iterator[Event]:
+    shaken_s = BEGIN_S
+    for event in drawn:
+        if event.at_s > 2.0 * BEGIN_S and _is_harmless(event):
+            if _shakes(event):
+                if event.at_s - shaken_s < APART_S:
+                    continue
+                shaken_s = event.at_s
+            yield _soften(event)
+
+
+def _shakes(event: Event) -> bool:
+    """Whether a sample, an answer or a tick is lost by it."""
+    return event.what == "stop" or (event.whom in ("output", "load_cell", "valve") and event.what != "push")
+
+
+def _soften(event: Event) -> Event:
+    """One lost answer, or a short standstill, is what may not cost a force."""
+    if event.what == "stop":
+        return replace(event, numbers=(min(event.numbers[0], LONGEST_STOP_S), 0.0))
+    if event.what == "late":
+        return replace(event, numbers=(1.0, min(event.numbers[1], LONGEST_LATE_S)))
+    if _shakes(event) and event.numbers:
+        return replace(event, numbers=(1.0, event.numbers[1]))
+    return event
+
+
+def _is_harmless(event: Event) -> bool:
+    match event.whom:
+        case "rival" | "fool":
+            return event.what not in QUIET and not (event.what in ("take", "split") or _may_stop(event.data))
+        case "villain" | "integrator" | "designer":
+            return True
+        case "person":
+            return not _asks_to_stop(event.data)
+        case "machine":
+            return event.what in (*DISKS, "disk_free", "clock_jump", "stop")
+        case "load_cell":
+            return event.what == "push" or event.what in TRUTHFUL
+        case "output":
+            return event.what not in ("pull", "power", "torn", "say")
+        case "bus" | "valve":
+            return event.what != "pull"
+    return False
+
+
+def _may_stop(pdu: bytes) -> bool:
+    """Whether a request clears enable, takes over, or changes bits of the control word."""
+    control = control_of(pdu) if pdu else None
+    return control is not None and (control < 0 or not control & ENABLE or bool(control & TAKE))
+
+
+def _asks_to_stop(line: bytes) -> bool:
+    """Whether a person's line is a request of a master's that clears enable."""
+    try:
+        request = json.loads(line)
+        return request["do"] == "modbus" and _may_stop(bytes.fromhex(request["pdu"]))
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return False
