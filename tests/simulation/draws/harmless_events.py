@@ -15,7 +15,7 @@ from random import Random
 from tests.simulation.draws.event import Event
 from tests.simulation.draws.events import draw_usual
 from tests.simulation.draws.rare_events import DISKS, draw_rare_events
-from tests.simulation.masters.spelling import WAYS, control_of
+from tests.simulation.masters.spelling import WAYS, WRITES, control_of, written_address
 
 BEGIN_S = 0.1
 FORCE_N = 8.0, 40.0
@@ -24,6 +24,10 @@ HELD_S = 7.0
 STREAMS = 3
 LONGEST_STOP_S = 0.03
 LONGEST_LATE_S = 0.04
+LONGEST_GAP_S = 0.03
+"""Inside of a request."""
+COMMANDS_END = 400
+"""Behind the blocks in which a master commands."""
 APART_S = 1.0
 """Between two moments in which a sample or an answer is lost: more than one in a row may cost the force."""
 TRUTHFUL = ("late", "lost", "doubled")
@@ -68,6 +72,8 @@ def _soften(event: Event) -> Event:
     """One lost answer, or a short standstill, is what may not cost a force."""
     if event.what == "stop":
         return replace(event, numbers=(min(event.numbers[0], LONGEST_STOP_S), 0.0))
+    if event.what == "split":
+        return replace(event, numbers=(event.numbers[0], min(event.numbers[1], LONGEST_GAP_S), 1.0))
     if event.what == "late":
         return replace(event, numbers=(1.0, min(event.numbers[1], LONGEST_LATE_S)))
     if _shakes(event) and event.numbers:
@@ -77,8 +83,10 @@ def _soften(event: Event) -> Event:
 
 def _is_harmless(event: Event) -> bool:
     match event.whom:
+        case "worker":
+            return event.what in ("burst", "split") or (event.what == "ask" and not _commands(event.data))
         case "rival" | "fool":
-            return event.what not in QUIET and not (event.what in ("take", "split") or _may_stop(event.data))
+            return event.what not in QUIET and not (event.what == "take" or _may_stop(event.data))
         case "villain" | "integrator" | "designer":
             return True
         case "person":
@@ -92,6 +100,11 @@ def _is_harmless(event: Event) -> bool:
         case "bus" | "valve":
             return event.what != "pull"
     return False
+
+
+def _commands(pdu: bytes) -> bool:
+    """Whether a request may write what its own master commands: words, coils or numbers."""
+    return pdu[0] in WRITES and (pdu[0] in (5, 15) or written_address(pdu) < COMMANDS_END)
 
 
 def _may_stop(pdu: bytes) -> bool:

@@ -4,7 +4,7 @@ The next question follows the answer, so a slow wire is used whole; where the wi
 than anything the loop could use, it follows when that is over. An answer that does not come in its time is given up and
 asked for again. It may still come then, and a number does not say what it answers: it is a true reading of this moment all
 the same, but the line is left alone until the later answer is here or overdue too, for on a bus of two wires a third
-question would garble it. Time comes in as an argument, so that tests run it in virtual time.
+question would garble it; then nothing is missing any more, and the next question is like any other. Time comes in as an argument, so that tests run it in virtual time.
 """
 
 from collections.abc import Callable
@@ -47,7 +47,8 @@ class CellExchange:
         self.identity.begin()
         self._sent_s: float | None = None
         self._next_s = -inf
-        self._is_overdue = False
+        self._is_overdue = False  # an answer is missing, and may still come
+        self._is_heard = False  # one has come since the question that is out: its own, or the one that was missing
 
     def clear_faults(self) -> None:
         """Ask again what is behind the port where another device seemed to be: somebody has reset."""
@@ -65,7 +66,7 @@ class CellExchange:
         if any(not isinstance(one, Garbage) for one in messages):
             self._next_s = max(self._next_s, now_s + self._host.gap_s)
             if self._is_overdue:
-                self._is_overdue = False  # of the question before, perhaps: the one that is out has its time
+                self._is_overdue, self._is_heard = False, True  # the question that is out has its time all the same
             else:
                 self._sent_s = None
         self._send_next(now_s)
@@ -83,11 +84,11 @@ class CellExchange:
         """Give up waiting for an overdue answer, and ask again."""
         if self._sent_s is not None and now_s - self._sent_s > self._reply_timeout_s:
             self._host.forget()
-            self._sent_s, self._is_overdue, self._next_s = None, True, now_s
+            self._sent_s, self._is_overdue, self._next_s = None, not self._is_heard, now_s
         self._send_next(now_s)
 
     def _send_next(self, now_s: float) -> None:
         if self._question and self._sent_s is None and now_s >= self._next_s and not self.identity.fault:
-            self._sent_s, self._next_s = now_s, now_s + self._period_s
+            self._sent_s, self._next_s, self._is_heard = now_s, now_s + self._period_s, False
             self.counts.asked += 1
             self._write(self.identity.question if self.identity.is_due else self._question)

@@ -103,17 +103,22 @@ def test_a_reset_asks_no_second_question_of_the_right_cell(wire: Wire) -> None:
     assert wire.asked == [b"W?\r\n"]
 
 
-def test_after_a_lost_answer_the_line_is_back_at_its_rate(wire: Wire) -> None:
-    wire.tick()
-    wire.tick(TIMEOUT_S + 0.01)
-    wire.answer()
-    wire.tick(TIMEOUT_S + 0.01)
-    for _ in range(5):
-        wire.answer()
-        wire.answer()
-    asked = len(wire.asked)
-    wire.answer()
-    assert len(wire.asked) == asked + 1
+@pytest.mark.parametrize("late_s", [None, TIMEOUT_S + 0.005, TIMEOUT_S + 0.05], ids=["lost", "late", "very late"])
+def test_after_an_answer_that_is_lost_or_late_the_line_is_back_at_its_rate(wire: Wire, late_s: float | None) -> None:
+    """The device answers each question once. It was asked once in a reply's time for ever, as one of the schedules showed."""
+    due: list[float] = []
+    for step in range(1000):
+        asked = len(wire.asked)
+        wire.tick(0.001)
+        if due and due[0] <= wire.now_s + 1e-9:
+            due.pop(0)
+            wire.answer(after_s=0.0)
+        if len(wire.asked) > asked:
+            due += [wire.now_s + ROUND_TRIP_S] if step else [] if late_s is None else [wire.now_s + late_s]
+            due.sort()
+        if step == 500:
+            before = len(wire.asked)
+    assert len(wire.asked) - before == pytest.approx(500 * 0.001 / ROUND_TRIP_S, abs=2)
 
 
 def test_half_an_answer_from_before_a_reopening_is_no_part_of_the_next(wire: Wire) -> None:
