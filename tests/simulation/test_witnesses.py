@@ -55,12 +55,12 @@ HELD_N = 20.0
 
 
 def look_at_held(observer: Observer, begun_s: float, *looks: tuple[int, float]) -> None:
-    """A force is held from 1 s on; looks: state and force, every second from 3 s on; the end."""
+    """A force is held from 1 s on; looks: state and force, every second from 4 s on; the end."""
     held = HeldForce(observer, begun_s)
     held.expect(HELD_N, 1.0)
     for number, (state, force_n) in enumerate(looks):
         words = [0, state, round(100 * force_n)] + [0] * (STATUS_WORDS - 3)
-        held.note(struct.pack(f">{STATUS_WORDS}h", *words), 3.0 + number)
+        held.note(struct.pack(f">{STATUS_WORDS}h", *words), 4.0 + number)
     held.end(10.0)
 
 

@@ -7,8 +7,8 @@ import struct
 from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Observer
 
 RAMPING, HOLDING = 2, 3
-SETTLE_S = 2.5
-"""After a command: a ramp, and where a valve turns before, its dwell."""
+SETTLE_S = 3.5
+"""After a command: a ramp, and where a valve turns before, a ramp down and its dwell as well."""
 LEAST_SHARE = 0.5
 IN_BAND_N = 1.0
 COUNT_N = 0.01
