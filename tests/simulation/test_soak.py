@@ -18,11 +18,13 @@ from gateway.profiles.strict_yaml.text import parse
 from tests.conftest import READERS
 from tests.simulation.draws.event import Event
 from tests.simulation.draws.events import draw_events
+from tests.simulation.draws.harmless_events import draw_harmless_events
 from tests.simulation.kernel.edges import simulated_edges
 from tests.simulation.kernel.fits import SimulatedFit
 from tests.simulation.schedule import Simulation
 
 PUSH_S, LONG_S = 200.0, float(os.environ.get("SOAK_SECONDS", "86400"))
+HELD_S = 7500.0
 SEED = 15
 DEADLY = frozenset(("kill", "stop", "kill_guardian", "terminate"))
 MOST_MORE_BYTES = 4_000_000
@@ -92,3 +94,9 @@ def test_what_a_gateway_holds_does_not_grow_with_time(simulation: Simulation, tm
     assert last.descriptors <= first.descriptors + len(simulation.masters)
     assert last.tasks <= first.tasks
     assert outcome.settings > duration_s, "something has happened"
+
+
+@pytest.mark.long
+def test_a_force_is_held_for_hours_beside_all_that_may_not_cost_it(simulation: Simulation) -> None:
+    """Two hours and a few minutes, so that a heartbeat of 16 bits begins anew."""
+    assert not simulation.run(draw_harmless_events(SEED, HELD_S), HELD_S).broken
