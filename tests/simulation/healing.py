@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 HELD_N = 12.0
 HEAL_S = 2.0
 IN_BAND_N = 1.0
+RATE_S, LEAST_RATE = 0.6, 0.6
+"""For so long the devices' answers are counted, and of so many as at first there must be so many at least."""
 ANSWER_S = 0.02
 LOOKING_S = 3.0
 """What is plugged in is looked for, and a guardian started again, every 2 s at the most."""
@@ -39,11 +41,23 @@ def heal(simulation: "Simulation") -> None:
             healer.tare()
             simulation._run_for(TARE_S)
     healer.hold(HELD_N)
-    simulation._run_for(HEAL_S)
+    simulation._run_for(HEAL_S - RATE_S)
+    rates = count_answers(simulation)
+    for line, count in simulation.rates.items():
+        if rates[line] < LEAST_RATE * count:
+            words = f"I13: {line} answers {rates[line]} times in {RATE_S:g} s, {count} times at first"
+            simulation.observer.broken.append(words)
     error_n = simulation._read_force_n() - HELD_N
     if not abs(error_n) <= IN_BAND_N:
         words = f"{error_n:+.2f} N off {HEAL_S:g} s after healing; {list(simulation.log.lines)[-4:]}"
         simulation.observer.broken.append(f"I13: {words}")
+
+
+def count_answers(simulation: "Simulation") -> dict[str, int]:
+    """Return how many answers each device gives in the next RATE_S."""
+    before = {line: cable.answers for line, cable in CABLES.items()}
+    simulation._run_for(RATE_S)
+    return {line: CABLES[line].answers - count for line, count in before.items()}
 
 
 def _repair(simulation: "Simulation") -> None:

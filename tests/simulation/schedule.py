@@ -15,7 +15,7 @@ from gateway.profiles import Rig
 from tests.simulation.draws.event import Event
 from tests.simulation.draws.rigs import LEASE_S, draw_badges, draw_rig, store_plants
 from tests.simulation.happening import happen
-from tests.simulation.healing import ANSWER_S, heal
+from tests.simulation.healing import ANSWER_S, RATE_S, count_answers, heal
 from tests.simulation.judges.held_force import HeldForce
 from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
 from tests.simulation.judges.status_witness import StatusWitness
@@ -53,9 +53,11 @@ class Outcome:
 
 
 class Simulation:
-    """A gateway, its world and its masters. rest_n: force that a healthy cell reads at rest, None where nobody has looked."""
+    """A gateway, its world and its masters. rest_n: force that a healthy cell reads at rest, None where nobody has looked;
+    rates: how many answers each healthy device gives in RATE_S, the same."""
 
     rest_n: float | None = None
+    rates: dict[str, int]
 
     def __init__(self, seed: int, folder: Path) -> None:
         drawn = draw_rig(seed)
@@ -129,11 +131,12 @@ class Simulation:
 
     def run(self, events: Iterable[Event], duration_s: float) -> Outcome:
         """Run the events, then heal everything, reset, and see the force come back."""
-        self._run_for(1.0)
+        self._run_for(1.0 - RATE_S)
+        self.rates = count_answers(self)
         self.rest_n = self._read_force_n()
         self._happen_next(iter(events))
         self._run_for(duration_s)
-        self.held_force.end(self.clock.now_s)
+        self.held_force.end()
         self._heal()
         for client in (*self.clients, self.person):
             self.observer.broken += client.complaints

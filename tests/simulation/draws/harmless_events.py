@@ -31,7 +31,7 @@ COMMANDS_END = 400
 APART_S = 1.0
 """Between two moments in which a sample or an answer is lost: more than one in a row may cost the force."""
 TRUTHFUL = ("late", "lost", "doubled")
-"""What may happen to a reading of the cell: of a cut one some cells' protocols cannot tell that it is another number."""
+"""What may happen to a reading of the cell or the valve: it is gone, or late. A cut one is another number in some protocols."""
 QUIET = ("calibrate", "self_test", "reset", "let_go", "tare", "burst")
 """What another master may do to stop the force, by right."""
 ENABLE, TAKE = 1, 8
@@ -93,11 +93,11 @@ def _is_harmless(event: Event) -> bool:
             return not _asks_to_stop(event.data)
         case "machine":
             return event.what in (*DISKS, "disk_free", "clock_jump", "stop")
-        case "load_cell":
+        case "load_cell" | "valve":
             return event.what == "push" or event.what in TRUTHFUL
         case "output":
             return event.what not in ("pull", "power", "torn", "say")
-        case "bus" | "valve":
+        case "bus":
             return event.what != "pull"
     return False
 

@@ -9,7 +9,6 @@ from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Observer
 RAMPING, HOLDING = 2, 3
 SETTLE_S = 3.5
 """After a command: a ramp, and where a valve turns before, a ramp down and its dwell as well."""
-LEAST_SHARE = 0.5
 IN_BAND_N = 1.0
 COUNT_N = 0.01
 
@@ -19,7 +18,6 @@ class HeldForce:
 
     _force_n = _settled_s = 0.0
     _is_expected = False
-    _last_n: float | None = None
 
     def __init__(self, observer: Observer, begun_s: float) -> None:
         self._observer, self._begun_s = observer, begun_s
@@ -29,24 +27,22 @@ class HeldForce:
         later may have to wait, for a person's run to end, say."""
         if self._is_expected or now_s < self._begun_s:
             self._is_expected = True
-            self._force_n, self._settled_s, self._last_n = force_n, now_s + SETTLE_S, None
+            self._force_n, self._settled_s = force_n, now_s + SETTLE_S
 
     def note(self, block: bytes, at_s: float) -> None:
         """Judge the status block as it was at at_s."""
         if not self._is_expected or at_s < self._settled_s:
             return
         words = struct.unpack(f">{STATUS_WORDS}h", block)
-        self._last_n = force_n = abs(words[2]) * COUNT_N
+        force_n = abs(words[2]) * COUNT_N
         if words[1] not in (RAMPING, HOLDING):
             told = f"fault {words[10]}" if words[1] == FAULT else f"state {words[1]}"
             self._complain(f"{told}, {force_n:.2f} N instead of {self._force_n:g} N", at_s)
-        elif force_n < LEAST_SHARE * self._force_n:
-            self._complain(f"{force_n:.2f} N of {self._force_n:g} N", at_s)
+        elif abs(force_n - self._force_n) > IN_BAND_N:
+            self._complain(f"{force_n:.2f} N instead of {self._force_n:g} N", at_s)
 
-    def end(self, now_s: float) -> None:
-        """Nobody holds any more: the force must be in its band, where there was time to see it."""
-        if self._is_expected and self._last_n is not None and abs(self._last_n - self._force_n) > IN_BAND_N:
-            self._complain(f"{self._last_n:.2f} N of {self._force_n:g} N in the end", now_s)
+    def end(self) -> None:
+        """Nobody holds any more."""
         self._is_expected = False
 
     def _complain(self, words: str, at_s: float) -> None:

@@ -40,6 +40,7 @@ class Cable:
         self.is_plugged = True
         self._spoils: deque[Spoil] = deque()
         self.strange_s = 0.0  # when something strange was said last
+        self.answers = 0  # what the device has said so far, in sentences
         self.heard_s = 0.0  # when the host has got something last
         self.reworded = (b"", b"")  # what the device says, and from now on says instead
         self._character_s = settings.character_s
@@ -68,6 +69,7 @@ class Cable:
 
     def send_to_host(self, data: bytes) -> None:
         """Put a device's bytes on the wire, or what becomes of them."""
+        self.answers += bool(data)
         if self.reworded[0]:
             data = data.replace(*self.reworded)
         if self._spoils and data:
