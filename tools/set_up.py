@@ -28,6 +28,8 @@ PIP: Final = (str(PYTHON), "-m", "pip", "--disable-pip-version-check", "--no-inp
 _LOOK_S: Final = 0.2
 _KEPT_LINES: Final = 30
 _COLLECTED: Final = re.compile(r"^(Collecting|Ignoring|Requirement already satisfied:)", re.MULTILINE)
+_NOT_COMPILED: Final = "/site-packages/(.*/)?(tests?|pip|setuptools|pkg_resources|mypyc?|lexers)/"
+"""What nobody imports: their own tests, who installs them, what is machine code already, all but one file of hundreds."""
 _INSTALLING: Final = re.compile(r"^Installing collected packages: (.*)$", re.MULTILINE)
 
 
@@ -86,13 +88,13 @@ def installed() -> list[Path]:
 
 def compile_packages() -> None:
     """Compile on all cores what pip would compile on one."""
-    sources = [path for path in (ENVIRONMENT / "lib").rglob("*.py") if not re.search(r"/tests?/", str(path))]
+    sources = [path for path in (ENVIRONMENT / "lib").rglob("*.py") if not re.search(_NOT_COMPILED, str(path))]
 
     def tell(said: str) -> None:
         report("compiling (4/5)", min(len(sources), said.count("Compiling ")), len(sources))
 
     try:
-        run_step([str(PYTHON), "-m", "compileall", "-j", "0", "-x", "/tests?/", str(ENVIRONMENT / "lib")], tell)
+        run_step([str(PYTHON), "-m", "compileall", "-j", "0", "-x", _NOT_COMPILED, str(ENVIRONMENT / "lib")], tell)
     except StepError:
         pass  # a package may hold a file for another Python
 
