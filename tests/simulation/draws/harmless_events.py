@@ -46,8 +46,8 @@ def draw_harmless_events(seed: int, duration_s: float) -> Iterator[Event]:
 
 def _draw_holds(seed: int, duration_s: float) -> Iterator[Event]:
     chance, at_s = Random(f"held {seed}"), BEGIN_S
-    way = chance.choice(tuple(WAYS)) if chance.random() < 0.4 else "block"
     while at_s < duration_s:
+        way = chance.choice(tuple(WAYS)) if chance.random() < 0.4 else "block"
         yield Event(round(at_s, 4), "worker", "hold_on", (round(chance.uniform(*FORCE_N), 2),), way=way)
         at_s += chance.expovariate(1.0 / HELD_S)
 
@@ -84,7 +84,7 @@ def _soften(event: Event) -> Event:
 def _is_harmless(event: Event) -> bool:
     match event.whom:
         case "worker":
-            return event.what in ("burst", "split") or (event.what == "ask" and not _commands(event.data))
+            return event.what in ("burst", "split", "tare") or (event.what == "ask" and not _commands(event.data))
         case "rival" | "fool":
             return event.what not in QUIET and not (event.what == "take" or _may_stop(event.data))
         case "villain" | "integrator" | "designer":
