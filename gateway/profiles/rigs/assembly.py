@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -11,11 +11,12 @@ from gateway.control.compensation.compensation import NO_COMPENSATION, Compensat
 from gateway.control.settings import (
     ControlSettings,
     Defaults,
+    LeadSettings,
     Limits,
+    ResponseSource,
     SelfTestSettings,
     Supervision,
     Trim,
-    ValveControl,
 )
 from gateway.devices import DeviceProfile
 from gateway.devices.profile import ADDRESS
@@ -181,20 +182,20 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
     output, load_cell = _part(document, "output", OutputFile), _part(document, "load_cell", CellFile)
     output_device = read_part("device", ("output", "device"), read_device)
     cell_device = read_part("device", ("load_cell", "device"), read_device)
-    plant = read_part("plant", ("plant",), read_plant)
-    extended = read_part("plant", ("compensation",), read_plant)
-    loop_hz = document.at("loop_hz") if ("loop_hz",) in document.marks else defaults.LOOP_HZ
+    plant, extended = (read_part("plant", (key,), read_plant) for key in ("plant", "compensation"))
     return Parts(
         name=str(document.at("name")),
         simulated=document.at("simulated") is True,
         names_plant=("plant",) in document.marks,
         accept_no_device_watchdog=document.at("accept_no_device_watchdog") is True,
-        loop_hz=float(loop_hz) if isinstance(loop_hz, (int, float)) else None,
+        loop_hz=_loop_hz(document),
         output=output,
         load_cell=load_cell,
         limits=_part(document, "limits", Limits),
         defaults=_part(document, "defaults", Defaults),
         trim=_part(document, "trim", Trim),
+        lead=_part(document, "lead", LeadSettings),
+        measures_response=document.at("response") != ResponseSource.RIG,
         supervision=_part(document, "supervision", Supervision),
         valve=_optional_part(document, "valve", ValveFile),
         valve_device=read_part("device", ("valve", "device"), read_device),
@@ -210,6 +211,11 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
         extended=extended,
         compensation=_compensation(plant, extended),
     )
+
+
+def _loop_hz(document: Document) -> float | None:
+    loop_hz = document.at("loop_hz") if ("loop_hz",) in document.marks else defaults.LOOP_HZ
+    return float(loop_hz) if isinstance(loop_hz, (int, float)) else None
 
 
 def _as_set(device: DeviceProfile | None, line: OutputFile | CellFile | None) -> DeviceProfile | None:
@@ -275,7 +281,7 @@ def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: 
             response=file.response,
             supervision=file.supervision,
             self_test=file.self_test,
-            valve=_valve_control(file.valve) if file.valve else None,
+            valve=file.valve.control if file.valve else None,
         ),
         valve=_valve_line(file.valve, parts.valve_device) if file.valve and parts.valve_device else None,
         pull_calibration=parts.valve_calibration,
@@ -304,10 +310,6 @@ def _notes(parts: Parts, compensation: Compensation) -> tuple[str, ...]:
 def _supported_bits(file: RigFile) -> ControlBit:
     self_test = ControlBit.START_SELF_TEST if file.self_test else ControlBit(0)
     return ALWAYS_SUPPORTED | self_test | (ControlBit.VALVE_PULL if file.valve else ControlBit(0))
-
-
-def _valve_control(valve: ValveFile) -> ValveControl:
-    return ValveControl(**{field.name: getattr(valve, field.name) for field in fields(ValveControl)})
 
 
 def _valve_line(valve: ValveFile, device: DeviceProfile) -> ValveLine:

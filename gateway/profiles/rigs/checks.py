@@ -12,7 +12,7 @@ from typing import Final
 from gateway import defaults
 from gateway.bsfm.model import Calibration
 from gateway.control.compensation.compensation import Compensation
-from gateway.control.settings import Defaults, Limits, SelfTestSettings, Supervision, Trim
+from gateway.control.settings import Defaults, LeadSettings, Limits, SelfTestSettings, Supervision, Trim
 from gateway.devices import DeviceProfile
 from gateway.profiles.http_sections import Web
 from gateway.profiles.kinds.plants import PlantProfile
@@ -38,6 +38,8 @@ class Parts:
     limits: Limits | None = None
     defaults: Defaults | None = None
     trim: Trim | None = None
+    lead: LeadSettings | None = None
+    measures_response: bool = True
     supervision: Supervision | None = None
     self_test: SelfTestSettings | None = None
     valve: ValveFile | None = None
@@ -57,6 +59,7 @@ class Parts:
 Check = Callable[[Parts], Found]
 
 _SATURATION_SHARE: Final = 0.98  # of the cell's range: what is suggested; an amplifier may clip a little below its end
+_SLOPES: Final = 50  # places of a curve at which its slope is looked at
 _LEAST_TICKS: Final = 2.0  # within a timeout, so that one late tick is no fault
 
 
@@ -229,6 +232,39 @@ def check_plant_supply(parts: Parts) -> Found:
         yield "limits.voltage_max_v", f"{volt(most_v)} asks for {needed}, the plant's supply has {available}: {end}"
 
 
+def check_pace(parts: Parts) -> Found:
+    """Yield a warning for a trim that is faster than the rig follows, or a lead longer than all of its lags, where this
+    file's numbers count: the force may swing, or go beyond the wish."""
+    calibration, supervision = parts.calibration, parts.supervision
+    if calibration is None or supervision is None or parts.limits is None:
+        return
+    is_own = calibration.rig == parts.name or parts.simulated
+    if parts.measures_response and calibration.response and is_own:
+        return
+    lag = f"supervision.response_lag_s = {second(supervision.response_lag_s)}"
+    if parts.trim and parts.trim.limit_v > 0:
+        slope_n_per_v = _steepest(calibration, parts.limits.force_max_n)
+        most = 1.0 / (slope_n_per_v * supervision.response_lag_s)
+        if (gain := parts.trim.gain_v_per_n_s) > most:
+            pace = f"corrects an error in {1.0 / (gain * slope_n_per_v):.2g} s where 1 V are {slope_n_per_v:.2g} N"
+            yield (
+                "trim.gain_v_per_n_s",
+                f"{gain:g} {pace}, faster than {lag}: the force may swing; at most {most:.2g}",
+            )
+    if parts.lead and (lead_s := parts.lead.lag_s + parts.lead.second_lag_s) > supervision.response_lag_s:
+        yield "lead.lag_s", f"{second(lead_s)} with the second is longer than {lag}: each step would go beyond its end"
+
+
+def _steepest(calibration: Calibration, most_n: float) -> float:
+    """Return the largest slope of both branches up to this force, N/V."""
+    model = calibration.model()
+    steps = [calibration.x0_v + (calibration.x1_v - calibration.x0_v) * share / _SLOPES for share in range(_SLOPES + 1)]
+    branches = (model.branches.rising, model.branches.falling)
+    return max(
+        branch.slope(voltage_v) for branch in branches for voltage_v in steps if branch.value(voltage_v) <= most_n
+    )
+
+
 def check_compensation(parts: Parts) -> Found:
     """Yield a fault for a compensation that has nothing to compensate."""
     if parts.extended is None or parts.compensation is None or not parts.compensation.is_null:
@@ -250,4 +286,4 @@ FAULTS: Final[tuple[Check, ...]] = (
     check_simulated_plant,
     check_compensation,
 )
-WARNINGS: Final[tuple[Check, ...]] = (check_real_rig, check_contact_threshold, check_plant_supply)
+WARNINGS: Final[tuple[Check, ...]] = (check_real_rig, check_contact_threshold, check_plant_supply, check_pace)

@@ -3,7 +3,7 @@
 Each field's comment is also its help in editors: gateway.profiles.schema carries it into the JSON schema.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Annotated, Literal
 
 from annotated_types import Ge, Gt, Le, MinLen
@@ -76,6 +76,11 @@ class ValveFile(ValveControl):
     baud: Baud | None = None  # as set in the device; null: as its profile says
     address: int | str | None = None  # of the device on its bus, its Modbus unit; null: the profile's
     calibration: Annotated[str, MinLen(1)] | None = None  # measured pulling; null: that of pushing by pull_area_share
+
+    @property
+    def control(self) -> ValveControl:
+        """Return what control knows of it."""
+        return ValveControl(**{one.name: getattr(self, one.name) for one in fields(ValveControl)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -108,6 +108,25 @@ def test_what_may_be_meant_is_a_warning_and_the_rig_loads(
     assert any(message.startswith(told) for message in messages(found.warnings)), messages(found.warnings)
 
 
+RULES = ("trim: #", "response: rig\ntrim: #")
+
+
+def test_a_trim_or_a_lead_that_the_rig_cannot_follow_is_told_where_the_file_rules(tmp_path: Path) -> None:
+    """Simulated: from a gain of 1.5 on the force swings by 6 N for good, and a lead of 0.6 s presses 53 N for 20 N."""
+    fast = ("gain_v_per_n_s: 0.3", "gain_v_per_n_s: 1.5")
+    long = ("  lag_s: 0.072\n  second_lag_s: 0.072", "  lag_s: 0.3\n  second_lag_s: 0.3")
+    lag, pace = "supervision.response_lag_s = 0.2 s", "corrects an error in 0.075 s where 1 V are 8.9 N"
+    told = [
+        f"trim.gain_v_per_n_s: 1.5 {pace}, faster than {lag}: the force may swing; at most 0.56",
+        f"lead.lag_s: 0.6 s with the second is longer than {lag}: each step would go beyond its end",
+    ]
+    assert messages(report(tmp_path, DEMO, RULES, fast, long).warnings) == told
+    assert messages(report(tmp_path, DEMO, RULES, (fast[0], "gain_v_per_n_s: 0.55")).warnings) == []
+    assert messages(report(tmp_path, DEMO, fast, long).warnings) == [], "a measured response sets its own pace"
+    slow = ("  sample_timeout_s: 0.25", "  response_lag_s: 0.7\n  sample_timeout_s: 0.25")
+    assert messages(report(tmp_path, DEMO, RULES, slow, long).warnings)[0].endswith("at most 0.16")
+
+
 def test_a_load_cell_line_that_cannot_carry_its_readings_is_told(tmp_path: Path) -> None:
     warnings = messages(report(tmp_path, DEMO, ("baud: 115200", "baud: 9600")).warnings)
     assert "load_cell.baud: 9600 carries 53 readings/s, stream-st-gs sends 100" in warnings
