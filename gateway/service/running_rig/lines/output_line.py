@@ -90,6 +90,7 @@ class OutputExchange:
         self._asked_v = self._before_v = inf
         self.standing_v: float | None = None
         self._is_overdue = False  # a question was given up, its answer may still come
+        self._is_altered = False  # the last echo was another voltage
         self._quiet_until_s = 0.0
         self._sent_s = 0.0
         self._next_poll_s = 0.0
@@ -233,16 +234,19 @@ class OutputExchange:
 
     def _check_setting(self, request: OutputRequest, reply: Accepted, now_s: float) -> None:
         """The echo of a setting, or the setting as it was read: another one than was sent is set anew, and counted. What then
-        stands is not known: an echo that lost its first digits says 0, and the safe voltage must go out all the same."""
+        stands is not known, not even by the next one that agrees: an echo that lost its first digits says 0, and the safe
+        voltage must go out all the same."""
         self.acknowledged_v, self.standing_v = reply.voltage_v, None
         if not self._host.confirms(self._asked_v, reply, request):
+            self._is_altered = True
             self._count_failure(type(request), FaultCode.OUTPUT_ALTERED)
             if self._host.confirms(self._before_v, reply, request):  # perhaps it came twice, and all behind it are late
                 self._quiet_until_s = now_s + self._reply_timeout_s
             return
-        self.standing_v = reply.voltage_v
-        if abs(reply.voltage_v - self._asked_v) > self._host.resolution_v:
-            self.standing_v = self._asked_v  # the answer only counts in coarser steps
+        was_altered, self._is_altered = self._is_altered, False
+        if not was_altered:
+            is_coarse = abs(reply.voltage_v - self._asked_v) > self._host.resolution_v  # it counts in coarser steps
+            self.standing_v = self._asked_v if is_coarse else reply.voltage_v
         self._note_success(type(request))
 
     def _note_success(self, question: type) -> None:

@@ -54,8 +54,9 @@ def test_a_setting_that_somebody_else_has_changed_is_set_anew_and_at_last_a_faul
         while wire.last != "REQ":
             wire.tick(0.2)
         wire.answer("400")
-        assert wire.last == "SET 512"
-        wire.answer("512")
+        for _ in range(2):  # the first echo behind another voltage is asked for once more
+            assert wire.last == "SET 512"
+            wire.answer("512")
     assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED, "its echo says one thing, its reading another"
 
 

@@ -155,6 +155,20 @@ def test_an_echo_cut_down_to_0_keeps_no_safe_voltage_back(wire: Wire, cut_before
     assert wire.exchange.acknowledged_v == 0.0 and not wire.exchange.fault, "a good echo heals what bad ones have found"
 
 
+def test_behind_a_bad_echo_a_good_one_is_asked_for_once_more(wire: Wire) -> None:
+    """A stray 0 on the wire of a device that stands at 50 counts: it was believed, and 0.49 V stood for good."""
+    wire.set_voltage(0)
+    wire.answer("50")
+    wire.answer("0")
+    assert wire.last == "SET 0" and wire.exchange.standing_v is None
+    wire.answer("50")
+    assert wire.exchange.standing_v is None
+    for _ in range(2):
+        assert wire.last == "SET 0"
+        wire.answer("0")
+    assert wire.exchange.standing_v == 0.0
+
+
 def test_a_good_echo_between_bad_ones_starts_the_count_anew(wire: Wire) -> None:
     for counts in (512, 600, 512):
         wire.set_voltage(counts)
