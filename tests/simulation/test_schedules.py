@@ -75,6 +75,17 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(7.8, "person", "say", data=b'{"do": "calibrate"}'),
         ],
     ),
+    (
+        63269,
+        [
+            Event(4.8516, "load_cell", "pace", (2.0,)),
+            Event(8.597, "world", "sim", data=b'{"do": "sim", "set": {"cell.silent": true}}'),
+            Event(9.6969, "load_cell", "pace", (1.0,)),
+            Event(17.5206, "world", "sim", data=b'{"do": "sim", "set": {"output.alter": 0.49092}}'),
+            Event(17.7718, "machine", "kill", (0.0297, 0.0)),
+            Event(22.0664, "output", "say", data=b"0\r\n"),
+        ],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,
