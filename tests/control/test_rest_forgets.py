@@ -163,3 +163,14 @@ def test_an_overload_before_an_enable_does_not_count_behind_it() -> None:
     bench.run(0.01)
     assert bench.last.fault is FaultCode.NONE
     assert bench.run(0.05).fault is FaultCode.OVER_FORCE
+
+
+def test_what_is_off_is_neither_in_band_nor_unreachable() -> None:
+    bench = Bench()
+    bench.run(0.5)
+    for contact, bit in ((True, StatusBit.IN_BAND), (False, StatusBit.TARGET_UNREACHABLE)):
+        bench.plant.contact = contact
+        bench.enable(30.0)
+        assert bench.run(4.0).status & bit
+        assert not bench.disable().status & (StatusBit.IN_BAND | StatusBit.TARGET_UNREACHABLE)
+        bench.run(1.0)
