@@ -14,7 +14,6 @@ from gateway.devices.messages import ForceSample, Quality
 from gateway.processes.disk_worker import DiskWorker
 from gateway.recording import Recorder, list_recordings, read_recording
 from gateway.recording.label import RecordingLabel
-from gateway.recording.recorder import sync_recording
 from gateway.service.run_recording import HANGS_S, RunRecording
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS
@@ -224,20 +223,6 @@ def test_what_may_not_outlive_a_power_cut_is_said(tmp_path: Path, log: Log, monk
     assert "0001.fgr may not outlive a power cut: Input/output error" in log[0]
     assert recordings.status()["recording"]
     recordings.stop()
-
-
-def test_what_was_deleted_while_it_is_synced_need_not_outlive_a_power_cut(
-    tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def delete_first(path: Path) -> None:
-        path.unlink(missing_ok=True)
-        sync_recording(path)
-
-    monkeypatch.setattr("gateway.service.run_recording.sync_recording", delete_first)
-    recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())  # type: ignore[arg-type]
-    recordings.start()
-    recordings.stop()
-    assert not [line for line in log if "power cut" in line]
 
 
 def test_a_disk_that_is_always_one_batch_behind_does_not_hang(recordings: Recordings, disk: HangingDisk) -> None:

@@ -294,18 +294,3 @@ def test_what_was_frozen_teaches_nothing() -> None:
         cell.value_n()
         watched.watch.start()
         assert watched.after(cell, 10.0) == inf
-
-
-def test_what_the_loop_has_told_as_frozen_teaches_nothing_however_long_it_went_on() -> None:
-    bench = Bench(seed=3, noise_n=0.12)
-    bench.run(1.0)
-    for _ in range(2):
-        bench.enable(12.0)
-        bench.run(6.0)
-        bench.cell_frozen = True
-        assert bench.seconds_until(has_fault(FaultCode.SAMPLE_FROZEN), 3.0) <= 2.0
-        bench.run(20.0)
-        bench.cell_frozen = False
-        bench.run(1.0)
-        bench.reset()
-        assert bench.last.state is State.OFF
