@@ -34,6 +34,7 @@ def test_where_the_byte_order_must_be_proven_the_page_proves_it(tmp_path: Path) 
         commands.join("me")
         await commands.enable("me", 12.0)
         stage.wired.until(lambda: stage.wired.state is State.HOLDING, 3.0)
+        assert commands.commander == "me"
 
     play(tmp_path, scene, rig)
 
