@@ -14,6 +14,7 @@ import numpy as np
 from gateway.bsfm.model import Calibration
 from gateway.control import Controller
 from gateway.control.inputs import LineStatus, Output
+from gateway.control.limits import TICK_S
 from gateway.devices.messages import ForceSample, Quality
 from gateway.profiles import Rig
 from gateway.progress import report
@@ -128,12 +129,13 @@ def _next_command(command: Command, setpoint_n: float, enabled: bool, controller
 
 
 def _since_command_s(columns: Columns) -> list[float]:
-    """Return how long before each row a command came, if one came since the row before: the ramp has gone on as long."""
+    """Return how long before each row a command came, if one came since the row before: the ramp has gone on as long, and a
+    tick of it was gone at once."""
     time_s, applied_n = columns["time_s"], columns.get("applied_n", columns["setpoint_n"])
     dt_s, moved_n = np.diff(time_s, prepend=time_s[:1]), np.abs(np.diff(applied_n, prepend=applied_n[:1]))
     rate = np.append(moved_n[1:] / np.maximum(dt_s[1:], 1e-6), 0.0)  # of the row after it
-    ramped_s = np.divide(moved_n, rate, out=dt_s.copy(), where=rate > 0.0)
-    since_s: list[float] = np.clip(ramped_s, 0.0, dt_s).tolist()
+    ramped_s = np.divide(moved_n, rate, out=dt_s + TICK_S, where=rate > 0.0)
+    since_s: list[float] = np.clip(ramped_s - TICK_S, 0.0, dt_s).tolist()
     return since_s
 
 

@@ -9,6 +9,7 @@ from random import Random
 import pytest
 
 from gateway.calibrations.store import CalibrationStore
+from gateway.numbered_documents import selection
 from gateway.numbered_documents.selection import BUILT_IN
 from gateway.numbered_documents.store import StoreError
 from gateway.processes.durable_file import add_checksum, verify_checksum
@@ -133,3 +134,43 @@ def test_a_file_of_gigabytes_is_no_document_and_is_not_read(used, name):
     selected = used.find_selected()
     assert selected.document is not None
     assert name in selected.notes[0] and "no document has" in selected.notes[0]
+
+
+def test_a_selection_that_the_disk_does_not_give_now_is_followed_by_none(used, monkeypatch):
+    """It may be whole: whoever went on from the one before it would undo what was acknowledged."""
+    read, newest = selection.read_regular, max(used.directory.glob("active.*"))
+    before = selection.read_selection(used.directory, used.noun)
+
+    def refuse(path: Path) -> bytes:
+        if path == newest:
+            raise OSError(5, "Input/output error", str(path))
+        return read(path)
+
+    monkeypatch.setattr(selection, "read_regular", refuse)
+    for change in (lambda: used.use(2), used.previous):
+        with pytest.raises(StoreError, match=r"Input/output error"):
+            change()
+    assert used.find_selected().notes, "but a start comes up with what it can read, and says so"
+    monkeypatch.undo()
+    assert selection.read_selection(used.directory, used.noun) == before
+    assert active_mark(used) == 3
+
+
+@pytest.mark.parametrize("spoilt", [{"generation": 8}, {"slots": [None] * 7}], ids=["renamed", "too few slots"])
+def test_a_sealed_file_that_is_no_selection_of_its_name_is_passed_over(used, spoilt):
+    newest = max(used.directory.glob("active.*"))
+    facts = json.loads(verify_checksum(newest.read_bytes())) | {"generation": 9, "active": {"number": 2, "slot": None}}
+    (used.directory / "active.000009").write_bytes(add_checksum(json.dumps(facts | spoilt)))
+    assert active_mark(used) == 3
+    assert "active.000009" in used.find_selected().notes[0]
+
+
+def test_the_number_of_a_calibration_to_go_back_to_is_given_to_no_other_one(used):
+    last = used.add(calibration(4))
+    for number in (last, 3):
+        used.use(number)
+    used.use(2)
+    used.use(last)
+    used.use(3)
+    (used.directory / f"{last:04d}.yaml").unlink()
+    assert used.add(calibration(5)) == last + 1

@@ -13,6 +13,7 @@ from tests.control.bench import Bench, has_fault
 
 STALE, SILENT, BUSY = FaultCode.SAMPLE_STALE, FaultCode.OUTPUT_SILENT, FaultCode.MACHINE_BUSY
 WIRES = "power or wires"
+OUTPUT_FAULT = RefusalReason.OUTPUT_FAULT
 
 
 @pytest.mark.parametrize("fault", [STALE, SILENT])
@@ -68,3 +69,45 @@ def test_a_refused_enable_does_not_either(held: Held) -> None:
     bench.write(control_word=ControlBit.ENABLE, force_setpoint_n=5.0)
     assert bench.refused and bench.refused.reason is RefusalReason.CELL_SILENT and bench.last.state is State.OFF
     assert ("power" in bench.refused.text) is (held == Held())
+
+
+WAITED = Held(rig_waited_s=0.4)
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (LineStatus(acknowledged_v=0.0, unanswered_since_s=0.0, output_held=WAITED), "waited 400 ms of them"),
+        (LineStatus(acknowledged_v=0.0, unanswered_since_s=0.0, cell_held=WAITED), OUTPUT_FAULT.explanation.sentence),
+        (LineStatus(unanswered_since_s=0.0, output_held=WAITED, fault=FaultCode.OUTPUT_LOST), "port went away"),
+        (LineStatus(acknowledged_v=0.0, cell_says="it answers 'ERR 3'"), "heard in time; it answers 'ERR 3'"),
+    ],
+)
+def test_a_refused_enable_tells_what_is_known_of_the_line_that_it_waits_for(line: LineStatus, words: str) -> None:
+    bench = Bench()
+    bench.run(0.5)
+    bench.cell_silent = bool(line.cell_says)
+    bench.line = line
+    bench.run(0.1 if line.cell_says else 0.01)
+    bench.write(control_word=ControlBit.ENABLE, force_setpoint_n=5.0)
+    assert bench.refused and words in bench.refused.text
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        LineStatus(acknowledged_v=0.0, unanswered_since_s=0.0, output_held=WAITED),
+        LineStatus(acknowledged_v=0.0, fault=FaultCode.OUTPUT_LOST),
+    ],
+    ids=["silent", "lost"],
+)
+def test_behind_a_fault_it_is_the_fault_that_keeps_an_enable_back(line: LineStatus) -> None:
+    bench = Bench()
+    bench.run(0.5)
+    bench.enable(5.0)
+    bench.line = line
+    assert bench.run(0.1).fault is not FaultCode.NONE
+    bench.disable()
+    bench.enable(5.0)
+    assert bench.refused and bench.refused.reason is RefusalReason.FAULT_LATCHED
+    assert bench.refused.text.endswith(RefusalReason.FAULT_LATCHED.explanation.sentence)

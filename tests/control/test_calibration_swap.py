@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.bsfm.model import Response
 from gateway.control import CalibrationInUse
-from gateway.registers.words import LimitedBy, State
-from tests.control.bench import bsfm, enabled
+from gateway.control.self_test.items import SelfTestPlan
+from gateway.control.settings import SelfTestSettings
+from gateway.registers.words import LimitedBy, State, StatusBit
+from tests.control.bench import Bench, bsfm, enabled, settings
 
 
 def test_a_calibration_is_swapped_without_a_bump():
@@ -79,3 +82,26 @@ def test_the_smallest_force_of_a_set_does_not_keep_the_tool_from_its_first_conta
     bench.run(1.5)
     assert bench.last.state is State.HOLDING
     assert abs(bench.plant.force_n - 10.0) < 1.0
+
+
+def test_a_force_that_goes_to_0_is_limited_by_no_range_that_its_setpoint_had_passed():
+    bench = enabled()
+    bench.force(20.0)
+    bench.controller.use(CalibrationInUse(replace(bsfm(), limits_n=(1.0, 15.0)), 2))
+    assert bench.run(1.5).limited_by is LimitedBy.FORCE_RANGE
+    bench.controller.stop()
+    output = bench.run(0.05)
+    assert output.force_applied_n > 0.0 and output.limited_by is LimitedBy.NONE
+    assert not output.status & StatusBit.LIMITED
+
+
+def test_a_self_test_judges_by_the_set_in_use():
+    bench = Bench(replace(settings(), self_test=SelfTestSettings(force_n=10.0)))
+    run = bench.controller.active_run
+    before = run.build(SelfTestPlan())._known
+    bench.controller.use(CalibrationInUse(bsfm(1.1), 2, Response(dead_time_s=0.2, lag_s=0.3), noise_n=0.05))
+    known = run.build(SelfTestPlan())._known
+    assert (known.has_measured_response, known.noise_n, known.model) == (True, 0.05, bsfm(1.1))
+    assert known.response_s == pytest.approx(0.5)
+    bench.controller.use(CalibrationInUse(bsfm(), 3))
+    assert run.build(SelfTestPlan())._known == before

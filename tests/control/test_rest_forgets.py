@@ -6,14 +6,17 @@ from random import Random
 
 import pytest
 
+from gateway.bsfm import Bsfm
 from gateway.bsfm.model import Response
 from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse, Controller
 from gateway.registers.words import ControlBit, LimitedBy, Mode, State, StatusBit
 from tests.control.bench import Bench, SmallPlant, bsfm, settings
 from tests.control.runs.test_ladder_run import SHORT
+from tests.control.test_slip import slip
 
 RESPONSE = Response(dead_time_s=0.02, lag_s=0.08)
+TWO_BRANCHES = bsfm()
 
 
 def _hold_where_the_model_is_off(bench: Bench) -> None:
@@ -79,9 +82,9 @@ LIVES: tuple[Callable[[Bench], None], ...] = (
 )  # fmt: skip
 
 
-def course(response: Response | None, life: Callable[[Bench], None] | None) -> list[float]:
+def course(response: Response | None, life: Callable[[Bench], None] | None, model: Bsfm = TWO_BRANCHES) -> list[float]:
     bench = Bench(noise_n=0.0)
-    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1, response))
+    bench.controller = Controller(bench.settings, CalibrationInUse(model, 1, response))
     bench.run(0.5)
     if life:
         life(bench)
@@ -102,6 +105,14 @@ def course(response: Response | None, life: Callable[[Bench], None] | None) -> l
 @pytest.mark.parametrize("life", LIVES, ids=lambda life: life.__name__.strip("_"))
 def test_behind_whatever_was_before_an_enable_begins_as_behind_a_start(life: Callable[[Bench], None]) -> None:
     assert course(None, life) == pytest.approx(course(None, None), abs=1.0e-6)
+
+
+@pytest.mark.parametrize("life", LIVES, ids=lambda life: life.__name__.strip("_"))
+def test_where_a_vented_tool_starts_apart_from_one_that_lost_its_contact_it_does_so_too(
+    life: Callable[[Bench], None],
+) -> None:
+    """Who was in contact before the output went off has lost none while it was off."""
+    assert course(None, life, slip()) == pytest.approx(course(None, None, slip()), abs=1.0e-6)
 
 
 @pytest.mark.parametrize("life", [_ramp, _drive_a_voltage], ids=lambda life: life.__name__.strip("_"))
@@ -152,3 +163,14 @@ def test_an_overload_before_an_enable_does_not_count_behind_it() -> None:
     bench.run(0.01)
     assert bench.last.fault is FaultCode.NONE
     assert bench.run(0.05).fault is FaultCode.OVER_FORCE
+
+
+def test_what_is_off_is_neither_in_band_nor_unreachable() -> None:
+    bench = Bench()
+    bench.run(0.5)
+    for contact, bit in ((True, StatusBit.IN_BAND), (False, StatusBit.TARGET_UNREACHABLE)):
+        bench.plant.contact = contact
+        bench.enable(30.0)
+        assert bench.run(4.0).status & bit
+        assert not bench.disable().status & (StatusBit.IN_BAND | StatusBit.TARGET_UNREACHABLE)
+        bench.run(1.0)

@@ -106,29 +106,34 @@ def test_a_tare_while_the_output_does_not_answer_is_refused(line):
     assert bench.write(control_word=ControlBit.TARE) and not bench.refused
 
 
-@pytest.mark.parametrize(("offset_n", "in_one_write"), [(-30.0, False), (25.0, False), (-0.9, True), (0.9, True)])
-def test_behind_a_tare_a_force_goes_as_if_the_cell_had_never_been_off(offset_n, in_one_write):
-    """What was measured before counts by the new zero, too, in whichever order one write asks for both."""
+TARE, ENABLE = ControlBit.TARE, ControlBit.ENABLE
+
+
+@pytest.mark.parametrize(
+    ("stuck_shares", "words"),
+    [((-2.0, -0.9, 0.9, 1.7), (TARE, ENABLE)), ((-0.9, 0.9), (TARE | ENABLE,)), ((-0.9, 0.9), (ENABLE, TARE | ENABLE))],
+    ids=["tare first", "in one write", "while enabled"],
+)
+def test_behind_a_tare_a_force_goes_as_if_the_cell_had_never_been_off(stuck_shares, words):
+    """What was measured before counts by the new zero, too, in whichever order both are asked for."""
     courses = []
-    for off_n in (0.0, offset_n * (settings().supervision.stuck_n if in_one_write else 1.0)):
+    for off_n in (0.0, *(share * settings().supervision.stuck_n for share in stuck_shares)):
         bench = Bench()
         bench.alter_sample = lambda sample, at_n=off_n: replace(sample, force_n=sample.force_n + at_n)
         bench.run(0.5)
-        if not in_one_write:
-            bench.write(control_word=ControlBit.TARE)
+        for word in words:
+            bench.write(control_word=word)
+            assert bench.refused is None
             bench.run(0.01)
-        bench.write(
-            control_word=ControlBit.TARE | ControlBit.ENABLE if in_one_write else ControlBit.ENABLE,
-            force_setpoint_n=20.0,
-        )
-        assert bench.refused is None
         bench.history.clear()
+        bench.force(20.0)
         bench.run(0.6)
         assert bench.last.fault is FaultCode.NONE
         courses.append(
             [one.output.voltage_v for one in bench.history] + [one.output.force_measured_n for one in bench.history]
         )
-    assert courses[1] == pytest.approx(courses[0], abs=1e-6)
+    for course in courses[1:]:
+        assert course == pytest.approx(courses[0], abs=1e-6)
 
 
 def test_the_weight_of_a_command_counts_in_the_step_of_its_arrival():

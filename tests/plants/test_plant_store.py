@@ -1,6 +1,7 @@
 """Numbered plants: what is stored reads back whole, is an ordinary plant file, and says where it comes from."""
 
 from dataclasses import replace
+from math import inf
 
 import pytest
 
@@ -8,6 +9,7 @@ from gateway.bsfm import Bsfm
 from gateway.numbered_documents.store import StoreError
 from gateway.plants.in_use import compensation_on, in_use_facts, with_cell_terms, with_plant_in_use
 from gateway.plants.store import FoundCause, NumberedPlant, PlantStore, Provenance, SourceRecording
+from gateway.processes.durable_file import add_checksum, verify_checksum
 from gateway.profiles import PlantProfile, load_calibration, load_plant, load_rig
 from gateway.profiles.kinds.plant_writer import with_origins
 from gateway.twin.plant import with_value
@@ -85,6 +87,48 @@ def test_a_calibration_of_this_very_rig_has_measured_the_command_map_itself():
     assert type(used.calibration_in_use(used.calibration).model) is Bsfm, "its volts are sent as they are"
     ((name, why),) = compensation.limited
     assert name == "command-nonlinearity" and "has measured it" in why
+
+
+def test_a_response_that_was_measured_on_this_very_rig_leaves_its_timing_to_the_calibration():
+    rig, slow = load_rig("demo"), bowed(regulator__command_bow=0.0, regulator__delay_s=0.3)
+    own = replace(rig, calibration=replace(load_calibration("demo"), rig="demo"))
+    foreign = replace(rig, calibration=replace(load_calibration("demo"), rig="another"))
+    assert own.calibration.response
+    compensated = compensation_on(foreign, slow).acts
+    assert compensated
+    assert [name for name, why in compensation_on(own, slow).limited if "has measured it" in why] == list(compensated)
+
+
+def test_a_simulated_rig_is_not_told_how_its_tool_is_held():
+    rig, leaning = load_rig("demo"), bowed(regulator__command_bow=0.0, contact__tilt_n=3.0)
+    assert compensation_on(replace(rig, simulated=False), leaning).outside
+    assert compensation_on(rig, leaning).outside is None
+
+
+def test_another_plant_says_nothing_of_what_the_one_before_compensated():
+    first = with_plant_in_use(load_rig("demo"), numbered(bowed(contact__spindle_n=1.0)))
+    second = with_plant_in_use(first, numbered(bowed(regulator__command_bow=0.0)))
+    assert not any("spindle-vibration" in note or "command-nonlinearity" in note for note in second.notes)
+
+
+@pytest.mark.parametrize("lost", ['"number": 1, ', '"rig": "demo", ', '"sha256": "', "# provenance"])
+def test_a_sealed_plant_of_which_nobody_knows_where_it_comes_from_is_none(tmp_path, lost):
+    store = PlantStore(tmp_path)
+    store.add(numbered())
+    file = tmp_path / "plants" / "0001.yaml"
+    text = verify_checksum(file.read_bytes()).decode()
+    assert lost in text
+    file.write_bytes(add_checksum(text.replace(lost, "")))
+    with pytest.raises(StoreError, match="E432"):
+        store.load(1)
+
+
+def test_a_plant_with_a_number_that_no_file_can_hold_is_not_stored(tmp_path):
+    store, endless = PlantStore(tmp_path), {"command_bow": BOWED | {"value": inf}}
+    cause = FoundCause(name="command-nonlinearity", confidence=0.99, parameters=endless)
+    with pytest.raises(StoreError, match="E432 plant bowed"):
+        store.add(replace(numbered(), provenance=replace(TOLD, causes=(cause,))))
+    assert store.numbers() == []
 
 
 def test_what_was_diagnosed_from_straightened_readings_comes_on_top_of_what_straightened_them():

@@ -48,9 +48,11 @@ def test_a_closed_port_stays_closed(ear: Any, line: Pty) -> None:
         await port.open()
         line.close()
         await ear.until(lambda: bool(ear.losses))
+        waiting = port._reopening
         port.close()
         port.close()
-        assert port._reopening is None
+        assert port._reopening is None and waiting is not None
+        assert waiting.cancelled()
         assert not port.write(b"x")
 
     asyncio.run(scene())
@@ -75,6 +77,7 @@ def test_reopening_waits_longer_each_time_up_to_two_seconds(
             )
 
         monkeypatch.setattr(loop, "call_later", at_once)
+        name.unlink()  # its number may be another pty's at once, of whoever runs beside this
         line.close()
         await ear.until(lambda: ear.opened[-1] == -1, timeout_s=5.0)
         monkeypatch.undo()
@@ -94,12 +97,12 @@ def test_a_port_that_was_back_is_looked_for_soon_when_it_is_lost_again(ear: Any,
         def at_once(delay_s: float) -> None:
             delays_s.append(delay_s)
             if len(delays_s) == 4:
-                name.unlink()
                 name.symlink_to(other.path)
             asyncio.get_running_loop().call_soon(port._reopen)
 
         port._reopen_after = at_once
         await port.open()
+        name.unlink()
         line.close()
         await ear.until(lambda: len(ear.opened) == 2)
         other.close()

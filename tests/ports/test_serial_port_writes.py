@@ -104,3 +104,62 @@ def test_closing_a_stuck_port_does_not_hang(ear: Any, line: Pty) -> None:
         assert asyncio.get_running_loop().time() - started_s < 1.0
 
     asyncio.run(scene())
+
+
+def filled(port: Any) -> bytes:
+    """Write until some of it waits here; all that was written."""
+    sent = b""
+    while not port._unsent:
+        chunk = len(sent).to_bytes(4) * 250
+        assert port.write(chunk)
+        sent += chunk
+    return sent
+
+
+def test_what_waits_when_the_port_is_closed_is_sent_first(ear: Any, line: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last of it is the safe voltage."""
+    heard = bytearray()
+
+    def listens_meanwhile(readers: list[int], writers: list[int], *rest: Any) -> tuple[list[int], list[int], list[int]]:
+        heard.extend(read_all(line.fd))
+        return [], writers, []
+
+    async def scene() -> bytes:
+        port = ear.port(line.path)
+        await port.open()
+        sent = filled(port) + b"SET 0\r\n"
+        assert port.write(b"SET 0\r\n") and port._unsent
+        monkeypatch.setattr("gateway.ports.serial_port.select.select", listens_meanwhile)
+        port.close()
+        heard.extend(read_all(line.fd))
+        return sent
+
+    assert asyncio.run(scene()) == bytes(heard)
+
+
+def test_who_has_sent_all_asks_for_room_no_more(ear: Any, line: Pty) -> None:
+    """A writable descriptor would wake the loop for ever."""
+
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        sent = filled(port)
+        assert await gather(line.fd, len(sent)) == sent
+        await port.drain()
+        assert not asyncio.get_running_loop().remove_writer(ear.opened[-1])
+        port.close()
+
+    asyncio.run(scene())
+
+
+def test_an_open_port_tells_what_its_adapter_is_slow_at(ear: Any, line: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gateway.ports.serial_port.set_low_latency", lambda descriptor, path: f"W332 {path} waits")
+
+    async def scene() -> None:
+        port = ear.port(line.path)
+        assert port.warning == ""
+        await port.open()
+        assert port.warning == f"W332 {line.path} waits"
+        port.close()
+
+    asyncio.run(scene())

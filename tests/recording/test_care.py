@@ -236,3 +236,26 @@ def test_rows_without_a_setpoint_are_no_changes_of_it(tmp_path: Path) -> None:
     recorder.close()
     (summary,) = list_summaries(tmp_path)
     assert summary["facts"]["setpoint_changes"] == 1
+
+
+@pytest.mark.parametrize("vanishes", ["before it is looked at", "before it is asked for", "before it goes"])
+def test_a_recording_that_somebody_deletes_meanwhile_keeps_no_other_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, vanishes: str
+) -> None:
+    """By the page, or a person at a terminal: there was no pruning for an hour then."""
+    gone, old = record(tmp_path, days_ago=50.0), record(tmp_path, days_ago=40.0)
+    paths = recording_paths(tmp_path)
+    asked = keeping.why_protected
+    times = iter(["before it is asked for", "before it goes"])
+
+    def why(path: Path, reference: str) -> str:
+        if path == gone and next(times) == vanishes:
+            gone.unlink()
+        return asked(path, reference)
+
+    if vanishes == "before it is looked at":
+        gone.unlink()
+    monkeypatch.setattr(keeping, "why_protected", why)
+    monkeypatch.setattr(keeping, "recording_paths", lambda state: paths)
+    assert [one.path for one in prune_recordings(tmp_path, Retention(days=30.0), "")] == [old]
+    assert numbers(tmp_path) == []

@@ -8,6 +8,7 @@ import pytest
 
 from gateway.bsfm.model import Calibration
 from gateway.codes.faults import FaultCode
+from gateway.control import CellMap
 from gateway.recording import Recording, RecordingError, list_recordings, read_recording
 from gateway.registers.words import State
 from gateway.service.replayed_control import ReplaySetup, SignalDifference, compare_decisions, replay_control
@@ -17,15 +18,15 @@ from tests.service.wired import ENABLE, Wired
 
 
 def record_work(state: Path) -> Recording:
-    """Record three levels of force, from OFF to OFF."""
+    """Record some levels of force, from OFF to OFF; commands come between two rows, and one step is shorter than a row."""
     wired = Wired().ready()
     recordings = Recordings(state / "recordings", wired.rig, lambda cause, sentence: None, AtOnce())
     recordings.start()
     wired.loop.recordings = recordings
     wired.run(0.2)
-    for level_n in (20, 35, 10):
-        wired.write(0, ENABLE, level_n * 100)
-        wired.run(1.0)
+    for level_n in (20.0, 35.0, 35.1, 10.0):
+        wired.write(0, ENABLE, round(level_n * 100))
+        wired.run(0.804)
     wired.write(0, 0, 0)
     wired.run(0.2)
     recordings.flush(1e9)
@@ -70,7 +71,7 @@ def test_the_replay_decides_as_the_gateway_did(recording: Recording, own: Replay
     assert found["applied_n"].rms < 1e-6
     assert found["fault_code"].rows == 0
     assert found["state"].rows <= 6
-    assert found["command_v"].rms < 0.15
+    assert found["command_v"].rms < 0.17
     assert np.ptp(recording.columns["command_v"]) > 4.0
 
 
@@ -99,6 +100,54 @@ def test_a_lease_is_no_matter_of_a_replay_and_an_overload_is_one(recording: Reco
     assert not fault[: recording.rows // 2].any() and FaultCode.OVER_FORCE in fault[recording.rows // 2 :]
 
 
+def changed(recording: Recording, at: slice, **values: float) -> Recording:
+    """The same with these values in some rows."""
+    columns = {name: recording.columns[name].copy() for name in values}
+    for name, value in values.items():
+        columns[name][at] = value
+    return replace(recording, columns=recording.columns | columns)
+
+
+def test_behind_a_fault_that_was_reset_there_a_replay_goes_on(recording: Recording, own: ReplaySetup) -> None:
+    n, lasts_s = recording.rows, float(np.ptp(recording.columns["time_s"])) + 0.01
+    failed = changed(recording, slice(n // 2, n // 2 + 10), quality=2.0).columns
+    again = recording.columns | {"time_s": recording.columns["time_s"] + lasts_s, "quality": np.zeros(n)}
+    twice = {name: np.concatenate([failed[name], again[name]]) for name in failed}
+    decided = replay_control(replace(recording, columns=twice, rows=2 * n), own)
+    assert FaultCode.OVER_FORCE in decided["fault_code"][:n]
+    assert not decided["fault_code"][n + n // 4 :].any()
+    assert np.ptp(decided["applied_n"][n:]) > 30.0
+
+
+def test_a_setpoint_that_a_row_does_not_hold_is_that_of_the_row_before(recording: Recording, own: ReplaySetup) -> None:
+    at = slice(recording.rows // 3, recording.rows // 3 + 10)
+    decided = replay_control(changed(recording, at, setpoint_n=np.nan), own)
+    assert not [
+        one
+        for one in compare_decisions(recording.columns["time_s"], replay_control(recording, own), decided)
+        if one.rows
+    ]
+
+
+def test_settings_that_nobody_saw_go_out_are_as_none_recorded(recording: Recording, own: ReplaySetup) -> None:
+    without = replace(recording, columns={k: v for k, v in recording.columns.items() if not k.startswith("sent_")})
+    unseen = changed(recording, slice(None), sent_v=np.nan, sent_age_s=np.nan)
+    decided = [replay_control(one, own) for one in (without, unseen)]
+    assert not [one for one in compare_decisions(recording.columns["time_s"], *decided) if one.rows]
+
+
+def test_the_recorded_force_is_not_straightened_again(recording: Recording, own: ReplaySetup) -> None:
+    bent = replace(own.rig, compensation=replace(own.rig.compensation, cell=CellMap(zero_n=5.0)))
+    decided = [replay_control(recording, setup) for setup in (own, replace(own, rig=bent))]
+    assert not [one for one in compare_decisions(recording.columns["time_s"], *decided) if one.rows]
+
+
+def test_one_row_is_no_recording(recording: Recording, own: ReplaySetup) -> None:
+    row = replace(recording, columns={name: values[:1] for name, values in recording.columns.items()}, rows=1)
+    with pytest.raises(RecordingError, match="has 1 rows"):
+        replay_control(row, own)
+
+
 @pytest.mark.parametrize("rows", [1, None])
 def test_a_recording_of_a_run_is_refused(recording: Recording, own: ReplaySetup, rows: int | None) -> None:
     """Also of one that is a part of it."""
@@ -117,9 +166,18 @@ def test_a_table_without_the_gateways_columns_is_refused(recording: Recording, o
 
 def test_the_largest_difference_is_told_with_its_sign_and_time() -> None:
     time_s = np.array([5.0, 5.1, 5.2])
-    one = {"command_v": np.array([1.0, 2.0, 3.0]), "state": np.array([0.0, 1.0, 1.0])}
-    other = {"command_v": np.array([1.0, 1.0, 3.5]), "state": np.array([0.0, 1.0, 4.0])}
+    one = {
+        "command_v": np.array([1.0, 2.0, 3.0]),
+        "state": np.array([0.0, 1.0, 1.0]),
+        "trim_v": np.array([1.0, 1.0, 1.0]),
+    }
+    other = {
+        "command_v": np.array([1.0, 1.0, 3.5]),
+        "state": np.array([0.0, 1.0, 4.0]),
+        "trim_v": np.array([np.nan, 1.0, 1.5]),
+    }
     found = by_signal(compare_decisions(time_s, one, other))
+    assert (found["trim_v"].rows, found["trim_v"].largest) == (1, 0.5), "what only one of them knows is no difference"
     assert found["command_v"].largest == -1.0
     assert found["command_v"].at_s == pytest.approx(0.1)
     assert found["command_v"].rms == pytest.approx(np.sqrt(1.25 / 3))

@@ -183,6 +183,7 @@ class ForceLoop:
         self._trim.reset()
         self._settling.restart()
         self._approach, self.feedforward_v, self.limited_by = Approach(), 0.0, LimitedBy.NONE
+        self._was_touching = False  # or the next contact, which is still to come, would count as lost
 
     def step(self, demand: Demand, inputs: LoopInputs) -> Moved:
         """Make one step towards the demand."""

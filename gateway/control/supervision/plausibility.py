@@ -118,6 +118,7 @@ class RiseCheck:
         self.smooth_n -= moved_n
         self._behind_n -= moved_n
         self._at_rest_n -= moved_n
+        self._base_n = min(self._at_rest_n, self._threshold_n)
 
     def judge(self, response: "ExpectedForce", branch_share: float, touching: bool, interval_s: float) -> FaultCode:
         """Judge one new sample against the rise that the model expects at this branch share."""

@@ -3,9 +3,11 @@
 Whoever records holds a lock on the file; the kernel ends it with the process. What is kept has a file NNNN.keep beside it.
 """
 
+import contextlib
 import fcntl
 import os
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -70,15 +72,30 @@ class Prunable:
 
 def choose_prunable(paths: list[Path], retention: Retention, reference: str, now_s: float) -> list[Prunable]:
     """Return the recordings that the limits have no room for, the oldest first. now_s: of the epoch."""
-    statuses = sorted(((path.stat(), path) for path in paths), key=lambda pair: (pair[0].st_mtime, pair[1].name))
+    statuses = sorted(_statuses(paths), key=lambda pair: (pair[0].st_mtime, pair[1].name))
     total, chosen = sum(status.st_size for status, _ in statuses), []
     for status, path in statuses:
         age_s = now_s - status.st_mtime if status.st_mtime >= _CLOCK_SET_S else None
         why = _why_it_goes(age_s, total, retention)
-        if why and now_s - status.st_mtime > _CLOSED_S and not why_protected(path, reference):
+        if why and now_s - status.st_mtime > _CLOSED_S and _may_go(path, reference):
             chosen.append(Prunable(path, status.st_size, why))
             total -= status.st_size
     return chosen
+
+
+def _statuses(paths: list[Path]) -> Iterator[tuple[os.stat_result, Path]]:
+    """Of those that are there still: the page, or somebody at a terminal, may delete at the same time."""
+    for path in paths:
+        with contextlib.suppress(FileNotFoundError):
+            yield path.stat(), path
+
+
+def _may_go(path: Path, reference: str) -> bool:
+    """What has gone already need not go."""
+    try:
+        return not why_protected(path, reference)
+    except FileNotFoundError:
+        return False
 
 
 def _why_it_goes(age_s: float | None, total_bytes: int, retention: Retention) -> str:
@@ -129,6 +146,8 @@ def prune_recordings(state: Path, retention: Retention, reference: str) -> list[
         try:
             if not delete_recording(one.path, reference):
                 gone.append(one)
+        except FileNotFoundError:
+            continue
         except OSError as error:
             refusals.append(error)
     if refusals and not gone:

@@ -120,3 +120,26 @@ def test_a_smaller_force_within_the_contact_ramp_is_gone_down_to_by_the_force_ra
     applied_n = contact(2.0, *[(False, 40.0)] * 20, *[(True, 40.0)] * 100, *[(True, 5.0)] * 60)
     assert applied_n[119] > 15.0 and applied_n[-1] == pytest.approx(5.0)
     assert all(later <= earlier for earlier, later in pairwise(applied_n[119:]))
+
+
+def test_behind_a_reset_nothing_of_the_force_before_is_still_on_its_way() -> None:
+    law = Feedforward(bsfm(), settings().limits, 0.1, delay_s=0.1)
+    for _ in range(100):
+        law.advance(30.0, 100.0, 0.01)
+    law.reset()
+    expected_n = []
+    for _ in range(20):
+        law.advance(10.0, 20.0, 0.01)
+        expected_n.append(law.reference_n)
+    assert max(expected_n) <= law.applied_n and expected_n[9] == 0.0
+
+
+def test_a_path_ends_with_the_output_that_it_was_for() -> None:
+    law, goal_n = Feedforward(bsfm(), settings().limits, 0.1, ahead_s=0.15), 20.0
+    for _ in range(30):
+        goal_n += 0.1
+        law.advance(goal_n, 500.0, 0.01)
+    assert law.aimed_n > goal_n + 1.0
+    law.reset()
+    law.advance(goal_n, 1.0e4, 0.01)
+    assert law.aimed_n == pytest.approx(goal_n)

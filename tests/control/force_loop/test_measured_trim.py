@@ -189,3 +189,19 @@ def test_it_stays_within_its_limit_and_says_so():
     assert one.value_n == pytest.approx(0.2 * SLOPE_N_PER_V)
     assert one.take_volts(0.3) == 0.2
     assert one.limited_by is LimitedBy.TRIM_RANGE
+
+
+def test_what_was_learned_either_way_and_its_limit_are_forgotten_by_a_reset():
+    one, way = trim(limit_v=0.1), 1.0
+    for _ in range(4):
+        one.travel(3.0 * way)
+        held(one, 3.0 - one.value_n, 3.0)
+        way = -way
+    one.travel(1.5 * way)
+    assert one.value_n > 0.5
+    held(one, 3.0, 1.0)
+    assert one.limited_by is LimitedBy.TRIM_RANGE
+    one.reset()
+    assert one.limited_by is LimitedBy.NONE
+    one.travel(2.0)
+    assert one.value_n == 0.0

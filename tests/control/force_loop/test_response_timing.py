@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gateway.bsfm.model import Response
-from gateway.control import CalibrationInUse, Trim
+from gateway.control import CalibrationInUse, LineStatus, Trim
+from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.force_loop.lag_inverse import LagInverse
 from gateway.control.force_loop.response_timing import timing_of
 from gateway.control.settings import ResponseSource
@@ -136,3 +137,41 @@ def test_a_trim_of_gain_nothing_stays_off():
     bench.enable(20.0)
     bench.run(3.0)
     assert all(record.output.trim_v == 0.0 for record in bench.history)
+
+
+def test_what_the_trim_takes_of_an_error_is_taken_off_what_is_still_expected_of_it():
+    bench, told_n = pressing(Response(dead_time_s=0.03, lag_s=0.08), gain_n_per_v=6.6), []
+    trim, estimate = bench.controller._loop._trim, bench.controller._loop._transient
+    bench.force(30.0)
+    bench.run(0.3)
+    correct, before_n = estimate.correct, trim.value_n
+    estimate.correct = lambda change_n: (told_n.append(change_n), correct(change_n))
+    bench.run(1.0)
+    assert abs(trim.value_n - before_n) > 0.1
+    assert sum(told_n) == pytest.approx(trim.value_n - before_n)
+
+
+def test_what_is_still_within_a_long_dead_time_is_not_learned():
+    bench = Bench(settings(), gain_n_per_v=7.12, delay_s=0.25, lag_s=0.05, noise_n=0.03)
+    bench.controller.use(CalibrationInUse(bsfm(), 1, Response(dead_time_s=0.265, lag_s=0.05)))
+    bench.run(0.1)
+    bench.enable(20.0)
+    bench.run(3.0)
+    for force_n in (23.0, 26.0, 29.0, 26.0, 23.0):
+        bench.history.clear()
+        bench.force(force_n)
+        bench.run(0.5)
+        assert max(abs(record.output.trim_v) for record in bench.history) < 0.2
+        bench.run(1.0)
+
+
+def test_a_response_that_comes_later_is_expected_as_one_from_the_start():
+    timed = timing_of(Response(dead_time_s=0.2, lag_s=0.3), settings())
+    later, first = ForceLoop(settings(), bsfm()), ForceLoop(timed, bsfm())
+    later.use(bsfm(), 0.0, timed)
+    for loop in (later, first):
+        for _ in range(10):
+            loop.drive_run(4.0, 1.0)
+            loop.elapse(0.01, LineStatus())
+    assert 0.0 < first.expected_n < 0.5 * bsfm().force_n(2.0, 1.0)
+    assert later.expected_n == first.expected_n

@@ -8,7 +8,7 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.devices.messages import ForceSample
 from gateway.registers.words import State
-from tests.control.bench import Bench, settings
+from tests.control.bench import Bench, has_fault, settings
 from tests.faults.test_control_reactions import pressing
 
 
@@ -48,3 +48,18 @@ def test_a_cell_that_repeats_itself_while_the_force_must_move_is_found_however_m
     bench.run(2.0)
     assert bench.last.fault is FaultCode.SAMPLE_FROZEN
     assert any("while the force must have changed" in event for event in bench.events)
+
+
+def test_what_the_loop_has_told_as_frozen_teaches_nothing_however_long_it_went_on() -> None:
+    bench = Bench(seed=3, noise_n=0.12)
+    bench.run(1.0)
+    for _ in range(2):
+        bench.enable(12.0)
+        bench.run(6.0)
+        bench.cell_frozen = True
+        assert bench.seconds_until(has_fault(FaultCode.SAMPLE_FROZEN), 3.0) <= 2.0
+        bench.run(20.0)
+        bench.cell_frozen = False
+        bench.run(1.0)
+        bench.reset()
+        assert bench.last.state is State.OFF

@@ -59,3 +59,25 @@ def test_the_lags_are_driven_by_what_the_wire_has_taken() -> None:
     assert loop._lead.first_v == pytest.approx(2.0 * (1.0 - exp(-1.0)))
     loop.elapse(0.1, LineStatus())
     assert loop._lead.first_v == pytest.approx(2.0 * (1.0 - exp(-1.0)) * exp(-1.0))
+
+
+@pytest.mark.parametrize("rate_n_per_s", [0.0, 3.0])
+@pytest.mark.parametrize("offset_n", [-12.0, 12.0])
+def test_behind_a_tare_a_force_that_rises_is_told_from_one_that_stays_as_before(
+    offset_n: float, rate_n_per_s: float
+) -> None:
+    judged = []
+    for off_n in (0.0, offset_n):
+        check, expected = RiseCheck(contact_threshold_n=1.0), ExpectedForce(bsfm(), 0.01, rest_v=0.0)
+        for _ in range(100):
+            check.smooth(RESTING._replace(cell_n=off_n))
+        check.shift(off_n)
+        check.start()
+        expected.advance(4.0, 10.0)
+        course = []
+        for k in range(100):
+            check.smooth(RESTING._replace(cell_n=1.5 + rate_n_per_s * 0.01 * k))
+            course.append(check.judge(expected, 1.0, touching=True, interval_s=0.01))
+        judged.append(course)
+    assert FaultCode.GAIN_WRONG in judged[0]
+    assert judged[1] == judged[0]

@@ -11,6 +11,7 @@ from gateway.control import CalibrationInUse, Controller
 from gateway.devices.messages import ForceSample, Quality
 from gateway.recording import list_recordings
 from gateway.recording.label import RecordingLabel, label_of
+from gateway.recording.recorder import sync_recording
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS, row_of
 from gateway.service.running_rig.recordings import LONGEST_S, Recordings
@@ -185,3 +186,18 @@ def test_whoever_begins_one_in_vain_leaves_it_waiting_for_room(
     recordings.flush(1000.0)
     assert recordings.status()["recording"]
     recordings.stop()
+
+
+def test_what_was_deleted_while_it_is_synced_need_not_outlive_a_power_cut(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def delete_first(path: Path) -> None:
+        path.unlink(missing_ok=True)
+        sync_recording(path)
+
+    monkeypatch.setattr("gateway.service.run_recording.sync_recording", delete_first)
+    log = Log()
+    recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())
+    recordings.start()
+    recordings.stop()
+    assert not [line for line in log if "power cut" in line]

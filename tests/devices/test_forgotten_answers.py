@@ -1,0 +1,38 @@
+"""An output that was lost owes no answer, and what is asked of one that has nothing to do."""
+
+import pytest
+
+from gateway.devices import DeviceRole, output_device, output_host
+from gateway.devices.messages import Accepted, Garbage, ReadPressure, ReadVoltage, SetVoltage
+from gateway.profiles import list_shipped
+from tests.profile_files import load_device
+
+OUTPUTS = [name for name in list_shipped("device") if load_device(name).role is DeviceRole.OUTPUT]
+
+
+@pytest.mark.parametrize("name", OUTPUTS)
+def test_an_answer_to_what_was_asked_before_a_loss_is_none(name: str) -> None:
+    profile = load_device(name)
+    host, device = output_host(profile), output_device(profile)
+    (asked, *_) = device.receive(host.request(SetVoltage(2.0)), 0.0)
+    answer = device.reply(Accepted(2.0), to=asked)
+    host.forget()
+    assert not any(isinstance(one, Accepted) for one in host.receive(answer, 0.0))
+
+
+@pytest.mark.parametrize("name", ["smc-itv-rc", "icpdas-702x"])
+def test_half_an_answer_of_before_a_loss_is_no_part_of_the_next_line(name: str) -> None:
+    host = output_host(load_device(name))
+    host.request(SetVoltage(2.0))
+    terminator = load_device(name).terminator_bytes
+    host.receive(b"half", 0.0)
+    host.forget()
+    (garbage,) = host.receive(b"whole" + terminator, 0.0)
+    assert isinstance(garbage, Garbage) and garbage.data.startswith(b"whole")
+
+
+@pytest.mark.parametrize("name", OUTPUTS)
+def test_an_idle_output_is_asked_for_its_pressure_else_for_its_setting_else_for_nothing(name: str) -> None:
+    profile = load_device(name)
+    expected = ReadPressure() if profile.read_pressure else ReadVoltage() if profile.read_voltage else None
+    assert output_host(profile).idle_question == expected

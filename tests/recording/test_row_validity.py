@@ -1,0 +1,148 @@
+"""Which rows may be judged: by what a quality column means, by readings that were renewed, by times that can be believed."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gateway.recording import Recording, RecordingError
+from gateway.recording.foreign.time_stamps import parse_stamp, seconds_from_stamps
+from gateway.recording.tables.row_validity import flag_repeated, valid_by_quality
+from gateway.recording.tables.time_axis import check_time_axis
+
+
+def quality(*counts: tuple[float, int]) -> np.ndarray:
+    return np.concatenate([np.full(count, value) for value, count in counts])
+
+
+@pytest.mark.parametrize(
+    ("column", "is_ours", "valid", "words"),
+    [
+        (quality((0.0, 50), (1.0, 40), (2.0, 10)), True, 90, "10 rows are not judged: overload or unknown"),
+        (quality((0.0, 5), (1.0, 95)), True, 100, ""),
+        (quality((0.0, 5), (1.0, 95)), False, 95, "5 rows are not judged: quality is not 1"),
+        (quality((0.0, 95), (1.0, 5)), False, 95, "5 rows are not judged: quality is not 0"),
+        (quality((192.0, 90), (0.0, 10)), False, 90, "10 rows are not judged: quality is not 192"),
+        (quality((0.0, 60), (1.0, 30), (2.0, 10)), False, 90, "10 rows are not judged: overload or unknown"),
+        (quality((0.0, 50), (1.0, 50)), False, 100, ""),
+        (quality((0.0, 98), (np.nan, 2)), True, 98, "2 rows are not judged: overload or unknown"),
+        (quality((np.nan, 10)), False, 10, "quality holds no numbers and was not used"),
+        (np.arange(20.0) % 9, False, 20, "quality takes 9 values: no flag"),
+        (np.tile(np.append(np.zeros(93), np.arange(1.0, 8.0)), 1), False, 93, "7 rows are not judged"),
+    ],
+)
+def test_what_a_quality_column_means_is_told_by_whose_it_is_and_by_what_is_usual(
+    column: np.ndarray, is_ours: bool, valid: int, words: str
+) -> None:
+    flags, notes = valid_by_quality(column, is_ours)
+    assert int(flags.sum()) == valid
+    assert notes == [] if not words else words in notes[0]
+
+
+def walk(rows: int, sigma: float, seed: int = 1) -> np.ndarray:
+    """A force in counts of 0.1 N that moves by some of them from row to row, from 20 N on."""
+    steps = np.round(np.random.default_rng(seed).normal(0.0, sigma, rows))
+    return 20.0 + 0.1 * np.cumsum(steps)
+
+
+def logged_twice(force_n: np.ndarray, every: int) -> np.ndarray:
+    force_n = force_n.copy()
+    force_n[every::every] = force_n[every - 1 :: every][: force_n[every::every].size]
+    return force_n
+
+
+@pytest.mark.parametrize("sigma", [1.2, 20.0])
+def test_readings_that_were_logged_twice_are_found_and_those_of_a_coarse_converter_are_not(sigma: float) -> None:
+    force_n = walk(4000, sigma)
+    assert not flag_repeated(force_n)[0].any()
+    flags, notes = flag_repeated(logged_twice(force_n, 3))
+    assert flags.sum() > 1000 and "logged twice, or not renewed" in notes[0]
+    assert np.flatnonzero(flags)[0] > 0
+
+
+@pytest.mark.parametrize("force_n", [np.zeros(0), np.ones(1), np.full(100, np.nan), np.full(100, 5.0)])
+def test_a_force_that_does_not_move_repeats_itself_by_right(force_n: np.ndarray) -> None:
+    flags, notes = flag_repeated(force_n)
+    assert flags.size == force_n.size and not flags.any() and notes == []
+
+
+def test_two_or_three_equal_readings_are_chance() -> None:
+    force_n = np.random.default_rng(2).normal(20.0, 1.0, 400)
+    force_n[100:102] = force_n[99]
+    assert not flag_repeated(force_n)[0].any()
+
+
+def timed(*stamps_s: float) -> Recording:
+    columns = {"time_s": np.array(stamps_s)}
+    return Recording(
+        Path("a.csv"), {}, columns, len(stamps_s), False, (), lines=range(2, 2 + len(stamps_s)), suggestion=""
+    )
+
+
+def test_of_rows_with_one_stamp_the_last_stays_and_rounding_is_no_way_back() -> None:
+    axis = check_time_axis(timed(0.0, 0.1, 0.1, 0.2 + 5e-10, 0.2, 0.3))
+    assert axis.kept.tolist() == [0, 2, 4, 5]
+    assert "2 rows repeat the time stamp before" in axis.notes[0]
+    with pytest.raises(RecordingError, match="time runs backwards"):
+        check_time_axis(timed(0.0, 0.1, 0.1 - 1e-6, 0.2))
+
+
+@pytest.mark.parametrize(("unknown", "is_refused"), [(2, False), (3, True)])
+def test_a_fifth_of_the_times_may_be_unknown(unknown: int, is_refused: bool) -> None:
+    recording = timed(*[np.nan] * unknown, *(0.1 * k for k in range(10 - unknown)))
+    if is_refused:
+        with pytest.raises(RecordingError, match="not a time"):
+            check_time_axis(recording)
+    else:
+        assert f"{unknown} rows without a time" in check_time_axis(recording).notes[0]
+
+
+@pytest.mark.parametrize(("step_s", "unit"), [(2.0, "ms"), (999.0, "ms"), (1000.0, "us")])
+def test_rows_that_are_too_far_apart_are_refused_with_the_unit_that_they_look_like(step_s: float, unit: str) -> None:
+    with pytest.raises(RecordingError, match=rf"Are the times in {unit}\?"):
+        check_time_axis(timed(*(step_s * k for k in range(10))))
+
+
+@pytest.mark.parametrize(("step_s", "is_asked"), [(0.9, False), (1.0, True), (1.9, True)])
+def test_rows_of_a_second_are_asked_for_their_unit(step_s: float, is_asked: bool) -> None:
+    notes = check_time_axis(timed(*(step_s * k for k in range(10)))).notes
+    assert any("are the times in ms?" in note for note in notes) is is_asked
+
+
+def test_behind_a_gap_half_a_second_is_not_judged() -> None:
+    times_s = np.concatenate([0.01 * np.arange(100), 2.0 + 0.01 * np.arange(100)])
+    axis = check_time_axis(timed(*times_s))
+    assert np.flatnonzero(axis.after_gap).tolist() == list(range(100, 150))
+    late = replace(timed(*times_s), columns={"time_s": np.where(times_s < 1.0, times_s, times_s - 0.95)})
+    assert not check_time_axis(late).after_gap.any(), "a pause of less than ten rows is none"
+
+
+def test_gaps_are_told_with_their_number_length_and_place() -> None:
+    times_s = np.concatenate([0.01 * np.arange(100), 2.0 + 0.01 * np.arange(100), 9.0 + 0.01 * np.arange(100)])
+    (note,) = check_time_axis(timed(*times_s)).notes
+    assert note.startswith("2 gaps in time (the longest 6.01 s, at 0.990 s the first): 100 rows up to 0.5 s")
+
+
+def test_one_row_and_none_have_a_time_axis_too() -> None:
+    assert check_time_axis(timed(7.0)).time_s.tolist() == [0.0]
+    assert check_time_axis(timed()).time_s.size == 0
+    assert check_time_axis(timed(7.0, 8.5)).time_s.tolist() == [0.0, 1.5]
+
+
+@pytest.mark.parametrize(
+    "stamp", ["2026-01-01T12:00:00+02:00", "2026-01-01T05:30:00-04:30", "2026-01-01 10:00:00", "2026-01-01T10:00:00Z"]
+)
+def test_the_zone_of_a_stamp_counts_either_way(stamp: str) -> None:
+    assert parse_stamp(stamp) == parse_stamp("2026-01-01T10:00:00.000")
+
+
+@pytest.mark.parametrize("cell", ["12.5", "-", "1e-3", "2026-13-45T10:00:00", "noon", ""])
+def test_what_is_no_stamp_is_none(cell: str) -> None:
+    assert parse_stamp(cell) is None
+
+
+def test_clocks_that_pass_midnight_go_on_and_stamps_that_nobody_knows_stay_unknown() -> None:
+    clocks = np.array([parse_stamp(clock) for clock in ("23:59:59.5", "00:00:00.5", "00:00:01.5")], dtype=float)
+    assert np.diff(seconds_from_stamps(clocks)) == pytest.approx([1.0, 1.0])
+    assert np.isnan(seconds_from_stamps(np.full(3, np.nan))).all()

@@ -1,0 +1,53 @@
+"""A value at the very end of what a rig allows is taken, in a word as in a float; one beyond is told with the range."""
+
+import struct
+
+import pytest
+
+from gateway.codes.refusals import RefusalReason
+
+FORCE, FORCE_FLOAT, MODE_FLOAT, PRECONTACT = 1, 202, 206, 7
+
+
+def test_the_least_force_of_a_rig_and_0_are_taken_in_words_and_floats(make_bank, master_of):
+    """2.1 N is no float32: the nearest one is a little less, and is what a master sends."""
+    master = master_of(make_bank(setpoint_min_n=2.1), "10.0.0.1")
+    for word in (210, 0, 6000):
+        master.write(FORCE, word)
+        assert master.word(FORCE) == word
+    for force_n in (2.1, 0.0, 60.0):
+        master.write_float(FORCE_FLOAT, force_n)
+        assert master.float(FORCE_FLOAT) == pytest.approx(force_n)
+    master.write(PRECONTACT, 100)
+    assert master.word(PRECONTACT) == 100, "the least is that of the force to hold"
+    for act, value in ((master.write, 209), (master.write_float, 2.09)):
+        refused = master.refusal(act, FORCE if act == master.write else FORCE_FLOAT, value)
+        assert "allowed 0 and 2.1 .. 60 N" in refused.sentence
+
+
+def test_a_rig_with_all_of_the_maps_force_has_its_own_least(make_bank, master_of):
+    master = master_of(make_bank(force_max_n=400.0, setpoint_min_n=2.0), "10.0.0.1")
+    master.write(FORCE, 32767)
+    assert "allowed 0 and 2 .. 327.67 N (rig demo)" in master.refusal(master.write, FORCE, 199).sentence
+
+
+def test_the_largest_force_in_swapped_words_is_known_as_that(make_bank, master_of):
+    master = master_of(make_bank(), "10.0.0.1")
+    refused = master.refusal(master.write_float_cdab, FORCE_FLOAT, 60.0)
+    assert refused.reason is RefusalReason.WORDS_SWAPPED and "with the words swapped 60.00 N" in refused.sentence
+
+
+def test_a_mode_that_is_no_number_is_refused_as_any_other_value(make_bank, master_of):
+    """Also where its words the other way round were a mode."""
+    master = master_of(make_bank(), "10.0.0.1")
+    assert master.refusal(master.write_float, MODE_FLOAT, float("nan")).reason is RefusalReason.NOT_FINITE
+    (swapped,) = struct.unpack(">f", struct.pack(">HH", 0x7FC0, 0x3F80))
+    refused = master.refusal(master.write_float, MODE_FLOAT, swapped)
+    assert refused.reason is RefusalReason.WORDS_SWAPPED and "nan" in refused.sentence
+
+
+def test_a_limit_is_told_with_what_has_set_it(make_bank, master_of):
+    master = master_of(make_bank(force_source="calibration 3", voltage_max_v=8.0), "10.0.0.1")
+    assert "(calibration 3)" in master.refusal(master.write, FORCE, 6001).sentence
+    assert "(rig demo)" in master.refusal(master.write, 5, 8001).sentence
+    assert "(map force-v1)" in master.refusal(master.write, 8, 10001).sentence

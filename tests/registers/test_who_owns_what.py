@@ -1,0 +1,117 @@
+"""Ownership by itself, and what a bank tells beside its registers: the state that runs, refusals, what is left of a command."""
+
+from collections.abc import Callable
+
+import pytest
+
+from gateway.registers import Status
+from gateway.registers.words import ControlBit, State, StatusBit
+from gateway.registers.writes.ownership import (
+    LARGEST_SERIAL_PLACE,
+    NOT_IPV4,
+    Ownership,
+    ip_number,
+    serial_host,
+    serial_place,
+)
+
+COMMANDS, COMMANDS_NOTHING = (
+    {"takes_over": False, "stops": False, "asks": True},
+    {"takes_over": False, "stops": False, "asks": False},
+)
+TAKES_OVER = {"takes_over": True, "stops": False, "asks": True}
+
+
+def test_who_took_over_owns_until_it_stops_and_who_only_commanded_until_it_commands_nothing() -> None:
+    explicit, plain = Ownership(None), Ownership(None)
+    explicit.settle("a", **TAKES_OVER)
+    for _ in range(2):
+        explicit.settle("a", **COMMANDS)
+        plain.settle("a", **COMMANDS)
+    assert (explicit.owner, plain.owner) == ("a", "a")
+    for one in (explicit, plain):
+        one.settle("a", **COMMANDS_NOTHING)
+    assert (explicit.owner, plain.owner) == ("a", None)
+    explicit.settle("a", takes_over=False, stops=True, asks=False)
+    assert explicit.owner is None
+    explicit.settle("a", **COMMANDS)
+    explicit.settle("a", **COMMANDS_NOTHING)
+    assert explicit.owner is None, "a takeover of before the stop is over"
+
+
+def test_the_owner_that_a_rig_names_may_say_so_and_no_other_one() -> None:
+    named, free = Ownership("a"), Ownership(None)
+    assert [named.may_take_over(host) for host in "ab"] == [True, False]
+    assert [free.may_take_over(host) for host in "ab"] == [True, True]
+    named.release()
+    assert named.owner == "a"
+
+
+@pytest.mark.parametrize(
+    ("host", "place"),
+    [
+        (serial_host(1), 1),
+        (serial_host(LARGEST_SERIAL_PLACE), LARGEST_SERIAL_PLACE),
+        (serial_host(LARGEST_SERIAL_PLACE + 1), None),
+        *[(host, None) for host in ("serial:0", "serial:01", "serial:", "serial:x", "1", "10.0.0.1", "certificate 1")],
+    ],
+)
+def test_a_serial_face_is_known_by_its_place_alone(host: str, place: int | None) -> None:
+    assert serial_place(host) == place
+    if place is not None:
+        assert ip_number(host) == place
+    elif not host[0].isdecimal():
+        assert ip_number(host) == NOT_IPV4
+
+
+def test_a_gateway_runs_unless_a_fault_is_latched(bank) -> None:
+    for state, word, runs in ((State.OFF, 0, True), (State.FAULT, StatusBit.FAULT, False), (State.OFF, 0, True)):
+        bank.publish(Status(state=state, status_word=int(word)))
+        assert bank.server_id.is_running is runs
+
+
+@pytest.mark.parametrize(("address", "word"), [(0, 1), (1, 1200), (5, 3000)])
+def test_whatever_alone_is_left_of_a_command_goes_with_it(bank, master, address: int, word: int) -> None:
+    """A setpoint that waits would be the next enable's."""
+    master.write(address, word)
+    assert master.word(address) == word
+    bank.clear_command()
+    assert [master.word(at) for at in (0, 1, 5)] == [0, 0, 0]
+    assert (bank.command.control_word, bank.command.force_setpoint_n, bank.command.voltage_setpoint_v) == (0, 0.0, 0.0)
+
+
+def test_each_refused_write_is_told_to_who_audits_and_a_refused_read_is_not(bank, master) -> None:
+    refused: list[int] = []
+    bank.on_refused_write = lambda refusal, peer: refused.append(refusal.address)
+    acts: list[tuple[Callable[..., None], tuple[object, ...]]] = [
+        (master.write, (1, 6001)),
+        (lambda: bank.write_bits(100, [True], master.peer), ()),
+        (lambda: bank.mask_write(100, 0, 1, master.peer), ()),
+        (lambda: bank.read_registers(9000, 1, master.peer), ()),
+    ]
+    for act, arguments in acts:
+        master.refusal(act, *arguments)
+    assert refused == [1, 100, 100]
+
+
+def test_an_owner_that_takes_over_what_it_owns_keeps_it_when_it_commands_nothing(bank, master) -> None:
+    master.write(1, 1200)
+    master.write(0, int(ControlBit.TAKE_OWNERSHIP))
+    master.write(1, 0)
+    assert bank.owner == "10.0.0.1"
+
+
+def test_the_watchdogs_that_are_shown_can_be_read(bank, master, register_map) -> None:
+    register = register_map.find("watchdogs")
+    for word in (3, 0):
+        bank.show_watchdogs(word)
+        assert master.word(register.address) == word
+
+
+def test_a_stop_leaves_no_bit_of_the_control_word(make_bank, master_of) -> None:
+    bank = make_bank(supported_bits=ControlBit.ENABLE | ControlBit.VALVE_PULL)
+    owner = master_of(bank, "10.0.0.1")
+    pull = int(ControlBit.VALVE_PULL)
+    owner.write(0, int(ControlBit.ENABLE) | pull, 1200)
+    owner.write(0, pull)
+    assert (owner.word(0), owner.word(1)) == (0, 0) and bank.command.stops

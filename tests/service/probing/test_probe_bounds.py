@@ -1,0 +1,104 @@
+"""How a probe decides: what counts as an answer, how long it waits for one, at which speed it begins."""
+
+import asyncio
+from collections.abc import Callable
+
+import pytest
+
+from gateway.devices import ValveDevice, ValveDirection, cell_device, output_device
+from gateway.devices.messages import ReadPressure
+from gateway.devices.profile import DeviceRole
+from gateway.profiles import list_shipped, load_device
+from gateway.service.probing import port_probe
+from gateway.service.probing.harmless_questions import HarmlessQuestion, count_readings, harmless_questions
+from gateway.service.probing.port_probe import _asked, _settings_to_try, _streamed
+
+STREAM = load_device("stream-st-gs")
+LINE = cell_device(STREAM, None).frame(5.0)
+
+
+class FakeEar:
+    """answers: of each question put, the bytes that come; waited_s: how long each would have been waited for."""
+
+    def __init__(self, answers: Callable[[bytes], bytes] = lambda data: b"", took_s: float = 0.0) -> None:
+        self.received, self.now_s, self.waited_s = b"", 0.0, list[float]()
+        self._answers, self._took_s = answers, took_s
+
+    async def ask(self, question: HarmlessQuestion, timeout_s: float) -> str:
+        self.now_s += self._took_s
+        self.waited_s.append(timeout_s)
+        self.received = self._answers(question.data)
+        return question.understands(self.received)
+
+    async def listen(self, duration_s: float) -> None:
+        self.now_s += duration_s
+
+
+@pytest.mark.parametrize(
+    ("received", "count"),
+    [(LINE * 4, 4), (LINE * 4 + b"\xff?\r\n" * 3, 4), (LINE * 4 + b"\xff?\r\n" * 9, 0), (b"", 0)],
+)
+def test_where_more_makes_no_sense_than_makes_some_it_is_no_stream(received: bytes, count: int) -> None:
+    assert count_readings(STREAM, received) == count
+
+
+@pytest.mark.parametrize(("lines", "is_told"), [(2, False), (3, True)])
+def test_two_readings_alone_are_no_stream(lines: int, is_told: bool) -> None:
+    assert (_streamed(STREAM, STREAM.serial, LINE * lines, 0.25) is not None) is is_told
+
+
+@pytest.mark.parametrize("baud", [300, 9600])
+@pytest.mark.parametrize("patience_s", [0.0, 3.0])
+def test_an_answer_is_waited_for_as_long_as_device_wire_and_person_allow(baud: int, patience_s: float) -> None:
+    profile, ear = load_device("smc-itv-rc"), FakeEar()
+    settings = profile.serial.at(baud)
+    asyncio.run(_asked(ear, profile, settings, patience_s, []))  # type: ignore[arg-type]
+    assert ear.waited_s
+    assert min(ear.waited_s) >= max(patience_s, profile.reply_timeout_s + 40 * settings.character_s)
+
+
+def test_a_question_takes_as_long_as_one_of_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    profile = load_device("icpdas-702x")
+    ear = FakeEar(lambda data: b"!017021\r", took_s=0.02)
+    monkeypatch.setattr(port_probe, "monotonic_s", lambda: ear.now_s)
+    found = asyncio.run(_asked(ear, profile, profile.serial, 0.0, []))  # type: ignore[arg-type]
+    assert found and (found.took_s, found.rate_hz) == (pytest.approx(0.02), pytest.approx(50.0))
+
+
+def test_a_cell_that_says_what_it_is_is_asked_for_a_reading_too() -> None:
+    profile = load_device("adam-4016")
+    identity, reading = harmless_questions(profile)
+    answers: dict[bytes, bytes] = {identity.data: b"!014016\r", reading.data: cell_device(profile, "N").frame(12.345)}
+    found = asyncio.run(_asked(FakeEar(answers.__getitem__), profile, profile.serial, 0.0, []))  # type: ignore[arg-type]
+    assert found and found.said == "it says that it is 4016, reads 12.345"
+    answers[reading.data] = b""
+    assert asyncio.run(_asked(FakeEar(answers.__getitem__), profile, profile.serial, 0.0, [])) is None  # type: ignore[arg-type]
+
+
+def test_the_profiles_own_speeds_come_first_and_each_is_tried_once() -> None:
+    profiles = [load_device("stream-st-gs"), load_device("icpdas-702x")]
+    tried = list(_settings_to_try(profiles, (9600, 19200, 115200)))
+    assert [settings for settings, _ in tried[:2]] == [profile.serial for profile in profiles]
+    assert len(tried) == len({settings for settings, _ in tried}) == 3
+    assert all(profile.serial.at(settings.baud) == settings for settings, fitting in tried for profile in fitting)
+
+
+@pytest.mark.parametrize("name", list_shipped("device"))
+def test_an_output_is_asked_for_each_value_that_it_can_read_back(name: str) -> None:
+    profile = load_device(name)
+    if profile.role is DeviceRole.OUTPUT:
+        device, questions = output_device(profile), harmless_questions(profile)
+        asked = [request for one in questions for request in device.receive(one.data, 0.0)]
+        assert (ReadPressure() in asked) is (profile.read_pressure is not None)
+
+
+@pytest.mark.parametrize("direction", list(ValveDirection))
+@pytest.mark.parametrize("name", list_shipped("device"))
+def test_a_valve_is_known_by_how_it_stands(name: str, direction: ValveDirection) -> None:
+    profile = load_device(name)
+    if profile.role is DeviceRole.VALVE:
+        (question,) = harmless_questions(profile)
+        device = ValveDevice(profile)
+        assert device.receive(question.data) == [None]
+        assert question.understands(device.reply(None, direction)) == f"stands at {direction.value}"
+        assert question.understands(b"\x00") == ""
