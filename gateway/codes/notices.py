@@ -166,10 +166,11 @@ NOTICES: Final = (
     ),
     Explanation(
         "W360",
-        "trim stands still",
-        "The trim's corrections at one setpoint changed their sign again and again, so it stopped correcting there.",
-        "The slide sticks and slips (dirt, dry seals, side load), or the workpiece moves under the tool.",
-        "Nothing if the force is good enough: the next setpoint starts afresh. Else free and clean the slide, and "
-        "calibrate.",
+        "trim has backed off",
+        "Force or corrections changed their sign at one setpoint again and again, so the trim stands still there, or goes "
+        "slower where its gain is the rig file's.",
+        "The slide sticks and slips (dirt, dry seals, side load), the workpiece moves under the tool, or trim.gain_v_per_n_s "
+        "or lead is too large for this rig.",
+        "Nothing if the force is good enough. Else free and clean the slide, and calibrate, which measures the trim's pace.",
     ),
 )

@@ -25,6 +25,14 @@ def hunting_sentence(force_n: float, turns: int) -> str:
     )
 
 
+def swinging_sentence(force_n: float) -> str:
+    """Return W360 for a trim whose gain the rig file says."""
+    return (
+        f"W360 at {force_n:.1f} N the force swings to both sides: trim.gain_v_per_n_s or lead is too large for this rig, or "
+        "the workpiece moves; the trim goes slower until the output is at rest. `force-gateway calibrate` measures its pace"
+    )
+
+
 def sign_sentence(rise_n: float, expected_n: float) -> str:
     """Return A302 in numbers, and what to do."""
     return fault_sentence(

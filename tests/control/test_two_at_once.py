@@ -189,8 +189,15 @@ def test_a_run_begins_with_nothing_of_the_one_before_and_keeps_its_own_ceiling_u
 
 
 def test_that_the_trim_hunts_is_told_once_each_time_it_begins() -> None:
-    loop, events = SimpleNamespace(is_hunting=False, applied_n=20.0), OneShotEvents(stuck_n=5.0)
+    loop, events = SimpleNamespace(is_hunting=False, is_gain_own=False, applied_n=20.0), OneShotEvents(stuck_n=5.0)
     told = []
     for loop.is_hunting in (False, True, True, True, False, True):
         told.append(bool(events.hunting_event(loop)))  # type: ignore[arg-type]
     assert told == [False, True, False, False, False, True]
+
+
+def test_a_trim_with_the_rig_files_gain_names_it_and_a_measured_one_does_not() -> None:
+    for is_gain_own in (False, True):
+        loop = SimpleNamespace(is_hunting=True, is_gain_own=is_gain_own, applied_n=20.0)
+        told = OneShotEvents(stuck_n=5.0).hunting_event(loop)  # type: ignore[arg-type]
+        assert told.startswith("W360 at 20.0 N ") and ("gain_v_per_n_s" in told) == is_gain_own

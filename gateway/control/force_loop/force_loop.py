@@ -154,8 +154,13 @@ class ForceLoop:
 
     @property
     def is_hunting(self) -> bool:
-        """The trim stands still because its corrections kept changing sign."""
-        return isinstance(self._trim, MeasuredTrim) and self._trim.has_hunted
+        """The trim stands still, or goes slower, because force or corrections kept changing sign."""
+        return self._trim.has_hunted
+
+    @property
+    def is_gain_own(self) -> bool:
+        """The trim's gain is the rig file's, for no response was measured."""
+        return isinstance(self._trim, TrimIntegral)
 
     @property
     def in_band(self) -> bool:

@@ -6,27 +6,52 @@ no limit acting and the target not far ahead. What was learned at one force fade
 and is kept over small steps. Errors within the dead zone are left to stiction: integrating them makes a limit cycle of
 the width of the friction.
 
+A gain that is too large for the rig makes the force swing about its target for good: so each swing after the first few makes
+the pace slower, until the output is at rest again. A swing is an error of SWING_N at least, SEEN_S long, on the other side of
+the same target, CALM_S behind the one before at the most.
+
 Bounds: Trim.gain_v_per_n_s, limit_v, dead_zone_n and memory_n in control/settings.py.
 """
 
 from math import exp
+from typing import Final
 
 from gateway.control.limits import trim_limited
 from gateway.control.settings import Trim
 from gateway.registers.words import LimitedBy
 
+SWING_N: Final = 1.0
+SEEN_S: Final = 0.05  # longer than the noise of a cell
+SEEN_SAMPLES: Final = 3  # the same, of a slow one
+CALM_S: Final = 3.0  # so long between two of them, and it is not the trim that swings
+FREE_SWINGS: Final = 3  # what a step, or a workpiece, may make of it
+SLOWER: Final = 0.6  # pace after each further one
+LEAST_PACE: Final = 0.02
+NEW_TARGET_N: Final = 1.0
+
 
 class TrimIntegral:
-    """value_v is added to the feedforward; limited_by says whether it stands at its limit."""
+    """value_v is added to the feedforward; limited_by says whether it stands at its limit; swings: how often the force has
+    gone from one side of this target to the other."""
 
     def __init__(self, settings: Trim) -> None:
         self._settings = settings
-        self.value_v = 0.0
-        self.limited_by = LimitedBy.NONE
+        self.reset()
+
+    @property
+    def has_hunted(self) -> bool:
+        """Decide whether the force has swung so often that the trim goes slower."""
+        return self._pace < 1.0
 
     def reset(self) -> None:
-        """Forget the correction."""
+        """Forget the correction, and the swings."""
         self.value_v, self.limited_by = 0.0, LimitedBy.NONE
+        self._pace = 1.0
+        self._begin_target()
+
+    def _begin_target(self) -> None:
+        self.swings = self._side = self._beyond_side = self._samples = 0
+        self._beyond_s = self._moved_n = self._since_swing_s = 0.0
 
     def resume(self, value_v: float) -> None:
         """Go on from a correction that another trim has learned."""
@@ -37,10 +62,30 @@ class TrimIntegral:
         if moved_n and self.value_v:
             self.value_v *= exp(-abs(moved_n) / self._settings.memory_n)
             self.limited_by = LimitedBy.NONE
+        self._moved_n += moved_n
+        if abs(self._moved_n) > NEW_TARGET_N:
+            self._begin_target()
 
     def integrate(self, error_n: float, interval_s: float) -> None:
         """Add one sample to the integral. error_n: wanted minus measured; interval_s: since the sample before."""
+        self._count_swings(error_n, interval_s)
         zone_n = self._settings.dead_zone_n
         beyond_n = error_n - max(-zone_n, min(zone_n, error_n))
-        wanted_v = self.value_v + self._settings.gain_v_per_n_s * beyond_n * interval_s
+        wanted_v = self.value_v + self._pace * self._settings.gain_v_per_n_s * beyond_n * interval_s
         self.value_v, self.limited_by = trim_limited(wanted_v, self._settings.limit_v)
+
+    def _count_swings(self, error_n: float, interval_s: float) -> None:
+        self._since_swing_s += interval_s
+        if self._since_swing_s > CALM_S:
+            self.swings = self._side = 0
+        side = 0 if abs(error_n) < SWING_N else 1 if error_n > 0.0 else -1
+        is_same = side == self._beyond_side
+        self._beyond_side = side
+        self._beyond_s, self._samples = (self._beyond_s + interval_s, self._samples + 1) if is_same else (interval_s, 1)
+        if not side or side == self._side or self._beyond_s < SEEN_S or self._samples < SEEN_SAMPLES:
+            return
+        if self._side:
+            self.swings += 1
+            if self.swings > FREE_SWINGS:
+                self._pace = max(LEAST_PACE, SLOWER * self._pace)
+        self._side, self._since_swing_s = side, 0.0

@@ -9,7 +9,7 @@ from typing import Final
 from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.force_loop.measured_trim import MOST_TURNS
 from gateway.control.inputs import LineStatus, LoopInputs
-from gateway.control.messages import hunting_sentence, stuck_sentence, unreachable_sentence
+from gateway.control.messages import hunting_sentence, stuck_sentence, swinging_sentence, unreachable_sentence
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.unreachable_force import Evidence
 
@@ -73,7 +73,9 @@ class OneShotEvents:
         """Return a sentence where the trim has just begun to hunt. Ask after each step in force or voltage mode."""
         is_hunting = loop.is_hunting
         is_first, self._was_hunting = is_hunting and not self._was_hunting, is_hunting
-        return hunting_sentence(loop.applied_n, MOST_TURNS) if is_first else ""
+        if not is_first:
+            return ""
+        return swinging_sentence(loop.applied_n) if loop.is_gain_own else hunting_sentence(loop.applied_n, MOST_TURNS)
 
     def stuck_event(self, is_stuck: bool, reading: Reading) -> str:
         """Return a sentence where a force has just been found stuck at the safe voltage. Ask while the output is off."""
