@@ -12,8 +12,8 @@ from gateway.processes.systemd.service_manager import ServiceManager
 from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.supervisor import guardian
 from gateway.service.supervisor.run_options import RunOptions
-from tests.service.supervisor.guarded import READY, FakeChild, Scene, port
-from tests.service.supervisor.scripted_children import assert_comes_up, dies_after, lives, scene
+from tests.service.supervisor.guarded import PTYS, READY, FakeChild, Scene, port
+from tests.service.supervisor.scripted_children import assert_comes_up, dies_after, lives, rig_lives, scene
 
 __all__ = ["port", "scene"]
 ALL_ASKED = RunOptions(
@@ -85,6 +85,50 @@ def test_a_listening_socket_that_is_kept_is_not_changed_for_another(scene, port,
     assert_comes_up(one)
     assert one.guardian.listeners == kept
     assert len(one.starter.optionals) == 1, "the page has outlived it"
+
+
+def test_a_page_that_dies_is_started_again_on_the_socket_that_it_had(scene, port, tmp_path):
+    (tmp_path / "socket").touch()
+    one = scene(with_page(tmp_path / "socket", port))
+    assert_comes_up(one)
+    one.guardian.control.heartbeat.stall_s = 1e3
+    one.starter.optionals_started[0].dies(1)
+    one.run(lambda: len(one.starter.optionals) == 2)
+    assert one.starter.optionals[1] == one.starter.optionals[0]
+    assert len(one.starter.started) == 1
+
+
+def test_a_control_process_that_is_started_again_finds_the_rig_that_there_was(scene, port):
+    """A real one does not go away with it: there is one, under force or not, and it is where it was."""
+    one = scene(dies_after(8, port), lives(port))
+    one.run(lambda: len(one.starter.started) == 2)
+    assert_comes_up(one)
+    heard: list[message_link.Message] = []
+    one.run(lambda: bool(heard.extend(one.child.hears()) or heard))
+    assert heard == [message_link.Message(message_link.RIG, {"ptys": PTYS})]
+    assert len(one.starter.rigs_started) == 1
+
+
+def test_at_the_end_every_child_is_ended(scene, port, tmp_path):
+    (tmp_path / "socket").touch()
+    one = scene(with_page(tmp_path / "socket", port))
+    assert_comes_up(one)
+    one.run(lambda: one.guardian.others.pids["rig"] is not None)
+    one.guardian._close()
+    one.guardian.listeners.clear()  # closed
+    children = (*one.starter.started, *one.starter.rigs_started, *one.starter.optionals_started)
+    assert len(children) == 3
+    assert all(child.exit_code is not None for child in children)
+    assert one.starter.calls[-1] == "end"
+
+
+def test_a_rig_that_came_to_nothing_reads_its_files_anew(scene, port):
+    def stillborn(child: FakeChild) -> None:
+        child.dies(1)
+
+    one = scene(lives(port), rigs=(stillborn, rig_lives))
+    one.run(lambda: len(one.starter.rigs_started) == 2)
+    assert [call for call in one.starter.calls if call.startswith("rig")] == ["rig prepared=True", "rig prepared=False"]
 
 
 def test_a_guardian_that_cannot_look_into_memory_asks_for_messages(scene, port, monkeypatch):
@@ -187,15 +231,17 @@ def test_the_last_beat_of_a_dead_process_does_not_make_its_successor_silent(scen
     memory.close()
 
 
-def test_orphans_are_reaped_and_children_that_somebody_asks_for_are_not(scene, port, monkeypatch):
+def test_orphans_are_reaped_and_children_that_somebody_asks_for_are_not(scene, port, monkeypatch, tmp_path):
     spared: list[set[int]] = []
     monkeypatch.setattr(guardian, "reap_orphans", spared.append)
-    one = scene(lives(port))
+    one = scene(with_page(tmp_path / "socket", port))
+    (tmp_path / "socket").touch()
+    one.starter.server_pid = 4000
+    one.run(lambda: one.guardian.announced)
     one.run(lambda: one.guardian.others.pids["rig"] is not None)
-    rig = one.guardian.others.pids["rig"]
+    others = one.guardian.others.pids
     one.run(lambda: len(one.starter.started) == 2)
-    assert len(spared) == 1
-    assert rig in spared[0]
+    assert spared == [{os.getpid(), others["rig"], others["web"], 4000}]
 
 
 def test_a_second_gateway_on_the_same_state_starts_nothing(tmp_path, monkeypatch, capsys):
