@@ -260,3 +260,17 @@ def test_a_trip_does_not_end_by_one_reading_that_says_armed() -> None:
     checks.trip()
     assert state(checks, "armed", 10.0) is FaultCode.WATCHDOG_TRIPPED
     assert checks.level == DeviceLevel(has_one=True, is_tripped=True)
+
+
+def test_of_a_device_before_the_port_was_opened_again_nothing_counts_against_the_next() -> None:
+    """Not its failures to arm, not the first half of its trip, not when it was looked at."""
+    checks = checks_of("icpdas-7024")
+    fresh = {name: repr(value) for name, value in vars(checks).items()}
+    arm(checks)
+    state(checks, "tripped", 10.0)
+    for _ in range(MOST_TRIES - 1):
+        checks.refuse(ARM, "NOT NOW")
+    checks.begin()
+    assert {name: repr(value) for name, value in vars(checks).items()} == fresh
+    checks.take(DeviceAnswer(IDENTITY, is_right=True))
+    assert state(checks, "tripped", 20.0) is FaultCode.NONE
