@@ -134,6 +134,7 @@ def test_behind_a_plug_may_be_another_cell() -> None:
         (b"ID B2\r\n", FaultCode.WRONG_DEVICE),
         (b"ID A1\r\n", FaultCode.NONE),
     ):
+        wire.exchange.receive(b"ID B", wire.now_s)
         wire.exchange.reset()
         wire.asked.clear()
         wire.tick()

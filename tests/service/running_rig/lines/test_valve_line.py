@@ -6,7 +6,7 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.control.settings import ValveControl
-from gateway.devices import ValveDevice, ValveDirection, ValveHost
+from gateway.devices import DeviceProfile, ValveDevice, ValveDirection, ValveHost
 from gateway.registers.words import State
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from tests.control.bench import settings
@@ -20,14 +20,14 @@ PROFILE = load_device("waveshare-relay")
 class Relay:
     """The device behind the line; takes_s: until its answer; deaf: it hears nothing."""
 
-    def __init__(self, stands: ValveDirection = PUSH) -> None:
-        self.device, self.stands = ValveDevice(PROFILE), stands
+    def __init__(self, stands: ValveDirection = PUSH, profile: DeviceProfile = PROFILE) -> None:
+        self.device, self.stands = ValveDevice(profile), stands
         self.now_s = 0.0
         self.is_deaf = self.is_stuck = False
         self.asked: list[tuple[float, ValveDirection | None]] = []
         self.answers: list[tuple[float, bytes]] = []
         self.shown: set[ValveDirection | None] = set()
-        self.line = ValveExchange(ValveHost(PROFILE), self.hear, PROFILE.reply_timeout_s)
+        self.line = ValveExchange(ValveHost(profile), self.hear, profile.reply_timeout_s)
 
     def hear(self, data: bytes) -> None:
         if self.is_deaf:
@@ -168,12 +168,13 @@ def test_noise_is_counted_and_a_new_port_begins_with_nothing() -> None:
     assert relay.line.status.stands is None
 
 
-def test_noise_frees_no_wire_and_half_an_answer_is_no_part_of_the_next() -> None:
-    relay = Relay()
+@pytest.mark.parametrize(("name", "noise"), [("waveshare-relay", "01050000FF008C3A"), ("mcu-valve", "3f3f0d0a")])
+def test_noise_frees_no_wire_and_half_an_answer_is_no_part_of_the_next(name: str, noise: str) -> None:
+    relay = Relay(profile=load_device(name))
     relay.line.tick(0.0)
     assert len(relay.asked) == 1
     answer = relay.answers.pop()[1]
-    relay.line.on_bytes(bytes.fromhex("01050000FF008C3A"), 0.01)  # to somebody else
+    relay.line.on_bytes(bytes.fromhex(noise), 0.01)
     relay.line.tick(0.02)
     assert len(relay.asked) == 1
     relay.line.on_bytes(answer[:3], 0.02)
