@@ -66,6 +66,7 @@ def test_counters_and_age_can_be_read(wired, reports):
     "request_",
     [
         {"cause": 98},
+        {"cause": 98, "counters": {"looks": 7}},
         {"cause": "friction"},
         {"cause": True},
         {"cause": -1},
@@ -80,11 +81,18 @@ def test_nonsense_is_refused_and_leaves_no_trace(wired, reports, request_):
         reports.answer(request_)
     assert wired.word("residual_cause") == 0
     assert reports.figures()["age_s"] is None
+    assert "looks" not in reports.figures()
 
 
 def test_strange_counters_and_long_sentences_do_no_harm(wired, reports):
     reports.answer(
-        {"cause": 12, "sentence": "x" * 10000, "counters": {"looks": 10**400, "cpu_s": "much", "judged": [1]}}
+        {
+            "cause": 12,
+            "sentence": "x" * 10000,
+            "worse": "y" * 10000,
+            "counters": {"looks": 10**400, "cpu_s": "much", "judged": [1]},
+        }
     )
     assert not {"looks", "cpu_s", "judged"} & set(reports.figures())
     assert len(wired.said("A345")[0]) < 600
+    assert len(wired.said("A347")[0]) < 600
