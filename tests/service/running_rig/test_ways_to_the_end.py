@@ -1,4 +1,4 @@
-"""How a running rig ends: asked, by a ramp; by a defect, with its cause told; and last its device's own watchdog is let go."""
+"""How a running rig ends: by a ramp, or a defect whose cause is told; what it hands on until then; what goes last."""
 
 import asyncio
 import socket
@@ -6,8 +6,13 @@ import time
 
 import pytest
 
+from gateway.audit.rig_audit import RigAudit
 from gateway.processes import message_link
+from gateway.service.guardian_line import GuardianLine
+from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.lines.rig_ports import RigPorts
+from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.rig_plants import RigPlants
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.end_to_end.own_devices import OwnDevices
 from tests.service.running_rig.test_running_rig import devices, pressing, with_running_rig
@@ -70,3 +75,30 @@ def test_a_watchdog_is_let_go_once_the_safe_voltage_has_been_answered(
     (timeout_s, safe_frame), (safe_s, safe), (off_s, off) = written
     assert (safe, off) == (safe_frame, b"~OFF")
     assert off_s - safe_s >= timeout_s
+
+
+def test_each_tick_beats_and_hands_on_what_waits_for_a_disk(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is lost with a killed process is the last tenth of a second, and not all since its start."""
+    called: set[str] = set()
+
+    def note(owner: type, method: str) -> None:
+        was = getattr(owner, method)
+        monkeypatch.setattr(owner, method, lambda *told: (called.add(f"{owner.__name__}.{method}"), was(*told))[1])
+
+    handed_on = (
+        (Recordings, "flush"),
+        (CalibrationRuns, "flush"),
+        (RigPlants, "take_waiting"),
+        (RigAudit, "flush"),
+        (GuardianLine, "heartbeat"),
+    )
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        for owner, method in handed_on:
+            note(owner, method)
+        while len(called) < len(handed_on):
+            await asyncio.sleep(0.005)
+
+    with_running_rig(devices, scene)
