@@ -201,3 +201,14 @@ def test_a_bus_has_its_silence_before_the_next_question_of_a_valve() -> None:
     assert len(relay.asked) == 1
     relay.line.tick(0.02 + 1.1 * gap_s)
     assert relay.orders == [PULL]
+
+
+def test_the_loop_asks_a_valve_again_whose_answer_was_lost() -> None:
+    """Nothing else would: nobody orders it anywhere."""
+    rig = ValveRig().run(1.0)
+    rig.relay.is_deaf = True
+    rig.run(0.5)
+    rig.relay.is_deaf, asked = False, len(rig.relay.asked)
+    rig.run(0.5)
+    assert len(rig.relay.asked) > asked
+    assert rig.now() - (rig.relay.line.status.unanswered_since_s or rig.now()) < 0.1
