@@ -193,6 +193,7 @@ def test_the_bank_holds_to_the_rigs_limits() -> None:
 def test_the_server_holds_to_the_rigs_network() -> None:
     rig = demo()
     network = replace(rig.network, units=(7,), connections=3, per_address=2, idle_s=9.0, requests_per_s=11.0)
+    network = replace(network, allow=(ip_network("10.0.0.0/8"),))
     settings = server_settings(replace(rig, network=network))
     assert (settings.units, settings.connections, settings.per_address) == ((7,), 3, 2)
     assert (settings.idle_s, settings.requests_per_s, settings.allow) == (9.0, 11.0, network.allow)

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,6 +11,7 @@ from gateway.control.runs.ladder_stairs import QUICK
 from gateway.recording import read_recording
 from gateway.registers.words import CalibrationPhase, State
 from gateway.service.run_recording import HANGS_S
+from gateway.service.running_rig import calibration_runs
 from gateway.service.running_rig.calibration_runs import FOLLOWED_S, CalibrationRuns
 from gateway.service.running_rig.fit_launcher import Result
 from tests.disk.at_once import AtOnce
@@ -52,7 +54,9 @@ def test_a_run_goes_on_while_it_is_followed_and_ends_when_it_is_not(tmp_path: Pa
     assert wired.said("A330")
     told = runs.status()
     assert "nobody at this machine" in told["ended"]
-    assert read_recording(Path(told["recording"])).header["ladder"]["groups"] == QUICK.groups
+    header = read_recording(Path(told["recording"])).header
+    assert header["ladder"]["groups"] == QUICK.groups
+    assert header["calibration"] == wired.controller.calibration_id
 
 
 def test_a_starved_load_cell_ends_it_as_a_fault_and_not_as_a_departure(tmp_path: Path) -> None:
@@ -295,3 +299,16 @@ def test_a_ladder_that_the_disk_has_not_taken_whole_is_not_fitted(
     assert (told["running"], told["phase"]) == (False, "stopped")
     assert why in told["ended"]
     assert rig.controller.refusal_of_run(rig.now(), QUICK) == "", "the next run may begin"
+
+
+def test_a_fit_that_cannot_be_started_is_a_refusal_that_names_the_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none_left(*_: object) -> None:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(calibration_runs, "FitLauncher", none_left)
+    runs = kept(Wired().ready(), tmp_path)
+    runs._fit(SimpleNamespace(failure=None, path=tmp_path / "0007", number=7))  # type: ignore[arg-type]
+    refused = runs.status()["result"]["refused"]
+    assert refused.startswith("A331 the fit did not start: Resource temporarily") and refused.endswith("fit 7")

@@ -1,0 +1,46 @@
+"""The process that fits a ladder is heard as a whole, whatever it says, and outlives whoever has started it."""
+
+import asyncio
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from gateway.service.running_rig import fit_launcher
+from gateway.service.running_rig.fit_launcher import FitLauncher, Result
+
+NO_RESULT = "A331 the fit process ended without a result"
+
+
+def heard(monkeypatch: pytest.MonkeyPatch, code: str) -> tuple[Result, int]:
+    """What such a process is heard to say, and its session."""
+    monkeypatch.setattr(fit_launcher, "module_command", lambda _: [sys.executable, "-S", "-c", f"import os; {code}"])
+
+    async def scene() -> tuple[Result, int]:
+        results: asyncio.Queue[Result] = asyncio.Queue()
+        child = FitLauncher(Path("recording"), Path("rig"), Path("state"), results.put_nowait)
+        session = os.getsid(child._process.pid)
+        async with asyncio.timeout(10):
+            result = await results.get()
+            while child._process.returncode is None:  # asked for again, until it is reaped
+                await asyncio.sleep(0.005)
+        return result, session - child._process.pid
+
+    return asyncio.run(scene())
+
+
+def test_a_result_that_comes_in_pieces_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a session of its own: the end of a terminal, or of control, is not the fit's."""
+    said = r"""os.write(1, b'{"stored": '); os.write(1, b'7, "report": "' + b'x' * 200000 + b'"}')"""
+    result, session = heard(monkeypatch, said)
+    assert result == {"stored": 7, "report": "x" * 200000}
+    assert session == 0
+
+
+@pytest.mark.parametrize("code", ["os._exit(1)", "os.write(1, b'{\"stored\": ')", "os.write(1, b'Killed')"])
+def test_a_fit_that_ends_without_a_result_is_a_refusal_and_no_exception(
+    code: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result, _ = heard(monkeypatch, code)
+    assert result["refused"].startswith(NO_RESULT)
