@@ -4,11 +4,14 @@ import asyncio
 import os
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from gateway.service.running_rig import fit_launcher
+from gateway.service.running_rig import calibration_runs, fit_launcher
 from gateway.service.running_rig.fit_launcher import FitLauncher, Result
+from tests.service.running_rig.test_calibration_runs import kept
+from tests.service.wired import Wired
 
 NO_RESULT = "A331 the fit process ended without a result"
 
@@ -44,3 +47,16 @@ def test_a_fit_that_ends_without_a_result_is_a_refusal_and_no_exception(
 ) -> None:
     result, _ = heard(monkeypatch, code)
     assert result["refused"].startswith(NO_RESULT)
+
+
+def test_a_fit_that_cannot_be_started_is_a_refusal_that_names_the_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none_left(*_: object) -> None:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(calibration_runs, "FitLauncher", none_left)
+    runs = kept(Wired().ready(), tmp_path)
+    runs._fit(SimpleNamespace(failure=None, path=tmp_path / "0007", number=7))  # type: ignore[arg-type]
+    refused = runs.status()["result"]["refused"]
+    assert refused.startswith("A331 the fit did not start: Resource temporarily") and refused.endswith("fit 7")

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -11,7 +10,6 @@ from gateway.control.runs.ladder_stairs import QUICK
 from gateway.recording import read_recording
 from gateway.registers.words import CalibrationPhase, State
 from gateway.service.run_recording import HANGS_S
-from gateway.service.running_rig import calibration_runs
 from gateway.service.running_rig.calibration_runs import FOLLOWED_S, CalibrationRuns
 from gateway.service.running_rig.fit_launcher import Result
 from tests.disk.at_once import AtOnce
@@ -299,16 +297,3 @@ def test_a_ladder_that_the_disk_has_not_taken_whole_is_not_fitted(
     assert (told["running"], told["phase"]) == (False, "stopped")
     assert why in told["ended"]
     assert rig.controller.refusal_of_run(rig.now(), QUICK) == "", "the next run may begin"
-
-
-def test_a_fit_that_cannot_be_started_is_a_refusal_that_names_the_recording(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def none_left(*_: object) -> None:
-        raise BlockingIOError(11, "Resource temporarily unavailable")
-
-    monkeypatch.setattr(calibration_runs, "FitLauncher", none_left)
-    runs = kept(Wired().ready(), tmp_path)
-    runs._fit(SimpleNamespace(failure=None, path=tmp_path / "0007", number=7))  # type: ignore[arg-type]
-    refused = runs.status()["result"]["refused"]
-    assert refused.startswith("A331 the fit did not start: Resource temporarily") and refused.endswith("fit 7")

@@ -102,3 +102,4 @@ def test_each_tick_beats_and_hands_on_what_waits_for_a_disk(
             await asyncio.sleep(0.005)
 
     with_running_rig(devices, scene)
+    assert called == {f"{owner.__name__}.{method}" for owner, method in handed_on}
