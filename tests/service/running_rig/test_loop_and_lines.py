@@ -5,12 +5,14 @@ from types import SimpleNamespace
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
+from gateway.codes.warning_bits import WarningBit
 from gateway.control.inputs import Output
 from gateway.devices import ValveHost
 from gateway.devices.messages import ForceSample
 from gateway.profiles import load_device
-from gateway.registers.words import State, StatusBit
+from gateway.registers.words import LimitedBy, State, StatusBit
 from gateway.service.running_rig.lines.valve_line import ValveExchange
+from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
 from tests.service.running_rig.simulated_rig import SmallRig
 from tests.service.wired import ENABLE, Wired
 
@@ -133,3 +135,17 @@ def test_control_is_told_what_surely_stands_and_not_what_was_confirmed_last() ->
     )
     line = rig.loop._line(rig.now())
     assert (line.standing_v, line.acknowledged_v) == (None, 2.0)
+
+
+def test_the_registers_show_each_part_of_a_decision_as_what_it_is() -> None:
+    """Ticks that were missed are counted, and nothing is shown in the place of another."""
+    health = LoopHealth()
+    for expirations in (1, 1, 4):
+        health.count(expirations, 0.0)
+    assert (health.ticks, health.missed_ticks) == (6, 3)
+    decision = SmallRig().holding().loop.decision
+    assert decision
+    decision = decision._replace(limited_by=LimitedBy.VOLTAGE_SLEW, warnings=WarningBit.SLOW_LOOP, sequence_echo=7)
+    status = status_of(decision, health, 1e5, BackgroundStatus(3))
+    assert (status.limited_by, status.warning_word) == (LimitedBy.VOLTAGE_SLEW, WarningBit.SLOW_LOOP)
+    assert (status.sequence_echo, status.missed_ticks, status.calibration_id) == (7, 3, 3)
