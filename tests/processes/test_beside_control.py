@@ -1,13 +1,12 @@
 """What a process beside control has to say is an event like any other: with its time, severity, code, and from where."""
 
 import json
-import os
 import socket
 import subprocess
 import sys
 from pathlib import Path
 
-from gateway.processes import exit_codes
+from gateway.processes import exit_codes, priority
 
 BROKER_AWAY_THEN_END = """
 import sys
@@ -27,6 +26,17 @@ from gateway.processes.beside_control import serve_until_guardian_ends
 async def serve(options, log):
     for _ in range(5000):
         logging.getLogger("uvicorn.error").warning("Exceeded concurrency limit.")
+
+sys.exit(serve_until_guardian_ends("web", sys.argv[1:], serve))
+"""
+
+SERVES_FOR_EVER = """
+import sys, time
+from gateway.processes.beside_control import serve_until_guardian_ends
+
+async def serve(options, log):
+    print("serves", flush=True)
+    time.sleep(60.0)  # in the middle of whatever it does
 
 sys.exit(serve_until_guardian_ends("web", sys.argv[1:], serve))
 """
@@ -68,4 +78,19 @@ def test_it_gives_way_to_control_and_goes_first_when_memory_runs_out() -> None:
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     score, nice = map(int, said.split())
-    assert score == 900 and nice > os.nice(0) - 1
+    assert score == 900 and nice >= priority.HELPER_NICE
+
+
+def test_it_ends_with_its_guardian_whatever_it_is_at(tmp_path: Path) -> None:
+    """Else it would hold its port, and show a gateway that is gone."""
+    guardian, link = socket.socketpair()
+    command = [sys.executable, "-c", SERVES_FOR_EVER, str(link.fileno()), json.dumps({"state": str(tmp_path)})]
+    with subprocess.Popen(command, pass_fds=[link.fileno()], stdout=subprocess.PIPE) as served:
+        link.close()
+        assert served.stdout and served.stdout.readline() == b"serves\n"
+        assert served.poll() is None
+        guardian.close()
+        try:
+            assert served.wait(10.0) == 0
+        finally:
+            served.kill()

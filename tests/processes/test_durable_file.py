@@ -82,3 +82,40 @@ def test_who_would_change_something_does_not_go_on_without_the_lock_and_a_reader
         with lock_directory(tmp_path, shared=True):
             assert list(tmp_path.iterdir()) == []
     assert refused.value.errno == errno.EBUSY
+
+
+def refused(*_: object, **__: object) -> None:
+    raise OSError(errno.EIO, "Input/output error")
+
+
+def test_what_its_folder_did_not_take_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else a number that was refused would be found at the next start."""
+    sync, syncs = os.fsync, iter([False, True])
+    monkeypatch.setattr(durable_file.os, "fsync", lambda descriptor: refused() if next(syncs) else sync(descriptor))
+    with lock_directory(tmp_path) as descriptor, pytest.raises(OSError, match="Input/output"):
+        write_durably(descriptor, "0001.yaml", b"number: 1\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_may_not_outlive_a_power_cut_is_not_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(durable_file, "sync_path", refused)
+    with pytest.raises(OSError, match="Input/output"):
+        make_directory(tmp_path / "calibrations")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_text_that_is_not_taken_leaves_nothing_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "report.html").write_text("old")
+    monkeypatch.setattr(durable_file, "sync_path", refused)
+    with pytest.raises(OSError, match="Input/output"):
+        durable_file.replace_text(tmp_path / "report.html", "new")
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("report.html", "old")]
+
+
+def test_what_a_killed_writer_has_left_is_no_part_of_the_next_file(tmp_path: Path) -> None:
+    (tmp_path / "0001.yaml.new").write_bytes(b"number: 1\npoints: a longer file\n")
+    with lock_directory(tmp_path) as descriptor:
+        write_durably(descriptor, "0001.yaml", b"number: 1\n")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("0001.yaml", b"number: 1\n")]

@@ -99,7 +99,7 @@ def test_size_and_number_of_files_are_bounded_and_the_newest_lines_stay(tmp_path
         file.append(encode_event(event(f"line {number}")))
     file.close()
     sizes = [path.stat().st_size for path in tmp_path.iterdir()]
-    assert len(sizes) <= KEPT + 1 and max(sizes) < 2200
+    assert len(sizes) == KEPT + 1 and max(sizes) < 2200
     numbers = [int(found.text.split()[1]) for found in kept(tmp_path)]
     assert numbers == list(range(numbers[0], 500))
     assert len(numbers) > 30
@@ -221,3 +221,33 @@ def test_who_comes_late_to_a_full_file_leaves_the_new_one_its_name(tmp_path: Pat
     late._rotate()
     other.close()
     assert (tmp_path / "events.jsonl").read_bytes() == line and not (tmp_path / "events.jsonl.2").exists()
+
+
+def test_who_finds_its_file_renamed_writes_into_the_new_one(tmp_path: Path) -> None:
+    """Into the old one, its lines would go away with that before they are old."""
+    line = encode_event(event("one"))
+    late, other = EventFile(tmp_path, 2 * len(line)), EventFile(tmp_path, 2 * len(line))
+    late.append(line)
+    other.append(line)  # full: it gets its old name
+    late.append(encode_event(event("two")))
+    for file in (late, other):
+        file.close()
+    assert [
+        parse_event((tmp_path / name).read_bytes().splitlines()[-1]).text
+        for name in (  # type: ignore[union-attr]
+            "events.jsonl.1",
+            "events.jsonl",
+        )
+    ] == ["one", "two"]
+
+
+def test_a_piece_of_a_line_at_the_end_of_an_old_file_costs_the_new_one_nothing(tmp_path: Path) -> None:
+    """As a killed writer leaves it."""
+    path, reader = tmp_path / "events.jsonl", EventReader(tmp_path)
+    path.write_bytes(encode_event(event("one")) + encode_event(event("torn"))[:40])
+    found = list(reader.read_stored())
+    path.rename(tmp_path / "events.jsonl.1")
+    path.write_bytes(encode_event(event("two")))
+    found += reader.read_new()
+    reader.close()
+    assert [each.text for each in found] == ["one", "two"]

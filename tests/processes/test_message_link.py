@@ -3,6 +3,7 @@
 import array
 import asyncio
 import contextlib
+import errno
 import os
 import socket
 from collections.abc import Iterator
@@ -284,3 +285,13 @@ def test_a_descriptor_that_came_with_no_message_is_closed(ends: Pair) -> None:
     assert message_link.receive(ends[1]) is None
     assert os.read(reader, 1) == b"", "nobody holds the other end any more"
     os.close(reader)
+
+
+def test_a_line_that_fails_in_whatever_way_is_at_its_end() -> None:
+    """Never an exception: it would end the guardian."""
+
+    class Broken:
+        def recvmsg(self, *_: object) -> None:
+            raise OSError(errno.ENOBUFS, "No buffer space available")
+
+    assert message_link.receive(Broken()) is None  # type: ignore[arg-type]

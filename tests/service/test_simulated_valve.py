@@ -1,10 +1,14 @@
 """The simulated rig's valve: the relay answers, the valve moves a moment later, and then the slide pulls, weaker by the rod."""
 
+from dataclasses import replace
+
 import pytest
 
 from gateway.devices import ValveDirection, ValveHost
 from gateway.profiles import load_rig
+from gateway.service.simulation.valve import SimulatedValve
 from gateway.service.simulation.world import SimulatedRig
+from tests.service.rigs import demo
 
 PUSH, PULL = ValveDirection
 
@@ -51,3 +55,17 @@ def test_stuck_it_answers_and_stands_cut_it_is_silent() -> None:
     assert rig.run(1.0).ask(None) == [PUSH]
     rig.simulated.fault({"do": "fault", "name": "valve-cut", "on": True})
     assert rig.ask(None) == []
+
+
+def test_what_presses_from_outside_is_against_a_pull() -> None:
+    """A weight that helps the push keeps the pull back, and the tool is tilted the other way round."""
+    valve, plant = SimulatedValve(load_rig("paper-pull")), demo().plant
+    assert plant
+    contact = replace(plant.contact, tilt_n=3.0, feed_drag_n=2.0, tilt_deg=30.0)
+    plant = replace(plant, contact=contact)
+    assert valve.plant_of(plant) == plant
+    valve.receive(ValveHost(load_rig("paper-pull").valve.device).request(PULL), 0.0)
+    assert valve.move(1.0)
+    pulling = valve.plant_of(plant).contact
+    assert (pulling.tilt_n, pulling.feed_drag_n, pulling.tilt_deg) == (-3.0, -2.0, 150.0)
+    assert valve.sign == -1.0

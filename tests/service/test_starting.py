@@ -1,21 +1,37 @@
 """What a start says and leaves behind: the banner, the JSON line, the flag of an unclean run, the rules for the bank."""
 
+import asyncio
+import errno
 import json
 from dataclasses import replace
 from ipaddress import ip_network
 from math import inf, nan
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
 from gateway.control.settings import LeaseAction
 from gateway.modbus import Role
+from gateway.ports import PortError
+from gateway.processes import exit_codes
 from gateway.processes.exit_cause import EndCause, Ending
+from gateway.profiles import Rig
 from gateway.service.banner import Ready, format_banner, ready_fields, tcp_face, try_lines
 from gateway.service.clean_shutdown_marker import CleanShutdownMarker
+from gateway.service.running_rig import starting
 from gateway.service.running_rig.bank_rules import bank_rules, plain_role, server_settings
-from gateway.service.running_rig.starting import cause_of_restart
+from gateway.service.running_rig.starting import (
+    StartError,
+    cause_of_restart,
+    lasting_warnings,
+    listen,
+    open_again,
+    warning_notes,
+)
 from tests.service.rigs import demo, with_supervision
 
 
@@ -177,6 +193,7 @@ def test_the_bank_holds_to_the_rigs_limits() -> None:
 def test_the_server_holds_to_the_rigs_network() -> None:
     rig = demo()
     network = replace(rig.network, units=(7,), connections=3, per_address=2, idle_s=9.0, requests_per_s=11.0)
+    network = replace(network, allow=(ip_network("10.0.0.0/8"),))
     settings = server_settings(replace(rig, network=network))
     assert (settings.units, settings.connections, settings.per_address) == ((7,), 3, 2)
     assert (settings.idle_s, settings.requests_per_s, settings.allow) == (9.0, 11.0, network.allow)
@@ -187,3 +204,75 @@ def test_a_plain_face_has_the_role_that_the_rig_gives_it(is_allowed: bool, role:
     rig = demo()
     rig = replace(rig, network=replace(rig.network, allow_plain_upload=is_allowed))
     assert (plain_role(rig), server_settings(rig).role) == (role, role)
+
+
+def test_a_disk_that_takes_no_mark_is_no_reason_not_to_begin(tmp_path: Path) -> None:
+    assert not CleanShutdownMarker(tmp_path / "gone").mark_running()
+
+
+def test_a_device_without_a_watchdog_and_a_coarse_clock_are_warned_of_for_good() -> None:
+    device = SimpleNamespace(name="a DAC")
+    without, armed = (
+        cast(Rig, SimpleNamespace(lacks_device_watchdog=lacks, output=SimpleNamespace(device=device)))
+        for lacks in (True, False)
+    )
+    assert lasting_warnings(without, is_coarse_clock=True) == WarningBit.CLOCK_FALLBACK | WarningBit.NO_WATCHDOG
+    assert lasting_warnings(without, is_coarse_clock=False) == WarningBit.NO_WATCHDOG
+    assert lasting_warnings(armed, is_coarse_clock=False) == WarningBit(0)
+    (note,) = warning_notes(without)
+    assert note.startswith("A343 a DAC has no watchdog: it holds its last voltage")
+    assert warning_notes(armed) == ()
+
+
+class HeldPort:
+    """A port that fails with these codes, one at each try."""
+
+    path = "/dev/ttyUSB7"
+
+    def __init__(self, *codes: str) -> None:
+        self.codes, self.tries = iter(codes), 0
+        self.lost: list[str] = []
+
+    async def open(self) -> None:
+        self.tries += 1
+        if code := next(self.codes, ""):
+            raise PortError(code, "no")
+
+    def begin_lost(self, error: PortError) -> None:
+        self.lost.append(error.code)
+
+
+@pytest.mark.parametrize(("codes", "tries", "lost"), [((), 1, []), (("E103", "E103"), 3, []), (("E102",), 1, ["E102"])])
+def test_after_a_restart_a_port_that_is_held_is_waited_for_and_one_that_is_away_is_lost(
+    codes: tuple[str, ...], tries: int, lost: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(starting, "_RETRY_S", 0.0)
+    port = HeldPort(*codes)
+    error = asyncio.run(open_again(port))  # type: ignore[arg-type]
+    assert (port.tries, port.lost, error and error.code) == (tries, lost, lost[0] if lost else None)
+
+
+def test_after_a_restart_too_a_permission_that_is_missing_is_an_end() -> None:
+    """Waiting does not change it: the sentence says what does."""
+    port = HeldPort("E101")
+    with pytest.raises(PortError, match="E101"):
+        asyncio.run(open_again(port))  # type: ignore[arg-type]
+    assert port.lost == []
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "words"),
+    [
+        (PermissionError(13, "Permission denied"), exit_codes.PERMISSION, "E120 port 502 needs the capability"),
+        (OSError(errno.EADDRINUSE, "Address already in use"), exit_codes.DEVICE, "E121 cannot listen on"),
+        (OSError(errno.EADDRNOTAVAIL, "Cannot assign"), exit_codes.DEVICE, "is no address of this machine"),
+    ],
+)
+def test_who_cannot_listen_ends_with_a_sentence_and_by_its_kind(error: OSError, code: int, words: str) -> None:
+    class Server:
+        async def start(self, host: str, port: int) -> None:
+            raise error
+
+    with pytest.raises(StartError, match=words) as refused:
+        asyncio.run(listen(Server(), "192.0.2.1", 502))  # type: ignore[arg-type]
+    assert refused.value.exit_code == code

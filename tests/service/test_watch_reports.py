@@ -66,6 +66,7 @@ def test_counters_and_age_can_be_read(wired, reports):
     "request_",
     [
         {"cause": 98},
+        {"cause": 98, "counters": {"looks": 7}},
         {"cause": "friction"},
         {"cause": True},
         {"cause": -1},
@@ -80,11 +81,49 @@ def test_nonsense_is_refused_and_leaves_no_trace(wired, reports, request_):
         reports.answer(request_)
     assert wired.word("residual_cause") == 0
     assert reports.figures()["age_s"] is None
+    assert "looks" not in reports.figures()
 
 
 def test_strange_counters_and_long_sentences_do_no_harm(wired, reports):
     reports.answer(
-        {"cause": 12, "sentence": "x" * 10000, "counters": {"looks": 10**400, "cpu_s": "much", "judged": [1]}}
+        {
+            "cause": 12,
+            "sentence": "x" * 10000,
+            "worse": "y" * 10000,
+            "counters": {"looks": 10**400, "cpu_s": "much", "judged": [1]},
+        }
     )
     assert not {"looks", "cpu_s", "judged"} & set(reports.figures())
     assert len(wired.said("A345")[0]) < 600
+    assert len(wired.said("A347")[0]) < 600
+
+
+def test_what_a_plant_makes_worse_is_told_once_shown_at_once_and_over_with_the_plant(wired, reports):
+    worse = {"do": "residual", "cause": 0, "worse": "the force is worse by 20 %"}
+    for _ in range(3):
+        reports.answer(worse)
+    assert wired.warnings & WarningBit.COMPENSATION_WORSE
+    assert len(wired.said("A347")) == 1
+    reports.follow_plant(3, 0.0)
+    assert not wired.warnings & WarningBit.COMPENSATION_WORSE
+    assert reports.answer({"do": "residual"})["plant"] == 3
+    reports.answer(worse)
+    reports.answer(told(0, ""))
+    assert not wired.warnings & WarningBit.COMPENSATION_WORSE
+    assert len(wired.said("the force is no worse")) == 2
+
+
+def test_another_cause_of_the_same_trouble_is_no_second_warning(wired, reports):
+    for cause in (
+        ResidualCause.COULOMB_FRICTION,
+        ResidualCause.LINEAR_DRIFT,
+        ResidualCause.NONE,
+        ResidualCause.UNKNOWN,
+    ):
+        reports.answer(told(cause))
+    assert reports.figures()["warnings"] == 2
+
+
+def test_a_truth_is_no_number(reports):
+    reports.answer(told(0, "", looks=True))
+    assert "looks" not in reports.figures()

@@ -267,3 +267,17 @@ def test_a_server_leaves_umask_and_clock_as_it_has_found_them(tmp_path: Path) ->
         assert server._sweep_timer and server._sweep_timer.cancelled()
 
     asyncio.run(scene())
+
+
+def test_a_line_that_is_too_long_is_refused_though_it_ends(tmp_path: Path) -> None:
+    """It comes in two pieces, each short enough."""
+    limits = SocketLimits(longest_line=200)
+
+    async def scene(path: Path) -> None:
+        long = ECHO[:-2] + b" " * 150
+        caller = talk(path, long)
+        caller.send(b" " * 60 + b"}\n")
+        (answer,) = (await heard(caller)).splitlines()
+        assert "a line of more than 200 bytes" in json.loads(answer)["error"]
+
+    with_server(tmp_path, scene, limits)

@@ -52,7 +52,9 @@ def test_a_run_goes_on_while_it_is_followed_and_ends_when_it_is_not(tmp_path: Pa
     assert wired.said("A330")
     told = runs.status()
     assert "nobody at this machine" in told["ended"]
-    assert read_recording(Path(told["recording"])).header["ladder"]["groups"] == QUICK.groups
+    header = read_recording(Path(told["recording"])).header
+    assert header["ladder"]["groups"] == QUICK.groups
+    assert header["calibration"] == wired.controller.calibration_id
 
 
 def test_a_starved_load_cell_ends_it_as_a_fault_and_not_as_a_departure(tmp_path: Path) -> None:

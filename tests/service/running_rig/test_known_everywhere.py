@@ -3,12 +3,15 @@
 import socket
 from dataclasses import replace
 
+import pytest
+
 from gateway.audit.audit_reader import read_audit
 from gateway.plants.in_use import in_use_facts
 from gateway.ports import PortError
+from gateway.registers.refusal import Refusal
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.end_to_end.own_devices import OwnDevices
-from tests.service.running_rig.test_running_rig import devices, with_running_rig
+from tests.service.running_rig.test_running_rig import MASTER, devices, with_running_rig
 
 __all__ = ["devices"]
 
@@ -18,19 +21,25 @@ def test_another_calibration_or_plant_is_known_everywhere_at_once(devices: OwnDe
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         activation, recordings = rig._calibrations._activation, rig._recordings
-        number = activation.store.add(replace(rig._rig.calibration, name="another"))
+        own = rig._rig.calibration
+        number = activation.store.add(replace(own, name="another", force_limits_n=(0.0, 21.0)))
         address = rig._rig.register_map.find("calibration_id").address
         assert int.from_bytes(rig.bank.read_registers(address, 1), "big") != number
         rig._on_calibration(activation.use(number, None))
         shown = rig.bank.read_registers(address, 1)
         assert int.from_bytes(shown, "big") == rig.controller.calibration_id == recordings.calibration.number == number
+        with pytest.raises(Refusal, match=f"calibration {number}"):
+            rig.bank.write_registers(1, (2200).to_bytes(2), MASTER)
         recordings.plant_in_use = {"number": 99}
-        rig._on_plant(rig._rig)
-        assert recordings.plant_in_use == in_use_facts(rig._rig)
+        other = replace(rig._rig, description="with another plant")
+        rig._on_plant(other)
+        assert recordings.plant_in_use == in_use_facts(other)
+        assert rig.controller.calibration_id == number, "it brings back no calibration of before"
+        assert rig._rig is other, "what comes next is judged by it"
 
     with_running_rig(devices, scene)
     told = [record["what"] for record in read_audit(devices.directory / "state")]
-    assert told == ["start", "calibration in use", "plant in use", "end"]
+    assert told == ["start", "calibration in use", "write", "plant in use", "end"]
 
 
 def test_a_port_that_is_gone_is_known_to_be_gone(devices: OwnDevices) -> None:

@@ -1,13 +1,19 @@
 """What the control loop makes of its lines: another load cell, a lost valve, a restart, rows of a pull, idle ticks."""
 
+from math import nan
 from types import SimpleNamespace
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
+from gateway.codes.warning_bits import WarningBit
+from gateway.control.inputs import Output
 from gateway.devices import ValveHost
+from gateway.devices.messages import ForceSample
 from gateway.profiles import load_device
-from gateway.registers.words import State, StatusBit
+from gateway.registers.words import LimitedBy, State, StatusBit
 from gateway.service.running_rig.lines.valve_line import ValveExchange
+from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
+from tests.service.running_rig.simulated_rig import SmallRig
 from tests.service.wired import ENABLE, Wired
 
 RESET = 2
@@ -72,3 +78,74 @@ def test_rows_of_a_pull_are_none_of_the_ring_whose_plant_pushes() -> None:
         wired.loop.decision = decision._replace(status=status)
         wired.loop._record()
         assert len(rows) == count
+
+
+def test_a_row_has_the_decision_that_its_sample_has_brought_about() -> None:
+    """One behind, a recording would show each force beside the voltage of the one before."""
+    rig, rows = SmallRig().holding(), list[tuple[ForceSample, Output]]()
+    rig.loop.recordings = SimpleNamespace(append=lambda sample, decision, _: rows.append((sample, decision)))  # type: ignore[assignment]
+    decided: list[Output] = []
+    step = rig.loop._step
+
+    def note(now_s: float) -> None:
+        step(now_s)
+        assert rig.loop.decision
+        decided.append(rig.loop.decision)
+
+    rig.loop._step = note  # type: ignore[method-assign]
+    rig.run(0.2)
+    assert len(rows) == 20
+    assert [decision for _, decision in rows] == decided
+
+
+def test_an_idle_question_does_not_hold_up_a_voltage() -> None:
+    """Where both are due at one tick: the wire has room for one."""
+    rig, done = SmallRig().holding(), list[str]()
+    rig.is_cell_silent = True
+    rig.run(0.1)  # from now on the tick decides
+    rig.wire.set_voltage = lambda *_: done.append("voltage")  # type: ignore[method-assign]
+    rig.wire.tick = lambda _: done.append("question may go")  # type: ignore[method-assign]
+    rig.run(0.2)
+    assert done == 20 * ["voltage", "question may go"]
+
+
+def test_what_a_cell_says_is_counted_by_whether_it_could_be_read() -> None:
+    wired = Wired().ready()
+    loop, before = wired.loop, wired.loop.cell_counts.heard
+    loop.on_cell_bytes(b"\r\n#?#\r\n" + wired.loop._cell._host.poll(), wired.now_s)
+    garbled, size = loop.cell_counts.garbled, loop.cell_garbage_bytes
+    assert garbled >= 1 and size >= 3
+    samples = loop.samples
+    wired.run(1.0)
+    assert loop.cell_counts.heard - before == loop.samples - samples > 10
+    assert (loop.cell_counts.garbled, loop.cell_garbage_bytes) == (garbled, size)
+
+
+def test_control_is_told_what_surely_stands_and_not_what_was_confirmed_last() -> None:
+    rig = SmallRig().holding()
+    rig.loop.output = SimpleNamespace(
+        **dict.fromkeys(("fault", "said"), ""),
+        confirmed_v=2.0,
+        standing_v=None,  # type: ignore[assignment]
+        unanswered_since_s=None,
+        pressure_pa=nan,
+        sent_v=3.0,
+        round_trip_s=nan,
+        counts=rig.wire.counts,
+    )
+    line = rig.loop._line(rig.now())
+    assert (line.standing_v, line.acknowledged_v) == (None, 2.0)
+
+
+def test_the_registers_show_each_part_of_a_decision_as_what_it_is() -> None:
+    """Ticks that were missed are counted, and nothing is shown in the place of another."""
+    health = LoopHealth()
+    for expirations in (1, 1, 4):
+        health.count(expirations, 0.0)
+    assert (health.ticks, health.missed_ticks) == (6, 3)
+    decision = SmallRig().holding().loop.decision
+    assert decision
+    decision = decision._replace(limited_by=LimitedBy.VOLTAGE_SLEW, warnings=WarningBit.SLOW_LOOP, sequence_echo=7)
+    status = status_of(decision, health, 1e5, BackgroundStatus(3))
+    assert (status.limited_by, status.warning_word) == (LimitedBy.VOLTAGE_SLEW, WarningBit.SLOW_LOOP)
+    assert (status.sequence_echo, status.missed_ticks, status.calibration_id) == (7, 3, 3)

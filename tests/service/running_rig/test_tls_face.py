@@ -12,7 +12,7 @@ import pytest
 
 from gateway.modbus import pdu
 from gateway.profiles.rigs.faces import TlsFace
-from gateway.service.running_rig.faces import faces_to_come
+from gateway.service.running_rig.faces import faces, faces_to_come
 from gateway.service.running_rig.starting import StartError
 from tests.certificates import Folder, store_all
 from tests.fieldbus.by_hand import framed
@@ -105,3 +105,17 @@ def test_a_face_whose_files_are_good_again_is_served_without_another_start(
             assert re.fullmatch(r"modbus tls 127\.0\.0\.1:\d+ is served again", served.log[-1])
 
     asyncio.run(asyncio.wait_for(scene(), 20.0))
+
+
+def test_a_face_holds_to_the_certificates_and_networks_of_its_own_section(
+    folder: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that was lost or stolen is turned away by its number."""
+    made: list[Any] = []
+    monkeypatch.setattr(faces, "ModbusTlsServer", lambda bank, settings, **_: made.append(settings))
+    rig = rig_with(folder)
+    face = replace(rig.fieldbus[0], revoked=("1A2B",), allow=(ip_network("192.168.125.0/24"),))
+    faces.make_tls_server(rig, face, None, lambda peer: None, lambda cause, text: None)  # type: ignore[arg-type]
+    (settings,) = made
+    assert settings.revoked == {"1A2B"}
+    assert settings.server.allow == face.allow

@@ -123,3 +123,23 @@ def test_names_are_told_apart() -> None:
     names = [one.name for one in (*FAULTS, *SURROUNDINGS)]
     assert len(names) == len(set(names))
     assert not set(names) & set(BY_NAME)
+
+
+def test_what_is_cleared_is_as_in_the_rigs_files_and_nothing_else_is() -> None:
+    settings = setting(creep__creep_share=0.05, creep__creep_s=3.0, cell__noise=0.5)
+    assert settings.changed(SimulationRequest(clear=("creep",))).values == {"cell.noise": 0.5}
+    assert settings.changed(SimulationRequest(clear=("creep.creep_s",))).values == {
+        "creep.creep_share": 0.05,
+        "cell.noise": 0.5,
+    }
+    assert settings.changed(SimulationRequest(clear_all=True)).values == {}
+
+
+def test_what_cannot_be_kept_leaves_what_was_kept_as_it_was(tmp_path: Path) -> None:
+    """Half a file would be nothing set, while the rig plays it."""
+    kept = KeptSettings(tmp_path, "run 1")
+    kept.write(setting(cell__noise=0.5))
+    (tmp_path / "simulation.json.part").mkdir()
+    with pytest.raises(OSError, match="Is a directory"):
+        kept.write(setting(cell__noise=0.7))
+    assert kept.read().values == {"cell.noise": 0.5}

@@ -111,6 +111,8 @@ class FakeStarter:
     start_timeout_s: float = 1.0
     started: list[FakeChild] = field(default_factory=list)
     rigs_started: list[FakeChild] = field(default_factory=list)
+    optionals: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
+    optionals_started: list[FakeChild] = field(default_factory=list)
     arguments: list[dict[str, Any]] = field(default_factory=list)
     calls: list[str] = field(default_factory=list)
 
@@ -121,6 +123,10 @@ class FakeStarter:
     def rig(self, *, prepared: bool) -> FakeChild:
         self.calls.append(f"rig prepared={prepared}")
         return self._play(self.rigs, self.rigs_started, 2000)
+
+    def optional(self, name: str, arguments: dict[str, Any]) -> FakeChild:
+        self.optionals.append((name, arguments))
+        return self._play([lambda child: child.attach(0)], self.optionals_started, 3000)
 
     def _play(self, scripts: list[Script], started: list[FakeChild], pid: int) -> FakeChild:
         child = FakeChild(pid + len(started))
@@ -225,7 +231,7 @@ class Scene:
     def close(self) -> None:
         self.guardian._close()
         self.signals.close()
-        for child in (*self.starter.started, *self.starter.rigs_started):
+        for child in (*self.starter.started, *self.starter.rigs_started, *self.starter.optionals_started):
             child.dies(0)
             child.close()
 

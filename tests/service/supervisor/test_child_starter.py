@@ -1,6 +1,8 @@
 """The prepared process is a convenience: whatever becomes of it, children are started."""
 
+import os
 from collections.abc import Iterator
+from importlib.util import find_spec
 from math import inf
 from pathlib import Path
 
@@ -87,9 +89,88 @@ def test_a_server_that_keeps_dying_is_given_up_in_the_end(kept, spawned):
         assert one.due_s == now_s + pause_s
         now_s += pause_s
         one.poll_child(set(), now_s)
+        assert one.due_s == inf, "it is there"
     spawned[-1][1].dies(-9)
     one.poll_child(set(one.sources), now_s)
     assert (one.due_s, one.sources, one.server_pid) == (inf, [], None)
     assert modules(spawned) == ["fork_server"] * 4
     assert [line[:4] for line in said] == ["A407"] * 4
     assert "it stays off" in said[-1]
+
+
+def test_a_server_that_does_not_answer_is_killed_and_its_successor_is_given_time_again(kept, spawned):
+    """Its imports take longer than a fork: from a server that never gave a child more is put up with."""
+    one, _ = kept
+    at_first_s = one.start_timeout_s
+    one.on_born()
+    assert one.start_timeout_s < at_first_s
+    one.drop_server("does not answer", 0.0)
+    assert spawned[0][1].exit_code == -9
+    assert spawned[0][1].link.fileno() == -1
+    assert one.start_timeout_s == at_first_s
+
+
+def test_at_the_end_the_server_ends(kept, spawned):
+    one, _ = kept
+    one.end()
+    assert spawned[0][1].exit_code is not None
+    assert one.server_pid is None
+
+
+def test_without_a_subreaper_there_is_no_server(spawned, monkeypatch):
+    """What it forks would be nobody's child, and its exit code nobody's to read."""
+    monkeypatch.setattr(fork_server, "become_subreaper", lambda: False)
+    one = ChildStarter("demo", simulate=True, state=Path("state"), say=pytest.fail)
+    one.open()
+    assert (modules(spawned), one.due_s) == ([], inf)
+
+
+def test_a_machine_that_has_no_process_for_the_server_is_no_reason_not_to_begin(monkeypatch):
+    def none_left(*_: object, **__: object) -> FakeChild:
+        raise BlockingIOError("Resource temporarily unavailable")
+
+    monkeypatch.setattr(child_starter, "spawn_child", none_left)
+    monkeypatch.setattr(fork_server, "become_subreaper", lambda: True)
+    one = ChildStarter("demo", simulate=True, state=Path("state"), say=pytest.fail)
+    one.open()
+    assert one.server_pid is None
+
+
+def test_control_is_forked_with_the_memories_that_it_shares(kept, spawned, tmp_path):
+    one, _ = kept
+    with (tmp_path / "ring").open("w") as ring, (tmp_path / "beat").open("w") as beat:
+        one.control({"rig": "demo", "ring": ring.fileno(), "beat": beat.fileno()}).close()
+        (asked,) = spawned[0][1].hears()
+        assert [
+            os.path.samestat(os.fstat(given), os.fstat(ours.fileno()))
+            for given, ours in zip(asked.descriptors[1:], (ring, beat), strict=True)
+        ] == [True, True]
+        asked.drop_descriptors()
+
+
+def test_the_rig_is_forked_as_it_was_read_or_read_anew_and_stays_the_same_run(kept, spawned, monkeypatch):
+    """What was set on it (`sim set`) is kept for one run of the gateway, in its state directory."""
+    one, _ = kept
+    told: list[dict] = []
+    monkeypatch.setattr(child_starter, "spawn_child", lambda module, arguments, *_: told.append(arguments))
+    one.rig(prepared=True).close()
+    assert told == []
+    (asked,) = spawned[0][1].hears()
+    asked.drop_descriptors()
+    one.rig(prepared=False)
+    assert told == [asked.body["arguments"]]
+    assert (told[0]["rig"], told[0]["simulate"], told[0]["state"]) == ("demo", True, "state")
+
+
+@pytest.mark.parametrize("name", child_starter.OPTIONAL)
+def test_a_child_that_control_can_do_without_shares_the_ring_and_the_socket(kept, monkeypatch, name):
+    one, _ = kept
+    asked: list[tuple[object, ...]] = []
+    monkeypatch.setattr(child_starter, "spawn_child", lambda *words: asked.append(words))
+    arguments = {"ring": 0, "listen": 7, "rig": "demo"}
+    one.optional(name, arguments)
+    one.optional(name, arguments | {"ring": None})
+    module = child_starter.OPTIONAL[name]
+    assert name in module.rpartition(".")[2]
+    assert find_spec(module)
+    assert [words[2:] for words in asked] == [(0, 7), (7,)]

@@ -1,13 +1,16 @@
 """Signals of the guardian: what stops it arrives as bytes; what means nothing to it ends neither it nor its children."""
 
 import os
+import select
 import signal
 import subprocess
 import sys
+from math import inf
+from types import SimpleNamespace
 
 import pytest
 
-from gateway.service.supervisor.event_wait import SignalPipe
+from gateway.service.supervisor.event_wait import SignalPipe, wait_readable
 
 _STRAY = ("SIGUSR1", "SIGUSR2", "SIGALRM", "SIGVTALRM", "SIGPROF", "SIGPOLL", "SIGPWR")
 _STOPS = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
@@ -68,3 +71,34 @@ def test_a_signal_that_who_started_us_had_blocked_is_heard(number):
         handler = signal.signal(number, signal.SIG_IGN)  # one that still waits is dropped, and ends no test run
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         signal.signal(number, handler)
+
+
+def test_two_signals_at_once_are_two():
+    """The second one says that nothing is to be waited for."""
+    with SignalPipe() as signals:
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert signals.take() == 2
+        assert signals.take() == 0
+    assert signal.set_wakeup_fd(-1) == -1, "its end of the pipe is closed: nothing is written there any more"
+
+
+def test_who_is_started_in_the_background_hears_what_stops_it():
+    """A shell ignores SIGINT for a job that it starts with &; only nohup's word counts."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with SignalPipe() as signals:
+            os.kill(os.getpid(), signal.SIGINT)
+            assert signals.take() == 1
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize("timeout_s", [-1.0, -1e-9, 0.0, inf, 1e9])
+def test_a_wait_is_never_without_an_end(timeout_s, monkeypatch):
+    """For poll a negative time is for ever, and there is a longest one."""
+    asked = []
+    poll = SimpleNamespace(register=lambda *_: None, poll=lambda ms: asked.append(ms) or [])
+    monkeypatch.setattr(select, "poll", lambda: poll)
+    assert wait_readable([0], timeout_s) == set()
+    assert 0.0 <= asked[0] < inf

@@ -1,9 +1,14 @@
 """A forked child begins only when the guardian follows it: one that was given up must not become a second control."""
 
+import ctypes
+import gc
+import json
 import os
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -92,3 +97,100 @@ def test_what_the_server_forked_and_nobody_follows_any_more_begins_nothing(tmp_p
     os.close(died)
     ours.close()
     assert os.waitstatus_to_exitcode(os.waitpid(server, 0)[1]) == 0
+
+
+def sockets() -> int:
+    """How many this process has."""
+    return sum(one.is_socket() for one in Path("/proc/self/fd").iterdir())
+
+
+def _child_that_tells(words: list[str]) -> int:
+    """Plays a child's module: what it is, and what it was given, as its second word; its exit code is 7."""
+    given = json.loads(words[1])
+    files = {name: os.fstat(given[name]).st_ino for name in fork_server.SHARED}
+    line = socket.socket(fileno=int(words[0]))
+    numbers = len([*Path("/proc/self/fd").iterdir()])
+    facts = {"session": os.getsid(0), "parent": os.getppid(), "files": files, "open": numbers, "sockets": sockets()}
+    message_link.send(line, "?", facts)
+    return 7
+
+
+def _serve(theirs: socket.socket) -> None:
+    """The server's whole life, in a process of its own; the second request finds no process left on the machine."""
+    fork, forks = os.fork, iter([True, False, True])
+    fork_server.import_module = lambda _: SimpleNamespace(main=_child_that_tells)  # type: ignore[assignment]
+
+    def sometimes() -> int:
+        """The first of the two forks of each child is by the server, the second is not this process's."""
+        if os.getpid() == server and not next(forks):
+            raise BlockingIOError("Resource temporarily unavailable")
+        return fork()
+
+    server, os.fork = os.getpid(), sometimes
+    fork_server.serve(theirs)
+
+
+@pytest.fixture
+def served() -> Iterator[tuple[socket.socket, int]]:
+    """The guardian's end of the line to a server that lives, and its process number; we are who gets its orphans."""
+    assert fork_server.become_subreaper()
+    ours, theirs = message_link.create_link()
+    if (server := os.fork()) == 0:
+        ours.close()
+        _serve(theirs)
+        os._exit(5)
+    theirs.close()
+    yield ours, server
+    ours.close()
+    assert os.waitstatus_to_exitcode(os.waitpid(server, 0)[1]) == 5, "it ends with the guardian"
+    ctypes.CDLL(None).prctl(36, 0, 0, 0, 0)
+
+
+def born_child(server: socket.socket, ring: int, beat: int) -> tuple[Child, dict[str, Any], int]:
+    """Ask for a child and follow it: what it tells of itself, and its exit code."""
+    child = Child(fork_server.request_child(server, "module", {"ring": ring, "beat": beat}, ring, beat))
+    assert wait_readable([child.link.fileno()], 10.0)
+    born = message_link.receive(child.link)
+    assert born and born.tag == message_link.BORN
+    child.adopt(born.body["pid"])
+    assert wait_readable([child.link.fileno()], 10.0)
+    told = message_link.receive(child.link)
+    assert told
+    code = child.wait(10.0)
+    child.close()
+    return child, told.body, code
+
+
+def test_a_forked_child_is_the_guardians_own_and_has_what_it_was_given(
+    served: tuple[socket.socket, int], tmp_path: Path
+) -> None:
+    """A session of its own, the guardian for a parent, who reads its exit code, and the memories under numbers of its own."""
+    server, server_pid = served
+    with (tmp_path / "ring").open("w") as ring, (tmp_path / "beat").open("w") as beat:
+        child, told, code = born_child(server, ring.fileno(), beat.fileno())
+        assert code == 7
+        assert (told["session"], told["parent"]) == (child.pid, os.getpid())
+        assert told["files"] == {"ring": os.fstat(ring.fileno()).st_ino, "beat": os.fstat(beat.fileno()).st_ino}
+        line = fork_server.request_child(server, "module", {})
+        assert wait_readable([line.fileno()], 10.0)
+        assert message_link.receive(line) is None, "no process is to be had: told by the end of the line"
+        line.close()
+        _, later, _ = born_child(server, ring.fileno(), beat.fileno())
+        assert told["sockets"] == sockets(), "one line each: the server's own is the server's"
+        assert later["open"] == told["open"], "the server keeps none of what it hands on"
+        children = Path(f"/proc/{server_pid}/task/{server_pid}/children").read_text()
+        assert children == "", "no zombies either"
+
+
+def test_what_a_child_imports_may_use_all_processors_and_the_server_one_thread(monkeypatch) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    seen: list[str | None] = []
+
+    def prepare(_: object) -> None:
+        seen.append(os.environ.get("OPENBLAS_NUM_THREADS"))
+
+    monkeypatch.setattr(fork_server, "import_module", lambda _: SimpleNamespace(prepare=prepare))
+    fork_server.prepare({})
+    gc.unfreeze()
+    assert seen == ["1"]
+    assert "OPENBLAS_NUM_THREADS" not in os.environ

@@ -1,12 +1,5 @@
 """The guardian's end, and children that come late or never: the safe voltage goes first, and nothing waits for what is gone."""
 
-import contextlib
-import os
-import select
-import subprocess
-import sys
-from subprocess import PIPE
-
 import pytest
 
 from gateway.processes import message_link
@@ -192,41 +185,3 @@ def test_whatever_ends_the_guardian_the_safe_voltage_goes_first(scene, port, mon
         one.run()
     one.guardian._close()
     assert port.wrote() == SAFE_FRAME
-
-
-def test_a_reader_that_has_gone_does_not_end_the_guardian():
-    """`run --json | head -1`, and a closed stderr: said to nobody, and exit 0."""
-    reader, writer = os.pipe()
-    os.close(reader)
-    code = (
-        "from gateway.service.supervisor.guardian_sentences import print_error, print_ready; print_ready('READY'); "
-        "print_ready({}); print_error('A401')"
-    )
-    done = subprocess.run([sys.executable, "-c", code], stdout=writer, stderr=writer, check=False)
-    os.close(writer)
-    assert done.returncode == 0
-
-
-def test_a_reader_that_reads_nothing_is_not_waited_for():
-    """A terminal that is paused while the gateway starts: the guardian has another work; READY comes once it is read."""
-    reader, writer = os.pipe()
-    os.set_blocking(writer, False)
-    with contextlib.suppress(BlockingIOError):
-        while True:
-            os.write(writer, bytes(4096))
-    os.set_blocking(writer, True)
-    code = (
-        "import sys; from gateway.service.supervisor.guardian_sentences import print_ready; print_ready('READY'); "
-        "sys.stderr.write('went on'); sys.stderr.flush(); sys.stdin.read()"
-    )
-    one = subprocess.Popen([sys.executable, "-c", code], stdin=PIPE, stdout=writer, stderr=PIPE)
-    os.close(writer)
-    assert one.stderr and one.stdin
-    assert select.select([one.stderr], [], [], 5.0)[0]
-    said = b""
-    while b"READY" not in said:
-        said = said[-10:] + os.read(reader, 65536)
-    one.stdin.close()
-    assert one.wait(5.0) == 0
-    one.stderr.close()
-    os.close(reader)

@@ -10,6 +10,7 @@ from typing import cast
 import pytest
 
 from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes.scheduler_counters import ProcessorTime
 from gateway.processes.systemd.service_manager import ServiceManager
 from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.supervisor.child_process import Child
@@ -111,6 +112,24 @@ def test_a_guardian_that_wakes_late_waits_once_more_and_not_again() -> None:
     heartbeat.record_beat(control, 10.0)
     assert not heartbeat.is_overdue(10.09)
     assert not heartbeat.is_overdue(10.5), "woken late"
+    assert heartbeat.due_s == pytest.approx(10.52), "not as long as a whole stall"
     assert heartbeat.is_overdue(10.9), "late again"
+    assert "900 ms without a tick" in heartbeat.why_silent(control, 10.9)().text, "since the beat, not since the waking"
     heartbeat.record_beat(control, 11.0)
     assert not heartbeat.is_overdue(11.5), "after a beat it has that chance anew"
+    heartbeat.reset()
+    heartbeat.record_beat(control, 12.0)
+    assert not heartbeat.is_overdue(12.5), "and so has the next process"
+
+
+def test_the_turn_that_a_kill_ends_is_counted_too() -> None:
+    """A process that waits for a processor has waited as long as the kernel says once it got one, if only to be killed."""
+    readings = iter([ProcessorTime(1.0, 5.0), ProcessorTime(1.0, 5.1)])
+    counters = SimpleNamespace(read=lambda: next(readings), state=lambda: next(letters))
+    letters = iter(["R", "Z"])
+    heartbeat, control = Heartbeat(), cast(Child, SimpleNamespace(counters=counters))
+    heartbeat.record_beat(control, 10.0)
+    why = heartbeat.why_silent(control, 10.1)
+    assert next(readings) == ProcessorTime(1.0, 5.1), "not read before the kill"
+    readings = iter([ProcessorTime(1.0, 5.1)])
+    assert why().cause is EndCause.MACHINE_BUSY

@@ -7,6 +7,7 @@ from math import inf
 
 import pytest
 
+from gateway.service.supervisor.child_process import LOST
 from gateway.service.supervisor.optional_child import OptionalChildSupervisor
 from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
 
@@ -107,3 +108,22 @@ def test_what_lives_is_left_alone_and_ended_once(supervisor, starter):
     supervisor.end()
     assert starter.children[0].ended
     assert supervisor.sources == []
+
+
+def test_a_long_life_is_counted_from_its_beginning(supervisor, starter):
+    """The machine's clock has run for days."""
+    now_s = 1e6
+    supervisor.start(now_s)
+    for pause_s in (*HELPER_PAUSES_S, 0.0):
+        dies(supervisor, now_s)
+        now_s += pause_s
+        supervisor.poll_child([], now_s)
+    assert supervisor.due_s == inf
+    assert "it stays off" in starter.said[-1]
+
+
+def test_a_child_that_nobody_could_ask_is_said_to_have_no_exit_code(supervisor, starter):
+    supervisor.start(0.0)
+    starter.children[0].code = LOST
+    dies(supervisor, 1.0)
+    assert "(no exit code)" in starter.said[0]

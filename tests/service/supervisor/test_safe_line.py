@@ -2,6 +2,7 @@
 left on the wire."""
 
 import os
+import select
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -204,6 +205,44 @@ def test_a_line_that_takes_no_bytes_does_not_hold_the_guardian(pty: Pty, client:
     began_s = time.monotonic()
     assert not SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
     assert time.monotonic() - began_s < 1.0
+
+
+def test_a_line_that_is_full_for_a_moment_gets_the_frame(
+    pty: Pty, client: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a dead process has written goes out first, as fast as the wire is."""
+    with pytest.raises(BlockingIOError):
+        while True:
+            os.write(client, b"x" * 4096)
+    wait = select.select
+
+    def drained(readers: list[int], writers: list[int], errors: list[int], timeout_s: float):
+        while writers and _heard(pty):
+            pass
+        return wait(readers, writers, errors, timeout_s)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(select, "select", drained)
+        assert SafeLine(client, FRAME, b"").write_safe(SHORT_S)
+
+
+def test_the_guardian_is_held_for_less_than_a_second_whatever_the_line_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has other children to end, and a service manager that waits for its word."""
+    clock_s = [0.0]
+
+    def nothing_comes(readers: list[int], writers: list[int], _: list[int], timeout_s: float):
+        clock_s[0] += 0.0 if writers else timeout_s
+        return [], writers, []
+
+    reader, writer = os.pipe()
+    with monkeypatch.context() as patch:
+        patch.setattr(select, "select", nothing_comes)
+        patch.setattr(time, "monotonic", lambda: clock_s[0])
+        assert not SafeLine(writer, FRAME, REPLY).write_safe()
+    assert 0.1 < clock_s[0] < 1.0
+    assert os.read(reader, 64) == FRAME * 3
+    os.close(reader)
+    os.close(writer)
 
 
 @pytest.mark.parametrize(

@@ -33,3 +33,15 @@ def test_the_state_directory_is_for_its_owner_alone(tmp_path: Path, monkeypatch:
     with pytest.raises(_EnoughSeenError):
         guardian.run(RunOptions(state=state))
     assert stat.S_IMODE(state.stat().st_mode) == 0o700
+
+
+def test_a_rig_without_a_given_directory_has_one_of_its_own_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever folder its file is in: a rig that is moved keeps its calibrations."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    assert RunOptions(rig="cells/left.yaml").state_directory == tmp_path / "force-gateway" / "left"
+    assert RunOptions(rig="left", state=tmp_path / "own").state_directory == tmp_path / "own"
+    monkeypatch.delenv("XDG_STATE_HOME")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert RunOptions(rig="left").state_directory == tmp_path / ".local" / "state" / "force-gateway" / "left"

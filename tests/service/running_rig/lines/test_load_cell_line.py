@@ -8,7 +8,7 @@ from gateway.codes.faults import FaultCode
 from gateway.devices import DeviceProfile, cell_device, cell_host
 from gateway.devices.device_checks.identity import Identity
 from gateway.devices.exchange import ForceReading
-from gateway.devices.messages import ForceSample
+from gateway.devices.messages import ForceSample, Garbage
 from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from tests.profile_files import load_device
 
@@ -139,6 +139,7 @@ def test_behind_a_plug_may_be_another_cell() -> None:
         (b"ID B2\r\n", FaultCode.WRONG_DEVICE),
         (b"ID A1\r\n", FaultCode.NONE),
     ):
+        wire.exchange.receive(b"ID B", wire.now_s)
         wire.exchange.reset()
         wire.asked.clear()
         wire.tick()
@@ -163,3 +164,63 @@ def test_questions_are_counted_and_a_stream_has_none(wire: Wire) -> None:
     stream.tick()
     stream.answer()
     assert stream.exchange.counts.asked == 0
+
+
+def test_noise_frees_no_wire(wire: Wire) -> None:
+    """A second question would garble the answer that is on its way."""
+    wire.tick()
+    messages = wire.exchange.receive(b"#?#\r\n", wire.now_s + 0.001)
+    assert [type(one) for one in messages] == [Garbage]
+    wire.tick(0.01)
+    assert len(wire.asked) == 1
+
+
+def test_a_cell_that_answers_at_once_is_asked_no_more_often_than_the_loop_can_use(wire: Wire) -> None:
+    wire.tick()
+    for _ in range(1000):
+        wire.answer(after_s=0.0005)
+        wire.tick(0.0005)
+    assert 245 <= len(wire.asked) <= 251
+
+
+def test_a_bus_has_its_silence_between_an_answer_and_the_next_question() -> None:
+    """Without it the cell does not see where a frame begins."""
+    wire = Wire(load_device("laumas-tlb"))
+    gap_s = cell_host(load_device("laumas-tlb")).gap_s
+    assert gap_s > 0.001
+    wire.tick()
+    wire.answer(after_s=0.1)
+    wire.tick(0.9 * gap_s)
+    assert len(wire.asked) == 1
+    wire.tick(0.2 * gap_s)
+    assert len(wire.asked) == 2
+
+
+def test_a_slow_cell_whose_answer_is_lost_is_asked_again_at_once() -> None:
+    wire = Wire(replace(POLLED, read_force=replace(READING, rate_hz=1.0)))
+    wire.tick()
+    wire.tick(TIMEOUT_S + 0.01)
+    assert len(wire.asked) == 2
+
+
+def test_half_an_answer_from_before_a_time_out_is_no_part_of_the_next(wire: Wire) -> None:
+    wire.tick()
+    wire.exchange.receive(b"W +0001", wire.now_s)
+    wire.tick(TIMEOUT_S + 0.01)
+    wire.answer(2.0)
+    assert [sample.force_n for sample in wire.samples] == [2.0]
+
+
+def test_what_a_cell_is_is_an_answer_like_any_other(wire: Wire) -> None:
+    """It is counted, noise before it is told, and no time-out of it slows the readings down."""
+    wire = Wire(replace(POLLED, identity=Identity(ask="ID?", answer="ID {model:s}", models=("A1",))))
+    wire.tick()
+    wire.tick(TIMEOUT_S + 0.01)
+    assert wire.asked == 2 * [b"ID?\r\n"]
+    assert [type(one) for one in wire.exchange.receive(b"#?#\r\n", wire.now_s)] == [Garbage]
+    wire.exchange.receive(b"ID A1\r\n", wire.now_s)
+    assert (wire.exchange.counts.asked, wire.exchange.counts.heard) == (3, 1)
+    wire.tick(0.0)
+    wire.answer()
+    wire.tick(0.0)
+    assert wire.asked[2:] == 2 * [b"W?\r\n"]

@@ -26,6 +26,14 @@ def test_of_waiting_setpoints_only_the_last_is_sent(wire: Wire) -> None:
     assert wire.written == [b"SET 100\r\n", b"SET 350\r\n"]
 
 
+def test_what_stands_is_not_known_while_another_voltage_is_on_its_way(wire: Wire) -> None:
+    wire.settle(100)
+    assert wire.exchange.standing_v == pytest.approx(100 * 10 / 1023)
+    wire.set_voltage(500)
+    assert wire.exchange.standing_v is None
+    assert wire.exchange.acknowledged_v == pytest.approx(100 * 10 / 1023)
+
+
 def test_a_thousand_setpoints_leave_no_queue_behind(wire: Wire) -> None:
     for counts in range(1000):
         wire.set_voltage(counts, after_s=0.0001)
@@ -214,9 +222,31 @@ def test_garbage_is_counted_and_answers_nothing(wire: Wire) -> None:
     wire.set_voltage(512)
     wire.answer("5a2")
     assert wire.exchange.garbage_bytes == 5
+    assert (wire.exchange.counts.asked, wire.exchange.counts.heard, wire.exchange.counts.garbled) == (1, 0, 1)
     assert wire.exchange.unanswered_since_s is not None
     wire.answer("512")
     assert wire.exchange.acknowledged_v == pytest.approx(512 * 10 / 1023)
+
+
+def test_noise_does_not_keep_a_silent_device_from_being_asked_again(wire: Wire) -> None:
+    """A motor cable beside the wire: something comes all the time, and nothing of it is an answer."""
+    wire.set_voltage(512)
+    began_s = wire.now_s
+    for _ in range(15):
+        wire.answer("5a2", after_s=0.01)
+        wire.tick(0.0)
+    assert wire.written == [b"SET 512\r\n"] * 3
+    assert wire.exchange.unanswered_since_s == began_s
+
+
+def test_what_nobody_asked_for_tells_nothing(wire: Wire) -> None:
+    """A second answer to one question, or somebody's at the device's own keys."""
+    wire.settle(512)
+    for _ in range(5):
+        wire.answer("510", after_s=0.001)
+    exchange = wire.exchange
+    assert (exchange.fault, exchange.acknowledged_v) == (FaultCode.NONE, pytest.approx(512 * 10 / 1023))
+    assert exchange.counts.heard == exchange.counts.asked == 2
 
 
 def test_an_answer_in_pieces_is_an_answer(wire: Wire) -> None:
@@ -266,4 +296,5 @@ def test_a_tripped_device_hears_the_same_setting_no_more_often_than_a_poll(wire:
         wire.answer("UNKNOWN COMMAND", after_s=0.005)
         wire.tick(0.005)
     assert set(wire.written[before:]) == {b"SET 0\r\n"}
+    assert wire.exchange.fault is FaultCode.WATCHDOG_TRIPPED, "which is why it refuses"
     assert 8 <= len(wire.written) - before <= 12

@@ -3,10 +3,11 @@
 import asyncio
 import os
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
-from gateway.ports import PortError, Pty
+from gateway.ports import PortError, Pty, serial_port
 from gateway.profiles import load_rig
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 
@@ -22,6 +23,7 @@ class Ear:
         self.heard = dict.fromkeys(LINES, b"")
         self.on_output_bytes, self.on_cell_bytes, self.on_valve_bytes = map(self._keeper, LINES)
         self._changed = asyncio.Event()
+        self.told: list[str] = []
 
     def _keeper(self, line: str) -> Callable[[bytes, float], None]:
         def keep(chunk: bytes, now_s: float) -> None:
@@ -34,11 +36,33 @@ class Ear:
         async with asyncio.timeout(5.0):
             await self._changed.wait()
 
-    def on_output_opened(self) -> None: ...
+    def __setattr__(self, name: str, value: object) -> None:
+        super().__setattr__(name, value)
+        if name == "cell_lost" and value:
+            self.told.append("cell lost")
 
-    def on_cell_opened(self) -> None: ...
+    async def hears(self, *told: str) -> None:
+        """Wait until it has been told as much, and that this is what it was."""
+        async with asyncio.timeout(5.0):
+            while len(self.told) < len(told):
+                await asyncio.sleep(0.001)
+        assert self.told == [*told]
+        self.told.clear()
 
-    def on_valve_opened(self) -> None: ...
+    def on_output_opened(self) -> None:
+        self.told.append("output opened")
+
+    def on_output_closed(self) -> None:
+        self.told.append("output closed")
+
+    def on_cell_opened(self) -> None:
+        self.told.append("cell opened")
+
+    def on_valve_opened(self) -> None:
+        self.told.append("valve opened")
+
+    def on_valve_closed(self) -> None:
+        self.told.append("valve closed")
 
 
 @pytest.fixture
@@ -71,6 +95,129 @@ def test_what_came_before_a_question_is_no_answer_to_it(far_ends: dict[str, Pty]
 
     asyncio.run(scene())
     assert os.read(here.fd, 16) == b"?"
+
+
+class Scene:
+    """A rig's three ports, open; log: what is said to people; guarded: what the guardian was handed, and what the loop had been
+    told by then."""
+
+    def __init__(self, far_ends: dict[str, Pty], folder: Path) -> None:
+        self.far_ends, self.ear, self.folder = far_ends, Ear(), folder
+        self.said: list[str] = []
+        self.guarded: list[tuple[str, list[str]]] = []
+        self.paths = {name: self.plug(name, name) for name in far_ends}
+        self.ports = RigPorts(
+            load_rig("paper-pull"), self.paths, self._hand_over, lambda _, text: self.said.append(text)
+        )
+        self.ports.loop = self.ear  # type: ignore[assignment]
+
+    def plug(self, line: str, name: str) -> str:
+        """Give the far end a name of its own: the number of a pseudo-terminal that is closed is given to the next one."""
+        (self.folder / name).symlink_to(self.far_ends[line].path)
+        return str(self.folder / name)
+
+    def unplug(self, line: str) -> None:
+        (self.folder / line).unlink()
+        self.far_ends[line].close()
+
+    def _hand_over(self, descriptor: int) -> None:
+        self.guarded.append((os.ttyname(descriptor), [*self.ear.told]))
+
+
+def test_the_guardian_has_an_output_before_the_loop_may_write_to_it(far_ends: dict[str, Pty], tmp_path: Path) -> None:
+    """Else the loop could die between the two, and its voltage stood."""
+
+    async def scene() -> None:
+        one = Scene(far_ends, tmp_path)
+        await one.ports.open(is_restart=False)
+        assert one.guarded == [(far_ends["output"].path, [])]
+        assert one.ports.is_guarded
+        await one.ear.hears("output opened", "cell opened", "valve opened")
+        one.ports.close()
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_lost_port_is_told_to_the_loop_and_to_people_and_is_opened_where_it_has_moved_to(
+    far_ends: dict[str, Pty], line: str, tmp_path: Path
+) -> None:
+    """As those of a simulated rig that was started again."""
+    name = line.removeprefix("load_")
+
+    async def scene() -> None:
+        one = Scene(far_ends, tmp_path)
+        await one.ports.open(is_restart=False)
+        one.ear.told.clear()
+        one.unplug(line)
+        await one.ear.hears(f"{name} lost" if name == "cell" else f"{name} closed")
+        assert one.paths[line] in one.said[0] and len(one.said) == 1
+        assert one.ports.is_guarded is (line != "output"), "of a port that is gone nobody writes the last voltage"
+        far_ends[line] = Pty()
+        one.ports.move(one.paths | {line: one.plug(line, "moved")})
+        await one.ear.hears(f"{name} opened")
+        assert one.ports.is_guarded
+        assert [path for path, _ in one.guarded][1:] == ([far_ends[line].path] if line == "output" else [])
+        one.ports.close()
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize("is_restart", [True, False])
+def test_a_port_that_is_away_ends_a_first_start_and_no_restart(
+    far_ends: dict[str, Pty], is_restart: bool, tmp_path: Path
+) -> None:
+    async def scene() -> None:
+        one = Scene(far_ends, tmp_path)
+        one.unplug("valve")
+        if is_restart:
+            await one.ports.open(is_restart=True)
+            assert [*one.ports.not_opened] == [one.paths["valve"]]
+            await one.ear.hears("output opened", "cell opened", "valve closed")
+        else:
+            with pytest.raises(PortError):
+                await one.ports.open(is_restart=False)
+        one.ports.close()
+
+    asyncio.run(scene())
+
+
+def test_nothing_is_written_behind_the_last_voltage(far_ends: dict[str, Pty], tmp_path: Path) -> None:
+    """A device whose sentence is followed at once by another one may obey neither."""
+
+    async def scene() -> None:
+        one = Scene(far_ends, tmp_path)
+        await one.ports.open(is_restart=False)
+        await one.ports.write_last(b"SET 0\r\n")
+        for write in (one.ports.write_output, one.ports.write_cell, one.ports.write_valve):
+            write(b"?")
+        assert os.read(far_ends["output"].fd, 64) == b"SET 0\r\n"
+        for pty in far_ends.values():
+            os.set_blocking(pty.fd, False)
+            with pytest.raises(BlockingIOError):
+                os.read(pty.fd, 64)
+        one.unplug("output")
+        await one.ports.write_last(b"SET 0\r\n")  # where nobody takes it that is no exception
+        one.ports.close()
+
+    asyncio.run(scene())
+
+
+def test_an_adapter_that_waits_before_it_tells_is_told_to_people(
+    far_ends: dict[str, Pty], tmp_path: Path, monkeypatch
+) -> None:
+    def slow(descriptor: int, path: str) -> str:
+        return f"W241 {path} waits"
+
+    monkeypatch.setattr(serial_port, "set_low_latency", slow)
+
+    async def scene() -> None:
+        one = Scene(far_ends, tmp_path)
+        await one.ports.open(is_restart=False)
+        assert one.said == [f"W241 {path} waits" for path in one.paths.values()]
+        one.ports.close()
+
+    asyncio.run(scene())
 
 
 def test_a_port_that_is_there_and_does_not_open_is_told_in_the_log(far_ends: dict[str, Pty]) -> None:

@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+import pytest
+
 from gateway.codes.faults import FaultCode
 from gateway.control.settings import ValveControl
-from gateway.devices import ValveDevice, ValveDirection, ValveHost
+from gateway.devices import DeviceProfile, ValveDevice, ValveDirection, ValveHost
 from gateway.registers.words import State
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from tests.control.bench import settings
@@ -18,14 +20,14 @@ PROFILE = load_device("waveshare-relay")
 class Relay:
     """The device behind the line; takes_s: until its answer; deaf: it hears nothing."""
 
-    def __init__(self, stands: ValveDirection = PUSH) -> None:
-        self.device, self.stands = ValveDevice(PROFILE), stands
+    def __init__(self, stands: ValveDirection = PUSH, profile: DeviceProfile = PROFILE) -> None:
+        self.device, self.stands = ValveDevice(profile), stands
         self.now_s = 0.0
         self.is_deaf = self.is_stuck = False
         self.asked: list[tuple[float, ValveDirection | None]] = []
         self.answers: list[tuple[float, bytes]] = []
         self.shown: set[ValveDirection | None] = set()
-        self.line = ValveExchange(ValveHost(PROFILE), self.hear, PROFILE.reply_timeout_s)
+        self.line = ValveExchange(ValveHost(profile), self.hear, profile.reply_timeout_s)
 
     def hear(self, data: bytes) -> None:
         if self.is_deaf:
@@ -68,8 +70,10 @@ def test_an_order_waits_until_the_valve_has_said_where_it_stands() -> None:
     assert [question for _, question in relay.asked[:2]] == [None, PULL]
 
 
-def test_an_order_goes_out_once_and_its_readback_follows_at_once() -> None:
-    relay = Relay().run(0.5, PUSH)
+@pytest.mark.parametrize("polls", range(20))
+def test_an_order_goes_out_once_and_its_readback_follows_at_once(polls: int) -> None:
+    """Wherever between two readings it comes."""
+    relay = Relay().run(0.5 + 0.005 * polls, PUSH)
     began_s = relay.now_s
     relay.run(0.5, PULL)
     assert relay.orders == [PULL] and relay.line.status.stands is PULL
@@ -91,7 +95,7 @@ def test_a_relay_that_does_not_move_keeps_its_readback_and_is_told_again() -> No
     relay = Relay().run(0.3)
     relay.is_stuck = True
     relay.run(1.0, PULL)
-    assert relay.line.status.stands is PUSH and len(relay.orders) > 2
+    assert relay.line.status.stands is PUSH and 2 < len(relay.orders) < 12
     assert relay.shown == {None, PUSH}, "an answer to an order is no readback"
 
 
@@ -162,3 +166,49 @@ def test_noise_is_counted_and_a_new_port_begins_with_nothing() -> None:
     assert relay.line.garbage_bytes == 8 and relay.line.status.stands is PUSH
     relay.line.reset()
     assert relay.line.status.stands is None
+
+
+@pytest.mark.parametrize(("name", "noise"), [("waveshare-relay", "01050000FF008C3A"), ("mcu-valve", "3f3f0d0a")])
+def test_noise_frees_no_wire_and_half_an_answer_is_no_part_of_the_next(name: str, noise: str) -> None:
+    relay = Relay(profile=load_device(name))
+    relay.line.tick(0.0)
+    assert len(relay.asked) == 1
+    answer = relay.answers.pop()[1]
+    relay.line.on_bytes(bytes.fromhex(noise), 0.01)
+    relay.line.tick(0.02)
+    assert len(relay.asked) == 1
+    relay.line.on_bytes(answer[:3], 0.02)
+    relay.line.tick(1.0)  # over its time
+    assert len(relay.asked) == 2
+    relay.line.on_bytes(relay.answers.pop()[1], 1.02)
+    assert relay.line.status.stands is PUSH
+    relay.answers.clear()
+    relay.line.tick(2.0)
+    relay.answers.clear()
+    relay.line.on_bytes(answer[:3], 2.01)
+    relay.line.reset()
+    relay.line.tick(2.02)
+    relay.line.on_bytes(answer, 2.03)
+    assert relay.line.status.stands is PUSH, "nor of what a port says that was opened again"
+
+
+def test_a_bus_has_its_silence_before_the_next_question_of_a_valve() -> None:
+    relay, gap_s = Relay(), ValveHost(PROFILE).gap_s
+    assert gap_s > 0.001
+    relay.line.tick(0.0)
+    relay.line.on_bytes(relay.answers.pop()[1], 0.02)
+    relay.line.set_direction(PULL, 0.02 + 0.9 * gap_s)
+    assert len(relay.asked) == 1
+    relay.line.tick(0.02 + 1.1 * gap_s)
+    assert relay.orders == [PULL]
+
+
+def test_the_loop_asks_a_valve_again_whose_answer_was_lost() -> None:
+    """Nothing else would: nobody orders it anywhere."""
+    rig = ValveRig().run(1.0)
+    rig.relay.is_deaf = True
+    rig.run(0.5)
+    rig.relay.is_deaf, asked = False, len(rig.relay.asked)
+    rig.run(0.5)
+    assert len(rig.relay.asked) > asked
+    assert rig.now() - (rig.relay.line.status.unanswered_since_s or rig.now()) < 0.1

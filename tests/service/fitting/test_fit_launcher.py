@@ -1,0 +1,62 @@
+"""The process that fits a ladder is heard as a whole, whatever it says, and outlives whoever has started it."""
+
+import asyncio
+import os
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from gateway.service.running_rig import calibration_runs, fit_launcher
+from gateway.service.running_rig.fit_launcher import FitLauncher, Result
+from tests.service.running_rig.test_calibration_runs import kept
+from tests.service.wired import Wired
+
+NO_RESULT = "A331 the fit process ended without a result"
+
+
+def heard(monkeypatch: pytest.MonkeyPatch, code: str) -> tuple[Result, int]:
+    """What such a process is heard to say, and its session."""
+    monkeypatch.setattr(fit_launcher, "module_command", lambda _: [sys.executable, "-S", "-c", f"import os; {code}"])
+
+    async def scene() -> tuple[Result, int]:
+        results: asyncio.Queue[Result] = asyncio.Queue()
+        child = FitLauncher(Path("recording"), Path("rig"), Path("state"), results.put_nowait)
+        session = os.getsid(child._process.pid)
+        async with asyncio.timeout(10):
+            result = await results.get()
+            while child._process.returncode is None:  # asked for again, until it is reaped
+                await asyncio.sleep(0.005)
+        return result, session - child._process.pid
+
+    return asyncio.run(scene())
+
+
+def test_a_result_that_comes_in_pieces_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a session of its own: the end of a terminal, or of control, is not the fit's."""
+    said = r"""os.write(1, b'{"stored": '); os.write(1, b'7, "report": "' + b'x' * 200000 + b'"}')"""
+    result, session = heard(monkeypatch, said)
+    assert result == {"stored": 7, "report": "x" * 200000}
+    assert session == 0
+
+
+@pytest.mark.parametrize("code", ["os._exit(1)", "os.write(1, b'{\"stored\": ')", "os.write(1, b'Killed')"])
+def test_a_fit_that_ends_without_a_result_is_a_refusal_and_no_exception(
+    code: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result, _ = heard(monkeypatch, code)
+    assert result["refused"].startswith(NO_RESULT)
+
+
+def test_a_fit_that_cannot_be_started_is_a_refusal_that_names_the_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none_left(*_: object) -> None:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(calibration_runs, "FitLauncher", none_left)
+    runs = kept(Wired().ready(), tmp_path)
+    runs._fit(SimpleNamespace(failure=None, path=tmp_path / "0007", number=7))  # type: ignore[arg-type]
+    refused = runs.status()["result"]["refused"]
+    assert refused.startswith("A331 the fit did not start: Resource temporarily") and refused.endswith("fit 7")

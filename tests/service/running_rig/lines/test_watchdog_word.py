@@ -1,0 +1,34 @@
+"""The register `watchdogs` says who writes the safe voltage when control, or this machine, is gone: never one who would not."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gateway.registers.words import WatchdogBit
+from gateway.service.running_rig.lines.watchdog_word import watchdog_word
+
+NONE = WatchdogBit(0)
+
+
+def word(*, guarded: bool = False, accepts_none: bool = False, **checks: bool) -> WatchdogBit:
+    known: dict[str, Any] = {"has_watchdog": True, "is_armed": False, "is_tripped": False} | checks
+    rig, ports = SimpleNamespace(accept_no_device_watchdog=accepts_none), SimpleNamespace(is_guarded=guarded)
+    line = SimpleNamespace(checks=SimpleNamespace(**known))
+    return WatchdogBit(watchdog_word(rig, ports, line))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("guarded", [False, True])
+def test_the_guardian_watches_only_a_line_that_it_has(guarded: bool) -> None:
+    bit = WatchdogBit.GUARDIAN_WATCHES if guarded else NONE
+    assert word(guarded=guarded) == bit
+    assert word(guarded=guarded, is_armed=True) == bit | WatchdogBit.DEVICE_ARMED
+    assert word(guarded=guarded, is_tripped=True) == bit | WatchdogBit.DEVICE_TRIPPED
+    assert word(guarded=guarded, is_armed=True, is_tripped=True) == bit | 6, "both, where both are said"
+
+
+@pytest.mark.parametrize("accepts_none", [False, True])
+def test_that_there_is_none_is_said_where_the_rig_accepts_it(accepts_none: bool) -> None:
+    bit = WatchdogBit.DEVICE_HAS_NONE if accepts_none else NONE
+    assert word(has_watchdog=False, is_armed=True, accepts_none=accepts_none) == bit
+    assert word(accepts_none=accepts_none) == NONE, "it has one"

@@ -1,0 +1,55 @@
+"""Another plant is taken into use once, and not under force; what becomes of it is told."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles import Rig
+from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
+from tests.service.rigs import demo
+
+
+class Edges:
+    """Stands for the control. is_free: nothing presses."""
+
+    def __init__(self, state: Path) -> None:
+        self.is_free, self.now_s = True, 10.0
+        self.taken: list[Rig] = []
+        self.said: list[str] = []
+        self.plants = RigPlants(demo(), state)
+        self.plants.serve(
+            PlantEdges(
+                lambda: self.is_free, self.taken.append, lambda: self.now_s, lambda _, text: self.said.append(text)
+            )
+        )
+
+
+@pytest.fixture
+def edges(tmp_path: Path) -> Edges:
+    return Edges(tmp_path)
+
+
+def test_what_waits_for_the_end_of_a_force_is_taken_once_it_is_over_and_once(edges: Edges) -> None:
+    edges.is_free = False
+    edges.plants._on_selected(demo())
+    for _ in range(3):
+        edges.plants.take_waiting()
+    assert (edges.taken, edges.plants.status()["waiting"]) == ([], 0)
+    edges.is_free, edges.now_s = True, 20.0
+    for _ in range(3):
+        edges.plants.take_waiting()
+    assert len(edges.taken) == 1
+    status = edges.plants.status()
+    assert (status["waiting"], status["since_s"], status["failed"]) == (None, 20.0, False)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"), [(OSError(28, "No space left on device"), "E431 No space left"), (KeyError("x"), "A499")]
+)
+def test_a_change_that_came_to_nothing_is_told_as_failed_and_the_plant_stays(
+    edges: Edges, error: Exception, words: str
+) -> None:
+    edges.plants._on_selected(error)
+    status = edges.plants.status()
+    assert status["failed"] and status["said"].startswith(words) and status["said"].endswith("stays in use")
+    assert edges.taken == [] and status["since_s"] == 10.0

@@ -1,0 +1,105 @@
+"""How a running rig ends: by a ramp, or a defect whose cause is told; what it hands on until then; what goes last."""
+
+import asyncio
+import socket
+import time
+
+import pytest
+
+from gateway.audit.rig_audit import RigAudit
+from gateway.processes import message_link
+from gateway.service.guardian_line import GuardianLine
+from gateway.service.running_rig.calibration_runs import CalibrationRuns
+from gateway.service.running_rig.lines.rig_ports import RigPorts
+from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.rig_plants import RigPlants
+from gateway.service.running_rig.running_rig import RunningRig
+from tests.end_to_end.own_devices import OwnDevices
+from tests.service.running_rig.test_running_rig import devices, pressing, with_running_rig
+
+__all__ = ["devices"]
+
+
+def test_a_stop_lets_the_force_down_in_steps_and_not_at_once(devices: OwnDevices) -> None:
+    """A part that is held would fall, one that is ground would have a mark."""
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        await pressing(rig, devices, 1.5)
+        while devices.force_n < 7.0 * 1.5:
+            await asyncio.sleep(0.005)
+        began_s = time.monotonic()
+        await rig.ramp_down()
+        assert rig.controller.has_stopped
+        assert devices.setting_v == 0.0, "before anything else is closed"
+        steps_v = [heard.voltage_v or 0.0 for heard in devices.settings_since(began_s)]
+        assert steps_v == sorted(steps_v, reverse=True)
+        assert len([one for one in steps_v if 0.3 < one < 1.2]) > 3
+
+    with_running_rig(devices, scene)
+
+
+def test_the_first_cause_of_an_end_is_told_to_the_guardian_and_to_people(devices: OwnDevices) -> None:
+    """Its sentence is what the next start tells, and the register `fault_code` of it."""
+    told: list[str] = []
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        loop = asyncio.get_running_loop()
+        loop.call_exception_handler({"message": "in a callback", "exception": ZeroDivisionError("x / 0")})
+        assert rig.failed.is_set()
+        while not told:
+            message = message_link.receive(guardian)
+            assert message
+            message.drop_descriptors()
+            told.extend([message.body["text"]] if message.tag == message_link.FIRST_CAUSE else [])
+
+    said = with_running_rig(devices, scene)
+    assert told == ["internal error: ZeroDivisionError('x / 0')"]
+    assert any("A499" in line and "in a callback" in line for line in said)
+
+
+def test_a_watchdog_is_let_go_once_the_safe_voltage_has_been_answered(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before it an end in the middle would leave nobody who watches; at once, both would talk on a bus of two wires."""
+    written: list[tuple[float, bytes]] = []
+
+    async def write_last(_: RigPorts, frame: bytes) -> None:
+        written.append((time.monotonic(), frame))
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        rig._last_frame = b"~OFF"
+        monkeypatch.setattr(RigPorts, "write_last", write_last)
+        written.append((rig._rig.output.device.reply_timeout_s, rig._safe_frame))
+
+    with_running_rig(devices, scene)
+    (timeout_s, safe_frame), (safe_s, safe), (off_s, off) = written
+    assert (safe, off) == (safe_frame, b"~OFF")
+    assert off_s - safe_s >= timeout_s
+
+
+def test_each_tick_beats_and_hands_on_what_waits_for_a_disk(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is lost with a killed process is the last tenth of a second, and not all since its start."""
+    called: set[str] = set()
+
+    def note(owner: type, method: str) -> None:
+        was = getattr(owner, method)
+        monkeypatch.setattr(owner, method, lambda *told: (called.add(f"{owner.__name__}.{method}"), was(*told))[1])
+
+    handed_on = (
+        (Recordings, "flush"),
+        (CalibrationRuns, "flush"),
+        (RigPlants, "take_waiting"),
+        (RigAudit, "flush"),
+        (GuardianLine, "heartbeat"),
+    )
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        for owner, method in handed_on:
+            note(owner, method)
+        while len(called) < len(handed_on):
+            await asyncio.sleep(0.005)
+
+    with_running_rig(devices, scene)
+    assert called == {f"{owner.__name__}.{method}" for owner, method in handed_on}

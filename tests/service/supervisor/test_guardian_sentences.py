@@ -1,0 +1,86 @@
+"""What the guardian says goes out as far as somebody reads it, and nothing of it keeps the guardian from its work."""
+
+import contextlib
+import io
+import os
+import select
+import subprocess
+import sys
+from subprocess import PIPE
+from types import SimpleNamespace
+
+import pytest
+
+from gateway.service.supervisor import guardian_sentences as words
+
+
+def test_a_reader_that_has_gone_does_not_end_the_guardian():
+    """`run --json | head -1`, and a closed stderr: said to nobody, and exit 0."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    code = (
+        "from gateway.service.supervisor.guardian_sentences import print_error, print_ready; print_ready('READY'); "
+        "print_ready({}); print_error('A401')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], stdout=writer, stderr=writer, check=False)
+    os.close(writer)
+    assert done.returncode == 0
+
+
+@pytest.mark.parametrize("is_read", [True, False])
+def test_a_reader_that_reads_nothing_is_not_waited_for(is_read):
+    """A terminal that is paused while the gateway starts: the guardian has another work; READY comes once it is read."""
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writer, bytes(4096))
+    os.set_blocking(writer, True)
+    code = (
+        "import sys; from gateway.service.supervisor.guardian_sentences import print_ready; print_ready('READY'); "
+        "sys.stderr.write('went on'); sys.stderr.flush(); sys.stdin.read()"
+    )
+    one = subprocess.Popen([sys.executable, "-c", code], stdin=PIPE, stdout=writer, stderr=PIPE)
+    os.close(writer)
+    assert one.stderr and one.stdin
+    assert select.select([one.stderr], [], [], 5.0)[0]
+    said = b""
+    while is_read and b"READY" not in said:
+        said = said[-10:] + os.read(reader, 65536)
+    one.stdin.close()
+    assert one.wait(5.0) == 0
+    one.stderr.close()
+    os.close(reader)
+
+
+def test_an_error_is_said_only_to_who_reads(monkeypatch):
+    """A paused terminal is waited for a moment at most."""
+    waits_s = []
+
+    def full(readers, writers, errors, timeout_s=None):
+        waits_s.append(timeout_s)
+        return [], [], []
+
+    monkeypatch.setattr(sys, "stderr", said := io.StringIO())
+    with monkeypatch.context() as patch:
+        patch.setattr(select, "select", full)
+        words.print_error("A401")
+    assert said.getvalue() == ""
+    assert waits_s == [pytest.approx(0.1)]
+
+
+def test_a_line_of_ready_that_goes_out_in_pieces_is_whole(monkeypatch):
+    reader, writer = os.pipe()
+    write = os.write
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "stdout", SimpleNamespace(fileno=lambda: writer))
+        patch.setattr(os, "write", lambda descriptor, data: write(descriptor, data[:3]))
+        words.print_ready("READY rig demo")
+    os.close(writer)
+    assert os.read(reader, 64) == b"READY rig demo\n"
+    os.close(reader)
+
+
+def test_what_was_not_acknowledged_is_not_called_so():
+    said = [words.describe_acknowledgement(one) for one in (True, False, None)]
+    assert said == ["acknowledged", "written, not acknowledged", "no line was open"]
