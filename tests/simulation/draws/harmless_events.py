@@ -26,6 +26,7 @@ LONGEST_STOP_S = 0.03
 LONGEST_LATE_S = 0.04
 LONGEST_GAP_S = 0.03
 """Inside of a request."""
+LONGEST_PDU = 253
 COMMANDS_END = 400
 """Behind the blocks in which a master commands."""
 APART_S = 1.0
@@ -45,10 +46,14 @@ def draw_harmless_events(seed: int, duration_s: float) -> Iterator[Event]:
 
 
 def _draw_holds(seed: int, duration_s: float) -> Iterator[Event]:
+    """A schedule pushes or pulls: a coil alone does not say which, and a valve that turns costs the force for its time."""
     chance, at_s = Random(f"held {seed}"), BEGIN_S
+    pulls = chance.random() < 0.5
+    ways = [way for way in WAYS if not (pulls and way == "coil")]
     while at_s < duration_s:
-        way = chance.choice(tuple(WAYS)) if chance.random() < 0.4 else "block"
-        yield Event(round(at_s, 4), "worker", "hold_on", (round(chance.uniform(*FORCE_N), 2),), way=way)
+        way = chance.choice(ways) if chance.random() < 0.4 else "block"
+        force_n = 0.02 * round(50.0 * chance.uniform(*FORCE_N)) + 0.01 * pulls
+        yield Event(round(at_s, 4), "worker", "hold_on", (round(force_n, 2),), way=way)
         at_s += chance.expovariate(1.0 / HELD_S)
 
 
@@ -103,8 +108,9 @@ def _is_harmless(event: Event) -> bool:
 
 
 def _commands(pdu: bytes) -> bool:
-    """Whether a request may write what its own master commands: words, coils or numbers."""
-    return pdu[0] in WRITES and (pdu[0] in (5, 15) or written_address(pdu) < COMMANDS_END)
+    """Whether a request may write what its own master commands: words, coils or numbers; or end its connection, as one that
+    is longer than Modbus allows does."""
+    return len(pdu) > LONGEST_PDU or (pdu[0] in WRITES and (pdu[0] in (5, 15) or written_address(pdu) < COMMANDS_END))
 
 
 def _may_stop(pdu: bytes) -> bool:
