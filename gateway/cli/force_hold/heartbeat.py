@@ -99,6 +99,7 @@ class HeartbeatThread(threading.Thread):
         except CliError as error:
             if error.exit_code != exit_codes.DEVICE:
                 raise
+            self.hold.note_lost(write)
             self._find_again(error)
 
     def _send(self, write: HoldWrite) -> None:

@@ -192,7 +192,9 @@ def test_a_reason_is_told_once_until_it_is_another_and_a_face_that_is_served_is_
                 raise StartError(why, 1)
             return ServedFace("tcp", "there", "", {})
 
-        to_come = faces_to_come.FacesToCome(lambda _, told: log.append(told), ended.set, sleep=lambda _: asyncio.sleep(0))
+        to_come = faces_to_come.FacesToCome(
+            lambda _, told: log.append(told), ended.set, sleep=lambda _: asyncio.sleep(0)
+        )
         to_come.add("tcp", serve, StartError("held", 1))
         await ended.wait()
         for _ in range(5):

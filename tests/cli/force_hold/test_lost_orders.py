@@ -1,0 +1,73 @@
+"""An order that no gateway has heard is no order given: `hold` says that it has let go when the gateway has been told."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gateway.cli.errors import CliError
+from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
+from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, HoldWrite, StatusReading
+from gateway.cli.master.client import GatewayClient
+from gateway.cli.master.wires import TcpWire
+from gateway.modbus.peer import NOBODY
+from gateway.processes import exit_codes
+from gateway.registers import RegisterMap
+from gateway.registers.words import State
+from tests.cli.conftest import PlainBank
+
+
+class LossyClient(GatewayClient):
+    """A gateway that holds a force. The first orders to disable get lost with their connection; each enable is answered by
+    `on_enabled`."""
+
+    def __init__(self, bank: PlainBank, losses: int) -> None:
+        super().__init__(TcpWire("127.0.0.1", 5020), 1, bank.register_map)
+        self.bank, self.losses = bank, losses
+        self.on_enabled = lambda: None
+
+    def _ask(self, method: str, request: str, *arguments: Any, **options: Any) -> Any:
+        if method == "read_holding_registers":
+            data = self.bank.read(arguments[0], options["count"])
+            return SimpleNamespace(
+                registers=[int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2)]
+            )
+        address, words = arguments
+        if address == 0 and words[0] == 0 and self.losses:
+            self.losses -= 1
+            raise CliError("E131 127.0.0.1:5020 closed the connection: gone", exit_codes.DEVICE)
+        self.bank.write_registers(address, b"".join(word.to_bytes(2, "big") for word in words), NOBODY)
+        if address == 0 and words[0] == 1:
+            self.on_enabled()
+        return None
+
+
+@pytest.mark.parametrize(("order", "applied_n"), [("stopping", 0.0), ("dropping", 12.0)])
+@pytest.mark.parametrize("losses", [1, 3])
+def test_a_disable_that_got_lost_is_sent_again(
+    order: str, applied_n: float, losses: int, register_map: RegisterMap
+) -> None:
+    """It was told as `0 N, disabled` while the gateway went on pressing."""
+    bank = PlainBank(register_map)
+    bank.set("state", State.HOLDING)
+    bank.set("force_applied", applied_n)
+    client, times = LossyClient(bank, losses), iter(range(10_000))
+    beat = HeartbeatThread(
+        client, HoldRun(12.0, heartbeat=0, resets=False), KnownLease(None), lambda: 0.001 * next(times)
+    )
+    client.on_enabled = getattr(beat, order).set
+    beat.run()
+    assert beat.failure is None and beat.hold.end is HoldEnd.STOPPED
+    assert client.losses == 0 and bank.words[0] == 0
+
+
+def test_a_ramp_down_that_got_lost_is_begun_again_and_nothing_is_enabled_that_is_off() -> None:
+    run = HoldRun(12.0, heartbeat=0, resets=False)
+    assert run.next(StatusReading(State.OFF), 0.0, stops=False) == HoldWrite(1, 1, 12.0)
+    pressing = StatusReading(State.HOLDING, applied_n=12.0)
+    lowered = run.next(pressing, 0.1, stops=True)
+    assert lowered == HoldWrite(2, 1, 0.0)
+    run.note_lost(lowered)
+    assert run.next(pressing, 0.2, stops=True) == HoldWrite(3, 1, 0.0)
+    run.note_lost(HoldWrite(3, 1, 0.0))
+    assert run.next(StatusReading(State.OFF), 0.3, stops=True) is None and run.end is HoldEnd.STOPPED
