@@ -55,7 +55,7 @@ def command(*, assignments: tuple[str, ...], dry_run: bool, wire: "Wire", as_jso
 
 @contextmanager
 def _sent_told(sent: "list[Frame]") -> Iterator[None]:
-    """Add to what is told of a failure which requests had gone out before: whoever reads of a refusal alone takes it for all."""
+    """Add to what is told of a failure which requests had gone out before: who reads of a refusal alone takes it for all."""
     try:
         yield
     except CliError as error:
