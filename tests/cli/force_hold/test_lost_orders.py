@@ -10,6 +10,7 @@ from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
 from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, HoldWrite, StatusReading
 from gateway.cli.master.client import GatewayClient
 from gateway.cli.master.wires import TcpWire
+from gateway.cli.verbs.hold import _report_end
 from gateway.modbus.peer import NOBODY
 from gateway.processes import exit_codes
 from gateway.registers import RegisterMap
@@ -71,3 +72,18 @@ def test_a_ramp_down_that_got_lost_is_begun_again_and_nothing_is_enabled_that_is
     assert run.next(pressing, 0.2, stops=True) == HoldWrite(3, 1, 0.0)
     run.note_lost(HoldWrite(3, 1, 0.0))
     assert run.next(StatusReading(State.OFF), 0.3, stops=True) is None and run.end is HoldEnd.STOPPED
+
+
+def test_a_status_that_nobody_here_understands_ends_at_the_safe_voltage_and_is_told(register_map: RegisterMap) -> None:
+    """A later gateway may have another fault: the thread died over it, and `hold` told `0 N, disabled` with exit code 0."""
+    bank = PlainBank(register_map)
+    bank.set("state", State.HOLDING)
+    client, times = LossyClient(bank, 0), iter(range(10_000))
+    beat = HeartbeatThread(
+        client, HoldRun(12.0, heartbeat=0, resets=False), KnownLease(None), lambda: 0.001 * next(times)
+    )
+    client.on_enabled = lambda: bank.set("limited_by", 99)
+    beat.run()
+    assert isinstance(beat.failure, ValueError) and bank.words[0] == 0
+    with pytest.raises(ValueError, match="99 is not a valid LimitedBy"):
+        _report_end(beat, "127.0.0.1:5020", as_json=False)
