@@ -13,7 +13,7 @@ from gateway.service.closed_loop.study import _ratios, _reach_n, _summarize, ans
 
 BEFORE = [
     SimulatedRun(np.array([3.0, -3.0]), (0.4, 0.8), ""),
-    SimulatedRun(np.array([1.0, -5.0]), (0.6, 0.6), "over_force"),
+    SimulatedRun(np.array([1.0, -5.0]), (0.8, 0.8), "over_force"),
 ]
 AFTER = [SimulatedRun(0.5 * run.error_n, (0.1, 0.3), fault) for run, fault in zip(BEFORE, ("", "stale"), strict=True)]
 
@@ -22,7 +22,7 @@ def test_a_summary_is_of_all_runs_of_both_kinds() -> None:
     gain = _summarize(BEFORE, AFTER, (0, 1), NO_COMPENSATION, ("noted",))
     assert (gain.before_rms_n, gain.after_rms_n) == (pytest.approx(np.sqrt(11.0)), pytest.approx(np.sqrt(11.0) / 2.0))
     assert (gain.before_max_n, gain.after_max_n) == (5.0, 2.5), "a force that is short is an error, too"
-    assert (gain.before_settled_s, gain.after_settled_s) == (pytest.approx(0.6), pytest.approx(0.2))
+    assert (gain.before_settled_s, gain.after_settled_s) == (pytest.approx(0.7), pytest.approx(0.2))
     assert gain.rms_ratio == pytest.approx(0.5) and gain.rms_ratio_ci95 == (pytest.approx(0.5), pytest.approx(0.5))
     assert (gain.before_faults, gain.after_faults) == (("over_force",), ("stale",))
     lines = format_gain(gain)
