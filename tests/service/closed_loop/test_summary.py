@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.control import NO_COMPENSATION
 from gateway.defaults import TICK_S
-from gateway.service.closed_loop.simulated_run import SimulatedRun, _settling_time_s
+from gateway.service.closed_loop.simulated_run import SimulatedLoop, SimulatedRun, _settling_time_s
 from gateway.service.closed_loop.study import _ratios, _reach_n, _summarize, answer_sentence, format_gain
+from gateway.twin.surroundings import Surroundings
 
 BEFORE = [
     SimulatedRun(np.array([3.0, -3.0]), (0.4, 0.8), ""),
@@ -58,3 +60,24 @@ def test_a_schedule_goes_no_further_than_the_rig_and_each_model() -> None:
     small: Any = SimpleNamespace(force_range_n=(0.0, 20.0))
     assert _reach_n(settings, [large, large]) == 30.0
     assert _reach_n(settings, [large, small]) == _reach_n(settings, [small, large]) == pytest.approx(0.92 * 20.0)
+
+
+def test_the_first_fault_is_the_one_that_stopped_a_run() -> None:
+    outputs = iter([FaultCode.NONE, FaultCode.SAMPLE_STALE, FaultCode.OVER_FORCE, FaultCode.NONE])
+    loop: Any = SimulatedLoop.__new__(SimulatedLoop)
+    loop.fault, loop._voltage_v, loop._command, loop._sample, loop._line = "", 0.0, None, None, None
+    loop._controller = SimpleNamespace(step=lambda *_: SimpleNamespace(voltage_v=0.0, fault=next(outputs)))
+    for _ in range(4):
+        loop._step(0.0)
+    assert loop.fault == "sample_stale"
+
+
+def test_control_is_told_what_it_has_an_input_for_and_the_plant_feels_all() -> None:
+    around, felt = Surroundings(temperature_c=31.0, feed_mm_s=5.0, tilt_deg=90.0), list[Surroundings]()
+    for inputs in (frozenset[str](), frozenset({"temperature_c", "tilt_deg"})):
+        loop: Any = SimulatedLoop.__new__(SimulatedLoop)
+        loop._inputs, loop._twin = inputs, SimpleNamespace(set_surroundings=felt.append)
+        tilt_rad = loop._surround(around)
+        assert tilt_rad == (pytest.approx(0.5 * np.pi) if inputs else 0.0)
+        assert np.isnan(loop._line.feed_mm_s) and np.isnan(loop._line.temperature_c) == (not inputs)
+    assert felt == [around, around]
