@@ -8,12 +8,17 @@ import pytest
 
 from gateway.bsfm import (
     Branches,
+    Bsfm,
     CoefficientLimits,
     CoefficientReason,
     Coefficients,
+    LinearBlend,
     RationalBezier,
     validate_coefficients,
 )
+from gateway.bsfm.model import Response
+from gateway.bsfm.slip.slip_stops import half_width_bound_v
+from tests.calibrations.coefficients import calibration
 
 LIMITS = CoefficientLimits(cell_range_n=98.0)
 GOOD = Coefficients(0.0, 5.0, (0.5, 14.0, 38.0), (1.0, 0.93, 1.2), (0.5, 22.0, 38.0), (1.0, 1.1, 1.2), 3.0)
@@ -49,6 +54,7 @@ def test_a_good_set_has_no_fault():
         ({"falling_handles_n": (0.5, 13.0, 38.0)}, -1, CoefficientReason.CROSSING),
         ({"x1_v": 10.5}, -1, CoefficientReason.VOLTAGE_RANGE),
         ({"x0_v": math.nan}, -1, CoefficientReason.VOLTAGE_RANGE),
+        ({"x0_v": -0.5}, -1, CoefficientReason.VOLTAGE_RANGE),
         ({"blend_span_n": math.nan}, -1, CoefficientReason.BLEND_SPAN),
         ({"rising_weights": (1.0, 1.0)}, -1, CoefficientReason.ORDER),
     ],
@@ -96,3 +102,38 @@ def test_a_weight_limit_is_met_exactly():
 def test_a_missing_array_is_an_order_fault_and_nothing_crashes():
     faults = validate_coefficients(Coefficients(0.0, 5.0, (), (), (), ()), LIMITS)
     assert [fault.reason for fault in faults] == [CoefficientReason.ORDER]
+
+
+def test_sixteen_handles_are_taken_and_seventeen_are_an_order_fault():
+    for count, reasons in ((16, []), (17, [CoefficientReason.ORDER])):
+        line = tuple(2.0 * place for place in range(count))
+        weights = (1.0,) * count
+        found = validate_coefficients(Coefficients(0.0, 5.0, line, weights, line, weights), LIMITS)
+        assert [fault.reason for fault in found] == reasons
+
+
+def test_a_calibration_is_checked_with_all_that_it_carries():
+    stops = {"slip_radii_v": (0.5, 1.0), "slip_shares": (0.6, 0.4)}
+    given = calibration(8, **stops, response=Response(dead_time_s=0.1, lag_s=0.2, second_lag_s=0.1, damping=0.3))
+    taken = Coefficients.of_calibration(given)
+    assert (taken.slip_radii_v, taken.slip_shares) == ((0.5, 1.0), (0.6, 0.4))
+    assert taken.response == given.response
+    stored = taken.round_to_float32().response
+    assert stored is not None and taken.response is not None
+    for name in ("dead_time_s", "lag_s", "second_lag_s", "damping"):
+        assert getattr(stored, name) == struct.unpack(">f", struct.pack(">f", getattr(taken.response, name)))[0], name
+
+
+@pytest.mark.parametrize(("share", "is_taken"), [(0.94, True), (0.96, False)])
+def test_stops_are_not_much_stiffer_than_a_voltage_that_is_unique(share: float, is_taken: bool):
+    """Right after a reversal the voltage would jump by more than twenty times its way."""
+    loop = branches((0.0, 10.0, 20.0), (0.0, 12.0, 20.0))
+    stiff = replace(Coefficients.of(loop), slip_radii_v=(half_width_bound_v(loop) / share,), slip_shares=(1.0,))
+    faults = validate_coefficients(stiff, LIMITS)
+    assert [fault.reason for fault in faults] == ([] if is_taken else [CoefficientReason.SLIP_STIFFNESS])
+
+
+def test_the_forces_of_both_branches_are_those_at_their_shares():
+    model = Bsfm(branches((0.0, 10.0, 20.0), (0.0, 12.0, 20.0)), LinearBlend(3.0))
+    for voltage_v in (0.5, 2.5, 4.5):
+        assert model.branch_forces_n(voltage_v) == (model.force_n(voltage_v, 1.0), model.force_n(voltage_v, -1.0))

@@ -52,6 +52,46 @@ def test_another_ones_job_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> 
     assert ask_until_done(Path(), "calibration", {"use": 2})["job"] == 2
 
 
+def test_a_change_without_an_end_is_not_waited_for_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(change_in_use, "_PATIENCE_S", 0.05)
+    monkeypatch.setattr(change_in_use, "ask", lambda directory, request: {"busy": True, "job": 1})
+    with pytest.raises(CliError, match="E431 the gateway has not answered for"):
+        ask_until_done(Path(), "calibration", {"use": 2})
+
+
+@pytest.mark.parametrize(("said", "told"), [(b"", "no answer"), (b"[]", "no answer"), (b"{", "E140")])
+def test_a_gateway_that_ends_over_a_question_is_told_as_one_that_is_gone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: bytes, told: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind("control.sock")
+        listener.listen()
+
+        def serve() -> None:
+            peer, _ = listener.accept()
+            with peer:
+                peer.recv(1000)
+                peer.sendall(said)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        with pytest.raises(CliError, match="E140 no gateway answers") as caught:
+            control_socket.ask(Path(), {"do": "running"})
+        thread.join()
+    assert told in str(caught.value) and caught.value.exit_code == exit_codes.DEVICE
+
+
+def test_a_gateway_of_another_user_is_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(path: Path, line: bytes) -> dict[str, Any]:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(control_socket, "_exchange", refuse)
+    with pytest.raises(CliError, match=r"E105 control\.sock: belongs to the user who runs the gateway") as caught:
+        control_socket.ask(Path(), {"do": "running"})
+    assert caught.value.exit_code == exit_codes.PERMISSION
+
+
 @pytest.mark.parametrize(
     ("reason", "code"), [(UploadReason.STORAGE, exit_codes.FAILED), (UploadReason.NOT_STORED, exit_codes.DATA)]
 )

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 from cryptography import x509
+from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from gateway.cli.certificates import Signed, make_ca, make_client, make_server, store
+from gateway.cli.certificates import Signed, load_ca, make_ca, make_client, make_server, store
 from gateway.modbus import Role
 
 
@@ -51,3 +52,20 @@ def test_only_the_ca_signs_certificates(ca: Signed) -> None:
         for each in made
     ]
     assert signs == [(True, True), (False, False), (False, False)]
+    assert ca.certificate.extensions.get_extension_for_class(x509.BasicConstraints).value.path_length == 0
+
+
+def test_a_client_s_certificate_is_no_server_s_and_the_other_way_round(ca: Signed) -> None:
+    """Else who has one for a panel can pose as the gateway."""
+    made = [make_server(ca, ["127.0.0.1"], 30), make_client(ca, "robot", Role.SETPOINT, 30)]
+    uses = [list(each.certificate.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value) for each in made]
+    assert uses == [[ExtendedKeyUsageOID.SERVER_AUTH], [ExtendedKeyUsageOID.CLIENT_AUTH]]
+
+
+def test_a_ca_with_another_s_key_signs_nothing(ca: Signed, tmp_path: Path) -> None:
+    store(ca, tmp_path, "ca")
+    assert load_ca(tmp_path).certificate == ca.certificate
+    store(make_ca(30), tmp_path, "other")
+    (tmp_path / "other.key").replace(tmp_path / "ca.key")
+    with pytest.raises(ValueError, match=r"ca\.key does not fit ca\.crt"):
+        load_ca(tmp_path)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gateway.cli import state_archive
-from gateway.cli.state_archive import ArchiveError, pack, unpack
+from gateway.cli.state_archive import ArchiveError, names_in, pack, unpack
 
 
 def archive_of(path: Path, manifest: bytes, *names: str) -> Path:
@@ -61,3 +61,94 @@ def test_who_unpacks_need_not_have_looked_before(tmp_path: Path) -> None:
     with pytest.raises(ArchiveError, match="which no backup does"):
         unpack(source, tmp_path / "new")
     assert os.listdir(tmp_path) == ["b.tar.gz"]  # noqa: PTH208
+
+
+def test_a_backup_that_fails_leaves_nothing_beside_its_name(
+    state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(state_archive.os, "fsync", fail)
+    with pytest.raises(OSError, match="No space"):
+        pack(state, tmp_path / "b.tar.gz")
+    assert os.listdir(tmp_path) == ["state"]  # noqa: PTH208
+
+
+def test_a_file_that_goes_while_it_is_packed_costs_itself_alone(
+    state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Event files get their next names, and recordings are pruned, while a gateway runs."""
+    files = state_archive._files
+    monkeypatch.setattr(state_archive, "_files", lambda folder: [*files(folder), folder / "events-7.jsonl"])
+    assert pack(state, tmp_path / "b.tar.gz") == names_in(tmp_path / "b.tar.gz") == ["calibrations/0001.yaml"]
+
+
+def test_a_link_stays_behind_or_the_backup_would_be_none(state: Path, tmp_path: Path) -> None:
+    """Restoring refuses an archive with a link as a whole."""
+    (tmp_path / "elsewhere").write_text("x")
+    (state / "link").symlink_to(tmp_path / "elsewhere")
+    (state / "folder").symlink_to(tmp_path)
+    pack(state, tmp_path / "b.tar.gz")
+    assert names_in(tmp_path / "b.tar.gz") == ["calibrations/0001.yaml"]
+
+
+def test_only_the_gateway_s_own_files_are_left_out(state: Path, tmp_path: Path) -> None:
+    for folder in (state, state / "calibrations"):
+        (folder / "lock").touch()
+        (folder / "running").touch()
+    assert pack(state, tmp_path / "b.tar.gz")[1:] == ["calibrations/lock", "calibrations/running"]
+
+
+def test_an_empty_state_comes_back_empty(tmp_path: Path) -> None:
+    (tmp_path / "state").mkdir()
+    (tmp_path / "new").mkdir()
+    pack(tmp_path / "state", tmp_path / "b.tar.gz")
+    assert unpack(tmp_path / "b.tar.gz", tmp_path / "new") is None
+    assert sorted(os.listdir(tmp_path)) == ["b.tar.gz", "new", "state"]  # noqa: PTH208
+
+
+def test_each_restore_keeps_what_was_there(state: Path, tmp_path: Path) -> None:
+    pack(state, tmp_path / "b.tar.gz")
+    kept = []
+    for text in ("one", "two", "three"):
+        (state / "mine.txt").write_text(text)
+        kept.append(unpack(tmp_path / "b.tar.gz", state))
+    assert [(folder / "mine.txt").read_text() for folder in kept if folder] == ["one", "two", "three"]
+
+
+def test_what_was_there_is_there_again_where_the_disk_refuses_the_last_step(
+    state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rename = Path.rename
+
+    def refuse(path: Path, target: Path) -> Path:
+        if path.name == "state" and path.parent.name.startswith(".state."):
+            raise OSError(5, "Input/output error", str(path))
+        return rename(path, target)
+
+    pack(state, tmp_path / "b.tar.gz")
+    (state / "mine.txt").write_text("mine")
+    monkeypatch.setattr(Path, "rename", refuse)
+    with pytest.raises(OSError, match="Input/output"):
+        unpack(tmp_path / "b.tar.gz", state)
+    assert (state / "mine.txt").read_text() == "mine"
+    assert sorted(os.listdir(tmp_path)) == ["b.tar.gz", "state"]  # noqa: PTH208
+
+
+def test_its_owner_may_read_what_is_restored_whatever_the_archive_says(tmp_path: Path) -> None:
+    source = tmp_path / "b.tar.gz"
+    with tarfile.open(source, "w:gz") as archive:
+        for name, data, mode in (("backup.json", b'{"format": 1}', 0o600), ("state/shut", b"x", 0)):
+            info = tarfile.TarInfo(name)
+            info.size, info.mode = len(data), mode
+            archive.addfile(info, io.BytesIO(data))
+    unpack(source, tmp_path / "new")
+    assert (tmp_path / "new" / "shut").stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.parametrize("name", ["state/.", "state/..", "state/lock", "state/control.sock"])
+def test_a_name_that_no_backup_has_is_refused(tmp_path: Path, name: str) -> None:
+    source = archive_of(tmp_path / "b.tar.gz", b'{"format": 1}', name)
+    with pytest.raises(ArchiveError, match="which no backup does"):
+        names_in(source)

@@ -83,3 +83,12 @@ def test_what_cannot_be_read_is_said_and_the_rest_is_packed(tmp_path: Path) -> N
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bundle.tar.gz", "state"], "nothing half beside it"
     again = gateway("report", target, "--state", state, "--rig", "demo")
     assert again.exit_code == 1 and "E405" in again.stderr
+
+
+def test_a_link_of_the_state_leads_nowhere_in_it_and_the_newest_events_are_there(tmp_path: Path) -> None:
+    state = with_events(tmp_path / "state", *(f"W204 number {number}" for number in range(30)))
+    (tmp_path / "other.txt").write_text("x")
+    (state / "link").symlink_to(tmp_path / "other.txt")
+    parts = collect(state, list)
+    assert "link" not in parts["state.txt"]
+    assert len(parts["events.jsonl"].splitlines()) == 30

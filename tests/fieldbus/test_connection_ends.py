@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from gateway.fieldbus.connection import BUFFER_BYTES
+from gateway.modbus import Role, pdu
 from tests.fieldbus.by_hand import READ, framed
 
 FAR = "192.0.2.7"
@@ -33,6 +35,17 @@ def test_a_frame_that_ends_late_starts_the_next_one_s_time_anew(stand: Any, deli
         deliver(connection, far, framed(READ, transaction=number)[:6])
         made.wait(3.0)
         deliver(connection, far, framed(READ, transaction=number)[6:])
+    assert (far.writes, far.ended) == (6, "")
+
+
+def test_so_does_one_whose_end_comes_with_the_next_one_s_beginning(stand: Any, deliver: Any) -> None:
+    made = stand(partial_s=5.0)
+    connection, far = made.connect()
+    stream = framed(READ) * 7
+    deliver(connection, far, stream[:6])
+    for number in range(6):
+        made.wait(3.0)
+        deliver(connection, far, stream[12 * number + 6 : 12 * number + 18])
     assert (far.writes, far.ended) == (6, "")
 
 
@@ -70,6 +83,7 @@ def test_a_fifth_connection_of_one_address_is_refused_and_is_nobody_s_loss(stand
     ends = [made.connect(FAR)[1] for _ in range(5)]
     assert [far.ended for far in ends] == ["", "", "", "", "aborted"]
     assert (made.closed, made.log[0][0]) == ([], "refused")
+    assert len(made.shared.connections) == 4
     assert "4 connections from its address" in made.log[0][1]
 
 
@@ -83,3 +97,34 @@ def test_a_place_that_becomes_free_is_used_again(stand: Any) -> None:
     made = stand(connections=1)
     made.connect()[1].close()
     assert made.connect()[1].ended == ""
+
+
+def test_what_waited_for_its_rate_is_not_executed_behind_the_end(stand: Any, deliver: Any) -> None:
+    """The master is told as gone, and what it owned is free: a write of its own would come from nobody."""
+    for end in ("close", "abort"):
+        made = stand(requests_per_s=1.0)
+        connection, far = made.connect(FAR)
+        deliver(connection, far, framed(pdu.write_register_request(0, 1)) * 3)
+        assert len(made.bank.writes) == 1 and not far.reading
+        getattr(connection, end)()
+        made.clock.advance(10.0)
+        assert len(made.bank.writes) == 1 and made.closed == [connection.peer]
+
+
+def test_lost_framing_is_told_once_also_where_it_fills_the_buffer(stand: Any, deliver: Any) -> None:
+    made = stand()
+    connection, far = made.connect(stuck=True)
+    deliver(connection, far, framed(READ) + b"\x00\x01\x00\x07" * (BUFFER_BYTES // 4))
+    made.clock.advance(1.0)
+    assert [cause for cause, _ in made.log] == ["framing"]
+
+
+def test_nobody_is_admitted_while_the_server_closes(stand: Any) -> None:
+    made = stand()
+    made.shared.closing = True
+    assert made.connect()[1].ended == "aborted" and not made.shared.connections
+
+
+def test_a_peer_without_a_certificate_has_the_role_of_its_face(stand: Any) -> None:
+    for role in Role:
+        assert stand(role=role).connect()[0].peer.role is role

@@ -127,6 +127,25 @@ def test_a_connection_that_was_lost_before_it_was_taken_is_no_defect(run: Any, s
     run(main())
 
 
+def test_a_connection_that_is_lost_while_it_is_taken_keeps_no_descriptor(run: Any, serve: Any) -> None:
+    async def main() -> None:
+        async with serve() as running:
+
+            class Losing:
+                async def connect_accepted_socket(self, _make: Any, accepted: socket.socket) -> None:
+                    raise OSError(errno.ENOTCONN, "gone")
+
+            taking = running.server._listener
+            loop, taking._loop = taking._loop, Losing()
+            accepted, far = socket.socketpair()
+            await taking._attach(accepted)
+            taking._loop = loop
+            assert accepted.fileno() < 0
+            far.close()
+
+    run(main())
+
+
 def test_closing_while_a_connection_is_refused_leaves_no_timer(run: Any, serve: Any) -> None:
     async def main() -> None:
         async with serve() as running:

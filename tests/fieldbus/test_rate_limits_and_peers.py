@@ -31,6 +31,16 @@ def test_the_wait_that_is_told_is_long_enough() -> None:
     assert now_s == pytest.approx((100 - 1.75) / 7.0, rel=1e-6)
 
 
+def test_who_was_quiet_has_saved_up_one_burst_and_no_more() -> None:
+    rate = RequestRate(200.0, 0.0)
+    for now_s in (0.0, 3600.0):
+        burst = 0
+        while rate.wait_s(now_s) == 0.0:
+            rate.spend()
+            burst += 1
+        assert burst == 50
+
+
 def test_ten_lines_a_second_of_a_cause_and_the_rest_counted() -> None:
     lines: list[tuple[str, str]] = []
     gate = LogLimiter(lambda cause, sentence: lines.append((cause, sentence)))
@@ -89,8 +99,12 @@ def test_leaving_and_coming_back_is_no_way_to_a_new_burst() -> None:
     assert rate is not None
     while rate.wait_s(0.0) == 0.0:
         rate.spend()
+    peers.forget(10.0)
+    assert peers.rate(host, 10.0) is rate, "a second connection beside it shares its rate"
+    while rate.wait_s(10.0) == 0.0:
+        rate.spend()
     peers.leave(host)
-    peers.forget(0.01)
-    assert peers.rate(host, 0.01) is rate
-    peers.forget(1.0)
-    assert peers.rate(host, 1.0) is not rate
+    peers.forget(10.01)
+    assert peers.rate(host, 10.01) is rate
+    peers.forget(11.0)
+    assert peers.rate(host, 11.0) is not rate

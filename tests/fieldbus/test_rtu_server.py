@@ -11,7 +11,7 @@ from typing import Any
 from pymodbus.client import ModbusSerialClient
 
 from gateway.devices import SerialSettings
-from gateway.fieldbus import ModbusRtuServer, RtuSettings
+from gateway.fieldbus import ModbusRtuServer, RtuSettings, rtu_server
 from gateway.modbus import Peer
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.rtu import LONGEST_ADU, encode_adu
@@ -128,20 +128,37 @@ def test_answers_do_not_pile_up_behind_a_slow_line() -> None:
                 write = P.read_write_request(0, 125, 20, bytes((0, k)))
                 face.server._execute(RtuRequest(3, write, True))
                 assert face.server._backlog_bytes <= 2 * LONGEST_ADU
+            assert face.server._backlog_bytes > LONGEST_ADU, "one answer may wait for the one before it"
             assert [data for _, data, _ in face.bank.writes] == [bytes((0, k)) for k in range(20)]
 
     play(scene())
 
 
-def test_an_answer_that_comes_back_is_not_asked_again() -> None:
+def test_an_answer_that_comes_back_is_not_asked_again_but_a_terminal_gives_none_back(tmp_path: Path) -> None:
     """An adapter for two wires hears itself, and what answers FC06 is a request, letter by letter."""
-    bank = NotingBank()
-    settings = RtuSettings("/dev/ttyNONE", LINE, unit=3, peer=FACE)
-    server = ModbusRtuServer(bank, settings, on_peer_closed=lambda peer: None, log=lambda cause, told: None)
-    write, now_s = P.write_register_request(0, 7), monotonic_s()
-    server._execute(RtuRequest(3, write, True))
-    server._receiver.receive(encode_adu(3, write), now_s)
-    assert len(bank.writes) == 1 and server._receiver.take(now_s + 1.0) == []
+    name = tmp_path / "terminal"
+    name.symlink_to("/dev/pts/99999")
+    for path, is_heard in (("/dev/ttyNONE", False), ("/dev/pts/99999", True), (str(name), True)):
+        bank = NotingBank()
+        settings = RtuSettings(path, LINE, unit=3, peer=FACE)
+        server = ModbusRtuServer(bank, settings, on_peer_closed=lambda peer: None, log=lambda cause, told: None)
+        write, now_s = P.write_register_request(0, 7), monotonic_s()
+        server._execute(RtuRequest(3, write, True))
+        server._receiver.receive(encode_adu(3, write), now_s)
+        assert len(bank.writes) == 1
+        assert server._receiver.take(now_s + 1.0) == [RtuRequest(3, write, True)] * is_heard, path
+
+
+def test_noise_is_told_by_what_is_new_of_it_once_a_minute_and_as_a_wrong_line_only_where_nothing_was_heard() -> None:
+    report = rtu_server._NoiseReport("115200 8N1")
+    assert report.tell(0, 5, 100.0) == "", "an adapter that is plugged in makes a few bytes"
+    assert "W235 {path}: 30 bytes" in report.tell(3, 30, 101.0)
+    assert report.tell(4, 30, 300.0) == ""
+    assert "W235 {path}: 3 bytes" in report.tell(4, 33, 301.0)
+    assert report.tell(5, 40, 360.9) == ""
+    assert "W235 {path}: 8 bytes" in report.tell(5, 41, 361.1)
+    deaf = rtu_server._NoiseReport("115200 8N1")
+    assert "W236 {path}: 24 bytes" in deaf.tell(0, 24, 0.0) and deaf.tell(0, 1000, 1000.0) == ""
 
 
 def test_noise_is_told_once_and_a_line_that_is_set_otherwise_as_such() -> None:

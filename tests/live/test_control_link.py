@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import json
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 
 import pytest
@@ -11,6 +11,7 @@ import pytest
 from gateway.live import control_link
 from gateway.live.control_link import ControlLink, ask_once
 from gateway.live.live_state import send_pdu
+from gateway.processes.json_socket.connection import SocketLimits
 from gateway.processes.json_socket.messages import Answer
 from gateway.processes.json_socket.server import JsonLineServer
 
@@ -83,6 +84,76 @@ def test_a_restarted_control_is_found_again_and_an_absent_one_is_said_to_be(tmp_
         with pytest.raises(OSError):
             await ask_once(tmp_path, {"do": "echo", "n": 3})
         await link.close()
+
+    asyncio.run(scene())
+
+
+@contextlib.asynccontextmanager
+async def saying(state: Path, *answers: bytes) -> AsyncIterator[list[bytes]]:
+    """A control that says this to the first question of each connection and closes; yields what it was asked."""
+    asked, left, ends = list[bytes](), iter(answers), list[asyncio.Task[None] | None]()
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        ends.append(asyncio.current_task())
+        asked.append(await reader.readline())
+        writer.write(next(left, b""))
+        writer.close()
+
+    async with await asyncio.start_unix_server(serve, state / "control.sock"):
+        yield asked
+        await asyncio.gather(*(end for end in ends if end))
+
+
+@pytest.mark.parametrize("said", [b"", b'{"ok": true, "n": 1'], ids=["nothing", "half an answer"])
+def test_a_control_that_ends_over_a_question_is_asked_no_second_time(tmp_path: Path, said: bytes) -> None:
+    """It may have obeyed before it died; a second time would be a second command, to a control that has just restarted."""
+
+    async def scene() -> None:
+        async with saying(tmp_path, said) as asked:
+            with pytest.raises(ConnectionError, match="no gateway answers"):
+                await ask_once(tmp_path, {"do": "modbus"})
+        assert asked == [b'{"do": "modbus"}\n']
+
+    asyncio.run(scene())
+
+
+def test_a_connection_that_was_idle_for_too_long_costs_nobody_a_question(tmp_path: Path) -> None:
+    """Control says why it closes; that is no answer to what is asked next."""
+
+    async def scene() -> None:
+        control, link = server(tmp_path), ControlLink(tmp_path)
+        control.limits = SocketLimits(idle_s=0.02)
+        await control.start()
+        assert await link.ask({"do": "echo", "n": 1}) == {"n": 1}
+        while control._callers:
+            await asyncio.sleep(0.005)
+        assert await link.ask({"do": "echo", "n": 2}) == {"n": 2}
+        await link.close()
+        await control.close()
+        async with saying(tmp_path, b'{"ok": true, "n": 1}\n', b'{"ok": true, "n": 2}\n'):
+            silent = ControlLink(tmp_path)
+            assert await silent.ask({}) == {"n": 1}
+            assert await silent.ask({}) == {"n": 2}
+            await silent.close()
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize("said", [b"[]\n", b"{}\n", b"12\n", b'{"n": 1}\n'])
+def test_what_is_no_answer_is_none_that_went_well(tmp_path: Path, said: bytes) -> None:
+    async def scene() -> None:
+        async with saying(tmp_path, said):
+            with pytest.raises(ValueError, match=r"no object|refused without a reason"):
+                await ask_once(tmp_path, {})
+
+    asyncio.run(scene())
+
+
+def test_a_long_answer_is_taken_whole(tmp_path: Path) -> None:
+    async def scene() -> None:
+        text = "x" * 500_000
+        async with saying(tmp_path, json.dumps({"ok": True, "n": text}).encode() + b"\n"):
+            assert await ask_once(tmp_path, {}) == {"n": text}
 
     asyncio.run(scene())
 

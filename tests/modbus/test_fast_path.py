@@ -46,6 +46,9 @@ nearly = st.tuples(
 @example(pack(">HHHBBHH", 1, 0, 6, 1, 3, 0, 125))
 @example(pack(">HHHBBHH", 1, 0, 6, 1, 4, 0, 126))
 @example(pack(">HHHBBHH", 1, 0, 6, 1, 3, 199, 2))
+@example(pack(">HHHBBHH", 1, 0, 6, 1, 1, 0, 8))  # coils are no registers
+@example(pack(">HHHBBHH", 1, 0, 6, 1, 2, 0, 8))
+@example(pack(">HHHBBHH", 1, 7, 6, 1, 3, 0, 8))  # another protocol
 def test_a_read_is_answered_as_the_long_way_or_left_to_it(frame: bytes) -> None:
     quick = whole_read_answer(frame, UNITS, bank().read_registers)
     assert quick is None or quick == the_long_way(frame)
@@ -71,6 +74,7 @@ frames = st.builds(Adu, st.integers(0, 0xFFFF), st.sampled_from([1, 2]), st.bina
 
 
 @given(st.one_of(nearly, frames, st.binary(max_size=40)), st.binary(min_size=300, max_size=300))
+@example(pack(">HHHBB", 1, 0, 255, 1, 0x41) + bytes(253), bytes(300))  # longer than any frame
 def test_any_segment_is_answered_as_the_long_way_or_left_to_it(segment: bytes, stale: bytes) -> None:
     """The buffer keeps what an earlier, longer segment left behind; it must not matter."""
     buffer = bytearray(stale)

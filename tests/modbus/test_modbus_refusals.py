@@ -250,6 +250,7 @@ def test_the_host_reads_a_refusal_as_one() -> None:
     with pytest.raises(ModbusError) as caught:
         answer_data(P.read_request(3, 0, 1), bytes.fromhex("83 0b"))
     assert caught.value.code == 0x0B
+    assert P.is_exception(bytes.fromhex("83 0b")) and not P.is_exception(bytes.fromhex("03 02 83 83"))
 
 
 @pytest.mark.parametrize("reply_hex", ["", "03", "03 02 00", "03 04 00000000", "04 02 0000", "84 02", "83"])
@@ -284,3 +285,10 @@ def test_a_read_and_write_whose_bytes_do_not_fit_names_where_it_would_have_writt
     cut = P.read_write_request(3, 2, 7, bytes(4))[:-1]
     assert answer(cut, bank, PEER) == bytes((23 | 0x80, 3))
     assert bank.heard == [(RequestFault.QUANTITY, 3, 7, PEER)]
+
+
+def test_a_refused_request_names_its_first_address_whatever_its_function() -> None:
+    for function in (1, 2, 3, 4, 5, 6, 15, 16, 22, 23):
+        assert P.address_in(bytes((function, 0x04, 0xB1))) == 0x04B1, function
+        assert P.address_in(bytes((function, 0x04))) is None, function
+    assert [P.address_in(bytes((function, 0x04, 0xB1))) for function in (8, 17, 43)] == [None] * 3

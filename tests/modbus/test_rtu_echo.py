@@ -1,6 +1,7 @@
 """Answers that come back from an adapter that hears itself: nothing is executed twice, and no master's write is lost."""
 
 from gateway.modbus import pdu as P  # noqa: N812
+from gateway.modbus import rtu_receiver
 from gateway.modbus.rtu import encode_adu
 from tests.modbus.rtu_bus import CHARACTER_S, SILENCE_S, Bus
 
@@ -15,7 +16,8 @@ AT_ONCE = (
 
 def exchange(bus: Bus, pdu: bytes, *, echo_s: float | None = None) -> int:
     """How often a request is executed that a master sends once; its answer comes back after echo_s, and so on."""
-    bus.send(encode_adu(1, pdu)).pause(1.05 * SILENCE_S)
+    silence_s = rtu_receiver.silence_s(bus.baud, 11 / bus.baud)
+    bus.send(encode_adu(1, pdu)).pause(1.05 * silence_s)
     executed = 0
     while bus.heard and executed < 50:
         ((_, heard),) = bus.heard
@@ -24,7 +26,7 @@ def exchange(bus: Bus, pdu: bytes, *, echo_s: float | None = None) -> int:
         answer = encode_adu(1, ANSWERS[pdu])
         bus.receiver.note_sent(heard, answer, bus.now_s)
         if echo_s is not None:
-            bus.pause(echo_s).send(answer).pause(1.05 * SILENCE_S)
+            bus.pause(echo_s).send(answer).pause(1.05 * silence_s)
     return executed
 
 
@@ -59,13 +61,32 @@ def test_before_any_read_a_row_of_quick_equal_writes_loses_few() -> None:
     assert 995 <= executed < 1000
 
 
-def test_a_terminal_has_no_echo() -> None:
+def test_a_late_echo_ends_on_a_slow_line_too() -> None:
+    """What an adapter holds it up comes on top of the time that it takes on the wire."""
+    assert 1 < exchange(Bus(baud=9600), WRITE, echo_s=8 * 11 / 9600 + 0.016) < 6
+
+
+def test_an_echo_in_two_pieces_is_one() -> None:
+    ones = b"\x03\x18" + 24 * b"\xff"  # none of which begins a frame by itself
+    bus, answer = Bus(), encode_adu(1, ones)
+    for cut in range(2, len(answer)):
+        ((_, heard),) = bus.send(encode_adu(1, READ)).pause(1.05 * SILENCE_S).heard
+        bus.heard.clear()
+        bus.receiver.note_sent(heard, answer, bus.now_s)
+        bus.pause(0.01).send(answer[:cut], answer[cut:], pause_s=0.01)
+        assert bus.requests() == [] and bus.receiver.noise_bytes == 0, cut
+
+
+def test_a_terminal_has_no_echo_also_when_it_was_opened_again() -> None:
     bus = Bus(may_echo=False)
     assert [exchange(bus, WRITE) for _ in range(100)] == [1] * 100
+    bus.receiver.forget()
+    assert [exchange(bus.pause(AT_ONCE), WRITE) for _ in range(100)] == [1] * 100
 
 
 def test_another_adapter_may_be_otherwise() -> None:
     bus = Bus()
-    exchange(bus, READ)
+    for _ in range(2):  # the second request shows that the first one's answer has not come back
+        exchange(bus, READ)
     bus.receiver.forget()
     assert exchange(bus, WRITE, echo_s=ANSWER_S + 1e-3) == 1

@@ -4,6 +4,7 @@ slow to draw, never costs the lease.
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -55,7 +56,7 @@ class HeartbeatThread(threading.Thread):
         self.hold = run
         self.status: StatusReading | None = None
         self.warned = WarningBit(0)  # every warning that there was
-        self.failure: CliError | None = None
+        self.failure: Exception | None = None
         self.stopping = threading.Event()
         self.dropping = threading.Event()
         self._client = client
@@ -80,6 +81,11 @@ class HeartbeatThread(threading.Thread):
             self._look()
         except CliError as error:
             self.failure = error
+        except Exception as error:  # a defect, or a gateway that says what this version does not know
+            self.failure = error
+            if self.hold.is_pressing:
+                with suppress(Exception):  # the first one is told
+                    self._send(self.hold.at_once())
 
     def _wait(self, seconds: float) -> None:
         """The order to drop everything is not waited for."""
@@ -99,6 +105,7 @@ class HeartbeatThread(threading.Thread):
         except CliError as error:
             if error.exit_code != exit_codes.DEVICE:
                 raise
+            self.hold.note_lost(write)
             self._find_again(error)
 
     def _send(self, write: HoldWrite) -> None:

@@ -113,6 +113,12 @@ class HoldRun:
         self.end = HoldEnd.STOPPED
         return self._write(0)
 
+    def note_lost(self, write: HoldWrite) -> None:
+        """Note that nobody may have heard the last write: nothing has ended by it, and to let go is said again."""
+        self.end = None
+        if self._phase is _Phase.LOWERING and write.control_word == _ENABLE:
+            self._phase = _Phase.HOLDING
+
     def _begin(self, status: StatusReading) -> HoldWrite:
         if self._phase is _Phase.BEGINNING and status.state is State.FAULT:
             self._phase = _Phase.RESETTING

@@ -1,12 +1,15 @@
 """`write`: registers by name, in engineering units, all of them in one request where Modbus allows."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from gateway.cli.command_line.completion_words import complete_assignments
+from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, json_option
 
 if TYPE_CHECKING:
@@ -42,10 +45,28 @@ def command(*, assignments: tuple[str, ...], dry_run: bool, wire: "Wire", as_jso
     with GatewayClient(wire, options["unit"], register_map) as client:
         with explain_refusals(client):
             frames = client.frames(writes)
-        with explain_refusals(client, frames, options["state"]):
+        sent: list[Frame] = []
+        with _sent_told(sent), explain_refusals(client, frames, options["state"]):
             for frame in [] if dry_run else frames:
                 client.write(frame)
+                sent.append(frame)
     _tell(frames, writes, dry_run=dry_run, as_json=as_json)
+
+
+@contextmanager
+def _sent_told(sent: "list[Frame]") -> Iterator[None]:
+    """Add to what is told of a failure which requests had gone out before: who reads of a refusal alone takes it for all."""
+    try:
+        yield
+    except CliError as error:
+        if not sent:
+            raise
+        before = "\n  ".join(f"sent before, and in effect: {_request(frame)}" for frame in sent)
+        raise CliError(f"{error.format_message()}\n  {before}", error.exit_code) from None
+
+
+def _request(frame: "Frame") -> str:
+    return f"FC16 address {frame.address}: {' '.join(f'{word:04X}' for word in frame.words)}"
 
 
 def _assignment(register_map: "RegisterMap", text: str) -> "Assignment":
@@ -84,9 +105,8 @@ def _tell(frames: "list[Frame]", assignments: "list[Assignment]", *, dry_run: bo
     for assignment in assignments:
         click.echo(f"{assignment.register.name} = {_as_shown(assignment)}")
     for frame in frames:
-        words = " ".join(f"{word:04X}" for word in frame.words)
         unchanged = f", {', '.join(frame.kept)} kept as read" if frame.kept else ""
-        click.echo(f"{'would send' if dry_run else 'sent'} FC16 address {frame.address}: {words}{unchanged}")
+        click.echo(f"{'would send' if dry_run else 'sent'} {_request(frame)}{unchanged}")
 
 
 def _as_shown(assignment: "Assignment") -> str:

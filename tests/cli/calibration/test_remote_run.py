@@ -1,9 +1,16 @@
 """`calibrate` by Modbus against the real bank, with a stand-in for control: the lease is kept, and a fault is told."""
 
+from collections.abc import Sequence
+from types import SimpleNamespace
+
 import pytest
 
+from gateway.cli.calibration import remote_run
+from gateway.cli.calibration.remote_run import RemoteRun
+from gateway.cli.master.client import Assignment, Frame, RefusedError
+from gateway.cli.master.wires import TcpWire
 from gateway.codes.faults import FaultCode
-from gateway.registers import BankRules, RegisterBank, RegisterMap
+from gateway.registers import BankRules, Register, RegisterBank, RegisterMap
 from gateway.registers.command import Command, Status
 from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import CalibrationPhase, ControlBit, State
@@ -51,3 +58,56 @@ def test_a_fault_that_ends_the_run_is_told(climbed) -> None:
     _, answer = climbed(FaultCode.SAMPLE_STALE)
     assert answer.exit_code == 1
     assert f"{FaultCode.SAMPLE_STALE.code} " in answer.stderr and "force-gateway explain" in answer.stderr
+
+
+class PlayedClient:
+    """Says these phases in turn, and refuses the heartbeat where another master commands."""
+
+    def __init__(self, *phases: CalibrationPhase, refuses: bool = False) -> None:
+        self.phases, self.refuses = list(phases), refuses
+        self.beats, self.written = 0, list[int]()
+
+    def read_values(self, registers: Sequence[Register]) -> list[SimpleNamespace]:
+        phase = self.phases.pop(0)
+        return [SimpleNamespace(value=float(phase if one.name == "calibration_phase" else 0)) for one in registers]
+
+    def frames(self, assignments: Sequence[Assignment]) -> list[Frame]:
+        return [Frame(0, (int.from_bytes(data, "big"),)) for _, data in assignments]
+
+    def write(self, frame: Frame) -> None:
+        self.written.append(frame.words[0])
+
+    def write_values(self, assignments: Sequence[Assignment]) -> None:
+        self.beats += 1
+        if self.refuses:
+            raise RefusedError(6, "write 1 at 4")
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def remote(client: PlayedClient) -> RemoteRun:
+    run = RemoteRun(TcpWire("cell-3", 5020), 1)
+    run._client = client  # type: ignore[assignment]
+    return run
+
+
+def test_how_the_run_before_ended_is_not_how_this_one_does() -> None:
+    """Registers keep it until the new run has begun; one that ends in the same way is told all the same."""
+    stored, ladder = CalibrationPhase.STORED, CalibrationPhase.LADDER
+    run = remote(PlayedClient(stored, stored, ladder, stored))
+    run.begin()
+    assert [run.look().phase for _ in range(3)] == ["idle", "ladder", "stored"]
+    run.stop()
+    run.close()
+    assert run._client.written == [int(ControlBit.START_CALIBRATION), 0]  # type: ignore[attr-defined]
+
+
+def test_a_heartbeat_that_is_refused_is_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another master has the setpoint: its refusal registers and its log are not to be filled."""
+    monkeypatch.setattr(remote_run, "DEFAULT_PERIOD_S", 0.001)
+    run = remote(client := PlayedClient(CalibrationPhase.IDLE, refuses=True))
+    run.begin()
+    run._beat.join(5.0)
+    assert not run._beat.is_alive() and client.beats == 1
+    run.close()

@@ -107,6 +107,16 @@ def test_a_line_that_stays_silent_is_told_as_one_that_answered_before(gateway, l
     assert gateway.store.list() == []
 
 
+@pytest.mark.parametrize("dry", [(), ("--dry-run",)])
+def test_a_commit_that_is_never_heard_is_told_and_no_check_has_passed(
+    gateway, line, call, file, noise, dry: tuple[str, ...]
+) -> None:
+    noise.lost = dict.fromkeys(range(4, 50), "request")
+    done = call("upload", file, *dry, *line)
+    assert done.exit_code == 69 and done.stderr.startswith("E123 "), done.output
+    assert noise.addresses.count(1145) == 4 and gateway.store.list() == []
+
+
 def test_a_write_of_a_command_is_never_repeated(line, call, noise) -> None:
     noise.lost = {0: "answer"}
     done = call("write", "force_setpoint=12", *line)

@@ -1,6 +1,9 @@
 """The client verbs by TLS, against the real server; and what they say of files and gateways that do not fit."""
 
 import asyncio
+import os
+import socket
+import ssl
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from gateway.cli.errors import CliError
+from gateway.cli.master.tls_wire import TlsFiles, TlsWire
 from gateway.fieldbus import ModbusTlsServer, ServerSettings, TlsSettings
 from tests.certificates import Folder, serial_of, store_all
 from tests.cli.conftest import PlainBank
@@ -105,7 +110,36 @@ def test_certs_makes_what_a_rig_and_a_client_need_and_overwrites_nothing(tmp_pat
     assert (tmp_path / "c" / "panel.crt").exists()
     for bad in ("robot", "robot:captain", "ca:admin", "a/b:monitor"):
         assert call("certs", tmp_path / "d", "--client", bad).exit_code == 2
+    twice = call("certs", tmp_path / "d", "--client", "robot:setpoint", "--client", "robot:admin")
+    assert twice.exit_code == 2 and "robot is there twice" in " ".join(twice.stderr.split())
+    nobody = call("certs", tmp_path / "c")
+    assert nobody.exit_code == 2 and "whom it shall sign for" in " ".join(nobody.stderr.split())
     for bad in ("not a host!", "cell3:8802", "192.168.1", "192.168.125.320", "-x", "a..b", ""):
         answer = call("certs", tmp_path / "d", "--host", bad)
         assert answer.exit_code == 2 and "neither a host name" in " ".join(answer.stderr.split())
     assert call("certs", tmp_path / "e", "--host", "cell-3.local", "--host", "fe80::1").exit_code == 0
+
+
+def test_a_gateway_is_believed_by_its_name_alone(server: TlsServer, folder: Folder, call: Any) -> None:
+    """Any server's certificate of the same CA would else do: a neighbour cell's could be put in between."""
+    files = TlsFiles(Path(folder.crt("ca")), Path(folder.crt("setpoint")), Path(folder.key("setpoint")))
+    wire = TlsWire("127.0.0.1", server.port, files)
+    context = wire._context()
+    assert context.check_hostname and context.verify_mode is ssl.CERT_REQUIRED
+    assert context.minimum_version is ssl.TLSVersion.TLSv1_2
+    elsewhere = TlsWire("cell-3.local", server.port, files)
+    with (
+        socket.create_connection(("127.0.0.1", server.port)) as plain,
+        pytest.raises(CliError, match=r"E176 the certificate of cell-3\.local:\d+ is not to be trusted"),
+    ):
+        elsewhere._greet(context, plain)
+    assert not wire.is_served_by({"port": server.port}), "what a gateway tells of itself is its plain port"
+
+
+def test_a_folder_of_keys_is_for_its_owner_alone(tmp_path: Path, call: Any) -> None:
+    previous = os.umask(0)
+    try:
+        assert call("certs", tmp_path / "c", "--client", "robot:setpoint").exit_code == 0
+    finally:
+        os.umask(previous)
+    assert (tmp_path / "c").stat().st_mode & 0o777 == 0o700

@@ -190,6 +190,13 @@ def test_another_set_than_the_one_sent_is_noticed(gateway, address, call, file):
     assert done.stderr.startswith("E434 committed, but another set is in use now (2 words differ, the first at 1680)")
 
 
+def test_the_set_in_another_slot_than_the_one_asked_for_is_noticed(gateway, address, call, file):
+    gateway.upload.on_use = lambda taken: gateway.bank.set_active_model(taken.calibration, 6)
+    done = call("upload", file, "--slot", 5, "--gateway", address)
+    assert done.exit_code == 1
+    assert done.stderr.startswith("E434 committed, but another set is in use now (slot 6)")
+
+
 # -- frames
 
 

@@ -65,6 +65,25 @@ def test_ctrl_c_ends_it_and_keeps_it(
 
 
 @pytest.mark.parametrize(
+    ("words", "asked"),
+    [
+        (("off",), {"do": "record", "on": False}),
+        (("on",), {"do": "record", "on": True}),
+        (("--name", "a"), {"do": "record", "on": True, "name": "a"}),
+        (("status",), {"do": "record"}),
+        ((), {"do": "record"}),
+    ],
+)
+def test_the_gateway_is_asked_for_what_was_said(
+    words: tuple[str, ...], asked: dict[str, Any], call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard = list[dict[str, Any]]()
+    monkeypatch.setattr("gateway.cli.control_socket.ask", lambda _, request: heard.append(request) or {})
+    assert call("record", *words, "--state", tmp_path).exit_code == 0
+    assert heard == [asked]
+
+
+@pytest.mark.parametrize(
     ("words", "why"),
     [
         (("off", "--for", "3s"), "of a recording that starts"),

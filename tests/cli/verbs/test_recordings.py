@@ -91,6 +91,8 @@ def test_prune_says_what_would_go_before_it_goes(state: Path, call) -> None:
     would = call("recordings", "prune", "--dry-run", "--days", "30", "--state", state)
     assert words_of(would.output).endswith("0001.fgr: older than 30 days")
     assert (state / "recordings" / "0001.fgr").exists()
+    unsure = call("recordings", "prune", "--days", "30", "--state", state)  # nobody answers
+    assert unsure.exit_code == 1 and (state / "recordings" / "0001.fgr").exists()
     assert call("recordings", "prune", "--yes", "--days", "30", "--state", state).exit_code == 0
     assert not (state / "recordings" / "0001.fgr").exists()
     assert "nothing to delete" in call("recordings", "prune", "--days", "30", "--state", state).output

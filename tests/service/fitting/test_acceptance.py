@@ -15,7 +15,7 @@ from gateway.calibrations.store import CalibrationStore
 from gateway.numbered_documents.store import StoreError
 from gateway.profiles import load_rig
 from gateway.recording import Recorder
-from gateway.service.fitting.acceptance import _worse
+from gateway.service.fitting.acceptance import _beyond_band, _worse
 from gateway.service.fitting.fit_process import fit_and_store
 
 TURNS_V = [8.0, 7.0, 2.0, 5.0, 3.0, 4.5, 1.0, 6.0, 3.5, 5.5, 0.5, 2.5, 1.5, 3.0]
@@ -89,6 +89,11 @@ def test_what_is_out_of_band_or_worse_than_what_is_in_use_is_kept_and_not_offere
 def test_worse_is_by_more_than_a_tenth_and_by_more_than_a_twentieth_of_the_band(in_use_n: float, most_n: float) -> None:
     for rms_n, is_worse in ((most_n - 0.001, False), (most_n + 0.001, True)):
         assert bool(_worse(Error(rms_n, rms_n, 50), Error(in_use_n, in_use_n, 50), 7, 1.0)) is is_worse
+
+
+def test_the_band_is_one_of_the_rms_and_not_of_the_worst_point() -> None:
+    for rms_n, is_beyond in ((0.999, False), (1.0, False), (1.001, True)):
+        assert bool(_beyond_band(Error(rms_n, 3.0, 50), 1.0)) is is_beyond
 
 
 def test_without_a_reversal_part_the_branches_are_judged_and_it_is_said(tmp_path: Path) -> None:

@@ -3,15 +3,21 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gateway.bsfm.fit.evaluation import FitRequest
+from gateway.bsfm.ladder.ladder_error import LadderError
+from gateway.bsfm.model import Response
 from gateway.calibrations.store import CalibrationStore
 from gateway.profiles import load_rig
 from gateway.recording import Recorder
 from gateway.service.fitting.fit_process import fit_and_store
+from gateway.service.fitting.ladder_fit import calibration_of, fit_recording
+from gateway.service.fitting.ladder_source import RigContext, read_source
 
 COLUMNS = ("time_s", "command_v", "force_n")
 
@@ -42,6 +48,17 @@ def test_a_ladder_becomes_a_numbered_calibration_with_report_and_provenance(tmp_
     document = json.loads(Path(result["document"]).read_text(encoding="utf-8"))
     assert document["calibration"] == result["stored"]
     assert f"Calibration {result['stored']}" in Path(result["report"]).read_text(encoding="utf-8")
+
+
+def test_what_the_cell_of_the_rig_cannot_hold_may_not_drive_it(tmp_path: Path) -> None:
+    """Handles beyond its range would be commanded, and never measured."""
+    fit = fit_recording(read_source(recorded(tmp_path)), FitRequest(), RigContext(rig="demo", state=tmp_path), "mine")
+    taken = calibration_of(fit, 60.0)
+    assert taken.name == "mine" and taken.response == fit.measured.response
+    with pytest.raises(LadderError, match=r"E401 the chosen model may not drive the rig: .* -40 \.\. 40 is allowed"):
+        calibration_of(fit, 40.0)
+    followed = replace(fit, measured=replace(fit.measured, response=Response(dead_time_s=0.1, lag_s=0.2)))
+    assert calibration_of(followed, 60.0).response == Response(dead_time_s=0.1, lag_s=0.2)
 
 
 @pytest.mark.parametrize(

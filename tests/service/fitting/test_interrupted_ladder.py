@@ -166,7 +166,7 @@ def test_a_finished_run_repeats_nothing_and_its_fit_is_made_once(whole_fit) -> N
     (path,) = (state / "recordings").iterdir()
     rest = find_rest_of_ladder(state)
     assert rest.is_whole(rest.plan)
-    assert rest.name == "left cell"
+    assert rest.name == "left cell" and rest.plan["tare"] is False
     assert fit_and_store(path, "demo", state) == first
     assert [entry.number for entry in CalibrationStore(state).list()] == [first["stored"]]
     more = rest.plan_with({"groups": 3})

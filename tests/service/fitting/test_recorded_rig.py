@@ -8,7 +8,7 @@ import pytest
 
 from gateway.profiles import ProfileError, load_rig
 from gateway.recording import Recorder, Recording, export_csv, export_parquet, read_recording, read_table
-from gateway.service.fitting.recorded_rig import plant_of, rig_of, rig_texts
+from gateway.service.fitting.recorded_rig import plant_of, recorded_noise_n, rig_of, rig_texts
 
 
 def table(header: dict[str, Any]) -> Recording:
@@ -76,3 +76,21 @@ def test_a_rig_without_a_plant_has_none(texts: dict[str, str]) -> None:
 def test_a_plant_that_this_version_cannot_read_is_told_by_its_place(texts: dict[str, str]) -> None:
     with pytest.raises(ProfileError, match=r"plants/.*yaml:\d+"):
         plant_of(table({"rig": "demo", "rig_texts": changed(texts, "area_m2", "aera_m2")}))
+
+
+def test_a_device_of_the_plant_s_name_is_not_the_plant(texts: dict[str, str]) -> None:
+    plant = next(file for file in texts if "plants" in file)
+    rig_file, *others = texts
+    device = f"devices/{Path(plant).name}"
+    told = {rig_file: texts[rig_file], device: "name: a-device\n"} | {file: texts[file] for file in others}
+    assert plant_of(table({"rig": "demo", "rig_texts": told})) == load_rig("demo").plant_profile
+
+
+@pytest.mark.parametrize("noise_n", [None, "", "much", -0.1, 0.0, float("inf"), float("nan"), [1]])
+def test_a_noise_that_is_none_is_not_known(noise_n: object) -> None:
+    assert recorded_noise_n(table({"calibration_noise_n": noise_n})) is None
+    assert recorded_noise_n(table({"calibration_noise_n": "0.05"})) == 0.05
+
+
+def test_texts_that_are_nested_without_end_are_none() -> None:
+    assert rig_texts(table({"rig_texts": "[" * 100_000})) == {}

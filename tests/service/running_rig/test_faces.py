@@ -13,14 +13,14 @@ from typing import Any
 
 import pytest
 
-from gateway.modbus import Peer
+from gateway.modbus import Peer, Role
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.rtu import encode_adu
 from gateway.ports import PortError, Pty, SerialPort
 from gateway.profiles import Rig
 from gateway.profiles.rigs.faces import RtuFace
 from gateway.registers import RegisterBank
-from gateway.service.banner import Ready, format_banner, ready_fields
+from gateway.service.banner import Ready, ServedFace, format_banner, ready_fields
 from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.faces import faces_to_come
 from gateway.service.running_rig.faces.faces import Faces, with_rtu_face
@@ -182,6 +182,46 @@ def test_a_face_that_never_comes_is_told_once_and_ends_with_the_others() -> None
     play(scene())
 
 
+def test_a_reason_is_told_once_until_it_is_another_and_a_face_that_is_served_is_left_alone() -> None:
+    async def scene() -> None:
+        log, ended = list[str](), asyncio.Event()
+        attempts = iter(["held", "held", "gone", "gone", "held"])
+
+        async def serve() -> ServedFace:
+            if why := next(attempts, ""):
+                raise StartError(why, 1)
+            return ServedFace("tcp", "there", "", {})
+
+        to_come = faces_to_come.FacesToCome(
+            lambda _, told: log.append(told), ended.set, sleep=lambda _: asyncio.sleep(0)
+        )
+        to_come.add("tcp", serve, StartError("held", 1))
+        await ended.wait()
+        for _ in range(5):
+            await asyncio.sleep(0)
+        assert log[0].startswith("held; it goes on") and log[1:] == ["gone", "held", "modbus tcp there is served again"]
+        await to_come.close()
+
+    play(scene())
+
+
+def test_a_restart_without_plain_modbus_tcp_does_not_end_over_where_to_bind_it() -> None:
+    async def scene() -> None:
+        async with Served(serial(None)).running(["127.0.0.1", 0], is_restart=True) as served:
+            assert [face.type for face in served.told] == ["rtu"]
+
+    play(scene())
+
+
+def test_a_serial_face_without_a_role_of_its_own_has_that_of_the_plain_faces() -> None:
+    async def scene() -> None:
+        for may_upload, role in ((False, Role.SETPOINT), (True, Role.CALIBRATION)):
+            async with Served(serial(None, allow_plain_upload=may_upload)).running() as served:
+                assert [peer.role for peer in served.faces.peers] == [role]
+
+    play(scene())
+
+
 def test_the_banner_and_the_json_line_tell_every_face() -> None:
     async def scene() -> None:
         async with Served(serial(None, plain=True)).running() as served:
@@ -216,3 +256,6 @@ def test_one_more_face_takes_no_port_that_the_rig_uses(tmp_path: Path) -> None:
     for rig in (serial("/dev/ttyS9"), replace(demo(), output=replace(demo().output, port="/dev/ttyS9"))):
         with pytest.raises(StartError, match=r"^E124 --rtu .* is used by rig demo"):
             with_rtu_face(rig, str(link))
+    named_by_link = replace(demo(), output=replace(demo().output, port=str(link)))
+    with pytest.raises(StartError, match=r"^E124 --rtu /dev/ttyS9 is used by rig demo"):
+        with_rtu_face(named_by_link, "/dev/ttyS9")

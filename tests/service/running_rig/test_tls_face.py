@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from gateway.modbus import pdu
-from gateway.profiles.rigs.faces import TlsFace
+from gateway.profiles.rigs.faces import RtuFace, TlsFace
 from gateway.service.running_rig.faces import faces, faces_to_come
 from gateway.service.running_rig.starting import StartError
-from tests.certificates import Folder, store_all
+from tests.certificates import Folder, serial_of, store_all
 from tests.fieldbus.by_hand import framed
 from tests.fieldbus.tls_by_hand import client
 from tests.service.rigs import demo
@@ -55,6 +55,33 @@ def test_both_faces_serve_one_bank_and_the_certificate_owns(folder: Folder) -> N
             assert await ask(plain.facts["port"], pdu.write_register_request(1, 1300)) == b"\x86\x06"
             while not any(peer.identity == "certificate setpoint" for peer in served.closed):
                 await asyncio.sleep(0.001)
+
+    asyncio.run(asyncio.wait_for(scene(), 20.0))
+
+
+def test_who_is_revoked_in_the_rig_file_stays_out(folder: Folder) -> None:
+    async def scene() -> None:
+        rig = rig_with(folder)
+        face = replace(rig.fieldbus[0], revoked=(serial_of("setpoint"),))
+        served = Served(replace(rig, fieldbus=(face,)))
+        async with served.running():
+            port, request = served.told[1].facts["port"], pdu.read_request(3, 0, 1)
+            with pytest.raises((OSError, EOFError)):
+                await ask(port, request, client(folder, "setpoint"))
+            assert [line.split()[0] for line in served.log] == ["W245"]
+            assert await ask(port, request, client(folder, "admin")) == bytes((3, 2, 0, 0))
+
+    asyncio.run(asyncio.wait_for(scene(), 20.0))
+
+
+def test_a_serial_face_is_counted_by_its_place_among_all(folder: Folder) -> None:
+    """As `network.owner` and the log name it."""
+
+    async def scene() -> None:
+        rig = rig_with(folder)
+        served = Served(replace(rig, fieldbus=(*rig.fieldbus, RtuFace(type="rtu"))))
+        async with served.running():
+            assert [face.facts["host"] for face in served.told if face.type == "rtu"] == ["serial:2"]
 
     asyncio.run(asyncio.wait_for(scene(), 20.0))
 

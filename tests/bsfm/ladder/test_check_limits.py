@@ -1,0 +1,87 @@
+"""A ladder near the bounds of what is one: what noise hides, what a saturated cell leaves, whose rows count, how parts join."""
+
+import numpy as np
+import pytest
+
+from gateway.bsfm.ladder.check import Expectation, join_ladders
+from gateway.bsfm.ladder.ladder_error import LadderFlaw
+from tests.bsfm.ladder.test_check import REFERENCE, Table, check_table, recorded, refuse_table, stairs, with_force
+
+ROWS_A_STAIR, STAIRS_UP = 20, 21
+
+
+def noise_n(size: int, sigma_n: float) -> np.ndarray:
+    return np.random.default_rng(5).normal(0.0, sigma_n, size)
+
+
+def test_a_force_that_is_noise_alone_is_not_called_a_model() -> None:
+    """Means of a dwell spread by more than a newton where one reading spreads by more than two."""
+    error = refuse_table(with_force(lambda force: 2.0 + noise_n(len(force), 3.0)))
+    assert error.flaw is LadderFlaw.FORCE_CONSTANT
+
+
+def test_where_the_cell_ends_is_known_a_noisy_stop_is_one() -> None:
+    """No two stairs agree to a count there."""
+    table = with_force(lambda force: np.minimum(force, 52.0) + noise_n(len(force), 0.3))
+    known = Expectation(reference=REFERENCE, named="1", saturation_n=52.0)
+    checked = check_table(table, known)
+    assert checked.ladder.voltage_v.max() <= 6.4 and not checked.closed
+    assert check_table(recorded(stairs())).closed, "and where it never was at its end"
+
+
+def test_a_force_that_still_moves_at_the_end_of_its_stairs_is_told() -> None:
+    checked = check_table(recorded(stairs(), dwell_s=0.12, noise_n=0.01))
+    assert any("dwells too short" in note for note in checked.notes)
+
+
+def test_a_force_that_dips_on_the_way_down_has_no_inverse_either() -> None:
+    table = recorded(stairs())
+    stair = np.arange(len(table["force_n"])) // ROWS_A_STAIR % (2 * (STAIRS_UP - 1))
+    dip = (stair >= STAIRS_UP) & (table["command_v"] > 4.0) & (table["command_v"] < 5.5)
+    error = refuse_table(table | {"force_n": np.where(dip, table["force_n"] - 12.0, table["force_n"])})
+    assert error.flaw is LadderFlaw.NOT_INCREASING and "on the way down" in str(error)
+
+
+def test_groups_of_several_parts_stay_apart() -> None:
+    """A fit leaves them out one at a time, and two under one number would be one."""
+    first, second = check_table(recorded(stairs(2))), check_table(recorded(stairs(3), seed=2))
+    whole = join_ladders([first, second])
+    assert whole.ladder.groups == (0, 1, 2, 3, 4) and len(whole.ladder) == 5 * 41
+    assert np.array_equal(whole.ladder.force_n[: 2 * 41], first.ladder.force_n)
+
+
+def test_one_part_without_its_top_leaves_the_whole_without_it() -> None:
+    cut, whole = check_table(with_force(lambda force: np.minimum(force, 52.0))), check_table(recorded(stairs(2)))
+    assert (cut.closed, whole.closed) == (False, True)
+    assert [join_ladders(parts).closed for parts in ([cut, whole], [whole, cut], [whole, whole])] == [
+        False,
+        False,
+        True,
+    ]
+
+
+def spoiled(table: Table, rows: list[int], value_n: float) -> Table:
+    force_n = table["force_n"].copy()
+    force_n[rows] = value_n
+    return table | {"force_n": force_n}
+
+
+def test_an_overloaded_reading_is_left_out_and_so_is_one_that_is_late() -> None:
+    """Each would carry its stair away, for it stands in the part that is averaged."""
+    table, last = recorded(stairs()), 10 * ROWS_A_STAIR - 2
+    sound = check_table(table).ladder.force_n
+    quality = np.zeros(len(table["time_s"]))
+    quality[last] = 2.0
+    overloaded = check_table(spoiled(table, [last], 90.0) | {"quality": quality})
+    time_s = table["time_s"].copy()
+    time_s[last] = time_s[last - 5]
+    late = check_table(spoiled(table, [last], 90.0) | {"time_s": time_s})
+    for checked, words in ((overloaded, "with the load cell overloaded"), (late, "does not advance")):
+        assert checked.ladder.force_n == pytest.approx(sound, abs=0.5)
+        assert words in checked.notes[0]
+
+
+def test_a_command_below_zero_is_none() -> None:
+    table = recorded(stairs())
+    error = refuse_table(table | {"command_v": table["command_v"] - 2.0})
+    assert error.flaw is LadderFlaw.COLUMNS

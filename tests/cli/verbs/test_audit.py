@@ -1,0 +1,63 @@
+"""`audit show` and `audit verify`: what they choose, and that a broken record is never told as one that holds."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from gateway.audit.audit_file import AuditFile
+
+
+@pytest.fixture
+def state(tmp_path: Path) -> Path:
+    file = AuditFile(tmp_path, 1 << 20)
+    for minute, peer in enumerate(("10.0.0.5:1", "10.0.0.6:2", "robot (10.0.0.5:3)")):
+        record = {
+            "time": f"2026-11-22T10:0{minute}:00.000Z",
+            "peer": peer,
+            "what": "force_setpoint",
+            "old": 1,
+            "new": 2,
+        }
+        file.append([record])
+    file.close()
+    return tmp_path
+
+
+def numbers(output: str) -> list[int]:
+    return [json.loads(line)["n"] for line in output.splitlines()]
+
+
+@pytest.mark.parametrize(
+    ("words", "shown"),
+    [
+        ((), [1, 2, 3]),
+        (("--peer", "10.0.0.5"), [1, 3]),
+        (("--peer", "robot"), [3]),
+        (("--peer", "10.0.0.7"), []),
+        (("--since", "2026-11-22T10:01"), [2, 3]),
+        (("--since", "2026-11-22T11:01+01:00", "--peer", "10.0.0.6"), [2]),
+        (("--since", "2026-11-22T10:03"), []),
+    ],
+)
+def test_only_who_and_what_was_asked_for_is_shown(state: Path, call, words: tuple[str, ...], shown: list[int]) -> None:
+    answer = call("audit", "show", "--json", *words, "--state", state)
+    assert answer.exit_code == 0 and numbers(answer.output) == shown
+
+
+def test_a_broken_record_is_said_to_hold_nowhere(state: Path, call) -> None:
+    (path,) = (state / "audit").glob("*.jsonl")
+    path.write_bytes(path.read_bytes().replace(b"10.0.0.6", b"10.0.0.8"))
+    for words in ((), ("--json",)):
+        answer = call("audit", "verify", *words, "--state", state)
+        assert answer.exit_code == 1 and answer.stderr.startswith("E170 ")
+        assert "hold, up to" not in answer.stdout
+    assert json.loads(answer.stdout)["broken"]["line"] == 2
+
+
+def test_a_line_that_a_power_cut_has_left_is_told_apart(state: Path, call) -> None:
+    (path,) = (state / "audit").glob("*.jsonl")
+    path.write_bytes(path.read_bytes() + b'{"n": 4, "ti')
+    answer = call("audit", "verify", "--state", state)
+    assert answer.exit_code == 0 and answer.stdout.startswith("3 lines hold, up to line 3, ")
+    assert "incomplete line (12 bytes)" in answer.stdout
