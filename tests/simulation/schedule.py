@@ -57,12 +57,12 @@ class Simulation:
     rates: how many answers each healthy device gives in RATE_S, the same."""
 
     rest_n: float | None = None
-    rates: dict[str, int]
 
     def __init__(self, seed: int, folder: Path) -> None:
         drawn = draw_rig(seed)
         rig = drawn.rig
         self.period_s = 1.0 / rig.loop_hz
+        self.rates: dict[str, int] = {}
         self.clock, self.chance = VirtualClock(), Random(~seed)
         self.observer = drawn.observer(self._bounds_of(rig))
         self.outside = VirtualLoop(self.clock)

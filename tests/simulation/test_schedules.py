@@ -86,6 +86,7 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(22.0664, "output", "say", data=b"0\r\n"),
         ],
     ),
+    (435, [Event(21.2182, "rival", "hold", (54.84,))]),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

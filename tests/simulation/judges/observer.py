@@ -124,7 +124,7 @@ class Observer:
 
     def _lease_end_s(self, now_s: float) -> float | None:
         """When who perhaps presses must have stopped; None for never."""
-        until_s = max(self.disabled_s or 0.0, now_s + self.bounds.lease_s)
+        until_s = max(self.disabled_s or 0.0, now_s + self.bounds.lease_s + self.bounds.lost_down_s)
         return None if until_s == inf else until_s
 
     def note_unanswered(self, control: int | None, now_s: float) -> None:
