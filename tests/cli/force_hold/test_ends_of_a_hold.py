@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,6 +17,22 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers.words import State
+
+
+@pytest.fixture(autouse=True)
+def terminal_may_end_it() -> Iterator[None]:
+    """As where a person works; who runs these tests under nohup has them ignore the terminal's end."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+def test_under_nohup_the_end_of_the_terminal_ends_no_hold() -> None:
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    with _handle_signals(beat):
+        os.kill(os.getpid(), signal.SIGHUP)
+        assert not beat.stopping.is_set()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
