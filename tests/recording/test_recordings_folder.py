@@ -55,7 +55,8 @@ def test_a_folder_that_may_not_be_read_is_not_an_empty_one(tmp_path: Path, monke
 
     assert recording_paths(tmp_path) == recording_paths(tmp_path / "none") == []
     with monkeypatch.context() as patched:
-        patched.setattr(os, "listdir", refuse)
+        for name in ("listdir", "scandir"):  # the one, or from Python 3.13 on the other
+            patched.setattr(os, name, refuse)
         with pytest.raises(PermissionError):
             recording_paths(tmp_path)
 

@@ -7,6 +7,7 @@ import json
 import os
 import socket
 import tarfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -125,14 +126,17 @@ def test_a_backup_without_a_part_that_may_not_be_read_is_none(
     state: Path, call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It packed the rest and said so many files: restored, it took the calibrations away."""
-    listdir = os.listdir
 
-    def refuse(path: Any) -> list[str]:
-        if Path(path).name == "calibrations":
-            raise PermissionError(errno.EACCES, "Permission denied", str(path))
-        return listdir(path)
+    def refusing(call: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        def refuse(path: Any) -> Any:
+            if not isinstance(path, int) and Path(path).name == "calibrations":
+                raise PermissionError(errno.EACCES, "Permission denied", str(path))
+            return call(path)
 
-    monkeypatch.setattr(os, "listdir", refuse)
+        return refuse
+
+    for name in ("listdir", "scandir"):  # the one, or from Python 3.13 on the other
+        monkeypatch.setattr(os, name, refusing(getattr(os, name)))
     answer = call("backup", tmp_path / "b.tar.gz", "--state", state)
     assert (answer.exit_code, answer.stderr[:4]) == (77, "E105")
     assert not (tmp_path / "b.tar.gz").exists()

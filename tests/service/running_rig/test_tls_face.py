@@ -36,11 +36,12 @@ def rig_with(folder: Folder, certificate: str = "gateway") -> Any:
 
 async def ask(port: int, request: bytes, context: Any = None) -> bytes:
     reader, writer = await asyncio.open_connection("127.0.0.1", port, ssl=context)
-    writer.write(framed(request))
-    size = struct.unpack(">4xH", await reader.readexactly(6))[0]
-    answer = await reader.readexactly(size)
-    writer.transport.abort()
-    return answer[1:]
+    try:
+        writer.write(framed(request))
+        size = struct.unpack(">4xH", await reader.readexactly(6))[0]
+        return (await reader.readexactly(size))[1:]
+    finally:
+        writer.transport.abort()
 
 
 def test_both_faces_serve_one_bank_and_the_certificate_owns(folder: Folder) -> None:
