@@ -18,7 +18,7 @@ class Defect(NamedTuple):
 
 
 _BANK = ("registers/test_bank_commands.py", "registers/test_bank_ownership.py", "registers/test_bank_refusals.py")
-_WIRED = ("service/running_rig/test_wired_faults.py", "service/running_rig/test_wired_invariants.py")
+_WIRED = ("service/running_rig/wired/test_faults.py", "service/running_rig/wired/test_invariants.py")
 _REACTIONS = ("faults/test_control_reactions.py", "faults/test_first_cause_and_reset.py", "control/test_states.py")
 _DETECTION = ("control/supervision/test_fault_detection.py", *_REACTIONS)
 
@@ -231,7 +231,7 @@ DEFECTS = (
            ("service/running_rig/lines/test_late_answers.py",)),
     Defect("a device behind a replugged port is not asked again", "service/running_rig/lines/output_line.py",
            "        self._host.forget()\n        self.checks.begin()\n", "        self._host.forget()\n",
-           ("service/running_rig/test_wired_watchdog.py",)),
+           ("service/running_rig/wired/test_watchdog.py",)),
     # -- coefficients, calibrations, disk
     Defect("the checksum of an upload is not compared", "registers/upload/staging.py",
            "if given.crc != (own := set_crc(given.words)):", "if not (own := set_crc(given.words)) and given.crc:",
@@ -416,7 +416,7 @@ DEFECTS = (
     Defect("a trip is kept over a plug", "service/running_rig/lines/device_checks.py",
            "        self.is_armed = self.is_tripped = self._is_said = False\n",
            "        self.is_armed = self._is_said = False\n        self.is_tripped = getattr(self, \"is_tripped\", False)\n",
-           ("service/running_rig/test_wired_watchdog.py",)),
+           ("service/running_rig/wired/test_watchdog.py",)),
     Defect("a babbling device holds the guardian", "service/supervisor/safe_line.py",
            "(left_s := deadline_s - time.monotonic()) > 0", "(left_s := timeout_s) > 0",
            ("service/supervisor/test_safe_line.py",)),
@@ -468,9 +468,9 @@ DEFECTS = (
            ("service/supervisor/test_restart_keeps.py",)),
     Defect("a simulated rig without ports is left alone", "service/supervisor/simulated_rig_child.py",
            "        self._child.kill()\n        self._child.wait()\n        self._on_death", "        self._on_death",
-           ("service/supervisor/test_simulated_rig_child.py",)),
+           ("service/supervisor/children/test_simulated_rig_child.py",)),
     Defect("Ctrl-C reaches the children", "service/supervisor/child_process.py",
-           "setsid=True, setsigmask=_BLOCKED)", "setsid=True)", ("service/supervisor/test_child_process.py",)),
+           "setsid=True, setsigmask=_BLOCKED)", "setsid=True)", ("service/supervisor/children/test_child_process.py",)),
     Defect("a setting goes before the watchdog's food", "service/running_rig/lines/output_line.py",
            "if self._host.sign_of_life and now_s >= self._next_feed_s:",
            "if self._host.sign_of_life and now_s >= self._next_feed_s and self._is_confirmed(wanted_v):",

@@ -8,7 +8,7 @@ from gateway.codes.faults import FaultCode
 from gateway.registers import Refusal
 from gateway.registers.words import State
 from tests.service.rigs import demo
-from tests.service.running_rig.test_wired_faults import TICK_S, assert_fails_with, assert_heals_after_reset, at_twenty
+from tests.service.running_rig.wired.test_faults import TICK_S, assert_fails_with, assert_heals_after_reset, at_twenty
 from tests.service.wired import ENABLE, Wired
 
 

@@ -9,7 +9,7 @@ from gateway.control.inputs import Output
 from gateway.registers import Refusal
 from gateway.registers.words import State
 from tests.service.rigs import strict
-from tests.service.running_rig.test_wired_faults import LAST_WORD_S, assert_heals_after_reset
+from tests.service.running_rig.wired.test_faults import LAST_WORD_S, assert_heals_after_reset
 from tests.service.wired import ENABLE, RESET, STEP_S, Observer, Wired
 
 FAULTS = ("no-air", "no-contact", "sign-inverted", "cell-cut", "output-cut")
