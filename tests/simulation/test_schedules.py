@@ -86,6 +86,14 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(22.0664, "output", "say", data=b"0\r\n"),
         ],
     ),
+    (
+        74244,
+        [
+            Event(10.3898, "world", "valve-stuck", (1.0,)),
+            Event(20.265, "worker", "take", (43.39,), way="floats"),
+            Event(20.4137, "worker", "hold", (55.62,)),
+        ],
+    ),
     (435, [Event(21.2182, "rival", "hold", (54.84,))]),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
