@@ -31,6 +31,7 @@ class Sets:
         self.known: set[bytes] = set()
         self.first: bytes | None = None
         self.mark = 0
+        self._is_any = False
         self._under_way: dict[str, set[bytes]] = {}
 
     def next_set(self) -> bytes:
@@ -53,7 +54,7 @@ class Sets:
         """It is told as committed, or not. While somebody else uploads, too, either may be in use."""
         may_be = self._under_way.pop(who, set())
         if is_committed:
-            self.allowed = may_be
+            self.allowed, self._is_any = may_be, False
         elif len(may_be) == 1:
             self.allowed = self._before
 
@@ -62,13 +63,16 @@ class Sets:
         self._under_way.pop(who, None)
 
     def expect_mark(self, mark: int) -> None:
-        """A set with this mark is stored, so that somebody may take it into use."""
+        """A set with this mark is stored, so that somebody may take it into use, or has asked for it already."""
         if self.first is not None:
-            self.known.add(with_mark(self.first, mark))
+            words = with_mark(self.first, mark)
+            self.known.add(words)
+            if self._is_any:
+                self.allowed.add(words)
 
     def expect_any(self) -> None:
         """Somebody takes one of the sets that there are into use."""
-        self.allowed = set(self.known)
+        self.allowed, self._is_any = set(self.known), True
         self._under_way.clear()
 
 
