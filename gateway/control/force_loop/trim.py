@@ -16,6 +16,7 @@ Bounds: Trim.gain_v_per_n_s, limit_v, dead_zone_n and memory_n in control/settin
 from math import exp
 from typing import Final
 
+from gateway.control.force_loop.measured_trim import NEW_TARGET_N, SLOWER
 from gateway.control.limits import trim_limited
 from gateway.control.settings import Trim
 from gateway.registers.words import LimitedBy
@@ -25,9 +26,7 @@ SEEN_S: Final = 0.05  # longer than the noise of a cell
 SEEN_SAMPLES: Final = 3  # the same, of a slow one
 CALM_S: Final = 3.0  # so long between two of them, and it is not the trim that swings
 FREE_SWINGS: Final = 3  # what a step, or a workpiece, may make of it
-SLOWER: Final = 0.6  # pace after each further one
 LEAST_PACE: Final = 0.02
-NEW_TARGET_N: Final = 1.0
 
 
 class TrimIntegral:

@@ -17,6 +17,7 @@ from gateway.devices import DeviceProfile
 from gateway.profiles.http_sections import Web
 from gateway.profiles.kinds.plants import PlantProfile
 from gateway.profiles.rigs.faces import Face
+from gateway.profiles.rigs.rig import is_own
 from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, ValveFile
 from gateway.profiles.strict_yaml.fault_sentences import newton, number, second, volt
 
@@ -238,31 +239,29 @@ def check_pace(parts: Parts) -> Found:
     calibration, supervision = parts.calibration, parts.supervision
     if calibration is None or supervision is None or parts.limits is None:
         return
-    is_own = calibration.rig == parts.name or parts.simulated
-    if parts.measures_response and calibration.response and is_own:
+    measured_here = is_own(calibration, parts.name, parts.plant if parts.simulated else None)
+    if parts.measures_response and calibration.response and measured_here:
         return
     lag = f"supervision.response_lag_s = {second(supervision.response_lag_s)}"
     if parts.trim and parts.trim.limit_v > 0:
-        slope_n_per_v = _steepest(calibration, parts.limits.force_max_n)
-        most = 1.0 / (slope_n_per_v * supervision.response_lag_s)
-        if (gain := parts.trim.gain_v_per_n_s) > most:
+        slope_n_per_v, gain = _steepest(calibration, parts.limits.force_max_n), parts.trim.gain_v_per_n_s
+        if slope_n_per_v * gain * supervision.response_lag_s > 1.0:
             pace = f"corrects an error in {1.0 / (gain * slope_n_per_v):.2g} s where 1 V are {slope_n_per_v:.2g} N"
-            yield (
-                "trim.gain_v_per_n_s",
-                f"{gain:g} {pace}, faster than {lag}: the force may swing; at most {most:.2g}",
-            )
+            most = f"at most {1.0 / (slope_n_per_v * supervision.response_lag_s):.2g}"
+            yield "trim.gain_v_per_n_s", f"{gain:g} {pace}, faster than {lag}: the force may swing; {most}"
     if parts.lead and (lead_s := parts.lead.lag_s + parts.lead.second_lag_s) > supervision.response_lag_s:
         yield "lead.lag_s", f"{second(lead_s)} with the second is longer than {lag}: each step would go beyond its end"
 
 
 def _steepest(calibration: Calibration, most_n: float) -> float:
-    """Return the largest slope of both branches up to this force, N/V."""
+    """Return the largest slope of both branches up to this force, N/V; 0 where none of them gives so little."""
     model = calibration.model()
     steps = [calibration.x0_v + (calibration.x1_v - calibration.x0_v) * share / _SLOPES for share in range(_SLOPES + 1)]
     branches = (model.branches.rising, model.branches.falling)
-    return max(
+    slopes = (
         branch.slope(voltage_v) for branch in branches for voltage_v in steps if branch.value(voltage_v) <= most_n
     )
+    return max(slopes, default=0.0)
 
 
 def check_compensation(parts: Parts) -> Found:

@@ -37,6 +37,11 @@ ALWAYS_SUPPORTED: Final = (
 """Control bits that act on every rig; a self-test and a valve act where the rig file has them, else they are refused."""
 
 
+def is_own(calibration: Calibration, rig: str, simulated_plant: PlantProfile | None) -> bool:
+    """Decide whether the calibration was measured on this very rig, or on the twin of the plant that it simulates."""
+    return calibration.rig in (rig, simulated_plant and f"twin of plant {simulated_plant.name}")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _SerialLine:
     """The wire to one device; port None in a simulated rig."""
@@ -162,12 +167,7 @@ class Rig:
         return calibration.response if self._has_made(calibration) else None
 
     def _has_made(self, calibration: Calibration) -> bool:
-        """Decide whether the calibration was measured on this very rig, or on the twin of its plant."""
-        own_names = [
-            self.name,
-            *([f"twin of plant {self.plant_profile.name}"] if self.simulated and self.plant_profile else []),
-        ]
-        return calibration.rig in own_names
+        return is_own(calibration, self.name, self.plant_profile if self.simulated else None)
 
     def calibration_in_use(self, calibration: Calibration, model: Bsfm | None = None) -> CalibrationInUse:
         """Return the calibration as control uses it here. model: its model, where that has been made already."""

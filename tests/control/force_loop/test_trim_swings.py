@@ -4,11 +4,11 @@ from random import Random
 
 import pytest
 
+from gateway.control.force_loop.measured_trim import NEW_TARGET_N
 from gateway.control.force_loop.trim import (
     CALM_S,
     FREE_SWINGS,
     LEAST_PACE,
-    NEW_TARGET_N,
     SEEN_S,
     SEEN_SAMPLES,
     SWING_N,

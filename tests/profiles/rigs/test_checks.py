@@ -127,6 +127,23 @@ def test_a_trim_or_a_lead_that_the_rig_cannot_follow_is_told_where_the_file_rule
     assert messages(report(tmp_path, DEMO, RULES, slow, long).warnings)[0].endswith("at most 0.16")
 
 
+def test_where_no_branch_gives_as_little_as_the_rig_allows_the_pace_is_not_judged(tmp_path: Path) -> None:
+    """The check ended with a traceback."""
+    small = [(old, f"{old.split(':')[0]}: 0.4") for old in ("force_max_n: 60", "precontact_force_n: 3", "force_n: 15")]
+    found = report(tmp_path, DEMO, RULES, *small)
+    assert not any("trim" in message for message in messages((*found.faults, *found.warnings)))
+
+
+def test_a_simulated_rig_with_another_rigs_calibration_goes_by_its_own_numbers(tmp_path: Path) -> None:
+    """As control does, which uses no response that another rig was measured with."""
+    other = (tmp_path / "other.yaml").resolve()
+    shipped = (RIGS.parent / "calibrations" / "demo.yaml").read_text(encoding="utf-8")
+    other.write_text(shipped.replace("twin of plant paper-slide", "another rig"), encoding="utf-8")
+    fast = ("gain_v_per_n_s: 0.3", "gain_v_per_n_s: 1.5")
+    found = report(tmp_path, DEMO, ("calibration: demo", f"calibration: {other}"), fast)
+    assert [message.split(":")[0] for message in messages(found.warnings)] == ["trim.gain_v_per_n_s"]
+
+
 def test_a_load_cell_line_that_cannot_carry_its_readings_is_told(tmp_path: Path) -> None:
     warnings = messages(report(tmp_path, DEMO, ("baud: 115200", "baud: 9600")).warnings)
     assert "load_cell.baud: 9600 carries 53 readings/s, stream-st-gs sends 100" in warnings
