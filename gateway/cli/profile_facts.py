@@ -14,7 +14,8 @@ def facts(checked: "Checked", *, whole: bool = False) -> dict[str, str]:
     """Return facts of a profile for the terminal, name -> words. whole: the fingerprint in full."""
     if checked.kind == "rig":
         return _rig(checked.value) | ({"fingerprint": checked.value.fingerprint} if whole else {})
-    return {checked.kind: _FACTS_OF[checked.kind](checked.value)}
+    told = {checked.kind: _FACTS_OF[checked.kind](checked.value)}
+    return told | (_sentences(checked.value) if checked.kind == "device" else {})
 
 
 def _rig(rig: "Rig") -> dict[str, str]:
@@ -46,11 +47,19 @@ def _rig(rig: "Rig") -> dict[str, str]:
 
 
 def _device(device: "DeviceProfile") -> str:
-    words = "asked" if device.read_force else f"{device.rate_hz:g} readings/s"
+    words = "asked" if device.read_force or device.read_valve else f"{device.rate_hz:g} readings/s"
     if device.set_voltage:
         low_v, high_v = device.voltage_range_v
         words = f"{low_v:g} .. {high_v:g} V"
     return f"{device.name}: {device.role}, {device.serial}, {words}; {device.hardware} ({device.certainty})"
+
+
+def _sentences(device: "DeviceProfile") -> dict[str, str]:
+    """What goes over the wire, to lay beside the manual, and what of a reading is not listened to."""
+    from gateway.cli.wire_example import example, read_over
+
+    told = {"on the wire": example(device), "read over": ", ".join(read_over(device))}
+    return {name: words for name, words in told.items() if words}
 
 
 def _plant(plant: "PlantProfile") -> str:

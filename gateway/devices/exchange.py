@@ -3,28 +3,19 @@
 Checked when built: a template that means nothing is told to its author, not to a running cell.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from math import ceil, floor, inf
-from typing import Annotated, Final, Literal
+from dataclasses import dataclass
+from math import ceil, floor
+from typing import Annotated, Final
 
-from annotated_types import Ge, Gt, Le, MinLen
+from annotated_types import MinLen
 
 from gateway.defaults import STRICT
 from gateway.devices.binary.register_access import RegisterAccess, check_direction, templates_of
-from gateway.devices.binary.weight_registers import WeightRegisters
-from gateway.devices.fields import Choice, Decimals, HexNumber, RegisterNumber, TemplateError, WholeNumber
-from gateway.devices.messages import Quality
-from gateway.devices.template import Template, compile_template, quote
-from gateway.units import NEWTON_PER_UNIT
+from gateway.devices.fields import TemplateError
+from gateway.devices.template import compile_template, quote
 
 Span = tuple[float, float]
 _GRAIN: Final = 1e-6  # of a step: what binary fractions are off
-ForceUnit = Literal["N", "kg", "g", "lb"]
-
-FORCE: Final = "force"
-STATUS: Final = "status"
-UNIT: Final = "unit"
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,138 +183,3 @@ class Refusals:
         """Return the texts by which the device refuses."""
         texts = (self.unknown, self.out_of_range.text if self.out_of_range else "")
         return tuple(text for text in texts if text)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ForceReading:
-    """One reading of a load cell: streamed, or the answer to `ask`.
-
-    frame: template with the number {force:...}, perhaps a word {status:...} and a word {unit:...}. Where the frame says its
-    unit, that unit counts; `unit` is what the simulated device is set to, and what a frame without one means. Raw counts
-    of a converter have no unit but newton_per_count and zero_count, which a rig has measured. before: a sentence that is
-    sent ahead of each question and not answered. modbus: registers, in place of frame and ask. overload, underload: what
-    the device says in place of the frame where it has no number to show; nothing in them changes but the profile's constants.
-    """
-
-    __pydantic_config__ = STRICT
-    frame: str = ""  # template of the reading, with the number {force:...}
-    ask: str = ""  # empty for a stream
-    before: str = ""  # sent ahead of ask, unanswered: such as the command to all devices to sample
-    modbus: WeightRegisters | None = None  # of a Modbus device, instead of frame and ask
-    unit: ForceUnit | None = None  # absent: the frame says it, or the rig must
-    newton_per_count: Annotated[float, Gt(0)] | None = None  # of raw counts: one count in newtons, usually the rig's
-    zero_count: float = 0.0  # of raw counts: reading without a force
-    end_count: Annotated[float, Gt(0)] | None = None  # of raw counts: where the converter ends; counts as an overload
-    quality: Mapping[str, Quality] = field(
-        default_factory=dict
-    )  # word of {status:...} -> how far to believe the reading
-    blank_is_overload: bool = False  # blanks instead of digits mean beyond the range
-    overload: tuple[str, ...] = ()  # sentences of their own that mean beyond the range: ["S +"]
-    underload: tuple[str, ...] = ()  # beyond its other end: ["S -"]; without it the device says overload there, too
-    rate_hz: Annotated[float, Ge(0), Le(10_000)] = 0.0  # readings per second; with ask: the most, 0: as the wire allows
-
-    def __post_init__(self) -> None:
-        if self.modbus:
-            if (self.ask, self.frame) not in (("", ""), self.modbus.templates()):
-                raise ValueError("`modbus` stands for question and answer: leave `ask` and `frame` out")
-            object.__setattr__(self, "ask", self.modbus.templates()[0])
-            object.__setattr__(self, "frame", self.modbus.templates()[1])
-        elif not self.frame:
-            raise ValueError("`frame` is missing: the sentence with {force:...}, or `modbus` with the registers")
-        if self.before and not self.ask:
-            raise ValueError("`before` is sent ahead of a question: there is no `ask`")
-        if self.unit and self.newton_per_count:
-            raise ValueError(f"unit {self.unit} and newton_per_count are two units for one number: leave one out")
-        if self.modbus and self.beyond_range:
-            raise ValueError(
-                "`overload` and `underload` are sentences: beside `modbus` say the bits in `modbus.overload`"
-            )
-        for text in (*filter(None, (self.ask, self.before)), *self.overload, *self.underload):
-            compile_template(text)
-        _check_reading(compile_template(self.frame), self)
-
-    @property
-    def newton_per_unit(self) -> float | None:
-        """Force of one unit of the device's number, N; None where neither unit nor counts say it."""
-        return NEWTON_PER_UNIT[self.unit] if self.unit else self.newton_per_count
-
-    @property
-    def says_overload(self) -> bool:
-        """Decide whether the device tells by itself that it is beyond its range."""
-        return (
-            self.blank_is_overload
-            or bool(self.overload)
-            or Quality.OVERLOAD in self.quality.values()
-            or bool(self.modbus and self.modbus.overload)
-        )
-
-    @property
-    def beyond_range(self) -> tuple[tuple[str, float], ...]:
-        """The sentences that mean beyond the range, each with the number that it stands for: inf or -inf."""
-        return tuple((text, inf) for text in self.overload) + tuple((text, -inf) for text in self.underload)
-
-    @property
-    def template(self) -> Template:
-        """The compiled template of the cell's frame."""
-        return compile_template(self.frame)
-
-    @property
-    def may_be_blank(self) -> str:
-        """Name of the field that the cell leaves blank when overloaded; empty where it does not."""
-        return FORCE if self.blank_is_overload else ""
-
-    @property
-    def decimals(self) -> int:
-        """Number of digits behind the point of the cell's force, 0 for whole numbers."""
-        number = self.template.field(FORCE)
-        if self.modbus:
-            return self.modbus.shown_decimals
-        return number.decimals if isinstance(number, Decimals) else 0
-
-    @property
-    def step(self) -> float:
-        """One count of the display, in the device's unit."""
-        return float(10.0**-self.decimals)
-
-    @property
-    def largest_shown(self) -> float:
-        """The largest number that the display has digits for, with room for a sign, in the device's unit."""
-        if self.end_count:
-            return self.end_count
-        if self.modbus:
-            return self.modbus.largest_shown
-        number = self.template.field(FORCE)
-        if isinstance(number, HexNumber):
-            return float(16**number.width - 1)
-        width = number.width if isinstance(number, Decimals | WholeNumber) else 0
-        if not width:
-            return 999999.0
-        digits = width - 1 - (self.decimals + 1 if self.decimals else 0)
-        return max(0.0, float(10.0**digits) - self.step)
-
-    def word(self, quality: Quality) -> str | None:
-        """Return the status word that means this, None where the frame has none; a device may know unstable readings only."""
-        qualities = (quality, Quality.UNSTABLE) if quality is Quality.OK else (quality,)
-        return next((word for one in qualities for word, meaning in self.quality.items() if meaning == one), None)
-
-
-def _check_reading(template: Template, reading: ForceReading) -> None:
-    number = template.field(FORCE)
-    if not isinstance(number, Decimals | WholeNumber | HexNumber | RegisterNumber):
-        raise TemplateError(f"{quote(template.text)} has no number {{force:...}}")
-    if reading.blank_is_overload and (number.is_open or not isinstance(number, Decimals)):
-        raise TemplateError(f"{quote(template.text)}: blank_is_overload needs decimals of fixed width")
-    unit = template.field(UNIT)
-    if unit and not (isinstance(unit, Choice) and set(unit.words) <= set(NEWTON_PER_UNIT)):
-        raise TemplateError(
-            f"{quote(template.text)}: units are {', '.join(NEWTON_PER_UNIT)}; another is text, with `unit`"
-        )
-    if isinstance(unit, Choice) and reading.unit and reading.unit not in unit.words:
-        raise TemplateError(f"{quote(template.text)} never says {reading.unit}: unit is one of {', '.join(unit.words)}")
-    status = template.field(STATUS)
-    words = set(status.words if isinstance(status, Choice) else ())
-    if odd := sorted(words ^ set(reading.quality)):
-        told = ", ".join(f"{word!r} is {'not named' if word in words else 'no word of it'}" for word in odd)
-        raise TemplateError(f"{quote(template.text)}: quality names the words of {{status:...}}: {told}")
-    if reading.quality and set(reading.quality.values()) <= {Quality.OVERLOAD, Quality.REPEATED}:
-        raise TemplateError(f"{quote(template.text)}: quality has no word for a good reading (ok, unstable)")

@@ -4,10 +4,21 @@ However a stream is cut into chunks, the same lines come out: each decision look
 line, never at how many have arrived (a property test says so).
 """
 
+import re
 from dataclasses import dataclass
 from typing import Final
 
 LONGEST_LINE_BYTES: Final = 128  # the longest sentence of the shipped grammars is 40
+
+_SPELT: Final = re.compile(r"<?(CR|LF|STX|ETX|\\[rnx])", re.IGNORECASE)
+_SHOWN: Final = r'"\r\n", ETX "\x03"'
+
+
+def no_terminator(text: str) -> str:
+    """Return why this ends no line: it is spelt as manuals spell it. Empty where it may."""
+    if not _SPELT.match(text):
+        return ""
+    return f"'{text}' would be {len(text)} characters on the wire: between double quotes CR LF is {_SHOWN}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +47,10 @@ class LineSplitter:
         """Drop the unfinished line; how many bytes that was."""
         dropped, self._buffer, self._is_skipping = len(self._buffer), b"", False
         return dropped
+
+    def skip(self) -> None:
+        """Take what comes up to the next end for the rest of a line that began before: it is no whole one."""
+        self._is_skipping = True
 
     def feed(self, chunk: bytes) -> list[Line]:
         """Return the lines that these bytes complete; an unfinished one waits."""

@@ -97,13 +97,13 @@ class Grammar:
         return self.line(self.number_body(template, number))
 
     def words(self, template: str) -> str:
-        """Return a sentence that carries nothing but the profile's constants, as text; an empty one is none."""
-        return self.encode(template).decode("ascii") if template else ""
+        """Return a sentence as text, with the profile's constants; its other numbers are 0. An empty one is none."""
+        return self.encode_filled(template, dict(self.profile.constants)).decode("ascii") if template else ""
 
-    def refusals(self) -> dict[bytes, str]:
-        """Return the sentences by which the device refuses, as they are on the wire and in words."""
-        words = map(self.words, self.profile.refusals.texts())
-        return {one.encode("ascii"): one for one in words}
+    def refusal(self, body: bytes) -> str:
+        """Return the words by which the device refuses, empty where this sentence is no refusal."""
+        is_refusal = any(self.read(text, body) is not None for text in self.profile.refusals.texts())
+        return body.decode("ascii") if is_refusal else ""
 
     def encode_filled(self, template: str, values: dict[str, Value]) -> bytes:
         """Return the sentence with these values; what else it carries is nothing in particular, as a simulated device says."""

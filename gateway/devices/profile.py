@@ -10,22 +10,26 @@ from enum import StrEnum
 from math import nan
 from typing import Annotated, Final, Literal
 
-from annotated_types import Gt, MinLen
+from annotated_types import Gt, MaxLen, MinLen
 
 from gateway.defaults import STRICT
 from gateway.devices.binary.register_access import VALUE, check_direction
 from gateway.devices.checksum import ChecksumName
 from gateway.devices.device_checks.identity import Identity
 from gateway.devices.device_checks.watchdog import Watchdog
-from gateway.devices.exchange import (
-    ForceReading,
-    PressureExchange,
-    Refusals,
-    Span,
-    Step,
-    VoltageExchange,
+from gateway.devices.exchange import PressureExchange, Refusals, Span, Step, VoltageExchange
+from gateway.devices.fields import (
+    Choice,
+    Decimals,
+    Field,
+    HexNumber,
+    RegisterNumber,
+    Scientific,
+    TemplateError,
+    Text,
+    WholeNumber,
 )
-from gateway.devices.fields import Choice, Decimals, Field, HexNumber, RegisterNumber, TemplateError, WholeNumber
+from gateway.devices.force_reading import STATUS, ForceReading
 from gateway.devices.line_settings import SerialSettings
 from gateway.devices.template import compile_template, quote
 from gateway.devices.valve_profile import ValveReading, ValveSettings
@@ -35,10 +39,10 @@ TEMPLATE: Final = "template"
 ADDRESS: Final = "address"
 """Name of the constant that tells devices on one bus apart: of a Modbus device its unit."""
 
-_NUMBERS: Final = (WholeNumber, HexNumber, Decimals, RegisterNumber)
+_NUMBERS: Final = (WholeNumber, HexNumber, Decimals, Scientific, RegisterNumber)
 _LONGEST_MODBUS_S: Final = 0.1  # later than this a Modbus answer is no use to a force loop
 _LARGEST_UNIT: Final = 255  # 247 by the specification; some devices take all that fit into a byte
-Terminator = Literal["", "\r\n", "\r", "\n", "\x03"]  # the last one is ETX
+Terminator = Annotated[str, MaxLen(8)]
 
 
 class Certainty(StrEnum):
@@ -71,9 +75,7 @@ class DeviceProfile:
     codec: str = TEMPLATE  # template, modbus-rtu, or the name of a Python codec in gateway/devices/codecs.py
     serial: SerialSettings  # the line as the device comes; a rig may set another baud
     terminator: Terminator = ""  # end of every line, both ways; a Modbus device has none
-    question_terminator: Literal["", "\r\n", "\r", "\n", "\x03", ";"] = (
-        ""  # end of what the gateway says, where another
-    )
+    question_terminator: Terminator = ""  # end of what the gateway says, where another
     checksum: ChecksumName = "none"  # appended before the terminator
     constants: Mapping[str, int | str] = field(
         default_factory=dict
@@ -171,7 +173,7 @@ class DeviceProfile:
     def decimals_in(self, template_text: str) -> int:
         """Return the decimals of the number that a template carries; 0 for a whole number, or none."""
         number = self.number_in(template_text)
-        return number.decimals if isinstance(number, Decimals | RegisterNumber) else 0
+        return number.decimals if isinstance(number, Decimals | Scientific | RegisterNumber) else 0
 
     @property
     def reading(self) -> ForceReading:
@@ -194,6 +196,8 @@ def _check_codec(profile: DeviceProfile) -> None:
     if not profile.is_modbus:
         if not profile.terminator:
             raise ValueError('terminator is missing: what ends a line, such as "\\r\\n"')
+        if not f"{profile.terminator}{profile.question_terminator}".isascii():
+            raise ValueError("terminator and question_terminator are ASCII text")
         return
     if profile.terminator or profile.question_terminator or profile.checksum != "none":
         raise ValueError("a Modbus RTU frame has its own end and checksum: leave terminator and checksum out")
@@ -253,7 +257,15 @@ def _check_load_cell(profile: DeviceProfile) -> None:
         raise ValueError("stream has a rate_hz and no ask")
     if profile.read_force and not profile.read_force.ask:
         raise ValueError("read_force needs an ask")
-    for text, _ in profile.reading.beyond_range:
+    reading = profile.reading
+    unheard = [one.name for one in reading.read_over(profile.constants) if isinstance(one, Choice | HexNumber | Text)]
+    if unheard and not (reading.modbus or reading.quality or reading.says_overload):
+        raise TemplateError(
+            f"{quote(reading.frame)}: {{{unheard[0]}:...}} is read over, and nothing here tells an overload, which would be "
+            f"believed: call the word that tells it {{{STATUS}:...}}, say it under `overload`, or write as text what never "
+            "changes"
+        )
+    for text, _ in reading.beyond_range:
         if any(one.name not in profile.constants for one in compile_template(text).fields):
             raise TemplateError(
                 f"{quote(text)} of overload or underload is said as it stands: no field in it but constants"

@@ -6,13 +6,14 @@ refusal, a display without room for a minus sign.
 """
 
 from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 from math import inf
 from typing import Final
 
 from gateway.devices.codecs import cell_device, cell_host, output_device, output_host
-from gateway.devices.exchange import UNIT
 from gateway.devices.fields import ValueRefused
-from gateway.devices.framing import LONGEST_LINE_BYTES
+from gateway.devices.force_reading import UNIT
+from gateway.devices.framing import LONGEST_LINE_BYTES, no_terminator
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import (
     Accepted,
@@ -40,13 +41,46 @@ Found = Iterator[tuple[tuple[str | int, ...], str]]
 """(place in the profile, sentence)."""
 
 _NOW_S: Final = 0.0
+_SAID_BY_US: Final = ("ask", "before", "feed")
+_NO_ROUND_PART: Final = 0.7361  # of the range: an answer with fewer digits than the setting shows it here
 _LONGEST_SHOWN: Final = 60  # of a line, in a sentence
 
 
 def rehearse(profile: DeviceProfile) -> Found:
     """Return what keeps the two ends of this profile from understanding each other; nothing when they do."""
+    if wrong := [*_terminators(profile), *_cut_sentences(profile)]:
+        yield from wrong
+        return
     talk = {DeviceRole.OUTPUT: _output, DeviceRole.LOAD_CELL: _cell, DeviceRole.VALVE: _valve}
     yield from talk[profile.role](profile)
+
+
+def _terminators(profile: DeviceProfile) -> Found:
+    for name in ("terminator", "question_terminator"):
+        if why := no_terminator(getattr(profile, name)):
+            yield (name,), why
+
+
+def _cut_sentences(profile: DeviceProfile) -> Found:
+    """Sentences with the end of a line in their middle."""
+    groups = ((one.name, getattr(profile, one.name)) for one in fields(profile))
+    for name, group in () if profile.is_modbus else groups:
+        for place, text in _sentences(group, (name,)) if is_dataclass(group) else ():
+            ours = place[-1] in _SAID_BY_US
+            terminator = (profile.question_terminator if ours else "") or profile.terminator
+            if terminator in text:
+                yield place, f"{quote(text)} has the terminator in its middle: the line would end there"
+
+
+def _sentences(group: object, place: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    if isinstance(group, str):
+        yield place, group
+    elif isinstance(group, tuple):
+        for index, one in enumerate(group):
+            yield from _sentences(one, (*place, index))
+    elif is_dataclass(group):
+        for one in fields(group):
+            yield from _sentences(getattr(group, one.name), (*place, one.name))
 
 
 def _valve(profile: DeviceProfile) -> Found:
@@ -61,7 +95,7 @@ def _valve(profile: DeviceProfile) -> Found:
 
 def _output(profile: DeviceProfile) -> Found:
     low_v, high_v = profile.voltage_range_v
-    for voltage_v in (low_v, 0.5 * (low_v + high_v), high_v):
+    for voltage_v in (low_v, 0.5 * (low_v + high_v), low_v + _NO_ROUND_PART * (high_v - low_v), high_v):
         if complaint := _talk(profile, SetVoltage(voltage_v), Accepted(voltage_v)):
             yield ("set_voltage",), f"{voltage_v:g} V: {complaint}"
             return
@@ -145,7 +179,7 @@ def _cell(profile: DeviceProfile) -> Found:
         if question and device.receive(question, _NOW_S) != 1:
             yield place, f"the device does not know its own question {_line(question)}{_too_long(question)}"
             return
-        if complaints := list(_beyond_range(profile, host, place)):
+        if complaints := list(_beyond_range(profile, unit, place)):
             yield from complaints
             return
         for counts in (0, 1, -1):
@@ -170,13 +204,15 @@ def _cell(profile: DeviceProfile) -> Found:
         yield place, str(error)
 
 
-def _beyond_range(profile: DeviceProfile, host: CellHost, place: tuple[str, ...]) -> Found:
+def _beyond_range(profile: DeviceProfile, unit: str | None, place: tuple[str, ...]) -> Found:
     """Each sentence that means an overload must mean nothing else."""
     grammar = Grammar(profile)
     for key, sign in (("overload", 1.0), ("underload", -1.0)):
         for index, text in enumerate(getattr(profile.reading, key)):
             body = grammar.encode(text)
-            if complaint := _other_meaning(grammar, text, body) or _misread(host, grammar.line(body), sign * inf):
+            if complaint := _other_meaning(grammar, text, body) or _misread(
+                cell_host(profile, unit=unit), grammar.line(body), sign * inf
+            ):
                 yield (*place, key, index), complaint
 
 
@@ -193,7 +229,6 @@ def _other_meaning(grammar: Grammar, text: str, body: bytes) -> str:
 
 def _misread(host: CellHost, line: bytes, force_n: float) -> str:
     """Return why this line is not the overload that it should be, empty where it is."""
-    host.forget()
     samples = host.receive(line, _NOW_S)
     if samples == [ForceSample(force_n, force_n, Quality.OVERLOAD, _NOW_S)]:
         return ""

@@ -8,7 +8,7 @@ from gateway.devices import DeviceProfile, cell_device, cell_host
 from gateway.devices.binary.register_access import WordOrder
 from gateway.devices.binary.rtu_framing import rtu_frame
 from gateway.devices.binary.weight_registers import RegisterBit, WeightRegisters
-from gateway.devices.exchange import ForceReading
+from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample, Garbage, Quality
 from tests.profile_files import load_device
 

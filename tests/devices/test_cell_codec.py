@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.devices import DeviceProfile, TemplateError, cell_device, cell_host, output_host
-from gateway.devices.exchange import ForceReading
+from gateway.devices.force_reading import ForceReading
 from gateway.devices.framing import LONGEST_LINE_BYTES
 from gateway.devices.messages import ForceSample, Garbage, Quality, RepeatedSample
 from gateway.profiles import load_device

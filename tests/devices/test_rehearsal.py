@@ -42,7 +42,30 @@ def loaded(folder: Path, name: str, **changes: Any) -> list[str]:
         ({"set_voltage__answer": "OK", "refusals__unknown": "OK"}, "is read as a refusal"),
         ({"refusals__unknown": "512"}, "5 V: the answer '512\\r\\n' to 'SET 512\\r\\n' is read as a refusal"),
         ({"refusals__unknown": "nö"}, "refusals are ASCII text, 'nö' is not"),
-        ({"refusals__unknown": "NO\r\nWAY"}, "refusals: 'NO\\r\\nWAY' is not printable text"),
+        ({"refusals__unknown": "NO\r\nWAY"}, "refusals.unknown: 'NO\\r\\nWAY' has the terminator in its middle"),
+        ({"read_pressure__answer": "1\r\n{counts:d}"}, "read_pressure.answer: '1\\r\\n{counts:d}' has the terminator"),
+        (
+            {"terminator": "CRLF"},
+            "terminator: 'CRLF' would be 4 characters on the wire: between double quotes CR LF is",
+        ),
+        ({"terminator": "\\r"}, "terminator: '\\r' would be 2 characters"),
+        ({"terminator": "é"}, "terminator and question_terminator are ASCII text"),
+        ({"terminator": "\n\r"}, None),
+        ({"terminator": ";FF", "question_terminator": "*"}, None),
+        ({"refusals__unknown": "ERR {code:d}"}, None),
+        (
+            {"set_voltage__answer": "OK {counts:d}", "refusals__unknown": "{word:OK|NO} {code:d}"},
+            "is read as a refusal",
+        ),
+        (
+            {
+                "set_voltage__ask": "SET {volts:.3f}",
+                "set_voltage__answer": "{volts:.1E}",
+                "set_voltage__range__device": [0, 100],
+            },
+            "set_voltage: 7.361 V: 'SET 73.610\\r\\n' is confirmed as 7.4 V by '7.4E+01\\r\\n': the ranges do not fit",
+        ),
+        ({"set_voltage__answer": "{counts:+.3E}"}, None),
         (
             {"set_voltage__ask": "SET {a:02X}{counts:d}", "constants": {"a": 300}},
             "set_voltage: 0 V: a = 12C: does not fit in 2 characters",

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.devices import DeviceProfile, cell_device, cell_host, output_device, output_host
-from gateway.devices.exchange import ForceReading
+from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import Accepted, ForceSample, Garbage, Quality, SetVoltage
 
 FORCES = st.floats(-900.0, 900.0)

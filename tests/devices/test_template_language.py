@@ -1,4 +1,4 @@
-"""The five field shapes, both ways, and what they refuse."""
+"""The field shapes, both ways, and what they refuse."""
 
 import re
 from math import inf, nan
@@ -10,15 +10,16 @@ from hypothesis import strategies as st
 from gateway.devices import TemplateError, ValueRefused
 from gateway.devices.checksum import add_checksum, strip_checksum
 from gateway.devices.fields import (
-    _LONGEST_NUMBER,
     Choice,
     Decimals,
     HexNumber,
     RegisterNumber,
+    Scientific,
     Text,
     WholeNumber,
     field_from,
 )
+from gateway.devices.fields.field import LONGEST_NUMBER
 from gateway.devices.template import compile_template
 
 
@@ -36,6 +37,12 @@ from gateway.devices.template import compile_template
         ("{name:8s};", {"name": "ITV"}, b"ITV     ;"),
         ("a{{b}}{counts:d}", {"counts": 1}, b"a{b}1"),
         ("\x02{force:+08.2f} N\x03", {"force": 12.34}, b"\x02+0012.34 N\x03"),
+        ("\n{x:8.3f} kg\r\nS{y:d}", {"x": -1.5, "y": 2}, b"\n  -1.500 kg\r\nS2"),
+        ("\x1bP{x:d}", {"x": 1}, b"\x1bP1"),
+        ("{x:+.4E}", {"x": 0.5}, b"+5.0000E-01"),
+        ("{x:.2e}", {"x": 1230.0}, b"1.23e+03"),
+        ("{x:+04X}", {"x": -128}, b"FF80"),
+        ("{unit: kg|  g}", {"unit": "  g"}, b"  g"),
         ("one:\t{x:.1f}\t| average:\t{y:d}", {"x": 12.3, "y": 7}, b"one:\t12.3\t| average:\t7"),
     ],
 )
@@ -88,6 +95,9 @@ SHAPES = {
     "+012d": WholeNumber("x", "+", "0", 12),
     "7d": WholeNumber("x", "", "", 7),
     "02X": HexNumber("x", 2),
+    "+04X": HexNumber("x", 4, True),
+    ".3e": Scientific("x", "", 3, "e"),
+    "+.8E": Scientific("x", "+", 8, "E"),
     ".3f": Decimals("x", "", "", 0, 3),
     "+07.2f": Decimals("x", "+", "0", 7, 2),
     "9.1f": Decimals("x", "", "", 9, 1),
@@ -98,6 +108,8 @@ SHAPES = {
     "uint16": RegisterNumber("x", "uint16", False),
     "ST|US": Choice("x", ("ST", "US")),
     " |M": Choice("x", (" ", "M")),
+    "kg |g  |   ": Choice("x", ("kg ", "g  ", "   ")),
+    " kg|  g|   ": Choice("x", (" kg", "  g", "   ")),
 }
 
 
@@ -114,7 +126,11 @@ def test_each_shape_is_read_to_its_last_letter(shape: str) -> None:
         ("d", 0.5, "x = 0.5: not a whole number"),
         ("02X", 256, "x = 100: does not fit in 2 characters"),
         ("02X", -1, "x = -1: not a whole number from 0"),
+        ("+04X", 32768, "x = 32768: does not fit in 4 characters with a sign"),
+        ("+04X", -32769, "x = -32769: does not fit in 4 characters with a sign"),
+        ("+04X", 0.5, "x = 0.5: not a whole number"),
         (".3f", 1e30, "x = 1e+30: too large"),
+        (".3E", 1e30, "x = 1e+30: too large"),
         ("+07.3f", 100.0, "x = +100.000: does not fit in 7 characters"),
         ("3s", "four", "x = four: does not fit in 3 characters"),
         ("s", "a ", "x = 'a ': not printable text"),
@@ -133,8 +149,8 @@ def test_a_refused_value_is_told_with_its_name_and_why(shape: str, value: float 
 
 
 def test_the_longest_numbers_are_still_told() -> None:
-    longest = 10.0**_LONGEST_NUMBER
-    for shape in ("d", ".1f"):
+    longest = 10.0**LONGEST_NUMBER
+    for shape in ("d", ".1f", ".9E"):
         field_from("x", shape).encode(longest - 2.0)
         with pytest.raises(ValueRefused, match="too large"):
             field_from("x", shape).encode(longest)
@@ -152,6 +168,22 @@ def test_a_missing_decimal_point_is_no_number() -> None:
     assert compile_template("{x:.3f}").decode(b"5000") is None
 
 
+@pytest.mark.parametrize("sent", ["+5.0000E+00", "5.0000E+00", "+5.0000e+000", "+5.0000E0", "50.0000E-1"])
+def test_an_exponent_is_read_however_long_and_a_mantissa_has_one_digit(sent: str) -> None:
+    decoded = compile_template("{x:+.4E}").decode(sent.encode())
+    assert decoded == (None if sent.startswith("50") else {"x": 5.0})
+
+
+def test_a_number_that_no_double_holds_is_none() -> None:
+    assert compile_template("{x:.1E}").decode(b"9.9E999") is None
+
+
+def test_twos_complement_comes_back() -> None:
+    compiled = compile_template("{x:+04X}")
+    for number in (-32768, -1, 0, 1, 32767):
+        assert compiled.decode(compiled.encode({"x": number})) == {"x": number}
+
+
 def test_blanks_are_a_value_only_where_they_may_be() -> None:
     compiled = compile_template("{x:+07.3f}")
     assert compiled.decode(b"       ") is None
@@ -166,7 +198,13 @@ def test_blanks_are_a_value_only_where_they_may_be() -> None:
         ("{x}", "none of"),
         ("{x:A|A}", "{x:A|A} has a word twice"),
         ("{x:A|}", "'' is no word"),
-        ("{x:ST | US}", "'ST ' is no word: characters without blanks, or blanks alone"),
+        (
+            "{x:ST | US}",
+            "'ST ' is no word: characters without blanks, blanks alone, or all of one length and padded on one side",
+        ),
+        ("{x:ST |US}", "'ST ' is no word"),
+        ("{x:kg | lb}", "'kg ' is no word"),
+        ("{x:N}", "one word alone is text: write it without braces"),
         ("{x:.0f}", "none of"),
         ("{x:d", "'{x:d'"),
         ("x}", "Single '}'"),
@@ -178,7 +216,8 @@ def test_blanks_are_a_value_only_where_they_may_be() -> None:
         ("SET {x:d}\r\n", "not printable"),
         ("", "not printable"),
         ("µ{x:d}", "not printable"),
-        ("\x01{x:d}", "not printable text, STX, ETX or tab"),
+        ("\x01{x:d}", "not printable text, STX, ETX, ESC or tab"),
+        ("{x:d}\n", "the terminator at its end is a setting of its own"),
         ("<STX>{x:d}", '<STX> would be 5 characters on the wire. Between double quotes STX is "\\x02"'),
         (r"\x02{x:d}", "\\x02 would be 4 characters on the wire"),
         (r"{x:d}\r\n", "\\r would be 2 characters on the wire"),

@@ -5,7 +5,7 @@ from math import inf
 import pytest
 
 from gateway.devices import DeviceProfile, cell_device, cell_host
-from gateway.devices.exchange import ForceReading
+from gateway.devices.force_reading import ForceReading
 from gateway.devices.line_settings import SerialSettings
 from gateway.devices.messages import ForceSample, Garbage, Quality
 from gateway.devices.profile import Certainty, DeviceRole, Terminator

@@ -7,7 +7,7 @@ import pytest
 
 from gateway.devices import DeviceProfile, cell_device, cell_host
 from gateway.devices.checksum import add_checksum
-from gateway.devices.exchange import ForceReading
+from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample, Garbage, Quality
 from tests.dialogues.test_overload_dialogue import cell
 

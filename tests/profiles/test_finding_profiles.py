@@ -98,10 +98,16 @@ def test_the_fingerprint_changes_with_every_text_that_was_read(tmp_path: Path) -
     assert load_rig("demo").fingerprint == load_rig("demo").fingerprint
 
 
-def test_an_ending_that_none_has_is_told_readably(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("ending", "shown"), [(r"'\r\n'", r"'\r\n'"), ('"CRLF"', "'CRLF'"), ('"<CR><LF>"', "'<CR><LF>'")]
+)
+def test_an_ending_that_is_spelt_is_told_so(ending: str, shown: str, tmp_path: Path) -> None:
+    """YAML reads no escapes between single quotes, and both look the same in a message."""
     device = (PROFILES / "devices" / "hx711-line.yaml").read_text(encoding="utf-8")
-    changed = device.replace('terminator: "\\r\\n"', 'terminator: "\\n\\r"')
+    changed = device.replace('terminator: "\\r\\n"', f"terminator: {ending}")
     assert changed != device
     (tmp_path / "any.yaml").write_text(changed, encoding="utf-8")
     (fault,) = check_file(tmp_path / "any.yaml").faults
-    assert str(fault).endswith(r'terminator: "\n\r" is not one of "", "\r\n", "\r", "\n", "\x03"')
+    assert f"terminator: {shown} would be {len(shown) - 2} characters on the wire: between double quotes CR LF" in str(
+        fault
+    )

@@ -11,6 +11,8 @@ from gateway.profiles.schema import schema
 SCHEMA = schema("device")
 Profile = dict[str, Any]
 
+_ENDINGS = (*2 * ("\r\n", "\r", "\n", "\x03"), "\n\r", ";FF")
+
 
 def choices(owner: str, key: str) -> list[Any]:
     """What the schema lists for a key of a group, `DeviceProfile` for the top."""
@@ -37,7 +39,7 @@ def _about(rng: Random, role: str) -> Profile:
             "parity": rng.choice(choices("SerialSettings", "parity")),
             "stop_bits": rng.choice(choices("SerialSettings", "stop_bits")),
         },
-        "terminator": rng.choice(choices("DeviceProfile", "terminator")),
+        "terminator": rng.choice(_ENDINGS),
         "checksum": rng.choice(choices("DeviceProfile", "checksum")),
     }
     _maybe(rng, profile, "codec", "template")
@@ -53,8 +55,9 @@ def _maybe(rng: Random, group: Profile, key: str, value: Any, share: float = 0.5
         group[key] = value
 
 
-_NUMBERS = ":d", ":04d", ":+05d", ":5d", ":.1f", ":.3f", ":07.3f", ":+07.3f", ":8.4f"
+_NUMBERS = ":d", ":04d", ":+05d", ":5d", ":.1f", ":.3f", ":07.3f", ":+07.3f", ":8.4f", ":+.6E", ":+04X"
 _SPANS = {"d": [[0, 1023], [0, 4095.5], [0, 100], [-2047, 2048]], "f": [[0, 10], [0.0, 5.0], [-10.0, 10.0], [0, 99.9]]}
+_SPANS |= {"E": _SPANS["f"], "X": _SPANS["d"]}
 
 
 def _number(rng: Random, name: str) -> tuple[str, list[float]]:
@@ -94,7 +97,21 @@ def drawn_output(rng: Random) -> Profile:
     return profile
 
 
-_FORCES = ":d", ":06d", ":+06d", ":.1f", ":.2f", ":.3f", ":+08.2f", ":08.3f", ":7.1f", ":5.1f", ":4.2f"
+_FORCES = (
+    ":d",
+    ":06d",
+    ":+06d",
+    ":.1f",
+    ":.2f",
+    ":.3f",
+    ":+08.2f",
+    ":08.3f",
+    ":7.1f",
+    ":5.1f",
+    ":4.2f",
+    ":+.5E",
+    ":+06X",
+)
 
 
 def drawn_cell(rng: Random) -> Profile:
@@ -106,8 +123,10 @@ def drawn_cell(rng: Random) -> Profile:
             [("ST|US|OL", {"ST": "ok", "US": "unstable", "OL": "overload"}), ("G|B", {"G": "ok", "B": "unstable"})]
         )
         frame = f"{{status:{words}}},{frame}"
+    if rng.random() < 0.2:
+        frame = frame.replace("{force:", "{sign: |-}{force:").replace("{force:+", "{force:")
     if rng.random() < 0.4:
-        frame += "{unit:kg|lb|g|N}"
+        frame += rng.choice(["{unit:kg|lb|g|N}", "{unit: kg|  N}"])
     frame += rng.choice(["", "", " {serial:04X}", " {remark:6s}", ";{count:d}"])
     reading["frame"] = frame
     _maybe(rng, reading, "unit", rng.choice(["N", "N", "kg", "g", "lb"]), 0.7)

@@ -11,8 +11,8 @@ import struct
 from math import isfinite
 from typing import Final
 
-from gateway.devices.exchange import FORCE
 from gateway.devices.fields import RegisterNumber
+from gateway.devices.force_reading import FORCE
 from gateway.devices.messages import ForceSample, Garbage, Quality, RepeatedSample
 from gateway.devices.profile import DeviceProfile
 from gateway.devices.template_codecs.cell import TemplateCellDevice, TemplateCellHost

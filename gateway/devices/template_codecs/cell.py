@@ -11,9 +11,9 @@ from typing import Final, NamedTuple
 from gateway.devices.binary.rtu_framing import quiet_s
 from gateway.devices.device_checks.spelling import CheckSpelling
 from gateway.devices.device_checks.watchdog import WatchdogState
-from gateway.devices.exchange import FORCE, STATUS, UNIT, ForceReading
 from gateway.devices.fields import Choice, Field, Text, Value, ValueRefused
-from gateway.devices.framing import Line
+from gateway.devices.force_reading import FORCE, MINUS, SIGN, STATUS, UNIT, ForceReading, units_of
+from gateway.devices.framing import Line, LineSplitter
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import ForceSample, Garbage, Quality, RepeatedSample
 from gateway.devices.profile import DeviceProfile
@@ -22,8 +22,7 @@ from gateway.units import NEWTON_PER_UNIT
 
 def _own_unit(reading: ForceReading) -> str | None:
     """The unit that the device is set to: the profile's, else the first that its frames can say."""
-    unit_field = reading.template.field(UNIT)
-    return reading.unit or (unit_field.words[0] if isinstance(unit_field, Choice) else None)
+    return reading.unit or next(iter(units_of(reading.template.field(UNIT))), None)
 
 
 def newton_per_unit(profile: DeviceProfile, unit: str | None) -> float:
@@ -90,8 +89,16 @@ class TemplateCellHost:
         return _question(self._grammar, self._reading)
 
     def forget(self) -> None:
-        """Drop half a frame: what comes next belongs to another stream."""
+        """Drop half a frame: what comes next belongs to another stream, and may begin in the middle of a number."""
         self._lines.forget()
+        first = self._reading.template.pieces[0]
+        if (
+            not self._reading.ask
+            and not isinstance(first, str)
+            and first.is_open
+            and isinstance(self._lines, LineSplitter)
+        ):
+            self._lines.skip()
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
         """Return the samples and the garbage that these bytes complete. now_s: time of their arrival."""
@@ -117,17 +124,20 @@ class TemplateCellHost:
 
     def _read(self, body: bytes | None) -> _KnownReading | None:
         values = self._grammar.read(self._reading.frame, body, self._reading.may_be_blank)
-        if values is None:
+        if values is None or (
+            SIGN in values and float(values[FORCE]) < 0.0
+        ):  # a minus behind a sign: which one counts?
             return None
         raw = self._raw(values)
         return _KnownReading(raw, self._newtons(raw, values), self._quality(raw, values))
 
     def _raw(self, values: dict[str, Value]) -> float:
         """The number of the device, in its own unit."""
-        return float(values[FORCE])
+        number = float(values[FORCE])
+        return -number if str(values.get(SIGN, "")).strip() == MINUS else number
 
     def _newtons(self, raw: float, values: dict[str, Value]) -> float:
-        per_unit = NEWTON_PER_UNIT[str(values[UNIT])] if UNIT in values else self._newton_per_unit
+        per_unit = NEWTON_PER_UNIT[str(values[UNIT]).strip()] if UNIT in values else self._newton_per_unit
         return self._sign * (raw - self._reading.zero_count) * per_unit
 
     def _quality(self, raw: float, values: dict[str, Value]) -> Quality:
@@ -148,7 +158,7 @@ class TemplateCellDevice:
             profile, unit or (None if self._reading.newton_per_count else self._unit)
         )
         nothing = {field.name: _nothing(field) for field in self._reading.template.fields}
-        self._around: dict[str, Value] = {**nothing, **profile.constants, UNIT: self._unit}
+        self._around: dict[str, Value] = {**nothing, **profile.constants, UNIT: self._reading.unit_word(self._unit)}
         self._largest, self._decimals = self._reading.largest_shown, self._reading.decimals
         self._lines = self._grammar.questions()
         self._checks, self._answers = CheckSpelling(self._grammar), b""
@@ -182,7 +192,10 @@ class TemplateCellDevice:
         return self._encode_frame(nan if self._reading.blank_is_overload else self._largest, Quality.OVERLOAD)
 
     def _encode_frame(self, raw: float, quality: Quality) -> bytes:
-        values = {**self._around, FORCE: round(raw, self._decimals) if isfinite(raw) else raw}
+        number = round(raw, self._decimals) if isfinite(raw) else raw
+        values = {**self._around, FORCE: number}
+        if sign := self._reading.sign_word(number):
+            values |= {SIGN: sign, FORCE: abs(number)}
         word = self._reading.word(quality)
         if word is not None:
             values[STATUS] = word

@@ -46,7 +46,6 @@ class TemplateOutputHost:
         self._lines = grammar.answers()
         self._checks = CheckSpelling(grammar)
         self._expected: deque[OutputRequest] = deque()
-        self._refusals = grammar.refusals()
         watchdog = profile.own_watchdog
         self._tripped = grammar.encode(watchdog.refusal) if watchdog and watchdog.refusal else None
         self.sign_of_life = grammar.question_line(grammar.encode(watchdog.feed)) if watchdog and watchdog.feed else b""
@@ -163,7 +162,7 @@ class TemplateOutputHost:
         return beyond + self._grammar.half_step(exchange.answer)
 
     def _refusal(self, body: bytes) -> Refused | None:
-        text = self._refusals.get(body) or (exception_text(body) if self._grammar.profile.is_modbus else "")
+        text = self._grammar.refusal(body) or (exception_text(body) if self._grammar.profile.is_modbus else "")
         return Refused(text) if text else None
 
 

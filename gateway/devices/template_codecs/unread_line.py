@@ -7,12 +7,12 @@ What another speed or noise makes of a line is no text, and nothing is said of i
 import re
 from typing import Final
 
-from gateway.devices.exchange import FORCE, UNIT
-from gateway.devices.fields import Choice, Field
+from gateway.devices.fields import Field
+from gateway.devices.force_reading import FORCE, UNIT, units_of
 from gateway.devices.profile import TEMPLATE, DeviceProfile, DeviceRole
-from gateway.devices.template import Template, quote
+from gateway.devices.template import TEXT_CHARACTERS, Template, quote
 
-_TEXT: Final = re.compile(rb"[ -~\x02\x03\t]{4,80}")
+_TEXT: Final = re.compile(f"[{TEXT_CHARACTERS}]{{4,80}}".encode("ascii"))
 
 
 def explain_unread(profile: DeviceProfile, line: bytes) -> str:
@@ -34,7 +34,7 @@ def _other_unit(frame: Template, body: bytes) -> tuple[str, str] | None:
     if at is None:
         return None
     piece = frame.pieces[at]
-    words = piece.words if isinstance(piece, Choice) else (str(piece).strip(),)
+    words = (str(piece).strip(),) if isinstance(piece, str) else units_of(piece)
     around = [_pattern(one) if k != at else r" *([A-Za-z]{1,4}) *" for k, one in enumerate(frame.pieces)]
     found = re.fullmatch("".join(around).encode("ascii"), body)
     other = found[1].decode("ascii") if found else words[0]

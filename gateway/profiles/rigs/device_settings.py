@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 from gateway.devices import DeviceProfile
-from gateway.devices.exchange import UNIT
+from gateway.devices.force_reading import UNIT
 from gateway.devices.profile import ADDRESS
 from gateway.devices.rehearsal import rehearse
 from gateway.profiles.rigs.rig_file import CellFile, OutputFile

@@ -21,7 +21,7 @@ from gateway.devices import (
     output_device,
     output_host,
 )
-from gateway.devices.exchange import UNIT
+from gateway.devices.force_reading import UNIT
 from gateway.devices.messages import (
     Accepted,
     OutputReply,

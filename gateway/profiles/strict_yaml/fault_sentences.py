@@ -175,10 +175,6 @@ def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
     shown = [choice if _PLAIN.fullmatch(choice) else f'"{choice}"' for choice in choices]
     if len(choices) == 1:
         return f"{value_text} is not {shown[0]}, the only choice"
-    if isinstance(value, str) and "\\" in value:
-        return (
-            f"'{value}' is a backslash and a letter, as it stands; between double quotes it is one of {one_of(shown)}"
-        )
     return f"{value_text} is not one of {one_of(shown)}" + (f"; did you mean {near}?" if near else "")
 
 

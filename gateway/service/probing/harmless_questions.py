@@ -10,7 +10,7 @@ from typing import Final
 
 from gateway.devices import DeviceProfile, DeviceRole, ValveDirection, ValveHost, cell_host, output_host
 from gateway.devices.device_checks.spelling import CheckSpelling
-from gateway.devices.exchange import UNIT
+from gateway.devices.force_reading import UNIT
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import (
     Accepted,

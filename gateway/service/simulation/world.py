@@ -159,7 +159,7 @@ class SimulatedRig:
     def _refusal(self) -> Refused:
         """The device's own word for what it does not do, an exception of a Modbus device; one without a word stays silent."""
         device = self._rig.output.device
-        return Refused(_REFUSED if device.is_modbus else next(iter(Grammar(device).refusals().values()), ""))
+        return Refused(_REFUSED if device.is_modbus else next(map(Grammar(device).words, device.refusals.texts()), ""))
 
     def _through_noise(self, data: bytes) -> bytes:
         """Return what arrives of these bytes where some of them get a wrong bit."""

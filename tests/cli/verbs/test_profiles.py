@@ -176,6 +176,28 @@ def test_a_rig_that_is_not_there_is_a_configuration_error(call) -> None:
     assert "did you mean demo?" in answer.stderr
 
 
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("smc-itv-rc", r"on the wire  5 V: 'SET 512\r\n' -> '512\r\n'"),
+        ("stream-st-gs", r"on the wire  -20 N: 'ST,GS,-0002.04kg\r\n'"),
+        ("laumas-tlb", "on the wire  -20 N: 01 03 00 06 00 05 65 C8 -> 01 03 0A 00 80 00 00 00 CC 00 00 00 00 55 60"),
+        ("mcu-valve", r"on the wire  pull: 'VALVE PULL*6D\n' -> 'OK PULL*21\n'"),
+        ("stream-st-gs", "read over    mode ('GS', 'NT')"),
+        ("adam-4016", "read over    lead ('>', '!')"),
+    ],
+)
+def test_check_shows_what_goes_over_the_wire_and_what_is_not_listened_to(name: str, told: str, call) -> None:
+    assert told in call("check", str(shipped_profiles_folder() / "devices" / f"{name}.yaml")).output.splitlines()
+
+
+def test_a_reading_whose_size_only_a_rig_knows_is_not_shown(call) -> None:
+    answer = call("check", str(shipped_profiles_folder() / "devices" / "hx711-line.yaml"))
+    assert answer.exit_code == 0
+    assert "on the wire" not in answer.output
+    assert "read over" not in answer.output
+
+
 @pytest.mark.parametrize("kind", ["rig", "device", "plant", "calibration", "registers"])
 def test_schemas_are_schemas(kind: str, call) -> None:
     schema = json.loads(call("schema", kind).output)

@@ -73,14 +73,14 @@ def test_raw_counts_are_sized_by_the_rig(tmp_path: Path) -> None:
             "output.address: smc-itv-rc has no address: leave this line out",
         ),
         (", channel: 1", "", ("icpdas-702x", "stream-st-gs"), "output.channel: icpdas-702x has no channel"),
-        (", address: 300", "", ("icpdas-702x", "stream-st-gs"), "output.address: address = 12C: does not fit"),
+        (", address: 300", "", ("icpdas-702x", "stream-st-gs"), "output.address: 0 V: address = 12C: does not fit"),
         (
             ", address: 0",
             "",
             ("waveshare-ao8b", "stream-st-gs"),
             "output.address: address 0: a Modbus unit is 1 to 255",
         ),
-        (", address: A", "", ("icpdas-702x", "stream-st-gs"), "output.address: address = A: not a number"),
+        (", address: A", "", ("icpdas-702x", "stream-st-gs"), "output.address: 0 V: address = A: not a number"),
         (
             ", checksum: xor",
             "",

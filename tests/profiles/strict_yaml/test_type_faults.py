@@ -8,7 +8,6 @@ import pytest
 from pydantic import Discriminator
 
 from gateway.defaults import STRICT
-from gateway.devices import DeviceProfile
 from gateway.profiles.rigs.rig_file import RigFile
 from gateway.profiles.strict_yaml.text import parse
 from gateway.profiles.strict_yaml.typed import build
@@ -43,13 +42,6 @@ def test_the_example_of_the_first_hour() -> None:
     (told,) = (str(fault) for fault in faults if fault.path == "output.baud")
     assert told.startswith("rig.yaml:5:9 output.baud: 115300 is not one of 300, 600, 1200, 2400, 4800, 9600, ")
     assert told.endswith("4000000; did you mean 115200?")
-
-
-def test_an_end_of_line_between_single_quotes_is_told_so() -> None:
-    """YAML reads no escapes there, and both look the same in a message."""
-    text = (Path(__file__).parents[3] / "profiles" / "devices" / "smc-itv-rc.yaml").read_text(encoding="utf-8")
-    _, faults = build(DeviceProfile, parse(text.replace(r'"\r\n"', r"'\r\n'").encode(), "dac.yaml"))
-    assert r"'\r\n' is a backslash and a letter, as it stands; between double quotes it is one of" in str(faults[0])
 
 
 @pytest.mark.parametrize(

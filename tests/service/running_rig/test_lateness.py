@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from gateway.control.blame_for_silence import Held
-from gateway.devices.exchange import ForceReading
+from gateway.devices.force_reading import ForceReading
 from gateway.processes.scheduler_counters import SchedulerCounters
 from gateway.service.running_rig.lateness import Lateness
 from tests.service.rigs import demo

@@ -7,7 +7,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.devices import DeviceProfile, cell_device, cell_host
 from gateway.devices.device_checks.identity import Identity
-from gateway.devices.exchange import ForceReading
+from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample, Garbage
 from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from tests.profile_files import load_device

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from gateway.devices import DeviceProfile, DeviceRole, ValveDirection, ValveHost, cell_host, output_device, output_host
-from gateway.devices.exchange import UNIT
+from gateway.devices.force_reading import UNIT
 from gateway.devices.messages import Accepted, SetVoltage
 from gateway.profiles import list_shipped, load_device
 from gateway.service.running_rig.lines.device_checks import DeviceChecks

@@ -1,0 +1,60 @@
+"""A profile's words as they go over the wire, for people to lay beside the manual."""
+
+from typing import Final
+
+from gateway.devices.codecs import cell_device, cell_host, output_device, output_host
+from gateway.devices.fields import Choice
+from gateway.devices.force_reading import UNIT
+from gateway.devices.messages import Accepted, Garbage, SetVoltage
+from gateway.devices.profile import DeviceProfile, DeviceRole
+from gateway.devices.template import quote
+from gateway.devices.valve import ValveDevice, ValveHost
+from gateway.devices.valve_profile import ValveDirection
+
+_SHOWN_N: Final = -20.0  # a pull, so that the place of the minus is seen
+
+
+def example(profile: DeviceProfile) -> str:
+    """Return one exchange: half the range of an output, a reading of -20 N, a valve that pulls. Empty where only a rig could
+    say it. The profile is one without faults."""
+    talk = {DeviceRole.OUTPUT: _output, DeviceRole.LOAD_CELL: _cell, DeviceRole.VALVE: _valve}
+    return talk[profile.role](profile)
+
+
+def read_over(profile: DeviceProfile) -> list[str]:
+    """Return the fields of a reading whose words change nothing, as the profile writes them."""
+    if profile.role is not DeviceRole.LOAD_CELL or profile.is_modbus:
+        return []
+    over = profile.reading.read_over(profile.constants)
+    return [f"{one.name} ({', '.join(map(repr, one.words))})" if isinstance(one, Choice) else one.name for one in over]
+
+
+def _output(profile: DeviceProfile) -> str:
+    host, device = output_host(profile), output_device(profile)
+    voltage_v = 0.5 * sum(profile.voltage_range_v)
+    asked = host.request(SetVoltage(voltage_v))
+    heard = [one for one in device.receive(asked, 0.0) if not isinstance(one, Garbage)]
+    answers = b"".join(device.reply(Accepted(voltage_v), to=one) for one in heard)
+    return f"{voltage_v:g} V: {_shown(profile, asked)} -> {_shown(profile, answers)}"
+
+
+def _cell(profile: DeviceProfile) -> str:
+    reading = profile.reading
+    if not (reading.newton_per_unit or reading.template.field(UNIT)):
+        return ""  # counts, or a unit that the rig says
+    asked, frame = cell_host(profile).poll(), cell_device(profile).frame(_SHOWN_N)
+    question = f"{_shown(profile, asked)} -> " if asked else ""
+    return f"{_SHOWN_N:g} N: {question}{_shown(profile, frame)}"
+
+
+def _valve(profile: DeviceProfile) -> str:
+    host, device = ValveHost(profile), ValveDevice(profile)
+    asked = host.request(ValveDirection.PULL)
+    return (
+        f"pull: {_shown(profile, asked)} -> {_shown(profile, device.reply(ValveDirection.PULL, ValveDirection.PULL))}"
+    )
+
+
+def _shown(profile: DeviceProfile, data: bytes) -> str:
+    is_text = not profile.is_modbus and data.isascii()
+    return quote(data.decode("ascii")) if is_text else data.hex(" ").upper()

@@ -1,0 +1,173 @@
+"""Shapes of numbers in text: whole, hexadecimal, with decimals, with an exponent."""
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from math import isfinite, nan
+from typing import Final
+
+from gateway.devices.fields.field import LONGEST_NUMBER, Value, finite, of_width, refuse
+
+_PADDED_NUMBER = r"(?:[+-] *| *[+-]?)"  # "+  12" and "  +12": both orders are sent by real indicators
+
+
+_WHOLE_NUMBER: Final = re.compile(rf"{_PADDED_NUMBER}\d+")
+
+
+@cache
+def _number_with_decimals(decimals: int) -> re.Pattern[str]:
+    return re.compile(rf"{_PADDED_NUMBER}\d+\.\d{{{decimals}}}")
+
+
+@dataclass(frozen=True, slots=True)
+class WholeNumber:
+    """{counts:d}; width 0 is open."""
+
+    name: str
+    sign: str = ""
+    zero: str = ""
+    width: int = 0
+
+    @property
+    def is_open(self) -> bool:
+        """Decide whether the number takes as many digits as it needs."""
+        return self.width == 0
+
+    @property
+    def pattern(self) -> str:
+        """Regular expression of a signed whole number, padded to the width where there is one."""
+        return rf"[+-]?\d{{1,{LONGEST_NUMBER}}}" if self.is_open else rf"[ +\-0-9]{{{self.width}}}"
+
+    def encode(self, value: Value) -> str:
+        """Return the digits. ValueRefused for a fraction, or a number that does not fit."""
+        number = finite(self.name, value)
+        if number != int(number):
+            raise refuse(self.name, value, "not a whole number")
+        if abs(number) >= 10**LONGEST_NUMBER:
+            raise refuse(self.name, value, "too large")
+        return of_width(self.name, format(int(number), f"{self.sign}{self.zero}{self.width or ''}d"), self.width)
+
+    def decode(self, text: str) -> Value | None:
+        """Return the whole number, None for blanks between digits or signs alone."""
+        return int(text.replace(" ", "")) if _WHOLE_NUMBER.fullmatch(text) else None
+
+
+@dataclass(frozen=True, slots=True)
+class HexNumber:
+    """{address:02X}; with a sign, {counts:+04X}, the two's complement: FFFF is -1."""
+
+    name: str
+    width: int
+    is_signed: bool = False
+
+    @property
+    def is_open(self) -> bool:
+        """Return False: a hexadecimal number has a fixed width."""
+        return False
+
+    @property
+    def pattern(self) -> str:
+        """Regular expression of upper-case hexadecimal digits."""
+        return rf"[0-9A-F]{{{self.width}}}"
+
+    def encode(self, value: Value) -> str:
+        """Return the digits, with leading zeros. ValueRefused for a fraction, a number that does not fit, or a negative one
+        without a sign."""
+        number = finite(self.name, value)
+        if self.is_signed:
+            return self._complement(number)
+        if number != int(number) or number < 0:
+            raise refuse(self.name, value, "not a whole number from 0")
+        return of_width(self.name, format(int(number), f"0{self.width}X"), self.width)
+
+    def decode(self, text: str) -> Value | None:
+        """Return the number of these digits."""
+        number = int(text, 16)
+        return number - self._span if self.is_signed and 2 * number >= self._span else number
+
+    @property
+    def _span(self) -> int:
+        return int(16**self.width)
+
+    def _complement(self, number: float) -> str:
+        if number != int(number):
+            raise refuse(self.name, number, "not a whole number")
+        if not -self._span <= 2 * number < self._span:
+            raise refuse(self.name, number, f"does not fit in {self.width} characters with a sign")
+        return format(int(number) % self._span, f"0{self.width}X")
+
+
+@dataclass(frozen=True, slots=True)
+class Decimals:
+    """{voltage_v:+07.3f}; width 0 is open. All blanks decode to nan: an indicator that shows nothing."""
+
+    name: str
+    sign: str
+    zero: str
+    width: int
+    decimals: int
+
+    @property
+    def is_open(self) -> bool:
+        """Decide whether the number takes as many digits as it needs."""
+        return self.width == 0
+
+    @property
+    def pattern(self) -> str:
+        """Regular expression of a number with a fixed count of decimals, padded to the width where there is one."""
+        if self.is_open:
+            return rf"[+-]?\d{{1,{LONGEST_NUMBER}}}\.\d{{{self.decimals}}}"
+        return rf"[ +\-0-9.]{{{self.width}}}"
+
+    def encode(self, value: Value) -> str:
+        """Return the rounded number, never as -0.00. ValueRefused for one that is not finite or does not fit."""
+        number = finite(self.name, value)
+        if abs(number) >= 10.0**LONGEST_NUMBER:
+            raise refuse(self.name, value, "too large")
+        text = format(number, f"{self.sign}z{self.zero}{self.width or ''}.{self.decimals}f")  # z: no minus before 0.00
+        return of_width(self.name, text, self.width)
+
+    @property
+    def blank(self) -> str:
+        """Return the text of a display that shows nothing."""
+        return " " * self.width
+
+    def decode(self, text: str) -> Value | None:
+        """Return the number, NaN for a blank display, None for anything else."""
+        if not self.is_open and not text.strip(" +-"):
+            return nan
+        if _number_with_decimals(self.decimals).fullmatch(text):
+            return float(text.replace(" ", ""))
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Scientific:
+    """{volts:+.8E}: a number with an exponent. decimals: of the mantissa; of a number from 1 to 10 its own."""
+
+    name: str
+    sign: str
+    decimals: int
+    letter: str = "E"
+
+    @property
+    def is_open(self) -> bool:
+        """Return True: an exponent takes as many digits as it needs."""
+        return True
+
+    @property
+    def pattern(self) -> str:
+        """Regular expression of one digit, the decimals and an exponent."""
+        return rf"[+-]?\d\.\d{{{self.decimals}}}[Ee][+-]?\d{{1,3}}"
+
+    def encode(self, value: Value) -> str:
+        """Return mantissa and exponent of two digits, never as -0. ValueRefused for one that is not finite, or no reading."""
+        number = finite(self.name, value)
+        if abs(number) >= 10.0**LONGEST_NUMBER:
+            raise refuse(self.name, value, "too large")
+        return format(number, f"{self.sign}z.{self.decimals}{self.letter}")
+
+    def decode(self, text: str) -> Value | None:
+        """Return the number, None for one that no double holds."""
+        number = float(text)
+        return number if isfinite(number) else None

@@ -1,0 +1,223 @@
+"""What a profile says of the readings of a load cell.
+
+Checked when built: what a frame carries beside the force is either known (its sign, its unit, its health) or read over, and a
+sign or a unit that would be read over is refused, for it would make a number that is believed and wrong.
+"""
+
+from collections.abc import Container, Mapping
+from dataclasses import dataclass, field
+from math import inf
+from typing import Annotated, Final, Literal
+
+from annotated_types import Ge, Gt, Le
+
+from gateway.defaults import STRICT
+from gateway.devices.binary.weight_registers import WeightRegisters
+from gateway.devices.fields import (
+    Choice,
+    Decimals,
+    Field,
+    HexNumber,
+    RegisterNumber,
+    Scientific,
+    TemplateError,
+    WholeNumber,
+)
+from gateway.devices.messages import Quality
+from gateway.devices.template import Template, compile_template, quote
+from gateway.units import NEWTON_PER_UNIT
+
+ForceUnit = Literal["N", "kg", "g", "lb"]
+
+FORCE: Final = "force"
+SIGN: Final = "sign"
+STATUS: Final = "status"
+UNIT: Final = "unit"
+MINUS: Final = "-"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceReading:
+    """One reading of a load cell: streamed, or the answer to `ask`.
+
+    frame: template with the number {force:...}, perhaps a word {status:...}, a word {unit:...}, and a word {sign:...} where
+    the minus stands apart from the digits. Where the frame says its unit, that unit counts; `unit` is what the simulated
+    device is set to, and what a frame without one means. Raw counts of a converter have no unit but newton_per_count and
+    zero_count, which a rig has measured. before: a sentence that is sent ahead of each question and not answered. modbus:
+    registers, in place of frame and ask. overload, underload: what the device says in place of the frame where it has no
+    number to show; nothing in them changes but the profile's constants.
+    """
+
+    __pydantic_config__ = STRICT
+    frame: str = ""  # template of the reading, with the number {force:...}
+    ask: str = ""  # empty for a stream
+    before: str = ""  # sent ahead of ask, unanswered: such as the command to all devices to sample
+    modbus: WeightRegisters | None = None  # of a Modbus device, instead of frame and ask
+    unit: ForceUnit | None = None  # absent: the frame says it, or the rig must
+    newton_per_count: Annotated[float, Gt(0)] | None = None  # of raw counts: one count in newtons, usually the rig's
+    zero_count: float = 0.0  # of raw counts: reading without a force
+    end_count: Annotated[float, Gt(0)] | None = None  # of raw counts: where the converter ends; counts as an overload
+    quality: Mapping[str, Quality] = field(
+        default_factory=dict
+    )  # word of {status:...} -> how far to believe the reading
+    blank_is_overload: bool = False  # blanks instead of digits mean beyond the range
+    overload: tuple[str, ...] = ()  # sentences of their own that mean beyond the range: ["S +"]
+    underload: tuple[str, ...] = ()  # beyond its other end: ["S -"]; without it the device says overload there, too
+    rate_hz: Annotated[float, Ge(0), Le(10_000)] = 0.0  # readings per second; with ask: the most, 0: as the wire allows
+
+    def __post_init__(self) -> None:
+        if self.modbus:
+            if (self.ask, self.frame) not in (("", ""), self.modbus.templates()):
+                raise ValueError("`modbus` stands for question and answer: leave `ask` and `frame` out")
+            object.__setattr__(self, "ask", self.modbus.templates()[0])
+            object.__setattr__(self, "frame", self.modbus.templates()[1])
+        elif not self.frame:
+            raise ValueError("`frame` is missing: the sentence with {force:...}, or `modbus` with the registers")
+        if self.before and not self.ask:
+            raise ValueError("`before` is sent ahead of a question: there is no `ask`")
+        if self.unit and self.newton_per_count:
+            raise ValueError(f"unit {self.unit} and newton_per_count are two units for one number: leave one out")
+        if self.modbus and self.beyond_range:
+            raise ValueError(
+                "`overload` and `underload` are sentences: beside `modbus` say the bits in `modbus.overload`"
+            )
+        for text in (*filter(None, (self.ask, self.before)), *self.overload, *self.underload):
+            compile_template(text)
+        _check_reading(compile_template(self.frame), self)
+
+    @property
+    def newton_per_unit(self) -> float | None:
+        """Force of one unit of the device's number, N; None where neither unit nor counts say it."""
+        return NEWTON_PER_UNIT[self.unit] if self.unit else self.newton_per_count
+
+    @property
+    def says_overload(self) -> bool:
+        """Decide whether the device tells by itself that it is beyond its range."""
+        return (
+            self.blank_is_overload
+            or bool(self.overload)
+            or Quality.OVERLOAD in self.quality.values()
+            or bool(self.modbus and self.modbus.overload)
+        )
+
+    @property
+    def beyond_range(self) -> tuple[tuple[str, float], ...]:
+        """The sentences that mean beyond the range, each with the number that it stands for: inf or -inf."""
+        return tuple((text, inf) for text in self.overload) + tuple((text, -inf) for text in self.underload)
+
+    @property
+    def template(self) -> Template:
+        """The compiled template of the cell's frame."""
+        return compile_template(self.frame)
+
+    @property
+    def may_be_blank(self) -> str:
+        """Name of the field that the cell leaves blank when overloaded; empty where it does not."""
+        return FORCE if self.blank_is_overload else ""
+
+    @property
+    def decimals(self) -> int:
+        """Number of digits behind the point of the cell's force, 0 for whole numbers."""
+        number = self.template.field(FORCE)
+        if self.modbus:
+            return self.modbus.shown_decimals
+        return number.decimals if isinstance(number, Decimals | Scientific) else 0
+
+    @property
+    def step(self) -> float:
+        """One count of the display, in the device's unit."""
+        return float(10.0**-self.decimals)
+
+    @property
+    def largest_shown(self) -> float:
+        """The largest number that the display has digits for, with room for a sign, in the device's unit."""
+        if self.end_count:
+            return self.end_count
+        if self.modbus:
+            return self.modbus.largest_shown
+        number = self.template.field(FORCE)
+        if isinstance(number, HexNumber):
+            return float(16**number.width - 1)
+        width = number.width if isinstance(number, Decimals | WholeNumber) else 0
+        if not width:
+            return 999999.0
+        digits = width - (self.template.field(SIGN) is None) - (self.decimals + 1 if self.decimals else 0)
+        return max(0.0, float(10.0**digits) - self.step)
+
+    def word(self, quality: Quality) -> str | None:
+        """Return the status word that means this, None where the frame has none; a device may know unstable readings only."""
+        qualities = (quality, Quality.UNSTABLE) if quality is Quality.OK else (quality,)
+        return next((word for one in qualities for word, meaning in self.quality.items() if meaning == one), None)
+
+    def sign_word(self, number: float) -> str | None:
+        """Return the word that says which sign a number has, None where its digits do."""
+        field = self.template.field(SIGN)
+        words = field.words if isinstance(field, Choice) else ()
+        return next((word for word in words if (word.strip() == MINUS) is (number < 0.0)), None)
+
+    def unit_word(self, unit: str) -> str:
+        """Return the frame's own word for a unit, which may be padded."""
+        field = self.template.field(UNIT)
+        words = field.words if isinstance(field, Choice) else ()
+        return next((word for word in words if word.strip() == unit), unit)
+
+    def read_over(self, constants: Container[str]) -> tuple[Field, ...]:
+        """Return the fields whose words, digits or text change nothing in what is believed."""
+        known = (FORCE, SIGN, STATUS, UNIT)
+        return tuple(one for one in self.template.fields if one.name not in known and one.name not in constants)
+
+
+def units_of(field: Field | None) -> tuple[str, ...]:
+    """Return the units that the words of a field stand for, without the blanks that pad them; none where it has no words."""
+    return tuple(word.strip() for word in field.words) if isinstance(field, Choice) else ()
+
+
+def _check_reading(template: Template, reading: ForceReading) -> None:
+    number = template.field(FORCE)
+    if not isinstance(number, Decimals | WholeNumber | HexNumber | Scientific | RegisterNumber):
+        raise TemplateError(f"{quote(template.text)} has no number {{force:...}}")
+    if reading.blank_is_overload and (number.is_open or not isinstance(number, Decimals)):
+        raise TemplateError(f"{quote(template.text)}: blank_is_overload needs decimals of fixed width")
+    _check_units(template, reading)
+    _check_signs(template, number)
+    status = template.field(STATUS)
+    words = set(status.words if isinstance(status, Choice) else ())
+    if odd := sorted(words ^ set(reading.quality)):
+        told = ", ".join(f"{word!r} is {'not named' if word in words else 'no word of it'}" for word in odd)
+        raise TemplateError(f"{quote(template.text)}: quality names the words of {{status:...}}: {told}")
+    if reading.quality and set(reading.quality.values()) <= {Quality.OVERLOAD, Quality.REPEATED}:
+        raise TemplateError(f"{quote(template.text)}: quality has no word for a good reading (ok, unstable)")
+
+
+def _check_units(template: Template, reading: ForceReading) -> None:
+    unit, units = template.field(UNIT), units_of(template.field(UNIT))
+    if unit and not (units and set(units) <= set(NEWTON_PER_UNIT)):
+        raise TemplateError(
+            f"{quote(template.text)}: units are {', '.join(NEWTON_PER_UNIT)}; another is text, with `unit`"
+        )
+    if units and reading.unit and reading.unit not in units:
+        raise TemplateError(f"{quote(template.text)} never says {reading.unit}: unit is one of {', '.join(units)}")
+    for one in template.fields:
+        if one.name not in (UNIT, STATUS) and units_of(one) and set(units_of(one)) <= set(NEWTON_PER_UNIT):
+            raise TemplateError(
+                f"{quote(template.text)}: the words of {{{one.name}:...}} are units, and would be read over: call it "
+                f"{{{UNIT}:...}}"
+            )
+
+
+def _check_signs(template: Template, number: Field) -> None:
+    """A minus apart from its digits is read where the field is called `sign`, and nowhere else."""
+    sign = template.field(SIGN)
+    if sign and (not isinstance(sign, Choice) or [word.strip() for word in sign.words].count(MINUS) != 1):
+        raise TemplateError(
+            f"{quote(template.text)}: {{{SIGN}:...}} is the sign of the force: one of its words is a minus"
+        )
+    if sign and isinstance(number, Decimals | WholeNumber | Scientific) and number.sign:
+        raise TemplateError(f"{quote(template.text)}: the sign of the force stands here twice")
+    for one in template.fields:
+        signs = {word.strip() for word in one.words} if isinstance(one, Choice) else set()
+        if one.name != SIGN and MINUS in signs and signs <= {MINUS, "+", ""}:
+            raise TemplateError(
+                f"{quote(template.text)}: the minus in {{{one.name}:...}} would be read over, and a pull taken for a push: "
+                f"call it {{{SIGN}:...}}"
+            )
