@@ -18,6 +18,7 @@ from gateway.devices.fields import (
     Decimals,
     Field,
     HexNumber,
+    Plain,
     RegisterNumber,
     Scientific,
     TemplateError,
@@ -121,7 +122,7 @@ class ForceReading:
         number = self.template.field(FORCE)
         if self.modbus:
             return self.modbus.shown_decimals
-        return number.decimals if isinstance(number, Decimals | Scientific) else 0
+        return number.decimals if isinstance(number, Decimals | Scientific | Plain) else 0
 
     @property
     def step(self) -> float:
@@ -174,7 +175,7 @@ def units_of(field: Field | None) -> tuple[str, ...]:
 
 def _check_reading(template: Template, reading: ForceReading) -> None:
     number = template.field(FORCE)
-    if not isinstance(number, Decimals | WholeNumber | HexNumber | Scientific | RegisterNumber):
+    if not isinstance(number, Decimals | WholeNumber | HexNumber | Scientific | Plain | RegisterNumber):
         raise TemplateError(f"{quote(template.text)} has no number {{force:...}}")
     if reading.blank_is_overload and (number.is_open or not isinstance(number, Decimals)):
         raise TemplateError(f"{quote(template.text)}: blank_is_overload needs decimals of fixed width")
@@ -212,7 +213,7 @@ def _check_signs(template: Template, number: Field) -> None:
         raise TemplateError(
             f"{quote(template.text)}: {{{SIGN}:...}} is the sign of the force: one of its words is a minus"
         )
-    if sign and isinstance(number, Decimals | WholeNumber | Scientific) and number.sign:
+    if sign and isinstance(number, Decimals | WholeNumber | Scientific | Plain) and number.sign:
         raise TemplateError(f"{quote(template.text)}: the sign of the force stands here twice")
     for one in template.fields:
         signs = {word.strip() for word in one.words} if isinstance(one, Choice) else set()

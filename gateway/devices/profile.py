@@ -23,6 +23,7 @@ from gateway.devices.fields import (
     Decimals,
     Field,
     HexNumber,
+    Plain,
     RegisterNumber,
     Scientific,
     TemplateError,
@@ -39,7 +40,7 @@ TEMPLATE: Final = "template"
 ADDRESS: Final = "address"
 """Name of the constant that tells devices on one bus apart: of a Modbus device its unit."""
 
-_NUMBERS: Final = (WholeNumber, HexNumber, Decimals, Scientific, RegisterNumber)
+_NUMBERS: Final = (WholeNumber, HexNumber, Decimals, Scientific, Plain, RegisterNumber)
 _LONGEST_MODBUS_S: Final = 0.1  # later than this a Modbus answer is no use to a force loop
 _LARGEST_UNIT: Final = 255  # 247 by the specification; some devices take all that fit into a byte
 Terminator = Annotated[str, MaxLen(8)]
@@ -173,7 +174,7 @@ class DeviceProfile:
     def decimals_in(self, template_text: str) -> int:
         """Return the decimals of the number that a template carries; 0 for a whole number, or none."""
         number = self.number_in(template_text)
-        return number.decimals if isinstance(number, Decimals | Scientific | RegisterNumber) else 0
+        return number.decimals if isinstance(number, Decimals | Scientific | Plain | RegisterNumber) else 0
 
     @property
     def reading(self) -> ForceReading:

@@ -14,7 +14,7 @@ from math import isnan
 from string import Formatter
 from typing import Final
 
-from gateway.devices.fields import Choice, Decimals, Field, TemplateError, Text, Value, ValueRefused, field_from
+from gateway.devices.fields import Choice, Decimals, Field, Plain, TemplateError, Text, Value, ValueRefused, field_from
 
 _NAMES: Final = {"\x02": "<STX>", "\x03": "<ETX>", "\x1b": "<ESC>", "\t": "<TAB>"}
 _WITH_NAMES: Final = str.maketrans(_NAMES)
@@ -131,10 +131,12 @@ def _check(text: str, pieces: list[str | Field]) -> None:
     if len(set(names)) != len(names):
         raise TemplateError(f"{quote(text)} uses a field twice")
     for piece, following in pairwise(pieces):
-        if not isinstance(piece, str) and piece.is_open and _runs_on(following):
+        if not isinstance(piece, str) and piece.is_open and _runs_on(piece, following):
             raise TemplateError(f"{quote(text)}: nothing marks the end of {{{piece.name}}}; give it a width")
 
 
-def _runs_on(following: str | Field) -> bool:
+def _runs_on(piece: Field, following: str | Field) -> bool:
     """What follows an open field could be read as a part of it."""
-    return following[0] in "0123456789.+-" if isinstance(following, str) else not isinstance(following, Choice)
+    if not isinstance(following, str):
+        return not isinstance(following, Choice)
+    return following[0] in ("0123456789.+-eE" if isinstance(piece, Plain) else "0123456789.+-")

@@ -13,6 +13,7 @@ from gateway.devices.fields import (
     Choice,
     Decimals,
     HexNumber,
+    Plain,
     RegisterNumber,
     Scientific,
     Text,
@@ -42,6 +43,11 @@ from gateway.devices.template import compile_template
         ("{x:+.4E}", {"x": 0.5}, b"+5.0000E-01"),
         ("{x:.2e}", {"x": 1230.0}, b"1.23e+03"),
         ("{x:+04X}", {"x": -128}, b"FF80"),
+        ("{x:04x}", {"x": 171}, b"00ab"),
+        ("{x:+08,2f} kg", {"x": -12.34}, b"-0012,34 kg"),
+        ("{x:,1f};", {"x": 0.5}, b"0,5;"),
+        ("F={x:g} N", {"x": -0.25}, b"F=-0.25 N"),
+        ("F={x:+g}", {"x": 12.0}, b"F=+12.0"),
         ("{unit: kg|  g}", {"unit": "  g"}, b"  g"),
         ("one:\t{x:.1f}\t| average:\t{y:d}", {"x": 12.3, "y": 7}, b"one:\t12.3\t| average:\t7"),
     ],
@@ -96,6 +102,10 @@ SHAPES = {
     "7d": WholeNumber("x", "", "", 7),
     "02X": HexNumber("x", 2),
     "+04X": HexNumber("x", 4, True),
+    "04x": HexNumber("x", 4, False, "x"),
+    "9,1f": Decimals("x", "", "", 9, 1, ","),
+    "g": Plain("x", ""),
+    "+g": Plain("x", "+"),
     ".3e": Scientific("x", "", 3, "e"),
     "+.8E": Scientific("x", "+", 8, "E"),
     ".3f": Decimals("x", "", "", 0, 3),
@@ -131,6 +141,7 @@ def test_each_shape_is_read_to_its_last_letter(shape: str) -> None:
         ("+04X", 0.5, "x = 0.5: not a whole number"),
         (".3f", 1e30, "x = 1e+30: too large"),
         (".3E", 1e30, "x = 1e+30: too large"),
+        ("g", 1e30, "x = 1e+30: too large"),
         ("+07.3f", 100.0, "x = +100.000: does not fit in 7 characters"),
         ("3s", "four", "x = four: does not fit in 3 characters"),
         ("s", "a ", "x = 'a ': not printable text"),
@@ -150,7 +161,7 @@ def test_a_refused_value_is_told_with_its_name_and_why(shape: str, value: float 
 
 def test_the_longest_numbers_are_still_told() -> None:
     longest = 10.0**LONGEST_NUMBER
-    for shape in ("d", ".1f", ".9E"):
+    for shape in ("d", ".1f", ".9E", "g"):
         field_from("x", shape).encode(longest - 2.0)
         with pytest.raises(ValueRefused, match="too large"):
             field_from("x", shape).encode(longest)
@@ -175,7 +186,44 @@ def test_an_exponent_is_read_however_long_and_a_mantissa_has_one_digit(sent: str
 
 
 def test_a_number_that_no_double_holds_is_none() -> None:
-    assert compile_template("{x:.1E}").decode(b"9.9E999") is None
+    for template in ("{x:.1E}", "{x:g}"):
+        assert compile_template(template).decode(b"9.9E999") is None
+
+
+@pytest.mark.parametrize(
+    ("sent", "number"),
+    [
+        *(
+            ("12", 12.0),
+            ("12.", 12.0),
+            ("12.0", 12.0),
+            ("-12.345", -12.345),
+            ("+.0273", 0.0273),
+            ("1e-05", 1e-5),
+            ("2.73E+2", 273.0),
+        ),
+        *((text, None) for text in ("", ".", "-", "1,5", "0x12", "nan", "inf", "1e", "1_0", " 12", "12345678901")),
+    ],
+)
+def test_a_number_as_a_program_prints_it_is_read_and_nothing_else(sent: str, number: float | None) -> None:
+    decoded = compile_template("F={x:g}").decode(f"F={sent}".encode())
+    assert decoded == (None if number is None else {"x": number})
+
+
+def test_a_comma_is_no_point_and_a_point_no_comma() -> None:
+    assert compile_template("{x:8,2f}").decode(b"-  12,34") == {"x": -12.34}
+    for template, sent in (
+        ("{x:8,2f}", b"   12.34"),
+        ("{x:8.2f}", b"   12,34"),
+        ("{x:,2f}", b"12.34"),
+        ("{x:.2f}", b"12,34"),
+    ):
+        assert compile_template(template).decode(sent) is None
+
+
+def test_hexadecimal_digits_have_the_case_of_their_shape() -> None:
+    assert compile_template("{x:02x}").decode(b"AB") is None
+    assert compile_template("{x:02X}").decode(b"ab") is None
 
 
 def test_twos_complement_comes_back() -> None:
@@ -211,6 +259,7 @@ def test_blanks_are_a_value_only_where_they_may_be() -> None:
         ("{:d}", "{name:shape}"),
         ("{x!r:d}", "{name:shape}"),
         ("{x:d}{y:d}", "nothing marks the end of {x}"),
+        ("{x:g}E", "nothing marks the end of {x}"),
         ("{x:d}5", "nothing marks the end of {x}"),
         ("{x:d},{x:d}", "twice"),
         ("SET {x:d}\r\n", "not printable"),

@@ -55,9 +55,9 @@ def _maybe(rng: Random, group: Profile, key: str, value: Any, share: float = 0.5
         group[key] = value
 
 
-_NUMBERS = ":d", ":04d", ":+05d", ":5d", ":.1f", ":.3f", ":07.3f", ":+07.3f", ":8.4f", ":+.6E", ":+04X"
+_NUMBERS = ":d", ":04d", ":+05d", ":5d", ":.1f", ":.3f", ":07.3f", ":+07.3f", ":8.4f", ":+.6E", ":+04X", ":g"
 _SPANS = {"d": [[0, 1023], [0, 4095.5], [0, 100], [-2047, 2048]], "f": [[0, 10], [0.0, 5.0], [-10.0, 10.0], [0, 99.9]]}
-_SPANS |= {"E": _SPANS["f"], "X": _SPANS["d"]}
+_SPANS |= {"E": _SPANS["f"], "g": _SPANS["f"], "X": _SPANS["d"]}
 
 
 def _number(rng: Random, name: str) -> tuple[str, list[float]]:
@@ -111,7 +111,9 @@ _FORCES = (
     ":4.2f",
     ":+.5E",
     ":+06X",
+    ":g",
 )
+_FORCES += (":+08,2f",)
 
 
 def drawn_cell(rng: Random) -> Profile:

@@ -1,9 +1,11 @@
 """The field shapes of a text template: numbers, words, text.
 
     {counts:d} {counts:04d} {counts:+05d}   whole number, open or of fixed width
-    {address:02X} {counts:+04X}             upper-case hex of fixed width; with a sign it is the two's complement
+    {address:02X} {counts:+04X} {bits:02x}  hex of fixed width, in upper or lower case; with a sign the two's complement
     {voltage_v:+07.3f} {voltage_v:.4f}      decimals, open or of fixed width; the point is always there
+    {force:8,2f}                            the same with a decimal comma
     {volts:+.8E}                            decimals with an exponent, as SCPI devices answer
+    {force:g}                               decimals that come and go, as programs print them: 12, 12.5, 1e-05
     {status:ST|US|OL} {status: |M|O}        one of the words; the first is the default; one may be a blank
     {unit:kg|lb} {unit: kg|  g}             words of one length may be padded, all on one side
     {text:s} {model:8s}                     printable text, open or of fixed width
@@ -17,7 +19,7 @@ One more shape is not for people: {force:int32} and its like are Modbus register
 """
 
 from gateway.devices.fields.field import Field, TemplateError, Value, ValueRefused
-from gateway.devices.fields.numbers import Decimals, HexNumber, Scientific, WholeNumber
+from gateway.devices.fields.numbers import Decimals, HexNumber, Plain, Scientific, WholeNumber
 from gateway.devices.fields.registers import RegisterNumber
 from gateway.devices.fields.shapes import field_from
 from gateway.devices.fields.words import Choice, Text
@@ -27,6 +29,7 @@ __all__ = [
     "Decimals",
     "Field",
     "HexNumber",
+    "Plain",
     "RegisterNumber",
     "Scientific",
     "TemplateError",

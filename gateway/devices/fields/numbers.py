@@ -15,8 +15,8 @@ _WHOLE_NUMBER: Final = re.compile(rf"{_PADDED_NUMBER}\d+")
 
 
 @cache
-def _number_with_decimals(decimals: int) -> re.Pattern[str]:
-    return re.compile(rf"{_PADDED_NUMBER}\d+\.\d{{{decimals}}}")
+def _number_with_decimals(decimals: int, point: str) -> re.Pattern[str]:
+    return re.compile(rf"{_PADDED_NUMBER}\d+[{point}]\d{{{decimals}}}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +59,7 @@ class HexNumber:
     name: str
     width: int
     is_signed: bool = False
+    letter: str = "X"
 
     @property
     def is_open(self) -> bool:
@@ -67,8 +68,8 @@ class HexNumber:
 
     @property
     def pattern(self) -> str:
-        """Regular expression of upper-case hexadecimal digits."""
-        return rf"[0-9A-F]{{{self.width}}}"
+        """Regular expression of hexadecimal digits, in upper case or, {x:04x}, in lower case."""
+        return rf"[0-9{'A-F' if self.letter == 'X' else 'a-f'}]{{{self.width}}}"
 
     def encode(self, value: Value) -> str:
         """Return the digits, with leading zeros. ValueRefused for a fraction, a number that does not fit, or a negative one
@@ -78,7 +79,7 @@ class HexNumber:
             return self._complement(number)
         if number != int(number) or number < 0:
             raise refuse(self.name, value, "not a whole number from 0")
-        return of_width(self.name, format(int(number), f"0{self.width}X"), self.width)
+        return of_width(self.name, format(int(number), f"0{self.width}{self.letter}"), self.width)
 
     def decode(self, text: str) -> Value | None:
         """Return the number of these digits."""
@@ -94,18 +95,19 @@ class HexNumber:
             raise refuse(self.name, number, "not a whole number")
         if not -self._span <= 2 * number < self._span:
             raise refuse(self.name, number, f"does not fit in {self.width} characters with a sign")
-        return format(int(number) % self._span, f"0{self.width}X")
+        return format(int(number) % self._span, f"0{self.width}{self.letter}")
 
 
 @dataclass(frozen=True, slots=True)
 class Decimals:
-    """{voltage_v:+07.3f}; width 0 is open. All blanks decode to nan: an indicator that shows nothing."""
+    """{voltage_v:+07.3f}, with a comma {force:8,2f}; width 0 is open. All blanks decode to nan: an indicator shows nothing."""
 
     name: str
     sign: str
     zero: str
     width: int
     decimals: int
+    point: str = "."
 
     @property
     def is_open(self) -> bool:
@@ -116,8 +118,8 @@ class Decimals:
     def pattern(self) -> str:
         """Regular expression of a number with a fixed count of decimals, padded to the width where there is one."""
         if self.is_open:
-            return rf"[+-]?\d{{1,{LONGEST_NUMBER}}}\.\d{{{self.decimals}}}"
-        return rf"[ +\-0-9.]{{{self.width}}}"
+            return rf"[+-]?\d{{1,{LONGEST_NUMBER}}}[{self.point}]\d{{{self.decimals}}}"
+        return rf"[ +\-0-9{self.point}]{{{self.width}}}"
 
     def encode(self, value: Value) -> str:
         """Return the rounded number, never as -0.00. ValueRefused for one that is not finite or does not fit."""
@@ -125,7 +127,7 @@ class Decimals:
         if abs(number) >= 10.0**LONGEST_NUMBER:
             raise refuse(self.name, value, "too large")
         text = format(number, f"{self.sign}z{self.zero}{self.width or ''}.{self.decimals}f")  # z: no minus before 0.00
-        return of_width(self.name, text, self.width)
+        return of_width(self.name, text.replace(".", self.point), self.width)
 
     @property
     def blank(self) -> str:
@@ -136,8 +138,8 @@ class Decimals:
         """Return the number, NaN for a blank display, None for anything else."""
         if not self.is_open and not text.strip(" +-"):
             return nan
-        if _number_with_decimals(self.decimals).fullmatch(text):
-            return float(text.replace(" ", ""))
+        if _number_with_decimals(self.decimals, self.point).fullmatch(text):
+            return float(text.replace(" ", "").replace(",", "."))
         return None
 
 
@@ -166,6 +168,39 @@ class Scientific:
         if abs(number) >= 10.0**LONGEST_NUMBER:
             raise refuse(self.name, value, "too large")
         return format(number, f"{self.sign}z.{self.decimals}{self.letter}")
+
+    def decode(self, text: str) -> Value | None:
+        """Return the number, None for one that no double holds."""
+        number = float(text)
+        return number if isfinite(number) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Plain:
+    """{force:g}: a number as programs print it, whose decimals come and go: 12, 12.5, .0273, 1e-05. decimals: those of what is
+    sent."""
+
+    name: str
+    sign: str = ""
+    decimals: int = 4
+
+    @property
+    def is_open(self) -> bool:
+        """Return True: it takes as many digits as it needs."""
+        return True
+
+    @property
+    def pattern(self) -> str:
+        """Regular expression of digits with or without a point and an exponent."""
+        return rf"[+-]?(?:\d{{1,{LONGEST_NUMBER}}}(?:\.\d{{0,9}})?|\.\d{{1,9}})(?:[Ee][+-]?\d{{1,3}})?"
+
+    def encode(self, value: Value) -> str:
+        """Return the rounded number without zeros at its end. ValueRefused for one that is not finite, or no reading."""
+        number = finite(self.name, value)
+        if abs(number) >= 10.0**LONGEST_NUMBER:
+            raise refuse(self.name, value, "too large")
+        text = format(number, f"{self.sign}z.{self.decimals}f").rstrip("0")
+        return f"{text}0" if text.endswith(".") else text
 
     def decode(self, text: str) -> Value | None:
         """Return the number, None for one that no double holds."""

@@ -3,14 +3,15 @@
 import re
 
 from gateway.devices.fields.field import Field, TemplateError
-from gateway.devices.fields.numbers import Decimals, HexNumber, Scientific, WholeNumber
+from gateway.devices.fields.numbers import Decimals, HexNumber, Plain, Scientific, WholeNumber
 from gateway.devices.fields.registers import RegisterNumber
 from gateway.devices.fields.words import Choice, Text
 
 _WHOLE = re.compile(r"(\+?)(0?)(\d{0,2})d")
-_HEX = re.compile(r"(\+?)0([1-8])X")
-_DECIMALS = re.compile(r"(\+?)(0?)(\d{0,2})\.([1-9])f")
+_HEX = re.compile(r"(\+?)0([1-8])([Xx])")
+_DECIMALS = re.compile(r"(\+?)(0?)(\d{0,2})([.,])([1-9])f")
 _SCIENTIFIC = re.compile(r"(\+?)\.([1-9])([Ee])")
+_PLAIN = re.compile(r"(\+?)g")
 _TEXT = re.compile(r"(\d{0,2})s")
 _REGISTERS = re.compile(r"(u?int16|u?int32|float32)(-cdab)?")
 _WORD = re.compile(r"[!-~]+| +")
@@ -22,11 +23,13 @@ def field_from(name: str, spec: str) -> Field:
     if match := _WHOLE.fullmatch(spec):
         return WholeNumber(name, match[1], match[2], int(match[3] or 0))
     if match := _HEX.fullmatch(spec):
-        return HexNumber(name, int(match[2]), bool(match[1]))
+        return HexNumber(name, int(match[2]), bool(match[1]), match[3])
     if match := _DECIMALS.fullmatch(spec):
-        return Decimals(name, match[1], match[2], int(match[3] or 0), int(match[4]))
+        return Decimals(name, match[1], match[2], int(match[3] or 0), int(match[5]), match[4])
     if match := _SCIENTIFIC.fullmatch(spec):
         return Scientific(name, match[1], int(match[2]), match[3])
+    if match := _PLAIN.fullmatch(spec):
+        return Plain(name, match[1])
     if match := _TEXT.fullmatch(spec):
         return Text(name, int(match[1] or 0))
     if match := _REGISTERS.fullmatch(spec):
@@ -34,7 +37,7 @@ def field_from(name: str, spec: str) -> Field:
     if "|" in spec:
         return _choice(name, spec)
     alone = "; one word alone is text: write it without braces" if spec.isalpha() else ""
-    raise TemplateError(f"{{{name}:{spec}}} is none of d, 04d, 02X, +07.3f, +.6E, ONE|TWO, s{alone}")
+    raise TemplateError(f"{{{name}:{spec}}} is none of d, 04d, 02X, +07.3f, +.6E, g, ONE|TWO, s{alone}")
 
 
 def _choice(name: str, spec: str) -> Choice:
