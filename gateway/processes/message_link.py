@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 HEARTBEAT: Final = "h"  # control -> guardian, each tick of the loop
-LINE: Final = "l"  # control -> guardian: {"safe_frame": hex, "safe_reply": hex} + descriptor
+LINE: Final = "l"  # control -> guardian: {"safe_frame": hex, "safe_reply": hex, "reply_end": hex} + descriptor
 NEED_RIG: Final = "n"  # control -> guardian: {"rig": name or path}: start the simulated rig
 READY: Final = (
     "r"  # control -> guardian: {"banner": text, "info": {...}, "stall_s": s, "optional": ..., "listening": ...}

@@ -54,10 +54,11 @@ class GuardianLine:
         with contextlib.suppress(OSError):  # a guardian that is gone shows as the end of the line
             guardian_link.send(self._link, guardian_link.HEARTBEAT)
 
-    def hand_over(self, descriptor: int, safe_frame: bytes, safe_reply: bytes) -> None:
+    def hand_over(self, descriptor: int, safe_frame: bytes, safe_reply: bytes, reply_end: bytes) -> None:
         """Give the guardian the line, before the first non-safe write and after each reopen: it can then do the final
-        safe-voltage write itself."""
-        self._tell(guardian_link.LINE, {"safe_frame": safe_frame.hex(), "safe_reply": safe_reply.hex()}, descriptor)
+        safe-voltage write itself. reply_end: see SafeLine."""
+        told = {"safe_frame": safe_frame.hex(), "safe_reply": safe_reply.hex(), "reply_end": reply_end.hex()}
+        self._tell(guardian_link.LINE, told, descriptor)
 
     def first_cause(self, cause: str) -> None:
         """Tell the guardian of an internal error, in words: this process is about to end."""

@@ -132,7 +132,7 @@ def test_control_hands_over_its_port_with_the_safe_frame(ends: Pair) -> None:
     async def scene() -> None:
         ends[1].setblocking(False)
         guardian = GuardianLine(ends[1])
-        guardian.hand_over(writer, b"SET 0\r\n", b"0\r\n")
+        guardian.hand_over(writer, b"SET 0\r\n", b"0\r\n", b"\r\n")
         guardian.close()
 
     asyncio.run(scene())
@@ -140,6 +140,7 @@ def test_control_hands_over_its_port_with_the_safe_frame(ends: Pair) -> None:
     assert message and message.tag == message_link.LINE
     assert bytes.fromhex(message.body["safe_frame"]) == b"SET 0\r\n"
     assert bytes.fromhex(message.body["safe_reply"]) == b"0\r\n"
+    assert bytes.fromhex(message.body["reply_end"]) == b"\r\n"
     for descriptor in (*message.descriptors, reader, writer):
         os.close(descriptor)
     assert len(message.descriptors) == 1
@@ -238,7 +239,7 @@ def test_what_a_full_line_does_not_take_comes_after_it_in_order(ends: Pair) -> N
         guardian = GuardianLine(ends[1])
         for _ in range(10_000):
             guardian.heartbeat(0.0)
-        guardian.hand_over(writer, b"SET 0", b"")
+        guardian.hand_over(writer, b"SET 0", b"", b"")
         os.close(writer)
         guardian.ready({}, 0.1)
         while message_link.receive(ends[0]) != message_link.Message(message_link.HEARTBEAT):

@@ -45,7 +45,7 @@ def test_the_end_of_the_guardian_is_heard_once_and_what_it_would_have_been_told_
         assert not asyncio.get_running_loop().remove_reader(ends[1].fileno())
         before = len(list(Path("/proc/self/fd").iterdir()))
         for _ in range(10):
-            guardian.hand_over(writer, b"SET 0\r\n", b"0\r\n")
+            guardian.hand_over(writer, b"SET 0\r\n", b"0\r\n", b"\r\n")
         assert len(list(Path("/proc/self/fd").iterdir())) == before
         guardian.close()
 

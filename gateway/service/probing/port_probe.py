@@ -197,6 +197,6 @@ def show_bytes(data: bytes) -> str:
     """Return bytes as people can read them: text as text, anything else in hexadecimal."""
     shown = data[:_SHOWN_BYTES]
     text = shown.decode("ascii", "replace")
-    is_text = shown.isascii() and all(one.isprintable() or one in "\r\n\t\x02\x03" for one in text)
+    is_text = shown.isascii() and all(one.isprintable() or one in "\r\n\t\x02\x03\x1b" for one in text)
     more = "..." if len(data) > _SHOWN_BYTES else ""
     return quote(text) + more if is_text else shown.hex(" ") + more

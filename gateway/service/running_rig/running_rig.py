@@ -80,8 +80,8 @@ class RunningRig:
         asyncio.get_running_loop().set_exception_handler(self._on_internal_error)
         host = output_host(rig.output.device)
         self._safe_frame, self._last_frame = host.safe_frame(rig.control.limits.safe_voltage_v), host.last_frame
-        frame, reply = self._safe_frame, host.safe_reply
-        self._ports = RigPorts(rig, ports, lambda descriptor: guardian.hand_over(descriptor, frame, reply), log)
+        frame, reply, end = self._safe_frame, host.safe_reply, rig.output.device.terminator_bytes
+        self._ports = RigPorts(rig, ports, lambda descriptor: guardian.hand_over(descriptor, frame, reply, end), log)
         checks = DeviceChecks(host, is_waived=rig.accept_no_device_watchdog)
         self._line = OutputExchange(host, self._ports.write_output, rig.output.device.reply_timeout_s, checks)
         self._counters = SchedulerCounters(os.getpid())

@@ -150,9 +150,9 @@ class ControlChild:
     def _take_line(self, message: message_link.Message) -> None:
         if not message.descriptors:
             raise message_link.ProtocolError("a line without its port")
-        frame, reply = bytes.fromhex(message.body["safe_frame"]), bytes.fromhex(message.body["safe_reply"])
+        frame, reply, end = (bytes.fromhex(message.body[name]) for name in ("safe_frame", "safe_reply", "reply_end"))
         self._drop_line()
-        self.safe_line = SafeLine(message.descriptors.pop(0), frame, reply)
+        self.safe_line = SafeLine(message.descriptors.pop(0), frame, reply, end)
 
     def _drop_line(self) -> None:
         if self.safe_line:

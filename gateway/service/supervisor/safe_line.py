@@ -8,22 +8,22 @@ Standard library only.
 
 import contextlib
 import os
-import re
 import select
 import time
 from dataclasses import dataclass
 
 _REPEATS = 3
-_TEXT = re.compile(rb"[ -~\t\x02\x03]*")  # of a sentence; a binary reply has other bytes
 
 
 @dataclass(frozen=True)
 class SafeLine:
-    """One output port: its descriptor, the frame for the safe voltage and the reply that acknowledges it (may be empty)."""
+    """One output port: its descriptor, the frame for the safe voltage and the reply that acknowledges it (may be empty).
+    end: of the reply, where lines have one; a Modbus frame has none."""
 
     descriptor: int
     frame: bytes
     reply: bytes
+    end: bytes
 
     def close(self) -> None:
         """Close the descriptor."""
@@ -58,12 +58,10 @@ class SafeLine:
         return False
 
     def _acknowledges(self, received: bytes) -> bool:
-        """A binary reply (Modbus RTU) has no line's end and may contain one; with its checksum it is whole where it stands."""
-        end = b"\x03" if self.reply.endswith(b"\x03") else b"\r\n"
-        words = self.reply.strip(end)
-        if not _TEXT.fullmatch(words):
+        """A reply without a line's end (Modbus RTU) may contain one; with its checksum it is whole where it stands."""
+        if not self.end:
             return self.reply in received
-        return words in re.split(b"[%b]+" % end, received)[:-1]
+        return self.reply.removesuffix(self.end) in received.split(self.end)[:-1]
 
 
 def _drop_input(descriptor: int) -> None:

@@ -22,7 +22,7 @@ Step = Callable[[FakeChild], None]
 
 def start_of(port: Port) -> list[Step]:
     """Every word of a control process from its birth to the first heartbeats, one step each."""
-    handed = {"safe_frame": SAFE_FRAME.hex(), "safe_reply": ""}
+    handed = {"safe_frame": SAFE_FRAME.hex(), "safe_reply": "", "reply_end": ""}
     return [
         lambda child: child.say(message_link.BORN, {"pid": 1}),
         lambda child: child.say(message_link.NEED_RIG, {"rig": "demo"}),

@@ -101,7 +101,7 @@ def test_a_dead_childs_last_words_still_count(scene, port):
         child.say(message_link.BORN, {"pid": 1})
         one.guardian.control.process = child  # as it is once this script is over
         one.guardian.control.read_messages()  # heard; what follows comes with the death
-        child.say(message_link.LINE, {"safe_frame": SAFE_FRAME.hex(), "safe_reply": ""}, port.writer)
+        child.say(message_link.LINE, {"safe_frame": SAFE_FRAME.hex(), "safe_reply": "", "reply_end": ""}, port.writer)
         child.say(message_link.FIRST_CAUSE, {"text": "internal error: ZeroDivisionError()"})
         child.dies(1)
 
@@ -127,7 +127,7 @@ def test_a_dead_childs_last_words_still_count(scene, port):
         b"r[1]",
         b"r{\xff",
         b"l{}",
-        b'l{"safe_frame": "zz", "safe_reply": ""}',
+        b'l{"safe_frame": "zz", "safe_reply": "", "reply_end": ""}',
         b"b{}",
         b"f{}",
         b'r{"info": 3, "banner": "", "stall_s": "soon", "optional": {}}',

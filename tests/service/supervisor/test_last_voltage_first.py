@@ -63,7 +63,7 @@ def test_the_line_that_was_handed_over_as_the_last_is_the_one_that_gets_the_safe
 
     def last_word() -> None:
         if one.child.exit_code is None:
-            handed = {"safe_frame": SAFE_FRAME.hex(), "safe_reply": ""}
+            handed = {"safe_frame": SAFE_FRAME.hex(), "safe_reply": "", "reply_end": ""}
             one.child.say(message_link.LINE, handed, opened_again.writer)
         kill()
 

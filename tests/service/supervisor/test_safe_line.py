@@ -15,7 +15,7 @@ from gateway.ports import Pty
 from gateway.service.supervisor.safe_line import SafeLine
 from tests.service.rigs import demo
 
-FRAME, REPLY = b"SET 0\r\n", b"0\r\n"
+FRAME, REPLY, END = b"SET 0\r\n", b"0\r\n", b"\r\n"
 SHORT_S = 0.05
 
 
@@ -83,7 +83,7 @@ def test_a_device_that_never_stops_talking_is_not_listened_to_for_ever(pty: Pty,
     talker = threading.Thread(target=babble)
     talker.start()
     heard: list[bool] = []
-    writer = threading.Thread(target=lambda: heard.append(SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)))
+    writer = threading.Thread(target=lambda: heard.append(SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)))
     writer.start()
     writer.join(40 * SHORT_S)
     is_over.set()
@@ -97,7 +97,7 @@ def test_a_line_that_takes_a_byte_at_a_time_gets_the_whole_frame(monkeypatch: py
     write = os.write
     with monkeypatch.context() as patch:
         patch.setattr(os, "write", lambda descriptor, data: write(descriptor, data[:1]))
-        assert SafeLine(writer, FRAME, b"").write_safe(SHORT_S)
+        assert SafeLine(writer, FRAME, b"", END).write_safe(SHORT_S)
     assert os.read(reader, 64) == FRAME
     os.close(reader)
     os.close(writer)
@@ -105,14 +105,14 @@ def test_a_line_that_takes_a_byte_at_a_time_gets_the_whole_frame(monkeypatch: py
 
 def test_an_acknowledged_safe_voltage_is_written_once(pty: Pty, client: int) -> None:
     with Regulator(pty) as device:
-        assert SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+        assert SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
     assert device.heard == [SetVoltage(0.0)]
 
 
 def test_half_a_command_of_a_dead_process_swallows_one_frame_and_no_more(pty: Pty, client: int) -> None:
     os.write(client, b"SET 51")
     with Regulator(pty) as device:
-        assert SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+        assert SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
     assert device.setting_v == 0.0
     assert [type(request) for request in device.heard] == [Garbage, SetVoltage]
 
@@ -121,20 +121,20 @@ def test_half_a_command_of_a_dead_process_swallows_one_frame_and_no_more(pty: Pt
 def test_whatever_half_it_is_the_safe_voltage_stands_in_the_end(pty: Pty, client: int, half: bytes) -> None:
     os.write(client, half)
     with Regulator(pty) as device:
-        assert SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+        assert SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
     assert device.setting_v == 0.0
 
 
 @pytest.mark.parametrize("other", [b"510\r\n", b"10\r\n", b"00\r\n", b"0", b"\r\n", b"0.\r\n"])
 def test_another_answer_does_not_acknowledge(pty: Pty, client: int, other: bytes) -> None:
     with Regulator(pty, answers=lambda reply: other) as device:
-        assert not SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+        assert not SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
     assert device.heard == [SetVoltage(0.0)] * 3
 
 
 def test_the_answer_to_an_older_question_may_come_before_the_acknowledgement(pty: Pty, client: int) -> None:
     with Regulator(pty, answers=lambda reply: b"510\r\n" + reply) as device:
-        assert SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+        assert SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
     assert len(device.heard) == 1
 
 
@@ -143,12 +143,12 @@ def test_what_was_said_before_the_frame_acknowledges_nothing(pty: Pty, client: i
     os.write(pty.fd, b"0\r\n")
     os.write(client, b"SET 51")
     with Regulator(pty) as device:
-        assert SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+        assert SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
     assert device.setting_v == 0.0
 
 
 def test_an_answer_in_pieces_acknowledges(pty: Pty, client: int) -> None:
-    line = SafeLine(client, FRAME, REPLY)
+    line = SafeLine(client, FRAME, REPLY, END)
 
     def slowly() -> None:
         while not _heard(pty):
@@ -172,26 +172,26 @@ def _heard(pty: Pty) -> bytes:
 
 def test_a_silent_device_gets_three_frames_and_no_more(pty: Pty, client: int) -> None:
     began_s = time.monotonic()
-    assert not SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+    assert not SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
     assert time.monotonic() - began_s < 10 * SHORT_S
     assert os.read(pty.fd, 256) == FRAME * 3
 
 
 def test_a_device_that_never_answers_is_believed_after_one_frame(pty: Pty, client: int) -> None:
-    assert SafeLine(client, FRAME, b"").write_safe(SHORT_S)
+    assert SafeLine(client, FRAME, b"", END).write_safe(SHORT_S)
     assert os.read(pty.fd, 256) == FRAME
 
 
 def test_a_port_that_is_gone_is_no_acknowledgement(client: int, pty: Pty) -> None:
     pty.close()
-    assert not SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+    assert not SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
 
 
 def test_a_dead_descriptor_is_no_acknowledgement_and_no_exception() -> None:
     reader, writer = os.pipe()
     os.close(reader)
     os.close(writer)
-    line = SafeLine(writer, FRAME, REPLY)
+    line = SafeLine(writer, FRAME, REPLY, END)
     assert not line.write_safe(SHORT_S)
     line.close()
 
@@ -203,7 +203,7 @@ def test_a_line_that_takes_no_bytes_does_not_hold_the_guardian(pty: Pty, client:
     except BlockingIOError:
         pass
     began_s = time.monotonic()
-    assert not SafeLine(client, FRAME, REPLY).write_safe(SHORT_S)
+    assert not SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
     assert time.monotonic() - began_s < 1.0
 
 
@@ -223,7 +223,7 @@ def test_a_line_that_is_full_for_a_moment_gets_the_frame(
 
     with monkeypatch.context() as patch:
         patch.setattr(select, "select", drained)
-        assert SafeLine(client, FRAME, b"").write_safe(SHORT_S)
+        assert SafeLine(client, FRAME, b"", END).write_safe(SHORT_S)
 
 
 def test_the_guardian_is_held_for_less_than_a_second_whatever_the_line_does(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -238,7 +238,7 @@ def test_the_guardian_is_held_for_less_than_a_second_whatever_the_line_does(monk
     with monkeypatch.context() as patch:
         patch.setattr(select, "select", nothing_comes)
         patch.setattr(time, "monotonic", lambda: clock_s[0])
-        assert not SafeLine(writer, FRAME, REPLY).write_safe()
+        assert not SafeLine(writer, FRAME, REPLY, END).write_safe()
     assert 0.1 < clock_s[0] < 1.0
     assert os.read(reader, 64) == FRAME * 3
     os.close(reader)
@@ -246,25 +246,31 @@ def test_the_guardian_is_held_for_less_than_a_second_whatever_the_line_does(monk
 
 
 @pytest.mark.parametrize(
-    ("reply", "received", "is_acknowledged"),
+    ("reply", "end", "received", "is_acknowledged"),
     [
-        ("01060000000089ca", "01060000000089ca", True),  # Modbus RTU, no line's end
-        ("01060000000089ca", "ff01060000000089ca", True),  # noise before it
-        ("01060000000089ca", "010600000000", False),
-        ("0106000d0a0089c9", "0106000d0a0089c9", True),  # a line's end within
-        ("300d0a", "3531300d0a", False),  # 510 is not 0
-        ("300d0a", "300d0a", True),
-        ("3003", "35313003", False),  # neither where a line ends with ETX
-        ("3003", "3f033003", True),
-        ("3003", "30", False),
-        ("02303103", "0202303103", False),  # half a frame before it
-        ("02303103", "3f0302303103", True),
-        ("0230030d0a", "0230030d0a", True),  # ETX as text ahead of the line's end
-        ("0230030d0a", "023003", False),
-        ("30090d0a", "30090d0a", True),
-        ("300d0a", "03300d0a", False),  # ETX ends no line here
+        ("01060000000089ca", "", "01060000000089ca", True),  # Modbus RTU, no line's end
+        ("01060000000089ca", "", "ff01060000000089ca", True),  # noise before it
+        ("01060000000089ca", "", "010600000000", False),
+        ("0106000d0a0089c9", "", "0106000d0a0089c9", True),  # a line's end within
+        ("300d0a", "0d0a", "3531300d0a", False),  # 510 is not 0
+        ("300d0a", "0d0a", "300d0a", True),
+        ("3003", "03", "35313003", False),  # neither where a line ends with ETX
+        ("3003", "03", "3f033003", True),
+        ("3003", "03", "30", False),
+        ("02303103", "03", "0202303103", False),  # half a frame before it
+        ("02303103", "03", "3f0302303103", True),
+        ("0230030d0a", "0d0a", "0230030d0a", True),  # ETX as text ahead of the line's end
+        ("0230030d0a", "0d0a", "023003", False),
+        ("30090d0a", "0d0a", "30090d0a", True),
+        ("414b3b4646", "3b4646", "414b3b4646", True),  # AK;FF
+        ("414b3b4646", "3b4646", "54414b3b4646", False),
+        ("303e", "3e", "300d0a303e", False),  # lines that end with a prompt
+        ("300a0d", "0a0d", "3f0a0d300a0d", True),
+        ("300d0a", "0d0a", "03300d0a", False),  # ETX ends no line here
     ],
 )
-def test_a_reply_in_lines_and_one_in_bytes_are_told_apart(reply: str, received: str, is_acknowledged: bool) -> None:
-    line = SafeLine(-1, b"", bytes.fromhex(reply))
+def test_a_reply_in_lines_and_one_in_bytes_are_told_apart(
+    reply: str, end: str, received: str, is_acknowledged: bool
+) -> None:
+    line = SafeLine(-1, b"", bytes.fromhex(reply), bytes.fromhex(end))
     assert line._acknowledges(bytes.fromhex(received)) is is_acknowledged
