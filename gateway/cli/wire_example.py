@@ -42,7 +42,8 @@ def _cell(profile: DeviceProfile) -> str:
     reading = profile.reading
     if not (reading.newton_per_unit or reading.template.field(UNIT)):
         return ""  # counts, or a unit that the rig says
-    asked, frame = cell_host(profile).poll(), cell_device(profile).frame(_SHOWN_N)
+    host, frame = cell_host(profile), cell_device(profile).frame(_SHOWN_N)
+    asked = host.poll() or host.start
     question = f"{_shown(profile, asked)} -> " if asked else ""
     return f"{_SHOWN_N:g} N: {question}{_shown(profile, frame)}"
 

@@ -52,6 +52,7 @@ class ForceReading:
     __pydantic_config__ = STRICT
     frame: str = ""  # template of the reading, with the number {force:...}
     ask: str = ""  # empty for a stream
+    start: str = ""  # of a stream that begins when it is told to: sent at each opening, and again while nothing comes
     before: str = ""  # sent ahead of ask, unanswered: such as the command to all devices to sample
     modbus: WeightRegisters | None = None  # of a Modbus device, instead of frame and ask
     unit: ForceUnit | None = None  # absent: the frame says it, or the rig must
@@ -76,13 +77,15 @@ class ForceReading:
             raise ValueError("`frame` is missing: the sentence with {force:...}, or `modbus` with the registers")
         if self.before and not self.ask:
             raise ValueError("`before` is sent ahead of a question: there is no `ask`")
+        if self.start and self.ask:
+            raise ValueError("`start` begins a stream: a cell that is asked needs none")
         if self.unit and self.newton_per_count:
             raise ValueError(f"unit {self.unit} and newton_per_count are two units for one number: leave one out")
         if self.modbus and self.beyond_range:
             raise ValueError(
                 "`overload` and `underload` are sentences: beside `modbus` say the bits in `modbus.overload`"
             )
-        for text in (*filter(None, (self.ask, self.before)), *self.overload, *self.underload):
+        for text in (*filter(None, (self.ask, self.before, self.start)), *self.overload, *self.underload):
             compile_template(text)
         _check_reading(compile_template(self.frame), self)
 
@@ -192,6 +195,8 @@ def _check_reading(template: Template, reading: ForceReading) -> None:
 
 def _check_units(template: Template, reading: ForceReading) -> None:
     unit, units = template.field(UNIT), units_of(template.field(UNIT))
+    if unit and reading.newton_per_count:
+        raise TemplateError(f"{quote(template.text)} says its unit: newton_per_count is a second one for one number")
     if unit and not (units and set(units) <= set(NEWTON_PER_UNIT)):
         raise TemplateError(
             f"{quote(template.text)}: units are {', '.join(NEWTON_PER_UNIT)}; another is text, with `unit`"

@@ -41,7 +41,7 @@ Found = Iterator[tuple[tuple[str | int, ...], str]]
 """(place in the profile, sentence)."""
 
 _NOW_S: Final = 0.0
-_SAID_BY_US: Final = ("ask", "before", "feed")
+_SAID_BY_US: Final = ("ask", "before", "start", "feed")
 _NO_ROUND_PART: Final = 0.7361  # of the range: an answer with fewer digits than the setting shows it here
 _LONGEST_SHOWN: Final = 60  # of a line, in a sentence
 
@@ -175,8 +175,8 @@ def _cell(profile: DeviceProfile) -> Found:
     unit = None if reading.unit or reading.template.field(UNIT) else "N"
     host, device = cell_host(profile, unit=unit), cell_device(profile, unit)
     try:
-        question = host.poll()
-        if question and device.receive(question, _NOW_S) != 1:
+        question = host.poll() or host.start
+        if reading.ask and device.receive(question, _NOW_S) != 1:
             yield place, f"the device does not know its own question {_line(question)}{_too_long(question)}"
             return
         if complaints := list(_beyond_range(profile, unit, place)):

@@ -97,6 +97,10 @@ class CellHost(Protocol):
         """Return the bytes that ask for one reading; empty for a stream."""
 
     @property
+    def start(self) -> bytes:
+        """The bytes that begin a stream which does not begin by itself; empty for any other."""
+
+    @property
     def gap_s(self) -> float:
         """Silence that the wire needs between an answer and the next question, s."""
 

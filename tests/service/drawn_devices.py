@@ -141,6 +141,7 @@ def drawn_cell(rng: Random) -> Profile:
         _maybe(rng, reading, "rate_hz", rng.choice([0.0, 10.0, 80.0]), 0.5)
     else:
         _maybe(rng, reading, "rate_hz", rng.choice([1.0, 10.0, 40.0, 100.0, 400.0]), 0.95)
+        _maybe(rng, reading, "start", rng.choice(["SIR", "SG"]), 0.3)
     profile["read_force" if is_asked else "stream"] = reading
     return profile
 

@@ -88,6 +88,11 @@ class TemplateCellHost:
         """Return the question for one sample, empty for a cell that streams."""
         return _question(self._grammar, self._reading)
 
+    @property
+    def start(self) -> bytes:
+        """The sentence that begins the stream, empty where it needs none."""
+        return self._grammar.question_line(self._grammar.encode(self._reading.start)) if self._reading.start else b""
+
     def forget(self) -> None:
         """Drop half a frame: what comes next belongs to another stream, and may begin in the middle of a number."""
         self._lines.forget()

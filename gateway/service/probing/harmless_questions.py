@@ -1,14 +1,15 @@
 """What a device may be asked by somebody who does not know yet what it is: nothing that could move anything.
 
 Of an output: what it is, its setting, its pressure. Of a load cell: a reading. Of a valve: how it stands. Never a setting, an
-arming or a clearing; a device whose profile has no such question is not asked at all. A stream is only listened to. Pure.
+arming or a clearing; a device whose profile has no such question is not asked at all. A stream is only listened to, and
+begun where it does not begin by itself. Pure.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.devices import DeviceProfile, DeviceRole, ValveDirection, ValveHost, cell_host, output_host
+from gateway.devices import CellHost, DeviceProfile, DeviceRole, ValveDirection, ValveHost, cell_host, output_host
 from gateway.devices.device_checks.spelling import CheckSpelling
 from gateway.devices.force_reading import UNIT
 from gateway.devices.grammar import Grammar
@@ -105,12 +106,17 @@ def _of_valve(profile: DeviceProfile) -> HarmlessQuestion:
 def _of_cell(profile: DeviceProfile) -> Iterator[HarmlessQuestion]:
     if profile.own_identity and profile.read_force:
         yield _who_it_is(profile, is_enough=False)
-    unit = None if profile.reading.newton_per_unit or profile.reading.template.field(UNIT) else "N"
 
     def understands(received: bytes) -> str:
-        return _first_words(cell_host(profile, unit=unit).receive(received, 0.0))
+        return _first_words(_cell_host(profile).receive(received, 0.0))
 
-    yield HarmlessQuestion(cell_host(profile, unit=unit).poll(), understands)
+    yield HarmlessQuestion(_cell_host(profile).poll(), understands)
+
+
+def _cell_host(profile: DeviceProfile) -> CellHost:
+    """Our end; where only a rig could say the unit, as if it were newtons."""
+    is_known = profile.reading.newton_per_unit or profile.reading.template.field(UNIT)
+    return cell_host(profile, unit=None if is_known else "N")
 
 
 def _first_words(messages: Sequence[object]) -> str:
@@ -129,9 +135,13 @@ def _words(message: object) -> str:
             return "a reading"
 
 
+def start_of_stream(profile: DeviceProfile) -> bytes:
+    """Return what begins the stream of a load cell; empty where nothing has to."""
+    return _cell_host(profile).start if profile.stream else b""
+
+
 def count_readings(profile: DeviceProfile, received: bytes) -> int:
     """Return how many readings of a stream these bytes hold; 0 where more of it makes no sense than makes some."""
-    unit = None if profile.reading.newton_per_unit or profile.reading.template.field(UNIT) else "N"
-    messages = cell_host(profile, unit=unit).receive(received, 0.0)
+    messages = _cell_host(profile).receive(received, 0.0)
     count = sum(isinstance(one, ForceSample) for one in messages)
     return count if 2 * count > len(messages) else 0

@@ -13,7 +13,12 @@ from gateway.devices import DeviceProfile, SerialSettings
 from gateway.devices.template import quote
 from gateway.ports import PortEvents, SerialPort
 from gateway.ports.port import monotonic_s
-from gateway.service.probing.harmless_questions import HarmlessQuestion, count_readings, harmless_questions
+from gateway.service.probing.harmless_questions import (
+    HarmlessQuestion,
+    count_readings,
+    harmless_questions,
+    start_of_stream,
+)
 
 BAUDS: Final = (9600, 19200, 38400, 57600, 115200)
 _LISTEN_S: Final = 0.25  # several lines of a stream of 20 readings a second
@@ -112,12 +117,14 @@ def _settings_to_try(
 
 
 async def _probe_at(
-    report: PortReport, settings: SerialSettings, profiles: Iterable[DeviceProfile], patience_s: float
+    report: PortReport, settings: SerialSettings, profiles: Sequence[DeviceProfile], patience_s: float
 ) -> None:
     ear = _Ear(report.path, settings)
     await ear.port.open()
     report.warning = ear.port.warning or report.warning
     try:
+        for start in filter(None, map(start_of_stream, profiles)):
+            ear.port.write(start)
         await ear.listen(_SETTLE_S)
         began_s, ear.received = monotonic_s(), b""
         await ear.listen(_LISTEN_S)

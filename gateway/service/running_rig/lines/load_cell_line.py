@@ -18,6 +18,9 @@ from gateway.devices.messages import ForceSample, Garbage, RepeatedSample
 from gateway.service.running_rig.lines.cell_identity import CellIdentity
 from gateway.service.running_rig.lines.unread_lines import UnreadLines
 
+_START_AGAIN_S: Final = (
+    1.0  # a stream that has been silent for so long is begun anew: the amplifier had no power, perhaps
+)
 _FASTEST_HZ: Final = 250.0  # the loop's fastest tick: more readings would only cost processor time
 
 
@@ -31,7 +34,7 @@ class CellExchange:
         self.identity = CellIdentity(profile)
         self._write = write
         self.counts = WireCounts()
-        self._question = host.poll()
+        self._question, self._start = host.poll(), host.start
         self._reply_timeout_s = profile.reply_timeout_s
         self._period_s = 1.0 / min(profile.reading.rate_hz or inf, _FASTEST_HZ)
         self.reset()
@@ -47,7 +50,7 @@ class CellExchange:
         self.unread.forget()
         self.identity.begin()
         self._sent_s: float | None = None
-        self._next_s = -inf
+        self._next_s, self._start_s = -inf, -inf
         self._is_overdue = False  # an answer is missing, and may still come
         self._is_heard = False  # one has come since the question that is out: its own, or the one that was missing
 
@@ -62,8 +65,10 @@ class CellExchange:
             return self._receive_identity(chunk, now_s)
         messages = self._host.receive(chunk, now_s)
         self.unread.hear(messages, now_s)
-        if not self._question:
-            return messages  # a stream
+        if not self._question:  # a stream
+            if any(not isinstance(one, Garbage) for one in messages):
+                self._start_s = now_s + _START_AGAIN_S
+            return messages
         if any(not isinstance(one, Garbage) for one in messages):
             self._next_s = max(self._next_s, now_s + self._host.gap_s)
             if self._is_overdue:
@@ -82,7 +87,10 @@ class CellExchange:
         return [*garbage]
 
     def tick(self, now_s: float) -> None:
-        """Give up waiting for an overdue answer, and ask again."""
+        """Give up waiting for an overdue answer, and ask again; begin a stream that does not begin by itself."""
+        if self._start and now_s >= self._start_s:
+            self._start_s = now_s + _START_AGAIN_S
+            self._write(self._start)
         if self._sent_s is not None and now_s - self._sent_s > self._reply_timeout_s:
             self._host.forget()
             self._sent_s, self._is_overdue, self._next_s = None, not self._is_heard, now_s
