@@ -129,9 +129,9 @@ class TemplateCellHost:
 
     def _read(self, body: bytes | None) -> _KnownReading | None:
         values = self._grammar.read(self._reading.frame, body, self._reading.may_be_blank)
-        if values is None or (
-            SIGN in values and float(values[FORCE]) < 0.0
-        ):  # a minus behind a sign: which one counts?
+        if values is None:
+            return None
+        if SIGN in values and float(values[FORCE]) < 0.0:  # a minus behind a sign: which one counts?
             return None
         raw = self._raw(values)
         return _KnownReading(raw, self._newtons(raw, values), self._quality(raw, values))
