@@ -5,7 +5,7 @@ from functools import reduce
 from operator import xor
 from typing import Final, Literal
 
-ChecksumName = Literal["none", "dcon-sum", "xor", "xor-hex"]
+ChecksumName = Literal["none", "dcon-sum", "sum-complement", "xor", "xor-hex"]
 
 
 def _nothing(body: bytes) -> bytes:
@@ -15,6 +15,11 @@ def _nothing(body: bytes) -> bytes:
 def _dcon_sum(body: bytes) -> bytes:
     """Sum of the character codes modulo 256, two upper-case hex digits (ICP DAS 7000 series manuals)."""
     return b"%02X" % (sum(body) % 256)
+
+
+def _sum_complement(body: bytes) -> bytes:
+    """What makes the sum of the character codes 0 modulo 256, two upper-case hex digits (Flintec FT-10, page 46)."""
+    return b"%02X" % (-sum(body) % 256)
 
 
 def _xor(body: bytes) -> bytes:
@@ -32,6 +37,7 @@ def _xor_hex(body: bytes) -> bytes:
 _TRAILERS: Final[dict[ChecksumName, Callable[[bytes], bytes]]] = {
     "none": _nothing,
     "dcon-sum": _dcon_sum,
+    "sum-complement": _sum_complement,
     "xor": _xor,
     "xor-hex": _xor_hex,
 }

@@ -249,14 +249,14 @@ def test_no_bytes_make_a_decoder_raise(data: bytes) -> None:
         assert values is None or isinstance(values, dict)
 
 
-@given(st.binary(max_size=40), st.sampled_from(["none", "dcon-sum", "xor", "xor-hex"]))
+@given(st.binary(max_size=40), st.sampled_from(["none", "dcon-sum", "sum-complement", "xor", "xor-hex"]))
 def test_a_checksum_opens_what_it_sealed(body: bytes, name: str) -> None:
     assert strip_checksum(add_checksum(body, name), name) == body  # type: ignore[arg-type]
 
 
 @given(st.binary(min_size=1, max_size=40), st.integers(0, 7), st.data())
 def test_a_flipped_bit_does_not_pass_a_checksum(body: bytes, bit: int, data: st.DataObject) -> None:
-    for name in ("dcon-sum", "xor"):
+    for name in ("dcon-sum", "sum-complement", "xor"):
         sentence = bytearray(add_checksum(body, name))  # type: ignore[arg-type]
         sentence[data.draw(st.integers(0, len(sentence) - 1))] ^= 1 << bit
         assert strip_checksum(bytes(sentence), name) is None  # type: ignore[arg-type]

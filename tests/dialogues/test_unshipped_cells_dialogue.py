@@ -7,6 +7,7 @@ from math import inf
 import pytest
 
 from gateway.devices import DeviceProfile, TemplateError, cell_device, cell_host
+from gateway.devices.checksum import add_checksum
 from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample, Garbage, Quality
 from tests.dialogues.test_overload_dialogue import cell
@@ -72,6 +73,19 @@ YAOHUA_A12 = replace(  # XK3190-A12E, page 12: the exclusive or of bytes 1 to 11
     ),
     checksum="xor-hex",
 )
+FLINTEC = replace(  # FT-10, page 46: address, command, S steady or D dynamic, sign and weight, E an error
+    cell(
+        read_force=ForceReading(
+            ask="{address:02d}X",
+            frame="{address:02d}X{status:S|D}{force:+09.2f}",
+            unit="kg",
+            quality={"S": OK, "D": UNSTABLE},
+            overload=("{address:02d}XE",),
+        ),
+        constants={"address": 1},
+    ),
+    checksum="sum-complement",
+)
 YAOHUA_A26 = cell(  # XK3190-A26, page 11, format 2: lines that begin with =, and have no other end
     terminator="=", stream=ForceReading(frame="{force:8.3f}", unit="kg", rate_hz=10.0)
 )
@@ -115,6 +129,9 @@ def sample(raw: float, per_unit: float, quality: Quality = OK) -> ForceSample:
         (YAOHUA_A12, b"WG004.139kg3C\r\n", Garbage(b"WG004.139kg3C\r\n")),
         (YAOHUA_A12, b"         OL23\r\n", ForceSample(inf, inf, OVERLOAD, 0.0)),
         (YAOHUA_A12, b"         LO23\r\n", ForceSample(-inf, -inf, OVERLOAD, 0.0)),
+        (FLINTEC, b"01XS+00123.4140\r\n", sample(123.41, KG_N)),
+        (FLINTEC, b"01XS+00123.4141\r\n", Garbage(b"01XS+00123.4141\r\n")),
+        (FLINTEC, b"01XE02\r\n", ForceSample(inf, inf, OVERLOAD, 0.0)),
         (YAOHUA_A26, b"0003.000=", sample(3.0, KG_N)),
         (YAOHUA_A26, b"-001.000=", sample(-1.0, KG_N)),
         (YAOHUA_A26, b"000.3000=", Garbage(b"000.3000=")),  # format 1: the digits of 3.000 in reverse order
@@ -139,7 +156,14 @@ def test_a_question_goes_out_as_it_is_printed(profile: DeviceProfile, asked: byt
     assert cell_device(profile).receive(asked, 0.0) == 1
 
 
-@pytest.mark.parametrize("profile", [KERN, SARTORIUS, SMA, RADWAG, NCI, YAOHUA_A12, YAOHUA_A26, EXPONENT, COMPLEMENT])
+def test_the_checksums_are_those_that_the_manual_works_out() -> None:
+    assert add_checksum(b"01P", "sum-complement") == b"01P4F"
+    assert add_checksum(b"01PS+000123.4", "sum-complement") == b"01PS+000123.449"
+
+
+@pytest.mark.parametrize(
+    "profile", [KERN, SARTORIUS, SMA, RADWAG, NCI, YAOHUA_A12, YAOHUA_A26, FLINTEC, EXPONENT, COMPLEMENT]
+)
 def test_the_simulated_one_is_read_as_what_it_shows(profile: DeviceProfile) -> None:
     device, host = cell_device(profile), cell_host(profile)
     for force_n in (-7.5, -0.001, 0.0, 0.2, 5.0, 7.6):

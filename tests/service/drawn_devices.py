@@ -11,7 +11,7 @@ from gateway.profiles.schema import schema
 SCHEMA = schema("device")
 Profile = dict[str, Any]
 
-_ENDINGS = (*2 * ("\r\n", "\r", "\n", "\x03"), "\n\r", ";FF")
+_ENDINGS = (*4 * ("\r\n", "\r", "\n", "\x03"), "\n\r", ";FF")
 
 
 def choices(owner: str, key: str) -> list[Any]:
@@ -133,7 +133,9 @@ def drawn_cell(rng: Random) -> Profile:
     reading["frame"] = frame
     _maybe(rng, reading, "unit", rng.choice(["N", "N", "kg", "g", "lb"]), 0.7)
     _maybe(rng, reading, "blank_is_overload", rng.choice([True, False]), 0.4)
-    _maybe(rng, reading, "overload", rng.choice([["S +"], ["OL,+9999999E+19", "------"]]), 0.3)
+    is_read_over = "{serial" in frame or "{remark" in frame  # then something has to tell an overload
+    overload = rng.choice([["S +"], ["OL,+9999999E+19", "------"]])
+    _maybe(rng, reading, "overload", overload, 0.8 if is_read_over else 0.3)
     _maybe(rng, reading, "underload", ["S -"], 0.3)
     is_asked = rng.random() < 0.6
     if is_asked:

@@ -154,7 +154,7 @@ class NoCounters:
 class SimulatedSafeLine:
     """Stands for `SafeLine`: the guardian's last write goes out behind what is on the wire; who is plugged in answers."""
 
-    def __init__(self, descriptor: int, frame: bytes, reply: bytes) -> None:
+    def __init__(self, descriptor: int, frame: bytes, reply: bytes, end: bytes) -> None:
         self._descriptor, self._frame = descriptor, frame
 
     def close(self) -> None:
