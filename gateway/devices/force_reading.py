@@ -4,8 +4,10 @@ Checked when built: what a frame carries beside the force is either known (its s
 sign or a unit that would be read over is refused, for it would make a number that is believed and wrong.
 """
 
+import re
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import inf
 from typing import Annotated, Final, Literal
 
@@ -35,6 +37,15 @@ SIGN: Final = "sign"
 STATUS: Final = "status"
 UNIT: Final = "unit"
 MINUS: Final = "-"
+
+_SPELT_UNITS: Final = {
+    **{unit: unit for unit in NEWTON_PER_UNIT},
+    **dict.fromkeys(("Kg", "KG", "kgf", "kgF", "KGF"), "kg"),
+    **dict.fromkeys(("gf", "gF"), "g"),
+    **dict.fromkeys(("Lb", "LB", "lbs", "LBS", "lbf", "lbF", "LBF"), "lb"),
+    **dict.fromkeys(("MN", "kN", "daN", "cN", "mN", "t", "oz", "ozf", "ozF"), "another unit"),
+}
+"""What the word behind a force stands for, as devices spell it. A lone K or L is none: it may be a mode."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,12 +214,23 @@ def _check_units(template: Template, reading: ForceReading) -> None:
         )
     if units and reading.unit and reading.unit not in units:
         raise TemplateError(f"{quote(template.text)} never says {reading.unit}: unit is one of {', '.join(units)}")
+    _check_spelt_unit(template, reading)
     for one in template.fields:
         if one.name not in (UNIT, STATUS) and units_of(one) and set(units_of(one)) <= set(NEWTON_PER_UNIT):
             raise TemplateError(
                 f"{quote(template.text)}: the words of {{{one.name}:...}} are units, and would be read over: call it "
                 f"{{{UNIT}:...}}"
             )
+
+
+def _check_spelt_unit(template: Template, reading: ForceReading) -> None:
+    """The word behind the force is that of `unit`: kilonewtons are not to be believed as newtons."""
+    behind = next((after for one, after in pairwise(template.pieces) if one is template.field(FORCE)), "")
+    word = re.match(r" *([A-Za-z]+)", behind) if isinstance(behind, str) else None
+    said = _SPELT_UNITS.get(word[1]) if word else None
+    if word and said and reading.unit and said != reading.unit:
+        cure = "leave unit out and say newton_per_count" if said not in NEWTON_PER_UNIT else f"unit: {said}"
+        raise TemplateError(f"{quote(template.text)} says {word[1]}, which is not unit: {reading.unit}; {cure}")
 
 
 def _check_signs(template: Template, number: Field) -> None:

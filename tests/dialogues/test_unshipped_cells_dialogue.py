@@ -197,6 +197,34 @@ def test_a_sign_a_unit_or_an_overload_that_would_be_read_over_is_refused(frame: 
 
 
 @pytest.mark.parametrize(
+    ("frame", "unit", "told"),
+    [
+        ("{force:8.3f} kN", "N", "says kN, which is not unit: N; leave unit out and say newton_per_count"),
+        ("{force:8.3f}kg", "N", "says kg, which is not unit: N; unit: kg"),
+        ("{force:8.3f} lbF", "kg", "says lbF, which is not unit: kg; unit: lb"),
+        ("{force:8.3f} ozF", "lb", "says ozF, which is not unit: lb; leave unit out"),
+        ("{force:8.3f} lbF", "lb", ""),
+        ("{force:8.3f}KG{mode:G|N}", "kg", ""),
+        ("{force:8.3f}KN", "kg", ""),  # K for kilogram, N for net
+        ("{force:8.3f} net", "kg", ""),
+        ("kN {force:8.3f}", "N", ""),
+    ],
+)
+def test_a_unit_that_is_written_behind_the_force_is_the_unit(frame: str, unit: str, told: str) -> None:
+    if not told:
+        ForceReading(frame=frame, unit=unit, rate_hz=10.0, overload=("OVER",))  # type: ignore[arg-type]
+        return
+    with pytest.raises(TemplateError) as refused:
+        ForceReading(frame=frame, unit=unit, rate_hz=10.0)  # type: ignore[arg-type]
+    assert told in str(refused.value)
+
+
+def test_kilonewtons_are_said_by_their_size() -> None:
+    profile = cell(stream=ForceReading(frame="{force:+08.4f} kN", newton_per_count=1000.0, rate_hz=10.0))
+    assert cell_host(profile).receive(b"-00.0200 kN\r\n", 0.0) == [sample(-0.02, 1000.0)]
+
+
+@pytest.mark.parametrize(
     "frame", ["{mode:N|G}{force:8.2f}", "{range:-|1|2}{force:8.2f}", "{mode:N| }{force:8.2f}", "{lead:>|!}{force:8.2f}"]
 )
 def test_words_that_say_neither_are_read_over(frame: str) -> None:
