@@ -27,10 +27,9 @@ from gateway.devices.fields import (
     RegisterNumber,
     Scientific,
     TemplateError,
-    Text,
     WholeNumber,
 )
-from gateway.devices.force_reading import STATUS, ForceReading
+from gateway.devices.force_reading import ForceReading
 from gateway.devices.line_settings import SerialSettings
 from gateway.devices.template import compile_template, quote
 from gateway.devices.valve_profile import ValveReading, ValveSettings
@@ -258,15 +257,7 @@ def _check_load_cell(profile: DeviceProfile) -> None:
         raise ValueError("stream has a rate_hz and no ask")
     if profile.read_force and not profile.read_force.ask:
         raise ValueError("read_force needs an ask")
-    reading = profile.reading
-    unheard = [one.name for one in reading.read_over(profile.constants) if isinstance(one, Choice | HexNumber | Text)]
-    if unheard and not (reading.modbus or reading.quality or reading.says_overload):
-        raise TemplateError(
-            f"{quote(reading.frame)}: {{{unheard[0]}:...}} is read over, and nothing here tells an overload, which would be "
-            f"believed: call the word that tells it {{{STATUS}:...}}, say it under `overload`, or write as text what never "
-            "changes"
-        )
-    for text, _ in reading.beyond_range:
+    for text, _ in profile.reading.beyond_range:
         if any(one.name not in profile.constants for one in compile_template(text).fields):
             raise TemplateError(
                 f"{quote(text)} of overload or underload is said as it stands: no field in it but constants"

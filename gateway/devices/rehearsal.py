@@ -11,8 +11,8 @@ from math import inf
 from typing import Final
 
 from gateway.devices.codecs import cell_device, cell_host, output_device, output_host
-from gateway.devices.fields import ValueRefused
-from gateway.devices.force_reading import UNIT
+from gateway.devices.fields import Choice, HexNumber, Text, ValueRefused
+from gateway.devices.force_reading import STATUS, UNIT
 from gateway.devices.framing import LONGEST_LINE_BYTES, no_terminator
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import (
@@ -172,6 +172,9 @@ def _refusals(profile: DeviceProfile) -> Found:
 
 def _cell(profile: DeviceProfile) -> Found:
     reading, place = profile.reading, ("stream" if profile.stream else "read_force",)
+    if told := _read_over(profile):
+        yield (*place, "frame"), told
+        return
     unit = None if reading.unit or reading.template.field(UNIT) else "N"
     host, device = cell_host(profile, unit=unit), cell_device(profile, unit)
     try:
@@ -202,6 +205,20 @@ def _cell(profile: DeviceProfile) -> Found:
                 return
     except (ValueRefused, UnicodeEncodeError) as error:
         yield place, str(error)
+
+
+def _read_over(profile: DeviceProfile) -> str:
+    """Return why words that nobody listens to may not be read over: one of them may be all that tells an overload."""
+    reading = profile.reading
+    if reading.modbus or reading.quality or reading.says_overload:
+        return ""
+    unheard = [one for one in reading.read_over(profile.constants) if isinstance(one, Choice | HexNumber | Text)]
+    if not unheard:
+        return ""
+    return (
+        f"{{{unheard[0].name}:...}} is read over, and nothing here tells an overload, which would be believed: call the word "
+        f"that tells it {{{STATUS}:...}}, say it under `overload`, or write as text what never changes"
+    )
 
 
 def _beyond_range(profile: DeviceProfile, unit: str | None, place: tuple[str, ...]) -> Found:

@@ -27,7 +27,7 @@ MOST_ENTERED: Final = 56
 _PACKAGE: Final = Path(gateway.__file__).parent
 _STATIONS: Final = {
     "bsfm/inverse.py": None,  # the force becomes a voltage
-    "devices/fields.py": "encode",  # the voltage becomes characters
+    "devices/fields/numbers.py": "encode",  # the voltage becomes characters
     "ports/serial_port.py": "write",  # the characters go to the wire
 }
 """File and function (None: any) at which the stack of calls is noted."""
