@@ -150,8 +150,7 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
         await _wait_first(guardian.told_to_stop, running.failed)
         if running.failed.is_set():
             return exit_codes.FAILED
-        if not guardian.is_gone:
-            await running.ramp_down()
+        await running.ramp_down()
     finally:
         listeners.close()
         await running.close()

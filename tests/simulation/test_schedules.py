@@ -95,6 +95,27 @@ KEPT: list[tuple[int, list[Event]]] = [
         ],
     ),
     (435, [Event(21.2182, "rival", "hold", (54.84,))]),
+    (
+        38270,
+        [
+            Event(1.6328, "machine", "kill", (0.1917, 623527.413956265)),
+            Event(1.7265, "worker", "hold", (51.42,)),
+            Event(5.2178, "machine", "terminate", (0.2811, 987137.2199224811)),
+            Event(5.3126, "machine", "stop", (0.0678, 0.0)),
+            Event(5.3875, "worker", "pull", (51.96,)),
+            Event(5.4679, "machine", "kill_guardian", (0.2072, 360017.672499747)),
+        ],
+    ),
+    (
+        35231,
+        [
+            Event(0.1791, "machine", "disk_hung", (0.057, 74842.36436101119)),
+            Event(0.4891, "machine", "terminate", (0.1352, 138411.73758985917)),
+            Event(4.0607, "worker", "hold", (16.43,)),
+            Event(4.6879, "worker", "take", (62.64,)),
+            Event(4.8661, "machine", "terminate", (0.2049, -101870.88049124472)),
+        ],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

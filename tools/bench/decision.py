@@ -3,10 +3,10 @@
     a setpoint    from the bank's write of a voltage until its bytes are handed to the port (`loop.py` has the rest of the way)
     a sample      from a cell's sentence to the decision with its reasons, while 2 V are out
 
-Each is measured in one process, with nothing of a kernel in it, once the simulation around it has just run the same code, and
-after something that leaves a processor's caches to others: 64 MB read through, or 10 ms of asking the clock, in which this
-process does not even sleep. What the last takes more, the program does not compute: it waits for its own code and data to
-come back from memory. The peer is the same way behind the simulation.
+Each is measured in one process, with nothing of a kernel in it, once the same code has just run, and after something that
+leaves a processor's caches to others: 64 MB read through, or 10 ms of asking the clock, in which this process does not even
+sleep. What the last takes more, the program does not compute: it waits for its own code and data to come back from memory. The
+peer is the same way once it has just run.
 """
 
 import argparse
@@ -45,7 +45,7 @@ def ask_the_clock() -> None:
 
 
 BEFORE: dict[str, Callable[[], None]] = {
-    "behind the simulation": lambda: None,
+    "once it has just run": lambda: None,
     "after 64 MB were read": read_through,
     "after 10 ms of asking the clock": ask_the_clock,
 }
@@ -68,14 +68,18 @@ class Decisions:
     def _command(self, voltage_mv: int) -> None:
         self._wired.write(0, ENABLE, 0, 0, VOLTAGE_MODE, 0, voltage_mv)
 
+    def _set_other_voltage(self) -> None:
+        self._voltage_mv = LOW_MV + HIGH_MV - self._voltage_mv
+        self._command(self._voltage_mv)
+
     def measure_setpoint(self, before: Callable[[], None]) -> float | None:
         """Return the seconds from a write to the port; None where a poll was just out."""
+        self._set_other_voltage()  # unmeasured: the simulation writes none, and the round before may have emptied the caches
         self._wired.run(FREE_LINE_S)
-        self._voltage_mv = LOW_MV + HIGH_MV - self._voltage_mv
         before()
         self._handed_s.clear()
         began_s = time.perf_counter()
-        self._command(self._voltage_mv)
+        self._set_other_voltage()
         return self._handed_s[0] - began_s if self._handed_s else None
 
     def measure_sample(self, before: Callable[[], None]) -> float:
@@ -98,7 +102,7 @@ def print_way(name: str, measure: Callable[[Callable[[], None]], float | None], 
     print(f"{name}, median of {rounds}:")
     for label, all_s in seconds.items():
         print(f"  {label:32} {median(all_s) * 1e6:5.0f} us  {median(all_s) / peer_s:4.1f} x")
-    print(f"  goal {GOAL_S * 1e6:.0f} us: {'reached' if peer_s <= GOAL_S else 'MISSED'} behind the simulation")
+    print(f"  goal {GOAL_S * 1e6:.0f} us: {'reached' if peer_s <= GOAL_S else 'MISSED'} once it has just run")
 
 
 def main() -> None:

@@ -58,13 +58,34 @@ def likely_dead_bands_pa(bench: Bench, fitted: FittedModel, whiten: Whitener) ->
         return ()
     regulator, span = fitted.parameters.plant.regulator, model_span(fitted, whiten)
     target = _Target(bench, fitted.parameters, whiten.apply_adjoint(span.left) * bench.usable)
-    likely_v = _BANDS_V[np.argsort(-target.correlate(correlate_dead_bands, _BANDS_V))]
-    bands_pa = likely_v[:_MOST_BANDS_IN_TWIN] * (regulator.full_scale_pa / regulator.full_scale_v)
+    likely_v = _likely_bands_v(target.correlate(correlate_dead_bands, _BANDS_V))
+    bands_pa = likely_v * (regulator.full_scale_pa / regulator.full_scale_v)
     rigid = replace(fitted.parameters, plant=_with_rigid_friction(fitted.parameters.plant))
     dead_band = DEAD_BAND if bench.witnesses is None else ChangedValue(DEAD_BAND, bench.witnesses)
     simulated = bench.simulate([rigid, *(rigid.with_value(dead_band, band_pa) for band_pa in bands_pa)])
     normal = NormalEquations(span, whiten.spectra(bench.reduce(simulated[1:] - simulated[0])))
     return tuple(bands_pa[np.argsort(normal.power - 2.0 * normal.slope)[:_MOST_ANSWERS]].tolist())
+
+
+def _likely_bands_v(alike: Floats) -> Floats:
+    """Return the bands to try in the twin, the likeliest first. Where the command moves in stairs, many bands decide alike at
+    each large one, and only the small ones tell them apart, which the likeness may not see: of all that are exactly alike the
+    first, the last and some between, not twenty neighbours."""
+    kinds, kind = np.unique(alike, return_inverse=True)
+    best = np.arange(kinds.size)[::-1][:_MOST_BANDS_IN_TWIN]
+    of_each = math.ceil(_MOST_BANDS_IN_TWIN / best.size)
+    return np.concatenate([_spread(_BANDS_V[kind == each], of_each) for each in best])
+
+
+def _spread(values: Floats, most: int) -> Floats:
+    """Some of the values, evenly: the first and the last among them; the middle one where only one is wanted."""
+    if most >= values.size:
+        return values
+    return (
+        values[values.size // 2 :][:1]
+        if most == 1
+        else values[np.linspace(0, values.size - 1, most).round().astype(int)]
+    )
 
 
 def _with_rigid_friction(plant: Plant) -> Plant:

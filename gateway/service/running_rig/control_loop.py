@@ -124,7 +124,8 @@ class ControlLoop:
         """Take bytes of the load cell; a complete sample makes control decide at once."""
         fresh = False
         messages = self._cell.receive(chunk, now_s)
-        self._begin(WarningBit.SERIAL_NOISE, self._cell_noise.hear(messages, now_s))
+        is_late = self._slow_loop.is_on and not self._cell.is_stream
+        self._begin(WarningBit.SERIAL_NOISE, self._cell_noise.hear(messages, now_s, is_late))
         for message in messages:
             if isinstance(message, ForceSample):
                 self.sample, fresh = message, True

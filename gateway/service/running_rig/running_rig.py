@@ -253,10 +253,10 @@ class RunningRig:
         return sentence
 
     async def ramp_down(self) -> None:
-        """Ramp the force to 0, then send the safe voltage (at most 4.5 s)."""
-        self.controller.stop()
-        deadline_s = time.monotonic() + _STOP_BOUND_S
-        while not self.controller.has_stopped and time.monotonic() < deadline_s:
+        """Ramp the force to 0, then send the safe voltage (at most 4.5 s); at once where nobody guards it, or it fails."""
+        controller, guardian, until_s = self.controller, self._guardian, time.monotonic() + _STOP_BOUND_S
+        controller.stop()
+        while time.monotonic() < until_s and not (controller.has_stopped or guardian.is_gone or self.failed.is_set()):
             await asyncio.sleep(self._tick.period_s)
 
     async def close(self) -> None:
@@ -264,10 +264,9 @@ class RunningRig:
         self._tick.close()
         await self._ports.write_last(self._safe_frame)
         self._guardian.note_safe()
-        if self._last_frame:  # once the safe voltage is answered: on a bus of two wires both would talk at once
-            await asyncio.sleep(self._rig.output.device.reply_timeout_s)
-            await self._ports.write_last(self._last_frame)
-        await self._faces.close()
+        reply_s = self._rig.output.device.reply_timeout_s
+        # Nothing is decided any more, and what masters read grows old: they go while the device is let go.
+        await asyncio.gather(self._faces.close(), self._ports.let_go_output(self._last_frame, reply_s))
         await self._control_socket.close()
         await self._recordings.close()
         await self._calibration_runs.close()

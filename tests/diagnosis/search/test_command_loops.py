@@ -11,6 +11,7 @@ from gateway.diagnosis.search.command_loops import (
     fill_rounding_errors,
     sine_of_turns,
 )
+from gateway.diagnosis.search.command_search import _BANDS_V, _likely_bands_v
 
 CHAIN = ForceChain(share=0.2, play_v=0.15)
 COMMAND_V = 3.0 + 0.2 * np.cumsum(np.random.default_rng(1).normal(size=300))
@@ -69,3 +70,12 @@ def test_what_a_size_makes_of_the_force_is_likened_about_its_mean(fill, given_v)
         column -= column.mean()
         assert alike[k] == pytest.approx(told @ column, abs=1e-6)
         assert squares[k] == pytest.approx(column @ column, rel=1e-6)
+
+
+def test_dead_bands_that_decide_alike_are_tried_by_their_ends_and_not_as_neighbours() -> None:
+    """On stairs the likeliest twenty of 160 would be one."""
+    alike = np.repeat([3.0, 9.0, 1.0, 8.0], 40)
+    tried = _likely_bands_v(alike).tolist()
+    assert tried[:5] == _BANDS_V[[40, 50, 60, 69, 79]].tolist()
+    assert {_BANDS_V[40 * kind + end] for kind in range(4) for end in (0, 39)} <= set(tried)
+    assert _likely_bands_v(np.arange(160.0)).tolist() == _BANDS_V[:-21:-1].tolist()

@@ -8,11 +8,12 @@ import pytest
 from gateway.codes.warning_bits import WarningBit
 from gateway.devices.messages import Garbage
 from gateway.processes.scheduler_counters import ProcessorTime
-from gateway.profiles import load_rig
+from gateway.profiles import load_device, load_rig
 from gateway.registers.words import State
 from gateway.service.running_rig.rate_warnings import LEAST, SHARE, WINDOW_S, LineNoise, SlowLoop
 from gateway.service.running_rig.starting import lasting_warnings, warning_notes
 from tests.service.rigs import demo
+from tests.service.test_every_device_presses import rig_with
 from tests.service.wired import Wired
 
 NOISE, SLOW = WarningBit.SERIAL_NOISE, WarningBit.SLOW_LOOP
@@ -175,14 +176,23 @@ def test_the_loop_asks_the_kernel_what_the_time_since_the_last_tick_went_to() ->
     assert "the machine is too busy" in sentence
 
 
-def test_answers_that_a_slow_loop_has_torn_are_not_blamed_on_cables() -> None:
-    wired = Wired().pressing(20.0)
+ASKED_CELL = "adam-4016"
+
+
+@pytest.mark.parametrize(
+    ("cell", "hear", "is_answer"),
+    [("stream-st-gs", on_output, True), ("stream-st-gs", on_cell, False), (ASKED_CELL, on_cell, True)],
+)
+def test_answers_that_a_slow_loop_has_torn_are_not_blamed_on_cables(cell: str, hear: Hear, is_answer: bool) -> None:
+    """What comes of its own accord waits in the kernel, whole."""
+    wired = Wired(rig_with(load_device(cell))).pressing(20.0)
     wired.lateness = late_ticks(20)
     wired.run(4.0)
     assert wired.warnings & SLOW
-    broken(wired, on_output, 8, 0.1)
+    broken(wired, hear, 8, 0.1)
     (sentence,) = wired.said("A341")
-    assert "our own loop is late (A342)" in sentence and "cable" not in sentence
+    assert ("our own loop is late (A342)" in sentence) is is_answer
+    assert ("cable" not in sentence) is is_answer
 
 
 # -- A343

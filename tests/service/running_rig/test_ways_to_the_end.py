@@ -57,6 +57,46 @@ def test_the_first_cause_of_an_end_is_told_to_the_guardian_and_to_people(devices
     assert any("A499" in line and "in a callback" in line for line in said)
 
 
+@pytest.mark.parametrize("end", ["the guardian is gone", "a defect"])
+def test_who_can_no_longer_be_trusted_with_a_ramp_ends_at_once(devices: OwnDevices, end: str) -> None:
+    """A ramp without a guardian is 4 s in which nothing writes the safe voltage when this process dies."""
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        await pressing(rig, devices)
+        if end == "a defect":
+            rig.failed.set()
+        else:
+            guardian.shutdown(socket.SHUT_RDWR)
+            while not rig._guardian.is_gone:
+                await asyncio.sleep(0.005)
+        await rig.ramp_down()
+        assert not rig.controller.has_stopped
+        assert devices.setting_v > 3.5
+
+    with_running_rig(devices, scene)
+    assert devices.setting_v == 0.0
+
+
+def test_no_master_is_answered_while_the_device_is_let_go(devices: OwnDevices, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is decided any more: it would read a force, and an age of it, that were true once."""
+    connected: list[int] = []
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        async def write_last(_: RigPorts, frame: bytes) -> None:
+            connected.append(len(rig._faces.peers))
+
+        assert rig._faces.modbus
+        master.connect(rig._faces.modbus)
+        while not rig._faces.peers:
+            await asyncio.sleep(0.005)
+        rig._last_frame = b"~OFF"
+        monkeypatch.setattr(RigPorts, "write_last", write_last)
+
+    with socket.socket() as master:
+        with_running_rig(devices, scene)
+    assert connected == [1, 0]
+
+
 def test_a_watchdog_is_let_go_once_the_safe_voltage_has_been_answered(
     devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,6 +3,7 @@
 Their bytes go to the control loop; the output's descriptor goes to the guardian, which writes the last safe voltage to it.
 """
 
+import asyncio
 import contextlib
 from collections.abc import Callable
 
@@ -66,11 +67,18 @@ class RigPorts:
         if self.valve:
             self.valve.move(paths["valve"])
 
-    async def write_last(self, safe_frame: bytes) -> None:
-        """Write the safe frame, as far as the output takes it, and nothing after it."""
+    async def write_last(self, frame: bytes) -> None:
+        """Write the frame, as far as the output takes it, and of the loop nothing after it."""
         self._is_closing = True
         with contextlib.suppress(PortError):
-            await self.output.write_last(safe_frame)
+            await self.output.write_last(frame)
+
+    async def let_go_output(self, last_frame: bytes, reply_s: float) -> None:
+        """Write what disarms the output's watchdog, where it has one, once the safe voltage has been answered: on a bus of two
+        wires both would talk at once. reply_s: longest time of an answer."""
+        if last_frame:
+            await asyncio.sleep(reply_s)
+            await self.write_last(last_frame)
 
     def close(self) -> None:
         """Close all ports."""
