@@ -35,6 +35,32 @@ def test_what_an_amplifier_says_of_its_weight_is_heard(moving: DeviceProfile, qu
         assert sample.force_n == pytest.approx(-12.0, abs=host.resolution_n)
 
 
+@pytest.mark.parametrize(
+    ("status", "quality"),
+    [("0002", Quality.OK), ("0006", Quality.UNSTABLE), ("0000", Quality.OVERLOAD), ("0004", Quality.OVERLOAD)],
+)
+def test_a_bit_that_stands_while_all_is_well_means_an_overload_when_it_is_gone(status: str, quality: Quality) -> None:
+    """Status of Flintec's FT-16, page 27: D1 is 1 where the data are right, D2 where the weight is not stable."""
+    registers = WeightRegisters(
+        first=2,
+        last=6,
+        weight=5,
+        type="int32",
+        decimals=2,
+        overload=(RegisterBit(register=2, bit=1, value=0),),
+        unstable=(RegisterBit(register=2, bit=2),),
+    )
+    profile = replace(load_device("laumas-tlb"), read_force=ForceReading(modbus=registers, unit="kg", rate_hz=100))
+    host, device = cell_host(profile), cell_device(profile)
+    host.poll()
+    (sample,) = host.receive(rtu_frame(1, f"030A{status}0000000000000064".encode()), 0.0)
+    assert sample == ForceSample(1.0, pytest.approx(9.80665), quality, 0.0)
+    host.poll()
+    (simulated,) = host.receive(device.frame(-12.0, quality), 0.0)
+    assert isinstance(simulated, ForceSample)
+    assert simulated.quality is quality
+
+
 @pytest.mark.parametrize("order", ["abcd", "cdab"])
 def test_a_float_weight_is_not_rounded_to_whole_units(order: WordOrder) -> None:
     """A float32 in kg with the point of its own: 1.25 kg, and a step of 1 mN or so, not of 9.81 N."""

@@ -14,7 +14,7 @@ def _registers(profile: DeviceProfile) -> WeightRegisters:
 
 
 def _is_set(bit: RegisterBit, values: dict[str, Value]) -> bool:
-    return bool(int(values[word_name(bit.register)]) >> bit.bit & 1)
+    return int(values[word_name(bit.register)]) >> bit.bit & 1 == bit.value
 
 
 class ModbusCellHost(TemplateCellHost):
@@ -48,8 +48,10 @@ class ModbusCellDevice(TemplateCellDevice):
         if abs(raw) > registers.largest_shown or (weight < 0 and not registers.is_signed):
             raise ValueRefused(f"{raw} is more than the amplifier shows")
         values[FORCE] = abs(weight) if registers.negative else weight
-        bits = [registers.negative] if registers.negative and weight < 0 else []
-        bits += list(registers.overload[:1]) if quality is Quality.OVERLOAD else []
-        bits += list(registers.unstable[:1]) if quality is Quality.UNSTABLE else []
-        for bit in bits:
-            values[word_name(bit.register)] = int(values[word_name(bit.register)]) | 1 << bit.bit
+        meant = [(registers.negative, weight < 0)] if registers.negative else []
+        meant += [(bit, quality is Quality.OVERLOAD and bit is registers.overload[0]) for bit in registers.overload]
+        meant += [(bit, quality is Quality.UNSTABLE and bit is registers.unstable[0]) for bit in registers.unstable]
+        for bit, is_meant in meant:
+            name, one = word_name(bit.register), 1 << bit.bit
+            is_one = is_meant == bool(bit.value)
+            values[name] = int(values[name]) | one if is_one else int(values[name]) & ~one

@@ -28,11 +28,12 @@ _LARGEST: Final[dict[RegisterType, float]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RegisterBit:
-    """One bit of a register."""
+    """One bit of a register, and which value of it means what it stands for: 0 where it is 1 while all is well."""
 
     __pydantic_config__ = STRICT
     register: Annotated[int, Ge(0), Le(65535)]  # address on the wire, from 0
     bit: Annotated[int, Ge(0), Le(15)]  # 0 is the lowest
+    value: Literal[0, 1] = 1  # of the bit, that means it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,9 +48,9 @@ class WeightRegisters:
     type: RegisterType = "int16"  # what the weight is
     word_order: WordOrder = "abcd"  # of a weight in two registers: abcd is the high word first
     decimals: Annotated[int, Ge(0), Le(6)] = 0  # of a weight in whole numbers: 2 means that 1234 is 12.34
-    negative: RegisterBit | None = None  # set: the weight is negative
-    overload: tuple[RegisterBit, ...] = ()  # any one set: no weight to rely on, counts as over-force
-    unstable: tuple[RegisterBit, ...] = ()  # any one set: in motion
+    negative: RegisterBit | None = None  # says that the weight is negative
+    overload: tuple[RegisterBit, ...] = ()  # any one says: no weight to rely on, counts as over-force
+    unstable: tuple[RegisterBit, ...] = ()  # any one says: in motion
 
     def __post_init__(self) -> None:
         if not 1 <= self.count <= MOST_REGISTERS:
