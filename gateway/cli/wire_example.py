@@ -51,11 +51,11 @@ def _cell(profile: DeviceProfile) -> str:
 def _valve(profile: DeviceProfile) -> str:
     host, device = ValveHost(profile), ValveDevice(profile)
     asked = host.request(ValveDirection.PULL)
-    return (
-        f"pull: {_shown(profile, asked)} -> {_shown(profile, device.reply(ValveDirection.PULL, ValveDirection.PULL))}"
-    )
+    heard = [one for one in device.receive(asked) if not isinstance(one, Garbage)]
+    answers = b"".join(device.reply(one, ValveDirection.PULL) for one in heard)
+    return f"pull: {_shown(profile, asked)} -> {_shown(profile, answers)}"
 
 
 def _shown(profile: DeviceProfile, data: bytes) -> str:
-    is_text = not profile.is_modbus and data.isascii()
+    is_text = not (profile.is_modbus or profile.is_raw) and data.isascii()
     return quote(data.decode("ascii")) if is_text else data.hex(" ").upper()

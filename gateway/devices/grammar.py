@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from gateway.devices.binary.raw_bytes import ByteSplitter
 from gateway.devices.binary.rtu_framing import RtuSplitter, answers, requests, rtu_frame
 from gateway.devices.checksum import add_checksum, strip_checksum
 from gateway.devices.exchange import Exchange, VoltageExchange
@@ -10,6 +11,8 @@ from gateway.devices.framing import Line, LineSplitter
 from gateway.devices.messages import OutputRequest, ReadPressure, ReadVoltage, SetVoltage
 from gateway.devices.profile import DeviceProfile
 from gateway.devices.template import compile_template
+
+Splitter = LineSplitter | RtuSplitter | ByteSplitter
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +49,18 @@ class Grammar:
             self._numbers[template] = self.profile.number_in(template), self.profile.decimals_in(template)
         return self._numbers[template]
 
-    def answers(self) -> LineSplitter | RtuSplitter:
+    def answers(self) -> Splitter:
         """Return what cuts the device's bytes into sentences."""
         profile = self.profile
+        if profile.is_raw:
+            return ByteSplitter(profile.question_bytes)
         return answers(profile.unit_id) if profile.is_modbus else LineSplitter(profile.terminator_bytes)
 
-    def questions(self) -> LineSplitter | RtuSplitter:
+    def questions(self) -> Splitter:
         """Return what cuts the gateway's bytes into sentences, at the device's end."""
         profile = self.profile
+        if profile.is_raw:
+            return ByteSplitter(profile.question_bytes)
         return requests(profile.unit_id) if profile.is_modbus else LineSplitter(profile.question_terminator_bytes)
 
     def line(self, body: bytes) -> bytes:
@@ -72,6 +79,8 @@ class Grammar:
     def _framed(self, body: bytes, terminator: bytes) -> bytes:
         if self.profile.is_modbus:
             return rtu_frame(self.profile.unit_id, body)
+        if self.profile.is_raw:
+            return bytes.fromhex(body.decode("ascii"))
         return add_checksum(body, self.profile.checksum) + terminator
 
     def body(self, line: Line) -> bytes | None:

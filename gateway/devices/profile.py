@@ -13,6 +13,7 @@ from typing import Annotated, Final, Literal
 from annotated_types import Gt, MaxLen, MinLen
 
 from gateway.defaults import STRICT
+from gateway.devices.binary.raw_bytes import byte_count
 from gateway.devices.binary.register_access import VALUE, check_direction
 from gateway.devices.checksum import ChecksumName
 from gateway.devices.device_checks.identity import Identity
@@ -35,6 +36,7 @@ from gateway.devices.template import compile_template, quote
 from gateway.devices.valve_profile import ValveReading, ValveSettings
 
 MODBUS_RTU: Final = "modbus-rtu"
+RAW_BYTES: Final = "raw-bytes"
 TEMPLATE: Final = "template"
 ADDRESS: Final = "address"
 """Name of the constant that tells devices on one bus apart: of a Modbus device its unit."""
@@ -145,6 +147,16 @@ class DeviceProfile:
         return self.codec == MODBUS_RTU
 
     @property
+    def is_raw(self) -> bool:
+        """Decide whether the device, a valve, speaks in raw bytes."""
+        return self.codec == RAW_BYTES
+
+    @property
+    def question_bytes(self) -> int:
+        """The bytes of a question to a device that speaks in raw bytes: all have the same."""
+        return byte_count(self.read_valve.ask) if self.read_valve else 0
+
+    @property
     def unit_id(self) -> int:
         """Unit of a Modbus device: its address, 1 where the profile says none."""
         return int(self.constants.get(ADDRESS, 1))
@@ -193,14 +205,16 @@ def _check_codec(profile: DeviceProfile) -> None:
                 "needs `modbus` with its registers" if profile.is_modbus else f"has `modbus`: say `codec: {MODBUS_RTU}`"
             )
             raise ValueError(f"{name} of codec {profile.codec} {wanted}")
-    if not profile.is_modbus:
+    if not (profile.is_modbus or profile.is_raw):
         if not profile.terminator:
             raise ValueError('terminator is missing: what ends a line, such as "\\r\\n"')
         if not f"{profile.terminator}{profile.question_terminator}".isascii():
             raise ValueError("terminator and question_terminator are ASCII text")
         return
     if profile.terminator or profile.question_terminator or profile.checksum != "none":
-        raise ValueError("a Modbus RTU frame has its own end and checksum: leave terminator and checksum out")
+        raise ValueError("a frame of Modbus RTU or of raw bytes has its own end: leave terminator and checksum out")
+    if profile.is_raw:
+        return
     if profile.reply_timeout_s > _LONGEST_MODBUS_S:
         raise ValueError(
             f"reply_timeout_s of a Modbus device is at most {_LONGEST_MODBUS_S} s: the force loop waits for it"
@@ -240,6 +254,16 @@ def _check_output(profile: DeviceProfile) -> None:
 def _check_valve(profile: DeviceProfile) -> None:
     if profile.set_valve is None or profile.read_valve is None:
         raise ValueError("a valve needs set_valve and read_valve: a direction that nobody reads back is not known")
+    if profile.codec not in (TEMPLATE, MODBUS_RTU, RAW_BYTES):
+        raise ValueError(f"codec {profile.codec} of a valve is not one of {TEMPLATE}, {MODBUS_RTU}, {RAW_BYTES}")
+    if profile.is_raw:
+        asks = {
+            byte_count(one) for one in (profile.set_valve.push.ask, profile.set_valve.pull.ask, profile.read_valve.ask)
+        }
+        if len(asks) > 1:
+            raise ValueError(
+                "the sentences to a device that speaks in raw bytes have one length: it tells them by that"
+            )
     if any(getattr(profile, name) for name in _EXCHANGES) or profile.steps:
         raise ValueError("set_voltage, read_voltage, read_pressure, read_force, stream and steps belong to other roles")
     if profile.watchdog != "none":

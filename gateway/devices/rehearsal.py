@@ -64,7 +64,7 @@ def _terminators(profile: DeviceProfile) -> Found:
 def _cut_sentences(profile: DeviceProfile) -> Found:
     """Sentences with the end of a line in their middle."""
     groups = ((one.name, getattr(profile, one.name)) for one in fields(profile))
-    for name, group in () if profile.is_modbus else groups:
+    for name, group in () if profile.is_modbus or profile.is_raw else groups:
         for place, text in _sentences(group, (name,)) if is_dataclass(group) else ():
             ours = place[-1] in _SAID_BY_US
             terminator = (profile.question_terminator if ours else "") or profile.terminator
@@ -84,12 +84,14 @@ def _sentences(group: object, place: tuple[str | int, ...]) -> Iterator[tuple[tu
 
 
 def _valve(profile: DeviceProfile) -> Found:
-    host, device = ValveHost(profile), ValveDevice(profile)
+    host, device, settings = ValveHost(profile), ValveDevice(profile), profile.set_valve
+    assert settings  # a valve's profile was checked for it
     for direction in ValveDirection:
         for place, question in (("set_valve", direction), ("read_valve", None)):
-            if device.receive(host.request(question)) != [question]:
+            asked = [question] if question is None or settings.of(question).answer else [question, None]
+            if device.receive(host.request(question)) != asked:
                 yield (place,), f"{direction}: the device's end takes our question for another"
-            elif host.receive(device.reply(question, direction)) != [direction]:
+            elif host.receive(b"".join(device.reply(one, direction) for one in asked)) != [direction]:
                 yield (place,), f"{direction}: our end does not understand the answer"
 
 

@@ -3,6 +3,7 @@
 from collections import deque
 from typing import Final
 
+from gateway.devices.binary.raw_bytes import ByteSplitter, byte_count
 from gateway.devices.binary.rtu_framing import quiet_s
 from gateway.devices.framing import Line
 from gateway.devices.grammar import Grammar
@@ -36,8 +37,13 @@ class ValveHost:
         """Return the bytes to write; their answer is expected from now on."""
         self._lines.forget()
         self._expected.append(question)
-        ask = self._settings.of(question).ask if question else self._reading.ask
-        return self._grammar.question_line(self._grammar.encode(ask))
+        asks = [self._settings.of(question).ask] if question else []
+        answer = self._settings.of(question).answer if question else ""
+        if not answer:
+            asks.append(self._reading.ask)
+        if isinstance(self._lines, ByteSplitter):
+            self._lines.length = byte_count(answer or self._reading.answer)
+        return b"".join(self._grammar.question_line(self._grammar.encode(ask)) for ask in asks)
 
     def receive(self, chunk: bytes) -> list[ValveDirection | Garbage]:
         """Return the directions that these bytes tell: an obeyed setting, or what stands. Never raises."""
@@ -53,8 +59,8 @@ class ValveHost:
         if body is None or not self._expected:
             return Garbage(line.data)
         question = self._expected[0]
-        if question is not None:
-            is_obeyed = self._grammar.read(self._settings.of(question).answer, body) is not None
+        if question is not None and (answer := self._settings.of(question).answer):
+            is_obeyed = self._grammar.read(answer, body) is not None
             told = question if is_obeyed else None
         else:
             values = self._grammar.read(self._reading.answer, body)
@@ -80,7 +86,8 @@ class ValveDevice:
     def reply(self, question: Question, stands: ValveDirection) -> bytes:
         """Return the answer to a question, with the direction that stands."""
         if question is not None:
-            return self._grammar.line(self._grammar.encode(self._settings.of(question).answer))
+            answer = self._settings.of(question).answer
+            return self._grammar.line(self._grammar.encode(answer)) if answer else b""
         return self._grammar.line(self._grammar.encode(self._reading.answer, {STATE: self._reading.word_of(stands)}))
 
     def _question(self, line: Line) -> Question | Garbage:

@@ -1,8 +1,8 @@
 """What a device profile says of a directional valve behind a switched output: a relay, or a digital output.
 
-Two directions and nothing between. Each setting is answered, and the direction that stands is read back by a question of its
-own. Of a Modbus RTU device a sentence is its PDU in hexadecimal digits (`05 0000 FF00`, without the blanks): two settings and
-one question need no other words.
+Two directions and nothing between. The direction that stands is read back by a question of its own. Of a Modbus RTU device a
+sentence is its PDU in hexadecimal digits (`05 0000 FF00`, without the blanks), of one that speaks in raw bytes these bytes:
+two settings and one question need no other words.
 """
 
 from collections.abc import Mapping
@@ -28,11 +28,12 @@ class ValveDirection(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveSetting:
-    """One direction: what is said, and what the device answers when it has obeyed."""
+    """One direction: what is said, and what the device answers when it has obeyed. One that says nothing is asked how it
+    stands in the same breath."""
 
     __pydantic_config__ = STRICT
     ask: Annotated[str, MinLen(1)]  # the sentence that switches; of a Modbus device its PDU in hexadecimal digits
-    answer: Annotated[str, MinLen(1)]  # what the device answers
+    answer: str = ""  # what the device answers; empty: nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
