@@ -210,16 +210,18 @@ def _cell(profile: DeviceProfile) -> Found:
 
 
 def _read_over(profile: DeviceProfile) -> str:
-    """Return why words that nobody listens to may not be read over: one of them may be all that tells an overload."""
+    """Return why words and single characters that nobody listens to may not be read over: one of them may be all that tells an
+    overload. Longer text, a time or a number of the device, may."""
     reading = profile.reading
     if reading.modbus or reading.quality or reading.says_overload:
         return ""
-    unheard = [one for one in reading.read_over(profile.constants) if isinstance(one, Choice | HexNumber | Text)]
+    over = reading.read_over(profile.constants)
+    unheard = [one for one in over if isinstance(one, Choice) or (isinstance(one, HexNumber | Text) and one.width == 1)]
     if not unheard:
         return ""
     return (
-        f"{{{unheard[0].name}:...}} is read over, and nothing here tells an overload, which would be believed: call the word "
-        f"that tells it {{{STATUS}:...}}, say it under `overload`, or write as text what never changes"
+        f"{{{unheard[0].name}:...}} is read over, and nothing here tells an overload, which would be believed: give its words "
+        f"as {{{STATUS}:...}} and say in quality what each means, say `overload`, or write as text what never changes"
     )
 
 

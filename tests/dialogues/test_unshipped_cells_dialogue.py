@@ -188,7 +188,7 @@ def test_the_simulated_one_is_read_as_what_it_shows(profile: DeviceProfile) -> N
         ("{force:8.2f}{u: kg|  g}", "the words of {u:...} are units"),
         ("{state:ST|US|OL},{force:8.2f}", "{state:...} is read over, and nothing here tells an overload"),
         ("{a:1s}{b:1s}{force:06d}", "{a:...} is read over, and nothing here tells an overload"),
-        ("{force:8.2f} {bits:02X}", "{bits:...} is read over, and nothing here tells an overload"),
+        ("{force:8.2f} {bits:01X}", "{bits:...} is read over, and nothing here tells an overload"),
     ],
 )
 def test_a_sign_a_unit_or_an_overload_that_would_be_read_over_is_refused(frame: str, told: str) -> None:
@@ -234,6 +234,13 @@ def test_kilonewtons_are_said_by_their_size() -> None:
 def test_words_that_say_neither_are_read_over(frame: str) -> None:
     profile = cell(stream=ForceReading(frame=frame, unit="N", rate_hz=10.0, overload=("OVER",)))
     assert [one.name for one in profile.reading.read_over(profile.constants)] == [frame[1:].split(":")[0]]
+
+
+def test_longer_text_and_numbers_are_read_over_where_nothing_tells_an_overload() -> None:
+    profile = cell(stream=ForceReading(frame="{time:8s} {force:8.2f} {count:d},{serial:04X}", unit="N", rate_hz=10.0))
+    assert list(rehearse(profile)) == []
+    (found,) = cell_host(profile).receive(b"12:34:56   -12.50 7,00AB\r\n", 0.0)
+    assert found == sample(-12.5, 1.0)
 
 
 def test_the_rest_of_a_bare_number_is_no_number() -> None:
