@@ -42,10 +42,12 @@ def _cell(profile: DeviceProfile) -> str:
     reading = profile.reading
     if not (reading.newton_per_unit or reading.template.field(UNIT)):
         return ""  # counts, or a unit that the rig says
-    host, frame = cell_host(profile), cell_device(profile).frame(_SHOWN_N)
+    host = cell_host(profile)
     asked = host.poll() or host.start
+    most_n = reading.largest_shown * host.resolution_n / reading.step
+    shown_n = _SHOWN_N if most_n > -_SHOWN_N else -float(f"{0.5 * most_n:.1g}")
     question = f"{_shown(profile, asked)} -> " if asked else ""
-    return f"{_SHOWN_N:g} N: {question}{_shown(profile, frame)}"
+    return f"{shown_n:g} N: {question}{_shown(profile, cell_device(profile).frame(shown_n))}"
 
 
 def _valve(profile: DeviceProfile) -> str:

@@ -10,10 +10,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from gateway.cli.wire_example import example
+from gateway.devices.force_reading import ForceReading
 from gateway.ports import PortInfo
 from gateway.processes import exit_codes
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.registers import RegisterMap
+from tests.dialogues.test_overload_dialogue import cell
 
 
 @pytest.fixture(autouse=True)
@@ -189,6 +192,11 @@ def test_a_rig_that_is_not_there_is_a_configuration_error(call) -> None:
 )
 def test_check_shows_what_goes_over_the_wire_and_what_is_not_listened_to(name: str, told: str, call) -> None:
     assert told in call("check", str(shipped_profiles_folder() / "devices" / f"{name}.yaml")).output.splitlines()
+
+
+def test_what_a_small_display_has_no_digits_for_is_shown_smaller() -> None:
+    profile = cell(read_force=ForceReading(ask="SI", frame="S {force:6.3f} g", unit="g"))
+    assert example(profile) == r"-0.05 N: 'SI\r\n' -> 'S -5.099 g\r\n'"
 
 
 def test_a_reading_whose_size_only_a_rig_knows_is_not_shown(call) -> None:
