@@ -7,6 +7,7 @@ import signal
 import time
 from collections.abc import Iterator
 from importlib import import_module
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -221,6 +222,12 @@ def run_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
 def budget(request: pytest.FixtureRequest) -> int:
     """How many times more than in the push gate a test may run its loop: 1, or 20 with --long."""
     return 20 if request.config.getoption("--long") else 1
+
+
+@pytest.fixture(scope="module")
+def tracker_process() -> None:
+    """The standard library's own process beside spawned ones, which stays to the end: nobody leaks it."""
+    resource_tracker.ensure_running()
 
 
 def open_descriptors() -> dict[str, str]:

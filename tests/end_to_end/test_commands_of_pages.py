@@ -73,6 +73,7 @@ def test_every_command_of_a_page_has_a_verb_and_options_that_are_there() -> None
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("tracker_process")
 def test_readme_s_commands_run_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """From an empty directory beside one gateway: force, calibration, recording, diagnosis, fleet."""
     state, here = tmp_path / "force-gateway" / "demo", tmp_path / "here"

@@ -156,8 +156,9 @@ def test_every_tab_in_both_themes(gateway: RunningGateway, browser: Any, tab: st
 
 @pytest.mark.long
 def test_twenty_viewers_leave_no_trace_in_the_loop() -> None:
-    """On a machine that is busy with something else ticks are missed without them, too: those do not count."""
+    """Nor does a broker that dies beside them, where there is one. On a machine that is busy with something else ticks are
+    missed without them, too: those do not count."""
     bench = Path(__file__).parents[2] / "tools" / "bench" / "missed_ticks.py"
     told = subprocess.run([sys.executable, bench], capture_output=True, text=True, check=True).stdout.splitlines()
-    alone, watched = (float(line.partition("missed_percent ")[2].split()[0]) for line in told)
-    assert watched < max(0.1, alone), told
+    alone, *watched = (float(line.partition("missed_percent ")[2].split()[0]) for line in told if "missed" in line)
+    assert watched and max(watched) < max(0.1, alone), told

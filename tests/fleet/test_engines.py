@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from multiprocessing import resource_tracker
 from pathlib import Path
 
 import pytest
@@ -11,11 +10,7 @@ from gateway.fleet.engines import Compute, Engine, processes, run_serially
 from gateway.fleet.tasks import Row, Task, find_tasks
 from tests.fleet.workers import count_bytes, die_at_some
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _tracker() -> None:
-    """The standard library's own process beside spawned ones, which stays to the end."""
-    resource_tracker.ensure_running()
+pytestmark = pytest.mark.usefixtures("tracker_process")
 
 
 def folder_of(folder: Path, *texts: str) -> list[Task]:
