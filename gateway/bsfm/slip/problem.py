@@ -150,11 +150,12 @@ def free_numbers(branches: Branches) -> Floats:
 
 def branches_of(numbers: Floats, frame: Branches) -> Branches:
     """Return the branches of such numbers, the inverse of `free_numbers`; frame gives voltages and order (of both
-    branches).
+    branches). ValueError for weights beyond a double.
     """
     order = frame.rising.order
     low_n, rising_n, falling_n, *inner = numbers[: 2 * order + 1].tolist()
-    weights = np.exp(numbers[2 * order + 1 :]).tolist()
+    with np.errstate(over="ignore"):  # an infinite weight is refused below
+        weights = np.exp(numbers[2 * order + 1 :]).tolist()
     x0, x1, middle = frame.rising.x0, frame.rising.x1, order - 1
     return Branches(
         RationalBezier(x0, x1, (low_n, *inner[:middle], rising_n), (1.0, *weights[:order])),

@@ -186,6 +186,14 @@ def test_table_inverse_and_free_numbers_agree_with_the_curves() -> None:
     assert again.rising.value(grid_v) == pytest.approx(RISING.value(grid_v))
 
 
+def test_weights_beyond_a_double_are_refused_in_silence() -> None:
+    """A search's trial may go that far; its next step is a shorter one."""
+    numbers = free_numbers(TRUTH.branches)
+    numbers[-1] = 1.0e3
+    with pytest.raises(ValueError, match="weight"):
+        branches_of(numbers, TRUTH.branches)
+
+
 def test_where_the_branches_meet_a_fit_that_crosses_by_a_hair_is_looked_for_again_not_given_up() -> None:
     """Without margins such a walk left branches that a staircase's turns had bent, and an error several times as large."""
     rising = RationalBezier(0.0, 5.0, (2.5, 4.0, 9.0, 40.0), (1.0, 1.0, 1.0, 1.0))
