@@ -95,9 +95,7 @@ class TcpWire:
 
         if isinstance(error, TimeoutError):
             symptom, probably = f"no answer within {TIMEOUT_S:g} s", "wrong address, or a firewall"
-        elif isinstance(
-            error, (socket.gaierror, UnicodeError)
-        ):  # UnicodeError: `a..b`, or a part of over 63 characters
+        elif isinstance(error, (socket.gaierror, UnicodeError)):  # `a..b`, or a part of over 63 characters
             symptom, probably = "no such host name", "a typo in --gateway"
         else:
             symptom, probably = error.strerror or str(error), "not running, or on another port"
