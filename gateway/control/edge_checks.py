@@ -253,7 +253,7 @@ def _refuse_blocked(at: Situation, bit: ControlBit) -> EdgeRefusal | None:
     if not reason:
         return None
     what = _NAMES[bit]
-    late = f"a device was not heard in time; {at.excuse}" if at.excuse and reason is at.block else ""
+    late = at.excuse if reason is at.block else ""
     line_fault = at.line_fault if reason is RefusalReason.OUTPUT_FAULT else ""
     return EdgeRefusal(reason, bit, f"{what} refused: {late or line_fault or reason.explanation.sentence}")
 
