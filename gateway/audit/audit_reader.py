@@ -30,8 +30,8 @@ class AuditVerdict(NamedTuple):
 
 
 def read_audit(state: Path, on_left_out: Callable[[], None] = lambda: None) -> Iterator[dict[str, Any]]:
-    """Yield what the lines say, oldest first, whether or not the chain holds; what is no line is passed over. on_left_out: called
-    with each whole line that is none of ours, as one that was changed."""
+    """Yield what the lines say, oldest first, whether or not the chain holds; what is no line is passed over. on_left_out:
+    called at each whole line that is none of ours, such as one that was changed."""
     for path in audit_files(state / FOLDER):
         for line in iterate_lines(path):
             try:
