@@ -40,17 +40,27 @@ def command(*, wire: "Wire", unit: int, map_name: str, as_json: bool) -> None:
     with GatewayClient(wire, unit, register_map) as client:
         with explain_refusals(client):
             run = _SelfTest(client)
-        run.begin()
-        try:
-            run.follow(shows=sys.stderr.isatty() and not as_json)
-        except KeyboardInterrupt:
-            run.stop()
-            raise CliError("self-test stopped; the force went to 0") from None
+        _run_to_its_end(run, shows=sys.stderr.isatty() and not as_json)
         with explain_refusals(client):
             answer = run.answer(wire)
     _tell(answer, as_json=as_json)
     if answer["result"] not in ("passed", "warned"):
         sys.exit(1)
+
+
+def _run_to_its_end(run: "_SelfTest", *, shows: bool) -> None:
+    """Begin it and follow it; whatever ends this process ends the test."""
+    from gateway.cli.master.ending_signals import signals_as_ctrl_c, signals_held_back
+
+    with signals_as_ctrl_c():
+        try:
+            with signals_held_back():
+                run.begin()
+            run.follow(shows=shows)
+        except (KeyboardInterrupt, OSError):  # OSError: the terminal is gone
+            with signals_held_back():
+                run.stop()
+            raise CliError("self-test stopped; the force went to 0") from None
 
 
 class _SelfTest:

@@ -69,6 +69,48 @@ def test_whatever_ends_the_terminal_stops_the_run(number: int, monkeypatch: pyte
         signal.signal(number, before)
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("when", ["begins", "has begun"])
+def test_an_end_while_the_run_begins_stops_it_too(number: int, when: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The request may have been heard already: what nobody stops climbs to its end, without anybody there."""
+    monkeypatch.setattr(following, "_POLL_S", 0.0)
+    end, show = (lambda: os.kill(os.getpid(), number)), following._progress
+
+    class Beginning(Climbing):
+        def begin(self) -> None:
+            if when == "begins":
+                end()
+            super().begin()
+
+    def show_first() -> Any:
+        monkeypatch.setattr(following, "_progress", show)
+        if when == "has begun":
+            end()
+        return show()
+
+    monkeypatch.setattr(following, "_progress", show_first)
+    run = Beginning(lambda: None)
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        assert follow(run) == {"phase": "stopped"}
+    except KeyboardInterrupt:
+        pytest.fail(f"left after {run.did}")
+    finally:
+        signal.signal(number, before)
+    assert run.did == ["begin", "stop"]
+
+
+def test_a_terminal_that_is_gone_without_a_signal_stops_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(following, "_POLL_S", 0.0)
+
+    def write_to_nobody() -> None:
+        raise BrokenPipeError
+
+    run = Climbing(write_to_nobody)
+    assert follow(run) == {"phase": "stopped"}
+    assert run.did == ["begin", "look", "stop"]
+
+
 @pytest.mark.parametrize("yes", [0, 1, 2])
 def test_without_a_yes_to_each_question_nothing_is_begun(
     call: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, yes: int

@@ -1,6 +1,8 @@
 """`self-test` against the real bank, with a stand-in for control that decides after three heartbeats."""
 
 import json
+import os
+import signal
 
 import pytest
 
@@ -22,8 +24,11 @@ class DecidingBank:
         self.bank.on_command = self.hear
         self.result, self.verdicts, self.beats = result, verdicts, set[int]()
         self.words: list[int] = []
+        self.signal_at_start = 0
 
     def hear(self, command: Command) -> None:
+        if self.signal_at_start and not self.words:
+            os.kill(os.getpid(), self.signal_at_start)
         self.words.append(int(command.control_word))
         self.beats.add(command.heartbeat)
         is_over = len(self.beats) > 3 and self.result is not SelfTestResult.RUNNING
@@ -67,3 +72,19 @@ def test_a_rig_without_one_refuses_with_what_to_do(register_map: RegisterMap, se
     bank = RegisterBank(register_map, BankRules(rig_name="irc5-cell", force_max_n=60.0), now=lambda: 0.0)
     answer = call("self-test", "--gateway", serve(bank).address)
     assert answer.exit_code == 1 and "W217" in answer.output and "irc5-cell" not in answer.stdout
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_whatever_ends_the_verb_ends_the_test_even_while_it_begins(
+    number: int, register_map: RegisterMap, serve, call
+) -> None:
+    rig = DecidingBank(register_map, SelfTestResult.RUNNING, {})
+    rig.signal_at_start = number
+    address = serve(rig.bank).address
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        answer = call("self-test", "--gateway", address)
+    finally:
+        signal.signal(number, before)
+    assert answer.exit_code == 1 and "self-test stopped; the force went to 0" in answer.stderr
+    assert (rig.words[0], rig.words[-1]) == (int(ControlBit.START_SELF_TEST), 0)
