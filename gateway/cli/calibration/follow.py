@@ -15,9 +15,6 @@ from gateway.cli.master.ending_signals import signals_as_ctrl_c, signals_held_ba
 _POLL_S: Final = 0.2
 _BEGIN_S: Final = 2.0
 _LEAST_WIDTH: Final = 76
-_LOST: Final = (
-    "the run has ended with it, at the safe voltage; what was recorded is kept: force-gateway calibrate --resume"
-)
 _NAMES: Final = {
     "idle": "starting",
     "zero": "zero and noise",
@@ -59,7 +56,7 @@ def _watch(run: Run) -> None:
     except NotBegunError:
         raise
     except CliError as error:
-        raise CliError(f"{error.format_message()}\n{_LOST}", error.exit_code) from None
+        raise CliError(f"{error.format_message()}\n{run.lost_words}", error.exit_code) from None
 
 
 def _progress() -> Progress:

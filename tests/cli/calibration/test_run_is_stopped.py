@@ -14,7 +14,9 @@ from gateway.cli.calibration.follow import follow
 from gateway.cli.calibration.remote_run import RemoteRun
 from gateway.cli.calibration.resume import RestOfLadder
 from gateway.cli.calibration.runs import RunStatus
+from gateway.cli.errors import CliError
 from gateway.cli.master.client import Frame, RefusedError
+from gateway.processes import exit_codes
 from gateway.registers.words import CalibrationPhase, ControlBit
 
 PREVIEW = {
@@ -186,6 +188,70 @@ def test_the_end_of_the_run_before_is_not_taken_for_this_ones(remote: Registers)
     remote.phase = CalibrationPhase.STORED
     assert run.look().phase == "stored"
     run.close()
+
+
+@pytest.mark.parametrize("is_heard", [True, False])
+def test_a_start_whose_answer_is_lost_is_followed_where_it_has_begun(remote: Registers, is_heard: bool) -> None:
+    """Noise on a line costs one request; left alone, the ladder would climb to its end with nobody there."""
+    write = remote.write
+
+    def lose_the_answer(frame: Frame) -> None:
+        write(frame)
+        remote.phase = CalibrationPhase.ZERO if is_heard else remote.phase
+        raise CliError("E131 no answer", exit_codes.DEVICE)
+
+    remote.write = lose_the_answer  # type: ignore[method-assign]
+    run = remote.run
+    assert run
+    if is_heard:
+        run.begin()
+        assert run.look().phase == "zero" and run._beat.ident
+    else:
+        with pytest.raises(CliError, match="E131"):
+            run.begin()
+    run.close()
+
+
+def test_one_lost_answer_ends_no_run_and_more_of_them_are_not_told_as_its_end(remote: Registers, monkeypatch) -> None:
+    """The ladder goes on without us: only the gateway of this machine ends its run with itself."""
+    monkeypatch.setattr(following, "_POLL_S", 0.0)
+    read, lost = remote.read_values, [1]
+
+    def lose_some(registers: list[Any]) -> list[Any]:
+        remote.phase = CalibrationPhase.STOPPED if 0 in remote.words else CalibrationPhase.LADDER
+        if remote.words and lost[0]:
+            lost[0] -= 1
+            raise CliError("E131 no answer", exit_codes.DEVICE)
+        return read(registers)
+
+    remote.read_values = lose_some  # type: ignore[method-assign]
+    run = remote.run
+    assert run
+    run.begin()
+    assert run.look().phase == "ladder"
+    lost[0] = 1_000_000
+    with pytest.raises(CliError) as told:
+        following._watch(run)
+    run.close()
+    assert "the run goes on" in told.value.message and "has ended" not in told.value.message
+
+
+def test_a_stop_that_got_lost_is_sent_again(remote: Registers) -> None:
+    write, said = remote.write, list[int]()
+
+    def lose_the_first_stop(frame: Frame) -> None:
+        said.extend(frame.words)
+        if said == [int(ControlBit.START_CALIBRATION), 0]:
+            raise CliError("E131 no answer", exit_codes.DEVICE)
+        write(frame)
+
+    remote.write = lose_the_first_stop  # type: ignore[method-assign]
+    run = remote.run
+    assert run
+    run.begin()
+    run.stop()
+    run.close()
+    assert remote.words == [int(ControlBit.START_CALIBRATION), 0]
 
 
 @pytest.mark.parametrize(("minor_points", "first_group"), [(0, 1), (32, 2)])
