@@ -6,6 +6,9 @@ import signal
 
 import pytest
 
+from gateway.cli.errors import CliError
+from gateway.cli.verbs import self_test
+from gateway.processes import exit_codes
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.command import Command
 from gateway.registers.rig_rules import BASIC_BITS
@@ -88,3 +91,24 @@ def test_whatever_ends_the_verb_ends_the_test_even_while_it_begins(
         signal.signal(number, before)
     assert answer.exit_code == 1 and "self-test stopped; the force went to 0" in answer.stderr
     assert (rig.words[0], rig.words[-1]) == (int(ControlBit.START_SELF_TEST), 0)
+
+
+@pytest.mark.parametrize(("code", "stops"), [(exit_codes.DEVICE, 1), (exit_codes.FAILED, 0)])
+def test_an_answer_that_is_lost_leaves_no_test_behind_and_a_refusal_disturbs_nobody(code: int, stops: int) -> None:
+    """Refused is who has been overtaken: what presses then is another master's."""
+
+    class Run:
+        stopped = 0
+
+        def begin(self) -> None: ...
+
+        def follow(self, *, shows: bool) -> None:
+            raise CliError("W210 or E131", code)
+
+        def stop(self) -> None:
+            self.stopped += 1
+
+    run = Run()
+    with pytest.raises(CliError, match="W210 or E131"):
+        self_test._run_to_its_end(run, shows=False)  # type: ignore[arg-type]
+    assert run.stopped == stops
