@@ -3,7 +3,7 @@
 A gateway may be writing meanwhile: a last line without its newline is no fault, and lines beyond the head are those since.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,13 +29,16 @@ class AuditVerdict(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def read_audit(state: Path) -> Iterator[dict[str, Any]]:
-    """Yield what the lines say, oldest first, whether or not the chain holds; what is no line is passed over."""
+def read_audit(state: Path, on_left_out: Callable[[], None] = lambda: None) -> Iterator[dict[str, Any]]:
+    """Yield what the lines say, oldest first, whether or not the chain holds; what is no line is passed over. on_left_out:
+    called at each whole line that is none of ours, such as one that was changed."""
     for path in audit_files(state / FOLDER):
         for line in iterate_lines(path):
             try:
                 fields, _ = open_line(line.text)
             except BrokenLine:
+                if line.is_whole:
+                    on_left_out()
                 continue
             yield fields
 

@@ -16,6 +16,7 @@ from gateway.codes.faults import FaultCode
 from gateway.units import format_ms
 
 _SHARE: Final = 0.5
+_WORTH_TELLING_S: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,7 @@ def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: st
         evidence = f"the simulated rig's process waited {format_ms(held.rig_waited_s)} of them for a processor"
         return FaultCode.MACHINE_BUSY, f"{evidence}: {BUSY_CURE}"
     if not held.loop_late_s >= enough_s:  # nor where silent_s is nan
-        return fault, f"{ours}: {suspects}" if held.loop_late_s > 0.0 and suspects else suspects
+        return fault, f"{ours}: {suspects}" if held.loop_late_s >= _WORTH_TELLING_S and suspects else suspects
     if waited_s is not None and waited_s >= _SHARE * held.loop_late_s:
         return FaultCode.MACHINE_BUSY, f"{ours}, {format_ms(waited_s)} of them waiting for a processor: {BUSY_CURE}"
     count_words = (

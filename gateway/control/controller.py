@@ -189,6 +189,7 @@ class Controller:
         self._last_s, self._line, self._moved_by = now_s, line, None
         self._machine.begin_step()
         self._loop.elapse(dt_s, line)
+        self._faults.observe_lateness(now_s, line)
         edges = self._commands.take(now_s, command)
         self._sense(now_s, sample, line)
         self._obey(now_s, edges)

@@ -34,6 +34,7 @@ _NAMES: Final = {
     ControlBit.START_SELF_TEST: "self-test",
 }
 _WHOLE: Final = ControlBit(0)
+_PUSHING: Final = "and a run is made pushing (bit 4 0, enable, wait until status bits 8, 9 are 0)"
 _OFF: Final = State.OFF
 _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
     State.FAULT: RefusalReason.FAULT_LATCHED,
@@ -175,6 +176,8 @@ class EdgeCheck:
             yield from _some(_refuse_blocked(_in(state, at), ControlBit.ENABLE))
         plans = [plan for plan in (CalibrationPlan(), SelfTestPlan()) if edges.rises & _bit_of(plan)]
         for plan in plans:
+            if self._valve is not None and command.control_word & ControlBit.VALVE_PULL:  # it would turn under the run
+                yield _no_run(_reason_of(plan), f"valve_pull is 1, {_PUSHING}", plan)
             yield from _some(self.of_run(plan, _in(state, at)))
             if held := _setpoints(command):
                 yield _no_run(_reason_of(plan), f"{' and '.join(held)}: a run begins with setpoint 0", plan)
@@ -235,7 +238,7 @@ class EdgeCheck:
         if at.state is State.READY and at.applied_n > 0.0:
             return f"state READY with {at.applied_n:.1f} N applied, {begins}"
         if self._valve is not None and (self._valve.is_pulling or self._valve.is_switching):
-            return "the valve pulls or is switching: a run is made pushing (bit 4 0, enable, wait until status bits 8, 9 are 0)"
+            return f"the valve pulls or is switching, {_PUSHING}"
         try:
             self._active_run.build(plan)
         except ValueError as error:
@@ -253,7 +256,7 @@ def _refuse_blocked(at: Situation, bit: ControlBit) -> EdgeRefusal | None:
     if not reason:
         return None
     what = _NAMES[bit]
-    late = f"a device was not heard in time; {at.excuse}" if at.excuse and reason is at.block else ""
+    late = at.excuse if reason is at.block else ""
     line_fault = at.line_fault if reason is RefusalReason.OUTPUT_FAULT else ""
     return EdgeRefusal(reason, bit, f"{what} refused: {late or line_fault or reason.explanation.sentence}")
 

@@ -5,7 +5,8 @@ changes the heartbeat register four times in a lease. When the browser goes (clo
 within GRACE_S (RELOAD_S where its connection has closed) and the lease does its work: no force is held for nobody. A reload
 within that time loses nothing. A command that was refused makes nobody the commander, and who is overtaken ceases to be it.
 
-Disabling is granted to every master, whoever owns the setpoint, and to nobody else's harm: that is what `stop` is.
+Disabling is granted to every master, whoever owns the setpoint, and to nobody else's harm: that is what `stop` is. It ends an
+enable that is on its way, too: that one asks before it writes, and whoever pressed Esc meanwhile wants no force after it.
 """
 
 import asyncio
@@ -51,6 +52,7 @@ class Commands:
         self._present: set[str] = set()
         self._beat: asyncio.Task[None] | None = None
         self._number = 0
+        self._stops = 0  # told so far
 
     # -- who is there
 
@@ -79,11 +81,15 @@ class Commands:
 
     async def enable(self, viewer: str, force_n: float) -> None:
         """Enable, with this setpoint. RefusedCommand says why not."""
+        stops = self._stops
         if self._context.profile.network.require_byte_order_echo:
             await self._write("byte_order_echo@proof", _PROOF)
         word = await self._control_word() | ControlBit.ENABLE
+        if stops != self._stops:
+            raise RefusedCommand("stopped meanwhile: nothing was enabled")
         await self._write_command(word, self._checked(force_n))
-        self._begin_to_beat(viewer)
+        if stops == self._stops:  # else the stop is right behind it
+            self._begin_to_beat(viewer)
 
     async def set_force(self, viewer: str, force_n: float) -> None:
         """Change the setpoint, N."""
@@ -92,6 +98,7 @@ class Commands:
 
     async def stop(self) -> None:
         """Switch the output off, whoever owns the setpoint; ends a run, too. The safe voltage is out before the answer."""
+        self._stops += 1
         self._end_beat()
         self.commander = ""
         await self._write("control_word", 0)

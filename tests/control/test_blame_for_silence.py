@@ -43,6 +43,10 @@ def test_the_larger_part_of_a_silence_is_its_cause(fault: FaultCode, held: Held,
     assert cause_of_silence(fault, nan, held, WIRES)[0] is fault, "never heard: no lateness explains that"
 
 
+def test_a_loop_that_came_in_time_is_not_said_to_have_come_0_ms_late() -> None:
+    assert cause_of_silence(STALE, 0.256, Held(loop_late_s=3e-4), WIRES)[1] == WIRES
+
+
 @pytest.mark.parametrize("is_cell", [True, False])
 @pytest.mark.parametrize("held", [Held(), Held(rig_waited_s=0.09), Held(loop_late_s=0.09, loop_waited_s=0.0)])
 def test_no_alarm_and_no_refusal_names_a_wire_for_a_machine_that_stood_still(is_cell: bool, held: Held) -> None:

@@ -86,7 +86,7 @@ class Stage:
         wired.loop.recordings = self.recordings
         self.calibration_runs = CalibrationRuns(wired.controller, wired.rig, self.state, lambda: wired.now_s, log)
         self.calibration_runs.disk = AtOnce()  # type: ignore[assignment]
-        wired.loop.calibration_runs = self.calibration_runs
+        wired.loop.calibration_runs, self.calibration_runs.decide = self.calibration_runs, wired.loop.refresh
         self.upload = RigCalibrations(wired.rig, self.state).serve(wired.bank, lambda taken: None, log)
         self.upload.run_in_background = lambda work, done: None  # type: ignore[assignment]  # a disk that never answers
         self.plants = RigPlants(wired.rig, self.state)

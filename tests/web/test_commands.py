@@ -92,6 +92,32 @@ def test_stop_ends_the_force_of_another_master_and_nothing_else_does(tmp_path: P
     play(tmp_path, scene)
 
 
+def test_a_stop_ends_an_enable_that_is_still_on_its_way(tmp_path: Path) -> None:
+    """An enable asks control before it writes; a stop in between must not come before that write."""
+
+    async def scene(commands: Commands, stage: Stage) -> None:
+        turn, answer_at_once = asyncio.Lock(), commands._context.control.ask
+
+        async def ask(request: dict[str, Any]) -> dict[str, Any]:
+            async with turn:  # one question at a time, in order, as on control's socket
+                await asyncio.sleep(0)
+                return await answer_at_once(request)
+
+        commands._context.control.ask = ask  # type: ignore[method-assign]
+        for turns in range(1, 8):
+            enable = asyncio.create_task(commands.enable("me", 12.0))
+            for _ in range(turns):
+                await asyncio.sleep(0)
+            await commands.stop()
+            await asyncio.gather(enable, return_exceptions=True)
+            stage.wired.run(0.1)
+            assert stage.wired.state is State.OFF and commands.commander == "", (
+                f"stopped {turns} turns after the enable"
+            )
+
+    play(tmp_path, scene)
+
+
 def test_stop_ends_a_calibration_too(tmp_path: Path) -> None:
     async def scene(commands: Commands, stage: Stage) -> None:
         wired = stage.wired

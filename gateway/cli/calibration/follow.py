@@ -1,10 +1,7 @@
 """Follows a run to its end with a progress bar; Ctrl-C, SIGTERM and a closed terminal take the force to 0, a second one leaves
 at once."""
 
-import signal
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from math import isnan
 from typing import Any, Final
 
@@ -13,13 +10,11 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TaskProgre
 
 from gateway.cli.calibration.runs import ENDED, Run, RunStatus
 from gateway.cli.errors import CliError
+from gateway.cli.master.ending_signals import signals_as_ctrl_c, signals_held_back
 
 _POLL_S: Final = 0.2
 _BEGIN_S: Final = 2.0
 _LEAST_WIDTH: Final = 76
-_LOST: Final = (
-    "the run has ended with it, at the safe voltage; what was recorded is kept: force-gateway calibrate --resume"
-)
 _NAMES: Final = {
     "idle": "starting",
     "zero": "zero and noise",
@@ -41,33 +36,27 @@ class NotBegunError(CliError):
 
 def follow(run: Run) -> dict[str, Any]:
     """Begin the run and wait for its end; how it ended."""
-    run.begin()
-    with _signals_as_ctrl_c(), _progress() as progress:
-        task = progress.add_task("starting", total=1.0, force="", eta="")
+    with signals_as_ctrl_c():
         try:
-            _wait(run, progress, task)
-        except KeyboardInterrupt:
-            run.stop()
-            _wait(run, progress, task)
-        except NotBegunError:
-            raise
-        except CliError as error:
-            raise CliError(f"{error.format_message()}\n{_LOST}", error.exit_code) from None
+            with signals_held_back():
+                run.begin()
+            _watch(run)
+        except (KeyboardInterrupt, OSError):  # OSError: nobody sees any more how it climbs
+            with signals_held_back():
+                run.stop()
+            _watch(run)
     return run.end()
 
 
-@contextmanager
-def _signals_as_ctrl_c() -> Iterator[None]:
-    """An end from outside stops the run at once, instead of when nobody has followed it for a while."""
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    before = {number: handler for number, handler in handlers.items() if handler is not signal.SIG_IGN}  # nohup
-    for number in before:
-        signal.signal(number, signal.default_int_handler)
+def _watch(run: Run) -> None:
+    """Show the run until it has ended."""
     try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        with _progress() as progress:
+            _wait(run, progress, progress.add_task("starting", total=1.0, force="", eta=""))
+    except NotBegunError:
+        raise
+    except CliError as error:
+        raise CliError(f"{error.format_message()}\n{run.lost_words}", error.exit_code) from None
 
 
 def _progress() -> Progress:

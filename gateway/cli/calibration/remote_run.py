@@ -5,8 +5,10 @@ thread: a terminal that is slow to draw costs no lease. Both use one connection,
 """
 
 import threading
+from collections.abc import Callable
+from contextlib import suppress
 from math import nan
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from gateway import defaults
 from gateway.cli.calibration.runs import ENDED, RunStatus
@@ -16,6 +18,7 @@ from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
 from gateway.cli.master.refusal_text import explain_refusals
 from gateway.cli.master.wires import Wire
 from gateway.codes.faults import FaultCode
+from gateway.processes import exit_codes
 from gateway.profiles import load_register_map
 from gateway.registers.words import CalibrationPhase, ControlBit
 
@@ -23,9 +26,17 @@ _WORDS: Final = (
     "calibration_phase", "calibration_progress", "calibration_stored", "force_measured", "output_voltage", "fault_code",
 )  # fmt: skip
 
+_TRIES: Final = 3
+Said = TypeVar("Said")
+
 
 class RemoteRun:
     """A gateway elsewhere; the recording and the report are there, too."""
+
+    lost_words = (
+        "where the gateway lives and its rig has no lease the run goes on, with nobody there: look at it, and end it by "
+        "control_word 0"
+    )
 
     def __init__(self, wire: Wire, unit: int) -> None:
         self._map = load_register_map(defaults.REGISTER_MAP)
@@ -44,13 +55,22 @@ class RemoteRun:
     def begin(self) -> None:
         """Start the run by the control word, and keep its lease from now on."""
         self._before = self.look().phase
-        self._command(int(ControlBit.START_CALIBRATION))
+        try:
+            self._command(int(ControlBit.START_CALIBRATION))
+        except CliError as error:
+            if error.exit_code != exit_codes.DEVICE or not self._has_begun():
+                raise
         self._beat.start()
 
+    def _has_begun(self) -> bool:
+        """Decide whether the run goes although the answer to its start was lost: then it needs somebody who follows it."""
+        with suppress(CliError):
+            return self.look().phase not in ("idle", *ENDED)
+        return False
+
     def look(self) -> RunStatus:
-        """Read from the registers how far the run is."""
-        with self._turn, explain_refusals(self._client):
-            self._values = [reading.value for reading in self._client.read_values(self._registers)]
+        """Read from the registers how far the run is; asked again where an answer is lost, as noise on a line does."""
+        self._values = self._said_again(self._read)
         phase, progress, _, force_n, output_mv, _ = self._values
         name = CalibrationPhase(int(phase)).name.lower()
         if name == self._before and name in ENDED:
@@ -60,8 +80,21 @@ class RemoteRun:
         return RunStatus(name, progress / 1000.0, nan, force_n, output_mv / 1000.0)
 
     def stop(self) -> None:
-        """Stop the run; the force goes to 0."""
-        self._command(0)
+        """Stop the run; the force goes to 0. Said again where nobody has answered: it may not have been heard."""
+        self._said_again(lambda: self._command(0))
+
+    def _read(self) -> list[float]:
+        with self._turn, explain_refusals(self._client):
+            return [reading.value for reading in self._client.read_values(self._registers)]
+
+    def _said_again(self, say: Callable[[], Said]) -> Said:
+        for _ in range(_TRIES - 1):
+            try:
+                return say()
+            except CliError as error:
+                if error.exit_code != exit_codes.DEVICE:
+                    raise
+        return say()
 
     def end(self) -> dict[str, Any]:
         """Return how it ended: phase and number of the stored calibration; sentence: the fault that has ended it."""

@@ -26,7 +26,9 @@ class RunStatus:
 
 
 class Run(Protocol):
-    """A run that can be followed to its end."""
+    """A run that can be followed to its end. lost_words: what becomes of it where its gateway does not answer any more."""
+
+    lost_words: str
 
     def begin(self) -> None:
         """Start the run."""
@@ -48,6 +50,10 @@ class LocalRun:
     """A run on the gateway of this machine, by its control socket. plan: fields of CalibrationPlan or ExperimentPlan;
     earlier: recordings that it goes on from; name: of the calibration.
     """
+
+    lost_words = (
+        "the run has ended with it, at the safe voltage; what was recorded is kept: force-gateway calibrate --resume"
+    )
 
     def __init__(self, state: Path, plan: dict[str, Any], earlier: list[int], name: str = "") -> None:
         self._state = state

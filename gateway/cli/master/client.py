@@ -159,6 +159,9 @@ class GatewayClient:
         except (ModbusException, OSError) as error:
             self.close()
             raise self.wire.no_answer(self._unit, error, has_answered=self._has_answered) from None
+        except KeyboardInterrupt:
+            self.close()  # its answer is still to come, and is none to what is asked next
+            raise
         self._has_answered = True
         if answer.isError():
             raise RefusedError(int(answer.exception_code), request)

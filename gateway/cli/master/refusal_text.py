@@ -53,7 +53,7 @@ def _known_limit(client: GatewayClient, address: int, reason: RefusalReason) -> 
     if not high.is_available or high.value <= 0.0:
         return ""
     asked = f"force_setpoint = {value.value:.2f} N"
-    if value.value > high.value:
+    if not 0.0 <= value.value <= high.value:
         return f"{asked}: allowed 0 .. {high.value:.4g} N by the calibration in use; the rig's own limit may be lower"
     return f"{asked}: beyond the rig's own limit, which no register tells; the calibration in use goes to {high.value:.4g} N"
 

@@ -2,7 +2,7 @@
 
 from difflib import get_close_matches
 from ipaddress import IPv4Address
-from math import isnan
+from math import inf, isnan
 
 from gateway.cli.command_line.numbers import describe_allowed
 from gateway.cli.master.client import RegisterReading
@@ -99,7 +99,9 @@ def _choice(register: Register, text: str) -> float:
 def _number(text: str, expected: str, names: "dict[str, int] | tuple[()]" = ()) -> float:
     text = text.strip()
     try:
-        return int(text, 0)
+        return float(int(text, 0))
+    except OverflowError:
+        return inf  # as what is written with a point, and refused as such
     except ValueError:
         pass
     try:

@@ -87,15 +87,15 @@ class TcpWire:
 
         try:
             return socket.create_connection((self.host, self.port), TIMEOUT_S)
-        except OSError as error:
+        except (OSError, UnicodeError) as error:
             raise self._no_connection(error) from None
 
-    def _no_connection(self, error: OSError) -> CliError:
+    def _no_connection(self, error: OSError | UnicodeError) -> CliError:
         import socket
 
         if isinstance(error, TimeoutError):
             symptom, probably = f"no answer within {TIMEOUT_S:g} s", "wrong address, or a firewall"
-        elif isinstance(error, socket.gaierror):
+        elif isinstance(error, (socket.gaierror, UnicodeError)):  # `a..b`, or a part of over 63 characters
             symptom, probably = "no such host name", "a typo in --gateway"
         else:
             symptom, probably = error.strerror or str(error), "not running, or on another port"

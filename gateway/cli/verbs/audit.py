@@ -34,12 +34,16 @@ def show_command(*, after: str, peer: str | None, as_json: bool, state: StateCho
     """Show who has written what, accepted and refused.
 
     Number, time (UTC), result, peer and role, register, old and new value. What came in streams is summed up: how many
-    writes in how many seconds, and the values between which they were.
+    writes in how many seconds, and the values between which they were. A line that was changed is left out, and told of.
     """
     _directory_of(state)
-    for record in read_audit(state.directory):
+    left_out: list[None] = []
+    for record in read_audit(state.directory, lambda: left_out.append(None)):
         if record.get("time", "") >= after and (peer is None or peer in str(record.get("peer", ""))):
             click.echo(json.dumps(record) if as_json else format_record(record))
+    if left_out:
+        lines = "1 line was" if len(left_out) == 1 else f"{len(left_out)} lines were"
+        click.echo(f"E170 {lines} changed or damaged, and left out: `force-gateway audit verify` says where", err=True)
 
 
 @command.command(name="verify")

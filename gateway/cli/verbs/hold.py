@@ -130,18 +130,19 @@ def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bo
     state_line, began_s = StateLine(as_json=as_json), time.monotonic()
     with _handle_signals(beat):
         beat.start()
-        while beat.is_alive():
-            beat.join(_SHOW_S)
-            now_s = time.monotonic() - began_s
-            if for_s is not None and now_s >= for_s:
-                beat.stopping.set()
-            try:
+        try:
+            while beat.is_alive():
+                beat.join(_SHOW_S)
+                now_s = time.monotonic() - began_s
+                if for_s is not None and now_s >= for_s:
+                    beat.stopping.set()
                 if beat.status:
                     state_line.show(beat.status, now_s)
-            except BrokenPipeError:
-                beat.stopping.set()
-                beat.join()
-                sys.stdout = open("/dev/null", "w")  # noqa: PTH123, SIM115 - nobody reads what would follow
+        except BrokenPipeError:
+            sys.stdout = open("/dev/null", "w")  # noqa: PTH123, SIM115 - nobody reads what would follow
+        finally:  # a full disk behind stdout, too: what ends us lets go of the force first
+            beat.stopping.set()
+            beat.join()
     with suppress(BrokenPipeError):
         state_line.close()
 

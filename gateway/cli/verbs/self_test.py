@@ -3,12 +3,14 @@
 import json
 import sys
 import time
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, json_option
+from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.cli.master.client import GatewayClient
@@ -40,17 +42,36 @@ def command(*, wire: "Wire", unit: int, map_name: str, as_json: bool) -> None:
     with GatewayClient(wire, unit, register_map) as client:
         with explain_refusals(client):
             run = _SelfTest(client)
-        run.begin()
-        try:
-            run.follow(shows=sys.stderr.isatty() and not as_json)
-        except KeyboardInterrupt:
-            run.stop()
-            raise CliError("self-test stopped; the force went to 0") from None
+        _run_to_its_end(run, shows=sys.stderr.isatty() and not as_json)
         with explain_refusals(client):
             answer = run.answer(wire)
     _tell(answer, as_json=as_json)
     if answer["result"] not in ("passed", "warned"):
         sys.exit(1)
+
+
+def _run_to_its_end(run: "_SelfTest", *, shows: bool) -> None:
+    """Begin it and follow it; whatever ends this process ends the test."""
+    from gateway.cli.master.ending_signals import signals_as_ctrl_c, signals_held_back
+
+    has_begun = False
+    with signals_as_ctrl_c():
+        try:
+            with signals_held_back():
+                run.begin()
+                has_begun = True
+            run.follow(shows=shows)
+        except (KeyboardInterrupt, OSError):  # OSError: the terminal is gone
+            with signals_held_back():
+                run.stop()
+            raise CliError("self-test stopped; the force went to 0") from None
+        except CliError as error:
+            if (
+                has_begun and error.exit_code == exit_codes.DEVICE
+            ):  # an answer is lost: nobody would look at it any more
+                with suppress(CliError):
+                    run.stop()
+            raise
 
 
 class _SelfTest:

@@ -7,6 +7,7 @@ refuse an enable.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from typing import Final
 
 from gateway.codes.explanation import BUSY_CURE
@@ -19,6 +20,7 @@ from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
 from gateway.control.supervision.stuck_sensor import StuckSensorCheck
+from gateway.units import format_ms
 
 _WRONG_SIGN, _WRONG_GAIN = FaultCode.SIGN_INVERTED, FaultCode.GAIN_WRONG
 _STUCK_S: Final = 1.0  # that a force must stay at the safe voltage, not only decay
@@ -54,10 +56,14 @@ def stop_cause(fault: FaultCode, detail: str) -> StopCause:
     return StopCause(fault, fault_sentence(fault, detail))
 
 
+def _unheard(excuse: str) -> str:
+    return f"a device was not heard in time; {excuse}" if excuse else ""
+
+
 def _lateness(line: LineStatus, allowed_s: float) -> StopCause:
     """Return the cause of a late loop: internal error or machine load, whichever made the larger part of the lateness."""
     observation = f"the loop came by {line.late_s * 1e3:.0f} ms late, allowed {allowed_s * 1e3:.0f} ms (stall_s)"
-    dropped = "what arrived meanwhile was dropped"
+    dropped = "nothing that arrived meanwhile moves it"
     if line.waited_s is None:
         return stop_cause(FaultCode.LOOP_STALLED, f"{observation}: the machine is overloaded; {dropped}")
     waited = f"{line.waited_s * 1e3:.0f} ms of them it waited for a processor"
@@ -80,6 +86,7 @@ class FaultDetector:
         self._over = 0
         self._response_fault = FaultCode.NONE
         self._stuck_s = 0.0
+        self._stood_still_s, self._stall_ended_s = 0.0, -inf
 
     def expect_noise(self, noise_n: float) -> None:
         """Begin with the cell's noise as the calibration in use has measured it, N; 0: not known."""
@@ -99,6 +106,11 @@ class FaultDetector:
         is_over = reading.overload or abs(reading.contact_n) >= self._limits.over_force_n
         self._over = self._over + 1 if is_over else 0
         self._response_fault = self._rise.judge(response, branch_share, touching, reading.interval_s)
+
+    def observe_lateness(self, now_s: float, line: LineStatus) -> None:
+        """Note a stall of the loop: what a master has sent meanwhile comes now, in OFF as well, where nothing faults."""
+        if line.late_s > self._bounds.stall_s:
+            self._stood_still_s, self._stall_ended_s = line.late_s, now_s
 
     def observe_rest(self, reading: Reading) -> None:
         """Measure how long a force stays at the safe voltage, while disabled. Of either sign: behind a zero that was taken
@@ -143,6 +155,8 @@ class FaultDetector:
             return RefusalReason.CELL_SILENT
         if line.valve is not None and (line.valve.stands is None or line.valve.lost):
             return RefusalReason.VALVE_UNKNOWN
+        if self._stall_words(now_s, line):
+            return RefusalReason.NOT_READY
         if line.acknowledged_v is None or not reading.is_usable or self.is_stuck:
             return RefusalReason.NOT_READY
         return RefusalReason.NONE
@@ -150,11 +164,23 @@ class FaultDetector:
     def excuse(self, block: RefusalReason, now_s: float, reading: Reading, line: LineStatus) -> str:
         """Return why it is not the device that keeps an enable back, or what a cell says in place of readings; else empty."""
         if block is RefusalReason.CELL_SILENT:
-            return cause_of_silence(FaultCode.SAMPLE_STALE, reading.age_s, line.cell_held, line.cell_says)[1]
+            return _unheard(cause_of_silence(FaultCode.SAMPLE_STALE, reading.age_s, line.cell_held, line.cell_says)[1])
         if block is RefusalReason.OUTPUT_FAULT and line.unanswered_since_s is not None and not line.fault:
             silent_s = now_s - line.unanswered_since_s
-            return cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, "")[1]
-        return ""
+            return _unheard(cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, "")[1])
+        return self._stall_words(now_s, line) if block is RefusalReason.NOT_READY else ""
+
+    def _stall_words(self, now_s: float, line: LineStatus) -> str:
+        """Why nothing begins right behind a stall, empty where there was none: what is asked for may have waited in a socket,
+        and a master that has given it up expects no force any more."""
+        stall_s = self._bounds.stall_s
+        if line.late_s > stall_s:
+            late_s = line.late_s
+        elif now_s - self._stall_ended_s < stall_s:
+            late_s = self._stood_still_s
+        else:
+            return ""
+        return f"the loop stood still for {format_ms(late_s)}, and this may have waited meanwhile: ask again"
 
     def first_cause(
         self, now_s: float, reading: Reading, line: LineStatus, expected_n: Callable[[], float]

@@ -39,8 +39,8 @@ Answer = dict[str, Any]
 
 
 class CalibrationRuns:
-    """stored: number of the calibration that the last run gave, 0 for none. disk: what the recordings wait for. Called from the
-    loop only."""
+    """stored: number of the calibration that the last run gave, 0 for none. disk: what the recordings wait for. decide: has the
+    loop decide now, where a run has been asked for: a stop right behind that must find it. Called from the loop only."""
 
     def __init__(
         self, controller: Controller, rig: Rig, state: Path, clock: Callable[[], float], log: Callable[[str, str], None]
@@ -67,6 +67,7 @@ class CalibrationRuns:
         self._ended = ""
         self._decision: Output | None = None
         self._followed_s = 0.0
+        self.decide: Callable[[], None] = lambda: None
 
     # -- asked by this machine
 
@@ -83,8 +84,7 @@ class CalibrationRuns:
         if query.stop:
             self._calibrating.ask_stop("calibration stopped at this machine")
         elif query.plan is not None:
-            self._start(query.plan, query.continues)
-            self._name = query.name
+            self._start(query)
         if refused := self._calibrating.take_refused():
             raise ValueError(refused)
         return self.status()
@@ -117,12 +117,14 @@ class CalibrationRuns:
             **_describe_experiment(plan),
         }
 
-    def _start(self, fields: Any, continues: tuple[int, ...]) -> None:
-        plan = _parse_plan(fields)
+    def _start(self, query: CalibrateRequest) -> None:
+        plan = _parse_plan(query.plan)
         if refused := self._controller.refusal_of_run(self._clock(), plan):
             raise ValueError(refused)
         self._calibrating.ask(plan)
-        self._continues, self._ended, self._result = continues, "", {}
+        self._continues, self._ended, self._result = query.continues, "", {}
+        self._name = query.name
+        self.decide()
 
     def status(self) -> Answer:
         """Return how the run is: phase, progress, time left, and the result of the last one."""

@@ -104,7 +104,7 @@ class RunningRig:
         self._wire_loop(cause)
         rig = self._rig
         self._calibration_runs = CalibrationRuns(self.controller, rig, self._state, time.monotonic, self._log)
-        self.loop.calibration_runs = self._calibration_runs
+        self.loop.calibration_runs, self._calibration_runs.decide = self._calibration_runs, self.loop.refresh
         self._faces = Faces(rig, self.bank, self._on_peer_closed, self._log)
         self._faces.on_served = self._show_faces
         self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)

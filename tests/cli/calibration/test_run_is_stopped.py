@@ -14,7 +14,9 @@ from gateway.cli.calibration.follow import follow
 from gateway.cli.calibration.remote_run import RemoteRun
 from gateway.cli.calibration.resume import RestOfLadder
 from gateway.cli.calibration.runs import RunStatus
+from gateway.cli.errors import CliError
 from gateway.cli.master.client import Frame, RefusedError
+from gateway.processes import exit_codes
 from gateway.registers.words import CalibrationPhase, ControlBit
 
 PREVIEW = {
@@ -67,6 +69,48 @@ def test_whatever_ends_the_terminal_stops_the_run(number: int, monkeypatch: pyte
         assert signal.getsignal(number) is own
     finally:
         signal.signal(number, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("when", ["begins", "has begun"])
+def test_an_end_while_the_run_begins_stops_it_too(number: int, when: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The request may have been heard already: what nobody stops climbs to its end, without anybody there."""
+    monkeypatch.setattr(following, "_POLL_S", 0.0)
+    end, show = (lambda: os.kill(os.getpid(), number)), following._progress
+
+    class Beginning(Climbing):
+        def begin(self) -> None:
+            if when == "begins":
+                end()
+            super().begin()
+
+    def show_first() -> Any:
+        monkeypatch.setattr(following, "_progress", show)
+        if when == "has begun":
+            end()
+        return show()
+
+    monkeypatch.setattr(following, "_progress", show_first)
+    run = Beginning(lambda: None)
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        assert follow(run) == {"phase": "stopped"}
+    except KeyboardInterrupt:
+        pytest.fail(f"left after {run.did}")
+    finally:
+        signal.signal(number, before)
+    assert run.did == ["begin", "stop"]
+
+
+def test_a_terminal_that_is_gone_without_a_signal_stops_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(following, "_POLL_S", 0.0)
+
+    def write_to_nobody() -> None:
+        raise BrokenPipeError
+
+    run = Climbing(write_to_nobody)
+    assert follow(run) == {"phase": "stopped"}
+    assert run.did == ["begin", "look", "stop"]
 
 
 @pytest.mark.parametrize("yes", [0, 1, 2])
@@ -144,6 +188,70 @@ def test_the_end_of_the_run_before_is_not_taken_for_this_ones(remote: Registers)
     remote.phase = CalibrationPhase.STORED
     assert run.look().phase == "stored"
     run.close()
+
+
+@pytest.mark.parametrize("is_heard", [True, False])
+def test_a_start_whose_answer_is_lost_is_followed_where_it_has_begun(remote: Registers, is_heard: bool) -> None:
+    """Noise on a line costs one request; left alone, the ladder would climb to its end with nobody there."""
+    write = remote.write
+
+    def lose_the_answer(frame: Frame) -> None:
+        write(frame)
+        remote.phase = CalibrationPhase.ZERO if is_heard else remote.phase
+        raise CliError("E131 no answer", exit_codes.DEVICE)
+
+    remote.write = lose_the_answer  # type: ignore[method-assign]
+    run = remote.run
+    assert run
+    if is_heard:
+        run.begin()
+        assert run.look().phase == "zero" and run._beat.ident
+    else:
+        with pytest.raises(CliError, match="E131"):
+            run.begin()
+    run.close()
+
+
+def test_one_lost_answer_ends_no_run_and_more_of_them_are_not_told_as_its_end(remote: Registers, monkeypatch) -> None:
+    """The ladder goes on without us: only the gateway of this machine ends its run with itself."""
+    monkeypatch.setattr(following, "_POLL_S", 0.0)
+    read, lost = remote.read_values, [1]
+
+    def lose_some(registers: list[Any]) -> list[Any]:
+        remote.phase = CalibrationPhase.STOPPED if 0 in remote.words else CalibrationPhase.LADDER
+        if remote.words and lost[0]:
+            lost[0] -= 1
+            raise CliError("E131 no answer", exit_codes.DEVICE)
+        return read(registers)
+
+    remote.read_values = lose_some  # type: ignore[method-assign]
+    run = remote.run
+    assert run
+    run.begin()
+    assert run.look().phase == "ladder"
+    lost[0] = 1_000_000
+    with pytest.raises(CliError) as told:
+        following._watch(run)
+    run.close()
+    assert "the run goes on" in told.value.message and "has ended" not in told.value.message
+
+
+def test_a_stop_that_got_lost_is_sent_again(remote: Registers) -> None:
+    write, said = remote.write, list[int]()
+
+    def lose_the_first_stop(frame: Frame) -> None:
+        said.extend(frame.words)
+        if said == [int(ControlBit.START_CALIBRATION), 0]:
+            raise CliError("E131 no answer", exit_codes.DEVICE)
+        write(frame)
+
+    remote.write = lose_the_first_stop  # type: ignore[method-assign]
+    run = remote.run
+    assert run
+    run.begin()
+    run.stop()
+    run.close()
+    assert remote.words == [int(ControlBit.START_CALIBRATION), 0]
 
 
 @pytest.mark.parametrize(("minor_points", "first_group"), [(0, 1), (32, 2)])

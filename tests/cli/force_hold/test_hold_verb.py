@@ -1,6 +1,8 @@
 """`hold` as a person or a script has it: its time, its refusals, its lines, and the words of each end."""
 
+import errno
 import json
+import os
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +12,7 @@ import pytest
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
 from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, HoldWrite, StatusReading
-from gateway.cli.force_hold.state_line import describe_state, document
+from gateway.cli.force_hold.state_line import StateLine, describe_state, document
 from gateway.cli.master.client import GatewayClient
 from gateway.cli.master.wires import TcpWire
 from gateway.cli.verbs import hold
@@ -26,6 +28,17 @@ def test_it_lets_go_by_itself_when_its_time_is_over(fake: Any, call: Any) -> Non
     done = call("hold", "12", "--for", "50ms", "--json", "--gateway", fake.address)
     assert done.exit_code == 0, done.output
     assert json.loads(done.output.splitlines()[-1]) == {"end": "stopped"}
+    assert fake.bank.writes[0][1][:2] == (1, 1200) and fake.bank.writes[-1][1][:2] == (0, 0)
+
+
+@pytest.mark.parametrize("trouble", [errno.ENOSPC, errno.EIO], ids=["full disk", "no terminal"])
+def test_a_line_that_cannot_be_shown_leaves_no_force_behind(trouble: int, fake: Any, call: Any, monkeypatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(trouble, os.strerror(trouble))
+
+    monkeypatch.setattr(StateLine, "show", fail)
+    fake.bank.set("state", State.HOLDING)
+    call("hold", "12", "--gateway", fake.address)
     assert fake.bank.writes[0][1][:2] == (1, 1200) and fake.bank.writes[-1][1][:2] == (0, 0)
 
 

@@ -187,6 +187,13 @@ def test_a_host_that_does_not_exist_is_told(call, monkeypatch) -> None:
     assert "no such host name" in answer.stderr
 
 
+@pytest.mark.parametrize("host", ["cell..3", "c" * 64], ids=["empty part", "long part"])
+def test_a_host_that_no_name_can_be_is_none_that_exists(host: str, call) -> None:
+    answer = call("read", "state", "--gateway", f"{host}:5020")
+    assert answer.exit_code == 69
+    assert answer.stderr.startswith(f"E130 no gateway at {host}:5020: no such host name")
+
+
 def test_a_server_that_hangs_up_is_no_gateway(call) -> None:
     """Somebody who accepts and closes at once, as a gateway does for who is not on its allow-list."""
     with socket.create_server(("127.0.0.1", 0)) as listener:

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -36,6 +37,16 @@ def test_a_force_is_commanded_and_read_back(bank: RegisterBank, gateway: str, ca
     assert facts["state"]["text"] == "holding"
     assert facts["force_measured"]["value"] == 11.97
     assert facts["force_measured@float_cdab"]["value"] == pytest.approx(11.97)
+
+
+def test_a_negative_force_is_not_beyond_a_limit_that_nobody_can_tell(
+    bank: RegisterBank, gateway: str, call, monkeypatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    bank.set_active_model(load_calibration("demo"))
+    answer = call("write", "force_setpoint=-1", "--gateway", gateway)
+    assert answer.exit_code == 1
+    assert answer.stderr.startswith("W204 force_setpoint = -1.00 N: allowed 0 .. 65.23 N by the calibration in use;")
 
 
 def test_shares_weights_and_short_times_are_shown_with_their_digits(bank: RegisterBank, gateway: str, call) -> None:

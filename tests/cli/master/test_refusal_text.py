@@ -134,6 +134,8 @@ def test_a_limit_that_only_registers_can_tell_is_told(
         (("hold", "-3"), "-3 N: allowed 0 .. 327.67 N"),
         (("hold", "--", "nan"), "nan N: allowed 0 .. 327.67 N"),
         (("write", "force_setpoint=400"), "force_setpoint: 400 N: allowed 0 .. 327.67 N"),
+        (("write", f"force_setpoint={'9' * 400}"), "force_setpoint: inf N: allowed 0 .. 327.67 N"),
+        (("write", f"control_word={'9' * 400}"), "control_word = inf is not a whole number"),
         (("write", "voltage_setpoint=99999"), "voltage_setpoint: 99999 mV: allowed 0 .. 10000 mV"),
         (("calibrate", "--groups", "500"), "500: allowed 1 .. 100"),
         (("calibrate", "--step", "0.001"), "0.001 V: allowed at least 0.01 V"),

@@ -55,6 +55,14 @@ def test_a_broken_record_is_said_to_hold_nowhere(state: Path, call) -> None:
     assert json.loads(answer.stdout)["broken"]["line"] == 2
 
 
+def test_a_changed_line_is_not_left_out_without_a_word(state: Path, call) -> None:
+    (path,) = (state / "audit").glob("*.jsonl")
+    path.write_bytes(path.read_bytes().replace(b"10.0.0.6", b"10.0.0.8") + b'{"n": 4, "ti')
+    answer = call("audit", "show", "--json", "--state", state)
+    assert numbers(answer.stdout) == [1, 3]
+    assert answer.stderr.startswith("E170 1 line was changed or damaged, and left out")
+
+
 def test_a_line_that_a_power_cut_has_left_is_told_apart(state: Path, call) -> None:
     (path,) = (state / "audit").glob("*.jsonl")
     path.write_bytes(path.read_bytes() + b'{"n": 4, "ti')

@@ -1,9 +1,14 @@
 """`self-test` against the real bank, with a stand-in for control that decides after three heartbeats."""
 
 import json
+import os
+import signal
 
 import pytest
 
+from gateway.cli.errors import CliError
+from gateway.cli.verbs import self_test
+from gateway.processes import exit_codes
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.command import Command
 from gateway.registers.rig_rules import BASIC_BITS
@@ -22,8 +27,11 @@ class DecidingBank:
         self.bank.on_command = self.hear
         self.result, self.verdicts, self.beats = result, verdicts, set[int]()
         self.words: list[int] = []
+        self.signal_at_start = 0
 
     def hear(self, command: Command) -> None:
+        if self.signal_at_start and not self.words:
+            os.kill(os.getpid(), self.signal_at_start)
         self.words.append(int(command.control_word))
         self.beats.add(command.heartbeat)
         is_over = len(self.beats) > 3 and self.result is not SelfTestResult.RUNNING
@@ -67,3 +75,40 @@ def test_a_rig_without_one_refuses_with_what_to_do(register_map: RegisterMap, se
     bank = RegisterBank(register_map, BankRules(rig_name="irc5-cell", force_max_n=60.0), now=lambda: 0.0)
     answer = call("self-test", "--gateway", serve(bank).address)
     assert answer.exit_code == 1 and "W217" in answer.output and "irc5-cell" not in answer.stdout
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_whatever_ends_the_verb_ends_the_test_even_while_it_begins(
+    number: int, register_map: RegisterMap, serve, call
+) -> None:
+    rig = DecidingBank(register_map, SelfTestResult.RUNNING, {})
+    rig.signal_at_start = number
+    address = serve(rig.bank).address
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        answer = call("self-test", "--gateway", address)
+    finally:
+        signal.signal(number, before)
+    assert answer.exit_code == 1 and "self-test stopped; the force went to 0" in answer.stderr
+    assert (rig.words[0], rig.words[-1]) == (int(ControlBit.START_SELF_TEST), 0)
+
+
+@pytest.mark.parametrize(("code", "stops"), [(exit_codes.DEVICE, 1), (exit_codes.FAILED, 0)])
+def test_an_answer_that_is_lost_leaves_no_test_behind_and_a_refusal_disturbs_nobody(code: int, stops: int) -> None:
+    """Refused is who has been overtaken: what presses then is another master's."""
+
+    class Run:
+        stopped = 0
+
+        def begin(self) -> None: ...
+
+        def follow(self, *, shows: bool) -> None:
+            raise CliError("W210 or E131", code)
+
+        def stop(self) -> None:
+            self.stopped += 1
+
+    run = Run()
+    with pytest.raises(CliError, match="W210 or E131"):
+        self_test._run_to_its_end(run, shows=False)  # type: ignore[arg-type]
+    assert run.stopped == stops

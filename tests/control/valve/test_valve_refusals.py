@@ -1,11 +1,13 @@
 """What the valve refuses: to move under a latched fault, and to have a run begin while it moves."""
 
+import pytest
+
 from gateway.codes.refusals import RefusalReason
 from gateway.control.inputs import ValveStatus
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.registers.words import ControlBit, State
 from gateway.registers.writes.proposed_write import ProposedWrite
-from tests.control.valve.valve_bench import BIT_4, PULL, ValveBench
+from tests.control.valve.valve_bench import BIT_4, PULL, PUSH, ValveBench
 
 
 def test_a_latched_fault_keeps_the_valve_unless_the_same_write_resets_it() -> None:
@@ -30,6 +32,18 @@ def test_no_run_begins_before_the_valve_has_read_back() -> None:
     bench.obeys = True
     bench.run(1.0)
     assert bench.controller.refusal_of_run(bench.now_s, CalibrationPlan()) == ""
+
+
+@pytest.mark.parametrize("run", [ControlBit.START_CALIBRATION, ControlBit.START_SELF_TEST])
+@pytest.mark.parametrize("beside", [ControlBit(0), ControlBit.ENABLE])
+def test_no_run_begins_in_the_write_that_turns_the_valve(run: ControlBit, beside: ControlBit) -> None:
+    """The valve would turn under it, and what was measured pulling would be fitted as a model of pushing."""
+    bench = ValveBench()
+    bench.run(1.0)
+    bench.write(control_word=run | BIT_4 | beside)
+    assert bench.refused and "a run is made pushing" in bench.refused.text
+    assert bench.run(2.0).state is State.OFF
+    assert bench.stands is PUSH
 
 
 def test_where_the_valves_port_is_lost_nothing_is_enabled_however_it_stood() -> None:

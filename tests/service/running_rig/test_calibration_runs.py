@@ -32,7 +32,7 @@ def kept(wired: Wired, state: Path) -> CalibrationRuns:
         lambda cause, sentence: wired.log.append((wired.now_s, sentence)),
     )
     runs.disk = AtOnce()  # type: ignore[assignment]
-    wired.loop.calibration_runs = runs
+    wired.loop.calibration_runs, runs.decide = runs, wired.loop.refresh
     wired.run(0.1)
     return runs
 
