@@ -14,6 +14,7 @@ from gateway.control.limits import (
     VoltageLimiter,
     force_limited,
     is_below_usable,
+    narrow_limits,
     ramp_limited,
     slew_limited,
     strongest,
@@ -109,3 +110,9 @@ def test_the_safe_voltage_is_the_rigs_and_comes_at_once_from_either_side(safe_v)
     assert stage.voltage_v == 9.0
     stage.make_safe()
     assert stage.voltage_v == safe_v
+
+
+@pytest.mark.parametrize(("own_n", "largest_n"), [(None, 50.0), ((2.0, 30.0), 30.0), ((2.0, 80.0), 50.0)])
+def test_of_the_rigs_largest_force_and_a_calibrations_the_smaller_one_counts(own_n, largest_n):
+    """The smallest one stays the rig's: a tool must come to its pre-contact force."""
+    assert narrow_limits(LIMITS, own_n) == replace(LIMITS, force_max_n=largest_n)
