@@ -47,6 +47,9 @@ def test_an_effect_that_is_on_changes_the_plant_and_off_it_is_the_rigs_own(effec
         (("cell.silent", "true"), {"cell.silent": True}),
         (("cell.silent", "0"), {"cell.silent": None}),
         (("noise", "0.5"), {"cell.noise": 0.5}),
+        (("noise", 0), {"cell.noise": 0.0}),
+        (("noise", "off"), {"cell.noise": None}),
+        (("around.temperature_c", "off"), {"around.temperature_c": None}),
         (("unplug", "on"), {"output.unplug": True}),
         (("creep", "0.05"), {"creep.creep_share": 0.05}),
         (("creep.creep_s", 3), {"creep.creep_s": 3.0}),
@@ -99,6 +102,12 @@ def test_an_effect_without_its_column_says_so() -> None:
     alone = setting(**{"feed-drag": "on"})
     assert alone.notes() == ("feed-drag acts by feed_mm_s: set around.feed_mm_s too",)
     assert setting(**{"feed-drag": "on"}, around__feed_mm_s=10).notes() == ()
+
+
+def test_zero_is_a_temperature_and_not_one_that_nobody_has_told() -> None:
+    cold = setting(**{"thermal-zero-drift": "on"}, around__temperature_c="0")
+    assert cold.surroundings().temperature_c == 0.0
+    assert cold.notes() == ()
 
 
 def test_what_is_kept_holds_for_one_run_of_the_gateway(tmp_path) -> None:
