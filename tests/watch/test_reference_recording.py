@@ -143,3 +143,12 @@ def test_the_copy_is_on_the_disk_before_anything_says_that_it_is_the_reference(
     monkeypatch.setattr(reference_recording, "replace_durably", lambda descriptor, name, data: done.append(name))
     keep_reference_recording(tmp_path, recording)
     assert done == [".0007.fgr", "reference", "reference.json"]
+
+
+def test_a_rig_that_has_gone_back_to_its_own_calibration_finds_no_reference(tmp_path: Path) -> None:
+    """Nobody has said of that one that the machine is as it should be; kept, it would pass for a user's choice."""
+    record(tmp_path, calibration=0), record(tmp_path)
+    use_calibration(tmp_path, 2)
+    with lock_directory(tmp_path / "calibrations") as descriptor:
+        write_selection(tmp_path / "calibrations", descriptor, SelectionState(active=Selection(None)))
+    assert FirstGoodRecording(tmp_path).keep(1.0e12) is None

@@ -217,3 +217,13 @@ def test_the_token_of_a_session_s_commands_makes_no_session() -> None:
 def test_a_way_out_of_the_folder_is_no_file_though_it_comes_back(path: str) -> None:
     assert _file("page.css").status_code == 200
     assert _file(path).status_code == 404
+
+
+def test_the_machines_own_name_is_one_only_where_a_token_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a token whoever controls the name, or the network's naming, would be let in."""
+    monkeypatch.setattr(security, "gethostname", lambda: "Cell-PC")
+    asked, open_to_all = Door("0.0.0.0", 8080, TOKEN), Door("127.0.0.1", 8080)
+    for host in ("cell-pc", "CELL-PC:8080"):
+        assert asked.admits_host(host)
+        assert not open_to_all.admits_host(host)
+    assert not asked.admits_host("other-pc")
