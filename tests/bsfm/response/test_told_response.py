@@ -7,17 +7,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gateway.bsfm.response import identification
+from gateway.bsfm.response import identification, lag_fit
 from gateway.bsfm.response.identification import FEWEST_STEPS, measure_response
 from gateway.bsfm.response.lag_fit import (
     HUBER,
     LEAST_SCALE_N,
+    ONE_LAG,
+    RINGING,
+    TWO_LAGS,
     LagFit,
     Shape,
     _guess,
+    _HeldOut,
     _loss,
     _scale_n,
     _share_beyond_end,
+    choose_shapes,
     interval,
 )
 from gateway.bsfm.response.response_model import Lags, StepResponse
@@ -167,3 +172,24 @@ def test_an_interval_holds_the_fit_and_narrows_with_more_steps() -> None:
         widths.append(high - low)
     assert np.all(widths[1] < 0.5 * widths[0])
     assert 1e-4 < widths[1][0] < 0.02
+
+
+@pytest.mark.parametrize(
+    ("two", "are_equal", "beyond", "pair", "chosen"),
+    [
+        (0.99, False, 0.0, 0.1, ONE_LAG),
+        (0.98, False, 0.0, 0.1, TWO_LAGS),
+        (0.98, True, 0.0, 0.85, RINGING),
+        (0.98, True, 0.0, 0.89, TWO_LAGS),
+        (0.99, False, 0.06, 0.85, RINGING),
+        (0.99, False, 0.05, 0.1, ONE_LAG),
+        (1.2, True, 0.0, 0.89, RINGING),
+    ],
+)
+def test_a_second_lag_and_a_pair_of_poles_must_each_be_better_in_steps_that_they_have_not_seen(
+    two: float, are_equal: bool, beyond: float, pair: float, chosen: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    losses = {ONE_LAG: (1.0, False), TWO_LAGS: (two, are_equal), RINGING: (pair, True)}
+    monkeypatch.setattr(lag_fit, "_compute_held_out_loss", lambda steps, shapes: _HeldOut(*losses[shapes]))
+    monkeypatch.setattr(lag_fit, "_share_beyond_end", lambda steps: beyond)
+    assert choose_shapes([]) == chosen
