@@ -199,3 +199,30 @@ def test_noise_before_a_question_to_the_valve_costs_no_answer() -> None:
     clean = pulls.on_valve_bytes(question, pulls.at_s)
     assert clean and pulls.on_valve_bytes(b"\xff\xfe\xfd\xfc\xfb\xfa\xf9\xf8\xf7" + question, pulls.at_s) == clean
     assert World(demo()).on_valve_bytes(question, 100.0) == b""
+
+
+def test_without_a_workpiece_nothing_is_pressed_and_exchanged_wires_show_a_push_as_a_pull(world: World) -> None:
+    held_n = world.sample().force_n
+    world.set(cell__inverted=True)
+    world.wait(0.5)
+    assert world.sample().force_n == pytest.approx(-held_n, abs=1.0)
+    world.set(cell__inverted=False, contact__off=True)
+    world.wait(2.0)
+    assert abs(world.sample().force_n) < 0.2 * held_n
+    world.set(contact__off=False, cell__scale=2.0)
+    world.wait(2.0)
+    assert world.sample().force_n == pytest.approx(2.0 * held_n, rel=0.1)
+
+
+def test_a_valve_takes_its_time_to_move_and_a_stuck_one_never_does() -> None:
+    for is_stuck in (False, True):
+        pulls = World(load_rig("paper-pull", simulated=True))
+        pulls.set(valve__stuck=is_stuck)
+        pulls.at_s += 0.5
+        assert pulls.on_valve_bytes(bytes.fromhex("01050000FF008C3A"), pulls.at_s)
+        signs = []
+        for after_s in (0.0, 0.02, 0.04):
+            pulls.advance(pulls.at_s + after_s)
+            signs.append(pulls.valve.sign)
+        assert signs == [1.0, 1.0, 1.0 if is_stuck else -1.0]
+        assert pulls._now_s == pulls.at_s + 0.04
