@@ -144,6 +144,7 @@ def test_what_control_has_cleared_is_told_with_what_was_asked_for_then(make_bank
     master.write(0, 1, 5000)
     bank.set_active_model(calibration(force_limits_n=(0.0, 40.0)))
     assert (bank.command.force_setpoint_n, bank.command.lowered_from_n) == (40.0, 50.0)
+    assert not bank.command.stops, "a lower limit is no stop"
     bank.clear_command()
     assert (bank.command.force_setpoint_n, bank.command.lowered_from_n) == (0.0, 0.0)
     master.write(0, 1, 1000)
