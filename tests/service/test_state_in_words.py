@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from gateway.live.live_state import LiveState
+from gateway.recording.label import RecordingLabel
 from gateway.registers.words import LimitedBy, State
 from gateway.service.live_answers import _age_s
 from tests.service.test_hostile_requests import PLAN, Stage
@@ -227,3 +228,19 @@ def test_what_the_socket_answers_of_changes_is_what_was_asked(stage: Stage) -> N
     health = ask(stage, do="health")
     assert health["ticks"] == stage.wired.loop.health.ticks
     assert health["loop_time_us"] == pytest.approx(stage.wired.loop.health.loop_time_s * 1e6)
+
+
+@pytest.mark.parametrize("via", ["web", "mqtt", "opcua"])
+def test_who_commands_by_another_way_is_named_by_it(stage: Stage, via: str) -> None:
+    ask(stage, do="modbus", via=via, pdu="060001" + "01f4")
+    assert state_of(stage).owner == via
+    assert ask(stage, do="modbus", via="mqtt" if via == "web" else "web", pdu="0600010064")["pdu"] == "8606"
+
+
+def test_a_recording_is_begun_with_what_was_said_of_it_and_how_long_it_may_last(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = list[Any]()
+    monkeypatch.setattr(stage.recordings, "start", lambda label, for_s: begun.append((label, for_s)) or {})
+    assert ask(stage, do="record", on=True, name="mine", note="a note", for_s=2.5)["ok"]
+    assert begun == [(RecordingLabel("mine", "a note"), 2.5)]

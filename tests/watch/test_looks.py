@@ -51,6 +51,19 @@ def test_only_what_is_younger_than_the_last_healthy_look_is_searched_in() -> Non
     assert bench.searched[1:] == [WINDOW_S]
 
 
+def test_a_search_that_finds_nothing_is_a_healthy_look_and_one_that_cannot_tell_is_none() -> None:
+    """What was searched once and was well is not searched again, half old and half new."""
+    for found, searched in ((WindowVerdict(excitation_v=1.0), 1), (None, 2)):
+        bench = Bench()
+        bench._comparison.judge = lambda window, bench=bench, found=found: bench.searched.append(1.0) or found  # type: ignore[method-assign]
+        bench.is_off = True
+        bench.look_again()
+        bench.look_again(0.5 * WINDOW_S)
+        assert len(bench.searched) == searched
+        bench.look_again(0.2 * WINDOW_S)
+        assert len(bench.searched) == searched + 1
+
+
 def test_a_cause_that_stands_is_searched_for_less_and_less_and_never_given_up() -> None:
     bench = Bench()
     bench.is_off = True

@@ -152,3 +152,14 @@ def test_a_rig_that_has_gone_back_to_its_own_calibration_finds_no_reference(tmp_
     with lock_directory(tmp_path / "calibrations") as descriptor:
         write_selection(tmp_path / "calibrations", descriptor, SelectionState(active=Selection(None)))
     assert FirstGoodRecording(tmp_path).keep(1.0e12) is None
+
+
+def test_an_earlier_recording_that_is_being_written_is_waited_for_though_a_later_one_is_good(tmp_path: Path) -> None:
+    """Two gateways, or a clock that went back: the first good one is the earlier."""
+    use_calibration(tmp_path, 2)
+    first = record(tmp_path)
+    record(tmp_path)
+    os.utime(first, (1000.0, 1000.0))
+    assert FirstGoodRecording(tmp_path).keep(1001.0) is None
+    kept = FirstGoodRecording(tmp_path).keep(2000.0)
+    assert kept is not None and kept.name == first.name

@@ -135,6 +135,15 @@ def test_with_a_token_nothing_is_told_before_the_login(tmp_path: Path, monkeypat
     assert answer(app, "POST", ALIVE, {"cookie": entered.cookie, "x-csrf-token": told["csrf"]}).status == 200
 
 
+def test_another_site_logs_nobody_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a token of its own choice it would command in the name of whoever visits it."""
+    monkeypatch.setattr(security, "_FAILED_LOGIN_S", 0.0)
+    app = page(tmp_path, TOKEN)
+    refused = answer(app, "POST", "/login", {"origin": "http://evil.example"}, TOKEN.encode())
+    assert refused.status == 403 and "set-cookie" not in refused.headers
+    assert answer(app, "POST", "/login", {"origin": "http://127.0.0.1:8080"}, TOKEN.encode()).status == 200
+
+
 def test_guesses_wait_for_one_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Many at once cost as long as one behind the other: else a thousand connections would guess a thousand times a second."""
     monkeypatch.setattr(security, "_FAILED_LOGIN_S", 0.02)

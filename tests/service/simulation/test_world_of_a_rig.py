@@ -226,3 +226,16 @@ def test_a_valve_takes_its_time_to_move_and_a_stuck_one_never_does() -> None:
             signs.append(pulls.valve.sign)
         assert signs == [1.0, 1.0, 1.0 if is_stuck else -1.0]
         assert pulls._now_s == pulls.at_s + 0.04
+
+
+def test_what_is_set_lasts_when_the_valve_moves() -> None:
+    pulls = World(load_rig("paper-pull", simulated=True))
+    pulls.set(air__off=True, cell__noise=0.0)
+    assert pulls.ask(SetVoltage(4.0))
+    assert pulls.on_valve_bytes(bytes.fromhex("01050000FF008C3A"), pulls.at_s)
+    pulls.wait(3.0)
+    assert pulls.valve.sign == -1.0
+    assert float(pulls.twin.pressure_pa) < 1e3
+    pulls.set(air__off=False)
+    pulls.wait(3.0)
+    assert float(pulls.twin.pressure_pa) > 1e4, "and what is commanded, too"
