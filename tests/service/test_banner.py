@@ -9,7 +9,7 @@ import pytest
 
 from gateway.control.settings import LeaseAction
 from gateway.profiles import load_rig
-from gateway.service.banner import Ready, format_banner, ready_fields, tcp_face, try_lines
+from gateway.service.banner import Ready, ServedFace, format_banner, ready_fields, tcp_face, try_lines
 from tests.service.rigs import demo, with_supervision
 
 
@@ -150,3 +150,24 @@ def test_the_page_is_told_where_a_browser_on_this_machine_finds_it() -> None:
     everywhere = format_banner(ready(http={"web": ("0.0.0.0", 8080)}))
     assert "http://127.0.0.1:8080/        (and on this machine's other addresses)" in everywhere
     assert ready_fields(ready())["web"] is None
+
+
+@pytest.mark.parametrize(
+    ("lease_s", "unit", "owner", "line"),
+    [
+        (None, 1, None, "mbpoll -m rtu -b 19200 -P none -a 1 -1 -r 1 /dev/pts/3 1 1200 "),
+        (0.2, 1, None, "force-gateway hold 12 --rtu /dev/pts/3 --rig "),
+        (0.2, 7, "serial:1", "force-gateway hold 12 --rtu /dev/pts/3 --unit 7 --rig "),
+        (None, 1, "serial:2", ""),
+    ],
+)
+def test_a_terminal_of_a_serial_face_is_tried_as_its_rig_wants(
+    lease_s: float | None, unit: int, owner: str | None, line: str
+) -> None:
+    rig = with_supervision(demo(), lease_s=lease_s)
+    rig = replace(rig, network=replace(rig.network, owner=owner))
+    facts = {"is_terminal": True, "unit": unit, "baud": 19200, "host": "serial:1"}
+    face = ServedFace("rtu", "/dev/pts/3", "", facts)
+    text = format_banner(replace(ready(rig=rig), modbus=None, faces=(face,)))
+    assert ("  try " in text) == bool(line)
+    assert f"  try          {line}" in text if line else True

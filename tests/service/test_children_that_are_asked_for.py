@@ -85,6 +85,12 @@ def test_metrics_are_read_only_and_need_no_token_anywhere(listeners: Listeners) 
     assert listeners.addresses["metrics"][0] == "0.0.0.0"
 
 
+def test_a_section_without_a_token_is_no_token(listeners: Listeners) -> None:
+    with pytest.raises(StartError, match="E128"):
+        listeners.open(replace(demo(), web=Web()), {"web": ["0.0.0.0", 0]})
+    assert listeners.sockets == {}
+
+
 def test_a_page_with_a_token_may_be_reached_from_elsewhere(listeners: Listeners) -> None:
     rig = replace(demo(), web=Web(listen="0.0.0.0:0", token="a-secret-of-some-length"))
     listeners.open(rig, {})

@@ -86,6 +86,8 @@ def test_a_line_that_is_closed_reads_and_beats_no_more(ends: Pair) -> None:
         memory = HeartbeatMemory(number)
         guardian = GuardianLine(ends[1], memory)
         reads = ends[1].fileno()
+        guardian.heartbeat(7.5)
+        assert memory.beat_s == 7.5
         guardian.close()
         assert ends[1].fileno() == -1
         assert not asyncio.get_running_loop().remove_reader(reads)

@@ -98,6 +98,7 @@ def test_a_fault_is_told_with_its_cure_and_since_when_and_why_no_enable_is_taken
     (fault,) = state.faults
     assert fault.code == "A311" and fault.title and fault.cure
     assert before_s <= fault.since_unix_s <= time.time()
+    assert state.refusals == stage.wired.bank.refusals
     assert state.state == "fault" and state.enable_block.startswith("W")
     assert state.force.measured_n is None or state.force.measured_n == pytest.approx(0.0, abs=60.0)
 
@@ -159,6 +160,7 @@ def test_a_refusal_of_before_is_none_of_a_later_answer(stage: Stage) -> None:
 def test_what_others_have_is_told_as_they_tell_it(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     parts, loop = stage.server.live._parts, stage.wired.loop
     stage.wired.write(3, 1)
+    stage.wired.run(1.5)
     calibration = {"active": 7, "name": "ladder", "built_in": False}
     monkeypatch.setitem(parts.status, "calibration", lambda: calibration)
     monkeypatch.setitem(parts.status, "plant", lambda: {"active": 3, "name": "stiffer"})
@@ -169,6 +171,8 @@ def test_what_others_have_is_told_as_they_tell_it(stage: Stage, monkeypatch: pyt
     monkeypatch.setattr(loop.health, "loop_time_s", 2e-4)
     monkeypatch.setattr(type(loop.health), "lateness_us", lambda health, share: {0.5: 64, 0.99: 1024}[share])
     loop.cell_counts.garbled, loop.cell_counts.asked = 4, 9
+    loop.output.counts.garbled = 2
+    stage.wired.bank.refusals = 6
     state = state_of(stage)
     assert (state.calibration.number, state.calibration.name, state.calibration.kind) == (7, "ladder", "stored")
     assert (state.plant.number, state.plant.name, state.mode) == (3, "stiffer", "voltage")
@@ -176,6 +180,8 @@ def test_what_others_have_is_told_as_they_tell_it(stage: Stage, monkeypatch: pyt
     assert (told.share, told.said, told.stored, told.result) == (0.25, "well", 17, {"rms_n": 0.2})
     assert (state.loop.missed, state.loop.late_p50_us, state.loop.late_p99_us) == (5, 64, 1024)
     assert state.loop.step_us == pytest.approx(200.0)
+    assert (state.output.garbled, state.refusals) == (2, 6)
+    assert state.writers["mode"].age_s == pytest.approx(1.5, abs=0.06)
     assert (state.load_cell.garbled, state.load_cell.asked) == (4, 9)
 
 

@@ -233,6 +233,7 @@ def test_a_broker_is_told_who_connects_and_known_by_its_certificate(monkeypatch:
     assert (told["host"], told["port"], told["username"], told["password"]) == ("b", 8883, "me", "secret")
     assert told["identifier"] == "force-gateway cell"
     assert told["tls_params"] == ("/ca", "/own", "/key")
+    assert (told["clean_session"], told["keepalive"]) == (True, 10), "nothing of yesterday waits there for us"
     assert told["will"] == ("cell/online", b"false", 0, True)
     plain = Told(None)
     connected(monkeypatch, Broker("b", 1883), plain)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from gateway.fieldbus.settings import ServerSettings
-from gateway.telemetry.opcua_connections import bound_connections
+from gateway.telemetry.opcua_connections import SilenceTimer, bound_connections
 
 
 class Wire(asyncio.Transport):
@@ -99,3 +99,17 @@ def test_who_is_silent_is_cut_and_who_speaks_is_not(connect: Callable[..., Any])
         await leave(first, second)
 
     asyncio.run(asyncio.wait_for(scene(), 20.0))
+
+
+def test_a_timer_that_is_closed_calls_nobody_though_it_has_looked_before() -> None:
+    async def scene() -> list[str]:
+        called = list[str]()
+        timer = SilenceTimer(0.01, lambda: called.append("silent"))
+        await asyncio.sleep(0.006)
+        timer.note_heard()
+        await asyncio.sleep(0.007)  # it has looked, and waits for the rest
+        timer.close()
+        await asyncio.sleep(0.02)
+        return called
+
+    assert asyncio.run(scene()) == []

@@ -4,6 +4,7 @@ import json
 import os
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -163,3 +164,32 @@ def test_an_earlier_recording_that_is_being_written_is_waited_for_though_a_later
     assert FirstGoodRecording(tmp_path).keep(1001.0) is None
     kept = FirstGoodRecording(tmp_path).keep(2000.0)
     assert kept is not None and kept.name == first.name
+
+
+@pytest.mark.parametrize(
+    ("command_v", "lasts_s", "why"),
+    [
+        ([0.0, 1.0, 0.0, 1.0, 0.0, 1.0], 30.0, ""),
+        ([0.0, 1.0, 0.0, 1.0, 0.0], 30.0, "hardly moves"),
+        ([0.0, 1.0, 0.0, 1.0, 0.0, 1.0], 29.9, "shorter than 30 s"),
+        ([0.0, 0.3, 0.0, 0.3, 0.0, 0.3], 30.0, "hardly moves"),
+        ([1.0], 30.0, "shorter than 30 s"),
+        ([], 30.0, "shorter than 30 s"),
+    ],
+)
+def test_a_machine_is_described_by_half_a_minute_of_moves(command_v: list[float], lasts_s: float, why: str) -> None:
+    time_s = 7.0 + np.linspace(0.0, lasts_s, len(command_v))
+    recording = SimpleNamespace(columns={"time_s": time_s, "command_v": np.array(command_v)})
+    told = reference_recording._why_it_says_little(recording)  # type: ignore[arg-type]
+    assert why in told and bool(told) == bool(why)
+
+
+def test_each_recording_is_read_once_for_each_calibration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record(tmp_path, calibration=1), record(tmp_path, calibration=1)
+    read = list[Path]()
+    monkeypatch.setattr(reference_recording, "_is_first_good", lambda path, *_: read.append(path) and False)
+    search = FirstGoodRecording(tmp_path)
+    for number, reads in ((2, 2), (2, 2), (3, 4), (2, 4)):
+        use_calibration(tmp_path, number)
+        assert search.keep(1.0e12) is None
+        assert len(read) == reads

@@ -82,6 +82,11 @@ def test_another_site_reads_nothing(app: Any) -> None:
     assert "access-control-allow-origin" not in answer(app, "GET", "/api/v1/session").headers
 
 
+def test_a_link_on_another_site_may_lead_to_the_page(app: Any) -> None:
+    for path in ("/", "/login"):
+        assert answer(app, "GET", path, {"sec-fetch-site": "cross-site"}).status < 400
+
+
 def test_every_answer_forbids_what_the_page_does_not_need(app: Any) -> None:
     for path, headers in (
         ("/", {}),
