@@ -11,7 +11,6 @@ from gateway.devices.binary.register_access import RegisterAccess, RegisterType
 from gateway.devices.binary.rtu_framing import LONGEST_ADU, answers
 from gateway.devices.binary.weight_registers import RegisterBit, WeightRegisters
 from gateway.devices.exchange import (
-    ForceReading,
     PressureExchange,
     PressureRange,
     Scale,
@@ -20,6 +19,7 @@ from gateway.devices.exchange import (
     VoltageRange,
 )
 from gateway.devices.fields import ValueRefused
+from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample, Quality
 from tests.profile_files import load_device
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from gateway.devices import DeviceProfile, cell_host, output_device, output_host
-from gateway.devices.exchange import ForceReading, VoltageExchange, VoltageRange
+from gateway.devices.exchange import VoltageExchange, VoltageRange
+from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import (
     Accepted,
     ForceSample,
