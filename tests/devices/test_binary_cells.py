@@ -115,3 +115,17 @@ def test_a_value_beyond_the_range_stands_at_its_end() -> None:
         assert isinstance(sample, ForceSample)
         assert abs(sample.raw) >= profile.reading.largest_shown
         assert (sample.raw > 0) == (force_n > 0)
+
+
+def test_a_zero_that_is_none_and_the_lower_byte_first_are_those_of_both_ends() -> None:
+    profile = load_device("hbm-aed-binary")
+    assert profile.read_force
+    usual = cell_device(profile, "N").frame(12.0)
+    for changes in ({"zero_count": 5000.0}, {"frame": "{force:int32-cdab}"}):
+        other = replace(profile, read_force=replace(profile.read_force, **changes))  # type: ignore[arg-type]
+        host, device = cell_host(other, unit="N"), cell_device(other, "N")
+        (sample,) = host.receive(device.frame(12.0), 0.0)
+        assert isinstance(sample, ForceSample)
+        assert sample.force_n == pytest.approx(12.0, abs=host.resolution_n)
+        assert device.frame(12.0) != usual
+    assert device.frame(12.0)[:4] == usual[3::-1]

@@ -18,7 +18,7 @@ from gateway.devices.exchange import (
     VoltageExchange,
     VoltageRange,
 )
-from gateway.devices.fields import ValueRefused
+from gateway.devices.fields import Text, ValueRefused
 from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample, Quality
 from tests.profile_files import load_device
@@ -53,6 +53,11 @@ def bit(register: int) -> RegisterBit:
         (lambda: pressure(WRITES), "function 6 is none of 3 or 4, which read"),
         (lambda: voltage(ask="SET {n:d}", answer="{n:q}"), "is none of d"),
         (lambda: pressure(ask="REQ"), "`answer` is missing"),
+        (lambda: pressure(ask="REQ", answer="{n:q}"), "is none of d"),
+        (lambda: VoltageRange(device=(5.0, 5.0), voltage_v=(0.0, 10.0)), "must rise on both sides"),
+        (lambda: VoltageRange(device=(0.0, 5.0), voltage_v=(10.0, 0.0)), "must rise on both sides"),
+        (lambda: PressureRange(device=(9.0, 5.0), pressure_pa=(0.0, 1.0)), "must rise on both sides"),
+        (lambda: PressureRange(device=(0.0, 5.0), pressure_pa=(1.0, 1.0)), "must rise on both sides"),
         (lambda: Step(ask="INC {n:d}", by=1.0), "a step is a bare word"),
         (lambda: ForceReading(), "`frame` is missing"),
         (lambda: ForceReading(frame="{force:+08.2f}", before="#**"), "there is no `ask`"),
@@ -90,6 +95,17 @@ def test_what_contradicts_itself_is_refused(make: Callable[[], object], told: st
 )
 def test_what_says_one_thing_is_taken(make: Callable[[], object]) -> None:
     assert make()
+
+
+def test_registers_stand_for_the_question_and_the_answer() -> None:
+    asked = pressure(READS)
+    assert (asked.ask, asked.answer) == ("0300010001", "0302{value:uint16}")
+
+
+@pytest.mark.parametrize("text", ["a\x01", "a ", "\u00e4", ""])
+def test_a_text_that_does_not_print_is_not_sent(text: str) -> None:
+    with pytest.raises(ValueRefused, match="not printable text"):
+        Text("name", 8).encode(text)
 
 
 def test_a_scale_begins_where_the_device_does() -> None:

@@ -9,6 +9,8 @@ from gateway.devices.exchange import VoltageExchange, VoltageRange
 from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import (
     Accepted,
+    AskDevice,
+    DeviceStep,
     ForceSample,
     Garbage,
     Pressure,
@@ -87,3 +89,21 @@ def test_a_question_that_is_sent_into_the_middle_of_an_answer_does_not_cut_it(it
     voltage, pressure = host.receive(answer[2:] + device.reply(Pressure(4.5e5)), 0.0)
     assert voltage == Accepted(pytest.approx(5.0, abs=0.01))
     assert isinstance(pressure, Pressure)
+
+
+def test_a_watchdog_that_has_a_sign_of_life_is_fed_by_that_alone() -> None:
+    profile = load_device("icpdas-702x")
+    own = profile.own_watchdog
+    assert own
+    for fed in (True, False):
+        host, device = output_host(profile), output_device(profile)
+        for step in host.checks:
+            if step is not DeviceStep.DISARM:
+                device.receive(host.request(AskDevice(step)), 0.0)
+        for now_s in (0.7 * own.time_s, 1.4 * own.time_s):
+            device.receive(host.sign_of_life if fed else host.request(SetVoltage(1.0)), now_s)
+        assert device.is_tripped is not fed
+
+
+def test_before_any_safe_frame_the_safe_voltage_is_the_lowest(itv: DeviceProfile) -> None:
+    assert output_host(itv).safe_reply == b"0\r\n"
