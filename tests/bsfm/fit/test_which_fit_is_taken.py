@@ -20,7 +20,9 @@ from gateway.bsfm.fit.evaluation import (
     _settings,
     _to_move,
     _with_groups,
+    evaluate,
 )
+from gateway.bsfm.fit.result import Ties
 from gateway.bsfm.ladder.ladder_error import LadderError
 from gateway.bsfm.ladder.measured_ladder import Ladder
 
@@ -50,9 +52,9 @@ def test_only_what_is_usable_and_moderate_may_drive() -> None:
 @pytest.mark.parametrize(
     ("chosen", "best_n", "poor"),
     [
-        (score(1.0), 0.99, False),
-        (score(1.0), 0.99 * POOR_SHARE, True),
-        (score(1.0), 1.01 * POOR_SHARE, False),
+        (score(2.0), 1.98, False),
+        (score(2.0), 1.98 * POOR_SHARE, True),
+        (score(2.0), 2.02 * POOR_SHARE, False),
         (score(1.0, usable=False), 1.0, True),
         (score(1.0, moderate=False), 1.0, True),
     ],
@@ -93,8 +95,8 @@ def test_of_fits_that_are_held_the_lowest_order_is_taken_that_is_nearly_as_good(
 
 
 def test_a_free_optimum_that_may_drive_stays_unless_a_held_one_is_much_better(monkeypatch: pytest.MonkeyPatch) -> None:
-    free = score(1.0)
-    for held_n, stays in ((0.99 * POOR_SHARE, False), (1.01 * POOR_SHARE, True)):
+    free = score(2.0)
+    for held_n, stays in ((1.98 * POOR_SHARE, False), (2.02 * POOR_SHARE, True)):
         taken, notes = held(monkeypatch, {1: held_n}, free, (1,))
         assert (taken is free) == stays == (not notes)
     assert held(monkeypatch, {}, free, (1, 2))[0] is free
@@ -133,11 +135,57 @@ def test_orders_that_the_stairs_cannot_carry_are_not_tried() -> None:
     notes = list[str]()
     ladder = ladder_of(2, 12)
     tried = _possible(ladder, (1, 2, 3, 15), notes)
+    assert _possible(ladder, (3, 4, 5), []) == (3, 4), "nine coefficients, of 12 stairs"
     assert tried and 15 not in tried and notes == [f"12 stairs on a branch: orders above {max(tried)} are not tried"]
     notes.clear()
     assert _possible(ladder, tried, notes) == tried and notes == []
     with pytest.raises(LadderError, match="12 stairs on a branch carry no order of 15"):
         _possible(ladder, (15,), notes)
+
+
+def test_the_branch_with_the_fewest_stairs_in_any_rest_decides() -> None:
+    whole = ladder_of(2, 12)
+    cut = whole.part((whole.group == 0) | (whole.direction > 0) | (whole.voltage_v < 6.0))
+    assert _possible(cut, (1, 2, 3), []) == (1,)
+
+
+def evaluated(monkeypatch: pytest.MonkeyPatch, reversal: Any, *, closed: bool = True, poor: bool = False) -> Any:
+    """The evaluation of a ladder whose fits are made up; the held one is of order 1."""
+    chosen, constrained = score(0.2, order=2), score(0.1, order=1)
+    model = SimpleNamespace(branches=SimpleNamespace(rising=SimpleNamespace(order=2)), force_range_n=(0.0, 50.0))
+    chosen.result.bsfm = constrained.result.bsfm = lambda span_n: model
+    asked = list[Any]()
+    for name, stand_in in {
+        "score_orders": lambda *given: asked.append(given) or [chosen],
+        "choose": lambda scores: chosen,
+        "_is_poor": lambda *_: poor,
+        "_fit_constrained": lambda *_: constrained,
+        "choose_reversal": lambda *_: reversal,
+    }.items():
+        monkeypatch.setattr(evaluation, name, stand_in)
+    checked: Any = SimpleNamespace(ladder=ladder_of(2, 12), closed=closed, minor_v=[], minor_n=[], notes=("checked",))
+    told = evaluate(checked, FitRequest(orders=(1, 2, 15)))
+    return told, asked[0], chosen, constrained, model
+
+
+def test_what_is_chosen_is_told_with_how_it_reverses(monkeypatch: pytest.MonkeyPatch) -> None:
+    told, (_, _, orders, ties, _), chosen, _, model = evaluated(monkeypatch, None)
+    assert (told.chosen, told.model, told.span_n, told.reversal) == (chosen, model, 10.0, None)
+    assert (orders, ties) == ((1, 2), FitRequest().ties)
+    assert [note.partition(":")[0] for note in told.notes] == ["checked", "12 stairs on a branch", "no minor-loop part"]
+    slip = SimpleNamespace(span=SimpleNamespace(span_n=3.0), model=SimpleNamespace(branches=model.branches))
+    told, *_ = evaluated(monkeypatch, slip)
+    assert (told.span_n, told.model, told.reversal) == (3.0, slip.model, slip)
+    assert not any("fitted anew" in note for note in told.notes)
+    slip.model = SimpleNamespace(branches=SimpleNamespace(rising=SimpleNamespace(order=1)))
+    told, *_ = evaluated(monkeypatch, slip)
+    assert "of order 1, which the model keeps" in told.notes[-1]
+
+
+def test_a_poor_choice_is_held_and_a_loop_that_is_cut_off_has_ends_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    told, (_, _, _, ties, _), _, constrained, _ = evaluated(monkeypatch, None, closed=False, poor=True)
+    assert told.chosen is constrained
+    assert ties is Ties.FREE and any("each branch gets its own ends" in note for note in told.notes)
 
 
 def test_outliers_are_treated_as_asked_and_the_curves_span_the_ladder() -> None:
