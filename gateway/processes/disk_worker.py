@@ -35,27 +35,32 @@ class DiskWorker:
 
         try:
             self._need_thread()
+            begun = self._submit(work)
         except OSError as error:
             loop.call_soon(done, error)
             return
-        self._threads.submit(work).add_done_callback(come_back)
+        begun.add_done_callback(come_back)
 
     def begin(self, work: Callable[[], object]) -> None:
         """Begin this, too: nobody waits for it, and it minds its own failures. OSError where it cannot begin. Also outside of a
         loop."""
         self._need_thread()
-        self._threads.submit(work)
+        self._submit(work)
 
     def _need_thread(self) -> None:
         """The executor starts its thread with the first work, and keeps that work for later where it cannot: so the first does
         nothing."""
         if self._has_thread:
             return
+        self._submit(lambda: None)
+        self._has_thread = True
+
+    def _submit(self, work: Work) -> Future[Any]:
+        """What is asked for behind the end is refused, too: what was under way may ask for its next part then."""
         try:
-            self._threads.submit(lambda: None)
+            return self._threads.submit(work)
         except RuntimeError as error:
             raise OSError(errno.EAGAIN, f"no thread for the disk: {error}") from None
-        self._has_thread = True
 
     def close(self) -> None:
         """Take nothing more; what runs comes to its end, and the process waits for it."""

@@ -161,3 +161,19 @@ def test_a_swap_leaves_a_voltage_that_is_driven_directly_alone(bench: Bench):
     assert bench.upload_of(calibration(60))[0] is CommitStatus.COMMITTED
     control.run(0.5)
     assert {voltage_v for time_s, voltage_v in control.voltages() if time_s > 0.9} == {3.0}
+
+
+def test_a_service_that_is_closed_begins_nothing_more_and_says_so(bench: Bench) -> None:
+    """Its thread would hold the process, and the folder, beyond the end."""
+
+    async def upload() -> None:
+        bench.upload.run_in_background = bench.upload._thread
+        bench.upload.close()
+        bench.stage(staged(CoefficientSet.of_calibration(calibration(16))))
+        bench.write(1145, 1)
+        while bench.upload.status()["busy"]:
+            await asyncio.sleep(0)
+
+    asyncio.run(asyncio.wait_for(upload(), 5.0))
+    assert bench.upload.status()["failed"] and bench.log[-1].startswith("E431 no thread for the disk")
+    assert bench.store.list() == []

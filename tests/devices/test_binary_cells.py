@@ -1,6 +1,7 @@
 """Amplifiers that speak in registers or raw bytes: what a status bit means, what is noise, where a value ends."""
 
 from dataclasses import replace
+from math import inf
 
 import pytest
 
@@ -102,8 +103,29 @@ def test_a_value_beyond_the_range_stands_at_its_end() -> None:
     profile = load_device("hbm-aed-binary")
     unit = None if profile.reading.newton_per_unit else "N"
     host, device = cell_host(profile, unit=unit), cell_device(profile, unit)
-    for force_n in (1e12, -1e12):
-        (sample,) = host.receive(device.frame(force_n), 0.0)
+    told = (
+        (1e12, Quality.OK),
+        (-1e12, Quality.OK),
+        (50.0, Quality.OVERLOAD),
+        (-50.0, Quality.OVERLOAD),
+        (-inf, Quality.OK),
+    )
+    for force_n, quality in told:
+        (sample,) = host.receive(device.frame(force_n, quality), 0.0)
         assert isinstance(sample, ForceSample)
         assert abs(sample.raw) >= profile.reading.largest_shown
         assert (sample.raw > 0) == (force_n > 0)
+
+
+def test_a_zero_that_is_none_and_the_lower_byte_first_are_those_of_both_ends() -> None:
+    profile = load_device("hbm-aed-binary")
+    assert profile.read_force
+    usual = cell_device(profile, "N").frame(12.0)
+    for changes in ({"zero_count": 5000.0}, {"frame": "{force:int32-cdab}"}):
+        other = replace(profile, read_force=replace(profile.read_force, **changes))  # type: ignore[arg-type]
+        host, device = cell_host(other, unit="N"), cell_device(other, "N")
+        (sample,) = host.receive(device.frame(12.0), 0.0)
+        assert isinstance(sample, ForceSample)
+        assert sample.force_n == pytest.approx(12.0, abs=host.resolution_n)
+        assert device.frame(12.0) != usual
+    assert device.frame(12.0)[:4] == usual[3::-1]

@@ -162,3 +162,25 @@ def test_closing_while_a_connection_is_refused_leaves_no_timer(run: Any, serve: 
 
     spare = socket.socket()
     run(main())
+
+
+def test_both_families_listen_on_one_port_each_by_itself_and_never_wait() -> None:
+    """A socket of IPv6 that took IPv4 too would keep the other from being opened, and know its callers by other names."""
+
+    async def scene() -> None:
+        try:
+            six = await listener._bind("::", 0)
+        except OSError:
+            pytest.skip("no IPv6 here")
+        port = six[0].getsockname()[1]
+        four = await listener._bind("0.0.0.0", port)
+        try:
+            assert [one.getsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY) for one in six] == [1] * len(six)
+            assert all(one.gettimeout() == 0.0 for one in (*six, *four))
+            with pytest.raises(OSError, match="Address already in use"):
+                await listener._bind("0.0.0.0", port)
+        finally:
+            for one in (*six, *four):
+                one.close()
+
+    asyncio.run(scene())

@@ -3,6 +3,7 @@
 import pytest
 
 from gateway.codes.refusals import RefusalReason
+from gateway.registers import Refusal
 from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import ControlBit
 from gateway.registers.writes.ownership import NOT_IPV4, ip_number
@@ -171,3 +172,46 @@ def test_the_byte_order_proof_needs_no_ownership(bank, master, other):
 )
 def test_owner_ip(host, number):
     assert ip_number(host) == number
+
+
+def test_who_is_no_owner_is_told_what_would_help_on_this_rig(make_bank, master_of):
+    for rules, cure in (
+        ({}, "write control_word with bit 3 to take over"),
+        ({"owner": "10.0.0.1"}, "this rig names its owner"),
+    ):
+        bank = make_bank(**rules)
+        master_of(bank, "10.0.0.1").write(0, 1, 1200)
+        other = master_of(bank, "10.0.0.2")
+        assert other.refusal(other.write, 1, 1300).sentence.endswith(cure)
+
+
+@pytest.mark.parametrize(("first", "word"), [(8, "control_word is 0 .. 15"), (108, "status_word is 100 .. 115")])
+def test_bits_beyond_a_word_are_refused_with_where_it_ends(bank, first, word):
+    with pytest.raises(Refusal, match=word):
+        bank.read_bits(first, 9)
+    assert len(bank.read_bits(first, 8)) == 1
+
+
+def test_a_takeover_in_the_write_that_disables_holds(bank, master, other):
+    master.write(0, 1, 1200)
+    other.write(0, TAKE)
+    assert (bank.owner, other.word(0), other.word(1)) == ("10.0.0.2", 0, 0)
+    assert master.refusal(master.write, 1, 100).reason is RefusalReason.NOT_OWNER
+
+
+def test_a_number_that_is_not_the_echo_proves_no_byte_order(make_bank, master_of, register_map):
+    bank = make_bank(require_byte_order_echo=True)
+    master = master_of(bank, "10.0.0.1")
+    echo = register_map.find("byte_order_echo").address
+    master.refusal(master.write_float, echo, 1234.0)
+    assert master.refusal(master.write, 0, 1).reason is RefusalReason.BYTE_ORDER_UNPROVEN
+    master.write_float(echo, 1234.5)
+    master.write(0, 1)
+
+
+def test_a_voltage_that_is_asked_for_owns_too(bank, master, other):
+    master.write(5, 3000)
+    assert bank.owner == "10.0.0.1"
+    assert other.refusal(other.write, 5, 100).reason is RefusalReason.NOT_OWNER
+    master.write(5, 0)
+    assert bank.owner is None

@@ -13,7 +13,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Role
 from gateway.registers import Refusal, RegisterBank
 from gateway.registers.upload.coefficients import SET_BYTES, CoefficientSet
-from gateway.registers.words import CommitAction, CommitStatus, UploadReason
+from gateway.registers.words import CommitAction, CommitNotice, CommitStatus, UploadReason
 
 CALIBRATION = Calibration(
     number=16,
@@ -128,7 +128,8 @@ def test_commit_is_passed_on_with_the_staged_words_and_reads_zero(bank, master):
     assert (master.word(1144), master.word(1145)) == (5, 0)
     master.write(1145, 2)
     master.write(1145, 0)
-    assert [entry[0] for entry in seen] == [CommitAction.COMMIT, CommitAction.DRY_RUN]
+    master.write(1145, 3)
+    assert [entry[0] for entry in seen] == [CommitAction.COMMIT, CommitAction.DRY_RUN, CommitAction.ROLLBACK]
     assert seen[0][1:] == (400, b"\0\5", master.peer)
 
 
@@ -148,6 +149,21 @@ def test_staging_is_locked_while_a_commit_is_under_way(bank, master):
     bank.staging.show_commit(CommitStatus.FAILED, -1, UploadReason.CRC)
     assert bank.read_registers(1146, 3) == struct.pack(">HhH", 4, -1, 21)
     master.write(1000, 2)
+
+
+def test_what_a_success_does_not_say_is_in_the_notice(bank, master, register_map):
+    bank.staging.show_commit(CommitStatus.COMMITTED, notice=CommitNotice.WITHOUT_STOPS)
+    assert master.word(register_map.find("commit_notice").address) == CommitNotice.WITHOUT_STOPS
+    bank.staging.show_commit(CommitStatus.IDLE)
+    assert master.word(register_map.find("commit_notice").address) == 0
+
+
+def test_who_commits_and_who_chooses_a_slot_is_told_to_the_audit(bank, master):
+    told = []
+    bank.staging.on_commit, bank.staging.on_select = lambda *given: None, lambda *given: None
+    bank.staging.on_act = lambda *given: told.append(given)
+    master.write(1145, 1), master.write(1149, 3), master.write(1145, 0)
+    assert told == [("commit", "commit", master.peer), ("slot_select", "slot 3", master.peer)]
 
 
 def test_a_slot_is_selected_by_its_number(bank, master):

@@ -8,6 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.bsfm import CoefficientLimits, CoefficientReason, Coefficients, Response
+from gateway.bsfm.coefficients import RADII_FROM, SHARES_FROM
+from gateway.bsfm.slip.slip_stops import STOPS_CARRIED, STOPS_MAX
 from gateway.registers.upload.coefficients import BLOCK_BYTES, SET_BYTES, CoefficientSet, set_crc, words_of_block
 from gateway.registers.upload.staging import StagedFault, check_staged
 from gateway.registers.values import float32
@@ -163,3 +165,41 @@ def test_as_many_stops_as_the_registers_carry_are_taken_and_more_than_a_model_ha
 def test_a_calibration_s_response_is_in_its_set():
     measured = replace(calibration(), response=Response(dead_time_s=0.125, lag_s=0.25, second_lag_s=0.5, damping=0.75))
     assert CoefficientSet.of_calibration(measured).response_s == (0.125, 0.25, 0.5, 0.75)
+
+
+def test_a_calibrations_set_has_its_stops_its_response_and_no_more_force_than_both_branches_reach() -> None:
+    response = Response(dead_time_s=0.08, lag_s=0.1, second_lag_s=0.02, damping=0.7)
+    stops = {"slip_radii_v": (0.5, 1.0), "slip_shares": (0.75, 0.25)}
+    given = CoefficientSet.of_calibration(calibration(force_limits_n=(2.0, 900.0), response=response, **stops))
+    assert (given.stops, given.slip_radii_v, given.slip_shares) == (2, (0.5, 1.0), (0.75, 0.25))
+    assert given.response == response
+    reach_n = min(given.rising_handles_n[-1], given.falling_handles_n[-1])
+    assert (given.force_low_n, given.force_high_n) == (2.0, pytest.approx(reach_n))
+
+
+def test_stops_beyond_their_number_are_a_master_that_means_more_of_them() -> None:
+    for where, index in (("slip_radii_v", RADII_FROM), ("slip_shares", SHARES_FROM)):
+        more = (*getattr(SLIP, where), 0.25)
+        fault = fault_of(staged(replace(SLIP, **{where: more})))
+        assert (fault.index, fault.reason) == (index + 2, UploadReason.UNUSED_NOT_ZERO)
+        assert f"index {index + 2}" in fault.sentence(4)
+
+
+def test_a_set_whose_stops_a_read_back_has_cut_is_told_as_such_before_its_crc() -> None:
+    fault = fault_of(staged(replace(SLIP, stops=STOPS_CARRIED + 1), crc=1))
+    assert fault.reason is UploadReason.STOPS_CUT
+    assert fault_of(staged(replace(SLIP, stops=STOPS_MAX + 1))).reason is CoefficientReason.SLIP_STOPS
+
+
+@pytest.mark.parametrize(
+    ("word", "length", "is_part"), [(1, 190, True), (1, 140, True), (151, 190, True), (151, 140, False)]
+)
+def test_an_unused_word_counts_where_it_is_part_of_what_is_sent(word: int, length: int, is_part: bool) -> None:
+    """A set of version 1 ends before the second of them: what lies there is none of it."""
+    block = bytearray(staged(length=length))
+    block[2 * word + 1] = 1
+    covered = bytes(block[:280]) if length == 140 else words_of_block(bytes(block))
+    block[284:288] = struct.pack(">I", set_crc(covered))
+    result = check_staged(bytes(block), LIMITS)
+    is_refused = isinstance(result, StagedFault) and result.reason is UploadReason.UNUSED_NOT_ZERO
+    assert is_refused == is_part, result

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -74,3 +75,72 @@ def test_what_has_waited_until_the_end_is_still_told(ends: Pair) -> None:
     assert asyncio.run(scene()) > 0
     last = message_link.receive(ends[0])
     assert last and last.body == {"text": "internal error: ZeroDivisionError()"}
+
+
+def test_a_line_that_is_closed_reads_and_beats_no_more(ends: Pair) -> None:
+    """Its number may be another file's by then, and the memory goes with it."""
+    number = os.memfd_create("beat")
+
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        memory = HeartbeatMemory(number)
+        guardian = GuardianLine(ends[1], memory)
+        reads = ends[1].fileno()
+        guardian.heartbeat(7.5)
+        assert memory.beat_s == 7.5
+        guardian.close()
+        assert ends[1].fileno() == -1
+        assert not asyncio.get_running_loop().remove_reader(reads)
+        with pytest.raises(ValueError, match="released"):
+            memory.beat(1.0)
+
+    asyncio.run(scene())
+    os.close(number)
+
+
+def test_a_simulated_rig_that_comes_again_is_followed_to_its_ports_and_its_process(ends: Pair) -> None:
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        guardian, moved, failed = GuardianLine(ends[1]), list[dict[str, str]](), list[dict[str, Any]]()
+        asyncio.get_running_loop().set_exception_handler(lambda loop, context: failed.append(context))
+        guardian.on_ports = moved.append
+        asked = asyncio.create_task(guardian.simulated_ports("demo"))
+        await asyncio.sleep(0)
+        need = message_link.receive(ends[0])
+        assert need and (need.tag, need.body) == (message_link.NEED_RIG, {"rig": "demo"})
+        message_link.send(ends[0], message_link.RIG, {"ptys": {"output": "/dev/pts/1"}, "pid": 7})
+        assert await asked == {"output": "/dev/pts/1"}
+        assert (guardian.rig_pid, moved) == (7, [])
+        for body in ({"pid": 8, "failed": True}, {"ptys": {"output": "/dev/pts/2"}, "pid": 9}):
+            message_link.send(ends[0], message_link.RIG, body)
+            while guardian.rig_pid != body["pid"]:
+                await asyncio.sleep(0.001)
+        assert (moved, failed) == ([{"output": "/dev/pts/2"}], [])
+        guardian.close()
+
+    asyncio.run(asyncio.wait_for(scene(), 5.0))
+
+
+def test_what_the_guardian_is_told_are_its_own_words(ends: Pair) -> None:
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        guardian.note_safe()
+        guardian.ready({"port": 5020}, 0.4)
+        for now_s in (1.0, 1.02, 1.051, 1.09, 1.102):
+            guardian.heartbeat(now_s)
+        told = [message_link.receive(ends[0]) for _ in range(5)]
+        assert [one and (one.tag, one.body) for one in told] == [
+            (message_link.SAFE, {}),
+            (message_link.READY, {"port": 5020, "stall_s": 0.4}),
+            *[(message_link.HEARTBEAT, {})] * 3,
+        ]
+        ends[0].setblocking(False)
+        with pytest.raises(BlockingIOError):
+            message_link.receive(ends[0])
+        message_link.send(ends[0], message_link.STOP)
+        await asyncio.wait_for(guardian.told_to_stop.wait(), 2.0)
+        assert guardian.is_gone is False
+        guardian.close()
+
+    asyncio.run(scene())

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.live.live_state import LiveState
 from gateway.registers.words import State
@@ -86,6 +87,16 @@ def test_an_alarm_keeps_the_time_at_which_it_rose(stage: Stage) -> None:
     times.follow(decision)
     times.follow(decision._replace(warnings=WarningBit.SLOW_LOOP))
     assert times.since(WarningBit.SLOW_LOOP) == 1060.0
+
+
+def test_a_fault_that_rises_alone_keeps_its_time_too(stage: Stage) -> None:
+    now_s = [1000.0]
+    times, decision = AlarmTimes(lambda: now_s[0]), stage.wired.loop.decision
+    assert decision is not None
+    for fault in (FaultCode.SAMPLE_STALE, FaultCode.SAMPLE_STALE, FaultCode.OVER_FORCE):
+        times.follow(decision._replace(fault=fault))
+        now_s[0] += 60.0
+    assert (times.since(FaultCode.SAMPLE_STALE), times.since(FaultCode.OVER_FORCE)) == (now_s[0], 1120.0)
 
 
 def test_a_taken_address_ends_the_start_unless_any_will_do() -> None:

@@ -97,3 +97,21 @@ def test_without_a_limit_and_behind_its_end_a_recording_that_has_ended_begins_no
         retention.hasten()
         retention.tick(1e6)
     assert begun == []
+
+
+def test_a_recording_that_has_become_long_is_a_reason_to_look_where_there_is_a_limit(tmp_path: Path) -> None:
+    async def run() -> list[int]:
+        counts = []
+        for retention in (Retention(days=1.0), Retention()):
+            looks: list[object] = []
+            pruning = RecordingRetention(tmp_path, retention, Said())  # type: ignore[arg-type]
+            pruning._worker.close()
+            pruning._worker = lambda work, done, looks=looks: looks.append(work)  # type: ignore[assignment,misc]
+            pruning.tick(10.0)
+            pruning.hasten()
+            pruning.tick(11.0)
+            pruning.tick(12.0)
+            counts.append(len(looks))
+        return counts
+
+    assert asyncio.run(run()) == [2, 0]

@@ -1,11 +1,10 @@
-"""What a start says and leaves behind: the banner, the JSON line, the flag of an unclean run, the rules for the bank."""
+"""What a start says and leaves behind: the flag of an unclean run, the rules for the bank."""
 
 import asyncio
 import errno
 import json
 from dataclasses import replace
 from ipaddress import ip_network
-from math import inf, nan
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -14,13 +13,11 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
-from gateway.control.settings import LeaseAction
 from gateway.modbus import Role
 from gateway.ports import PortError
 from gateway.processes import exit_codes
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.profiles import Rig
-from gateway.service.banner import Ready, format_banner, ready_fields, tcp_face, try_lines
 from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.service.running_rig import starting
 from gateway.service.running_rig.bank_rules import bank_rules, plain_role, server_settings
@@ -32,110 +29,7 @@ from gateway.service.running_rig.starting import (
     open_again,
     warning_notes,
 )
-from tests.service.rigs import demo, with_supervision
-
-
-def ready(**changes: object) -> Ready:
-    facts = {
-        "rig": demo(),
-        "modbus": ("127.0.0.1", 5020),
-        "output_port": "/dev/pts/4",
-        "cell_port": "/dev/pts/6",
-        "voltage_v": 0.0,
-        "force_n": 0.004,
-    }
-    facts |= changes
-    return Ready(**({"faces": (tcp_face(*facts["modbus"], facts["rig"].network.units),)} | facts))  # type: ignore[arg-type,misc,attr-defined]
-
-
-def test_the_banner_says_where_and_what_and_how_to_try() -> None:
-    text = format_banner(ready())
-    for words in (
-        "rig demo (simulated, seed 7)",
-        "calibration demo: bsfm n=2",
-        "127.0.0.1:5020   units 0, 1, 255",
-        "/dev/pts/4       smc-itv-rc 9600  ok   0.000 V",
-        "/dev/pts/6       stream-st-gs 115200  ok   0.00 N",
-        "none (demo): a command lasts until the next one",
-        "mbpoll -1 -p 5020 -r 1 127.0.0.1 1 1200",
-        "READY  loop 100 Hz · Ctrl-C ramps the force to 0 and stops · not a safety device",
-    ):
-        assert words in text
-    assert text.splitlines()[-1].startswith("READY")
-
-
-def test_a_silent_device_is_not_shown_as_zero() -> None:
-    text = format_banner(ready(voltage_v=None, force_n=None, notes=("E111 /dev/pts/6: silence at every speed",)))
-    assert text.count("silent") == 2
-    assert "  note         E111 /dev/pts/6" in text
-
-
-@pytest.mark.parametrize("force_n", [nan, inf, -inf])
-def test_an_overloaded_cell_is_not_shown_as_well(force_n: float) -> None:
-    assert "stream-st-gs 115200  beyond its range\n" in format_banner(ready(force_n=force_n))
-
-
-def test_the_command_to_try_names_another_gateway() -> None:
-    text = format_banner(ready(modbus=("10.0.0.9", 502)))
-    assert "mbpoll -1 -p 502 -r 1 10.0.0.9 1 1200" in text
-    assert "--gateway 10.0.0.9:502" in text
-    assert "--gateway" not in format_banner(ready())
-
-
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
-        ({}, "force-gateway hold 12        (enable"),
-        ({"lease_s": 0.15}, "force-gateway hold 12        (enable"),
-        ({"lease_s": 0.05}, "force-gateway hold 12 --rig "),
-    ],
-)
-def test_with_a_lease_the_line_to_try_keeps_a_heartbeat(changes: dict[str, float], expected: str) -> None:
-    (line,) = try_lines(with_supervision(demo(), **({"lease_s": 0.2} | changes)), "127.0.0.1", 5020)
-    assert line.startswith(expected)
-
-
-def test_the_lines_to_try_are_of_the_rig_at_hand() -> None:
-    rig = demo()
-    network = replace(rig.network, units=(7,), allow=(ip_network("127.0.0.0/8"),))
-    mbpoll, write, hold = try_lines(replace(rig, network=network), "0.0.0.0", 502)
-    assert mbpoll.startswith("mbpoll -1 -a 7 -p 502 -r 1 127.0.0.1 1 1200 ")
-    assert "--gateway 127.0.0.1:502 --unit 7" in write and "--gateway 127.0.0.1:502 --unit 7" in hold
-    closed = replace(rig, network=replace(rig.network, allow=(ip_network("10.0.0.0/8"),)))
-    assert "--gateway THIS-MACHINE:5020" in try_lines(closed, "0.0.0.0", 5020)[1], "loopback may not connect there"
-    owned = replace(rig, network=replace(rig.network, owner="192.168.1.5"))
-    assert try_lines(owned, "127.0.0.1", 5020) == ("force-gateway monitor        (192.168.1.5 alone may command)",)
-    proving = replace(rig, network=replace(rig.network, require_byte_order_echo=True))
-    assert try_lines(proving, "127.0.0.1", 5020)[0].startswith("force-gateway hold 12 ")
-    limits = replace(rig.control.limits, force_max_n=9.0)
-    weak = replace(rig, control=replace(rig.control, limits=limits))
-    assert "1 500 " in try_lines(weak, "127.0.0.1", 5020)[0]
-    assert "--gateway [::1]:5020" in try_lines(rig, "::1", 5020)[1]
-
-
-def test_a_lease_is_told_with_its_length_and_what_follows() -> None:
-    rig = with_supervision(demo(), lease_s=0.2, lease_action=LeaseAction.RAMP)
-    assert "lease        200 ms, then ramp" in format_banner(ready(rig=rig))
-    assert "none: a command lasts until the next one" in format_banner(ready(rig=replace(demo(), simulated=False)))
-
-
-def test_the_json_line_is_json_and_tells_the_ports() -> None:
-    facts = json.loads(json.dumps(ready_fields(ready(modbus=("127.0.0.1", 40123), notes=("a",)))))
-    assert facts["ready"] is True
-    assert facts["modbus"] == ["127.0.0.1", 40123]
-    assert facts["ptys"] == {"output": "/dev/pts/4", "load_cell": "/dev/pts/6"}
-    assert facts["notes"] == ["a"]
-    assert ready_fields(ready(rig=replace(demo(), simulated=False)))["ptys"] == {}
-
-
-def test_the_page_is_told_where_a_browser_on_this_machine_finds_it() -> None:
-    near = ready(http={"web": ("127.0.0.1", 8080), "metrics": ("::1", 9464)})
-    assert "web          http://127.0.0.1:8080/\n" in format_banner(near)
-    assert "metrics      http://[::1]:9464/metrics\n" in format_banner(near)
-    assert ready_fields(near)["web"] == ["127.0.0.1", 8080]
-    everywhere = format_banner(ready(http={"web": ("0.0.0.0", 8080)}))
-    assert "http://127.0.0.1:8080/        (and on this machine's other addresses)" in everywhere
-    assert ready_fields(ready())["web"] is None
+from tests.service.rigs import demo
 
 
 def test_only_a_run_that_never_ended_is_unclean(tmp_path: Path) -> None:

@@ -127,3 +127,9 @@ def test_another_cause_of_the_same_trouble_is_no_second_warning(wired, reports):
 def test_a_truth_is_no_number(reports):
     reports.answer(told(0, "", looks=True))
     assert "looks" not in reports.figures()
+
+
+def test_what_the_watch_says_of_an_end_is_what_is_told(wired, reports):
+    reports.answer(told(ResidualCause.LINEAR_DRIFT))
+    reports.answer(told(ResidualCause.NONE, "it has gone by itself"))
+    assert wired.said("it has gone by itself")

@@ -183,3 +183,68 @@ def test_who_has_nothing_to_say_waits_until_there_is_something(monkeypatch: pyte
 
 def test_a_password_is_shown_to_nobody() -> None:
     assert "secret" not in repr(Broker("b", 1883, "me", "secret"))
+
+
+class Told:
+    """The library, as far as it is told who connects; it never has a broker."""
+
+    MqttError = MqttError
+
+    def __init__(self, *ends: Exception | None) -> None:
+        self.ends = deque(ends)
+        self.clients: list[dict[str, Any]] = []
+
+    def Will(self, topic: str, payload: bytes, qos: int, retain: bool) -> Any:  # noqa: N802
+        return topic, payload, qos, retain
+
+    def TLSParameters(self, *files: str | None) -> Any:  # noqa: N802
+        return files
+
+    def Client(self, host: str, port: int, **more: Any) -> "Told":  # noqa: N802
+        self.clients.append(more | {"host": host, "port": port})
+        return self
+
+    async def __aenter__(self) -> "Told":
+        end = self.ends.popleft()
+        if end is not None:
+            raise end
+        return self
+
+    async def __aexit__(self, *_: object) -> None: ...
+
+    async def subscribe(self, topic: str, qos: int) -> None:
+        raise MqttError("broken pipe") if self.ends else asyncio.CancelledError
+
+
+def connected(monkeypatch: pytest.MonkeyPatch, broker: Broker, library: Told) -> list[str]:
+    """What is said while the library goes through its ends."""
+    said = list[str]()
+    monkeypatch.setattr(broker_connection, "import_library", lambda name: library)
+    monkeypatch.setattr(broker_connection, "check_plain", lambda file: None)
+    with pytest.raises(asyncio.CancelledError):
+        asyncio.run(keep_connected(broker, Session(), said.append, again_s=0.0))
+    return said
+
+
+def test_a_broker_is_told_who_connects_and_known_by_its_certificate(monkeypatch: pytest.MonkeyPatch) -> None:
+    library = Told(None)
+    connected(monkeypatch, Broker("b", 8883, "me", "secret", "/ca", "/own", "/key"), library)
+    (told,) = library.clients
+    assert (told["host"], told["port"], told["username"], told["password"]) == ("b", 8883, "me", "secret")
+    assert told["identifier"] == "force-gateway cell"
+    assert told["tls_params"] == ("/ca", "/own", "/key")
+    assert (told["clean_session"], told["keepalive"]) == (True, 10), "nothing of yesterday waits there for us"
+    assert told["will"] == ("cell/online", b"false", 0, True)
+    plain = Told(None)
+    connected(monkeypatch, Broker("b", 1883), plain)
+    assert plain.clients[0]["tls_params"] is None
+
+
+def test_a_broker_that_goes_and_comes_is_told_once_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    away, back = "E181 the MQTT broker b:1883 is away", "the MQTT broker b:1883 is back"
+    refused = ConnectionRefusedError("nobody listens")
+    said = connected(monkeypatch, Broker("b", 1883), Told(None, refused, refused, None, MqttError("no"), None))
+    assert [sentence.partition(" (")[0] for sentence in said] == [away, back, away, back]
+    assert "(broken pipe)" in said[0]
+    at_first = connected(monkeypatch, Broker("b", 1883), Told(refused, None))
+    assert [sentence.partition(" (")[0] for sentence in at_first] == [away, back]

@@ -2,6 +2,7 @@
 
 import asyncio
 import itertools
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -177,3 +178,59 @@ def test_bd_seq_goes_on_where_the_process_before_has_ended(tmp_path: Path) -> No
         (tmp_path / "sparkplug.json").write_text(damage)
         assert KeptBdSeq(tmp_path).next() == 0
     assert [KeptBdSeq(tmp_path / "nowhere").next() for _ in range(2)] == [0, 0], "no disk: counts in memory only"
+
+
+def field(number: int, wire_type: int, content: bytes) -> bytes:
+    return bytes([number << 3 | wire_type]) + content
+
+
+def metric(*fields: bytes) -> bytes:
+    body = b"".join(fields)
+    return field(2, 2, bytes([len(body)]) + body)
+
+
+NAME = field(1, 2, b"\x01a")
+
+
+@pytest.mark.parametrize(
+    ("content", "value"),
+    [
+        (field(10, 0, b"\x05"), 5),
+        (field(14, 0, b"\x01"), True),
+        (field(12, 5, struct.pack("<f", 1.5)), 1.5),
+        (field(13, 1, struct.pack("<d", 2.5)), 2.5),
+        (field(15, 2, b"\x02hi"), "hi"),
+        (field(12, 1, struct.pack("<d", 2.5)), None),
+        (field(13, 5, struct.pack("<f", 1.5)), None),
+        (field(12, 0, b"\x05"), None),
+    ],
+)
+def test_a_value_is_read_as_its_field_and_one_of_another_width_is_none(content: bytes, value: object) -> None:
+    assert decode_values(metric(NAME, content)) == {"a": value}
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        metric(field(1, 0, b"\x05")),
+        metric(NAME)[:-1],
+        field(2, 2, b"\x05" + NAME),
+        field(3, 1, bytes(7)),
+        field(3, 3, b""),
+        field(3, 0, b"\xff" * 11),
+        field(3, 0, b""),
+    ],
+)
+def test_what_is_no_payload_is_refused_whole(payload: bytes) -> None:
+    with pytest.raises(ValueError, match=r"no text|beyond the payload|wire type|without an end|within a number"):
+        decode_values(payload)
+
+
+def test_a_number_in_the_place_of_a_metric_is_none() -> None:
+    assert decode_values(field(2, 0, b"\x05") + metric(NAME, field(10, 0, b"\x01"))) == {"a": 1}
+
+
+def test_numbers_of_every_length_are_written_as_they_are_read() -> None:
+    numbers = [0, 1, 0x7F, 0x80, 0x3FFF, 0x4000, 2**32, 2**64 - 1]
+    metrics = [SparkplugMetric(str(number), DataType.UINT64, number, 0) for number in numbers]
+    assert decode_values(encode_payload(0, metrics, 0)) == {str(number): number for number in numbers}

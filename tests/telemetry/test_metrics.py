@@ -3,6 +3,7 @@
 import asyncio
 import json
 import re
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -117,3 +118,23 @@ def test_a_control_that_refuses_to_say_is_one_that_does_not_answer() -> None:
             raise ValueError("too many questions")
 
     assert asyncio.run(read_gateway(Refusing())) is None  # type: ignore[arg-type]
+
+
+def test_what_the_watch_has_found_is_told_by_number_and_name_and_nothing_where_no_watch_speaks() -> None:
+    told = {"cause": 12, "name": "coulomb-friction", "rms_n": 0.3, "age_s": None}
+    found = samples("\n".join(exposition(replace(reading(), health=HEALTH | {"residual": told}))) + "\n")
+    residual = {key: value for key, value in found.items() if "residual" in key[0] and "model" not in key[0]}
+    assert residual == {
+        ("force_gateway_residual_cause", frozenset({("name", "coulomb-friction")})): 12.0,
+        ("force_gateway_residual_rms_newtons", frozenset()): 0.3,
+    }
+    for nothing in ({}, {"residual": None}):
+        health = {key: value for key, value in HEALTH.items() if key != "residual"} | nothing
+        names = {name for name, _ in samples("\n".join(exposition(replace(reading(), health=health))) + "\n")}
+        assert not any("residual_cause" in name for name in names)
+
+
+def test_a_pressure_that_no_device_reports_is_left_out() -> None:
+    state = reading().state
+    silent = replace(reading(), state=replace(state, force=replace(state.force, pressure_kpa=None)))
+    assert "pressure_pascals" not in "\n".join(exposition(silent))

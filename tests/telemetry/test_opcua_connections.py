@@ -3,12 +3,13 @@
 import asyncio
 from collections.abc import Callable
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from gateway.fieldbus.settings import ServerSettings
-from gateway.telemetry.opcua_connections import bound_connections
+from gateway.telemetry.opcua_connections import SilenceTimer, bound_connections
 
 
 class Wire(asyncio.Transport):
@@ -99,3 +100,49 @@ def test_who_is_silent_is_cut_and_who_speaks_is_not(connect: Callable[..., Any])
         await leave(first, second)
 
     asyncio.run(asyncio.wait_for(scene(), 20.0))
+
+
+class Timers:
+    """A loop of which only the timers count, moved by hand."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+        self.waiting: list[tuple[float, Callable[[], None]]] = []
+
+    def time(self) -> float:
+        return self.now_s
+
+    def call_later(self, delay_s: float, what: Callable[[], None]) -> Any:
+        entry = (self.now_s + delay_s, what)
+        self.waiting.append(entry)
+        return SimpleNamespace(cancel=lambda: self.waiting.remove(entry))
+
+    def pass_to(self, now_s: float) -> None:
+        self.now_s = now_s
+        due = [entry for entry in self.waiting if entry[0] <= now_s]
+        self.waiting = [entry for entry in self.waiting if entry[0] > now_s]
+        for _, what in due:
+            what()
+
+
+def test_silence_is_counted_from_the_last_word_and_a_closed_timer_waits_for_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    timers, called = Timers(), list[float]()
+    monkeypatch.setattr(asyncio, "get_running_loop", lambda: timers)
+    timer, other = (SilenceTimer(10.0, lambda: called.append(timers.now_s)) for _ in range(2))
+    timers.pass_to(106.0)
+    timer.note_heard()
+    timers.pass_to(110.0)
+    assert called == [110.0], "the other one has heard nothing"
+    timers.pass_to(116.0)
+    assert called == [110.0, 116.0]
+    third = SilenceTimer(10.0, lambda: called.append(timers.now_s))
+    third.note_heard()
+    timers.pass_to(120.0)
+    third.note_heard()
+    timers.pass_to(126.0)  # it has looked, and waits for the rest
+    third.close()
+    assert timers.waiting == [] and other is not timer
+    timers.pass_to(200.0)
+    assert called == [110.0, 116.0]

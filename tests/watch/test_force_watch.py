@@ -70,3 +70,20 @@ def test_what_was_counted_against_one_plant_is_not_held_against_the_next(watch: 
     watch.follow(PlantSince(4, 170.0))
     assert looked(watch, held(170.0, 60.0, 0.9)) == "", "one look is none"
     assert looked(watch, held(170.0, 60.0, 0.9)) != ""
+
+
+@pytest.mark.parametrize("share", [0.2, 0.3])
+def test_a_quarter_of_the_rigs_band_is_what_matters(tmp_path: Path, share: float) -> None:
+    """Of a wide band, too: 8 N leave 2 N to nobody's concern."""
+    rows = dict(zip(COLUMNS, held(0.0, 60.0, 0.2).T, strict=True))
+    keep_reference(tmp_path, ForceReference(3, "0001.rec", 0, error_blocks(commanded_force(rows))))
+    wide = ForceWatch(tmp_path, 8.0)
+    wide.follow(PlantSince(3, 100.0))
+    for _ in range(2):
+        looked(wide, held(100.0, 60.0, 0.2 + share * 8.0))
+    assert bool(wide.sentence) == (share > 0.25)
+
+
+def test_a_ring_without_a_row_says_nothing(watch: ForceWatch) -> None:
+    watch.look(b"", COLUMNS)
+    assert looked(watch, held(100.0, 0.04, 5.0)) == ""

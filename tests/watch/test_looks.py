@@ -8,6 +8,7 @@ import pytest
 
 from gateway.registers.residual_cause import ResidualCause
 from gateway.twin.plant import Plant, with_value
+from gateway.watch.plant_comparison import PlantComparison
 from gateway.watch.reference import WatchReference
 from gateway.watch.residual_watch import Watch, WatchSettings
 from gateway.watch.warning_filter import WindowVerdict
@@ -51,6 +52,19 @@ def test_only_what_is_younger_than_the_last_healthy_look_is_searched_in() -> Non
     assert bench.searched[1:] == [WINDOW_S]
 
 
+def test_a_search_that_finds_nothing_is_a_healthy_look_and_one_that_cannot_tell_is_none() -> None:
+    """What was searched once and was well is not searched again, half old and half new."""
+    for found, searched in ((WindowVerdict(excitation_v=1.0), 1), (None, 2)):
+        bench = Bench()
+        bench._comparison.judge = lambda window, bench=bench, found=found: bench.searched.append(1.0) or found  # type: ignore[method-assign]
+        bench.is_off = True
+        bench.look_again()
+        bench.look_again(0.5 * WINDOW_S)
+        assert len(bench.searched) == searched
+        bench.look_again(0.2 * WINDOW_S)
+        assert len(bench.searched) == searched + 1
+
+
 def test_a_cause_that_stands_is_searched_for_less_and_less_and_never_given_up() -> None:
     bench = Bench()
     bench.is_off = True
@@ -87,3 +101,23 @@ def test_only_a_delay_of_the_size_of_a_serial_line_is_the_lines(delay_s: float, 
     found: Any = SimpleNamespace(plant=with_value(plant, "regulator", "delay_s", 0.15 + delay_s))
     reference.take_line_delays(found)
     assert reference.plant.regulator.delay_s == pytest.approx(0.15 + delay_s if is_taken else 0.15)
+
+
+@pytest.mark.parametrize(
+    ("excitation_v", "moves", "is_settled", "suits"),
+    [(0.2, 4, False, True), (0.19, 4, False, False), (0.2, 3, False, False), (0.0, 0, True, True)],
+)
+def test_the_first_window_must_have_been_moved_and_later_ones_need_not(
+    excitation_v: float, moves: int, is_settled: bool, suits: bool
+) -> None:
+    reference: Any = SimpleNamespace(is_settled=is_settled)
+    comparison = PlantComparison(reference, None, 0.1)  # type: ignore[arg-type]
+    told = comparison.why_unsuitable(Window(None, 0.0, excitation_v, moves))  # type: ignore[arg-type]
+    assert told == ("" if suits else "too little was commanded to begin with")
+
+
+def test_what_is_usual_is_exceeded_by_a_quarter_and_what_is_not_known_by_anything() -> None:
+    reference = WatchReference(Plant())
+    assert reference.is_exceeded(window(1.0), 0.0)
+    reference.raise_floor(window(1.0), 0.4)
+    assert [reference.is_exceeded(window(1.0), rms_n) for rms_n in (0.49, 0.51)] == [False, True]

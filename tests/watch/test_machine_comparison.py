@@ -17,6 +17,7 @@ from gateway.diagnosis.changes.machine_document import read_machine
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT
 from gateway.registers.residual_cause import ResidualCause
+from gateway.twin.plant import with_value
 from gateway.watch import described_machine as room
 from gateway.watch import machine_comparison
 from gateway.watch.machine_comparison import MachineComparison
@@ -82,6 +83,9 @@ def test_a_described_machine_is_kept_and_read_again(tmp_path, monkeypatch):
     (tmp_path / "reference" / "machine.json").write_bytes(b"torn")
     room.described_machine(tmp_path, kept, DEFAULT_PLANT)
     assert len(made) == 2
+    other = with_value(DEFAULT_PLANT, "friction", "coulomb_n", 7.0)
+    room.described_machine(tmp_path, kept, other)
+    assert made[2:] == [other], "what was described from another plant is another machine"
 
 
 def named_after_s(effect: str, size: float, tmp_path: Path) -> tuple[float, ResidualCause, str]:

@@ -4,6 +4,7 @@ import json
 import os
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -143,3 +144,52 @@ def test_the_copy_is_on_the_disk_before_anything_says_that_it_is_the_reference(
     monkeypatch.setattr(reference_recording, "replace_durably", lambda descriptor, name, data: done.append(name))
     keep_reference_recording(tmp_path, recording)
     assert done == [".0007.fgr", "reference", "reference.json"]
+
+
+def test_a_rig_that_has_gone_back_to_its_own_calibration_finds_no_reference(tmp_path: Path) -> None:
+    """Nobody has said of that one that the machine is as it should be; kept, it would pass for a user's choice."""
+    record(tmp_path, calibration=0), record(tmp_path)
+    use_calibration(tmp_path, 2)
+    with lock_directory(tmp_path / "calibrations") as descriptor:
+        write_selection(tmp_path / "calibrations", descriptor, SelectionState(active=Selection(None)))
+    assert FirstGoodRecording(tmp_path).keep(1.0e12) is None
+
+
+def test_an_earlier_recording_that_is_being_written_is_waited_for_though_a_later_one_is_good(tmp_path: Path) -> None:
+    """Two gateways, or a clock that went back: the first good one is the earlier."""
+    use_calibration(tmp_path, 2)
+    first = record(tmp_path)
+    record(tmp_path)
+    os.utime(first, (1000.0, 1000.0))
+    assert FirstGoodRecording(tmp_path).keep(1001.0) is None
+    kept = FirstGoodRecording(tmp_path).keep(2000.0)
+    assert kept is not None and kept.name == first.name
+
+
+@pytest.mark.parametrize(
+    ("command_v", "lasts_s", "why"),
+    [
+        ([0.0, 1.0, 0.0, 1.0, 0.0, 1.0], 30.0, ""),
+        ([0.0, 1.0, 0.0, 1.0, 0.0], 30.0, "hardly moves"),
+        ([0.0, 1.0, 0.0, 1.0, 0.0, 1.0], 29.9, "shorter than 30 s"),
+        ([0.0, 0.3, 0.0, 0.3, 0.0, 0.3], 30.0, "hardly moves"),
+        ([1.0], 30.0, "shorter than 30 s"),
+        ([], 30.0, "shorter than 30 s"),
+    ],
+)
+def test_a_machine_is_described_by_half_a_minute_of_moves(command_v: list[float], lasts_s: float, why: str) -> None:
+    time_s = 7.0 + np.linspace(0.0, lasts_s, len(command_v))
+    recording = SimpleNamespace(columns={"time_s": time_s, "command_v": np.array(command_v)})
+    told = reference_recording._why_it_says_little(recording)  # type: ignore[arg-type]
+    assert why in told and bool(told) == bool(why)
+
+
+def test_each_recording_is_read_once_for_each_calibration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record(tmp_path, calibration=1), record(tmp_path, calibration=1)
+    read = list[Path]()
+    monkeypatch.setattr(reference_recording, "_is_first_good", lambda path, *_: read.append(path) and False)
+    search = FirstGoodRecording(tmp_path)
+    for number, reads in ((2, 2), (2, 2), (3, 4), (2, 4)):
+        use_calibration(tmp_path, number)
+        assert search.keep(1.0e12) is None
+        assert len(read) == reads

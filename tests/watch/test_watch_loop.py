@@ -144,3 +144,19 @@ def test_a_force_that_is_worse_is_told_before_the_long_search_and_its_end_too(sc
     assert order == ["at once worse", "look 1", "tells worse"]
     assert scene.times_s("at once worse") == [160.0]
     assert scene.times_s("at once ") == [260.0]
+
+
+def test_each_look_also_looks_for_a_first_good_recording_and_a_full_disk_stops_nothing(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = list[float]()
+
+    def keep(now_s: float) -> None:
+        asked.append(now_s)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(
+        "gateway.watch.reference_recording.FirstGoodRecording", lambda state: SimpleNamespace(keep=keep)
+    )
+    watch(scene)
+    assert asked == scene.times_s("look 1")

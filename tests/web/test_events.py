@@ -7,6 +7,7 @@ from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from gateway.live.ring_rows import RingRows
@@ -221,3 +222,63 @@ def test_a_gateway_that_does_not_answer_is_said_and_what_it_logged_is_shown(
     told = asyncio.run(scene())
     assert [(data["code"], data["text"]) for kind, data in told if kind == "note"] == [("A310", "master lost")]
     assert "does not answer" in told[-1][1]["sentence"]
+
+
+@pytest.mark.parametrize("count", [0, 1, 11, 12, 13, 24, 25, 999])
+def test_a_screen_gets_no_more_rows_than_it_can_show_evenly_spaced_and_the_newest_one(count: int) -> None:
+    times = np.arange(count, dtype=float)
+    shown = events._shown({"time_s": times, "unknown": times}, 12) if count else events._shown({}, 12)
+    rows = shown.get("time_s", [])
+    assert set(shown) <= {"time_s"}
+    assert min(count, 12) / 2 <= len(rows) <= 12 or count == 0 == len(rows)
+    assert rows[-1:] == list(times[-1:])
+    assert len(set(np.diff(rows))) <= 1
+
+
+def test_who_comes_late_is_shown_the_last_minute_and_what_was_logged(
+    tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The ring holds more than a minute where rows are few."""
+    monkeypatch.setattr(events, "_KEPT_NOTES", 3)
+    for number in range(2000):
+        ring[1].append((number / 10, *(0.0 for _ in COLUMNS[1:])))
+    with EventLog(lambda line: None, source="control", file=EventFile(tmp_path)) as log:
+        for number in range(5):
+            log("control", f"line {number}")
+
+    async def scene() -> list[tuple[str, Any]]:
+        source = EventSource(Context(tmp_path), RingRows(ring[0]), Commands())  # type: ignore[arg-type]
+        told = []
+        for _ in range(2):  # the second comes back: what was logged is shown again, once
+            stream = source.stream("me")
+            told = [read(await anext(stream)) for _ in range(5)]
+            await stream.aclose()
+        await source.close()
+        return told
+
+    _, (kind, history), *notes = asyncio.run(scene())
+    assert kind == "history"
+    assert history["time_s"][-1] - history["time_s"][0] == pytest.approx(60.0, abs=0.2)
+    assert [data["text"] for _, data in notes] == [f"line {number}" for number in range(2, 5)]
+
+
+def test_one_that_leaves_does_not_end_the_reading_for_the_others(
+    tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(events, "_SAMPLES_S", 0.001)
+
+    async def scene() -> None:
+        source = EventSource(Context(tmp_path), RingRows(ring[0]), Commands())  # type: ignore[arg-type]
+        stays, leaves = source.stream("stays"), source.stream("leaves")
+        for one in (stays, leaves):
+            await anext(one)
+        await leaves.aclose()
+        put(ring[1], 0, 50)
+        async with asyncio.timeout(5.0):
+            while read(await anext(stays))[0] != "samples":
+                pass
+        await stays.aclose()
+        assert source._task is None, "nobody looks any more"
+        await source.close()
+
+    asyncio.run(scene())

@@ -82,6 +82,11 @@ def test_another_site_reads_nothing(app: Any) -> None:
     assert "access-control-allow-origin" not in answer(app, "GET", "/api/v1/session").headers
 
 
+def test_a_link_on_another_site_may_lead_to_the_page(app: Any) -> None:
+    for path in ("/", "/login"):
+        assert answer(app, "GET", path, {"sec-fetch-site": "cross-site"}).status < 400
+
+
 def test_every_answer_forbids_what_the_page_does_not_need(app: Any) -> None:
     for path, headers in (
         ("/", {}),
@@ -133,6 +138,15 @@ def test_with_a_token_nothing_is_told_before_the_login(tmp_path: Path, monkeypat
     assert "HttpOnly" in entered.headers["set-cookie"] and "SameSite=strict" in entered.headers["set-cookie"]
     told = answer(app, "GET", "/api/v1/session", {"cookie": entered.cookie}).json
     assert answer(app, "POST", ALIVE, {"cookie": entered.cookie, "x-csrf-token": told["csrf"]}).status == 200
+
+
+def test_another_site_logs_nobody_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a token of its own choice it would command in the name of whoever visits it."""
+    monkeypatch.setattr(security, "_FAILED_LOGIN_S", 0.0)
+    app = page(tmp_path, TOKEN)
+    refused = answer(app, "POST", "/login", {"origin": "http://evil.example"}, TOKEN.encode())
+    assert refused.status == 403 and "set-cookie" not in refused.headers
+    assert answer(app, "POST", "/login", {"origin": "http://127.0.0.1:8080"}, TOKEN.encode()).status == 200
 
 
 def test_guesses_wait_for_one_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,3 +231,13 @@ def test_the_token_of_a_session_s_commands_makes_no_session() -> None:
 def test_a_way_out_of_the_folder_is_no_file_though_it_comes_back(path: str) -> None:
     assert _file("page.css").status_code == 200
     assert _file(path).status_code == 404
+
+
+def test_the_machines_own_name_is_one_only_where_a_token_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a token whoever controls the name, or the network's naming, would be let in."""
+    monkeypatch.setattr(security, "gethostname", lambda: "Cell-PC")
+    asked, open_to_all = Door("0.0.0.0", 8080, TOKEN), Door("127.0.0.1", 8080)
+    for host in ("cell-pc", "CELL-PC:8080"):
+        assert asked.admits_host(host)
+        assert not open_to_all.admits_host(host)
+    assert not asked.admits_host("other-pc")

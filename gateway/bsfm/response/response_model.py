@@ -74,7 +74,7 @@ class StepResponse:
     @cached_property
     def _slope_at_end(self) -> float:
         """N/V over the last third of the way; where the model's range ends there, not more than twice that of the whole."""
-        third = slice(-PATH_POINTS // 3, None) if self.way > 0.0 else slice(0, PATH_POINTS // 3)
+        third = slice(-(PATH_POINTS // 3), None) if self.way > 0.0 else slice(0, PATH_POINTS // 3)
         whole = float(np.ptp(self.path_n) / np.ptp(self.path_v))
         return min(2.0 * whole, float(np.ptp(self.path_n[third]) / max(np.ptp(self.path_v[third]), SAME_V)))
 

@@ -8,7 +8,7 @@ middle costs a frame. `frame` of the profile names the format: {force:int32} COF
 """
 
 import struct
-from math import isfinite
+from math import copysign, isfinite
 from typing import Final
 
 from gateway.devices.fields import RegisterNumber
@@ -80,5 +80,5 @@ class HbmCellDevice(TemplateCellDevice):
         """Return one measured value; beyond its range it stands at its end."""
         raw = force_n / self._newton_per_unit + self._reading.zero_count
         if quality is Quality.OVERLOAD or not isfinite(raw):
-            raw = self._reading.largest_shown
+            raw = copysign(self._reading.largest_shown, raw)
         return self._format.encode(round(raw))

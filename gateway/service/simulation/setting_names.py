@@ -73,7 +73,7 @@ def parse_assignment(name: str, value: Value | str) -> dict[str, Value | None]:
     """Return what NAME=VALUE sets, by whole names; None: it is as the rig's own again. ValueError: E132, E133."""
     name = ALIASES.get(name, name)
     if setting := BY_SETTING.get(name):
-        return {name: _value_of(setting, value) or None}
+        return {name: _value_of(setting, value)}
     effect = BY_NAME.get(name.partition(".")[0])
     if effect is None:
         raise ValueError(_explain_unknown(name))
@@ -138,14 +138,15 @@ def _parameter_of(effect: Effect, name: str) -> Parameter:
     return found
 
 
-def _value_of(setting: Setting, value: Value | str) -> Value:
+def _value_of(setting: Setting, value: Value | str) -> Value | None:
+    """Return what is set, None where it is switched off. A zero is a number: 0 degC is a temperature that is known."""
     if not setting.is_switch:
         off = _switch(value) is False
-        return 0.0 if off else _number(setting.name, value, setting.low, setting.high, setting.unit)
+        return None if off else _number(setting.name, value, setting.low, setting.high, setting.unit)
     switch = _switch({"1": True, "0": False}.get(str(value), value))
     if switch is None:
         raise ValueError(f"E133 {setting.name}={value}: allowed are on and off (or true and false)")
-    return switch
+    return switch or None
 
 
 def _switch(value: Value | str) -> bool | None:

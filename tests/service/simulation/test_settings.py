@@ -10,7 +10,14 @@ from gateway.profiles import load_rig
 from gateway.service.simulation.demonstration import DEMONSTRATIONS
 from gateway.service.simulation.kept_settings import KeptSettings
 from gateway.service.simulation.requests import SimulationRequests
-from gateway.service.simulation.setting_names import FAULTS, SURROUNDINGS, parse_assignment
+from gateway.service.simulation.setting_names import (
+    FAULTS,
+    SURROUNDINGS,
+    effect_settings,
+    find_unit,
+    list_cleared_names,
+    parse_assignment,
+)
 from gateway.service.simulation.settings import SimulationSettings
 from gateway.service.socket_requests import SimulationRequest
 from tests.service.rigs import demo
@@ -45,8 +52,12 @@ def test_an_effect_that_is_on_changes_the_plant_and_off_it_is_the_rigs_own(effec
     ("assignment", "wanted"),
     [
         (("cell.silent", "true"), {"cell.silent": True}),
+        (("cell.silent", "1"), {"cell.silent": True}),
         (("cell.silent", "0"), {"cell.silent": None}),
         (("noise", "0.5"), {"cell.noise": 0.5}),
+        (("noise", 0), {"cell.noise": 0.0}),
+        (("noise", "off"), {"cell.noise": None}),
+        (("around.temperature_c", "off"), {"around.temperature_c": None}),
         (("unplug", "on"), {"output.unplug": True}),
         (("creep", "0.05"), {"creep.creep_share": 0.05}),
         (("creep.creep_s", 3), {"creep.creep_s": 3.0}),
@@ -71,6 +82,8 @@ def test_an_assignment_means(assignment, wanted) -> None:
         (("cell.noise", "nan"), "out of range"),
         (("cell.silent", "2"), "allowed are on and off"),
         (("creep.creep_s", "on"), "is not a number"),
+        (("cell.noise", "50.1"), "allowed: 0 .. 50 N"),
+        (("cell.scale", "0.001"), "allowed: 0.01 .. 100"),
     ],
 )
 def test_what_cannot_be_set_is_refused_with_what_can(assignment, said) -> None:
@@ -99,6 +112,12 @@ def test_an_effect_without_its_column_says_so() -> None:
     alone = setting(**{"feed-drag": "on"})
     assert alone.notes() == ("feed-drag acts by feed_mm_s: set around.feed_mm_s too",)
     assert setting(**{"feed-drag": "on"}, around__feed_mm_s=10).notes() == ()
+
+
+def test_zero_is_a_temperature_and_not_one_that_nobody_has_told() -> None:
+    cold = setting(**{"thermal-zero-drift": "on"}, around__temperature_c="0")
+    assert cold.surroundings().temperature_c == 0.0
+    assert cold.notes() == ()
 
 
 def test_what_is_kept_holds_for_one_run_of_the_gateway(tmp_path) -> None:
@@ -143,3 +162,68 @@ def test_what_cannot_be_kept_leaves_what_was_kept_as_it_was(tmp_path: Path) -> N
     with pytest.raises(OSError, match="Is a directory"):
         kept.write(setting(cell__noise=0.7))
     assert kept.read().values == {"cell.noise": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "allowed"),
+    [
+        ("cell.silent", "", "on, off"),
+        ("cell.noise", "N", "0 .. 50 N"),
+        ("cell.scale", "1", "0.01 .. 100"),
+        ("around.tilt_deg", "deg", "-360 .. 360 deg"),
+    ],
+)
+def test_what_a_setting_takes_is_told_with_its_unit_and_its_ends_are_taken(name: str, unit: str, allowed: str) -> None:
+    (known,) = [one for one in (*FAULTS, *SURROUNDINGS) if one.name == name]
+    assert (find_unit(name), known.allowed) == (unit, allowed)
+    if unit:
+        assert [parse_assignment(name, end) for end in (known.low, known.high)] == [
+            {name: known.low},
+            {name: known.high},
+        ]
+
+
+def test_units_of_effects_are_those_of_the_catalogue_and_what_is_none_has_none() -> None:
+    for effect in EFFECTS:
+        for parameter in effect.parameters:
+            assert find_unit(f"{effect.name}.{parameter.name}") == parameter.unit
+    assert find_unit("nothing") == ""
+    listed = {one.name: one for one in effect_settings()}
+    assert set(listed) == {f"{effect.name}.{one.name}" for effect in EFFECTS for one in effect.parameters}
+    assert (listed["creep.creep_s"].unit, listed["creep.creep_s"].low) == ("s", 0.3)
+
+
+@pytest.mark.parametrize(
+    ("name", "cleared"),
+    [
+        ("noise", ("cell.noise",)),
+        ("cell.silent", ("cell.silent",)),
+        ("creep", ("creep.creep_share", "creep.creep_s")),
+        ("creep.creep_s", ("creep.creep_s",)),
+    ],
+)
+def test_a_name_clears_what_it_sets(name: str, cleared: tuple[str, ...]) -> None:
+    assert list_cleared_names(name) == cleared
+
+
+@pytest.mark.parametrize("name", ["creep.speed", "crep", "cell.slient"])
+def test_what_is_no_name_clears_nothing(name: str) -> None:
+    with pytest.raises(ValueError, match="E132"):
+        list_cleared_names(name)
+
+
+def test_the_cells_own_noise_is_another_ones_where_it_is_set_and_its_own_again_without() -> None:
+    plant = demo().plant
+    assert plant
+    assert setting(cell__noise=0.5).plant_of(plant).cell.noise_n == 0.5
+    assert setting(cell__noise=0).plant_of(plant).cell.noise_n == 0.0
+    assert setting(cell__noise="off").plant_of(plant) == plant
+
+
+@pytest.mark.parametrize(
+    "kept",
+    ['{"run": "first"}', '{"set": {}}', '{"run": "first", "set": 5}', '{"run": "first", "set": {"crep": 1}}', "[]", ""],
+)
+def test_what_is_kept_and_makes_no_sense_is_nothing(tmp_path: Path, kept: str) -> None:
+    (tmp_path / "simulation.json").write_text(kept)
+    assert KeptSettings(tmp_path, "first").read() == SimulationSettings()

@@ -1,0 +1,173 @@
+"""What a start says to people and to programs: where everything is, how it is, and lines to try that work there."""
+
+import json
+from dataclasses import replace
+from ipaddress import ip_network
+from math import inf, nan
+
+import pytest
+
+from gateway.control.settings import LeaseAction
+from gateway.profiles import load_rig
+from gateway.service.banner import Ready, ServedFace, format_banner, ready_fields, tcp_face, try_lines
+from tests.service.rigs import demo, with_supervision
+
+
+def ready(**changes: object) -> Ready:
+    facts = {
+        "rig": demo(),
+        "modbus": ("127.0.0.1", 5020),
+        "output_port": "/dev/pts/4",
+        "cell_port": "/dev/pts/6",
+        "voltage_v": 0.0,
+        "force_n": 0.004,
+    }
+    facts |= changes
+    return Ready(**({"faces": (tcp_face(*facts["modbus"], facts["rig"].network.units),)} | facts))  # type: ignore[arg-type,misc,attr-defined]
+
+
+def test_the_banner_says_where_and_what_and_how_to_try() -> None:
+    text = format_banner(ready())
+    for words in (
+        "rig demo (simulated, seed 7)",
+        "calibration demo: bsfm n=2",
+        "127.0.0.1:5020   units 0, 1, 255",
+        "/dev/pts/4       smc-itv-rc 9600  ok   0.000 V",
+        "/dev/pts/6       stream-st-gs 115200  ok   0.00 N",
+        "none (demo): a command lasts until the next one",
+        "mbpoll -1 -p 5020 -r 1 127.0.0.1 1 1200",
+        "READY  loop 100 Hz · Ctrl-C ramps the force to 0 and stops · not a safety device",
+    ):
+        assert words in text
+    assert text.splitlines()[-1].startswith("READY")
+
+
+def test_a_silent_device_is_not_shown_as_zero() -> None:
+    text = format_banner(ready(voltage_v=None, force_n=None, notes=("E111 /dev/pts/6: silence at every speed",)))
+    assert text.count("silent") == 2
+    assert "  note         E111 /dev/pts/6" in text
+
+
+@pytest.mark.parametrize("force_n", [nan, inf, -inf])
+def test_an_overloaded_cell_is_not_shown_as_well(force_n: float) -> None:
+    assert "stream-st-gs 115200  beyond its range\n" in format_banner(ready(force_n=force_n))
+
+
+def test_the_command_to_try_names_another_gateway() -> None:
+    text = format_banner(ready(modbus=("10.0.0.9", 502)))
+    assert "mbpoll -1 -p 502 -r 1 10.0.0.9 1 1200" in text
+    assert "--gateway 10.0.0.9:502" in text
+    assert "--gateway" not in format_banner(ready())
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, "force-gateway hold 12        (enable"),
+        ({"lease_s": 0.15}, "force-gateway hold 12        (enable"),
+        ({"lease_s": 0.05}, "force-gateway hold 12 --rig "),
+    ],
+)
+def test_with_a_lease_the_line_to_try_keeps_a_heartbeat(changes: dict[str, float], expected: str) -> None:
+    (line,) = try_lines(with_supervision(demo(), **({"lease_s": 0.2} | changes)), "127.0.0.1", 5020)
+    assert line.startswith(expected)
+
+
+def test_a_valve_and_what_listens_for_http_are_told_where_they_are() -> None:
+    pulls, http = load_rig("paper-pull", simulated=True), {"web": ("127.0.0.1", 8080), "metrics": ("::", 9090)}
+    given = ready(rig=pulls, valve_port="/dev/pts/9", http=http)
+    text, fields = format_banner(given), ready_fields(given)
+    assert f"  valve        /dev/pts/9       {pulls.valve and pulls.valve.device.name} " in text
+    assert "  web          http://127.0.0.1:8080/\n" in text
+    assert "  metrics      http://[::1]:9090/metrics        (and on this machine's other addresses)" in text
+    assert fields["ptys"] == {"output": "/dev/pts/4", "load_cell": "/dev/pts/6", "valve": "/dev/pts/9"}
+    assert (fields["web"], fields["metrics"]) == (["127.0.0.1", 8080], ["::", 9090])
+    bare = ready_fields(ready())
+    assert (set(bare["ptys"]), bare["web"], bare["metrics"]) == ({"output", "load_cell"}, None, None)
+
+
+@pytest.mark.parametrize(("owner", "may_try"), [("127.0.0.1", True), ("192.168.1.5", False), ("serial:1", False)])
+def test_a_rig_that_names_its_master_is_tried_from_there_only(owner: str, may_try: bool) -> None:
+    rig = replace(demo(), network=replace(demo().network, owner=owner))
+    assert (len(try_lines(rig, "127.0.0.1", 5020)) > 1) == may_try
+
+
+@pytest.mark.parametrize(
+    ("least_n", "most_n", "tried_n"),
+    [
+        (0.0, 12.0, "12"),
+        (12.0, 30.0, "12"),
+        (0.0, 9.0, "5"),
+        (14.2, 14.6, "14.4"),
+        (13.0, 14.0, "14"),
+        (2.3, 2.4, "2.35"),
+    ],
+)
+def test_the_force_to_try_is_one_that_the_rig_takes(least_n: float, most_n: float, tried_n: str) -> None:
+    limits = replace(demo().control.limits, smallest_force_n=least_n, force_max_n=most_n)
+    rig = replace(demo(), control=replace(demo().control, limits=limits))
+    assert f"force_setpoint={tried_n} " in try_lines(rig, "127.0.0.1", 5020)[1]
+
+
+def test_the_lines_to_try_are_of_the_rig_at_hand() -> None:
+    rig = demo()
+    network = replace(rig.network, units=(7,), allow=(ip_network("127.0.0.0/8"),))
+    mbpoll, write, hold = try_lines(replace(rig, network=network), "0.0.0.0", 502)
+    assert mbpoll.startswith("mbpoll -1 -a 7 -p 502 -r 1 127.0.0.1 1 1200 ")
+    assert "--gateway 127.0.0.1:502 --unit 7" in write and "--gateway 127.0.0.1:502 --unit 7" in hold
+    closed = replace(rig, network=replace(rig.network, allow=(ip_network("10.0.0.0/8"),)))
+    assert "--gateway THIS-MACHINE:5020" in try_lines(closed, "0.0.0.0", 5020)[1], "loopback may not connect there"
+    owned = replace(rig, network=replace(rig.network, owner="192.168.1.5"))
+    assert try_lines(owned, "127.0.0.1", 5020) == ("force-gateway monitor        (192.168.1.5 alone may command)",)
+    proving = replace(rig, network=replace(rig.network, require_byte_order_echo=True))
+    assert try_lines(proving, "127.0.0.1", 5020)[0].startswith("force-gateway hold 12 ")
+    limits = replace(rig.control.limits, force_max_n=9.0)
+    weak = replace(rig, control=replace(rig.control, limits=limits))
+    assert "1 500 " in try_lines(weak, "127.0.0.1", 5020)[0]
+    assert "--gateway [::1]:5020" in try_lines(rig, "::1", 5020)[1]
+
+
+def test_a_lease_is_told_with_its_length_and_what_follows() -> None:
+    rig = with_supervision(demo(), lease_s=0.2, lease_action=LeaseAction.RAMP)
+    assert "lease        200 ms, then ramp" in format_banner(ready(rig=rig))
+    assert "none: a command lasts until the next one" in format_banner(ready(rig=replace(demo(), simulated=False)))
+
+
+def test_the_json_line_is_json_and_tells_the_ports() -> None:
+    facts = json.loads(json.dumps(ready_fields(ready(modbus=("127.0.0.1", 40123), notes=("a",)))))
+    assert facts["ready"] is True
+    assert facts["modbus"] == ["127.0.0.1", 40123]
+    assert facts["ptys"] == {"output": "/dev/pts/4", "load_cell": "/dev/pts/6"}
+    assert facts["notes"] == ["a"]
+    assert ready_fields(ready(rig=replace(demo(), simulated=False)))["ptys"] == {}
+
+
+def test_the_page_is_told_where_a_browser_on_this_machine_finds_it() -> None:
+    near = ready(http={"web": ("127.0.0.1", 8080), "metrics": ("::1", 9464)})
+    assert "web          http://127.0.0.1:8080/\n" in format_banner(near)
+    assert "metrics      http://[::1]:9464/metrics\n" in format_banner(near)
+    assert ready_fields(near)["web"] == ["127.0.0.1", 8080]
+    everywhere = format_banner(ready(http={"web": ("0.0.0.0", 8080)}))
+    assert "http://127.0.0.1:8080/        (and on this machine's other addresses)" in everywhere
+    assert ready_fields(ready())["web"] is None
+
+
+@pytest.mark.parametrize(
+    ("lease_s", "unit", "owner", "line"),
+    [
+        (None, 1, None, "mbpoll -m rtu -b 19200 -P none -a 1 -1 -r 1 /dev/pts/3 1 1200 "),
+        (0.2, 1, None, "force-gateway hold 12 --rtu /dev/pts/3 --rig "),
+        (0.2, 7, "serial:1", "force-gateway hold 12 --rtu /dev/pts/3 --unit 7 --rig "),
+        (None, 1, "serial:2", ""),
+    ],
+)
+def test_a_terminal_of_a_serial_face_is_tried_as_its_rig_wants(
+    lease_s: float | None, unit: int, owner: str | None, line: str
+) -> None:
+    rig = with_supervision(demo(), lease_s=lease_s)
+    rig = replace(rig, network=replace(rig.network, owner=owner))
+    facts = {"is_terminal": True, "unit": unit, "baud": 19200, "host": "serial:1"}
+    face = ServedFace("rtu", "/dev/pts/3", "", facts)
+    text = format_banner(replace(ready(rig=rig), modbus=None, faces=(face,)))
+    assert ("  try " in text) == bool(line)
+    assert f"  try          {line}" in text if line else True
