@@ -19,7 +19,7 @@ PER_PUSH: Final = {
     "Parquet files": 120,
     "workbooks": 40,
 }
-"""Requests to control.sock and rig.sock: tests/service/test_hostile_requests.py, about 5 000 more."""
+"""Requests to control.sock and rig.sock: tests/service/requests/test_hostile_requests.py, about 5 000 more."""
 LONG: Final = 100
 SEED: Final = 15
 

@@ -17,7 +17,7 @@ class Defect(NamedTuple):
     tests: tuple[str, ...]
 
 
-_BANK = ("registers/test_bank_commands.py", "registers/test_bank_ownership.py", "registers/test_bank_refusals.py")
+_BANK = ("registers/bank/test_commands.py", "registers/bank/test_ownership.py", "registers/bank/test_refusals.py")
 _WIRED = ("service/running_rig/wired/test_faults.py", "service/running_rig/wired/test_invariants.py")
 _REACTIONS = ("faults/test_control_reactions.py", "faults/test_first_cause_and_reset.py", "control/test_states.py")
 _DETECTION = ("control/supervision/test_fault_detection.py", *_REACTIONS)
@@ -130,7 +130,7 @@ DEFECTS = (
     Defect("a read runs over the end of a block", "registers/bank.py",
            "if not 0 < count <= self._room[address]:\n            raise self._note_refusal(no_such",
            "if not 0 < count <= self._room[address] + 1:\n            raise self._note_refusal(no_such",
-           ("registers/test_bank_reading.py", "registers/test_bank_refusals.py")),
+           ("registers/bank/test_reading.py", "registers/bank/test_refusals.py")),
     Defect("control is not asked", "registers/writes/admission.py",
            "refused = self.decide(ProposedWrite(command, lambda: self._changes(values)))", "refused = None",
            ("service/edge_table", *_BANK)),
@@ -144,7 +144,7 @@ DEFECTS = (
     Defect("a monitor may command", "registers/bank.py",
            "return is_inside and peer.role >= self._command_role", "return is_inside", ("registers/test_roles.py",)),
     Defect("a revoked certificate connects", "fieldbus/tls_settings.py", "if shown.serial in revoked:", "if False:",
-           ("fieldbus/test_tls_server.py",)),
+           ("fieldbus/tls/test_server.py",)),
     # -- the wire to masters
     Defect("a foreign unit is answered", "fieldbus/connection.py",
            "if request.unit in shared.settings.units:", "if True:",
@@ -175,7 +175,7 @@ DEFECTS = (
     Defect("the write of FC23 goes after its read", "modbus/server.py",
            "    bank.write_registers(write_address, data, peer)\n    words = bank.read_registers(read_address, count, peer)\n",
            "    words = bank.read_registers(read_address, count, peer)\n    bank.write_registers(write_address, data, peer)\n",
-           ("modbus", "registers/test_bank_commands.py")),
+           ("modbus", "registers/bank/test_commands.py")),
     Defect("a serial frame ends in the middle of itself", "modbus/rtu_receiver.py",
            "        self._silence_s = silence_s(baud, character_s)\n",
            "        self._silence_s = 0.1 * silence_s(baud, character_s)\n", ("modbus/test_rtu_receiver.py",)),
@@ -184,9 +184,9 @@ DEFECTS = (
     Defect("answers pile up behind a slow line", "fieldbus/rtu_server.py",
            "or self._backlog_bytes > LONGEST_ADU:", "or False:", ("fieldbus/test_rtu_server.py",)),
     Defect("a stranger chooses how dear the keys of TLS are", "fieldbus/tls_settings.py",
-           "    context.set_ecdh_curve(CURVE)\n", "", ("fieldbus/test_tls_bounds.py",)),
+           "    context.set_ecdh_curve(CURVE)\n", "", ("fieldbus/tls/test_bounds.py",)),
     Defect("a stranger's certificates are judged however many", "fieldbus/tls_stream.py",
-           "if self._shaken_bytes > HANDSHAKE_BYTES:", "if False:", ("fieldbus/test_tls_bounds.py",)),
+           "if self._shaken_bytes > HANDSHAKE_BYTES:", "if False:", ("fieldbus/tls/test_bounds.py",)),
     Defect("the beginning of the request behind a broadcast is lost", "modbus/rtu_receiver.py",
            "if found and self._burst[found[-1][0]] == self._unit else 0", "if found else 0", ("modbus/test_rtu_receiver.py",)),
     Defect("half a request from before the plug is completed after it", "fieldbus/rtu_server.py",
@@ -195,7 +195,7 @@ DEFECTS = (
            "if not request.is_answered or ", "if ", ("fieldbus/test_rtu_server.py",)),
     # -- the wires to devices
     Defect("another unit's answer is the device's", "devices/binary/rtu_framing.py", "unit == self._unit)", "True)",
-           ("devices/test_rtu_framing.py",)),
+           ("devices/framing/test_rtu_framing.py",)),
     Defect("the unit that a frame says is not read", "devices/template_codecs/cell.py",
            "if UNIT in values else self._newton_per_unit", "if False else self._newton_per_unit",
            ("devices/test_cell_codec.py",)),
@@ -249,10 +249,10 @@ DEFECTS = (
     # -- coefficients, calibrations, disk
     Defect("the checksum of an upload is not compared", "registers/upload/staging.py",
            "if given.crc != (own := set_crc(given.words)):", "if not (own := set_crc(given.words)) and given.crc:",
-           ("registers/test_bank_staging.py", "registers/test_staged_set.py")),
+           ("registers/bank/test_staging.py", "registers/test_staged_set.py")),
     Defect("coefficients are not judged", "registers/upload/staging.py",
            "for finding in validate_coefficients(used, limits):", "for finding in validate_coefficients(used, limits)[:0]:",
-           ("registers/test_bank_staging.py", "registers/test_staged_set.py")),
+           ("registers/bank/test_staging.py", "registers/test_staged_set.py")),
     Defect("curves are not proven to rise", "bsfm/validate.py",
            "return list(_curve_faults(branches, limits)) or list(", "return list(",
            ("bsfm/test_validate_coefficients.py", "properties")),
@@ -351,10 +351,10 @@ DEFECTS = (
     Defect("words that were taken once pass narrower limits", "registers/writes/command_block.py",
            "        self.fields = self._fields(rules)\n        self._last_words = (0, b\"\", [])\n",
            "        self.fields = self._fields(rules)\n",
-           ("registers/test_bank_commands.py",)),
+           ("registers/bank/test_commands.py",)),
     Defect("an owner that was released is still shown", "registers/bank.py",
            "        self._ownership.release()\n        self._show_owner()\n", "        self._ownership.release()\n",
-           ("registers/test_bank_ownership.py",)),
+           ("registers/bank/test_ownership.py",)),
     Defect("an enable from the page turns the valve", "web/commands.py",
            "word = await self._control_word() | ControlBit.ENABLE", "word = ControlBit.ENABLE",
            ("web/test_commands.py",)),
@@ -378,7 +378,7 @@ DEFECTS = (
            ("fieldbus/test_rtu_server.py",)),
     Defect("who begins a handshake and says nothing stays", "fieldbus/tls_server.py",
            "        self._handshakes.sweep(now_s)\n", "        pass\n",
-           ("fieldbus/test_tls_sockets.py",)),
+           ("fieldbus/tls/test_sockets.py",)),
     Defect("a watchdog is left armed at an orderly end", "devices/template_codecs/output_host.py",
            "return self._encode_request(AskDevice(DeviceStep.DISARM)) if DeviceStep.DISARM in self.checks else b\"\"",
            "return b\"\"",
@@ -407,13 +407,13 @@ DEFECTS = (
     Defect("a dry run moves the tool", "service/running_rig/calibration_runs.py",
            "        if query.dry_run:\n            return self._try_plan(_parse_plan(query.plan))\n",
            "        if query.dry_run:\n            self._try_plan(_parse_plan(query.plan))\n",
-           ("service/running_rig/test_calibration_runs.py",)),
+           ("service/running_rig/runs/test_calibration_runs.py",)),
     Defect("a run is taken for the one before it", "service/running_rig/calibration_runs.py",
            "        if recording is not self._last:\n            return\n", "",
-           ("service/running_rig/test_calibration_runs.py",)),
+           ("service/running_rig/runs/test_calibration_runs.py",)),
     Defect("a ladder that the disk has not taken is fitted", "service/running_rig/calibration_runs.py",
            "        if recording.failure or not recording.path:\n", "        if not recording.path:\n",
-           ("service/running_rig/test_calibration_runs.py",)),
+           ("service/running_rig/runs/test_calibration_runs.py",)),
     Defect("a run begins beside a moving valve", "control/edge_checks.py",
            "(self._valve.is_pulling or self._valve.is_switching)", "self._valve.is_pulling", ("control/valve",)),
     Defect("volts of another calibration outlive the output's end", "control/force_loop/feedforward.py",
@@ -461,7 +461,7 @@ DEFECTS = (
            "        elif first_number(path) > 1:", "        elif False:", ("audit/test_chain_starts.py",)),
     Defect("words known at one address are taken for those at another", "registers/writes/command_block.py",
            "if data != known_data or offset != known_offset:", "if data != known_data:",
-           ("registers/test_bank_commands.py",)),
+           ("registers/bank/test_commands.py",)),
     # -- as found by planting a fourth time: the guardian, its children, the lines
     Defect("what a control process said last before its kill is not read", "service/supervisor/control_child.py",
            "            self.process.kill()\n            self.read_messages()",

@@ -15,8 +15,8 @@ from gateway.service.live_answers import AlarmTimes
 from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.starting import StartError
 from tests.control.bench import bsfm
+from tests.service.requests.test_hostile_requests import Stage
 from tests.service.rigs import demo
-from tests.service.test_hostile_requests import Stage
 
 ENABLE_12_N = "10000000020400" + "01" + "04b0"
 DISABLE = "060000" + "0000"

@@ -13,7 +13,7 @@ from gateway.live.live_state import LiveState
 from gateway.recording.label import RecordingLabel
 from gateway.registers.words import LimitedBy, State
 from gateway.service.live_answers import _age_s
-from tests.service.test_hostile_requests import PLAN, Stage
+from tests.service.requests.test_hostile_requests import PLAN, Stage
 from tests.service.wired import ENABLE
 
 

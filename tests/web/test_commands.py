@@ -15,8 +15,8 @@ from gateway.profiles import Rig
 from gateway.registers.words import ControlBit, State
 from gateway.web.commands import RELOAD_S, Commands, RefusedCommand
 from gateway.web.context import WebContext
+from tests.service.requests.test_hostile_requests import Stage
 from tests.service.rigs import demo
-from tests.service.test_hostile_requests import Stage
 from tests.service.wired import Wired
 
 Scene = Callable[[Commands, Stage], Awaitable[None]]

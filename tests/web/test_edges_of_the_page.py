@@ -9,8 +9,8 @@ from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.words import State
 from gateway.web.commands import Commands
 from gateway.web.context import WebContext
+from tests.service.requests.test_hostile_requests import Stage
 from tests.service.rigs import demo
-from tests.service.test_hostile_requests import Stage
 from tests.web.test_commands import leased, play
 
 

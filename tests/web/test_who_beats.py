@@ -6,8 +6,8 @@ from pathlib import Path
 
 from gateway.registers.words import State
 from gateway.web.commands import Commands
+from tests.service.requests.test_hostile_requests import Stage
 from tests.service.rigs import demo
-from tests.service.test_hostile_requests import Stage
 from tests.web.test_commands import leased, play
 
 

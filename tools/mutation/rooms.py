@@ -22,6 +22,6 @@ ROOMS: Final = {
         ("bsfm/validate.py", "bsfm/validate_dynamics.py", "bsfm/exact_polynomials.py"),
         ("bsfm/test_validate_coefficients.py", "bsfm/test_validate_dynamics.py",
          "bsfm/test_exact_polynomials.py", "bsfm/test_curve_reference.py",
-         "registers/test_bank_staging.py", "registers/test_staged_set.py"),
+         "registers/bank/test_staging.py", "registers/test_staged_set.py"),
     ),
 }  # fmt: skip

@@ -10,7 +10,7 @@ import pytest
 
 from gateway.service.running_rig import calibration_runs, fit_launcher
 from gateway.service.running_rig.fit_launcher import FitLauncher, Result
-from tests.service.running_rig.test_calibration_runs import kept
+from tests.service.running_rig.runs.test_calibration_runs import kept
 from tests.service.wired import Wired
 
 NO_RESULT = "A331 the fit process ended without a result"

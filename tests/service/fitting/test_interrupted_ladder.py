@@ -26,7 +26,7 @@ from gateway.service.fitting.fit_process import fit_and_store
 from gateway.service.fitting.ladder_source import RigContext, check_source
 from gateway.service.running_rig import calibration_runs
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
-from tests.service.running_rig.test_calibration_runs import kept
+from tests.service.running_rig.runs.test_calibration_runs import kept
 from tests.service.wired import Wired
 
 PLAN = {"step_v": 1.0, "groups": 2, "minor_points": 24}

@@ -12,8 +12,8 @@ from gateway.profiles import load_device, load_rig
 from gateway.registers.words import State
 from gateway.service.running_rig.rate_warnings import LEAST, SHARE, WINDOW_S, LineNoise, SlowLoop
 from gateway.service.running_rig.starting import lasting_warnings, warning_notes
+from tests.service.every_device.test_every_device_presses import rig_with
 from tests.service.rigs import demo
-from tests.service.test_every_device_presses import rig_with
 from tests.service.wired import Wired
 
 NOISE, SLOW = WarningBit.SERIAL_NOISE, WarningBit.SLOW_LOOP

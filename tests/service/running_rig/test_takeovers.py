@@ -10,6 +10,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.control import CalibrationInUse
 from gateway.profiles import load_calibration
 from gateway.registers.words import State
+from tests.service.running_rig.runs.test_runs_and_masters import leased, locally
 from tests.service.running_rig.simulated_rig import (
     CALIBRATE,
     ENABLE,
@@ -20,7 +21,6 @@ from tests.service.running_rig.simulated_rig import (
     TARE,
     SmallRig,
 )
-from tests.service.running_rig.test_runs_and_masters import leased, locally
 
 HOLDERS: dict[str, Callable[[], SmallRig]] = {
     "off": SmallRig,

@@ -16,7 +16,7 @@ from gateway.service.running_rig.faces import faces, faces_to_come
 from gateway.service.running_rig.starting import StartError
 from tests.certificates import Folder, serial_of, store_all
 from tests.fieldbus.by_hand import framed
-from tests.fieldbus.tls_by_hand import client
+from tests.fieldbus.tls.by_hand import client
 from tests.service.rigs import demo
 from tests.service.running_rig.test_faces import Served
 

@@ -8,8 +8,8 @@ from gateway.codes.faults import FaultCode
 from gateway.devices import DeviceRole
 from gateway.registers.words import State
 from tests.profile_files import load_device
+from tests.service.every_device.test_every_device_presses import PROFILES, rig_with
 from tests.service.rigs import strict
-from tests.service.test_every_device_presses import PROFILES, rig_with
 from tests.service.wired import ENABLE, RESET, Wired
 
 OUTPUTS = [profile for profile in PROFILES.values() if profile.role is DeviceRole.OUTPUT]

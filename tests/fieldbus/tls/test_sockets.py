@@ -16,7 +16,7 @@ from gateway.modbus import Peer
 from tests.certificates import Folder
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
 from tests.fieldbus.conftest import HandClock, NotingBank
-from tests.fieldbus.tls_by_hand import client
+from tests.fieldbus.tls.by_hand import client
 
 READ_TWO = framed(READ, 7)
 

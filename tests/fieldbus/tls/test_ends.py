@@ -10,7 +10,7 @@ from gateway.fieldbus.tls_server import _utc_now
 from gateway.fieldbus.tls_settings import HANDSHAKE_S
 from tests.certificates import Folder
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
-from tests.fieldbus.tls_by_hand import VERSIONS, Face, Line, SocketInHand, client, face
+from tests.fieldbus.tls.by_hand import VERSIONS, Face, Line, SocketInHand, client, face
 
 __all__ = ["face"]
 

@@ -16,7 +16,7 @@ from gateway.profiles import Report, check_report, shipped_profiles_folder
 from gateway.profiles.schema import schema
 from gateway.profiles.strict_yaml.text import parse
 from gateway.registers.words import State
-from tests.service.drawn_devices import (
+from tests.service.every_device.drawn_devices import (
     Profile,
     drawn_cell,
     drawn_counts,

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from gateway.registers.words import CalibrationPhase, State
-from tests.service.running_rig.test_calibration_runs import PLAN, kept
+from tests.service.running_rig.runs.test_calibration_runs import PLAN, kept
 from tests.service.wired import Wired
 
 

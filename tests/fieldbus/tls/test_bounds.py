@@ -10,7 +10,7 @@ import pytest
 from gateway.fieldbus import tls_stream
 from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING, MOST_PENDING_OF_ONE
 from tests.certificates import Folder
-from tests.fieldbus.tls_by_hand import REFUSED, VERSIONS, Face, client, face
+from tests.fieldbus.tls.by_hand import REFUSED, VERSIONS, Face, client, face
 
 __all__ = ["face"]
 

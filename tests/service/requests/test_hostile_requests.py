@@ -26,7 +26,7 @@ from gateway.service.simulation.requests import SimulationRequests
 from gateway.service.simulation.world import SimulatedRig
 from gateway.service.watch_reports import WatchReports
 from tests.disk.at_once import AtOnce
-from tests.service.hostile import garbage, mutants
+from tests.service.requests.hostile import garbage, mutants
 from tests.service.wired import ENABLE, MASTER, Wired
 
 PLAN = {"step_v": 1.0, "groups": 2, "minor_points": 24, "v_max_v": 4.0, "tare": False, "first_group": 0}

@@ -13,7 +13,7 @@ from gateway.modbus import Role, pdu
 from gateway.modbus.certificate import ROLES, read_certificate
 from tests.certificates import Folder, serial_of
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
-from tests.fieldbus.tls_by_hand import REFUSED, VERSIONS, Face, client, face
+from tests.fieldbus.tls.by_hand import REFUSED, VERSIONS, Face, client, face
 
 __all__ = ["face"]
 
