@@ -51,9 +51,9 @@ def main() -> None:
         state, mark, *n = line.split()
         pid = os.fork()
         if pid == 0:
+            say(f"child {os.getpid()}")  # itself: said by its parent it could come behind a commit
             child(Path(state), int(mark), int(n[0]) if n else None)
             os._exit(0)
-        say(f"child {pid}")
         os.waitpid(pid, 0)
         say("gone")
 
