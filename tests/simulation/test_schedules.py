@@ -94,6 +94,14 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(20.4137, "worker", "hold", (55.62,)),
         ],
     ),
+    (
+        42926,
+        [
+            Event(6.4324, "worker", "hold", (57.77,), way="mask"),
+            Event(8.6703, "machine", "stop", (0.2453, 0.0)),
+            Event(23.9622, "person", "say", data=b'{"do": "calibrate", "name": "20", "plan": {"groups": 1}}'),
+        ],
+    ),
     (435, [Event(21.2182, "rival", "hold", (54.84,))]),
     (
         38270,
