@@ -8,8 +8,7 @@ anything, the same setting once more. Time comes in as an argument, so that test
 An answer may come after its time has run out, when the next question is already out, and a bare number does not say what
 it answers. Taken for the next question's, each following answer would be one behind for as long as the setpoint moves, and
 an honest device would look like one that alters its settings. So after a time-out an answer that is no echo of what was
-asked last is believed by nobody: the line is left alone until the answer that is still out has come, if that takes as long as
-this one did, and for one reply time at least; then it is asked anew. A falling voltage never waits.
+asked last is believed by nobody: the line is left alone for one reply time, then asked anew. A falling voltage never waits.
 After any of them the setting is read or sent anew: the device may have lost its power, and stand where it then begins.
 An answer that comes twice has the same effect: where an echo repeats the setting before, the line is left alone as well.
 
@@ -42,8 +41,6 @@ from gateway.service.running_rig.lines.device_checks import DeviceChecks
 
 _FAILURES_BEFORE_FAULT = 3  # in a row; one bad echo is noise on the line
 _POLL_PERIOD_S = 0.1
-_LATE_MARGIN = 0.5  # reply times on top of how late an answer was
-_MOST_LATE = 3.0  # reply times: what is later than that has been lost
 _AFTER_SIGN_OF_LIFE_S = 0.005  # nothing tells when the device is through with a sentence that it does not answer
 
 
@@ -93,8 +90,6 @@ class OutputExchange:
         self._asked_v = self._before_v = inf
         self.standing_v: float | None = None
         self._is_overdue = False  # a question was given up, its answer may still come
-        self._given_up_s = 0.0  # when that question, or the oldest of them, had been sent
-        self._late_s = 0.0  # the latest answer since the last one in time
         self._is_altered = False  # the last echo was another voltage
         self._quiet_until_s = 0.0
         self._sent_s = 0.0
@@ -153,8 +148,6 @@ class OutputExchange:
             self._host.forget()
             if not isinstance(self._in_flight, ReadVoltage):  # which tells anew what stands
                 self.standing_v = None
-            if not self._is_overdue:
-                self._given_up_s = self._sent_s
             self._in_flight, self._is_overdue = None, True
             self._next_poll_s = now_s  # ask again at once: three tries fit into the bound on silence
         self._send_next(now_s)
@@ -211,11 +204,9 @@ class OutputExchange:
         self._free_s = max(self._free_s, now_s + self._host.gap_s)
         self.counts.heard += request is not None
         if self._is_overdue and not self._is_echo(request, reply):
-            self._await_late_answers(now_s)
+            self._is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
             return
         self.round_trip_s = now_s - self._sent_s
-        if not self._is_overdue:
-            self._late_s = 0.0
         if isinstance(request, AskDevice):
             self._take_check(request, reply)
         elif isinstance(reply, WatchdogTripped):
@@ -227,13 +218,6 @@ class OutputExchange:
             self._count_failure(type(request), FaultCode.OUTPUT_REFUSED)
         elif request is not None and isinstance(reply, Accepted):
             self._check_setting(request, reply, now_s)
-
-    def _await_late_answers(self, now_s: float) -> None:
-        """Leave the line alone: an answer was late, and what was asked last will be answered as late as that."""
-        timeout_s = self._reply_timeout_s
-        self._late_s = max(self._late_s, min(now_s - self._given_up_s, _MOST_LATE * timeout_s))
-        self._quiet_until_s = max(now_s + timeout_s, self._sent_s + self._late_s + _LATE_MARGIN * timeout_s)
-        self._is_overdue, self._given_up_s = False, self._sent_s
 
     def _take_check(self, request: AskDevice, reply: OutputReply) -> None:
         if isinstance(reply, DeviceAnswer):

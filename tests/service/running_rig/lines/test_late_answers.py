@@ -52,22 +52,6 @@ def test_a_late_answer_is_not_taken_for_the_next_one(wire: Wire, every: int, slo
     assert wire.exchange.pressure_pa == pytest.approx(7 * 0.9e6 / 1023)
 
 
-@pytest.mark.parametrize("every", [1, 2, 3])
-@pytest.mark.parametrize("slow_s", [0.065, 0.075, 0.09, 0.12, 0.13, 0.18])
-def test_a_device_that_answers_everything_late_is_none_that_alters_its_settings(
-    wire: Wire, every: int, slow_s: float
-) -> None:
-    """Whether so slow a line may hold a force, the bound on its silence says; it must not be blamed for what it does not do."""
-    wire.settle(200)
-    device = SlowDevice(wire, every, slow_s)
-    device.seen = len(wire.written)
-    for index in range(300):
-        wire.set_voltage(200 + (index * 7) % 500)
-        device.advance(wire.now_s + 0.01)
-        assert wire.exchange.fault is FaultCode.NONE
-    assert {round(pressure_pa) for pressure_pa in wire.pressures_pa} <= {0, round(7 * 0.9e6 / 1023)}
-
-
 @pytest.mark.parametrize("rounds", [20, 21, 22, 23])
 def test_an_answer_that_comes_twice_makes_no_honest_device_one_that_alters(wire: Wire, rounds: int) -> None:
     """While the setpoint moves each answer behind it would be taken for the next question's, for as long as it moves."""
@@ -101,7 +85,7 @@ def test_a_device_that_alters_its_settings_is_found_after_a_lost_answer_too(wire
     wire.set_voltage(512)
     wire.tick(REPLY_TIMEOUT_S + 0.001)
     wire.answer("510")
-    wire.tick(2.0 * REPLY_TIMEOUT_S)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
     for _ in range(3):
         assert wire.exchange.fault is FaultCode.NONE
         wire.answer("510")
@@ -134,7 +118,7 @@ def test_a_fall_that_does_not_wait_believes_no_answer_but_its_own_echo(wire: Wir
     wire.set_voltage(0)
     wire.answer("220")
     assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
-    wire.tick(2.0 * REPLY_TIMEOUT_S)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
     wire.answer("0")
     assert wire.exchange.standing_v == 0.0
 
