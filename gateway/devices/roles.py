@@ -66,6 +66,9 @@ class OutputHost(Protocol):
     def receive(self, chunk: bytes, now_s: float) -> list[OutputReply]:
         """Return what these bytes complete. Never raises."""
 
+    def expect(self, message: OutputRequest) -> None:
+        """Expect the answer of a request that is out already: what was taken for it answered an older one."""
+
     def forget(self) -> None:
         """Drop half-received bytes and expected answers: after a timeout, or when the port was opened again."""
 

@@ -91,6 +91,10 @@ class TemplateOutputHost:
         self._expected.append(message)
         return data
 
+    def expect(self, message: OutputRequest) -> None:
+        """Expect the answer of a request that is out already."""
+        self._expected.append(message)
+
     def forget(self) -> None:
         """Drop half a line and every answer still expected."""
         self._lines.forget()

@@ -7,8 +7,9 @@ anything, the same setting once more. Time comes in as an argument, so that test
 
 An answer may come after its time has run out, when the next question is already out, and a bare number does not say what
 it answers. Taken for the next question's, each following answer would be one behind for as long as the setpoint moves, and
-an honest device would look like one that alters its settings. So after a time-out an answer that is no echo of what was
-asked last is believed by nobody: the line is left alone for one reply time, then asked anew. A falling voltage never waits.
+an honest device would look like one that alters its settings. So after a time-out an answer that repeats a setting which was
+given up answers that one, and what was asked last is still out. One that repeats neither is believed by nobody: the line is
+left alone for one reply time, then asked anew. A falling voltage never waits.
 After any of them the setting is read or sent anew: the device may have lost its power, and stand where it then begins.
 An answer that comes twice has the same effect: where an echo repeats the setting before, the line is left alone as well.
 
@@ -90,6 +91,8 @@ class OutputExchange:
         self._asked_v = self._before_v = inf
         self.standing_v: float | None = None
         self._is_overdue = False  # a question was given up, its answer may still come
+        self._given_up: list[tuple[OutputRequest, float]] = []  # in a row, with their send times
+        self._is_behind = False  # the answer to one of them came, that to the last question is out
         self._is_altered = False  # the last echo was another voltage
         self._quiet_until_s = 0.0
         self._sent_s = 0.0
@@ -145,19 +148,28 @@ class OutputExchange:
     def tick(self, now_s: float) -> None:
         """Give up waiting for an overdue answer and ask again; unanswered_since_s keeps the age of the silence."""
         if self._in_flight is not None and now_s - self._sent_s > self._reply_timeout_s:
-            self._host.forget()
-            if not isinstance(self._in_flight, ReadVoltage):  # which tells anew what stands
-                self.standing_v = None
-            self._in_flight, self._is_overdue = None, True
+            self._give_up(self._in_flight)
             self._next_poll_s = now_s  # ask again at once: three tries fit into the bound on silence
         self._send_next(now_s)
 
+    def _give_up(self, question: OutputRequest) -> None:
+        self._host.forget()
+        if not isinstance(question, ReadVoltage):  # which tells anew what stands
+            self.standing_v = None
+        self._given_up.append((question, self._sent_s))
+        self._in_flight, self._is_overdue = None, True
+
     def _send_next(self, now_s: float) -> None:
         wanted_v = self._wanted_v
-        if wanted_v is None or self._in_flight is not None:
+        if wanted_v is None or now_s < self._free_s:
             return
-        if now_s < self._free_s or (now_s < self._quiet_until_s and wanted_v >= self._asked_v):
+        is_fall = wanted_v < self._asked_v
+        if now_s < self._quiet_until_s and not is_fall:
             return
+        if self._in_flight is not None:
+            if not (self._is_behind and is_fall):
+                return
+            self._give_up(self._in_flight)
         if self._host.sign_of_life and now_s >= self._next_feed_s:
             self._next_feed_s, self._free_s = now_s + self._host.feed_period_s, now_s + _AFTER_SIGN_OF_LIFE_S
             self._write(self._host.sign_of_life)
@@ -187,7 +199,7 @@ class OutputExchange:
         return not self.checks.is_tripped or voltage_v != self._asked_v or now_s >= self._next_poll_s
 
     def _send(self, request: OutputRequest, now_s: float) -> None:
-        self._in_flight, self._sent_s = request, now_s
+        self._in_flight, self._sent_s, self._is_behind = request, now_s, False
         self.counts.asked += 1
         if self.unanswered_since_s is None:
             self.unanswered_since_s = now_s
@@ -200,10 +212,14 @@ class OutputExchange:
             self._is_overdue = self._is_overdue and self._in_flight is not None  # unasked: that was it
             return
         request, self._in_flight = self._in_flight, None
-        self.unanswered_since_s = None
         self._free_s = max(self._free_s, now_s + self._host.gap_s)
         self.counts.heard += request is not None
-        if self._is_overdue and not self._is_echo(request, reply):
+        if self._is_late(request, reply, now_s):
+            return
+        self.unanswered_since_s = None
+        is_own = self._is_echo(request, reply)
+        self._given_up.clear()
+        if self._is_overdue and not is_own:
             self._is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
             return
         self.round_trip_s = now_s - self._sent_s
@@ -218,6 +234,21 @@ class OutputExchange:
             self._count_failure(type(request), FaultCode.OUTPUT_REFUSED)
         elif request is not None and isinstance(reply, Accepted):
             self._check_setting(request, reply, now_s)
+
+    def _is_late(self, request: OutputRequest | None, reply: OutputReply, now_s: float) -> bool:
+        """Where a setting's answer repeats one that was given up before it, that one has been answered, and those before it
+        never will be: what is out stays so, and the silence is as old as the oldest of it."""
+        if not (isinstance(request, SetVoltage) and isinstance(reply, Accepted)) or self._is_echo(request, reply):
+            return False
+        for index, (question, sent_s) in enumerate(self._given_up):
+            if not isinstance(question, SetVoltage) or self._is_echo(question, reply):
+                del self._given_up[: index + 1]
+                self.round_trip_s = now_s - sent_s
+                self.unanswered_since_s = self._given_up[0][1] if self._given_up else self._sent_s
+                self._in_flight, self._is_behind = request, True
+                self._host.expect(request)
+                return True
+        return False
 
     def _take_check(self, request: AskDevice, reply: OutputReply) -> None:
         if isinstance(reply, DeviceAnswer):

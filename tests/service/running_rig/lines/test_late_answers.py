@@ -52,6 +52,25 @@ def test_a_late_answer_is_not_taken_for_the_next_one(wire: Wire, every: int, slo
     assert wire.exchange.pressure_pa == pytest.approx(7 * 0.9e6 / 1023)
 
 
+@pytest.mark.parametrize("slow_s", [0.062, 0.065, 0.07, 0.08, 0.09, 0.099, 0.115, 0.13, 0.18])
+@pytest.mark.parametrize("step", [1, 3, 7, -2])
+def test_a_device_that_is_always_late_is_no_device_that_alters(wire: Wire, slow_s: float, step: int) -> None:
+    """Its silence is as long as it is late: up to the bound of supervision the force is held, beyond it that is what is
+    blamed."""
+    wire.settle(400)
+    device = SlowDevice(wire, every=1, slow_s=slow_s)
+    device.seen = len(wire.written)
+    longest_s = 0.0
+    for index in range(400):
+        wire.set_voltage(400 + (step * index) % 500 if index < 300 else 400)
+        device.advance(wire.now_s + 0.01)
+        assert wire.exchange.fault is FaultCode.NONE
+        since_s = wire.exchange.unanswered_since_s
+        longest_s = max(longest_s, 0.0 if since_s is None else wire.now_s - since_s)
+    assert slow_s - 0.025 <= longest_s <= slow_s + 0.011
+    assert wire.exchange.acknowledged_v == pytest.approx(400 * 10 / 1023)
+
+
 @pytest.mark.parametrize("rounds", [20, 21, 22, 23])
 def test_an_answer_that_comes_twice_makes_no_honest_device_one_that_alters(wire: Wire, rounds: int) -> None:
     """While the setpoint moves each answer behind it would be taken for the next question's, for as long as it moves."""
