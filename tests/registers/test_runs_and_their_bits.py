@@ -35,6 +35,36 @@ def test_a_0_that_is_meant_for_enable_stops_the_run_from_everywhere(running, mas
     assert len(handed) == 8 and all(command.stops for command in handed)
 
 
+@pytest.mark.parametrize("run", [CALIBRATE, TEST])
+@pytest.mark.parametrize("host", ["10.0.0.1", "10.0.0.2"])
+@pytest.mark.parametrize("way", ["coil", "mask"])
+@pytest.mark.parametrize("state", [State.CALIBRATING, State.OFF], ids=["running", "about to run"])
+def test_enable_cleared_by_its_name_stops_a_run_that_its_bit_has_begun(make_bank, master_of, run, host, way, state):
+    """Whoever clears it: it has not been 1, and the run's own bit stays as it was."""
+    bank, handed = make_bank(supported_bits=ALL), list[Command]()
+    master_of(bank, "10.0.0.1").write(0, run)
+    bank.publish(Status(state=state))
+    bank.on_command = handed.append
+    peer = master_of(bank, host).peer
+    if way == "coil":
+        bank.write_bits(0, [False], peer)
+    else:
+        bank.mask_write(0, 0xFFFE, 0, peer)
+    (command,) = handed
+    assert command.stops and not int(command.control_word) & (run | int(ControlBit.ENABLE))
+    assert bank.read_registers(0, 1) == b"\0\0"
+
+
+def test_a_row_of_coils_that_holds_the_runs_bit_lets_it_go_on(make_bank, master_of) -> None:
+    bank, handed = make_bank(supported_bits=ALL), list[Command]()
+    master = master_of(bank, "10.0.0.1")
+    master.write(0, CALIBRATE)
+    bank.publish(Status(state=State.CALIBRATING))
+    bank.on_command = handed.append
+    bank.write_bits(0, [False] * 5 + [True, False], master.peer)
+    assert not any(command.stops for command in handed)
+
+
 def test_a_0_in_another_bit_or_beside_other_registers_stops_nothing(running, master_of) -> None:
     """A cyclic block of zeros, and a coil that is cleared in passing."""
     bank, handed = running

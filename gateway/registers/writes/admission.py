@@ -145,7 +145,9 @@ class Admission:
         commands = self._commands
         written, before = int(values[CONTROL_WORD]), int(commands.values[CONTROL_WORD])
         falls = before & ~written
-        is_stop = bool(falls & ENABLE and not written & ~before & RUN_BITS) or self._is_bare_stop(write, written)
+        is_stop = bool(falls & ENABLE and not written & ~before & RUN_BITS)
+        if not is_stop and self._is_named_stop(write, written):
+            is_stop, written = True, written & ~RUN_BITS
         if self._ownership.admits(write.host) or (written & TAKE and self._ownership.may_take_over(write.host)):
             return _PermittedWrite(values, written, is_stop)
         if is_stop:
@@ -157,14 +159,16 @@ class Admission:
             return None
         raise self._not_owner(write.address, write.host)
 
-    def _is_bare_stop(self, write: Write, written: int) -> bool:
-        """During a run that this machine has begun the control word holds no bit that could fall: then 0 in the control word
-        alone, meant for enable, is a stop. A cyclic block of zeros is none."""
-        if not self.is_calibrating or not write.touched & ENABLE:
-            return False
+    def _is_named_stop(self, write: Write, written: int) -> bool:
+        """A run has no enable that could fall, nor any bit of it where this machine has begun it. Then enable written as 0 by
+        its name, its coil say, is a stop whatever the run's bit is, and so is 0 in the control word alone. A cyclic block of
+        zeros is none, nor is a row of coils that holds the run's bit at 1."""
         before = int(self._commands.values[CONTROL_WORD])
-        is_idle = not (written | before) & STARTS and not written & EDGE_BITS
-        return is_idle and tuple(self._offsets(write)) == (CONTROL_WORD,)
+        if not (self.is_calibrating or before & RUN_BITS) or not write.touched & ENABLE:
+            return False
+        if written & (ENABLE | EDGE_BITS) or tuple(self._offsets(write)) != (CONTROL_WORD,):
+            return False
+        return not write.touched & RUN_BITS or not (written | before) & RUN_BITS
 
     def _offsets(self, write: Write) -> range:
         """Return which words of the command block are written whole."""
