@@ -52,7 +52,7 @@ def test_a_late_answer_is_not_taken_for_the_next_one(wire: Wire, every: int, slo
     assert wire.exchange.pressure_pa == pytest.approx(7 * 0.9e6 / 1023)
 
 
-@pytest.mark.parametrize("slow_s", [0.062, 0.065, 0.07, 0.08, 0.09, 0.099, 0.115, 0.13, 0.18])
+@pytest.mark.parametrize("slow_s", [0.065, 0.07, 0.08, 0.09, 0.099, 0.115, 0.13, 0.18])
 @pytest.mark.parametrize("step", [1, 3, 7, -2])
 def test_a_device_that_is_always_late_is_no_device_that_alters(wire: Wire, slow_s: float, step: int) -> None:
     """Its silence is as long as it is late: up to the bound of supervision the force is held, beyond it that is what is
@@ -146,3 +146,12 @@ def test_garbage_before_a_late_answer_makes_it_none_of_the_next_question(wire: W
     given_up(wire).answer("#?#")
     wire.answer("210", after_s=0.001)
     assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
+
+
+def test_a_device_that_is_silent_for_long_leaves_nothing_behind(wire: Wire) -> None:
+    """Each question that is given up might be answered late: not those of an hour ago."""
+    wire.settle(200)
+    for index in range(500):
+        wire.set_voltage(200 + index % 7, after_s=REPLY_TIMEOUT_S)
+        wire.tick(0.011)
+    assert len(wire.exchange._given_up) <= 4
