@@ -42,6 +42,7 @@ from gateway.service.running_rig.lines.device_checks import DeviceChecks
 
 _FAILURES_BEFORE_FAULT = 3  # in a row; one bad echo is noise on the line
 _POLL_PERIOD_S = 0.1
+_MOST_GIVEN_UP = 32  # questions whose answers may still come: a device without power is asked for days
 _AFTER_SIGN_OF_LIFE_S = 0.005  # nothing tells when the device is through with a sentence that it does not answer
 
 
@@ -91,7 +92,7 @@ class OutputExchange:
         self._asked_v = self._before_v = inf
         self.standing_v: float | None = None
         self._is_overdue = False  # a question was given up, its answer may still come
-        self._given_up: list[tuple[OutputRequest, float]] = []  # in a row, with their send times
+        self._given_up: list[tuple[OutputRequest, float]] = []  # the last in a row, with their send times
         self._is_behind = False  # the answer to one of them came, that to the last question is out
         self._is_altered = False  # the last echo was another voltage
         self._quiet_until_s = 0.0
@@ -157,6 +158,7 @@ class OutputExchange:
         if not isinstance(question, ReadVoltage):  # which tells anew what stands
             self.standing_v = None
         self._given_up.append((question, self._sent_s))
+        del self._given_up[:-_MOST_GIVEN_UP]
         self._in_flight, self._is_overdue = None, True
 
     def _send_next(self, now_s: float) -> None:

@@ -146,3 +146,14 @@ def test_garbage_before_a_late_answer_makes_it_none_of_the_next_question(wire: W
     given_up(wire).answer("#?#")
     wire.answer("210", after_s=0.001)
     assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
+
+
+def test_a_device_that_is_silent_for_long_leaves_no_more_than_its_last_questions(wire: Wire) -> None:
+    """Its answers come no more, and the first one behind days without power must not be held against a million."""
+    wire.settle(200)
+    for _ in range(1000):
+        wire.tick(REPLY_TIMEOUT_S + 0.001)
+    assert len(wire.exchange._given_up) < 100
+    assert wire.exchange.unanswered_since_s == pytest.approx(wire.now_s - 61.0, abs=0.2)
+    wire.answer("200")
+    assert wire.exchange._given_up == [] and wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
