@@ -117,8 +117,13 @@ class EventLog:
             self._put(self._event(cause, f"{code} {sentence}" if code else sentence, window.source))
 
     def _forget_old(self, now_s: float) -> None:
+        """What was left out of a forgotten cause is told now: nobody comes back to it."""
         recent = {cause: window for cause, window in self._windows.items() if now_s - window.began_s < 1.0}
-        self._windows = recent if len(recent) < _MOST_CAUSES else {}
+        kept = recent if len(recent) < _MOST_CAUSES else {}
+        for cause, window in self._windows.items():
+            if cause not in kept:
+                self._put_left_out(cause, window)
+        self._windows = kept
 
     def _event(self, cause: str, sentence: str, source: str = "") -> EventRecord:
         return make_event(self._wall(), source or self._source, cause, sentence)

@@ -9,6 +9,7 @@ import pytest
 from gateway.codes.all_codes import CATALOGUE
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
+from gateway.processes import event_log
 from gateway.processes.event import (
     WARNING_ALARMS,
     EventRecord,
@@ -112,6 +113,17 @@ def test_ever_new_causes_need_no_more_memory() -> None:
     assert len(log._windows) <= 2000
     with log:
         pass
+
+
+@pytest.mark.parametrize("others_s", [0.5, 1.5], ids=["in the same second", "later"])
+def test_what_was_left_out_is_told_however_many_causes_come_behind_it(
+    monkeypatch: pytest.MonkeyPatch, others_s: float
+) -> None:
+    monkeypatch.setattr(event_log, "_MOST_CAUSES", 20)
+    others = ((others_s, f"refusal 10.0.0.1:{index}", "other") for index in range(50))
+    lines = texts(said(Clock(), *((0.0, "flood", "x") for _ in range(25)), *others))
+    assert [line for line in lines if line not in ("x", "other")] == ["15 more lines of 'flood' left out"]
+    assert lines.count("x") == 10 and lines.count("other") == 50
 
 
 def flooded(log: EventLog, terminal: BlockedTerminal) -> tuple[bool, bool]:
