@@ -159,6 +159,35 @@ def test_a_terminal_that_takes_nothing_holds_up_neither_the_caller_nor_the_end_n
     assert len(kept(tmp_path)) >= 1000
 
 
+def test_what_did_not_fit_is_counted_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A terminal that was held up: the last of what it shows is followed by how much it does not."""
+    monkeypatch.setattr(event_log, "_LONGEST_QUEUE", 5)
+    lines: list[str] = []
+    log = EventLog(lines.append)
+    for index in range(8):
+        log(f"cause {index}", f"line {index}")
+    assert log._terminal._events.qsize() == 5
+    log._terminal._events.get_nowait()
+    log("cause 8", "line 8")
+    assert log._terminal._events.qsize() == 4, "the count takes no event's place"
+    log._terminal._events.get_nowait()
+    log("cause 9", "line 9")
+    with log:
+        pass
+    assert texts(lines)[3:] == ["4 more lines left out: those before them were not written yet", "line 9"]
+
+
+def test_what_did_not_fit_until_the_end_is_counted_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(event_log, "_LONGEST_QUEUE", 5)
+    lines: list[str] = []
+    log = EventLog(lines.append)
+    for index in range(8):
+        log(f"cause {index}", f"line {index}")
+    with log:
+        pass
+    assert texts(lines)[5:] == ["3 more lines left out: those before them were not written yet"]
+
+
 @pytest.mark.parametrize("error", [BrokenPipeError(), ValueError("I/O operation on closed file")])
 def test_a_terminal_that_went_away_stops_nothing(error: Exception) -> None:
     tried: list[str] = []
