@@ -50,9 +50,10 @@ class EventLog:
         self._clock, self._wall, self._source = clock, wall, source
         self._windows: dict[str, _RateWindow] = {}
         self._lock = threading.Lock()
-        self._terminal = QueuedWriter("terminal", _terminal_writer(write), self._tell_left_out)
+        self._terminal = QueuedWriter("terminal", _terminal_writer(write), self._event, self._tell_left_out)
         self._file = file
-        self._disk = QueuedWriter("events", _EventFileWriter(file, self._terminal.put, self._event)) if file else None
+        to_disk = _EventFileWriter(file, self._terminal.put, self._event) if file else None
+        self._disk = QueuedWriter("events", to_disk, self._event) if to_disk else None
 
     def __call__(self, cause: str, sentence: str) -> None:
         self._say(self._source, cause, sentence)
@@ -117,8 +118,13 @@ class EventLog:
             self._put(self._event(cause, f"{code} {sentence}" if code else sentence, window.source))
 
     def _forget_old(self, now_s: float) -> None:
+        """What was left out of a forgotten cause is told now: nobody comes back to it."""
         recent = {cause: window for cause, window in self._windows.items() if now_s - window.began_s < 1.0}
-        self._windows = recent if len(recent) < _MOST_CAUSES else {}
+        kept = recent if len(recent) < _MOST_CAUSES else {}
+        for cause, window in self._windows.items():
+            if cause not in kept:
+                self._put_left_out(cause, window)
+        self._windows = kept
 
     def _event(self, cause: str, sentence: str, source: str = "") -> EventRecord:
         return make_event(self._wall(), source or self._source, cause, sentence)
@@ -149,15 +155,21 @@ def _lines_after(before: _RateWindow | None, now_s: float) -> int:
 class QueuedWriter:
     """A queue and the thread that empties it into `write`, whose OSError and ValueError (a terminal that is gone) nobody minds.
 
-    What does not fit in the queue is left out; the registers still show the cause. each_round: called when nothing has come
-    for a second.
+    What does not fit in the queue is left out; the registers still show the cause, and how many there were is said where they
+    are missing. event: makes that one; each_round: called when nothing has come for a second.
     """
 
     def __init__(
-        self, name: str, write: Callable[[EventRecord], object], each_round: Callable[[], None] | None = None
+        self,
+        name: str,
+        write: Callable[[EventRecord], object],
+        event: Callable[[str, str], EventRecord],
+        each_round: Callable[[], None] | None = None,
     ) -> None:
-        self._write = write
+        self._write, self._event = write, event
         self._each_round = each_round
+        self._left_out = 0
+        self._lock = threading.Lock()
         self._events: queue.Queue[EventRecord | None] = queue.Queue(_LONGEST_QUEUE)
         self._thread = threading.Thread(target=self._run, name=f"event-log {name}", daemon=True)
 
@@ -171,15 +183,27 @@ class QueuedWriter:
         self._thread.start()
 
     def put(self, event: EventRecord) -> None:
-        """Queue an event; a full queue drops it."""
-        with contextlib.suppress(queue.Full):
+        """Queue an event; a full queue drops it, and counts."""
+        with self._lock:
+            if self._events.qsize() + bool(self._left_out) >= _LONGEST_QUEUE:  # a count takes no event's place
+                self._left_out += 1
+                return
+            self._put_left_out()
             self._events.put_nowait(event)
 
     def end(self) -> None:
         """Write what is in the queue, then end, if that takes no longer than a second."""
         with contextlib.suppress(queue.Full):
+            self._put_left_out(_END_BOUND_S)
             self._events.put(None, timeout=_END_BOUND_S)
         self._thread.join(_END_BOUND_S)
+
+    def _put_left_out(self, timeout_s: float | None = None) -> None:
+        """Say how many events did not fit, before whatever comes behind them. Raises queue.Full."""
+        if self._left_out:
+            sentence = f"{self._left_out} more lines left out: those before them were not written yet"
+            self._events.put(self._event("events", sentence), timeout=timeout_s)
+            self._left_out = 0
 
     def _run(self) -> None:
         while True:

@@ -15,8 +15,8 @@ from gateway.fieldbus import ModbusRtuServer, RtuSettings, rtu_server
 from gateway.modbus import Peer
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.rtu import LONGEST_ADU, encode_adu
-from gateway.modbus.rtu_receiver import RtuRequest
-from gateway.ports import Pty
+from gateway.modbus.rtu_receiver import RtuRequest, silence_s
+from gateway.ports import PortError, Pty
 from gateway.ports.port import monotonic_s
 from tests.fieldbus.conftest import NotingBank
 
@@ -147,6 +147,29 @@ def test_an_answer_that_comes_back_is_not_asked_again_but_a_terminal_gives_none_
         server._receiver.receive(encode_adu(3, write), now_s)
         assert len(bank.writes) == 1
         assert server._receiver.take(now_s + 1.0) == [RtuRequest(3, write, True)] * is_heard, path
+
+
+def test_a_face_that_is_closed_executes_nothing_more_and_waits_as_long_as_the_line_must_be_silent() -> None:
+    async def scene() -> None:
+        async with Face().serving(None) as face:
+            face.server._on_bytes(encode_adu(3, P.write_register_request(5, 77)), monotonic_s())
+            timer = face.server._timer
+            assert timer.when() - asyncio.get_running_loop().time() > 0.5 * silence_s(LINE.baud, LINE.character_s)
+        assert timer.cancelled() and face.bank.writes == []
+
+    play(scene())
+
+
+def test_a_port_that_is_back_and_does_not_open_is_told() -> None:
+    face, settings = Face(), RtuSettings("/dev/ttyNONE", LINE, unit=3, peer=FACE)
+    server = ModbusRtuServer(
+        face.bank,
+        settings,
+        on_peer_closed=face.gone.append,
+        log=lambda cause, told: face.log.append(f"{cause}: {told}"),
+    )
+    server.port._on_refused(PortError("E101", "no permission"))
+    assert face.log == [f"face {FACE}: E101 no permission; tried again until it opens"] and face.gone == []
 
 
 def test_noise_is_told_by_what_is_new_of_it_once_a_minute_and_as_a_wrong_line_only_where_nothing_was_heard() -> None:

@@ -90,3 +90,23 @@ def test_another_adapter_may_be_otherwise() -> None:
         exchange(bus, READ)
     bus.receiver.forget()
     assert exchange(bus, WRITE, echo_s=ANSWER_S + 1e-3) == 1
+
+
+def test_an_echo_is_known_as_long_as_no_master_can_have_been_as_fast() -> None:
+    for echo_s in (ANSWER_S + 1.5 * SILENCE_S, 2.0 * ANSWER_S + 0.9 * SILENCE_S):
+        assert exchange(Bus(), WRITE, echo_s=echo_s) == 1
+
+
+def test_an_echo_that_got_lost_is_known_again_when_the_next_comes() -> None:
+    bus, back_s = Bus(), ANSWER_S + 1e-3
+    for echo_s in (back_s, None, None, back_s):
+        assert exchange(bus.pause(0.1), READ, echo_s=echo_s) == 1
+    late_s = ANSWER_S + 0.016
+    assert [exchange(bus.pause(0.1), WRITE, echo_s=late_s) for _ in range(5)] == [1] * 5
+
+
+def test_a_pause_ends_a_row_of_equal_writes() -> None:
+    """Three at once are a master's however often it sends them."""
+    bus = Bus()
+    for _ in range(20):
+        assert [exchange(bus.pause(pause_s), WRITE) for pause_s in (0.1, AT_ONCE, AT_ONCE, AT_ONCE)] == [1] * 4

@@ -1,8 +1,9 @@
 """Where the receiver's decisions end: the shortest silence, stray bytes, frames across a silence, and what is forgotten."""
 
 from gateway.modbus import pdu as P  # noqa: N812
+from gateway.modbus.diagnostics import loopback_request, report_request
 from gateway.modbus.rtu import encode_adu
-from gateway.modbus.rtu_receiver import MOST_BYTES, RtuRequest
+from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuRequest
 from tests.modbus.rtu_bus import SILENCE_S, Bus
 from tests.modbus.test_rtu_receiver import COMMAND, INSIDE, OURS, READ, WRITE, answered
 
@@ -70,3 +71,85 @@ def test_where_silences_were_is_forgotten_with_the_port() -> None:
 def test_a_request_with_more_bytes_than_it_says_is_none() -> None:
     for pdu in (WRITE, READ, P.write_registers_request(0, bytes(4))):
         assert Bus().send(encode_adu(1, pdu + bytes(2))).requests() == []
+
+
+MANY = P.write_registers_request(0, bytes(8))
+LONG_ECHO = loopback_request(bytes(8))  # of a length that only its checksum tells
+
+
+def known(*heard_before: int) -> Bus:
+    """A line on which these other units were heard."""
+    bus = Bus()
+    for unit in heard_before:
+        assert bus.send(encode_adu(unit, READ)).requests() == []
+    return bus
+
+
+def test_a_broadcast_in_two_reads_is_one_frame() -> None:
+    for pdu in (WRITE, MANY, P.write_coil_request(0, True), P.mask_write_request(0, 1, 2)):
+        frame = encode_adu(0, pdu)
+        for cut in range(1, len(frame)):
+            assert Bus().send(frame[:cut], frame[cut:], pause_s=0.016).requests() == [RtuRequest(0, pdu, False)], cut
+
+
+def test_an_answer_waits_for_the_silence_and_only_where_more_may_come_for_the_longest_pause() -> None:
+    """From the last byte on: what has come late before makes the next wait no longer."""
+    late, stray = (OURS[:5], OURS[5:]), (b"\x00", b"\xff", b"\x01")
+    for chunks in (late, *((each + OURS,) for each in stray), (OURS + b"\xff\xff\xff",), (INSIDE[:6], OURS)):
+        bus = Bus()
+        assert bus.send(*chunks[:-1], pause_s=0.01).heard == []
+        begin_s = bus.now_s
+        assert bus.send(chunks[-1]).pause(1.0).heard == [(begin_s + SILENCE_S, RtuRequest(1, READ, True))], chunks
+    for stray, pdu in ((b"\x00", report_request()), (b"\x01", WRITE)):  # its first bytes could claim more than there is
+        bus = Bus()
+        begin_s = bus.now_s
+        heard = [(begin_s + SILENCE_S, RtuRequest(1, pdu, True))]
+        assert bus.send(stray + encode_adu(1, pdu)).pause(1.0).heard == heard
+    bus = Bus()
+    begin_s = bus.now_s
+    assert bus.send(COMMAND + OURS[:3]).pause(1.0).heard == [(begin_s + SPLIT_S, RtuRequest(1, WRITE, True))]
+
+
+def test_a_frame_without_a_length_is_heard_behind_another_and_behind_a_silence() -> None:
+    frame = encode_adu(1, LONG_ECHO)
+    assert Bus().send(COMMAND + frame).requests() == [RtuRequest(1, WRITE, False), RtuRequest(1, LONG_ECHO, True)]
+    assert Bus().send(b"\x00", frame, pause_s=0.016).requests() == answered(LONG_ECHO)
+
+
+def test_each_byte_that_is_no_part_of_a_frame_is_counted_once() -> None:
+    bus = Bus().send(b"\x07", COMMAND + b"\x07\x03\xf0", OURS + b"\xff", pause_s=0.016)
+    assert bus.requests() == [RtuRequest(1, WRITE, False), *answered()]
+    assert (bus.receiver.frames, bus.receiver.noise_bytes) == (2, 5)
+
+
+def test_a_silence_is_kept_when_a_flood_before_it_is_dropped() -> None:
+    bus = Bus().send(b"\x55" * 300 + b"\x07", pause_s=0.005)
+    assert bus.send(OURS + b"\x55" * (MOST_BYTES - 290)).requests() == answered()
+
+
+def test_what_goes_beyond_a_begun_frame_is_no_part_of_it_and_what_ends_with_it_may_be() -> None:
+    for begun, heard in ((b"\x07\x03\x00", answered()), (b"\x07\x03\x06", []), (b"\x07\x03\x07", [])):
+        assert known(7).send(begun + OURS).requests() == heard, begun.hex()
+
+
+def test_a_stray_byte_behind_a_silence_costs_nothing_whatever_unit_it_looks_like() -> None:
+    """Also where a frame of that unit was cut off before the silence."""
+    assert known(7).send(b"\x00\x00", b"\x07" + encode_adu(1, MANY), pause_s=0.0021).requests() == answered(MANY)
+    assert known(7).send(b"\x07\x03\xf0", b"\x2d" + COMMAND, pause_s=0.01).requests() == answered(WRITE)
+
+
+def test_a_begun_frame_hides_what_follows_only_where_a_frame_may_begin_and_its_unit_is_known() -> None:
+    assert known(7).send(b"\x00\x00\x00\x07\x03\xf0" + COMMAND).requests() == answered(WRITE)
+    for before in (b"", b"\x55"):  # behind a silence, and with a stray byte there
+        assert known(7).send(b"\x55\x66\x77\x01", before + b"\x07\x03\xf0" + OURS, pause_s=0.01).requests() == []
+        assert Bus().send(b"\x55\x66\x77\x01", before + b"\x07\x03\xf0" + OURS, pause_s=0.01).requests() == answered()
+
+
+def test_behind_another_s_frame_in_noise_a_silence_still_begins_the_next() -> None:
+    assert known(7).send(b"\x07\x03\xf0" + encode_adu(7, READ), OURS, pause_s=0.01).requests() == answered()
+
+
+def test_behind_a_stray_byte_a_frame_counts_where_frames_reach_to_the_next_silence() -> None:
+    both = [RtuRequest(1, WRITE, False), *answered()]
+    assert Bus().send(b"\x0a" + COMMAND, OURS + b"\x00", pause_s=0.0021).requests() == both
+    assert Bus().send(b"\x77" + encode_adu(0, WRITE) + b"\x03", b"\xf0", pause_s=0.016).requests() == []

@@ -186,7 +186,7 @@ def test_a_full_disk_is_one_alarm_and_its_end_says_what_is_missing(tmp_path: Pat
         assert alarmed.wait(5)
         log._disk.end()  # type: ignore[union-attr]
         file.is_full = False
-        log._disk = QueuedWriter("events", log._disk._write)  # type: ignore[union-attr]
+        log._disk = QueuedWriter("events", log._disk._write, log._event)  # type: ignore[union-attr]
         log._disk.start()
         log("cause", "again")
     assert sum("E150" in line for line in lines) == 1

@@ -9,6 +9,7 @@ import pytest
 from gateway.codes.all_codes import CATALOGUE
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
+from gateway.processes import event_log
 from gateway.processes.event import (
     WARNING_ALARMS,
     EventRecord,
@@ -114,6 +115,17 @@ def test_ever_new_causes_need_no_more_memory() -> None:
         pass
 
 
+@pytest.mark.parametrize("others_s", [0.5, 1.5], ids=["in the same second", "later"])
+def test_what_was_left_out_is_told_however_many_causes_come_behind_it(
+    monkeypatch: pytest.MonkeyPatch, others_s: float
+) -> None:
+    monkeypatch.setattr(event_log, "_MOST_CAUSES", 20)
+    others = ((others_s, f"refusal 10.0.0.1:{index}", "other") for index in range(50))
+    lines = texts(said(Clock(), *((0.0, "flood", "x") for _ in range(25)), *others))
+    assert [line for line in lines if line not in ("x", "other")] == ["15 more lines of 'flood' left out"]
+    assert lines.count("x") == 10 and lines.count("other") == 50
+
+
 def flooded(log: EventLog, terminal: BlockedTerminal) -> tuple[bool, bool]:
     """Says more than the queue holds, in a thread of its own: whether saying it came to an end, and leaving the log."""
     said, left = threading.Event(), threading.Event()
@@ -145,6 +157,35 @@ def test_a_terminal_that_takes_nothing_holds_up_neither_the_caller_nor_the_end_n
     assert left, "leaving the log waits for the terminal"
     assert 1 <= len(terminal.lines) <= 1001
     assert len(kept(tmp_path)) >= 1000
+
+
+def test_what_did_not_fit_is_counted_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A terminal that was held up: the last of what it shows is followed by how much it does not."""
+    monkeypatch.setattr(event_log, "_LONGEST_QUEUE", 5)
+    lines: list[str] = []
+    log = EventLog(lines.append)
+    for index in range(8):
+        log(f"cause {index}", f"line {index}")
+    assert log._terminal._events.qsize() == 5
+    log._terminal._events.get_nowait()
+    log("cause 8", "line 8")
+    assert log._terminal._events.qsize() == 4, "the count takes no event's place"
+    log._terminal._events.get_nowait()
+    log("cause 9", "line 9")
+    with log:
+        pass
+    assert texts(lines)[3:] == ["4 more lines left out: those before them were not written yet", "line 9"]
+
+
+def test_what_did_not_fit_until_the_end_is_counted_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(event_log, "_LONGEST_QUEUE", 5)
+    lines: list[str] = []
+    log = EventLog(lines.append)
+    for index in range(8):
+        log(f"cause {index}", f"line {index}")
+    with log:
+        pass
+    assert texts(lines)[5:] == ["3 more lines left out: those before them were not written yet"]
 
 
 @pytest.mark.parametrize("error", [BrokenPipeError(), ValueError("I/O operation on closed file")])

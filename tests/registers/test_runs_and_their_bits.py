@@ -13,6 +13,7 @@ ALL = ControlBit(127)
 RESET, CALIBRATE, TEST = (
     int(bit) for bit in (ControlBit.RESET_FAULT, ControlBit.START_CALIBRATION, ControlBit.START_SELF_TEST)
 )
+PULL = int(ControlBit.VALVE_PULL)
 
 
 @pytest.fixture
@@ -75,6 +76,50 @@ def test_a_0_in_another_bit_or_beside_other_registers_stops_nothing(running, mas
     master.write(0, RESET)
     master.write(0, 1)
     assert not any(command.stops for command in handed)
+
+
+def test_the_run_s_own_bit_ends_a_run_and_stops_no_other(make_bank, master_of, running) -> None:
+    """Cleared it ramps the force to 0, as no stop does; set beside a run of this machine it is a start, which is control's."""
+    bank, handed = make_bank(supported_bits=ALL), list[Command]()
+    master = master_of(bank, "10.0.0.1")
+    master.write(0, CALIBRATE)
+    bank.publish(Status(state=State.CALIBRATING))
+    bank.on_command = handed.append
+    master.write(0, 0)
+    assert not handed[0].stops and not handed[0].control_word
+    bank, handed = running
+    master_of(bank, "10.0.0.1").write(0, CALIBRATE)
+    assert not handed[0].stops and handed[0].control_word == CALIBRATE
+
+
+@pytest.mark.parametrize("host", ["10.0.0.1", "10.0.0.2"])
+def test_enable_that_falls_beside_a_run_s_bit_that_stands_is_a_stop(make_bank, master_of, host) -> None:
+    bank, handed = make_bank(supported_bits=ALL), list[Command]()
+    master_of(bank, "10.0.0.1").write(0, 1 | CALIBRATE)
+    bank.on_command = handed.append
+    master_of(bank, host).write(0, CALIBRATE)
+    assert handed[0].stops
+
+
+def test_of_somebody_else_s_stop_nothing_else_is_taken(make_bank, master_of) -> None:
+    """No edge that stands beside it, and no bit that is not enable."""
+    bank, handed = make_bank(supported_bits=ALL), list[Command]()
+    owner, other = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
+    owner.write(0, 1 | PULL, 1200)
+    bank.on_command = handed.append
+    assert other.refusal(other.write, 0, 1).reason is RefusalReason.NOT_OWNER, "the valve is none of its business"
+    other.write(0, RESET | PULL)
+    assert handed[0].stops and not handed[0].control_word
+
+
+def test_who_writes_other_coils_beside_a_run_does_not_hold_its_bit(make_bank, master_of) -> None:
+    bank = make_bank(supported_bits=ALL)
+    master = master_of(bank, "10.0.0.1")
+    for _ in range(2):
+        bank.write_bits(5, [True], master.peer)
+        bank.write_bits(4, [True], master.peer)
+        bank.write_bits(4, [False], master.peer)
+        bank.clear_command()  # the run has ended
 
 
 def test_without_a_run_a_0_where_nothing_stands_is_no_stop(make_bank, master_of) -> None:

@@ -10,7 +10,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TaskProgre
 
 from gateway.cli.calibration.runs import ENDED, Run, RunStatus
 from gateway.cli.errors import CliError
-from gateway.cli.master.ending_signals import signals_as_ctrl_c, signals_held_back
+from gateway.cli.master.ending_signals import signals_as_ctrl_c, watch_to_the_end
 
 _POLL_S: Final = 0.2
 _BEGIN_S: Final = 2.0
@@ -37,14 +37,8 @@ class NotBegunError(CliError):
 def follow(run: Run) -> dict[str, Any]:
     """Begin the run and wait for its end; how it ended."""
     with signals_as_ctrl_c():
-        try:
-            with signals_held_back():
-                run.begin()
-            _watch(run)
-        except (KeyboardInterrupt, OSError):  # OSError: nobody sees any more how it climbs
-            with signals_held_back():
-                run.stop()
-            _watch(run)
+        if not watch_to_the_end(run.begin, lambda: _watch(run), run.stop):
+            _watch(run)  # on its way to 0
     return run.end()
 
 

@@ -29,6 +29,20 @@ def signals_held_back() -> Iterator[None]:
         raise KeyboardInterrupt
 
 
+def watch_to_the_end(begin: Callable[[], None], watch: Callable[[], None], stop: Callable[[], None]) -> bool:
+    """Begin what presses and watch it; False where something from outside has ended that before: it is stopped then."""
+    with signals_as_ctrl_c():
+        try:
+            with signals_held_back():
+                begin()
+            watch()
+        except (KeyboardInterrupt, OSError):  # OSError: the terminal is gone, and nobody sees it any more
+            with signals_held_back():
+                stop()
+            return False
+    return True
+
+
 @contextmanager
 def _handled_by(handler: Callable[[int, Any], Any]) -> Iterator[None]:
     before = {number: signal.getsignal(number) for number in _ENDING}

@@ -52,26 +52,19 @@ def command(*, wire: "Wire", unit: int, map_name: str, as_json: bool) -> None:
 
 def _run_to_its_end(run: "_SelfTest", *, shows: bool) -> None:
     """Begin it and follow it; whatever ends this process ends the test."""
-    from gateway.cli.master.ending_signals import signals_as_ctrl_c, signals_held_back
+    from gateway.cli.master.ending_signals import watch_to_the_end
 
-    has_begun = False
-    with signals_as_ctrl_c():
-        try:
-            with signals_held_back():
-                run.begin()
-                has_begun = True
-            run.follow(shows=shows)
-        except (KeyboardInterrupt, OSError):  # OSError: the terminal is gone
-            with signals_held_back():
+    try:
+        is_over = watch_to_the_end(run.begin, lambda: run.follow(shows=shows), run.stop)
+    except CliError as error:
+        if (
+            error.exit_code == exit_codes.DEVICE and run.may_run()
+        ):  # an answer is lost: nobody would look at it any more
+            with suppress(CliError):
                 run.stop()
-            raise CliError("self-test stopped; the force went to 0") from None
-        except CliError as error:
-            if (
-                has_begun and error.exit_code == exit_codes.DEVICE
-            ):  # an answer is lost: nobody would look at it any more
-                with suppress(CliError):
-                    run.stop()
-            raise
+        raise
+    if not is_over:
+        raise CliError("self-test stopped; the force went to 0")
 
 
 class _SelfTest:
@@ -89,12 +82,18 @@ class _SelfTest:
         self._word, self._heartbeat = register_map.find("control_word"), register_map.find("heartbeat")
         (beat,) = client.read_values([self._heartbeat])
         self._beat = int(beat.value)
+        self._has_begun = False
 
     def begin(self) -> None:
         """Write the bit, in one request with a new heartbeat."""
         from gateway.registers.words import ControlBit
 
         self._write(int(ControlBit.START_SELF_TEST))
+        self._has_begun = True
+
+    def may_run(self) -> bool:
+        """Decide whether it runs, as far as is known here."""
+        return self._has_begun
 
     def stop(self) -> None:
         """End the test: the force goes to 0."""

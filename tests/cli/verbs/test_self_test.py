@@ -102,6 +102,9 @@ def test_an_answer_that_is_lost_leaves_no_test_behind_and_a_refusal_disturbs_nob
 
         def begin(self) -> None: ...
 
+        def may_run(self) -> bool:
+            return True
+
         def follow(self, *, shows: bool) -> None:
             raise CliError("W210 or E131", code)
 

@@ -39,10 +39,10 @@ class Wire:
         self.now_s += after_s
         self.exchange.tick(self.now_s)
 
-    def settle(self, counts: int) -> None:
-        """This setting acknowledged, the wire idle."""
+    def settle(self, counts: float) -> None:
+        """This setting acknowledged, by where the device then stands, the wire idle."""
         self.set_voltage(counts)
-        self.answer(str(counts))
+        self.answer(str(round(counts)))
         if self.last == "MON":
             self.answer("0")
 

@@ -148,10 +148,96 @@ def test_garbage_before_a_late_answer_makes_it_none_of_the_next_question(wire: W
     assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
 
 
-def test_a_device_that_is_silent_for_long_leaves_nothing_behind(wire: Wire) -> None:
-    """Each question that is given up might be answered late: not those of an hour ago."""
+def test_a_device_that_is_silent_for_long_leaves_no_more_than_its_last_questions(wire: Wire) -> None:
+    """Its answers come no more, and the first one behind days without power must not be held against a million."""
     wire.settle(200)
-    for index in range(500):
-        wire.set_voltage(200 + index % 7, after_s=REPLY_TIMEOUT_S)
-        wire.tick(0.011)
+    for _ in range(1000):
+        wire.tick(REPLY_TIMEOUT_S + 0.001)
     assert len(wire.exchange._given_up) <= 4
+    assert wire.exchange.unanswered_since_s == pytest.approx(wire.now_s - 61.0, abs=0.2)
+    wire.set_voltage(300)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    wire.answer("200")  # a late one, of which of them nobody knows
+    assert wire.now_s - (wire.exchange.unanswered_since_s or 0.0) < 3.0
+    wire.set_voltage(200)
+    wire.answer("200")
+    assert wire.exchange._given_up == [] and wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
+
+
+def late_out_of_three(wire: Wire) -> list[float]:
+    """Three settings were given up, and a fourth is out: when each of them went out."""
+    sent_s = []
+    wire.settle(200)
+    for counts in (210, 220, 230, 240):
+        wire.set_voltage(counts)
+        assert wire.last == f"SET {counts}"
+        sent_s.append(wire.now_s)
+        wire.set_voltage(counts + 10)
+        if counts < 240:
+            wire.now_s += REPLY_TIMEOUT_S + 0.001
+            wire.tick(0.0)
+    return sent_s
+
+
+@pytest.mark.parametrize("answered", [0, 1, 2])
+def test_a_late_answer_tells_its_own_round_trip_and_leaves_the_silence_of_those_behind_it(
+    wire: Wire, answered: int
+) -> None:
+    """Those before it never will be answered. What is out stays so, and no second question goes out beside it."""
+    sent_s = late_out_of_three(wire)
+    wire.answer(str(210 + 10 * answered), after_s=0.001)
+    assert wire.exchange.answer_late_s == pytest.approx(wire.now_s - sent_s[answered])
+    assert wire.exchange.unanswered_since_s == sent_s[answered + 1]
+    assert wire.last == "SET 240" and wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
+    wire.set_voltage(300)
+    wire.answer("240", after_s=0.001)
+    assert wire.exchange.acknowledged_v == pytest.approx(240 * 10 / 1023) and wire.last == "SET 300"
+
+
+def test_a_fall_goes_out_beside_a_question_that_is_behind_and_beside_no_other(wire: Wire) -> None:
+    """A fall below what was asked last, however high it still is above what was confirmed."""
+    given_up(wire).answer("210")
+    wire.set_voltage(215)
+    assert wire.last == "SET 215"
+    wire.answer("220")
+    wire.answer("215")
+    assert wire.last == "MON"
+    wire.answer("0")
+    wire.set_voltage(400)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    assert wire.last == "SET 400"
+    wire.set_voltage(0)
+    assert wire.last == "SET 400", "its own answer is the next, and not late"
+
+
+def test_behind_an_answer_that_repeats_nothing_a_rise_waits_and_a_fall_does_not_and_is_believed_by_its_echo(
+    wire: Wire,
+) -> None:
+    given_up(wire).answer("333")
+    wire.set_voltage(230)
+    assert wire.last == "SET 220"
+    wire.set_voltage(0)
+    assert wire.last == "SET 0"
+    wire.answer("333")
+    assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
+
+
+def test_garbage_leaves_an_answer_that_repeats_nothing_as_doubtful_as_it_was(wire: Wire) -> None:
+    given_up(wire).answer("#?#")
+    wire.answer("#", after_s=0.001)
+    assert wire.exchange.garbage_bytes == 8
+    wire.answer("333", after_s=0.001)
+    assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
+
+
+def test_a_late_reading_is_not_taken_for_the_setting_that_is_out_and_costs_no_time(wire: Wire) -> None:
+    wire.settle(200)
+    wire.tick(0.2)
+    assert wire.last == "MON"
+    wire.set_voltage(300)
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    assert wire.last == "SET 300"
+    wire.answer("7", after_s=0.001)
+    assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
+    wire.answer("300", after_s=0.001)
+    assert wire.exchange.acknowledged_v == pytest.approx(300 * 10 / 1023)

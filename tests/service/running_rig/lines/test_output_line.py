@@ -11,7 +11,7 @@ __all__ = ["wire"]
 def test_a_voltage_is_sent_at_once_when_the_wire_is_free(wire: Wire) -> None:
     wire.set_voltage(512)
     assert wire.written == [b"SET 512\r\n"]
-    assert wire.exchange.acknowledged_v is None
+    assert wire.exchange.acknowledged_v is None and wire.exchange.line.sent_s == wire.now_s
     wire.answer("512")
     assert wire.exchange.acknowledged_v == pytest.approx(512 * 10 / 1023)
     assert wire.exchange.round_trip_s == pytest.approx(ROUND_TRIP_S)
@@ -51,10 +51,10 @@ def test_there_is_never_a_second_question_on_the_wire(wire: Wire) -> None:
 
 
 def test_within_half_a_step_of_the_device_nothing_is_sent(wire: Wire) -> None:
-    wire.settle(512)
+    wire.settle(512.4)
     before = len(wire.written)
-    wire.set_voltage(512.4)
-    wire.set_voltage(511.6)
+    wire.set_voltage(512.49)
+    wire.set_voltage(511.51)
     assert len(wire.written) == before
     wire.set_voltage(512.6)
     assert wire.last == "SET 513"
