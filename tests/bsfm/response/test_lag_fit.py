@@ -112,3 +112,14 @@ def test_the_interval_is_as_wide_as_nineteen_in_twenty_fits_scatter() -> None:
         half.append(0.5 * (high - low))
     scatter = np.std(found, axis=0, ddof=1)
     assert np.mean(half, axis=0) == pytest.approx(1.96 * scatter, rel=0.35)
+
+
+@pytest.mark.parametrize("dead_time_s", [0.0, 0.004, 0.08])
+def test_steps_without_noise_give_their_lags_back_and_no_answer_comes_before_its_cause(dead_time_s: float) -> None:
+    lags = Lags(dead_time_s, 0.13)
+    exact = fit_lags([step(Random(seed), lags, 50.0, 0.0) for seed in range(8)], ONE_LAG)
+    assert exact.dead_time_s == pytest.approx(dead_time_s, abs=2e-4)
+    assert exact.lags_s == pytest.approx(0.13, abs=2e-4)
+    for seed in range(8):
+        noisy = fit_lags([step(Random(seed), lags, 50.0, 2.0) for _ in range(2)], ONE_LAG)
+        assert noisy.dead_time_s >= 0.0

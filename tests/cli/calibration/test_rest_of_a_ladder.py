@@ -67,7 +67,7 @@ class Recorded:
         header["rig_fingerprint"] = "f" * 64
         none = SimpleNamespace(header={"rig": "demo"}, path=Path("0004.fgr"), number=4)
         last = SimpleNamespace(header=header, path=Path("0003.fgr"), number=3)
-        older = SimpleNamespace(header={"ladder": {}}, path=Path("0000.fgr"), number=0)
+        older = SimpleNamespace(header={"ladder": PLAN}, path=Path("0000.fgr"), number=0)
         self.entries: list[Any] = [older, last, none]
         monkeypatch.setattr(resume, "list_recordings", lambda state: self.entries)
         monkeypatch.setattr(resume, "read_recording", self._read)
