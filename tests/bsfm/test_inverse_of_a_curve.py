@@ -30,9 +30,9 @@ CURVES: dict[str, tuple[Sequence[float], Sequence[float]]] = {
 }
 
 
-def force_at(x: float, handles: Sequence[float], weights: Sequence[float]) -> Fraction:
-    """The curve's force, without rounding."""
-    t, n = (Fraction(x) - Fraction(X0)) / (Fraction(X1) - Fraction(X0)), len(handles) - 1
+def force_at(x: float, handles: Sequence[float], weights: Sequence[float], first: float = X0) -> Fraction:
+    """The curve's force, without rounding; first: voltage of its begin."""
+    t, n = (Fraction(x) - Fraction(first)) / (Fraction(X1) - Fraction(X0)), len(handles) - 1
     shares = [comb(n, i) * Fraction(w) * t**i * (1 - t) ** (n - i) for i, w in enumerate(weights)]
     return sum(s * Fraction(b) for s, b in zip(shares, handles, strict=True)) / sum(shares)
 
@@ -42,7 +42,7 @@ def forces(handles: Sequence[float]) -> list[float]:
     return [low + share * (high - low) for share in SHARES]
 
 
-@pytest.mark.parametrize("scale", [1.0, 1e-90, 1e90, 1e199], ids=lambda scale: f"x{scale:g}")
+@pytest.mark.parametrize("scale", [1.0, 1e-156, 1e-90, 1e90, 1e156, 1e199], ids=lambda scale: f"x{scale:g}")
 @pytest.mark.parametrize("name", CURVES)
 def test_the_force_of_the_inverse_is_the_one_that_was_asked_for(name: str, scale: float) -> None:
     handles, weights = [scale * handle for handle in CURVES[name][0]], CURVES[name][1]
@@ -58,6 +58,19 @@ def test_the_force_of_the_inverse_is_the_one_that_was_asked_for(name: str, scale
         assert off <= 1e-7 * steepest + 1e-14, (force_n, x)
         found.append(x)
     assert all(before <= after for before, after in pairwise(found))
+
+
+@pytest.mark.parametrize("name", [name for name in CURVES if CURVES[name][0][0] == 0.0 and "flat" not in name])
+def test_near_an_end_at_0_v_and_0_n_the_voltage_keeps_its_digits(name: str) -> None:
+    """Whichever end that is: a voltage is measured from the nearer one."""
+    handles, weights = CURVES[name]
+    mirrored = [-handle for handle in reversed(handles)], list(reversed(weights))
+    rising, pulling = inverse_of(0.0, 8.0, handles, weights), inverse_of(-8.0, 0.0, *mirrored)
+    for force_n in (6e-14, 6e-11, 6e-7):
+        x, _ = rising(force_n)
+        reached_n = force_at(x, handles, weights, first=0.0)
+        assert float(reached_n) == pytest.approx(force_n, rel=1e-12, abs=0.0)
+        assert pulling(-force_n)[0] == pytest.approx(-x, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("name", CURVES)
@@ -80,7 +93,7 @@ def test_beyond_its_ends_a_curve_stays_there_and_says_so(name: str) -> None:
         inverse(nan)
 
 
-@pytest.mark.parametrize("weight", [1e-150, 1e150])
+@pytest.mark.parametrize("weight", [1e-170, 1e-150, 1e150, 1e170])
 def test_a_weight_whose_square_no_float_has_is_carried(weight: float) -> None:
     handles, weights = (0.0, 20.0, 60.0), (1.0, weight, 1.0)
     inverse = inverse_of(X0, X1, handles, weights)
@@ -105,6 +118,10 @@ def test_newton_needs_few_steps_and_none_for_a_force_that_was_just_asked(monkeyp
             needed.append(len(steps))
             inverse(force_n)
             assert len(steps) == needed[-1]
+        steps.clear()
+        for force_n in forces(handles)[-room.KEPT :]:  # as many as control asks for in turn
+            inverse(force_n)
+        assert not steps and room.KEPT >= 4, "the aim, and where the slide is, before and after a movement"
     assert sum(needed) / len(needed) < MEAN_STEPS and max(needed) <= MOST_STEPS, (
         sum(needed) / len(needed),
         max(needed),

@@ -168,3 +168,17 @@ def test_a_master_goes_back_to_what_was_in_use_before(filled):
     assert filled.outcome == COMMITTED
     assert (filled.active_words, filled.active_slot) == (before, 3)
     assert filled.restarted().active_words == before
+
+
+def test_what_comes_beside_a_job_of_this_machine_is_refused_at_its_own_register(filled, register_map):
+    """Staging is open then: nothing of a master's is under way. Each job has a number of its own."""
+    commit = register_map.find("commit").address
+    jobs = [filled.upload.use(2)["job"]]
+    for address, word in ((1149, 1), (commit, 1)):
+        refusal = filled.refused(address, word)
+        assert (refusal.reason, refusal.address) == (RefusalReason.BUSY, address)
+        assert "calibration use 2 is under way" in refusal.sentence
+    filled.run()
+    jobs.append(filled.upload.use(3)["job"])
+    filled.run()
+    assert jobs[1] == jobs[0] + 1 and filled.upload.status()["job"] == jobs[1]

@@ -178,3 +178,16 @@ def test_noise_without_end_is_told_in_pieces_and_what_waits_is_counted_when_it_i
     assert splitter.is_between_lines is False
     assert told + splitter.forget() == 1000
     assert splitter.is_between_lines is True
+
+
+@pytest.mark.parametrize(
+    ("device", "decimals", "grid"),
+    [((1.1, 9.9), 1, (11, 99)), ((0.14, 4.35), 2, (14, 435)), ((0.05, 9.96), 1, (1, 99)), ((-1.1, 1.1), 1, (-11, 11))],
+)
+def test_an_end_of_a_range_is_one_of_its_numbers_whatever_binary_fractions_make_of_it(
+    device: tuple[float, float], decimals: int, grid: tuple[int, int]
+) -> None:
+    scale = Scale(device, (0.0, 10.0))
+    assert scale.grid(decimals) == grid
+    assert scale.on_grid(device[0] - 5.0, decimals) == grid[0] / 10**decimals
+    assert scale.on_grid(device[1] + 5.0, decimals) == grid[1] / 10**decimals

@@ -164,6 +164,15 @@ def test_after_sixteen_requests_the_others_have_their_turn(stand: Any, deliver: 
     assert answered(far) == list(range(80)) and far.reading
 
 
+def test_a_full_buffer_gives_way_however_few_requests_it_holds(stand: Any, deliver: Any) -> None:
+    made = stand()
+    connection, far = made.connect()
+    longest = framed(pdu.write_registers_request(0, bytes(246)))
+    assert deliver(connection, far, 5 * longest) == BUFFER_BYTES and not far.reading
+    made.clock.advance(0.0)
+    assert far.reading
+
+
 def test_a_flood_gives_way_after_each_buffer_and_loses_nothing(stand: Any, deliver: Any) -> None:
     made = stand()
     connection, far = made.connect()

@@ -1,5 +1,6 @@
 """How a connection ends: deadlines, too many of one address, and who is told."""
 
+from dataclasses import replace
 from typing import Any
 
 from gateway.fieldbus.connection import BUFFER_BYTES
@@ -128,3 +129,17 @@ def test_nobody_is_admitted_while_the_server_closes(stand: Any) -> None:
 def test_a_peer_without_a_certificate_has_the_role_of_its_face(stand: Any) -> None:
     for role in Role:
         assert stand(role=role).connect()[0].peer.role is role
+
+
+def test_of_two_certificates_on_one_machine_each_goes_with_its_own_last_connection(stand: Any) -> None:
+    """Whose lease it is: another program beside it keeps nobody there."""
+    made = stand()
+    ends = []
+    for name in ("robot", "robot", "plc"):
+        connection, _ = made.connect(FAR)
+        connection.peer = replace(connection.peer, name=name)
+        ends.append(connection)
+    ends[0].connection_lost(None)
+    assert made.closed == []
+    ends[1].connection_lost(None)
+    assert [peer.name for peer in made.closed] == ["robot"]

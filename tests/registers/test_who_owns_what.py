@@ -115,3 +115,51 @@ def test_a_stop_leaves_no_bit_of_the_control_word(make_bank, master_of) -> None:
     owner.write(0, int(ControlBit.ENABLE) | pull, 1200)
     owner.write(0, pull)
     assert (owner.word(0), owner.word(1)) == (0, 0) and bank.command.stops
+
+
+def test_whoever_acts_on_a_command_sees_its_owner(bank, master) -> None:
+    """Control takes it inside the write, and asks at once whether the owner is connected."""
+    owners = list[str | None]()
+    bank.on_command = lambda command: owners.append(bank.owner)
+    master.write(0, 1, 1200)
+    master.write(0, 0)
+    assert owners == [master.peer.host, None]
+
+
+def test_what_control_has_cleared_stands_nowhere_and_is_no_stop_again(make_bank, master_of) -> None:
+    """A stop that leaves the valve's bit at 1: behind it the valve goes where the rig says."""
+    bank, pull = make_bank(supported_bits=ControlBit(127)), int(ControlBit.VALVE_PULL)
+    master = master_of(bank, "10.0.0.1")
+    master.write(0, 1 | pull, 1200)
+    master.write(0, pull)
+    assert bank.command.stops and bank.command.control_word == pull
+    bank.clear_command()
+    assert not bank.command.stops and not bank.command.control_word
+
+
+def test_behind_a_run_a_0_is_no_stop_any_more(make_bank, master_of) -> None:
+    bank = make_bank()
+    for state, stops in ((State.CALIBRATING, True), (State.OFF, False)):
+        bank.publish(Status(state=state))
+        master_of(bank, "10.0.0.1").write(0, 0)
+        assert bank.command.stops is stops
+
+
+def test_what_always_changes_is_not_told(bank, master) -> None:
+    told = list[str]()
+    bank.on_accepted = lambda sentence, peer: told.append(sentence)
+    for word in (1, 2, 3):
+        master.write(4, word)
+        master.write(10, word)
+    assert told == []
+    master.write(1, 1200)
+    assert len(told) == 1
+
+
+def test_the_byte_order_of_sixty_four_hosts_is_remembered(make_bank, master_of, register_map) -> None:
+    bank, address = make_bank(require_byte_order_echo=True), register_map.find("byte_order_echo").address
+    for number in range(65):
+        if number == 64:
+            assert bank._echo.is_proven_by("10.0.1.0")
+        master_of(bank, f"10.0.1.{number}").write_float(address, 1234.5)
+    assert not bank._echo.is_proven_by("10.0.1.0") and bank._echo.is_proven_by("10.0.1.1")

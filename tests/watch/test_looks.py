@@ -121,3 +121,26 @@ def test_what_is_usual_is_exceeded_by_a_quarter_and_what_is_not_known_by_anythin
     assert reference.is_exceeded(window(1.0), 0.0)
     reference.raise_floor(window(1.0), 0.4)
     assert [reference.is_exceeded(window(1.0), rms_n) for rms_n in (0.49, 0.51)] == [False, True]
+
+
+def test_a_window_that_cannot_be_compared_is_skipped_and_counted() -> None:
+    """It neither clears nor confirms what stands, and is told by its sentence."""
+    bench = Bench()
+    bench._comparison.why_unsuitable = lambda window: "another tool is on"  # type: ignore[method-assign]
+    for is_off in (False, True):
+        bench.is_off = is_off
+        bench.look_again()
+    assert bench.searched == [] and bench.why_skipped == "another tool is on"
+    assert (bench.counters["looks"], bench.counters["judged"], bench.counters["skipped"]) == (2, 0, 2)
+
+
+def test_healthy_looks_clear_what_was_published() -> None:
+    bench = Bench()
+    bench.is_off = True
+    for _ in range(6):
+        bench.look_again()
+    assert bench.published.cause is ResidualCause.COULOMB_FRICTION
+    bench.is_off = False
+    for _ in range(6):
+        bench.look_again()
+    assert bench.published.cause is ResidualCause.NONE

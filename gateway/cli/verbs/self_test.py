@@ -57,9 +57,7 @@ def _run_to_its_end(run: "_SelfTest", *, shows: bool) -> None:
     try:
         is_over = watch_to_the_end(run.begin, lambda: run.follow(shows=shows), run.stop)
     except CliError as error:
-        if (
-            error.exit_code == exit_codes.DEVICE and run.may_run()
-        ):  # an answer is lost: nobody would look at it any more
+        if error.exit_code == exit_codes.DEVICE and run.may_run():  # an answer is lost: nobody looks at it any more
             with suppress(CliError):
                 run.stop()
         raise
@@ -92,8 +90,13 @@ class _SelfTest:
         self._has_begun = True
 
     def may_run(self) -> bool:
-        """Decide whether it runs, as far as is known here."""
-        return self._has_begun
+        """Decide whether it runs. Where the answer to its start was lost the gateway is asked: what presses there may be
+        another master's, which no stop of ours may end."""
+        from gateway.registers.words import SelfTestResult
+
+        with suppress(CliError):
+            return self._has_begun or self._read()["result"] == SelfTestResult.RUNNING
+        return False
 
     def stop(self) -> None:
         """End the test: the force goes to 0."""

@@ -5,7 +5,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from gateway.bsfm.response.lag_fit import TWO_LAGS, choose_shapes, fit_lags
+from gateway.bsfm.response.lag_fit import ONE_LAG, TWO_LAGS, _compute_held_out_loss, choose_shapes, fit_lags, interval
 from gateway.bsfm.response.response_model import JoinedSteps, Lags, StepResponse, missing_share
 from gateway.bsfm.response.second_order import SecondOrder
 
@@ -88,3 +88,38 @@ def test_many_steps_at_once_give_each_the_force_that_it_has_alone(lags: Lags) ->
     alone_n = [force_n for step in steps for force_n in force_of_one_n(step, lags)]
     assert joined.expected_n(lags).tolist() == pytest.approx(alone_n, abs=1e-9)
     assert joined.force_n.tolist() == [force_n for step in steps for force_n in step.force_n.tolist()]
+
+
+def test_shapes_are_judged_by_steps_that_their_fit_has_not_seen() -> None:
+    """Every other step of another plant: each half fits its own without an error, and the other half not at all."""
+    rng, equal, apart = Random(2), Lags(0.02, 0.05, 0.05), Lags(0.02, 0.19, 0.01)
+    of_two = [step(rng, lags, 50.0, 0.0) for _ in range(4) for lags in (equal, apart)]
+    held_out = _compute_held_out_loss(of_two, TWO_LAGS)
+    seen = sum(fit_lags(half, TWO_LAGS).loss for half in (of_two[::2], of_two[1::2]))
+    assert held_out.loss > 10.0 * seen and not held_out.are_equal
+    of_one = _compute_held_out_loss([step(rng, equal, 50.0, 0.0) for _ in range(8)], TWO_LAGS)
+    assert of_one.loss < 0.01 * held_out.loss and of_one.are_equal
+
+
+def test_the_interval_is_as_wide_as_nineteen_in_twenty_fits_scatter() -> None:
+    found, half = [], []
+    for seed in range(24):
+        rng = Random(seed)
+        steps = [step(rng, Lags(0.05, 0.1), 50.0, 0.3) for _ in range(12)]
+        fit = fit_lags(steps, ONE_LAG)
+        low, high = interval(fit, steps)
+        found.append(fit.place)
+        half.append(0.5 * (high - low))
+    scatter = np.std(found, axis=0, ddof=1)
+    assert np.mean(half, axis=0) == pytest.approx(1.96 * scatter, rel=0.35)
+
+
+@pytest.mark.parametrize("dead_time_s", [0.0, 0.004, 0.08])
+def test_steps_without_noise_give_their_lags_back_and_no_answer_comes_before_its_cause(dead_time_s: float) -> None:
+    lags = Lags(dead_time_s, 0.13)
+    exact = fit_lags([step(Random(seed), lags, 50.0, 0.0) for seed in range(8)], ONE_LAG)
+    assert exact.dead_time_s == pytest.approx(dead_time_s, abs=2e-4)
+    assert exact.lags_s == pytest.approx(0.13, abs=2e-4)
+    for seed in range(8):
+        noisy = fit_lags([step(Random(seed), lags, 50.0, 2.0) for _ in range(2)], ONE_LAG)
+        assert noisy.dead_time_s >= 0.0

@@ -7,6 +7,7 @@ import pytest
 
 from gateway.cli.calibration import remote_run
 from gateway.cli.calibration.remote_run import RemoteRun
+from gateway.cli.errors import CliError
 from gateway.cli.master.client import Assignment, Frame, RefusedError
 from gateway.cli.master.wires import TcpWire
 from gateway.codes.faults import FaultCode
@@ -110,4 +111,21 @@ def test_a_heartbeat_that_is_refused_is_not_repeated(monkeypatch: pytest.MonkeyP
     run.begin()
     run._beat.join(5.0)
     assert not run._beat.is_alive() and client.beats == 1
+    run.close()
+
+
+def test_a_heartbeat_whose_answer_is_lost_is_followed_by_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that noise took must not be the last: the lease would end the run."""
+    monkeypatch.setattr(remote_run, "DEFAULT_PERIOD_S", 0.001)
+    run = remote(client := PlayedClient(CalibrationPhase.IDLE))
+    answers = [CliError("E131 no answer"), CliError("E131 no answer"), RefusedError(6, "write 1 at 4")]
+
+    def lose(assignments: Sequence[Assignment]) -> None:
+        client.beats += 1
+        raise answers.pop(0)
+
+    monkeypatch.setattr(client, "write_values", lose)
+    run.begin()
+    run._beat.join(5.0)
+    assert not run._beat.is_alive() and client.beats == 3
     run.close()

@@ -67,7 +67,8 @@ class Recorded:
         header["rig_fingerprint"] = "f" * 64
         none = SimpleNamespace(header={"rig": "demo"}, path=Path("0004.fgr"), number=4)
         last = SimpleNamespace(header=header, path=Path("0003.fgr"), number=3)
-        self.entries: list[Any] = [last, none]
+        older = SimpleNamespace(header={"ladder": PLAN}, path=Path("0000.fgr"), number=0)
+        self.entries: list[Any] = [older, last, none]
         monkeypatch.setattr(resume, "list_recordings", lambda state: self.entries)
         monkeypatch.setattr(resume, "read_recording", self._read)
         monkeypatch.setattr(resume, "check_ladder", self._check)
@@ -116,7 +117,7 @@ def test_a_run_whose_last_stair_stood_when_it_ended_is_not_finished(monkeypatch:
 
 def test_without_a_ladder_there_is_nothing_to_go_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
     recorded = Recorded(monkeypatch, {})
-    del recorded.entries[0]
+    del recorded.entries[:2]
     with pytest.raises(CliError, match="E422") as ended:
         find_rest_of_ladder(Path())
     assert ended.value.exit_code == exit_codes.DATA

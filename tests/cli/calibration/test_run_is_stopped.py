@@ -132,13 +132,14 @@ class Registers:
         self.words: list[int] = []
         self.beats = 0
         self.phase = CalibrationPhase.STORED
+        self.values: dict[str, float] = {}
 
     def _in_turn(self) -> None:
         assert self.run and self.run._turn.locked(), "both speak at once"
 
     def read_values(self, registers: list[Any]) -> list[Any]:
         self._in_turn()
-        values = {"calibration_phase": float(self.phase), "calibration_stored": 3.0}
+        values = {"calibration_phase": float(self.phase), "calibration_stored": 3.0} | self.values
         return [type("Reading", (), {"value": values.get(register.name, 0.0)}) for register in registers]
 
     def frames(self, assignments: list[Any]) -> list[Frame]:
@@ -252,6 +253,41 @@ def test_a_stop_that_got_lost_is_sent_again(remote: Registers) -> None:
     run.stop()
     run.close()
     assert remote.words == [int(ControlBit.START_CALIBRATION), 0]
+
+
+def test_a_start_that_is_refused_beside_another_s_run_is_no_run_of_ours(remote: Registers) -> None:
+    def refuse(frame: Frame) -> None:
+        remote.phase = CalibrationPhase.LADDER
+        raise CliError("W217 busy", exit_codes.FAILED)
+
+    remote.write = refuse  # type: ignore[method-assign]
+    run = remote.run
+    assert run
+    with pytest.raises(CliError, match="W217"):
+        run.begin()
+    assert not run._beat.ident, "whose lease is kept is somebody else's"
+    run.close()
+
+
+def test_what_is_refused_is_not_said_again(remote: Registers) -> None:
+    said = list[int]()
+
+    def refuse(frame: Frame) -> None:
+        said.extend(frame.words)
+        raise CliError("W210 not owner", exit_codes.FAILED)
+
+    remote.write = refuse  # type: ignore[method-assign]
+    assert remote.run
+    with pytest.raises(CliError, match="W210"):
+        remote.run.stop()
+    assert said == [0]
+
+
+def test_a_run_elsewhere_is_told_in_shares_and_volts(remote: Registers) -> None:
+    remote.values = {"calibration_progress": 250.0, "output_voltage": 1500.0, "force_measured": 12.0}
+    assert remote.run
+    look = remote.run.look()
+    assert (look.progress, look.voltage_v, look.force_n) == (0.25, 1.5, 12.0)
 
 
 @pytest.mark.parametrize(("minor_points", "first_group"), [(0, 1), (32, 2)])

@@ -45,3 +45,13 @@ def test_an_endless_line_is_dropped_in_pieces_and_the_next_one_is_read() -> None
 
 def test_the_longest_line_is_still_a_line() -> None:
     assert lines([b"a" * LONGEST_LINE_BYTES + b"\r\n"]) == [(b"a" * 128 + b"\r\n", b"a" * 128, True)]
+
+
+def test_behind_a_line_that_was_forgotten_the_next_is_whole_however_long_that_was() -> None:
+    """A port that was opened again while somebody shouted: the first answer counts."""
+    for lost in (b"51", b"x" * 200):
+        splitter = LineSplitter(b"\r\n")
+        splitter.feed(lost)
+        assert 0 < splitter.forget() <= LONGEST_LINE_BYTES and splitter.is_between_lines
+        (line,) = splitter.feed(b"512\r\n")
+        assert line.is_whole and line.body == b"512"

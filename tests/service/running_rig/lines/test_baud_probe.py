@@ -11,7 +11,7 @@ from gateway.devices import DeviceProfile, cell_device, output_device
 from gateway.devices.messages import Accepted, Garbage, SetVoltage
 from gateway.ports import PacedPty
 from gateway.profiles import CellLine, OutputLine
-from gateway.service.running_rig.lines.baud_probe import explain_silent_device, listen_at
+from gateway.service.running_rig.lines.baud_probe import ProbeResult, explain_silent_device, listen_at
 from tests.service.rigs import demo
 
 FRAME_PERIOD_S = 0.01
@@ -163,3 +163,19 @@ def test_a_cell_in_another_unit_is_quoted_and_the_unit_told(cell: CellLine, righ
     assert sentence.startswith("E110 ")
     where = "" if right == 115200 else "at 38400 "
     assert f"; {where}it says 'ST,GS,+0012.34kN', in kN: stream-st-gs reads kg or lb or g or N; set the" in sentence
+
+
+def test_each_speed_is_tried_once_the_rig_s_own_first_and_what_it_says_there_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried = list[int]()
+
+    async def hear(line: object, path: str, baud: int) -> ProbeResult:
+        tried.append(baud)
+        return ProbeResult(baud, 9, 0, f"it says words of {baud}")
+
+    monkeypatch.setattr("gateway.service.running_rig.lines.baud_probe.listen_at", hear)
+    line = replace(demo().load_cell, baud=38400)
+    told = asyncio.run(explain_silent_device(line, "/dev/ttyNONE"))
+    assert tried == [38400, 9600, 19200, 57600, 115200]
+    assert told == "E110 /dev/ttyNONE: 9 bytes, 0 valid lines at 38400; it says words of 38400"

@@ -212,3 +212,23 @@ def test_the_loop_asks_a_valve_again_whose_answer_was_lost() -> None:
     rig.run(0.5)
     assert len(rig.relay.asked) > asked
     assert rig.now() - (rig.relay.line.status.unanswered_since_s or rig.now()) < 0.1
+
+
+def test_an_answer_of_before_an_unplug_tells_nothing_behind_it() -> None:
+    relay = Relay(PULL)
+    relay.line.tick(relay.now_s)
+    (_, answer) = relay.answers.pop()
+    relay.line.reset()
+    relay.line.on_bytes(answer, relay.now_s + 0.02)
+    assert relay.line.status.stands is None
+
+
+def test_a_valve_that_lost_its_power_is_told_anew_as_soon_as_it_has_said_where_it_stands() -> None:
+    relay = Relay().run(0.5, PULL)
+    assert relay.orders == [PULL]
+    relay.answers.clear()
+    relay.line.reset()
+    relay.stands, before = PUSH, len(relay.asked)
+    relay.run(0.5, PULL)
+    (first_s, first), (then_s, then) = relay.asked[before : before + 2]
+    assert (first, then) == (None, PULL) and then_s - first_s < 0.04

@@ -1,0 +1,47 @@
+"""A lease by itself: what renews it, when it is over, and what counts as a sign of life since a time."""
+
+import pytest
+
+from gateway.control.supervision.lease import Lease
+
+
+def test_a_lease_is_over_behind_its_length_and_at_once_where_its_owner_has_gone() -> None:
+    lease = Lease(0.5)
+    lease.start(10.0)
+    assert not lease.is_lost(10.5, True) and lease.is_lost(10.51, True)
+    assert lease.is_lost(10.0, False)
+    lease.observe(10.5, 7)
+    assert not lease.is_lost(11.0, True) and lease.age_s(11.0) == 0.5
+    lease.start(12.0)
+    assert not lease.is_lost(12.4, True)
+
+
+def test_without_a_lease_nobody_is_lost() -> None:
+    lease = Lease(None)
+    assert not lease.is_lost(1e6, False) and lease.is_fresh_since(1e6, 2e6)
+
+
+def test_only_another_heartbeat_renews_it_and_none_that_the_bank_has_zeroed() -> None:
+    lease = Lease(0.5)
+    lease.observe(10.0, 7)
+    lease.observe(10.4, 7)
+    assert lease.age_s(10.5) == 0.5
+    lease.adopt(0)
+    lease.observe(10.6, 0)
+    assert lease.age_s(11.0) == 1.0
+    lease.observe(11.0, 7)
+    assert lease.age_s(11.0) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("since_s", "now_s", "is_fresh"),
+    [(9.9, 10.2, True), (9.9, 10.5, True), (9.9, 10.6, False), (10.0, 10.2, False), (10.1, 10.2, False)],
+)
+def test_a_sign_of_life_is_one_that_came_later_and_within_one_length(
+    since_s: float, now_s: float, is_fresh: bool
+) -> None:
+    lease = Lease(0.5)
+    lease.observe(10.0, 7)
+    assert lease.is_fresh_since(since_s, now_s) is is_fresh
+    assert lease.would_be_fresh_since(since_s, now_s, 7) is is_fresh
+    assert lease.would_be_fresh_since(since_s, now_s, 8)
