@@ -44,13 +44,17 @@ def settings_of(descriptor: int) -> TerminalSettings:
     return termios.tcgetattr(descriptor)
 
 
+def let_send(descriptor: int) -> None:
+    """Let the terminal send, where another program has stopped it: that stays, behind its end too."""
+    termios.tcflow(descriptor, termios.TCOON)
+
+
 def restore_settings(descriptor: int, settings: TerminalSettings, baud: int) -> bool:
-    """Set the terminal as it was, and let it send; return whether it is. A speed that has no name of its own cannot be told
+    """Set the terminal as it was; return whether it is. A speed that has no name of its own cannot be told
     this way. SERIAL_FAILURES where there is none any more."""
     if not hasattr(termios, f"B{baud}"):
         return False
     termios.tcsetattr(descriptor, termios.TCSANOW, settings)
-    termios.tcflow(descriptor, termios.TCOON)
     return settings_of(descriptor) == settings
 
 
@@ -96,5 +100,5 @@ def _return_eagain_for_nothing(descriptor: int) -> None:
     attributes = termios.tcgetattr(descriptor)
     attributes[6][_MINIMUM], attributes[6][_TIME] = 1, 0
     termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
-    termios.tcflow(descriptor, termios.TCOON)  # whoever had the port before may have stopped it, and that stays
+    let_send(descriptor)
     os.set_blocking(descriptor, False)

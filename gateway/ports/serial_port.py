@@ -21,7 +21,7 @@ from gateway.devices import SerialSettings
 from gateway.ports.errors import SERIAL_FAILURES, PortError, explain_changed_settings, explain_loss
 from gateway.ports.identity import PtyIdentity
 from gateway.ports.latency import set_low_latency
-from gateway.ports.opening import TerminalSettings, open_descriptor, restore_settings, settings_of
+from gateway.ports.opening import TerminalSettings, let_send, open_descriptor, restore_settings, settings_of
 from gateway.ports.port import WRITE_DEADLINE_S, PortEvents, monotonic_s
 
 MOST_UNSENT_BYTES: Final = 4096  # beyond it the line is stuck: no command here is longer than 40 bytes
@@ -167,6 +167,7 @@ class SerialPort:
     def _look_at_settings(self) -> None:
         self._look = asyncio.get_running_loop().call_later(_LOOK_S, self._look_at_settings)
         with contextlib.suppress(*SERIAL_FAILURES):  # the next read tells of what is gone
+            let_send(self._descriptor)
             if settings_of(self._descriptor) == self._set_to:
                 return
             change = explain_changed_settings(self._path)

@@ -109,13 +109,19 @@ def test_a_port_that_is_gone_is_lost_by_its_hang_up_and_nothing_else(ear: Any, l
     assert (told, [loss.code for loss in ear.losses]) == ([], ["E102"])
 
 
-def test_a_terminal_that_somebody_has_stopped_sends_again_once_it_is_opened(ear: Any, line: Pty) -> None:
+def test_a_terminal_that_somebody_stops_sends_again(ear: Any, line: Pty) -> None:
+    """Before it is opened, or while it is open: that outlives the program which did it."""
+
     async def scene() -> None:
         termios.tcflow(line._slave, termios.TCOOFF)
         port = ear.port(line.path)
         await port.open()
         port.write(b"SET 0\r\n")
         assert await gather(line.fd, 7) == b"SET 0\r\n"
+        termios.tcflow(line._slave, termios.TCOOFF)
+        port.write(b"SET 1\r\n")
+        port._look_at_settings()
+        assert await gather(line.fd, 7) == b"SET 1\r\n"
         port.close()
 
     asyncio.run(scene())
