@@ -75,6 +75,7 @@ def test_the_look_comes_by_itself(ear: Any, line: Pty) -> None:
         port.close()
 
     asyncio.run(scene())
+    assert len(told) == 2
 
 
 def test_a_speed_without_a_name_is_set_again_by_opening_anew(ear: Any, line: Pty) -> None:
