@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.extras import import_library
+from gateway.live.standstill import Standstill
 from gateway.plain_file import check_plain
 from gateway.telemetry.broker_session import BrokerMessage, BrokerSession
 from gateway.telemetry.command_queue import CommandQueue
@@ -91,12 +92,13 @@ async def _carry(client: Any, session: BrokerSession) -> None:
         await client.subscribe(topic, qos=1)
     for message in session.greet():
         await _publish(client, message)
-    queue = CommandQueue(session.is_stop, asyncio.get_running_loop().time)
+    standstill = Standstill(asyncio.get_running_loop().time)
+    queue = CommandQueue(session.is_stop, standstill)
     async with asyncio.TaskGroup() as group:
         group.create_task(_speak(client, session, turn))
         group.create_task(_listen(client, queue))
         group.create_task(_answer(client, session, queue, turn))
-        group.create_task(queue.keep_time())
+        group.create_task(standstill.keep_time())
 
 
 async def _speak(client: Any, session: BrokerSession, turn: asyncio.Lock) -> None:

@@ -2,8 +2,7 @@
 
 Control takes some ten commands a second by its socket; whoever sends more of them had each one carried out later than the one
 before, and the stop behind them after minutes. So few wait, and of more than that the oldest goes; a stop takes the place of
-all that wait, since it would undo them. What came while this process stood still (a machine that sleeps, or swaps) belongs to
-a situation that is over: nobody presses because of it, and a stop is carried out all the same.
+all that wait, since it would undo them. What came while this process stood still presses nothing.
 """
 
 import asyncio
@@ -12,10 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from gateway.live.standstill import Standstill
+
 ROOM: Final = 10
-STANDSTILL_S: Final = 1.0
-_BEAT_S: Final = 0.1
-_AFTERMATH_S: Final = 0.5  # behind a standstill: what the kernel has kept meanwhile comes in several pieces
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +26,13 @@ class HeardMessage:
 
 
 class CommandQueue:
-    """is_stop: of a payload; clock: in seconds, of the loop."""
+    """is_stop: of a payload; standstill: of this process."""
 
-    def __init__(self, is_stop: Callable[[bytes], bool], clock: Callable[[], float]) -> None:
-        self._is_stop, self._clock = is_stop, clock
+    def __init__(self, is_stop: Callable[[bytes], bool], standstill: Standstill) -> None:
+        self._is_stop, self._standstill = is_stop, standstill
         self._waiting: deque[HeardMessage] = deque()
         self._ready = asyncio.Event()
         self._dropped = 0
-        self._beat_s, self._over_s = clock(), -STANDSTILL_S
 
     def put(self, topic: str, payload: bytes) -> None:
         """Have a message wait."""
@@ -55,7 +52,7 @@ class CommandQueue:
             self._ready.clear()
             await self._ready.wait()
         message = self._waiting.popleft()
-        if message.is_stop or not self._is_aftermath():
+        if message.is_stop or not self._standstill.is_aftermath():
             return message, ""
         return message, "the gateway's MQTT process stood still: what came meanwhile is not carried out"
 
@@ -63,19 +60,3 @@ class CommandQueue:
         """Return how many were dropped since the last call."""
         dropped, self._dropped = self._dropped, 0
         return dropped
-
-    async def keep_time(self) -> None:
-        """Watch for a standstill, for ever."""
-        while True:
-            self._note_time()
-            await asyncio.sleep(_BEAT_S)
-
-    def _note_time(self) -> None:
-        now_s = self._clock()
-        if now_s - self._beat_s > STANDSTILL_S:
-            self._over_s = now_s
-        self._beat_s = now_s
-
-    def _is_aftermath(self) -> bool:
-        self._note_time()  # whoever wakes first
-        return self._clock() - self._over_s < _AFTERMATH_S

@@ -5,6 +5,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
+from gateway.live.standstill import Standstill
 from gateway.telemetry.command_queue import ROOM, CommandQueue
 from gateway.telemetry.register_commands import is_stop
 
@@ -20,8 +21,12 @@ class Clock:
 def play(scene: Callable[[CommandQueue, Clock], Awaitable[None]]) -> None:
     async def run() -> None:
         clock = Clock()
+        standstill = Standstill(clock)
+        keeping = asyncio.create_task(standstill.keep_time())
+        await asyncio.sleep(0.0)
         async with asyncio.timeout(5.0):
-            await scene(CommandQueue(lambda payload: payload == b"stop", clock), clock)
+            await scene(CommandQueue(lambda payload: payload == b"stop", standstill), clock)
+        keeping.cancel()
 
     asyncio.run(run())
 
@@ -77,22 +82,6 @@ def test_what_came_while_the_process_stood_still_presses_nothing_and_a_stop_stop
         clock.now_s = 4.6
         queue.put("command", b"4")
         assert (await queue.get())[1] == ""
-
-    play(scene)
-
-
-def test_whoever_waits_for_a_message_keeps_the_time_meanwhile() -> None:
-    """A queue without messages for an hour has not stood still."""
-
-    async def scene(queue: CommandQueue, clock: Clock) -> None:
-        keeping = asyncio.create_task(queue.keep_time())
-        for _ in range(3):
-            await asyncio.sleep(0.0)
-            clock.now_s += 0.9
-            queue._note_time()  # what its timer does, without waiting for it
-        queue.put("command", b"1")
-        assert (await queue.get())[1] == ""
-        keeping.cancel()
 
     play(scene)
 
