@@ -127,6 +127,7 @@ class Simulation:
             self.period_s,
             DOWN_S if supervision.lease_action is LeaseAction.RAMP else 0.0,
             supervision.output_timeout_s + rig.output.device.reply_timeout_s + POLL_S,
+            rig.output.device.reply_timeout_s,
         )
 
     def run(self, events: Iterable[Event], duration_s: float) -> Outcome:

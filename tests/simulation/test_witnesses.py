@@ -144,6 +144,18 @@ def test_a_force_that_stands_while_the_output_or_the_cell_says_nothing_is_seen(o
     assert [line.partition(" at ")[0] for line in observer.broken] == ["I3 output", "I3 cell unheard"]
 
 
+@pytest.mark.parametrize(("spoiled_s", "is_seen"), [(1.95, False), (1.7, True)])
+def test_a_stop_may_wait_for_an_answer_that_is_lost_and_for_none_of_before(spoiled_s: float, is_seen: bool) -> None:
+    """As long as any answer is waited for, whatever the loop's rate: on a fast one that is longer than its own times."""
+    observer = Observer(replace(BOUNDS, period_s=0.01, reply_timeout_s=0.06))
+    observer.voltage_v, observer.write_s, observer.cell_heard_s = 3.0, 2.0, 2.0
+    observer.disabled_s, observer.answer_spoiled_s = 1.95, spoiled_s
+    observer.look(2.03)
+    assert bool(observer.broken) is is_seen
+    observer.look(2.1)
+    assert observer.broken
+
+
 @pytest.mark.parametrize(
     ("pdu", "counts"),
     [

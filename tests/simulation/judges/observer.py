@@ -22,7 +22,8 @@ STATUS_FIRST, STATUS_WORDS = 100, 18
 @dataclass(frozen=True)
 class Bounds:
     """What the rig's file says, and what the wire takes (`GRACE_S`: one tick, two sentences of 9600 baud, the loop's grid).
-    lease_s: endless where a lost master's force is held; lost_down_s: how long it may take to ramp down."""
+    lease_s: endless where a lost master's force is held; lost_down_s: how long it may take to ramp down; reply_timeout_s: how
+    long an answer of the output is waited for, before anything else is sent."""
 
     voltage_max_v: float
     slew_v_per_s: float
@@ -32,6 +33,7 @@ class Bounds:
     period_s: float
     lost_down_s: float = 0.0
     output_timeout_s: float = inf
+    reply_timeout_s: float = 0.0
 
 
 ENABLE, RESET, RUN_BITS = 1, 2, 32 | 64
@@ -55,6 +57,7 @@ class Observer:
     cell_heard_s: float = 0.0
     answers_lost_s: float | None = None
     output_lost_s: float | None = None
+    answer_spoiled_s: float = -inf
     control_lost_s: float | None = None
     write_s: float = 0.0
     disabled_s: float | None = 0.0
@@ -171,6 +174,9 @@ class Observer:
             return
         standing_s = now_s - self.setting_s
         down_s = DOWN_S if self.is_run or now_s - self.run_ended_s < DOWN_S else 0.0
+        grace_s = GRACE_S + 2.0 * self.bounds.period_s
+        if now_s - self.answer_spoiled_s <= self.bounds.reply_timeout_s + grace_s:
+            grace_s += self.bounds.reply_timeout_s  # for nothing: it was lost, or late
         limits = (
             ("I3 cell", self.cell_lost_s, self.bounds.sample_timeout_s),
             ("I3 cell unheard", self.cell_heard_s, self.bounds.sample_timeout_s),
@@ -184,7 +190,7 @@ class Observer:
                 continue  # who stands still hears nothing: then it is the guardian's turn, within its own bound
             if law in ("I4", "I3 master") and now_s - self._pressing_s <= GRACE_S:
                 continue  # the answer to the write that has begun it is still on its way
-            if since_s is not None and now_s - since_s > bound_s + GRACE_S + 2.0 * self.bounds.period_s:
+            if since_s is not None and now_s - since_s > bound_s + grace_s:
                 self.complain(
                     law, f"{self.voltage_v:.3f} V for {standing_s:.3f} s, {now_s - since_s:.3f} s after", now_s
                 )

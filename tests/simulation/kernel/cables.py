@@ -8,6 +8,7 @@ import asyncio
 import os
 from collections import deque
 from collections.abc import Callable
+from math import inf
 
 from gateway.devices import SerialSettings
 from gateway.ports import PortError, PortEvents
@@ -40,6 +41,7 @@ class Cable:
         self.is_plugged = True
         self._spoils: deque[Spoil] = deque()
         self.strange_s = 0.0  # when something strange was said last
+        self.spoiled_s = -inf  # when an answer of the device was spoiled last
         self.answers = 0  # what the device has said so far, in sentences
         self.heard_s = 0.0  # when the host has got something last
         self.reworded = (b"", b"")  # what the device says, and from now on says instead
@@ -88,6 +90,7 @@ class Cable:
             self._put(self._to_host, data, self._reach_host)
 
     def _send_spoiled(self, data: bytes) -> None:
+        self.spoiled_s = self._outside.time()
         for late_s, piece in spoiled(self._spoils.popleft(), data):
             self._outside.call_later(late_s, self.say, piece) if late_s else self.say(piece)
 
