@@ -6,11 +6,13 @@ on the disk, `audit/head` is replaced: number and hash of the last line. So line
 a power cut, after which the files may hold more than the head says but never less, is told apart from that. A new audit
 begins with a head of no line, and a new file's name is on the disk before its first line is.
 
-What a killed writer has left of a line is cut off at the next start, and the first line after it quotes it. Everything
-here waits for the disk: it runs in a thread beside the loop.
+What a killed writer has left of a line is cut off at the next start, and the first line after it quotes it. A file that is
+removed or replaced while it is written takes no more lines, for nobody would find them: the chain goes on in another one, and
+tells of it. Everything here waits for the disk: it runs in a thread beside the loop.
 """
 
 import contextlib
+import errno
 import json
 import os
 from collections.abc import Iterable, Mapping
@@ -70,17 +72,21 @@ class AuditFile:
         self._folder = state / FOLDER
         self._longest_bytes, self._kept = longest_bytes, kept
         self._end = ChainEnd()
-        self._descriptor = -1
+        self._path, self._descriptor = self._folder, -1
         self._good_bytes = 0
         self._is_open = self._is_torn = False
         self._found: tuple[str, ...] = ()
+        self._untold: list[Fields] = []
 
     def append(self, records: Iterable[Fields]) -> tuple[str, ...]:
         """Put these records at the end, durably, all or none; return what was found broken, the first time. OSError when the
         disk does not take them."""
         if not self._is_open:
             self._found = self._start()
-        self._add(records)
+        elif self._is_removed():
+            self._go_on_elsewhere()
+        self._add([*self._untold, *records])
+        self._untold.clear()
         self._rotate_if_full()
         found, self._found = self._found, ()
         return found
@@ -90,6 +96,25 @@ class AuditFile:
         if self._descriptor >= 0:
             os.close(self._descriptor)
             self._descriptor = -1
+
+    def _is_removed(self) -> bool:
+        """Decide whether the path of the file leads elsewhere than to the one that is written, or nowhere."""
+        try:
+            return not os.path.samestat(self._path.stat(), os.fstat(self._descriptor))
+        except (FileNotFoundError, NotADirectoryError):
+            return True
+
+    def _go_on_elsewhere(self) -> None:
+        """Begin another file behind the last line; what comes first in it tells of the one that is gone. OSError where the
+        folder cannot be made again, as where the whole state directory was moved away."""
+        if not self._folder.parent.is_dir():
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self._folder.parent))
+        make_directory(self._folder)
+        gone = f"{self._path.name} was removed or replaced while it was written"
+        self._open(self._path_of_next())
+        text = f"A352 {gone}: lines up to {self._end.number} of the audit may be gone"
+        self._untold.append({"what": BROKEN, "text": text})
+        self._found = (text,)
 
     def _start(self) -> tuple[str, ...]:
         """Continue the chain that is there: what is torn goes, and a line tells of it. Return what is broken."""
@@ -232,4 +257,4 @@ class AuditFile:
                 path.unlink()
             raise
         self.close()
-        self._descriptor, self._good_bytes = descriptor, os.fstat(descriptor).st_size
+        self._path, self._descriptor, self._good_bytes = path, descriptor, os.fstat(descriptor).st_size

@@ -3,11 +3,11 @@
 A gateway may be writing meanwhile: a last line without its newline is no fault, and lines beyond the head are those since.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gateway.audit.audit_file import FOLDER, HEAD, audit_files, first_number, read_head
+from gateway.audit.audit_file import BROKEN, FOLDER, HEAD, audit_files, first_number, read_head
 from gateway.audit.chain import BrokenLine, ChainEnd, check_link, open_line
 from gateway.audit.file_lines import iterate_lines
 
@@ -98,11 +98,21 @@ class _ChainWalk:
                 f"names line {self._head.number}, the last that is there is {self.end.number}: the end was removed"
             )
 
+    def _check_link(self, fields: Mapping[str, Any]) -> None:
+        """A start that cannot go on with the chain says why in its first line, and that is what is broken."""
+        try:
+            check_link(fields, self.end)
+        except BrokenLine:
+            if fields.get("what") == BROKEN:
+                text = str(fields.get("text")).removeprefix("A352 ")
+                raise BrokenLine(f"tells what the start behind it has found: {text}") from None
+            raise
+
     def _take(self, line: bytes, path: Path) -> None:
         fields, own = open_line(line)
         if self._begins_after is None:
             self._begins_after = self.end = ChainEnd(own.number - 1, str(fields.get("prev")))
-        check_link(fields, self.end)
+        self._check_link(fields)
         if self.line == 1 and own.number != first_number(path):
             raise BrokenLine(f"has number {own.number}, its file is named by {first_number(path)}")
         if self._head and own.number == self._head.number:

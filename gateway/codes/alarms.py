@@ -101,7 +101,7 @@ ALARMS: Final = (
     Explanation(
         "A352",
         "audit was altered",
-        "At its start the gateway found the end of its record of writes removed or changed. It goes on behind that place.",
+        "The gateway found the end of its record of writes removed or changed, at its start or later. It goes on behind it.",
         "Somebody edited or deleted lines, restored an older copy of part of the directory, or the disk lost what it had kept.",
         "force-gateway audit verify names the first place; compare with a backup, and find out who may write there.",
         is_warning=True,

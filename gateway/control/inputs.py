@@ -60,8 +60,9 @@ class LineStatus(NamedTuple):
     acknowledged_v: voltage that the device confirmed last, None before the first; standing_v: that surely stands there, None
     while another one is on its way, and where nobody knows; sent_v: voltage that went out last on the wire, which carries one
     at a time, None where nobody knows; wire_s: how long one setting keeps it, nan if not known; unanswered_since_s: monotonic
-    time of the oldest write without an answer, None if all are answered; fault: what the line itself reports (refused, altered,
-    lost), said: in the device's own words, where it has said something to it;
+    time of the oldest write without an answer, None if all are answered; answer_late_s: what the last answer took, where it
+    came after its time, else 0; fault: what the line itself reports (refused, altered, lost), said: in the device's own words,
+    where it has said something to it;
     pressure_pa_per_v: of the output device by the ranges in its profile; owner_connected: False once the owning master's last
     connection has closed; late_s: how late this step runs; waited_s: so much of it the process could have run and was not
     let, None where the machine does not count that; cell_held, output_held: what kept us from hearing a
@@ -92,6 +93,7 @@ class LineStatus(NamedTuple):
     valve: ValveStatus | None = None
     standing_v: float | None = None
     cell_says: str = ""
+    answer_late_s: float = 0.0
 
 
 class LoopInputs(NamedTuple):

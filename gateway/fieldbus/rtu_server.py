@@ -58,7 +58,7 @@ class ModbusRtuServer:
         self._noise = _NoiseReport(str(serial))
         self._timer: asyncio.TimerHandle | None = None
         self._was_lost = False
-        events = PortEvents(self._on_bytes, self._on_lost, self._on_open, self._on_refused)
+        events = PortEvents(self._on_bytes, self._on_lost, self._on_open, self._on_refused, self._on_restored)
         self.port = SerialPort(settings.path, serial, events) if settings.path else None
         self._pty = None if settings.path else _make_pty(serial, self._on_bytes)
 
@@ -116,6 +116,9 @@ class ModbusRtuServer:
 
     def _on_refused(self, error: PortError) -> None:
         self._log(f"face {self.settings.peer}", f"{error}; tried again until it opens")
+
+    def _on_restored(self, change: PortError) -> None:
+        self._log("port", str(change))
 
     def _on_bytes(self, chunk: bytes, now_s: float) -> None:
         self._receiver.receive(chunk, now_s)

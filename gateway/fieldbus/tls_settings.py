@@ -124,6 +124,10 @@ def handshake_failure(error: ssl.SSLError) -> str:
         return "W244 it offers no group of ours: allow P-256 (secp256r1) for its key exchange"
     if reason == "WRONG_CURVE":
         return "W240 its certificate is of another curve than P-256, of no use to TLS 1.2: make one of P-256, or use TLS 1.3"
+    if "CERTIFICATE_EXPIRED" in reason:
+        return (
+            "W240 it finds our certificate expired or not valid yet (or its clock, or ours, is wrong): make a new one"
+        )
     if "ALERT" in reason:
         return (
             f"W240 it refused our certificate ({reason.lower()}): give the client our CA, and the name it connects to"

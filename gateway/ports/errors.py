@@ -75,6 +75,13 @@ def explain_loss(path: str, error: Exception | None) -> PortError:
     return PortError("E102", f"{path} disconnected{reason} (unplugged?); reconnecting")
 
 
+def explain_changed_settings(path: str) -> PortError:
+    """Return what to say where another program has changed speed or mode of an open port."""
+    return PortError(
+        "E103", f"{path}: another program has set it otherwise; it is set again. `fuser -v {path}` names who has it"
+    )
+
+
 def _permission(path: str) -> str:
     user = _user()
     try:

@@ -3,7 +3,7 @@
 import errno
 import os
 import termios
-from typing import Final
+from typing import Any, Final
 
 import serial
 
@@ -13,6 +13,7 @@ from gateway.ports.listing import present_paths
 
 _PARITY: Final = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN, "odd": serial.PARITY_ODD}
 _MINIMUM, _TIME = termios.VMIN, termios.VTIME
+TerminalSettings = list[Any]  # as termios.tcgetattr returns them
 
 
 def open_descriptor(path: str, settings: SerialSettings) -> int:
@@ -36,6 +37,25 @@ def open_serial(path: str, settings: SerialSettings, timeout_s: float) -> serial
         return _open_quietly(path, settings, timeout_s)
     except (*SERIAL_FAILURES, ValueError) as error:
         raise explain_open_failure(path, error, present_paths()) from error
+
+
+def settings_of(descriptor: int) -> TerminalSettings:
+    """Return what the terminal is set to now. SERIAL_FAILURES where there is none any more."""
+    return termios.tcgetattr(descriptor)
+
+
+def let_send(descriptor: int) -> None:
+    """Let the terminal send, where another program has stopped it: that stays, behind its end too."""
+    termios.tcflow(descriptor, termios.TCOON)
+
+
+def restore_settings(descriptor: int, settings: TerminalSettings, baud: int) -> bool:
+    """Set the terminal as it was; return whether it is. A speed that has no name of its own cannot be told
+    this way. SERIAL_FAILURES where there is none any more."""
+    if not hasattr(termios, f"B{baud}"):
+        return False
+    termios.tcsetattr(descriptor, termios.TCSANOW, settings)
+    return settings_of(descriptor) == settings
 
 
 def _open_quietly(path: str, settings: SerialSettings, timeout_s: float = 0.0) -> serial.Serial:
@@ -80,4 +100,5 @@ def _return_eagain_for_nothing(descriptor: int) -> None:
     attributes = termios.tcgetattr(descriptor)
     attributes[6][_MINIMUM], attributes[6][_TIME] = 1, 0
     termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+    let_send(descriptor)
     os.set_blocking(descriptor, False)

@@ -14,13 +14,15 @@ OnOpen = Callable[[int], None]  # descriptor
 
 @dataclass(frozen=True, slots=True)
 class PortEvents:
-    """Callbacks of a serial port: bytes with their time of arrival, the loss of the port, each opening with its descriptor, and
-    why a lost one that is there again does not open (permission, another program), once."""
+    """Callbacks of a serial port: bytes with their time of arrival, the loss of the port, each opening with its descriptor,
+    why a lost one that is there again does not open (permission, another program), once, and that another program had set it
+    otherwise."""
 
     on_bytes: OnBytes
     on_lost: OnLost
     on_open: OnOpen
     on_refused: OnLost = lambda refusal: None
+    on_restored: OnLost = lambda change: None
 
 
 WRITE_DEADLINE_S: Final = 0.5

@@ -2,6 +2,8 @@
 
 pyserial's own read and write are not used in the loop: they would add a select per call and hide hang-ups. A read error, a
 hang-up or a device that takes no bytes for too long all end in `on_lost` and a reopening with backoff; `on_open` comes again.
+The lock binds only who asks for it: a terminal program that is started on the port sets its own speed, and often leaves it.
+Nothing would come to the device any more, not even the safe voltage, so the settings are looked at and set again.
 Only a simulated rig's pty that has lost its device is not looked for under its number, which may be another's by then:
 `move` says where it is. Nothing written before a loss is sent after it: an old voltage is worse than none.
 """
@@ -16,10 +18,10 @@ import termios
 from typing import Final
 
 from gateway.devices import SerialSettings
-from gateway.ports.errors import SERIAL_FAILURES, PortError, explain_loss
+from gateway.ports.errors import SERIAL_FAILURES, PortError, explain_changed_settings, explain_loss
 from gateway.ports.identity import PtyIdentity
 from gateway.ports.latency import set_low_latency
-from gateway.ports.opening import open_descriptor
+from gateway.ports.opening import TerminalSettings, let_send, open_descriptor, restore_settings, settings_of
 from gateway.ports.port import WRITE_DEADLINE_S, PortEvents, monotonic_s
 
 MOST_UNSENT_BYTES: Final = 4096  # beyond it the line is stuck: no command here is longer than 40 bytes
@@ -28,6 +30,7 @@ _FIRST_BACKOFF_S, _LONGEST_BACKOFF_S = 0.1, 2.0
 _REFUSALS: Final = ("E101", "E103")  # permission, another program: somebody must do something
 _REFUSALS_TOLD: Final = 3  # in a row: 0.6 s after the first
 _CLOSE_DEADLINE_S: Final = 0.25
+_LOOK_S: Final = 0.1  # at the settings: a microsecond
 
 
 class SerialPort:
@@ -41,6 +44,9 @@ class SerialPort:
         self._settings = settings
         self._on_bytes, self._on_lost, self._on_open = events.on_bytes, events.on_lost, events.on_open
         self._on_refused, self._refusals = events.on_refused, 0
+        self._on_restored = events.on_restored
+        self._set_to: TerminalSettings = []
+        self._look: asyncio.TimerHandle | None = None
         self._descriptor = -1
         self._is_wanted = False  # from `open` to `close`
         self._identity = PtyIdentity(is_kept=is_simulated)
@@ -154,7 +160,21 @@ class SerialPort:
         self._failure, self._unsent, self._backoff_s, self._refusals = None, b"", _FIRST_BACKOFF_S, 0
         self.warning = set_low_latency(self._descriptor, self._path)
         asyncio.get_running_loop().add_reader(self._descriptor, self._on_readable)
+        self._set_to = settings_of(self._descriptor)
+        self._look = asyncio.get_running_loop().call_later(_LOOK_S, self._look_at_settings)
         self._on_open(self._descriptor)
+
+    def _look_at_settings(self) -> None:
+        self._look = asyncio.get_running_loop().call_later(_LOOK_S, self._look_at_settings)
+        with contextlib.suppress(*SERIAL_FAILURES):  # the next read tells of what is gone
+            let_send(self._descriptor)
+            if settings_of(self._descriptor) == self._set_to:
+                return
+            change = explain_changed_settings(self._path)
+            if restore_settings(self._descriptor, self._set_to, self._settings.baud):
+                self._on_restored(change)
+            else:
+                self._lose(change)
 
     def _on_readable(self) -> None:
         try:
@@ -205,6 +225,8 @@ class SerialPort:
         loop = asyncio.get_running_loop()
         loop.remove_reader(self._descriptor)
         loop.remove_writer(self._descriptor)
+        if self._look:
+            self._look.cancel()
         with contextlib.suppress(OSError):  # the guardian has the same open file, and with it the lock: give it back
             fcntl.flock(self._descriptor, fcntl.LOCK_UN)
         with contextlib.suppress(OSError):

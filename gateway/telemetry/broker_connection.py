@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.extras import import_library
+from gateway.live.standstill import Standstill
 from gateway.plain_file import check_plain
 from gateway.telemetry.broker_session import BrokerMessage, BrokerSession
+from gateway.telemetry.command_queue import CommandQueue
 
 AGAIN_S: Final = 2.0
 _KEEPALIVE_S: Final = 10
@@ -90,9 +92,13 @@ async def _carry(client: Any, session: BrokerSession) -> None:
         await client.subscribe(topic, qos=1)
     for message in session.greet():
         await _publish(client, message)
+    standstill = Standstill(asyncio.get_running_loop().time)
+    queue = CommandQueue(session.is_stop, standstill)
     async with asyncio.TaskGroup() as group:
         group.create_task(_speak(client, session, turn))
-        group.create_task(_listen(client, session, turn))
+        group.create_task(_listen(client, queue))
+        group.create_task(_answer(client, session, queue, turn))
+        group.create_task(standstill.keep_time())
 
 
 async def _speak(client: Any, session: BrokerSession, turn: asyncio.Lock) -> None:
@@ -108,12 +114,23 @@ async def _speak(client: Any, session: BrokerSession, turn: asyncio.Lock) -> Non
         await session.ready.wait()
 
 
-async def _listen(client: Any, session: BrokerSession, turn: asyncio.Lock) -> None:
+async def _listen(client: Any, queue: CommandQueue) -> None:
     async for message in client.messages:
-        if message.retain:  # of yesterday: a command that waits in the broker must never be carried out
-            continue
+        if not message.retain:  # of yesterday: a command that waits in the broker must never be carried out
+            queue.put(str(message.topic), bytes(message.payload or b""))
+
+
+async def _answer(client: Any, session: BrokerSession, queue: CommandQueue, turn: asyncio.Lock) -> None:
+    while True:
+        message, why_not = await queue.get()
         async with turn:
-            for answer in await session.answer(str(message.topic), bytes(message.payload or b"")):
+            answers = [*await session.answer(message.topic, message.payload, why_not)]
+            if dropped := queue.take_dropped():
+                why = (
+                    f"{dropped} commands were not carried out: more came than control takes, or a stop came behind them"
+                )
+                answers += await session.answer(message.topic, b"", why)
+            for answer in answers:
                 await _publish(client, answer)
 
 

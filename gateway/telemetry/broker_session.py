@@ -49,5 +49,8 @@ class BrokerSession(Protocol):
     def lose(self) -> None:
         """Note that the connection is gone."""
 
-    async def answer(self, topic: str, payload: bytes) -> Sequence[BrokerMessage]:
-        """Return what a message to one of its topics makes it say."""
+    def is_stop(self, payload: bytes) -> bool:
+        """Decide whether a message does nothing but stop, so that it goes before all others."""
+
+    async def answer(self, topic: str, payload: bytes, why_not: str) -> Sequence[BrokerMessage]:
+        """Return what a message to one of its topics makes it say. why_not: it must not press, and why; empty: it may."""

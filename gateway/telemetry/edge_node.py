@@ -103,8 +103,13 @@ class EdgeNode:
         """Note that there is no connection: what comes now is kept, and will be historical."""
         self._current = None
 
-    async def answer(self, topic: str, payload: bytes) -> Sequence[BrokerMessage]:
-        """Return a new birth where a host asks for one. Every other command is left alone: the node is read only."""
+    def is_stop(self, payload: bytes) -> bool:
+        """Return that it does not: no command of a node stops anything."""
+        return False
+
+    async def answer(self, topic: str, payload: bytes, why_not: str) -> Sequence[BrokerMessage]:
+        """Return a new birth where a host asks for one, however late: it presses nothing. Every other command is left alone:
+        the node is read only."""
         try:
             wanted = decode_values(payload)
         except ValueError:  # not Sparkplug

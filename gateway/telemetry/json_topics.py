@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from gateway.live.live_state import LiveState
 from gateway.telemetry.broker_session import BrokerMessage
+from gateway.telemetry.register_commands import is_stop
 
 Command = Callable[[bytes], Awaitable[dict[str, Any]]]
 _ROOM: Final = 1000
@@ -73,7 +74,9 @@ class JsonTopics:
             self._keep(self._online())
         self._state = state
         told = _slow_part(state)
-        if told != self._told or time_unix_s - self._told_s >= _STATE_AGAIN_S:
+        if (
+            told != self._told or abs(time_unix_s - self._told_s) >= _STATE_AGAIN_S
+        ):  # either way: clocks are set back, too
             self._told, self._told_s = told, time_unix_s
             if self._is_connected:
                 self._keep(self._message("state", told, retain=True))
@@ -96,9 +99,16 @@ class JsonTopics:
         events = [message for message in self._waiting if message.topic == f"{self._base}/events"]
         self._waiting = deque(events, _ROOM)
 
-    async def answer(self, topic: str, payload: bytes) -> Sequence[BrokerMessage]:
-        """Return what is told of a command that is carried out."""
-        return (self._message("command/result", await self._command(payload)),) if self._command else ()
+    def is_stop(self, payload: bytes) -> bool:
+        """Decide whether a command does nothing but stop."""
+        return is_stop(payload)
+
+    async def answer(self, topic: str, payload: bytes, why_not: str) -> Sequence[BrokerMessage]:
+        """Return what is told of a command that is carried out, or must not be."""
+        if not self._command:
+            return ()
+        result = {"ok": False, "written": [], "error": why_not} if why_not else await self._command(payload)
+        return (self._message("command/result", result),)
 
     def _online(self) -> BrokerMessage:
         return self._message("online", self._state is not None, retain=True)

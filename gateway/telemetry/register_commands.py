@@ -42,6 +42,15 @@ class RegisterCommands:
             raise ValueError(f"{name}: {answer.get('refusal') or 'refused'}")
 
 
+def is_stop(payload: bytes) -> bool:
+    """Decide whether a command clears the control word, and sets nothing to anything but 0."""
+    try:
+        registers = _registers(payload)
+    except ValueError:
+        return False
+    return not any(registers.values()) and any(name.partition("@")[0] == "control_word" for name in registers)
+
+
 def _registers(payload: bytes) -> dict[str, float]:
     if len(payload) > _LONGEST:
         raise ValueError(f"{len(payload)} bytes: a command has {_LONGEST} at most")

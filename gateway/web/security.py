@@ -8,6 +8,8 @@ Decisions
 - The session is a cookie that scripts cannot read and other sites cannot send. With a token configured it exists after a
   login only; tools send `Authorization: Bearer TOKEN` instead, which needs no CSRF token because no browser adds it by itself.
 - A failed login costs a second, one at a time: a token of 16 characters is not guessed.
+- What came while this process stood still is refused, but for what stops: an enable of then pressed seconds after its browser
+  had given it up.
 """
 
 import asyncio
@@ -25,10 +27,13 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from gateway.live.standstill import Standstill
+
 CSRF_HEADER: Final = "x-csrf-token"
 LONGEST_BODY: Final = 1 << 16
 _OPEN: Final = ("/login", "/healthz", "/static/style.css", "/static/page.css", "/static/login.js")
 """Reached without a session: what the login itself needs."""
+_STOPS: Final = ("/api/v1/command/stop", "/api/v1/calibrate/stop")
 _FAILED_LOGIN_S: Final = 1.0
 _SAFE_METHODS: Final = ("GET", "HEAD")
 HEADERS: Final = {
@@ -95,8 +100,8 @@ class Door:
 class Guard:
     """ASGI middleware: lets a request through to the routes, or answers why not."""
 
-    def __init__(self, app: ASGIApp, door: Door) -> None:
-        self._app, self._door = app, door
+    def __init__(self, app: ASGIApp, door: Door, standstill: Standstill) -> None:
+        self._app, self._door, self._standstill = app, door, standstill
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Check one request."""
@@ -112,9 +117,14 @@ class Guard:
             await send(message)
 
         request = Request(scope)
-        refusal = self._refusal(request)
+        refusal = self._refusal(request) or self._lateness(request)
         with contextlib.suppress(ClientDisconnect):  # in the middle of its body: nobody is there to be told anything
             await (refusal or self._app)(scope, receive, send_with_headers)
+
+    def _lateness(self, request: Request) -> Response | None:
+        if request.method in _SAFE_METHODS or request.url.path in _STOPS or not self._standstill.is_aftermath():
+            return None
+        return refuse(503, "the page's process stood still for a while, and this may have waited: ask again", "late")
 
     def _refusal(self, request: Request) -> Response | None:
         """Return why a request is not let through, None where it is."""

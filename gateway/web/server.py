@@ -5,6 +5,7 @@ module each, and the style is the reports' own (gateway.reports.style.css) with 
 """
 
 import json
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from importlib import import_module
@@ -20,6 +21,7 @@ from starlette.routing import BaseRoute, Route
 
 from gateway import VERSION
 from gateway.live.ring_rows import RingRows
+from gateway.live.standstill import Standstill
 from gateway.processes.json_socket.messages import encode_answer
 from gateway.reports.style import read_style
 from gateway.web import tabs
@@ -45,9 +47,11 @@ def make_app(context: WebContext, door: Door, rows: RingRows | None) -> Starlett
     """Return the application. rows: the sample ring, None where there is none."""
     commands = Commands(context)
     events = EventSource(context, rows, commands)
+    standstill = Standstill(time.monotonic)
 
     @asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
+        context.begin(standstill.keep_time())
         yield
         await events.close()
         await context.end_work()
@@ -56,7 +60,7 @@ def make_app(context: WebContext, door: Door, rows: RingRows | None) -> Starlett
 
     routes = [*_page_routes(), *_api_routes(context, commands, events)]
     routes += [route for module in _tab_modules() for route in module.routes(context)]
-    app = Starlette(routes=routes, middleware=[Middleware(Guard, door=door)], lifespan=lifespan)
+    app = Starlette(routes=routes, middleware=[Middleware(Guard, door=door, standstill=standstill)], lifespan=lifespan)
     app.state.door = door
     return app
 

@@ -32,6 +32,16 @@ def test_a_start_covers_up_no_head_that_is_gone_or_names_another_line(state: Pat
     assert verify_audit(state).broken
 
 
+def test_a_head_that_is_damaged_alone_is_no_line_that_was_replaced(state: Path) -> None:
+    """The line of the next start continues none, and says why."""
+    (state / "audit" / "head").write_text("{")
+    file = AuditFile(state, 1 << 20)
+    file.append([{"what": "start"}])
+    file.close()
+    broken = verify_audit(state).broken
+    assert broken and broken.line and "no head that can be read" in broken.text and "replaced" not in broken.text
+
+
 @pytest.mark.parametrize("kind", MAKERS)
 @pytest.mark.parametrize("name", ["newest", "head", "head.new"])
 def test_no_audit_waits_for_what_is_no_file(state: Path, name: str, kind: str) -> None:

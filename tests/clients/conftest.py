@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
-from tests.clients.c_program import CProgram
-from tests.clients.controllers import S7, Codesys, Irc5, TwinCat, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.python_program import PythonProgram
+from tests.clients.programs.c_program import CProgram
+from tests.clients.programs.controllers import S7, Codesys, Irc5, TwinCat, UniversalRobot
+from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import MAP, TEXTS
 
 CONTROLLERS: dict[str, Any] = {

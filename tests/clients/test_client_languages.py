@@ -7,11 +7,11 @@ import re
 import pytest
 
 from gateway.codes.faults import FaultCode
-from tests.clients.controllers import Irc5
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.machine import Machine
+from tests.clients.programs.controllers import Irc5
+from tests.clients.programs.machine import Machine
+from tests.clients.programs.syntax import PATTERNS, Unit, parse, tokenize
 from tests.clients.scenes import MAP, MODEL, TEXTS, cycles
-from tests.clients.syntax import PATTERNS, Unit, parse, tokenize
 
 RESERVED = {
     "rapid": "alias and backward case connect const default div do else elseif endfor endfunc endif endmodule endproc "

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from tests.clients.conftest import CONTROLLERS
-from tests.clients.controllers import Irc5
 from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.controllers import Irc5
 from tests.clients.scenes import TEXTS, command, commands, cycles
 
 OWN_SOCKETS = ["rapid", "urscript", "python", "c"]

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from tests.clients.controllers import S7, Codesys, Irc5, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.controllers import S7, Codesys, Irc5, UniversalRobot
 from tests.clients.scenes import MAP, MODEL, TEXTS, cycles
 
 

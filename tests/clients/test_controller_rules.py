@@ -13,12 +13,12 @@ import pytest
 from gateway.clients import Endpoint, MissingRegisterError, render_client
 from gateway.profiles import load_register_map
 from gateway.registers import RegisterMap
-from tests.clients.controllers import S7, Codesys, Irc5, MbClient, Plc, TwinCat, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.iec_libraries import TwinCatRequest
-from tests.clients.machine import Machine, TaskStopped
+from tests.clients.programs.controllers import S7, Codesys, Irc5, MbClient, Plc, TwinCat, UniversalRobot
+from tests.clients.programs.iec_libraries import TwinCatRequest
+from tests.clients.programs.machine import Machine, TaskStopped
+from tests.clients.programs.syntax import parse
 from tests.clients.scenes import MAP, MODEL, TEXTS, WHERE, command, commands, cycles
-from tests.clients.syntax import parse
 
 LANGUAGES = ("rapid", "scl", "st", "urscript", "c", "python")
 PROFILES = Path(__file__).parents[2] / "profiles"

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from tests.clients.conftest import CONTROLLERS
-from tests.clients.controllers import S7, Codesys, Plc, TwinCat, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.controllers import S7, Codesys, Plc, TwinCat, UniversalRobot
 from tests.clients.scenes import MODEL, TEXTS, command, commands, cycles
 
 TARE = 4

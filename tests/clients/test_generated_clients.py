@@ -14,8 +14,8 @@ from gateway.clients import render_client
 from gateway.codes.faults import FaultCode
 from gateway.registers import Status
 from tests.clients.conftest import CONTROLLERS
-from tests.clients.controllers import S7, Codesys, Irc5, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
+from tests.clients.programs.controllers import S7, Codesys, Irc5, UniversalRobot
 from tests.clients.scenes import MAP, TEXTS, WHERE, command, commands, cycles
 
 

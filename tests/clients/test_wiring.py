@@ -16,8 +16,8 @@ from gateway.clients.wiring import wiring_page
 from gateway.profiles import list_shipped, load_register_map, load_rig
 from gateway.profiles.rigs.faces import TlsFace
 from tests.certificates import store_all
-from tests.clients.controllers import S7, MbClient
 from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.controllers import S7, MbClient
 
 PROFILES = Path(__file__).parents[2] / "profiles"
 MAP = load_register_map("force-v1")

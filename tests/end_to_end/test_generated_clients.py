@@ -16,8 +16,8 @@ import pytest
 from gateway.clients import Endpoint, render_client
 from gateway.clients.wiring import wiring_page
 from gateway.profiles import load_register_map, load_rig
-from tests.clients.controllers import S7, Codesys, Irc5, UniversalRobot
 from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.controllers import S7, Codesys, Irc5, UniversalRobot
 
 MAP = load_register_map("force-v1")
 MAIN = r"""

@@ -140,6 +140,19 @@ def test_what_was_recorded_before_anybody_had_set_the_clock_is_not_old(tmp_path:
     assert [one.path for one in choose_prunable([path], Retention(bytes=1), "", NOW_S)] == [path]
 
 
+def test_what_was_recorded_while_the_clock_was_ahead_goes_in_its_turn(tmp_path: Path) -> None:
+    """A clock was a year ahead and was set back: its recordings would have stayed for a year, and each new one gone."""
+    paths = [record(tmp_path, days_ago=days_ago) for days_ago in (3, -365, -366, 1, 0.5)]
+    size = paths[0].stat().st_size
+    chosen = choose_prunable(recording_paths(tmp_path), Retention(bytes=2 * size), "", NOW_S)
+    assert [one.path for one in chosen] == paths[:3]
+    only_ahead = choose_prunable(paths[1:3], Retention(bytes=1), "", NOW_S)
+    assert [one.path for one in only_ahead] == paths[1:3]
+    assert choose_prunable(paths, Retention(days=0.75), "", NOW_S) == choose_prunable(
+        [paths[0], paths[3]], Retention(days=0.75), "", NOW_S
+    ), "nobody knows how old they are"
+
+
 def test_bytes_take_the_oldest_first_and_only_as_many_as_it_needs(tmp_path: Path) -> None:
     for days_ago in (1, 4, 3, 2):
         record(tmp_path, days_ago=days_ago)

@@ -117,6 +117,7 @@ def test_who_writes_other_coils_beside_a_run_does_not_hold_its_bit(make_bank, ma
     master = master_of(bank, "10.0.0.1")
     for _ in range(2):
         bank.write_bits(5, [True], master.peer)
+        assert int(bank.command.control_word) & CALIBRATE, "it begins each time"
         bank.write_bits(4, [True], master.peer)
         bank.write_bits(4, [False], master.peer)
         bank.clear_command()  # the run has ended

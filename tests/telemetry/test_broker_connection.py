@@ -45,8 +45,11 @@ class Session:
     def lose(self) -> None:
         self.lost += 1
 
-    async def answer(self, topic: str, payload: bytes) -> Sequence[BrokerMessage]:
-        self.answered.append(payload)
+    def is_stop(self, payload: bytes) -> bool:
+        return payload == b"stop"
+
+    async def answer(self, topic: str, payload: bytes, why_not: str) -> Sequence[BrokerMessage]:
+        self.answered.append(why_not.encode() or payload)
         return (BrokerMessage("cell/result", payload),)
 
 
@@ -129,6 +132,30 @@ def test_a_command_of_yesterday_is_not_carried_out(monkeypatch: pytest.MonkeyPat
         assert session.answered == [b"now"] and said == [b"now"]
 
     play(monkeypatch, scene)
+
+
+def test_a_stop_waits_for_the_command_that_is_carried_out_and_for_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A flow that sent 5000 setpoints at once had its stop behind them carried out 110 s later."""
+    held, going = asyncio.Event(), asyncio.Event()
+
+    async def publish(payload: bytes) -> None:
+        if payload == b"first":
+            held.set()
+            await going.wait()
+
+    async def scene(session: Session, library: Library, said: list[bytes]) -> None:
+        library.bring(b"first", retain=False)
+        await held.wait()
+        for number in range(5000):
+            library.bring(b"%d" % number, retain=False)
+        library.bring(b"stop", retain=False)
+        await turns(20_000)
+        going.set()
+        await turns()
+        assert session.answered[:2] == [b"first", b"stop"]
+        assert session.answered[2].startswith(b"5000 commands were not carried out") and len(session.answered) == 3
+
+    play(monkeypatch, scene, publish=publish)
 
 
 def test_what_the_broker_has_not_taken_is_said_again(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -117,7 +117,7 @@ def test_only_a_rebirth_that_is_asked_for_is_answered() -> None:
     node.greet()
 
     def asked(payload: bytes) -> list[BrokerMessage]:
-        return list(asyncio.run(node.answer("spBv1.0/plant/NCMD/cell", payload)))
+        return list(asyncio.run(node.answer("spBv1.0/plant/NCMD/cell", payload, "")))
 
     command = Payload(timestamp=5)
     command.metrics.add(name=REBIRTH, datatype=11, boolean_value=True)

@@ -46,6 +46,16 @@ def test_state_is_retained_and_force_comes_with_every_look() -> None:
         assert [name for name, _, _ in drain(session)] == topics
 
 
+def test_a_clock_that_is_set_back_keeps_nobody_from_being_told() -> None:
+    """By a year, say: until then the state would have been told on changes only."""
+    session = JsonTopics("cell", None)
+    session.begin()
+    session.greet()
+    for time_s, topics in ((1e6, ["online", "state", "force"]), (9.0, ["state", "force"]), (18.9, ["force"])):
+        session.offer(holding(), time_s)
+        assert [name for name, _, _ in drain(session)] == topics
+
+
 def test_events_wait_for_the_broker_and_forces_do_not() -> None:
     session = JsonTopics("cell", None)
     session.begin()
@@ -149,6 +159,14 @@ def test_a_command_is_written_in_order_until_the_first_refusal(
     assert answer == result if result else answer["ok"] is False and answer["written"] == [] and answer["error"]
     assert [request["pdu"] for request in asked] == pdus
     assert {request["via"] for request in asked} <= {"mqtt"}
+
+
+def test_what_must_not_be_carried_out_is_told_and_asks_nobody() -> None:
+    async def command(payload: bytes) -> dict[str, Any]:
+        raise AssertionError(payload)
+
+    (told_of,) = asyncio.run(JsonTopics("cell", command).answer("cell/command", b"{}", "too late"))
+    assert told(told_of) == ("command/result", {"ok": False, "written": [], "error": "too late"}, False)
 
 
 def test_two_connections_to_one_broker_say_once_that_it_is_away() -> None:

@@ -109,9 +109,9 @@ def test_commands_are_heard_and_answered_where_there_is_one_who_carries_them_out
 
     hearing, deaf = JsonTopics("cell", carry_out), JsonTopics("cell", None)
     assert (tuple(hearing.subscriptions), tuple(deaf.subscriptions)) == (("cell/command",), ())
-    (answer,) = asyncio.run(hearing.answer("cell/command", b"x"))  # type: ignore[arg-type]
+    (answer,) = asyncio.run(hearing.answer("cell/command", b"x", ""))  # type: ignore[arg-type]
     assert answer.topic == "cell/command/result" and b'"said": "x"' in answer.payload
-    assert tuple(asyncio.run(deaf.answer("cell/command", b"x"))) == ()  # type: ignore[arg-type]
+    assert tuple(asyncio.run(deaf.answer("cell/command", b"x", ""))) == ()  # type: ignore[arg-type]
 
 
 def test_an_alarm_is_raised_once_and_ages_alone_are_no_new_state() -> None:

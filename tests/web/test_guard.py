@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from gateway.live.standstill import Standstill
 from gateway.web import security
 from gateway.web.security import Door
 from gateway.web.server import _file
@@ -241,3 +242,27 @@ def test_the_machines_own_name_is_one_only_where_a_token_is_asked_for(monkeypatc
         assert asked.admits_host(host)
         assert not open_to_all.admits_host(host)
     assert not asked.admits_host("other-pc")
+
+
+@pytest.mark.parametrize(
+    ("path", "reason"),
+    [
+        ("/api/v1/command/enable", "late"),
+        ("/api/v1/command/setpoint", "late"),
+        ("/api/v1/calibrate/start", "late"),
+        ("/api/v1/command/stop", "gone"),  # nobody is behind this page
+        ("/api/v1/no-such", "late"),
+    ],
+)
+def test_what_came_while_the_page_stood_still_presses_nothing_and_a_stop_stops(
+    app: Any, monkeypatch: pytest.MonkeyPatch, path: str, reason: str
+) -> None:
+    """A browser had given an enable up after three seconds; after six the tool pressed."""
+    monkeypatch.setattr(Standstill, "is_aftermath", lambda standstill: True)
+    told = answer(app, "POST", path, session_of(app), b'{"force_n": 12}')
+    assert (told.status, told.json["reason"]) == (503, reason)
+    assert answer(app, "POST", path, {}, b"{}").status == 403, "whoever may not is told that first"
+
+
+def test_a_page_that_runs_is_not_late(app: Any) -> None:
+    assert answer(app, "POST", "/api/v1/command/enable", session_of(app), b'{"force_n": 12}').json["reason"] == "gone"

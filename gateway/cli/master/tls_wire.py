@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pymodbus.client import ModbusTcpClient
 
 _ASK_LOG = "its log (force-gateway events on its machine) says which"
+_NOT_NOW = (9, 10)  # X509_V_ERR_CERT_NOT_YET_VALID, X509_V_ERR_CERT_HAS_EXPIRED
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +79,8 @@ class TlsWire(TcpWire):
         except ssl.SSLCertVerificationError as error:
             why = f"the certificate of {self.where} is not to be trusted: {error.verify_message.rstrip('.')}"
             cure = "give --tls the CA that has signed it, and --gateway a name that is in it (certs --host)"
+            if error.verify_code in _NOT_NOW:
+                cure = "look at the clocks of both machines, or make new ones there (force-gateway certs)"
             raise CliError(f"E176 {why}; {cure}", exit_codes.DEVICE) from None
         except OSError as error:
             reason = error.reason if isinstance(error, ssl.SSLError) else error.strerror

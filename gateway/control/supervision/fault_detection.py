@@ -204,7 +204,12 @@ class FaultDetector:
     def _no_answer(self, now_s: float, line: LineStatus) -> StopCause:
         silent_s, bound_s = now_s - (line.unanswered_since_s or 0.0), self._bounds.output_timeout_s
         observation = f"no answer from the output device for {silent_s * 1e3:.0f} ms, allowed {bound_s * 1e3:.0f} ms"
-        fault, blamed = cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, "power or wires")
+        suspects = "power or wires"
+        if line.answer_late_s:
+            suspects = (
+                f"the answer before took {format_ms(line.answer_late_s)}, it may be too slow for that; else {suspects}"
+            )
+        fault, blamed = cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, suspects)
         return stop_cause(fault, f"{observation}: {blamed}")
 
     def _of_cell(self, reading: Reading, line: LineStatus) -> StopCause | None:

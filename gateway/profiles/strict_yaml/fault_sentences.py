@@ -23,6 +23,8 @@ _SCALES: Final = (
     {"m2": 1.0, "mm2": 1e-6},
     {"hz": 1.0, "khz": 1e3},
 )
+_NEWTONS: Final = {"MN": "1000000", "kN": "1000", "daN": "10", "cN": "0.01", "mN": "0.001", "t": "9806.65"}
+"""Units of force that no `unit` names: near to one that it does, and a thousand times as large."""
 _DECIMAL: Final = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 _TYPES_ELSEWHERE: Final = dict.fromkeys(
@@ -175,7 +177,11 @@ def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
     shown = [choice if _PLAIN.fullmatch(choice) else f'"{choice}"' for choice in choices]
     if len(choices) == 1:
         return f"{value_text} is not {shown[0]}, the only choice"
-    return f"{value_text} is not one of {one_of(shown)}" + (f"; did you mean {near}?" if near else "")
+    if "N" in choices and isinstance(value, str) and value in _NEWTONS:
+        cure = f"; in its place: newton_per_count: {_NEWTONS[value]}"
+    else:
+        cure = f"; did you mean {near}?" if near else ""
+    return f"{value_text} is not one of {one_of(shown)}{cure}"
 
 
 def _nearest(value: Any, choices: list[str]) -> str | None:

@@ -1,6 +1,8 @@
 """Which recordings may go: not one that somebody keeps, nor the rig's reference, nor one that is being recorded.
 
 Whoever records holds a lock on the file; the kernel ends it with the process. What is kept has a file NNNN.keep beside it.
+A recording whose time is still to come was made before the clock was set back: nobody knows its age, and it stands behind the
+one that has the number before it. Otherwise such ones would have stayed for a year, say, and every new one gone at once.
 """
 
 import contextlib
@@ -9,6 +11,7 @@ import os
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Final
 
@@ -72,15 +75,23 @@ class Prunable:
 
 def choose_prunable(paths: list[Path], retention: Retention, reference: str, now_s: float) -> list[Prunable]:
     """Return the recordings that the limits have no room for, the oldest first. now_s: of the epoch."""
-    statuses = sorted(_statuses(paths), key=lambda pair: (pair[0].st_mtime, pair[1].name))
-    total, chosen = sum(status.st_size for status, _ in statuses), []
-    for status, path in statuses:
+    ended = sorted(_with_ends(paths, now_s), key=lambda one: (one[0], one[2].name))
+    total, chosen = sum(status.st_size for _, status, _ in ended), []
+    for _, status, path in ended:
         age_s = now_s - status.st_mtime if status.st_mtime >= _CLOCK_SET_S else None
         why = _why_it_goes(age_s, total, retention)
-        if why and now_s - status.st_mtime > _CLOSED_S and _may_go(path, reference):
+        if why and abs(now_s - status.st_mtime) > _CLOSED_S and _may_go(path, reference):
             chosen.append(Prunable(path, status.st_size, why))
             total -= status.st_size
     return chosen
+
+
+def _with_ends(paths: list[Path], now_s: float) -> Iterator[tuple[float, os.stat_result, Path]]:
+    """With the time at which each ended, as far as the clock of now goes along with it. paths: by number."""
+    ended_s = -inf
+    for status, path in _statuses(paths):
+        ended_s = status.st_mtime if status.st_mtime <= now_s + _CLOSED_S else ended_s
+        yield ended_s, status, path
 
 
 def _statuses(paths: list[Path]) -> Iterator[tuple[os.stat_result, Path]]:

@@ -5,8 +5,7 @@ control's own, and the voltage is on its way before the master has it.
 The tick serves what must happen without anybody asking: watchdogs, trim, ramps. Where a sample or a command was decided on
 within the last period it leaves the decision to the next sample, which a cell as fast as the loop brings before the next
 tick; only a tick that finds none decides, so that two decisions are at most two periods apart (and a bit, for jitter).
-Clock and ports come in as arguments; the same class runs behind ptys, behind real ports and in virtual time. No exception of
-ours may leave the last voltage standing: `_decide` turns any into the safe voltage and the INTERNAL fault.
+Clock and ports come in as arguments. No exception of ours leaves a voltage standing: `_decide` turns any into the safe one.
 """
 
 import traceback
@@ -260,6 +259,7 @@ class ControlLoop:
             output_counts=output.counts,
             cell_counts=self.cell_counts,
             cell_says=self._cell.unread.words(now_s),
+            answer_late_s=output.answer_late_s,
             valve=self.valve.status if self.valve else None,
         )
 

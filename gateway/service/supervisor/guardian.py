@@ -243,7 +243,8 @@ class Guardian:
             self.leaving = control
         reap_orphans(set(self._pids().values()))
         if self.stop_deadline_s is not None:
-            self.log.note("stop", words.stop_sentence(acknowledged, None if code == exit_codes.OK else ending))
+            say = self.log if acknowledged is False else self.log.note  # else the terminal shows as much already
+            say("stop", words.stop_sentence(acknowledged, None if code == exit_codes.OK else ending))
             return exit_codes.OK
         if code in _REFUSED or (code == exit_codes.DEVICE and not self.announced):
             return code  # it told the user why

@@ -49,7 +49,8 @@ def restart_sentence(ending: Ending, how: str, acknowledged: bool | None) -> str
 def stop_sentence(acknowledged: bool | None, ending: Ending | None) -> str:
     """Return what the log says of a stop that was asked for. ending: of a control process that did not end by itself."""
     how = f"; {ending.sentence}" if ending else ""
-    return f"stopped as asked: safe voltage {describe_acknowledgement(acknowledged)}{how}"
+    said = f"stopped as asked: safe voltage {describe_acknowledgement(acknowledged)}"
+    return f"A314 {said}: the tool may still press{how}" if acknowledged is False else f"{said}{how}"
 
 
 def leaving_sentence(pid: int) -> str:

@@ -136,6 +136,21 @@ def test_a_gateway_is_believed_by_its_name_alone(server: TlsServer, folder: Fold
     assert not wire.is_served_by({"port": server.port}), "what a gateway tells of itself is its plain port"
 
 
+@pytest.mark.parametrize(
+    ("number", "cure"), [(9, "the clocks of both machines"), (10, "make new ones there"), (19, "give --tls the CA")]
+)
+def test_what_is_out_of_its_days_wants_a_clock_or_another_one_and_no_other_ca(number: int, cure: str) -> None:
+    class Context:
+        def wrap_socket(self, *words: Any, **more: Any) -> None:
+            error = ssl.SSLCertVerificationError(1, "certificate verify failed")
+            error.verify_code, error.verify_message = number, "no good"
+            raise error
+
+    wire = TlsWire("127.0.0.1", 802, TlsFiles(Path("ca"), Path("crt"), Path("key")))
+    with pytest.raises(CliError, match=f"E176 .* is not to be trusted: no good; .*{cure}"):
+        wire._greet(Context(), None)  # type: ignore[arg-type]
+
+
 def test_a_folder_of_keys_is_for_its_owner_alone(tmp_path: Path, call: Any) -> None:
     previous = os.umask(0)
     try:

@@ -9,6 +9,7 @@ import pytest
 
 from gateway.fieldbus import ServerSettings
 from gateway.fieldbus.peers import Peers
+from gateway.fieldbus.tls_settings import handshake_failure
 from gateway.modbus import Role, pdu
 from gateway.modbus.certificate import ROLES, read_certificate
 from tests.certificates import Folder, serial_of
@@ -98,6 +99,13 @@ def test_a_client_that_does_not_trust_us_is_told(face: Face, folder: Folder) -> 
         line.greet(client(folder, "foreign", ca="other-ca"))
     line.exchange()
     assert face.log[0].startswith("W240 127.0.0.1:40000: it refused our certificate")
+
+
+def test_a_client_that_finds_us_expired_is_not_told_to_look_for_another_ca() -> None:
+    error = ssl.SSLError(1, "sslv3 alert certificate expired")
+    error.reason = "SSLV3_ALERT_CERTIFICATE_EXPIRED"
+    told = handshake_failure(error)
+    assert told.startswith("W240 ") and "expired" in told and "clock" in told and "give the client" not in told
 
 
 def test_a_stranger_to_the_allow_list_begins_no_handshake(face: Face) -> None:

@@ -84,6 +84,7 @@ def test_an_unknown_key_is_placed_at_the_key_with_what_was_meant(old: str, new: 
         ("name: demo", "name: null", "name: has no value"),
         ("lease_s: null", "lease_action: falt",
          "supervision.lease_action: falt is not one of fault, hold, ramp; did you mean fault?"),
+        ("sign: 1", "unit: kN", "load_cell.unit: kN is not one of N, kg, g, lb; in its place: newton_per_count: 1000"),
         ("limit_v: 0.5", "limit_v: 0,5", 'trim.limit_v: "0,5" is not a number: write 0.5 (decimals take a point)'),
         ("force_max_n: 60", "force_max_n: 400", "limits.force_max_n: 400 N is above 300 N, the most allowed"),
         ("force_max_n: 60", "force_max_n: 0", "limits.force_max_n: 0 N is not above 0 N"),

@@ -40,6 +40,7 @@ class Wire:
         self.fault = FaultCode.NONE
         self.said = ""
         self.pressure_pa = self.round_trip_s = nan
+        self.answer_late_s = 0.0
         self.counts = WireCounts()
 
     @property

@@ -131,6 +131,7 @@ def test_control_is_told_what_surely_stands_and_not_what_was_confirmed_last() ->
         pressure_pa=nan,
         sent_v=3.0,
         round_trip_s=nan,
+        answer_late_s=0.0,
         counts=rig.wire.counts,
     )
     line = rig.loop._line(rig.now())

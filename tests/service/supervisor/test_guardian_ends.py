@@ -5,6 +5,7 @@ import pytest
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.processes.scheduler_counters import ProcessorTime
+from gateway.service.supervisor.safe_line import SafeLine
 from tests.service.supervisor.guarded import (
     PTYS,
     READY,
@@ -126,6 +127,19 @@ def test_a_loop_that_falls_silent_while_it_ramps_down_is_not_waited_for(scene, p
     assert one.now_s == pytest.approx(100.1)
     assert port.wrote() == SAFE_FRAME
     assert any("stopped as asked" in line and "without a tick" in line for line in one.noted), one.noted
+
+
+def test_a_safe_voltage_that_nobody_acknowledges_is_told_at_the_end_too(scene, port, monkeypatch):
+    """The person at the terminal saw a gateway that had stopped as asked, beside a tool that went on pressing."""
+    one = scene(lives(port))
+    assert_comes_up(one)
+    monkeypatch.setattr(SafeLine, "write_safe", lambda line: False)
+    one.signals.send()
+    assert one.run() == 0
+    assert one.said[-1].startswith(
+        "A314 stopped as asked: safe voltage written, not acknowledged: the tool may still press"
+    )
+    assert not any("stopped as asked" in line for line in one.noted)
 
 
 def test_how_long_a_silence_may_last_says_the_rig(scene, port):

@@ -42,7 +42,7 @@ from gateway.service.running_rig.lines.device_checks import DeviceChecks
 
 _FAILURES_BEFORE_FAULT = 3  # in a row; one bad echo is noise on the line
 _POLL_PERIOD_S = 0.1
-_MOST_GIVEN_UP = 32  # questions whose answers may still come: a device without power is asked for days
+_MOST_OUT = 4  # questions that were given up and may still be answered, each so many reply times later at most
 _AFTER_SIGN_OF_LIFE_S = 0.005  # nothing tells when the device is through with a sentence that it does not answer
 
 
@@ -59,10 +59,10 @@ class OutputExchange:
     """Asks the device through `write`, keeps what it answered.
 
     acknowledged_v: confirmed by the device, None before the first; standing_v: surely stands there, None while another one is
-    on its way, and where nobody knows; unanswered_since_s: send time of the oldest question
-    without an answer; fault: three failures in a row, or what the device's checks have found; pressure_pa: last measured, nan
-    before the first; counts: since the start, whatever reset in between. checks: the questions about the device itself, made
-    from the host where none are given.
+    on its way, and where nobody knows; unanswered_since_s: send time of the oldest question without an answer;
+    answer_late_s: what the last answer took, where it came after its time, else 0; fault: three failures in a row, or what the
+    device's checks have found; pressure_pa: last measured, nan before the first; counts: since the start, whatever reset in
+    between. checks: the questions about the device itself, made from the host where none are given.
     """
 
     def __init__(
@@ -92,7 +92,9 @@ class OutputExchange:
         self._asked_v = self._before_v = inf
         self.standing_v: float | None = None
         self._is_overdue = False  # a question was given up, its answer may still come
-        self._given_up: list[tuple[OutputRequest, float]] = []  # the last in a row, with their send times
+        self._given_up: list[tuple[OutputRequest, float]] = []  # in a row, with their send times
+        self._heard_s = -inf  # an answer of nobody knows which: none that was asked before counts as silent any more
+        self.answer_late_s = 0.0
         self._is_behind = False  # the answer to one of them came, that to the last question is out
         self._is_altered = False  # the last echo was another voltage
         self._quiet_until_s = 0.0
@@ -157,9 +159,11 @@ class OutputExchange:
         self._host.forget()
         if not isinstance(question, ReadVoltage):  # which tells anew what stands
             self.standing_v = None
-        self._given_up.append((question, self._sent_s))
-        del self._given_up[:-_MOST_GIVEN_UP]
+        self._note_still_out(question)
         self._in_flight, self._is_overdue = None, True
+
+    def _note_still_out(self, question: OutputRequest) -> None:
+        self._given_up = [*self._given_up[1 - _MOST_OUT :], (question, self._sent_s)]
 
     def _send_next(self, now_s: float) -> None:
         wanted_v = self._wanted_v
@@ -211,7 +215,9 @@ class OutputExchange:
         if isinstance(reply, Garbage):
             self.garbage_bytes += len(reply.data)
             self.counts.garbled += 1
-            self._is_overdue = self._is_overdue and self._in_flight is not None  # unasked: that was it
+            if self._in_flight is None:  # unasked: that was it
+                self._is_overdue = False
+                del self._given_up[:1]
             return
         request, self._in_flight = self._in_flight, None
         self._free_s = max(self._free_s, now_s + self._host.gap_s)
@@ -219,11 +225,14 @@ class OutputExchange:
         if self._is_late(request, reply, now_s):
             return
         self.unanswered_since_s = None
-        is_own = self._is_echo(request, reply)
-        self._given_up.clear()
-        if self._is_overdue and not is_own:
+        if self._is_overdue and not self._is_echo(request, reply):
+            self._heard_s = now_s
+            if request is not None:
+                self._note_still_out(request)  # if what came was of an older one
             self._is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
             return
+        self._given_up.clear()
+        self.answer_late_s = 0.0
         self.round_trip_s = now_s - self._sent_s
         if isinstance(request, AskDevice):
             self._take_check(request, reply)
@@ -243,10 +252,12 @@ class OutputExchange:
         if not (isinstance(request, SetVoltage) and isinstance(reply, Accepted)) or self._is_echo(request, reply):
             return False
         for index, (question, sent_s) in enumerate(self._given_up):
-            if not isinstance(question, SetVoltage) or self._is_echo(question, reply):
+            is_its = not isinstance(question, SetVoltage) or self._is_echo(question, reply)
+            if is_its and now_s - sent_s <= _MOST_OUT * self._reply_timeout_s:
                 del self._given_up[: index + 1]
-                self.round_trip_s = now_s - sent_s
-                self.unanswered_since_s = self._given_up[0][1] if self._given_up else self._sent_s
+                self.answer_late_s = now_s - sent_s
+                still_out_s = (sent_s for _, sent_s in self._given_up if sent_s > self._heard_s)
+                self.unanswered_since_s = next(still_out_s, self._sent_s)
                 self._in_flight, self._is_behind = request, True
                 self._host.expect(request)
                 return True

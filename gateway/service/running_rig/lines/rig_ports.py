@@ -29,13 +29,17 @@ class RigPorts:
         self.output = SerialPort(
             paths["output"],
             rig.output.settings,
-            PortEvents(self._on_output_bytes, self._on_output_lost, self._on_output_open, self._on_refused),
+            PortEvents(
+                self._on_output_bytes, self._on_output_lost, self._on_output_open, self._on_refused, self._on_restored
+            ),
             is_simulated=rig.simulated,
         )
         self.cell = SerialPort(
             paths["load_cell"],
             rig.load_cell.settings,
-            PortEvents(self._on_cell_bytes, self._on_cell_lost, self._on_cell_open, self._on_refused),
+            PortEvents(
+                self._on_cell_bytes, self._on_cell_lost, self._on_cell_open, self._on_refused, self._on_restored
+            ),
             is_simulated=rig.simulated,
         )
 
@@ -44,7 +48,9 @@ class RigPorts:
             self.valve = SerialPort(
                 paths["valve"],
                 rig.valve.settings,
-                PortEvents(self._on_valve_bytes, self._on_valve_lost, self._on_valve_open, self._on_refused),
+                PortEvents(
+                    self._on_valve_bytes, self._on_valve_lost, self._on_valve_open, self._on_refused, self._on_restored
+                ),
                 is_simulated=rig.simulated,
             )
 
@@ -119,6 +125,9 @@ class RigPorts:
 
     def _on_refused(self, error: PortError) -> None:
         self._log("port", f"{error}; tried again until it opens")
+
+    def _on_restored(self, change: PortError) -> None:
+        self._log("port", str(change))
 
     def _on_cell_bytes(self, chunk: bytes, now_s: float) -> None:
         self.loop.on_cell_bytes(chunk, now_s)

@@ -52,7 +52,7 @@ def test_a_late_answer_is_not_taken_for_the_next_one(wire: Wire, every: int, slo
     assert wire.exchange.pressure_pa == pytest.approx(7 * 0.9e6 / 1023)
 
 
-@pytest.mark.parametrize("slow_s", [0.062, 0.065, 0.07, 0.08, 0.09, 0.099, 0.115, 0.13, 0.18])
+@pytest.mark.parametrize("slow_s", [0.065, 0.07, 0.08, 0.09, 0.099, 0.115, 0.13, 0.18])
 @pytest.mark.parametrize("step", [1, 3, 7, -2])
 def test_a_device_that_is_always_late_is_no_device_that_alters(wire: Wire, slow_s: float, step: int) -> None:
     """Its silence is as long as it is late: up to the bound of supervision the force is held, beyond it that is what is
@@ -153,7 +153,7 @@ def test_a_device_that_is_silent_for_long_leaves_no_more_than_its_last_questions
     wire.settle(200)
     for _ in range(1000):
         wire.tick(REPLY_TIMEOUT_S + 0.001)
-    assert len(wire.exchange._given_up) < 100
+    assert len(wire.exchange._given_up) <= 4
     assert wire.exchange.unanswered_since_s == pytest.approx(wire.now_s - 61.0, abs=0.2)
     wire.set_voltage(300)
     wire.tick(REPLY_TIMEOUT_S + 0.001)
@@ -186,7 +186,7 @@ def test_a_late_answer_tells_its_own_round_trip_and_leaves_the_silence_of_those_
     """Those before it never will be answered. What is out stays so, and no second question goes out beside it."""
     sent_s = late_out_of_three(wire)
     wire.answer(str(210 + 10 * answered), after_s=0.001)
-    assert wire.exchange.round_trip_s == pytest.approx(wire.now_s - sent_s[answered])
+    assert wire.exchange.answer_late_s == pytest.approx(wire.now_s - sent_s[answered])
     assert wire.exchange.unanswered_since_s == sent_s[answered + 1]
     assert wire.last == "SET 240" and wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
     wire.set_voltage(300)

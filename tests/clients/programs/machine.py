@@ -1,4 +1,4 @@
-"""Runs what tests/clients/syntax.py has parsed: values of a width, lists that are copied, routines, function blocks.
+"""Runs what tests/clients/programs/syntax.py has parsed: values of a width, lists that are copied, routines, function blocks.
 
 What a controller brings along (sockets, MB_CLIENT, timers, conversions) comes in as `library`: a name -> a Python function that
 gets the machine, the arguments as expressions and as values. A name that nobody has declared is a NameError: so a run of every
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from tests.clients.syntax import Node, Routine, Unit
+from tests.clients.programs.syntax import Node, Routine, Unit
 
 WIDTHS = {"WORD": 16, "UINT": 16, "BYTE": 8, "USINT": 8, "DWORD": 32, "UDINT": 32}
 SIGNED = {"INT": 16, "DINT": 32}

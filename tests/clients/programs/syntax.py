@@ -1,7 +1,7 @@
 """Parsers of the parts of RAPID, SCL, Structured Text and URScript that the generated clients use.
 
 Small and strict: what is not known here is a SyntaxError with its line. Expressions and statements are tuples, the same for all
-four languages, so that one interpreter runs them (tests/clients/machine.py). Grammars: ABB "RAPID Kernel" 3HAC050946, chapter 1
+four languages, so that one interpreter runs them (machine.py). Grammars: ABB "RAPID Kernel" 3HAC050946, chapter 1
 to 6; Siemens "STEP 7 Programming Guideline"/SCL; IEC 61131-3 (3rd edition) part 7.3; "The URScript Programming Language".
 """
 

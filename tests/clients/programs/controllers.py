@@ -8,9 +8,9 @@ from contextlib import suppress
 from typing import Any, ClassVar
 
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
-from tests.clients.iec_libraries import modbus_fb, tc2_modbus_srv
-from tests.clients.machine import Frame, Machine, RapidError
-from tests.clients.syntax import Node, parse
+from tests.clients.programs.iec_libraries import modbus_fb, tc2_modbus_srv
+from tests.clients.programs.machine import Frame, Machine, RapidError
+from tests.clients.programs.syntax import Node, parse
 
 
 def values(act: Callable[..., Any]) -> Callable[[Machine, list[Node], Frame], Any]:
