@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from gateway.bsfm.model import Response
-from gateway.control import CalibrationInUse
+from gateway.control import CalibrationInUse, Controller
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.self_test.items import SelfTestPlan
 from gateway.control.settings import SelfTestSettings
 from gateway.registers.words import LimitedBy, State, StatusBit
@@ -105,3 +106,25 @@ def test_a_self_test_judges_by_the_set_in_use():
     assert known.response_s == pytest.approx(0.5)
     bench.controller.use(CalibrationInUse(bsfm(), 3))
     assert run.build(SelfTestPlan())._known == before
+
+
+def test_the_limits_of_the_set_that_control_begins_with_hold_as_those_of_a_later_one_do():
+    """After a restart nobody swaps: the first enable already presses no more than its set allows."""
+    bench = Bench()
+    bench.controller = Controller(bench.settings, CalibrationInUse(replace(bsfm(), limits_n=(1.0, 15.0)), 2))
+    bench.run(0.1)
+    bench.enable(30.0)
+    bench.run(2.0)
+    assert max(record.force_n for record in bench.history) < 16.0
+    assert bench.last.limited_by is LimitedBy.FORCE_RANGE
+
+
+def test_a_run_of_this_machine_that_cannot_begin_says_why_once_in_the_log():
+    bench = enabled()
+    bench.force(20.0)
+    bench.run(1.0)
+    bench.controller.active_run.ask(CalibrationPlan())
+    bench.run(0.1)
+    assert bench.controller.active_run.refused.startswith("W305 ")
+    assert bench.events.count(bench.controller.active_run.refused) == 1
+    assert bench.controller.state is State.HOLDING

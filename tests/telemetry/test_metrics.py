@@ -2,20 +2,25 @@
 
 import asyncio
 import json
+import os
 import re
+import socket
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
+from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.parser import text_string_to_metric_families as parse
 from starlette.applications import Starlette
 
 from gateway.processes.json_socket.server import JsonLineServer
+from gateway.telemetry import metrics_process
 from gateway.telemetry.exposition import exposition
-from gateway.telemetry.metrics_process import make_metrics_app, read_gateway
+from gateway.telemetry.metrics_process import ReadingCollector, make_metrics_app, read_gateway
 from gateway.telemetry.series import SERIES
+from gateway.web.impatient_http import ImpatientProtocol
 from tests.telemetry.readings import HEALTH, holding, reading, without_sample
 from tests.web.asgi import call
 
@@ -138,3 +143,29 @@ def test_a_pressure_that_no_device_reports_is_left_out() -> None:
     state = reading().state
     silent = replace(reading(), state=replace(state, force=replace(state.force, pressure_kpa=None)))
     assert "pressure_pascals" not in "\n".join(exposition(silent))
+
+
+def test_a_counter_has_one_ending_and_nobody_keeps_what_was_read(tmp_path: Path) -> None:
+    collector = ReadingCollector(reading())
+    registry = CollectorRegistry(auto_describe=False)
+    registry.register(collector)
+    text = generate_latest(registry).decode()
+    assert "# TYPE force_gateway_" in text and "_total_total" not in text
+    answer = asyncio.run(call(make_metrics_app(tmp_path), "GET", "/metrics"))
+    assert answer.headers["cache-control"] == "no-store"
+
+
+def test_scrapers_are_bounded_like_any_client(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    given = dict[str, Any]()
+
+    class Server:
+        def __init__(self, config: object) -> None: ...
+        async def serve(self, sockets: list[Any]) -> None:
+            sockets[0].close()
+
+    monkeypatch.setattr("uvicorn.Config", lambda app, **options: given.update(options))
+    monkeypatch.setattr("uvicorn.Server", Server)
+    with socket.socket() as listening:
+        options = {"state": str(tmp_path), "listen": os.dup(listening.fileno())}
+        asyncio.run(metrics_process.serve(options, None))  # type: ignore[arg-type]
+    assert (given["limit_concurrency"], given["http"], given["server_header"]) == (32, ImpatientProtocol, False)

@@ -6,9 +6,13 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
+from gateway.control import LineStatus
+from gateway.control.sample_conditioning import Reading
+from gateway.control.supervision.fault_detection import FaultDetector
+from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
 from gateway.devices.messages import ForceSample
 from gateway.registers.words import State
-from tests.control.bench import Bench, has_fault, settings
+from tests.control.bench import Bench, bsfm, has_fault, settings
 from tests.faults.test_control_reactions import pressing
 
 
@@ -63,3 +67,25 @@ def test_what_the_loop_has_told_as_frozen_teaches_nothing_however_long_it_went_o
         bench.run(1.0)
         bench.reset()
         assert bench.last.state is State.OFF
+
+
+def test_an_enable_begins_without_what_was_found_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also in the step of the enable itself, which may come with no new sample."""
+    monkeypatch.setattr(RiseCheck, "judge", lambda *_: FaultCode.GAIN_WRONG)
+    detector, reading = FaultDetector(settings()), Reading(50.0, 70.0, 0.0, 0.01, True, True, True)
+    response = ExpectedForce(bsfm(), 0.1, 0.0)
+    for _ in range(3):
+        detector.observe(reading, response, 1.0, True)
+    line = LineStatus(acknowledged_v=0.0)
+
+    def first_fault() -> FaultCode:
+        cause = detector.first_cause(1.0, reading, line, lambda: 10.0)
+        return cause.fault if cause else FaultCode.NONE
+
+    assert first_fault() is FaultCode.OVER_FORCE
+    lost = detector.first_cause(1.0, reading, line._replace(cell_lost=True), lambda: 10.0)
+    assert lost and lost.fault is FaultCode.CELL_LOST, "what makes others follow comes first"
+    detector.observe(reading._replace(contact_n=5.0), response, 1.0, True)
+    assert first_fault() is FaultCode.GAIN_WRONG
+    detector.start()
+    assert first_fault() is FaultCode.NONE

@@ -8,10 +8,19 @@ from typing import Any
 import pytest
 
 from gateway.devices import DeviceProfile, cell_device, output_device
+from gateway.devices.exchange import VoltageRange
 from gateway.devices.messages import Accepted, Garbage, SetVoltage
 from gateway.ports import PacedPty
 from gateway.profiles import CellLine, OutputLine
-from gateway.service.running_rig.lines.baud_probe import ProbeResult, explain_silent_device, listen_at
+from gateway.service.running_rig.lines.baud_probe import (
+    ProbeResult,
+    _question,
+    _question_and_receiver,
+    _sentence,
+    explain_silent_device,
+    listen_at,
+)
+from tests.profile_files import load_device
 from tests.service.rigs import demo
 
 FRAME_PERIOD_S = 0.01
@@ -179,3 +188,19 @@ def test_each_speed_is_tried_once_the_rig_s_own_first_and_what_it_says_there_is_
     told = asyncio.run(explain_silent_device(line, "/dev/ttyNONE"))
     assert tried == [38400, 9600, 19200, 57600, 115200]
     assert told == "E110 /dev/ttyNONE: 9 bytes, 0 valid lines at 38400; it says words of 38400"
+
+
+def test_what_cannot_be_asked_is_set_to_the_least_that_it_can_be_and_a_cell_to_nothing() -> None:
+    regulator = replace(load_device("mcu-line"), read_pressure=None, read_voltage=None)
+    assert regulator.set_voltage
+    assert _question(regulator) == SetVoltage(0.0)
+    range_ = VoltageRange(device=(1.0, 9.0), voltage_v=(1.0, 9.0))
+    assert _question(replace(regulator, set_voltage=replace(regulator.set_voltage, range=range_))) == SetVoltage(1.0)
+    stream, asked_cell = demo().load_cell, replace(demo().load_cell, device=load_device("mantracourt-dsc"), unit="N")
+    assert _question_and_receiver(stream)[0]() == b"" != _question_and_receiver(asked_cell)[0]()
+
+
+@pytest.mark.parametrize(("here", "elsewhere", "code"), [(0, 0, "E111"), (5, 0, "E110"), (0, 5, "E110")])
+def test_a_single_byte_at_any_speed_is_no_silence(here: int, elsewhere: int, code: str) -> None:
+    told = _sentence("/dev/ttyNONE", ProbeResult(9600, here, 0), [ProbeResult(19200, elsewhere, 0)])
+    assert told.startswith(f"{code} /dev/ttyNONE: ")

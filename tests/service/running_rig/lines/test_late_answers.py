@@ -241,3 +241,43 @@ def test_a_late_reading_is_not_taken_for_the_setting_that_is_out_and_costs_no_ti
     assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
     wire.answer("300", after_s=0.001)
     assert wire.exchange.acknowledged_v == pytest.approx(300 * 10 / 1023)
+
+
+def test_an_answer_in_time_ends_what_is_said_of_late_ones_and_so_does_an_opening(wire: Wire) -> None:
+    for end in ("answer", "opening"):
+        wire.exchange.reset()
+        given_up(wire).answer("210")
+        assert wire.exchange.answer_late_s > REPLY_TIMEOUT_S
+        wire.answer("220") if end == "answer" else wire.exchange.reset()
+        assert wire.exchange.answer_late_s == 0.0
+
+
+def test_of_many_that_were_given_up_the_newest_may_still_be_answered_and_none_for_ever(wire: Wire) -> None:
+    wire.settle(200)
+    for counts in range(210, 280, 10):
+        wire.set_voltage(counts)
+        if counts < 270:
+            wire.set_voltage(counts + 10)
+            wire.tick(REPLY_TIMEOUT_S + 0.001)
+    sent_s = wire.now_s
+    assert wire.last == "SET 270"
+    wire.answer("250", after_s=0.001)
+    assert wire.exchange.unanswered_since_s == pytest.approx(sent_s - REPLY_TIMEOUT_S - 0.001), "260 is out, too"
+    wire.answer("260", after_s=0.4)
+    assert wire.exchange.unanswered_since_s is None, "what comes so late is nobody's"
+
+
+def test_behind_an_answer_of_nobody_knows_which_no_older_question_counts_as_silent(wire: Wire) -> None:
+    """And what was out then is answered by its own echo, however the next one is asked by that time."""
+    for late in ("210", "220"):
+        wire.exchange.reset()
+        given_up(wire).answer("333", after_s=0.001)
+        wire.set_voltage(230)
+        wire.tick(REPLY_TIMEOUT_S + 0.001)
+        sent_s = wire.now_s
+        assert wire.last == "SET 230"
+        wire.answer(late, after_s=0.001)
+        assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
+        assert wire.exchange.unanswered_since_s == sent_s
+        wire.answer("230", after_s=0.001)
+        assert wire.exchange.acknowledged_v == pytest.approx(230 * 10 / 1023)

@@ -1,0 +1,144 @@
+"""A change of state by itself, its parts played: what it starts, what it lets go of, and what of it is kept."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gateway.codes.faults import FaultCode
+from gateway.control import CalibrationInUse, Controller
+from gateway.control.command_edges import CommandTracker
+from gateway.control.runs.ladder_stairs import CalibrationPlan
+from gateway.control.settings import LeaseAction
+from gateway.control.supervision.fault_detection import StopCause
+from gateway.control.transitions import ControllerParts, StepOutcome, Transitions
+from gateway.registers.command import Command
+from gateway.registers.words import ControlBit, State
+from tests.control.bench import Bench, bsfm, settings
+
+STALE = StopCause(FaultCode.SAMPLE_STALE, "A311 stale")
+
+
+class Parts:
+    """Everything that a change acts on, and what it was told."""
+
+    def __init__(self, *, is_running: bool = False) -> None:
+        self.did: list[str] = []
+        note = self.did.append
+        run = SimpleNamespace(
+            running=is_running, kind="calibration", rest=lambda fault: note("run.rest"), take_report=lambda: ("report",),
+            leave=lambda loop, given_n: note("run.leave"), begin=lambda plan, is_local: note("run.begin"),
+        )  # fmt: skip
+        commands = SimpleNamespace(
+            who="10.0.0.1", start_lease=lambda now_s: note("lease"), expect_clearing=lambda: note("clearing")
+        )
+        parts: Any = ControllerParts(
+            commands,  # type: ignore[arg-type]
+            SimpleNamespace(start=lambda: note("faults")),  # type: ignore[arg-type]
+            SimpleNamespace(start=lambda: note("one_shot")),  # type: ignore[arg-type]
+            SimpleNamespace(rest=lambda: note("loop.rest")),  # type: ignore[arg-type]
+            run,  # type: ignore[arg-type]
+        )
+        self.machine = Transitions(parts, is_restarted=True)
+
+
+def enabled(**running: bool) -> Parts:
+    parts = Parts(**running)
+    parts.machine.enable(1.0)
+    parts.did.clear()
+    return parts
+
+
+def test_whatever_begins_begins_anew_and_acknowledges_a_restart() -> None:
+    for begin in ("enable", "run"):
+        parts = Parts()
+        if begin == "enable":
+            parts.machine.enable(1.0)
+        else:
+            parts.machine.begin_run(1.0, CalibrationPlan(), "10.0.0.1")
+        assert parts.did == ["run.begin"] * (begin == "run") + ["faults", "one_shot", "lease"]
+        assert parts.machine.is_enabled and not parts.machine.is_restarted
+
+
+def test_the_first_fault_stays_whatever_breaks_behind_it() -> None:
+    parts = enabled()
+    parts.machine.fail(2.0, STALE)
+    parts.did.clear()
+    parts.machine.fail_internally(3.0)
+    assert (parts.machine.fault, parts.machine.faulted_s) == (FaultCode.SAMPLE_STALE, 2.0)
+    assert parts.did == ["loop.rest", "run.rest", "clearing"], "the safe voltage all the same"
+    parts = enabled()
+    parts.machine.fail_internally(3.0)
+    assert (parts.machine.state, parts.machine.fault, parts.machine.faulted_s) == (State.FAULT, FaultCode.INTERNAL, 3.0)
+
+
+def test_a_reset_in_off_is_the_device_s_alone_and_acknowledges_no_restart() -> None:
+    machine = Parts().machine
+    machine.reset()
+    assert machine.outcome.resets_device and machine.is_restarted and machine.state is State.OFF
+    parts = enabled()
+    parts.machine.fail(2.0, STALE)
+    parts.machine.reset()
+    assert (parts.machine.state, parts.machine.fault) == (State.OFF, FaultCode.NONE)
+
+
+@pytest.mark.parametrize(
+    ("was_ramping", "action", "is_running", "ramps"),
+    [
+        (False, LeaseAction.HOLD, False, False),
+        (True, LeaseAction.HOLD, False, True),
+        (False, LeaseAction.RAMP, False, True),
+        (False, LeaseAction.HOLD, True, True),
+    ],
+)
+def test_a_lost_master_ends_no_way_to_0_and_leaves_no_run_alone(
+    was_ramping: bool, action: LeaseAction, is_running: bool, ramps: bool
+) -> None:
+    parts = enabled(is_running=is_running)
+    parts.machine.is_ramping_down = was_ramping
+    parts.machine.lose_master(2.0, "no heartbeat", action)
+    assert parts.machine.is_master_lost and parts.machine.is_ramping_down is ramps
+    assert parts.machine.outcome.release_owner
+    assert ("ramping to 0 N" if ramps else "holding") in parts.machine.outcome.events[-1]
+
+
+def test_what_lets_go_of_the_force_forgets_where_it_was_going_and_has_the_command_cleared() -> None:
+    for end in ("disable", "fail"):
+        parts = enabled()
+        parts.machine.is_ramping_down = parts.machine.is_master_lost = True
+        parts.machine.disable("off") if end == "disable" else parts.machine.fail(2.0, STALE)
+        assert not parts.machine.is_ramping_down and not parts.machine.is_master_lost
+        assert parts.machine.outcome.clear_command and parts.did == ["loop.rest", "run.rest", "clearing"]
+        assert parts.machine.outcome.events[-1] == "report"
+
+
+@pytest.mark.parametrize("wish", ["events", "clear_command", "release_owner", "resets_device"])
+def test_each_wish_of_a_step_is_one_and_is_gone_with_the_next_step(wish: str) -> None:
+    machine = Parts().machine
+    setattr(machine.outcome, wish, ["told"] if wish == "events" else True)
+    assert not machine.outcome.is_empty
+    machine.begin_step()
+    assert machine.outcome.is_empty and machine.outcome == StepOutcome()
+
+
+def test_an_enable_right_behind_a_clearing_is_a_sign_of_life_and_the_clearing_itself_none() -> None:
+    for control_word, age_s in ((ControlBit.ENABLE, 0.0), (ControlBit(0), 5.0)):
+        tracker = CommandTracker(settings(lease_s=1.0))
+        tracker.take(0.0, Command(heartbeat=3, number=1))
+        tracker.expect_clearing()
+        tracker.take(5.0, Command(control_word=control_word, heartbeat=0, number=2))
+        assert tracker.lease_age_s(5.0) == age_s
+
+
+def test_a_run_beside_which_the_gateway_stops_ends_and_says_so() -> None:
+    bench = Bench()
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1))
+    bench.run(0.5)
+    bench.controller.active_run.ask(CalibrationPlan())
+    bench.run(1.0)
+    assert bench.controller.active_run.running
+    bench.controller.stop()
+    bench.run(0.1)
+    assert not bench.controller.active_run.running
+    assert "calibration stopped: ramping down" in bench.events
+    assert bench.controller.state in (State.CALIBRATING, State.OFF)

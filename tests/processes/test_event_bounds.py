@@ -1,0 +1,148 @@
+"""What is left out of a log and counted, and what is read of a file that gets another name meanwhile."""
+
+import fcntl
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gateway.processes import event_log
+from gateway.processes.event import EventRecord, encode_event, make_event
+from gateway.processes.event_file import KEPT, NAME, EventFile, EventReader
+from gateway.processes.event_log import EventLog
+from tests.processes.test_event_log import Clock, texts
+
+
+def line(text: str) -> bytes:
+    return encode_event(make_event(0.0, "control", "cause", text))
+
+
+class Terminal:
+    """A log on a clock of its own, and what came to the terminal until it was left."""
+
+    def __init__(self) -> None:
+        self.clock, self.lines = Clock(), list[str]()
+        self.log = EventLog(self.lines.append, self.clock)
+
+    def say(self, at_s: float, *causes: str) -> None:
+        self.clock.now_s = at_s
+        for cause in causes:
+            self.log(cause, cause)
+
+    def look(self, at_s: float) -> None:
+        """The round that the writer makes when nothing has come for a second."""
+        self.clock.now_s = at_s
+        self.log._tell_left_out()
+
+    def said(self) -> list[str]:
+        with self.log:
+            pass
+        return texts(self.lines)
+
+
+def test_what_is_left_out_of_a_second_is_counted_when_it_is_over() -> None:
+    """However often somebody looks before."""
+    terminal = Terminal()
+    terminal.say(0.0, *["x"] * 15)
+    terminal.look(0.5)
+    terminal.say(0.9, *["x"] * 10)
+    terminal.look(1.1)
+    assert terminal.said()[10:] == ["15 more lines of 'x' left out"]
+
+
+def test_a_flood_is_still_one_in_the_next_second_whoever_looked_between_and_forgotten_behind_that() -> None:
+    terminal = Terminal()
+    terminal.say(0.0, *["x"] * 15)
+    terminal.look(1.0)
+    terminal.say(1.0, *["x"] * 15)
+    terminal.look(3.0)
+    assert not terminal.log._windows
+    assert terminal.said().count("x") == 10 + 1
+
+
+def test_ten_lines_a_second_are_no_flood_however_long_they_go_on() -> None:
+    terminal = Terminal()
+    for second in range(5):
+        terminal.say(float(second), *["x"] * 10)
+    assert terminal.said() == ["x"] * 50
+
+
+def test_of_more_causes_than_are_kept_the_recent_ones_stay_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(event_log, "_MOST_CAUSES", 20)
+    terminal = Terminal()
+    terminal.say(0.0, *(f"old {number}" for number in range(19)))
+    terminal.say(1.5, *["x"] * 25)
+    terminal.say(1.6, "new")
+    terminal.say(1.7, *["x"] * 25)
+    assert terminal.said().count("x") == 10
+
+
+def test_causes_that_all_come_at_once_need_no_more_memory() -> None:
+    terminal = Terminal()
+    terminal.say(0.0, *(f"cause {number}" for number in range(3000)))
+    assert len(terminal.log._windows) <= 1000
+    terminal.said()
+
+
+# -- the file
+
+
+def read(reader: EventReader) -> list[str]:
+    return [event.text for event in reader.read_new()]
+
+
+def test_who_does_not_hold_the_file_s_lock_gives_it_no_other_name(tmp_path: Path) -> None:
+    """Another process is at it; the file grows a little longer meanwhile."""
+    file = EventFile(tmp_path, longest_bytes=200)
+    file.append(line("one"))
+    holder = os.open(tmp_path / NAME, os.O_RDONLY)
+    fcntl.flock(holder, fcntl.LOCK_EX)
+    for _ in range(5):
+        file.append(line("more"))
+    assert [path.name for path in tmp_path.iterdir()] == [NAME]
+    os.close(holder)
+    file.append(line("last"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"{NAME}.1"]
+    file.close()
+
+
+def test_what_comes_right_before_a_file_gets_its_new_name_is_read(tmp_path: Path) -> None:
+    file = EventFile(tmp_path)
+
+    class Overtaken(EventReader):
+        """Between this reader's two looks another process writes, and gives the file its old name."""
+
+        is_overtaken = False
+
+        def _whole_lines(self) -> Iterator[EventRecord]:
+            yield from super()._whole_lines()
+            if not self.is_overtaken:
+                self.is_overtaken = True
+                file.append(line("late"))
+                (tmp_path / NAME).rename(tmp_path / f"{NAME}.1")
+                file.append(line("new"))
+
+    file.append(line("first"))
+    with Overtaken(tmp_path) as reader:
+        assert [*(event.text for event in reader.read_stored()), *read(reader)] == ["first", "late", "new"]
+    file.close()
+
+
+def test_a_torn_end_of_the_old_file_spoils_nothing_of_the_new_one(tmp_path: Path) -> None:
+    (tmp_path / NAME).write_bytes(line("first") + line("torn")[:9])
+    with EventReader(tmp_path) as reader:
+        assert [event.text for event in reader.read_stored()] == ["first"]
+        (tmp_path / NAME).rename(tmp_path / f"{NAME}.1")
+        (tmp_path / NAME).write_bytes(line("new"))
+        assert read(reader) == ["new"]
+
+
+def test_every_old_file_is_read_oldest_first_and_one_of_two_names_once(tmp_path: Path) -> None:
+    """One that gets its next number while they are opened is met twice."""
+    for number in range(KEPT + 1):
+        (tmp_path / (f"{NAME}.{number}" if number else NAME)).write_bytes(line(str(number)))
+    (tmp_path / f"{NAME}.2").unlink()
+    os.link(tmp_path / f"{NAME}.1", tmp_path / f"{NAME}.2")
+    with EventReader(tmp_path) as reader:
+        assert [event.text for event in reader.read_stored()] == ["4", "3", "1", "0"]

@@ -1,0 +1,84 @@
+"""The simulated rig's process from its arguments on: what it keeps, how it ends, and whose bytes are whose."""
+
+import asyncio
+import json
+import os
+import signal
+import socket
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.processes import exit_codes
+from gateway.profiles import ProfileError
+from gateway.service import simulated_rig
+from gateway.service.simulated_rig import SimulatedLines, _make_pty
+from gateway.service.simulation.kept_settings import KeptSettings
+from tests.service.rigs import demo
+
+
+@pytest.fixture
+def arguments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    monkeypatch.setattr("gateway.processes.priority.set_nice", lambda _nice: None)
+    ours, theirs = socket.socketpair()
+    descriptor = os.dup(ours.fileno())
+    ours.close()
+    theirs.close()
+    options = {"state": str(tmp_path), "rig": "demo", "simulate": True, "run": "this one"}
+    return [str(descriptor), json.dumps(options)]
+
+
+def test_what_is_set_is_kept_for_this_run_of_the_gateway(arguments: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    served = list[KeptSettings]()
+
+    async def serve(rig: object, link: socket.socket, kept: KeptSettings, log: object) -> None:
+        served.append(kept)
+        link.close()
+
+    monkeypatch.setattr(simulated_rig, "_serve_process", serve)
+    assert simulated_rig.main(arguments) == 0
+    assert served[0].run == "this one"
+
+
+def test_a_rig_file_that_was_edited_since_is_no_internal_error(
+    arguments: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_name: str, *, simulated: bool) -> None:
+        os.close(int(arguments[0]))
+        raise ProfileError(())
+
+    monkeypatch.setattr(simulated_rig, "kept_rig", refuse)
+    monkeypatch.setattr(socket, "socket", lambda fileno: None)
+    assert simulated_rig.main(arguments) == exit_codes.CONFIGURATION
+
+
+def test_sigterm_ends_it_as_the_guardian_s_end_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def until_ended(*given: Any) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        await asyncio.wait_for(given[-1].wait(), 5.0)
+
+    monkeypatch.setattr(simulated_rig, "serve", until_ended)
+
+    async def scene() -> None:
+        try:
+            await simulated_rig._serve_process(None, None, None, None)  # type: ignore[arg-type]
+        finally:
+            asyncio.get_running_loop().remove_signal_handler(signal.SIGTERM)
+
+    before = signal.signal(signal.SIGTERM, lambda *_: pytest.fail("it was ended without a word"))
+    try:
+        asyncio.run(scene())
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def test_each_line_hears_its_own_bytes_at_its_own_frame() -> None:
+    lines = SimulatedLines(demo())
+    assert lines._ptys["output"]._on_bytes == lines.world.on_output_bytes
+    assert lines._ptys["load_cell"]._on_bytes == lines.world.on_cell_bytes
+    device = demo().load_cell.device
+    for parity, bits in (("none", 10), ("even", 11)):
+        serial = replace(device.serial, parity=parity)
+        assert _make_pty(replace(device, serial=serial), lambda chunk, now_s: None)._bits_per_character == bits
