@@ -74,13 +74,14 @@ def optional_children(rig: Rig, ring: SampleRing | None, addresses: dict[str, Ad
     """Return what each child that control can do without is told, by its name; settings: its section of the rig file, without
     secrets, which do not belong on a command line."""
     children: dict[str, dict[str, Any]] = {}
+    read_again = {"simulated": rig.simulated, "fingerprint": rig.fingerprint}
     if rig.is_watched and not rig.why_unwatched and ring is not None:
         watch = rig.residual_watch
-        children["watch"] = {"simulated": rig.simulated, "window_s": watch.window_s, "every_s": watch.every_s}
+        children["watch"] = read_again | {"window_s": watch.window_s, "every_s": watch.every_s}
     if rig.mqtt:
-        children["mqtt"] = {"simulated": rig.simulated}
+        children["mqtt"] = read_again
     if rig.opcua:
         children["opcua"] = {"settings": {"listen": rig.opcua.listen, "name": rig.name}}
     for name, (host, port) in addresses.items():
-        children[name] = {"simulated": rig.simulated, "settings": {"host": host, "port": port}}
+        children[name] = read_again | {"settings": {"host": host, "port": port}}
     return children

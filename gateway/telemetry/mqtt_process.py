@@ -68,9 +68,9 @@ class Announcer:
 
 async def publish(options: dict[str, Any], log: EventLog) -> None:
     """Publish until the process ends. options: as the guardian gives them."""
-    from gateway.profiles import load_rig
+    from gateway.profiles.kept_rig import unchanged_rig
 
-    rig = load_rig(options["rig"], simulated=options["simulated"])
+    rig = unchanged_rig(options["rig"], options["fingerprint"], simulated=options["simulated"])
     assert rig.mqtt is not None
     password = read_plain(rig.mqtt.password_file).decode().strip() if rig.mqtt.password_file else None
     tls = rig.mqtt.tls

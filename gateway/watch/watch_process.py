@@ -55,12 +55,13 @@ def report_to_control(state: Path, message: dict[str, Any]) -> dict[str, Any]:
 def make_watch(ring: RingReader, options: dict[str, Any]) -> tuple["Watch", "ForceWatch"]:
     """Return the watch over the rig, and that over the force. Everything heavy is imported here."""
     from gateway.plants.in_use import with_selected_plant
-    from gateway.profiles import load_rig
+    from gateway.profiles.kept_rig import unchanged_rig
     from gateway.watch.force_watch import ForceWatch
     from gateway.watch.residual_watch import Watch, WatchSettings
 
     state = Path(options["state"])
-    rig, _ = with_selected_plant(load_rig(options["rig"], simulated=options["simulated"]), state)
+    as_started = unchanged_rig(options["rig"], options["fingerprint"], simulated=options["simulated"])
+    rig, _ = with_selected_plant(as_started, state)
     setup = WatchSettings(options["window_s"], options["every_s"])
     watch = Watch(ring, make_comparison(rig, state), setup, time.monotonic)
     return watch, ForceWatch(state, rig.control.defaults.in_band_tolerance_n)
@@ -183,10 +184,12 @@ def main(arguments: list[str]) -> int:
     """Watch until the guardian ends. arguments: descriptor of the link, options as JSON."""
     yield_to_others()
     exit_with_guardian(socket.socket(fileno=int(arguments[0])))
+    from gateway.profiles.kept_rig import ChangedRigError
+
     try:
         watch_forever(json.loads(arguments[1]))
-    except MissingExtraError as missing:  # numba is there, or nobody had started us, and does not load
-        sys.stderr.write(f"{missing}\n")
+    except (MissingExtraError, ChangedRigError) as why:  # numba is there, or nobody had started us, and does not load
+        sys.stderr.write(f"{why}\n")
     return exit_codes.DEVICE
 
 

@@ -7,26 +7,28 @@ from pathlib import Path
 from typing import Any
 
 from gateway.live.control_link import ControlLink
-from gateway.profiles import Rig, load_rig
+from gateway.profiles import Rig
+from gateway.profiles.kept_rig import unchanged_rig
 
 
 @dataclass
 class WebContext:
     """state: directory; rig: name or file, as `run` was given it; simulated: its devices are; control: the way to control's
-    socket, for questions and commands. jobs: long work that a tab has begun, by a name of its own; it outlives a reload, and
-    `tasks` keeps what must not be collected while it runs."""
+    socket, for questions and commands; fingerprint: of the rig that runs, None: whatever it is. jobs: long work that a tab has
+    begun, by a name of its own; it outlives a reload, and `tasks` keeps what must not be collected while it runs."""
 
     state: Path
     rig: str
     simulated: bool
     control: ControlLink
+    fingerprint: str | None = None
     jobs: dict[str, Any] = field(default_factory=dict)
     tasks: set["asyncio.Task[Any]"] = field(default_factory=set)
 
     @cached_property
     def profile(self) -> Rig:
-        """The rig as its files say; read once, when it is first needed."""
-        return load_rig(self.rig, simulated=self.simulated)
+        """The rig as its files say; read once, when it is first needed. ChangedRigError where they say another one by now."""
+        return unchanged_rig(self.rig, self.fingerprint, simulated=self.simulated)
 
     def begin(self, work: Any) -> "asyncio.Task[Any]":
         """Run a coroutine beside the requests, and keep it until it has ended."""

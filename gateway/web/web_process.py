@@ -35,7 +35,7 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
             yield
 
     state = Path(options["state"])
-    context = WebContext(state, options["rig"], options["simulated"], ControlLink(state))
+    context = WebContext(state, options["rig"], options["simulated"], ControlLink(state), options["fingerprint"])
     web = context.profile.web
     door = Door(options["settings"]["host"], options["settings"]["port"], web.token if web else None)
     rows = None if options["ring"] is None else RingRows(options["ring"])

@@ -40,12 +40,13 @@ def test_each_child_is_told_what_it_needs_and_no_secret() -> None:
         web=Web(listen="127.0.0.1:8080", token="a-secret-of-some-length"),
     )
     told = optional_children(rig, RING, {"web": ("127.0.0.1", 8080), "metrics": ("::1", 9090)})
+    again = {"simulated": True, "fingerprint": rig.fingerprint}
     assert told == {
-        "watch": {"simulated": True, "window_s": 90.0, "every_s": 15.0},
-        "mqtt": {"simulated": True},
+        "watch": again | {"window_s": 90.0, "every_s": 15.0},
+        "mqtt": again,
         "opcua": {"settings": {"listen": "127.0.0.1:4840", "name": "demo"}},
-        "web": {"simulated": True, "settings": {"host": "127.0.0.1", "port": 8080}},
-        "metrics": {"simulated": True, "settings": {"host": "::1", "port": 9090}},
+        "web": again | {"settings": {"host": "127.0.0.1", "port": 8080}},
+        "metrics": again | {"settings": {"host": "::1", "port": 9090}},
     }
     assert "secret" not in str(told)
 

@@ -114,7 +114,8 @@ def test_a_taken_address_ends_the_start_unless_any_will_do() -> None:
     kept.open(demo(), {"web": [host, port]})
     assert kept.sockets == {} and kept.addresses == {"web": (host, port)}, "the guardian has it already"
     children = optional_children(replace(demo(), simulated=True), None, first.addresses)
-    assert children["web"] == {"simulated": True, "settings": {"host": host, "port": port}}
+    again = {"simulated": True, "fingerprint": demo().fingerprint}
+    assert children["web"] == again | {"settings": {"host": host, "port": port}}
     for listeners in (first, *usual):
         listeners.close()
 

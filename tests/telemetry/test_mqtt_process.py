@@ -109,11 +109,11 @@ def test_the_broker_is_asked_with_the_password_of_its_file_and_the_certificates_
     async def look(link: Any, sessions: Any) -> None:
         assert len(sessions) == 2
 
-    monkeypatch.setattr("gateway.profiles.load_rig", lambda name, simulated: rig)
+    monkeypatch.setattr("gateway.profiles.kept_rig.load_rig", lambda name, simulated: rig)
     monkeypatch.setattr(mqtt_process, "keep_connected", keep)
     monkeypatch.setattr(mqtt_process, "look_forever", look)
     log: Any = lambda cause, sentence: said.append((cause, sentence))  # noqa: E731
-    options = {"rig": "demo", "simulated": True, "state": str(tmp_path)}
+    options = {"rig": "demo", "simulated": True, "fingerprint": rig.fingerprint, "state": str(tmp_path)}
     asyncio.run(publish(options, log))
     assert said == [("broker", "E181 away")], "both say the same"
     assert {broker for broker, _ in asked} == {Broker("broker", 8883, "me", "a secret", *files)}

@@ -142,7 +142,7 @@ def run_client(tmp_path: Path, section: str) -> Iterator["subprocess.Popen[bytes
     rig.write_text(f"{text}mqtt: {section}\n", encoding="utf-8")
     guardian, link = socket.socketpair()
     os.set_inheritable(link.fileno(), True)
-    options = json.dumps({"rig": str(rig), "state": str(tmp_path), "simulated": True})
+    options = json.dumps({"rig": str(rig), "state": str(tmp_path), "simulated": True, "fingerprint": None})
     command = [sys.executable, "-m", "gateway.telemetry.mqtt_process", str(link.fileno()), options]
     with guardian, link:
         process = subprocess.Popen(command, pass_fds=[link.fileno()])
