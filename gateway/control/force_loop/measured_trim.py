@@ -17,9 +17,9 @@ A supervisor watches for hunting: corrections that change sign again and again a
 world's), not the model's. Each makes the zone wider and the pace slower; after MOST_TURNS the trim stands still until the
 target has moved by more than NEW_TARGET_N, and says so. A correction that has stood at its limit was not friction's, but that
 of air that failed and came back, or the like: the count begins anew. One that only touched it counts, for a trim may swing
-from limit to limit. And where the trim turned round it may stand wrong: an
-error of one sign for STOOD_S, wider than the zone has become, is corrected again; behind each further standstill at one target
-after twice as long.
+from limit to limit. And where the trim turned round it may stand wrong: an error of one sign for STOOD_S, wider than the zone
+has become, is corrected again. Fewer turns may have been disturbances that came and went: behind them an error of one sign
+for STOOD_S need only be wider than the zone was at first. Either takes twice as long each further time at one target.
 """
 
 from math import exp, sqrt
@@ -160,6 +160,8 @@ class MeasuredTrim:
         if self.has_hunted:
             self._stand(zone_n, interval_s)
             return
+        if self._turns and not self._way:
+            self._stand(zone_n / WIDER**self._turns, interval_s)
         if abs(self._smooth_n) > zone_n and self._seen_s >= LEAST_SEEN_S:
             self._turn(1 if self._smooth_n > 0.0 else -1)
         elif self._way * self._smooth_n < LEFT_SHARE * zone_n:
@@ -187,7 +189,7 @@ class MeasuredTrim:
         return self._at_limit_s > max(AT_LIMIT_S, AT_LIMIT_PACES / self._timing.integral_per_s)
 
     def _stand(self, zone_n: float, interval_s: float) -> None:
-        """Stand still behind too many turns, unless what is left is an offset."""
+        """Stand still behind turns, unless what is left is an offset: then they are forgotten."""
         way = 1 if self._smooth_n > 0.0 else -1
         is_offset = abs(self._smooth_n) > WIDER * zone_n and way * self._stood_s >= 0.0
         self._stood_s = self._stood_s + way * interval_s if is_offset else 0.0

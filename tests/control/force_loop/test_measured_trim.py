@@ -142,6 +142,17 @@ def test_behind_the_hunting_an_error_to_and_fro_is_left_alone():
     assert one.has_hunted
 
 
+@pytest.mark.parametrize("turns", range(1, MOST_TURNS))
+def test_a_few_disturbances_keep_no_error_from_being_corrected_for_long(turns):
+    """Each made the zone wider for as long as the target stood: 1 N was left behind four of them."""
+    one, way = trim(), 1.0
+    for _ in range(turns + 1):
+        held(one, 3.0 * way, 1.5)
+        way = -way
+    assert not one.has_hunted
+    assert abs(held(one, 0.9 * way, 8.0)) < 0.3
+
+
 def test_a_swing_from_limit_to_limit_is_hunting():
     """A plant that answers later than was measured may keep it going: it must become slower, and come to an end."""
     one, way, waited_s = trim(), 1.0, []
