@@ -114,9 +114,9 @@ DESCRIPTORS = "/proc/self/fd/"
 BEHIND_REAL_TIME = 5
 """Nice value of the workers that run what waits for no clock."""
 
-REAL_TIME = ("end_to_end", "ports")
-"""Folders whose tests start processes or wait for real lines: one worker runs them one after the other, so that their
-bounds in seconds do not compete with each other."""
+REAL_TIME = ("end_to_end/", "ports/", "service/probing/", "service/running_rig/lines/test_baud_probe.py")
+"""What starts processes or waits for real lines: one worker runs it one after the other, so that bounds in seconds do
+not compete with each other, and no worker that has something to calculate waits."""
 
 LONG_WAITS = ("end_to_end/first_hour/test_calibrate.py", "end_to_end/first_hour/test_experiment_run.py")
 """Of these, what waits for minutes while a plan is run, and is held to no second: another worker does that meanwhile."""
@@ -148,7 +148,7 @@ def group_of(nodeid: str) -> str:
     path = name.partition("::")[0]
     if path in LONG_WAITS:
         return "long waits"
-    return "real time" if path.partition("/")[0] in REAL_TIME else path
+    return "real time" if path.startswith(REAL_TIME) else path
 
 
 def begun_at(nodeid: str) -> int:
