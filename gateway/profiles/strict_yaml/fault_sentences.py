@@ -23,8 +23,10 @@ _SCALES: Final = (
     {"m2": 1.0, "mm2": 1e-6},
     {"hz": 1.0, "khz": 1e3},
 )
-_NEWTONS: Final = {"MN": "1000000", "kN": "1000", "daN": "10", "cN": "0.01", "mN": "0.001", "t": "9806.65"}
-"""Units of force that no `unit` names: near to one that it does, and a thousand times as large."""
+_NEWTONS: Final = {"MN": "1000000", "kN": "1000", "daN": "10", "cN": "0.01", "mN": "0.001"} | {
+    "t": f"{1e3 * STANDARD_GRAVITY_M_PER_S2:g}"
+}
+"""Units of force that no `unit` names, in N: near to one that it does, and a thousand times as large."""
 _DECIMAL: Final = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 _TYPES_ELSEWHERE: Final = dict.fromkeys(
