@@ -13,45 +13,25 @@ import click
 from gateway import VERSION
 from gateway.cli.errors import translate_error
 
-VERBS: Final = (
-    "run",
-    "monitor",
-    "read",
-    "write",
-    "hold",
-    "calibrate",
-    "self-test",
-    "fit",
-    "registers",
-    "wiring",
-    "check",
-    "init",
-    "ports",
-    "schema",
-    "explain",
-    "events",
-    "audit",
-    "certs",
-    "calibration",
-    "plant",
-    "upload",
-    "record",
-    "recordings",
-    "replay",
-    "metrics",
-    "diagnose",
-    "fleet",
-    "sim",
-    "simulate",
-    "effects",
-    "backup",
-    "restore",
-    "service",
-    "report",
-    "completion",
-    "version",
-)
-"""In the order in which a newcomer meets them; each is a module of gateway.cli.verbs with its `command`."""
+SECTIONS: Final = {
+    "Run it and command a force": ("run", "monitor", "hold", "read", "write", "sim"),
+    "Set up a cell": ("init", "ports", "check", "wiring", "registers", "certs", "schema"),
+    "Calibrate and test": ("calibrate", "self-test", "fit", "upload", "calibration"),
+    "Record, and say why the force is off": (
+        "record",
+        "recordings",
+        "replay",
+        "diagnose",
+        "effects",
+        "plant",
+        "simulate",
+        "fleet",
+    ),
+    "See what happened": ("explain", "events", "audit", "metrics", "report"),
+    "Keep it running": ("service", "backup", "restore", "completion", "version"),
+}
+"""The verbs in the order in which a newcomer meets them; each is a module of gateway.cli.verbs with its `command`."""
+VERBS: Final = tuple(verb for verbs in SECTIONS.values() for verb in verbs)
 ALIASES: Final = {"install-service": ("service", "install")}
 """Other names of subcommands, on which programs rely; the help does not list them."""
 HELP: Final = """Modbus gateway that holds a constant contact force, and says why the force is off.
@@ -71,6 +51,17 @@ class VerbGroup(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the verbs in the order of the help."""
         return list(VERBS)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the verbs by what they are for; all sections have one column of names."""
+        width = max(map(len, VERBS))
+        for section, verbs in SECTIONS.items():
+            commands = [(verb, self.get_command(ctx, verb)) for verb in verbs]
+            with formatter.section(section):
+                limit = formatter.width - 6 - width
+                formatter.write_dl(
+                    [(verb.ljust(width), one.get_short_help_str(limit)) for verb, one in commands if one]
+                )
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a verb's module only when it is called."""

@@ -73,10 +73,10 @@ EXAMPLES = ("calibrate --quick --yes", 'calibrate --groups 3 --step 0.25 --name 
 def command(
     *, state: StateChoice, wire: "Wire | None", unit: int, yes: bool, as_json: bool, **plan_options: Any
 ) -> None:
-    """Measure a ladder and make a numbered calibration of it, or run and record an experiment (--plan).
+    """Calibrate by a measured ladder, or record an experiment.
 
-    Runs on the gateway of this machine. Ctrl-C takes the force to 0 and keeps the data. Nothing is activated: that is
-    `calibration use N`.
+    The calibration gets a number. An experiment is a --plan that `diagnose` wrote. Runs on the gateway of this
+    machine. Ctrl-C takes the force to 0 and keeps the data. Nothing is activated: that is `calibration use N`.
     """
     from gateway.cli.calibration.follow import follow
     from gateway.cli.calibration.plans import is_experiment

@@ -71,7 +71,7 @@ EXAMPLES = ("fit ladder.csv --models bsfm --orders 1-3", "fit ladder.csv --model
 @rig_option("The rig it must be from  [default: the recording's own]")
 @json_option
 def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> None:
-    """Fit the four models to a recorded ladder, and say which to use.
+    """Fit the four models to a ladder, and say which to use.
 
     RECORDING is a number of `recordings list`, a .fgr file, or a CSV or Parquet table with time_s, command_v, force_n.
     """

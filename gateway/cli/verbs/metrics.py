@@ -18,7 +18,7 @@ EXAMPLES = ("metrics", "metrics --rig demo")
 @click.option("--grafana", "file", flag_value="grafana.json", help="Print a Grafana dashboard of these series instead.")
 @click.option("--telegraf", "file", flag_value="telegraf.conf", help="Print a Telegraf configuration instead.")
 def command(*, state: StateChoice, file: str | None) -> None:
-    """Print the running gateway's own figures, in Prometheus' text format."""
+    """Print the gateway's own figures, in Prometheus' text format."""
     if file:
         click.echo((files("gateway.telemetry") / "dashboards" / file).read_text(encoding="utf-8"), nl=False)
         return

@@ -35,7 +35,10 @@ _yes = click.option("--yes", is_flag=True, help="Do not ask.")
 
 @click.group(name="recordings")
 def command() -> None:
-    """List, show, plot, keep, delete and export recordings, and choose the reference."""
+    """List, show, plot, keep and export recordings.
+
+    Delete them, and choose the reference.
+    """
 
 
 @command.command(name="list")

@@ -29,7 +29,7 @@ EXAMPLES = ("registers force_setpoint", "registers --format scl --rig irc5-cell"
 )
 @rig_option("The rig whose map, address and port a client gets")
 def command(*, name: str | None, form: str | None, map_name: str | None, rig: str | None) -> None:
-    """Print the register table, one register's card, or the whole client of a robot or PLC.
+    """Print the register table, one register, or a robot's client.
 
     NAME: a register such as force_setpoint, its number such as 40002, or its address counted from 0.
     rapid: ABB IRC5 over sockets. scl: S7-1200/1500, MB_CLIENT. st: TwinCAT 3 and CODESYS V3. urscript: Universal Robots. c: C99

@@ -18,10 +18,11 @@ EXAMPLES = ("report for-support.tar.gz", "report --show")
 @click.option("--show", is_flag=True, help="Print what would go in instead.")
 @state_options
 def command(*, file: Path, force: bool, show: bool, state: StateChoice) -> None:
-    """Pack a support bundle into FILE (tar.gz): versions, rig, events, live state, lists of files.
+    """Pack a support bundle without secrets into FILE (tar.gz).
 
-    No keys, passwords, tokens or recordings; addresses of masters become master-1, master-2 ... Look at it before you send
-    it: --show prints all of it. The gateway may be running or not.
+    Versions, rig, events, live state, lists of files. No keys, passwords, tokens or recordings; addresses of masters
+    become master-1, master-2 ... Look at it before you send it: --show prints all of it. The gateway may be running
+    or not.
     """
     from gateway.cli.support_bundle import collect, pack_bundle
     from gateway.profiles import load_rig
