@@ -27,6 +27,7 @@ class DeviceStep(StrEnum):
     IDENTITY = "identity"
     STATUS = "watchdog status"
     VERIFY = "watchdog verification"
+    SET_TIME = "watchdog time"
     ARM = "watchdog arming"
     DISARM = "watchdog disarming"
     CLEAR = "watchdog clearing"

@@ -26,15 +26,18 @@ class SimulatedWatchdog:
         return True
 
     def feed(self, now_s: float) -> None:
-        """Note that the host is alive. A trip that the device has no words to clear is over by that: it obeys again."""
+        """Note that the host is alive. A trip that the device has no words to clear is over by that: it obeys, and watches,
+        again."""
         if self._profile.clear is None and self.state is WatchdogState.TRIPPED:
-            self.state = WatchdogState.OFF
+            self.state = WatchdogState.ARMED
         self._due_s = now_s + self.ticks * self._profile.tick_s
 
     def do(self, step: DeviceStep, ticks: int | None, now_s: float) -> None:
         """Follow a sentence of the host; ticks: the time that it carries."""
-        if step is DeviceStep.ARM and ticks is not None and self.state is not WatchdogState.TRIPPED:
-            self.state, self.ticks = WatchdogState.ARMED, ticks
+        if ticks is not None and step in (DeviceStep.SET_TIME, DeviceStep.ARM):
+            self.ticks = ticks
+        if step is DeviceStep.ARM and self.state is not WatchdogState.TRIPPED:
+            self.state = WatchdogState.ARMED
             self.feed(now_s)
         elif (step, self.state) in _SWITCHED_OFF:
             self.state = WatchdogState.OFF

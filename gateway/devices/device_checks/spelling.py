@@ -10,6 +10,7 @@ from gateway.devices.messages import AskDevice, DeviceAnswer, DeviceStep
 
 _EXCHANGES: Final = {
     DeviceStep.VERIFY: "verify",
+    DeviceStep.SET_TIME: "set_time",
     DeviceStep.ARM: "arm",
     DeviceStep.DISARM: "disarm",
     DeviceStep.CLEAR: "clear",
@@ -93,8 +94,8 @@ class CheckSpelling:
         return next((AskDevice(step) for step in steps if self.grammar.read(self._ask(step), body) is not None), None)
 
     def asked_ticks(self, body: bytes | None) -> int | None:
-        """Return the time that an arming sentence carries, in ticks."""
-        values = self.grammar.read(self._ask(DeviceStep.ARM), body) if self._watchdog else None
+        """Return the time that a sentence to the watchdog carries, in ticks."""
+        values = self.grammar.read(self._watchdog.timing.ask, body) if self._watchdog else None
         return None if values is None else int(values[TIME])
 
     def reply(self, step: DeviceStep, state: WatchdogState, ticks: int) -> bytes:

@@ -69,12 +69,14 @@ class WatchdogQuestion:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Watchdog:
     """How a device's watchdog is armed, fed, read and cleared. The gateway arms it before the first voltage that is not the
-    safe one, reads it back, and switches it off when it ends in order."""
+    safe one, reads it back, and switches it off when it ends in order. Of a Modbus RTU device a sentence is its PDU in
+    hexadecimal digits."""
 
     __pydantic_config__ = STRICT
     time_s: Annotated[float, Gt(0), Le(LONGEST_S)]  # silence of the host after which it trips; a rig may say another
     tick_s: Annotated[float, Gt(0)]  # one count of {time:...}, s; firmware may differ: a rig may say another
-    arm: WatchdogExchange  # {time:...} in ask
+    set_time: WatchdogExchange | None = None  # {time:...} in ask, where it is set by a sentence of its own before arm
+    arm: WatchdogExchange  # {time:...} in ask, where it arms by that
     disarm: WatchdogExchange  # what switches it off
     verify: WatchdogExchange | None = None  # reads {time:...} back
     status: WatchdogQuestion | None = None  # off, armed or tripped
@@ -83,9 +85,12 @@ class Watchdog:
     refusal: str = ""  # its answer to a setting while it is tripped
 
     def __post_init__(self) -> None:
-        field = compile_template(self.arm.ask).field(TIME)
-        if not isinstance(field, WholeNumber | HexNumber):
-            raise TemplateError(f"{quote(self.arm.ask)} has no whole number {{time:...}}")
+        if not isinstance(compile_template(self.timing.ask).field(TIME), WholeNumber | HexNumber):
+            raise TemplateError(f"{quote(self.timing.ask)} has no whole number {{time:...}}, such as {{time:04X}}")
+        if self.set_time and self.status is None:
+            raise ValueError(
+                "a watchdog whose time is set apart from its arming needs status: the time alone does not say that it watches"
+            )
         if self.verify is None and self.status is None:
             raise ValueError("a watchdog needs verify or status: one that cannot be read back is none to rely on")
         if self.verify and compile_template(self.verify.answer).field(TIME) is None:
@@ -93,6 +98,11 @@ class Watchdog:
         if self.feed:
             compile_template(self.feed)
         self.arming_text_fits()
+
+    @property
+    def timing(self) -> WatchdogExchange:
+        """Return the exchange that carries the time."""
+        return self.set_time or self.arm
 
     @property
     def ticks(self) -> int:
@@ -106,7 +116,7 @@ class Watchdog:
 
     def arming_text_fits(self) -> None:
         """Raise ValueError where the time is less than one count, or does not fit into the device's field."""
-        field = compile_template(self.arm.ask).field(TIME)
+        field = compile_template(self.timing.ask).field(TIME)
         assert isinstance(field, WholeNumber | HexNumber)
         if self.ticks * self.tick_s > self.time_s * (1.0 + 1e-9):
             raise ValueError(
@@ -121,4 +131,4 @@ class Watchdog:
 
     def exchanges(self) -> tuple[WatchdogExchange, ...]:
         """Return the exchanges, apart from the state's question."""
-        return tuple(one for one in (self.arm, self.disarm, self.verify, self.clear) if one)
+        return tuple(one for one in (self.set_time, self.arm, self.disarm, self.verify, self.clear) if one)

@@ -13,7 +13,7 @@ from gateway.devices import OutputHost
 from gateway.devices.device_checks.watchdog import WatchdogState
 from gateway.devices.messages import DeviceAnswer, DeviceStep
 
-_STATUS_PERIOD_S = 1.0  # between two readings of the watchdog's state
+_LOOK_PERIOD_S = 1.0  # between two looks at the watchdog: a device that was off for a moment has forgotten its arming
 _TRIES = 3  # of arming; then it does not arm
 
 
@@ -34,15 +34,18 @@ class DeviceChecks:
         self._known = host.checks
         self._is_waived = is_waived
         self.has_watchdog = DeviceStep.ARM in self._known
-        proof = DeviceStep.VERIFY if DeviceStep.VERIFY in self._known else DeviceStep.STATUS
-        self._arming = (DeviceStep.ARM, proof) if self.has_watchdog else ()
+        is_timed_apart = DeviceStep.SET_TIME in self._known  # then the time alone does not say that it watches
+        self._is_proved_by_state = is_timed_apart or DeviceStep.VERIFY not in self._known
+        proof = (DeviceStep.VERIFY, DeviceStep.STATUS) if self._is_proved_by_state else (DeviceStep.VERIFY,)
+        self._arming = self._known_of(DeviceStep.SET_TIME, DeviceStep.ARM, *proof) if self.has_watchdog else ()
+        self._looks = self._known_of(DeviceStep.STATUS, DeviceStep.VERIFY)[:1]
         self.begin()
 
     def begin(self) -> None:
         """Begin anew: the port has been opened, and another device may be behind it."""
-        self._waiting = self._known_of(DeviceStep.IDENTITY, DeviceStep.STATUS, *self._arming)
+        self._waiting = deque(self._known_of(DeviceStep.IDENTITY, DeviceStep.STATUS, *self._arming))
         self._tries = 0
-        self._next_status_s = 0.0
+        self._next_look_s = 0.0
         self.fault = FaultCode.NONE
         self.said = ""
         self.is_armed = self.is_tripped = self._is_said = False
@@ -51,8 +54,8 @@ class DeviceChecks:
     def _settle(self) -> None:
         self.is_done = not self._waiting and not self.fault
 
-    def _known_of(self, *steps: DeviceStep) -> deque[DeviceStep]:
-        return deque(step for step in steps if step in self._known)
+    def _known_of(self, *steps: DeviceStep) -> tuple[DeviceStep, ...]:
+        return tuple(step for step in steps if step in self._known)
 
     @property
     def level(self) -> DeviceLevel:
@@ -61,11 +64,13 @@ class DeviceChecks:
 
     def next_step(self, now_s: float) -> DeviceStep | None:
         """Return the question that is due, None where there is none."""
-        if self._waiting:
-            return self._waiting[0]
-        if DeviceStep.STATUS in self._known and now_s >= self._next_status_s and self.fault in _GOES_ON:
-            self._next_status_s = now_s + _STATUS_PERIOD_S
-            return DeviceStep.STATUS
+        return self._waiting[0] if self._waiting else self.next_look(now_s)
+
+    def next_look(self, now_s: float) -> DeviceStep | None:
+        """Return the question whether the watchdog still watches, where it is due."""
+        if not self._waiting and self._looks and now_s >= self._next_look_s and self.fault in _GOES_ON:
+            self._next_look_s = now_s + _LOOK_PERIOD_S
+            return self._looks[0]
         return None
 
     def trip(self) -> None:
@@ -86,7 +91,7 @@ class DeviceChecks:
                 DeviceStep.CLEAR in self._known
             )  # lasts until that is answered; without it any setting ends it
             self._tries = 0
-            self._waiting = self._known_of(DeviceStep.CLEAR, DeviceStep.STATUS, *self._arming)
+            self._waiting = deque(self._known_of(DeviceStep.CLEAR, DeviceStep.STATUS, *self._arming))
         elif self.fault in _ASKED_AGAIN:
             self.begin()
         self._settle()
@@ -104,7 +109,7 @@ class DeviceChecks:
         elif answer.step is DeviceStep.STATUS:
             if DeviceStep.CLEAR not in self._waiting:  # else it was asked before the reset
                 self._take_state(WatchdogState(answer.text), is_due=is_due)
-        elif answer.step is DeviceStep.VERIFY:
+        elif answer.step is DeviceStep.VERIFY and not (answer.is_right and self._is_proved_by_state):
             self._take_proof(is_armed=answer.is_right)
         self._settle()
 
@@ -117,7 +122,7 @@ class DeviceChecks:
             self._waiting.clear()
         elif step is DeviceStep.CLEAR:
             self.trip()
-        elif step in (DeviceStep.ARM, DeviceStep.VERIFY):
+        elif step in (DeviceStep.SET_TIME, DeviceStep.ARM, DeviceStep.VERIFY):
             self._take_proof(is_armed=False, words=words)
         self._settle()
 
@@ -128,8 +133,8 @@ class DeviceChecks:
             self.trip()
         elif self._is_said:
             self._waiting.extendleft([DeviceStep.STATUS] if is_due else [])
-            self._next_status_s = 0.0
-        elif not self._waiting and not self.is_tripped and DeviceStep.VERIFY not in self._known:
+            self._next_look_s = 0.0
+        elif not self._waiting and not self.is_tripped and (self._is_proved_by_state or state is WatchdogState.OFF):
             self._take_proof(is_armed=state is WatchdogState.ARMED)  # after arming, and whenever it is looked at
 
     def _take_proof(self, *, is_armed: bool, words: str = "") -> None:

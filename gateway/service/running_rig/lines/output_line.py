@@ -179,6 +179,8 @@ class OutputExchange:
         if self._host.sign_of_life and now_s >= self._next_feed_s:
             self._next_feed_s, self._free_s = now_s + self._host.feed_period_s, now_s + _AFTER_SIGN_OF_LIFE_S
             self._write(self._host.sign_of_life)
+        elif self._is_refused(wanted_v) and (look := self.checks.next_look(now_s)):
+            self._send(AskDevice(look), now_s)
         elif not self._is_confirmed(wanted_v) and self._may_obey(wanted_v, now_s):
             self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
             if wanted_v != self._asked_v:
@@ -199,6 +201,10 @@ class OutputExchange:
         surely stands: a device whose answer was lost may have obeyed, and must hear the safe voltage."""
         standing_v = self.standing_v
         return standing_v is not None and abs(voltage_v - standing_v) <= 0.5 * self._host.resolution_v
+
+    def _is_refused(self, voltage_v: float) -> bool:
+        """A device that refuses this again and again may have tripped: its watchdog is looked at in between."""
+        return self._line_fault is FaultCode.OUTPUT_REFUSED and voltage_v == self._asked_v
 
     def _may_obey(self, voltage_v: float, now_s: float) -> bool:
         """Where the watchdog is said to have tripped, the same setting is tried no more often than a poll would be."""

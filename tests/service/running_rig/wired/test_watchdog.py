@@ -10,6 +10,7 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.devices import DeviceProfile, cell_device, output_device, output_host
 from gateway.devices.device_checks.spelling import CheckSpelling
+from gateway.devices.device_checks.watchdog import WatchdogState
 from gateway.devices.fields import Value
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import AskDevice, DeviceStep
@@ -198,6 +199,19 @@ def test_every_watchdog_that_is_shipped_is_armed_and_does_not_trip_in_work(name:
     wired.run(3.0)
     assert wired.state is State.HOLDING
     assert not wired.world._output.is_tripped  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("name", ["adam-4024", "icpdas-702x", "icpdas-7024", "mcu-line"])
+def test_one_that_has_forgotten_is_armed_again_and_the_force_stays(name: str) -> None:
+    """Its power was off for a moment. Else the register would go on to say that it watches, until the next restart."""
+    wired = Wired(rig_with(device(name))).pressing(12.0)
+    watchdog = wired.world._output.watchdog  # type: ignore[attr-defined]
+    watchdog.state, watchdog.ticks = WatchdogState.OFF, 0
+    wired.until(lambda: watchdog.state is WatchdogState.ARMED, 1.5)
+    for _ in range(10):
+        wired.run(0.1)
+        assert wired.state is State.HOLDING and wired.force_n == pytest.approx(12.0, abs=1.0)
+    assert wired.exchange.checks.is_armed and watchdog.ticks
 
 
 def test_a_load_cell_that_says_that_it_is_another_one_is_not_read() -> None:
