@@ -6,6 +6,7 @@ from contextlib import suppress
 from typing import Any
 
 from gateway.devices import output_device
+from gateway.devices.device_checks.watchdog import WatchdogState
 from gateway.profiles import Rig
 from gateway.service.simulation.world import SimulatedRig
 from tests.simulation.judges.observer import Observer
@@ -14,6 +15,8 @@ from tests.simulation.kernel.virtual_time import VirtualLoop
 
 LOOSE_S = 0.1
 """In which a valve that was stuck goes where its relay has it."""
+UNWATCHED_S = 2.0
+"""In which a device's watchdog that is not armed is looked at, and armed; a spoiled answer costs another look."""
 FIRST_SETTING_S = 0.3
 """On a line that is back: a watchdog is fed before the safe voltage goes out."""
 
@@ -26,6 +29,7 @@ class Surroundings:
     _dark_until_s = 0.0
     _freed_s = -LOOSE_S
     _back_s = 0.0  # when a line that was lost has brought its first byte
+    _unwatched_s: float | None = None
 
     def __init__(self, rig: Rig, outside: VirtualLoop, observer: Observer, cell_s: float | None) -> None:
         self._rig, self._outside, self._observer, self._cell_s = rig, outside, observer, cell_s
@@ -107,6 +111,16 @@ class Surroundings:
             observer.cell_lost_s = max(observer.cell_lost_s, CABLES["load_cell"].strange_s)
         if observer.answers_lost_s is not None:
             observer.answers_lost_s = max(observer.answers_lost_s, CABLES["output"].strange_s)
+        self._judge_watchdog()
+
+    def _judge_watchdog(self) -> None:
+        """While it presses, the device's own watchdog watches; one that has forgotten is armed anew."""
+        now_s, watchdog = self._outside.time(), getattr(self.world._output, "watchdog", None)
+        is_off = watchdog is not None and watchdog.state is WatchdogState.OFF and self._observer.voltage_v > 0.0
+        self._unwatched_s = _since(self._unwatched_s, is_off, now_s)
+        if self._unwatched_s is not None and now_s - self._unwatched_s > UNWATCHED_S:
+            self._observer.complain("I6", "it presses, and the device's watchdog does not watch", now_s)
+            self._unwatched_s = now_s
 
     def _judge_valve(self, now_s: float) -> bool:
         """The valve is moved without pressure, whatever its relay was told and when; but for one that comes loose, which its

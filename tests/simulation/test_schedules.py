@@ -124,6 +124,7 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(4.8661, "machine", "terminate", (0.2049, -101870.88049124472)),
         ],
     ),
+    (2076, [Event(6.6042, "output", "power", (0.0827, 0.0)), Event(7.3518, "rival", "hold", (14.49,))]),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,
