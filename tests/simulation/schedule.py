@@ -128,6 +128,7 @@ class Simulation:
             DOWN_S if supervision.lease_action is LeaseAction.RAMP else 0.0,
             supervision.output_timeout_s + rig.output.device.reply_timeout_s + POLL_S,
             rig.output.device.reply_timeout_s,
+            limits.over_force_n,
         )
 
     def run(self, events: Iterable[Event], duration_s: float) -> Outcome:

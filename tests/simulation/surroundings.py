@@ -41,6 +41,7 @@ class Surroundings:
         )
         self._move_valve, self.world.valve.move = self.world.valve.move, self._judge_valve  # type: ignore[method-assign]
         lay_cables(outside, rig, self._on_output, self.world.on_cell_bytes, self._on_valve)
+        CABLES["load_cell"].on_host = observer.hear_cell
         if cell_s:
             outside.call_later(0.3 * cell_s, self._stream)
 

@@ -51,6 +51,32 @@ def test_a_register_that_does_not_say_what_is_is_seen(observer: Observer, law: s
     assert observer.broken and all(line.startswith(law) for line in observer.broken)
 
 
+@pytest.mark.parametrize(
+    ("sentences", "is_over"),
+    [
+        ((b"OL,GS,        kg\r\n",) * 3, True),
+        ((b"ST,GS,+0009.00kg\r\n",) * 3, True),
+        ((b"ST,GS,-0090.00 N\r\n",) * 3, True),
+        ((b"ST,GS,+0009.00kg\r\n",) * 2, False),
+        ((b"OL,GS,        kg\r\n", b"OL,GS,        kg\r\n", b"ST,GS,+0001.00kg\r\n", b"OL,GS,        kg\r\n"), False),
+        ((b"OL,GS,        kg\r\n",) * 5 + (b"ST,GS,+0001.00kg\r\n",), False),
+        ((b"ST,GS,+0080.00 N\r\n",) * 3, False),
+    ],
+)
+def test_a_voltage_that_stands_behind_over_force_is_seen(
+    observer: Observer, sentences: tuple[bytes, ...], is_over: bool
+) -> None:
+    observer.write_s = observer.cell_heard_s = 1.0
+    observer.disabled_s = None
+    observer.hear(b"SET 0\r\nSET 1\r\n", 0.9)
+    for sentence in sentences:
+        observer.hear_cell(sentence, 1.0)
+    observer.look(1.1)
+    assert not observer.broken
+    observer.look(1.16)
+    assert [line.partition(" at ")[0] for line in observer.broken] == ["I3 over-force"] * is_over
+
+
 HELD_N = 20.0
 
 

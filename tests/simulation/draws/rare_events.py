@@ -7,6 +7,7 @@ device that loses its power, and a disk that fails while something is recorded.
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from random import Random
 from typing import Any
 
@@ -47,6 +48,7 @@ EFFECTS = (
     "sign-loss",
 )
 REFUSED = ({"cell.scale": 0.0}, {"no-such": 1}, {"wire.noise": 2.0}, {"cell.unplug": "perhaps"}, {"leak.no-such": 1.0})
+JAM_SHARE = 0.12
 UNITS = (b" N", b" t", b"lb", b" g", b"kg")
 PAUSES_S = (0.0003, 0.0012, 0.003, 0.012, 0.03, 0.2, 1.0, 6.0)
 """Shorter and longer than 1.5 and 3.5 characters of a bus, than a lease, and than half a frame is waited for."""
@@ -64,6 +66,18 @@ def draw_ladder(seed: int) -> Iterator[Event]:
         yield Event(round(chance.uniform(1.0, LADDER_S), 4), "machine", chance.choice(DISKS), (0.0, 0.0))
     for at_s in sorted(round(chance.uniform(LADDER_S - 2.0, 24.0), 4) for _ in range(4)):
         yield _say(at_s, do="calibration", use=chance.randrange(1, 3), force=chance.random() < 0.3)
+
+
+def draw_jam(seed: int) -> Iterator[Event]:
+    """In some schedules the cell shows many times the force that is held, as where the tool jams."""
+    chance = Random(f"jam {seed}")
+    if chance.random() > JAM_SHARE:
+        return
+    at_s = round(chance.uniform(1.0, 19.0), 4)
+    yield Event(at_s, "worker", "hold", (round(chance.uniform(10.0, 40.0), 2),))
+    jams_s = round(at_s + chance.uniform(0.5, 3.0), 4)
+    yield replace(_sim(set={"cell.scale": round(chance.uniform(3.0, 12.0), 2)}), at_s=jams_s)
+    yield replace(_sim(clear=["cell.scale"]), at_s=round(jams_s + chance.uniform(0.2, 2.0), 4))
 
 
 def _say(at_s: float, **fields: Any) -> Event:

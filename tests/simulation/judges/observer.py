@@ -1,10 +1,10 @@
 """An observer beside the gateway, which shares no code with it: it hears the bytes on the output's wire, knows what was done to
 the world, and reads the status registers as any master could. What it finds broken is a line of `broken`.
 
-I1 range, I2 slew, I3 the safe voltage in time after the loss of cell, output, master or control, I4 none without an enable, I5
-faults latch, I6 the safe voltage first, I7 whole sentences, I11 one first cause. What registers say besides is judged by
-status_witness.py (I7, I10), I8 and roles (I7) by the masters, I9 by the integrator, I12 by the log and the soak, I13 by the
-schedule.
+I1 range, I2 slew, I3 the safe voltage in time after the loss of cell, output, master or control and after over-force, I4 none
+without an enable, I5 faults latch, I6 the safe voltage first, I7 whole sentences, I11 one first cause. What registers say
+besides is judged by status_witness.py (I7, I10), I8 and roles (I7) by the masters, I9 by the integrator, I12 by the log and
+the soak, I13 by the schedule.
 """
 
 import re
@@ -34,11 +34,17 @@ class Bounds:
     lost_down_s: float = 0.0
     output_timeout_s: float = inf
     reply_timeout_s: float = 0.0
+    over_force_n: float = 75.0
 
 
 ENABLE, RESET, RUN_BITS = 1, 2, 32 | 64
 DOWN_S = 4.0  # a run's end, whoever ends it, is a ramp down that needs no master; it takes this long at the most
 UNHEARD_S = 0.1  # so late a write may be taken whose master has hung up, or fallen silent on a bus
+SENTENCE = re.compile(
+    rb"(ST|US|OL),(?:GS|NT),([ +\-.0-9]{8})(kg| N)\r\n"
+)  # of the demo rig's cell; OL: beyond its range
+OVER_READINGS = 3  # in a row are over-force
+ZERO_N = 8.0  # so far may the zero have been moved by somebody who has tared
 GRACE_S = 0.05  # and two periods: a tick decides nothing within one of a sample
 
 
@@ -55,6 +61,7 @@ class Observer:
     fingerprint: Any = field(default_factory=sha256)
     cell_lost_s: float | None = None
     cell_heard_s: float = 0.0
+    over_s: float | None = None
     answers_lost_s: float | None = None
     output_lost_s: float | None = None
     answer_spoiled_s: float = -inf
@@ -63,6 +70,7 @@ class Observer:
     disabled_s: float | None = 0.0
     is_run: bool = False
     run_ended_s: float = -DOWN_S
+    _over: int = 0
     _line: bytes = b""
     _is_cut: bool = True
     _must_be_safe: bool = True
@@ -83,6 +91,18 @@ class Observer:
             elif line != b"MON" and not self._is_cut:
                 self.complain("I7", f"{line!r} is no sentence", now_s)
             self._is_cut = False
+
+    def hear_cell(self, chunk: bytes, now_s: float) -> None:
+        """What has reached the gateway from its load cell, most often a sentence."""
+        found = SENTENCE.fullmatch(chunk)
+        self._over = self._over + 1 if found and self._is_over(found) else 0
+        self.over_s = (self.over_s or now_s) if self._over >= OVER_READINGS else None
+
+    def _is_over(self, found: re.Match[bytes]) -> bool:
+        if found[1] == b"OL":
+            return True
+        force_n = float(found[2].replace(b" ", b"")) * (9.80665 if found[3] == b"kg" else 1.0)
+        return abs(force_n) >= self.bounds.over_force_n + ZERO_N
 
     def note_cut(self, until_s: float) -> None:
         """The sender was cut off, or the plug pulled: half a sentence may stand before the next, and the first that is begun
@@ -180,6 +200,7 @@ class Observer:
         limits = (
             ("I3 cell", self.cell_lost_s, self.bounds.sample_timeout_s),
             ("I3 cell unheard", self.cell_heard_s, self.bounds.sample_timeout_s),
+            ("I3 over-force", self.over_s, 0.0),
             ("I3 output", self.answers_lost_s, self.bounds.output_timeout_s),
             ("I3 control", self.control_lost_s, self.bounds.stall_s),
             ("I3 master", self.write_s, self.bounds.lease_s + max(down_s, self.bounds.lost_down_s)),

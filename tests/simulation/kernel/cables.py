@@ -44,6 +44,7 @@ class Cable:
         self.spoiled_s = -inf  # when an answer of the device was spoiled last
         self.answers = 0  # what the device has said so far, in sentences
         self.heard_s = 0.0  # when the host has got something last
+        self.on_host: Callable[[bytes, float], None] = lambda chunk, now_s: None  # what the host has got
         self.reworded = (b"", b"")  # what the device says, and from now on says instead
         self._character_s = settings.character_s
         self._to_device, self._to_host = Direction(), Direction()
@@ -120,6 +121,7 @@ class Cable:
     def _reach_host(self, direction: Direction, data: bytes) -> None:
         if self.port and not direction.is_cut:
             self.heard_s = self._outside.time()
+            self.on_host(data, self.heard_s)
             self.port.hear(data)
 
 
