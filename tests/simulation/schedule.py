@@ -16,6 +16,7 @@ from tests.simulation.draws.event import Event
 from tests.simulation.draws.rigs import LEASE_S, draw_badges, draw_rig, store_plants
 from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, RATE_S, count_answers, heal
+from tests.simulation.judges.audit_judge import judge_audit
 from tests.simulation.judges.held_force import HeldForce
 from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
 from tests.simulation.judges.status_witness import StatusWitness
@@ -59,6 +60,7 @@ class Simulation:
     rest_n: float | None = None
 
     def __init__(self, seed: int, folder: Path) -> None:
+        self._folder = folder
         drawn = draw_rig(seed)
         rig = drawn.rig
         self.period_s = 1.0 / rig.loop_hz
@@ -140,6 +142,7 @@ class Simulation:
         self._run_for(duration_s)
         self.held_force.end()
         self._heal()
+        self.observer.broken += judge_audit(self._folder, self.masters["healer"].name)
         for client in (*self.clients, self.person):
             self.observer.broken += client.complaints
         self.observer.broken += self.log.internal_errors
