@@ -1,5 +1,5 @@
-"""Whether the audit on the disk holds after all that was done to disk and processes, and tells who has commanded last. Reads the
-lines as an auditor with a text editor and sha256sum would; no code of the gateway is used here."""
+"""Whether the audit on the disk holds after all that was done to disk and processes, and tells who has commanded last. Reads
+the lines as an auditor with a text editor and sha256sum would; no code of the gateway is used here."""
 
 import json
 from collections.abc import Iterator
