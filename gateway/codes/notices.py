@@ -121,6 +121,14 @@ NOTICES: Final = (
         "ulimit -n and /proc/sys/fs/file-nr show limit and use; end the program that opens so many, or raise LimitNOFILE.",
     ),
     Explanation(
+        "W249",
+        "the device's watchdog was off",
+        "The output device, looked at once a second, said that its own watchdog does not watch any more. It was armed again at "
+        "once; the force was not touched.",
+        "Its power was away for a moment (a loose plug, a weak supply), or another program on its line has switched it off.",
+        "Look at the device's plug and supply; let nobody else talk to it. Where it cannot be armed again, A334 says so.",
+    ),
+    Explanation(
         "W304",
         "force at the safe voltage",
         "The output is at the safe voltage and the load cell still measures a force.",

@@ -39,7 +39,7 @@ from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.lines.valve_line import ValveExchange
-from gateway.service.running_rig.lines.watchdog_word import device_fault_note, watchdog_word
+from gateway.service.running_rig.lines.watchdog_word import WatchdogRegister, device_fault_note, watchdog_word
 from gateway.service.running_rig.recordings import Recordings
 from gateway.service.running_rig.rig_calibrations import RigCalibrations
 from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
@@ -76,7 +76,6 @@ class RunningRig:
         }
         self.ring: SampleRing | None = None
         self.failed = asyncio.Event()
-        self._shown_watchdogs = -1
         asyncio.get_running_loop().set_exception_handler(self._on_internal_error)
         host = output_host(rig.output.device)
         self._safe_frame, self._last_frame = host.safe_frame(rig.control.limits.safe_voltage_v), host.last_frame
@@ -141,6 +140,7 @@ class RunningRig:
     def _wire_loop(self, cause: FaultCode) -> None:
         rig = self._rig
         self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=time.monotonic)
+        self._watchdogs = WatchdogRegister(self._line, self.bank.show_watchdogs, self._log)
         self._audit.watch(self.bank)
         self.bank.on_refusal = lambda refusal, peer: self._log(
             f"refusal {peer.host} {refusal.reason.name.lower()}", f"{refusal.sentence}   ({peer})"
@@ -285,9 +285,7 @@ class RunningRig:
 
     def _on_tick(self, expirations: int, late_s: float) -> None:
         self.loop.on_tick(expirations, late_s)
-        if (word := watchdog_word(self._rig, self._ports, self._line)) != self._shown_watchdogs:
-            self._shown_watchdogs = word
-            self.bank.show_watchdogs(word)
+        self._watchdogs.follow(watchdog_word(self._rig, self._ports, self._line))
         now_s = time.monotonic()
         self._guardian.heartbeat(now_s)
         self._control_socket.live.alarm_times.follow(self.loop.decision)

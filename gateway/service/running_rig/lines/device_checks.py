@@ -28,7 +28,8 @@ class DeviceLevel:
 
 class DeviceChecks:
     """next_step: the question that is due; fault: what keeps the output from being enabled; said: the device's own words for
-    it; is_done: all is asked and well. is_waived: the rig accepts an output without a watchdog."""
+    it; is_done: all is asked and well; times_forgotten: how often a look found an armed watchdog off. is_waived: the rig
+    accepts an output without a watchdog."""
 
     def __init__(self, host: OutputHost, *, is_waived: bool) -> None:
         self._known = host.checks
@@ -39,6 +40,7 @@ class DeviceChecks:
         proof = (DeviceStep.VERIFY, DeviceStep.STATUS) if self._is_proved_by_state else (DeviceStep.VERIFY,)
         self._arming = self._known_of(DeviceStep.SET_TIME, DeviceStep.ARM, *proof) if self.has_watchdog else ()
         self._looks = self._known_of(DeviceStep.STATUS, DeviceStep.VERIFY)[:1]
+        self.times_forgotten = 0
         self.begin()
 
     def begin(self) -> None:
@@ -138,6 +140,7 @@ class DeviceChecks:
             self._take_proof(is_armed=state is WatchdogState.ARMED)  # after arming, and whenever it is looked at
 
     def _take_proof(self, *, is_armed: bool, words: str = "") -> None:
+        self.times_forgotten += self.is_armed and not (is_armed or words)
         self.is_armed = is_armed
         if is_armed:
             self._tries = 0

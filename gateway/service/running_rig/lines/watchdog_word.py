@@ -1,5 +1,8 @@
 """What registers and notes say of the two watchdogs below control: the guardian, and the output device's own."""
 
+from collections.abc import Callable
+from typing import Final
+
 from gateway.control.inputs import LineStatus
 from gateway.control.supervision.fault_detection import line_words
 from gateway.profiles import Rig
@@ -9,6 +12,9 @@ from gateway.service.running_rig.lines.rig_ports import RigPorts
 
 # plain integers, for it is asked at every tick
 _GUARDIAN_WATCHES, _DEVICE_ARMED = int(WatchdogBit.GUARDIAN_WATCHES), int(WatchdogBit.DEVICE_ARMED)
+_FORGOTTEN: Final = (
+    "W249 the output device said that its watchdog is off: a moment without power, or somebody switched it off"
+)
 _DEVICE_HAS_NONE, _DEVICE_TRIPPED = int(WatchdogBit.DEVICE_HAS_NONE), int(WatchdogBit.DEVICE_TRIPPED)
 
 
@@ -21,6 +27,23 @@ def watchdog_word(rig: Rig, ports: RigPorts, line: OutputExchange) -> int:
     if checks.is_tripped:
         word |= _DEVICE_TRIPPED
     return word | (_DEVICE_ARMED if checks.is_armed else 0)
+
+
+class WatchdogRegister:
+    """Keeps the register `watchdogs`, and tells where the device had forgotten its arming. show: writes the register."""
+
+    def __init__(self, line: OutputExchange, show: Callable[[int], None], log: Callable[[str, str], None]) -> None:
+        self._checks, self._show, self._log = line.checks, show, log
+        self._shown, self._told = -1, 0
+
+    def follow(self, word: int) -> None:
+        """Show the word where it has changed; at each tick."""
+        if word != self._shown:
+            self._shown = word
+            self._show(word)
+        if self._checks.times_forgotten != self._told:
+            self._told = self._checks.times_forgotten
+            self._log("device", f"{_FORGOTTEN}; it is armed again")
 
 
 def device_fault_note(line: OutputExchange) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from gateway.registers.words import WatchdogBit
-from gateway.service.running_rig.lines.watchdog_word import watchdog_word
+from gateway.service.running_rig.lines.watchdog_word import WatchdogRegister, watchdog_word
 
 NONE = WatchdogBit(0)
 
@@ -25,6 +25,16 @@ def test_the_guardian_watches_only_a_line_that_it_has(guarded: bool) -> None:
     assert word(guarded=guarded, is_armed=True) == bit | WatchdogBit.DEVICE_ARMED
     assert word(guarded=guarded, is_tripped=True) == bit | WatchdogBit.DEVICE_TRIPPED
     assert word(guarded=guarded, is_armed=True, is_tripped=True) == bit | 6, "both, where both are said"
+
+
+def test_an_arming_that_the_device_has_forgotten_is_told_once_each_time() -> None:
+    checks, shown, told = SimpleNamespace(times_forgotten=0), list[int](), list[str]()
+    register = WatchdogRegister(SimpleNamespace(checks=checks), shown.append, lambda cause, text: told.append(text))  # type: ignore[arg-type]
+    for word, times in ((3, 0), (3, 0), (1, 1), (3, 1), (3, 1), (3, 2)):
+        checks.times_forgotten = times
+        register.follow(word)
+    assert shown == [3, 1, 3]
+    assert [text[:4] for text in told] == ["W249", "W249"]
 
 
 @pytest.mark.parametrize("accepts_none", [False, True])

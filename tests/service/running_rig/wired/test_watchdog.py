@@ -60,7 +60,7 @@ def test_a_trip_is_a_fault_of_its_own_that_only_a_reset_clears() -> None:
     wired.run(2.5)
     wired.is_plugged = True
     wired.until(lambda: wired.exchange.checks.is_tripped, 3.0)
-    assert wired.state is State.FAULT
+    assert wired.state is State.FAULT and not wired.exchange.checks.times_forgotten
     wired.run(0.5)
     assert wired.exchange.confirmed_v is None
     assert wired.twin.pressure_pa < 1e5, "the device itself has let go"
@@ -212,6 +212,7 @@ def test_one_that_has_forgotten_is_armed_again_and_the_force_stays(name: str) ->
         wired.run(0.1)
         assert wired.state is State.HOLDING and wired.force_n == pytest.approx(12.0, abs=1.0)
     assert wired.exchange.checks.is_armed and watchdog.ticks
+    assert wired.exchange.checks.times_forgotten == 1
 
 
 def test_a_load_cell_that_says_that_it_is_another_one_is_not_read() -> None:
