@@ -66,11 +66,9 @@ class DeviceChecks:
 
     def next_step(self, now_s: float) -> DeviceStep | None:
         """Return the question that is due, None where there is none."""
-        return self._waiting[0] if self._waiting else self.next_look(now_s)
-
-    def next_look(self, now_s: float) -> DeviceStep | None:
-        """Return the question whether the watchdog still watches, where it is due."""
-        if not self._waiting and self._looks and now_s >= self._next_look_s and self.fault in _GOES_ON:
+        if self._waiting:
+            return self._waiting[0]
+        if self._looks and now_s >= self._next_look_s and self.fault in _GOES_ON:
             self._next_look_s = now_s + _LOOK_PERIOD_S
             return self._looks[0]
         return None

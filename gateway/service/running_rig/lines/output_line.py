@@ -43,6 +43,7 @@ from gateway.service.running_rig.lines.device_checks import DeviceChecks
 _FAILURES_BEFORE_FAULT = 3  # in a row; one bad echo is noise on the line
 _POLL_PERIOD_S = 0.1
 _MOST_OUT = 4  # questions that were given up and may still be answered, each so many reply times later at most
+_AWAY_S = 0.5  # of silence: what answers then may be another device, or one that was switched on again
 _AFTER_SIGN_OF_LIFE_S = 0.005  # nothing tells when the device is through with a sentence that it does not answer
 
 
@@ -96,6 +97,9 @@ class OutputExchange:
         self._heard_s = -inf  # an answer of nobody knows which: none that was asked before counts as silent any more
         self.answer_late_s = 0.0
         self._is_behind = False  # the answer to one of them came, that to the last question is out
+        self._refused_v = (
+            nan  # refused a moment ago: perhaps the watchdog has tripped, which is asked before it is tried again
+        )
         self._is_altered = False  # the last echo was another voltage
         self._quiet_until_s = 0.0
         self._sent_s = 0.0
@@ -179,8 +183,9 @@ class OutputExchange:
         if self._host.sign_of_life and now_s >= self._next_feed_s:
             self._next_feed_s, self._free_s = now_s + self._host.feed_period_s, now_s + _AFTER_SIGN_OF_LIFE_S
             self._write(self._host.sign_of_life)
-        elif self._is_refused(wanted_v) and (look := self.checks.next_look(now_s)):
-            self._send(AskDevice(look), now_s)
+        elif wanted_v == self._refused_v and (step := self.checks.next_step(now_s)):
+            self._refused_v = nan
+            self._send(AskDevice(step), now_s)
         elif not self._is_confirmed(wanted_v) and self._may_obey(wanted_v, now_s):
             self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
             if wanted_v != self._asked_v:
@@ -201,10 +206,6 @@ class OutputExchange:
         surely stands: a device whose answer was lost may have obeyed, and must hear the safe voltage."""
         standing_v = self.standing_v
         return standing_v is not None and abs(voltage_v - standing_v) <= 0.5 * self._host.resolution_v
-
-    def _is_refused(self, voltage_v: float) -> bool:
-        """A device that refuses this again and again may have tripped: its watchdog is looked at in between."""
-        return self._line_fault is FaultCode.OUTPUT_REFUSED and voltage_v == self._asked_v
 
     def _may_obey(self, voltage_v: float, now_s: float) -> bool:
         """Where the watchdog is said to have tripped, the same setting is tried no more often than a poll would be."""
@@ -230,6 +231,8 @@ class OutputExchange:
         self.counts.heard += request is not None
         if self._is_late(request, reply, now_s):
             return
+        if self.unanswered_since_s is not None and now_s - self.unanswered_since_s > _AWAY_S:
+            self.checks.begin()
         self.unanswered_since_s = None
         if self._is_overdue and not self._is_echo(request, reply):
             self._heard_s = now_s
@@ -248,6 +251,7 @@ class OutputExchange:
             self.pressure_pa = reply.pressure_pa
             self._note_success(type(request))
         elif isinstance(reply, Refused):
+            self._refused_v = request.voltage_v if isinstance(request, SetVoltage) else nan
             self._count_failure(type(request), FaultCode.OUTPUT_REFUSED)
         elif request is not None and isinstance(reply, Accepted):
             self._check_setting(request, reply, now_s)

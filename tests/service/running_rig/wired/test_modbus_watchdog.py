@@ -181,3 +181,13 @@ def test_what_the_device_refuses_three_times_is_told_in_its_words(step: DeviceSt
         elif asked:
             checks.take(DeviceAnswer(asked, is_right=True, text="off" if asked is DeviceStep.STATUS else ""))
     assert (checks.fault, checks.said) == (FaultCode.WATCHDOG_NOT_ARMED, "exception 3 (illegal data value)")
+
+
+def test_a_trip_of_before_the_start_is_told_and_cleared_although_each_voltage_is_refused(tmp_path: Path) -> None:
+    wired = wired_to(load(tmp_path, "timed-apart", TIMED_APART))
+    wired.world._output.watchdog.state = WatchdogState.TRIPPED  # type: ignore[attr-defined]
+    wired.run(1.0)
+    assert wired.exchange.fault is FaultCode.WATCHDOG_TRIPPED
+    wired.write(0, RESET)
+    wired.until(lambda: wired.exchange.checks.is_armed, 1.0)
+    wired.pressing(12.0)

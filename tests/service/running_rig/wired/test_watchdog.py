@@ -170,6 +170,28 @@ def test_after_an_unplug_the_device_is_asked_anew_what_it_is_and_armed_again() -
     wired.pressing(12.0)
 
 
+@pytest.mark.parametrize("away_s", [0.6, 3.0])
+def test_what_answers_behind_a_silence_is_asked_what_it_is(away_s: float) -> None:
+    """A module on an RS-485 line is changed for another one, and the adapter stays where it is."""
+    wired = Wired(rig_with(device())).pressing(12.0)
+    wired.is_plugged = False
+    wired.run(away_s)
+    identity = device().own_identity
+    assert identity
+    wired.world._output = output_device(replace(device(), identity=replace(identity, models=("7022",))))
+    wired.is_plugged = True
+    wired.run(0.5)
+    assert wired.exchange.fault is FaultCode.WRONG_DEVICE and not wired.exchange.checks.is_armed
+    wired.write(0, RESET)
+    wired.run(0.5)
+    with pytest.raises(Refusal, match=r"A333 another device answers .*7022"):
+        wired.write(0, ENABLE, 1200)
+    wired.world._output = output_device(device())
+    wired.write(0, RESET)
+    wired.until(lambda: wired.exchange.checks.is_armed, 1.0)
+    wired.pressing(8.0)
+
+
 def test_a_watchdog_that_does_not_arm_refuses_an_enable_unless_the_rig_accepts_to_have_none() -> None:
     wired = Wired(rig_with(device()))
     watchdog = device().own_watchdog
