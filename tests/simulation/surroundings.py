@@ -117,7 +117,8 @@ class Surroundings:
     def _judge_watchdog(self) -> None:
         """While it presses, the device's own watchdog watches; one that has forgotten is armed anew."""
         now_s, watchdog = self._outside.time(), getattr(self.world._output, "watchdog", None)
-        is_off = watchdog is not None and watchdog.state is WatchdogState.OFF and self._observer.voltage_v > 0.0
+        presses = self._observer.voltage_v > 0.0 and self._observer.output_lost_s is None
+        is_off = presses and watchdog is not None and watchdog.state is WatchdogState.OFF
         self._unwatched_s = _since(self._unwatched_s, is_off, now_s)
         if self._unwatched_s is not None and now_s - self._unwatched_s > UNWATCHED_S:
             self._observer.complain("I6", "it presses, and the device's watchdog does not watch", now_s)
