@@ -158,6 +158,7 @@ ${crc_table}];
   LOCAL VAR num nException:=0;
   LOCAL VAR num nOnce:=0;
   LOCAL VAR bool bOffPending:=FALSE;
+  LOCAL VAR bool bOffRefused:=FALSE;
   ! Enable is on its way: without an answer nobody knows
   LOCAL VAR bool bAsking:=FALSE;
   ! A: fgAlive is watched, its last value, cycles it has stood still
@@ -218,9 +219,10 @@ ${crc_table}];
     nUploadStep:=0;
     nOnce:=0;
     nBackoff:=0;
-    FgForget;
     fgEnded:=FALSE;
+    FgForget;
     bOffPending:=FALSE;
+    bOffRefused:=FALSE;
     bAsking:=FALSE;
     ClkStop clRetry;
     ClkReset clRetry;
@@ -276,7 +278,7 @@ ${crc_table}];
     nWant{FG_C_HEARTBEAT}:=0;
     nWant{FG_C_FORCE_SETPOINT}:=0;
     IF fgReset THEN
-      fgEnable:=FALSE;
+      IF FgIsOn() fgEnable:=FALSE;
       nOnce:=nOnce+FgBitUnless(FG_RESET_FAULT);
       fgReset:=FALSE;
     ENDIF
@@ -288,7 +290,8 @@ ${crc_table}];
       nOnce:=nOnce+FgBitUnless(FG_TAKE_OWNERSHIP);
       fgTake:=FALSE;
     ENDIF
-    IF fgEnable THEN
+    ! A reset needs force 0: an enable beside it waits for its answer
+    IF fgEnable AND NOT FgHasBit(nOnce,FG_RESET_FAULT) THEN
       IF NOT FgIsOn() fgText:="";
       nWant{FG_C_CONTROL_WORD}:=FG_ENABLE;
       IF fgPull nWant{FG_C_CONTROL_WORD}:=FG_ENABLE+FG_VALVE_PULL;
@@ -342,6 +345,7 @@ ${crc_table}];
 
   ! Words nFrom .. nTo of the command, counted from 1
   LOCAL PROC FgWriteAndRead(num nFrom,num nTo)
+    VAR bool bGivesUp;
     IF NOT bProven FgProveByteOrder;
     nHeartbeat:=(nHeartbeat+1) MOD 65536;
     FgFrameExchange nFrom,nTo;
@@ -350,12 +354,17 @@ ${crc_table}];
     bOffPending:=FALSE;
     IF nException<>0 THEN
       bAsking:=FALSE;
+      ! Not even the heartbeat, or an OFF behind one: another master
+      ! owns the setpoint
+      bGivesUp:=nFrom=nTo OR (bOffRefused AND nWant{FG_C_CONTROL_WORD}=0);
+      bOffRefused:=nWant{FG_C_CONTROL_WORD}=0;
+      FgGoOn;
       FgExplain;
-      ! Not even the heartbeat: another master owns the setpoint
-      IF nFrom=nTo FgForget;
+      IF bGivesUp FgForget;
       RETURN;
     ENDIF
     FgTakeWords STATUS_WORDS;
+    bOffRefused:=FALSE;
     nGood:=nWant;
     nOnce:=0;
     bAsking:=FALSE;
@@ -383,11 +392,8 @@ ${crc_table}];
     FgFollow;
   ENDPROC
 
-  ! Why it was refused stands in the status; then go on as before
-  LOCAL PROC FgExplain()
-    VAR num nCode;
-    VAR string stReason;
-    nCode:=nException;
+  ! Behind a refusal the last accepted command goes on
+  LOCAL PROC FgGoOn()
     nOnce:=0;
     nWant:=nGood;
     ! Never to TRUE: T_ROB1 may have taken it back meanwhile
@@ -395,6 +401,13 @@ ${crc_table}];
     fgForce:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};
     fgPull:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
     fgCommand:=nGood;
+  ENDPROC
+
+  ! Why it was refused stands in the status
+  LOCAL PROC FgExplain()
+    VAR num nCode;
+    VAR string stReason;
+    nCode:=nException;
     FgReadStatus;
     stReason:=FgRefusalText(fgStatus{FG_S_REFUSAL_REASON});
     fgText:="refused: "+stReason;

@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import Any, ClassVar
 
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
-from tests.clients.programs.iec_libraries import modbus_fb, tc2_modbus_srv
+from tests.clients.programs.iec_libraries import REQUEST_EXCEPTION, modbus_fb, tc2_modbus_srv
 from tests.clients.programs.machine import Frame, Machine, RapidError
 from tests.clients.programs.syntax import Node, parse
 
@@ -576,3 +576,4 @@ class Codesys(StructuredText):
 
     def prepare(self) -> None:
         self.machine.blocks |= modbus_fb(self.gateway)
+        self.machine.library["MODBUSFB"] = {"ERROR": {"REQUESTEXCEPTION": REQUEST_EXCEPTION}}  # type: ignore[assignment]
