@@ -22,6 +22,13 @@ def values(act: Callable[..., Any]) -> Callable[[Machine, list[Node], Frame], An
     return call
 
 
+def real_to_int(number: float) -> int:
+    """TwinCAT: "outside the integer's range of values, you get an undefined result. An exception error is also possible!"""
+    if not -32768.5 < number < 32767.5:
+        raise OverflowError(f"REAL_TO_INT({number})")
+    return round(number)
+
+
 def nothing(*_: Any) -> None:
     """Do what no client can see."""
 
@@ -364,7 +371,7 @@ class Plc:
             "WORD_TO_INT": values(lambda word: word - 65536 if word > 32767 else word),
             "INT_TO_WORD": values(lambda number: number & 0xFFFF),
             "INT_TO_REAL": values(float),
-            "REAL_TO_INT": values(round),
+            "REAL_TO_INT": values(real_to_int),
             "REAL_TO_DWORD": values(lambda number: struct.unpack(">I", struct.pack(">f", number))[0]),
             "DWORD_TO_REAL": values(lambda bits: struct.unpack(">f", struct.pack(">I", bits))[0]),
             "SHL": values(lambda number, places: number << places & 0xFFFFFFFF),
