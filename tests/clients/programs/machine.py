@@ -6,7 +6,6 @@ routine is also the check that everything is declared.
 """
 
 import copy
-import math
 import struct
 from collections.abc import Callable
 from functools import cache
@@ -375,7 +374,6 @@ OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
     "/": lambda a, b: a / b,
     "DIV": lambda a, b: int(a) // int(b),
     "MOD": lambda a, b: int(a) % int(b),
-    "%": lambda a, b: math.fmod(a, b) if isinstance(a, float) else a % b,
     "AND": lambda a, b: a & b,
     "OR": lambda a, b: a | b,
     "XOR": lambda a, b: a ^ b,

@@ -573,7 +573,7 @@ class UrScript(Parser):
         "AND": 20,
         **dict.fromkeys(["==", "!=", "<", ">", "<=", ">="], 30),
         **dict.fromkeys(["+", "-"], 40),
-        **dict.fromkeys(["*", "/", "%"], 50),
+        **dict.fromkeys(["*", "/"], 50),  # no remainder: the script manual has none
     }
     UNARY: ClassVar[dict[str, int]] = {"NOT": 25}
     EQUAL = "=="
