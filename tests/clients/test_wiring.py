@@ -97,6 +97,37 @@ def test_a_rig_without_a_lease_is_told_that_its_force_outlives_the_master() -> N
     assert told not in " ".join(call("wiring", "irc5-cell").split())
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "on_the_page", "in_the_client"),
+    [
+        (
+            "lease_action: fault",
+            "lease_action: hold",
+            "At the end of its lease this rig keeps the force",
+            "lease_action is hold",
+        ),
+        ("lease_s: 0.2 ", "lease_s: null ", "This rig has no lease", "This rig has no lease"),
+        ("owner: null", "owner: serial:1", "Only serial:1 may command here", "This rig's owner is no address"),
+        ("owner: null", "plain: false\n  owner: null", "Plain Modbus TCP is off", "This rig has no plain Modbus TCP"),
+    ],
+)
+def test_what_a_rig_keeps_a_client_from_is_told_on_the_page_and_in_the_client(
+    old: str, new: str, on_the_page: str, in_the_client: str, tmp_path: Path
+) -> None:
+    """A force that outlasts its program, and a client that nobody will listen to."""
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    assert text.count(old) == 1
+    face = "\nfieldbus:\n  - {type: rtu, port: /dev/ttyS7, baud: 38400, parity: even, stop_bits: 1, unit: 17}\n"
+    (tmp_path / "own.yaml").write_text(text.replace(old, new) + face)
+    assert on_the_page not in " ".join(call("wiring", "irc5-cell").split())
+    assert on_the_page in " ".join(call("wiring", str(tmp_path / "own.yaml")).split())
+    for language in ("rapid", "scl", "st", "urscript", "c", "python"):
+        told = call("registers", "--format", language, "--rig", str(tmp_path / "own.yaml"))
+        assert in_the_client in told
+        assert in_the_client not in call("registers", "--format", language, "--rig", "irc5-cell")
+        assert language != "rapid" or max(map(len, told.splitlines())) <= 80
+
+
 def test_a_rig_that_no_robot_can_reach_is_told_so() -> None:
     assert "no robot can reach it" in call("wiring", "demo")
 
