@@ -9,7 +9,8 @@ import pytest
 from gateway.registers.words import CommitStatus
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
 from tests.clients.programs.c_program import CProgram
-from tests.clients.programs.controllers import Irc5
+from tests.clients.programs.controllers import S7, Irc5, MbClient, TwinCat
+from tests.clients.programs.iec_libraries import TwinCatRequest
 from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import MODEL, TEXTS, command, commands, cycles
 from tests.clients.test_edges_and_losses import TARE, control_word_of
@@ -88,6 +89,38 @@ def test_an_answer_that_comes_too_late_is_a_loss_and_no_refusal(
         client.cycle(1.0)
     assert commands(gateway) == [command(1, 1200), command(0, 0)]
     assert client.ended and not client.enabled and "refused" not in client.text
+
+
+@pytest.mark.parametrize(("kind", "language"), [(S7, "scl"), (TwinCat, "st")])
+def test_an_answer_that_is_lost_is_no_refusal_whatever_number_the_library_gives_it(
+    kind: Any, language: str, gateway: GatewayAtHand, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not all their numbers are documented; heartbeat_echo shows whether the gateway has taken what was written."""
+    monkeypatch.setattr(MbClient, "NO_ANSWER", 0x80A1)
+    monkeypatch.setattr(TwinCatRequest, "NO_ANSWER", 0x8004)
+    client = kind(TEXTS[language], gateway)
+    cycles(client)
+    lose_the_answer_to(gateway, lambda request: request[0] in (16, 23) and bool(gateway.words))
+    client.enable(12.0)
+    for _ in range(6):
+        client.cycle(1.0)
+    assert commands(gateway) == [command(1, 1200), command(0, 0)]
+    assert client.ended and not client.enabled and "lost" in client.text
+
+
+@pytest.mark.parametrize(("kind", "language"), [(S7, "scl"), (TwinCat, "st")])
+def test_a_heartbeat_that_the_gateway_has_seen_of_another_is_left_out(
+    kind: Any, language: str, gateway: GatewayAtHand
+) -> None:
+    """Of the program before a start, or of another master: its echo would bear witness for a write that was refused."""
+    gateway.answer(bytes((6, 0, 4, 0, 1)))
+    gateway.answer(bytes((16, 0, 0, 0, 2, 4, 0, 0, 0, 0)))
+    client = kind(TEXTS[language], gateway)
+    cycles(client)
+    seen = len(gateway.writes)
+    client.enable(65.0)
+    cycles(client)
+    assert [words[4] for _, words in gateway.writes[seen:]] == [2] and "W204" in client.text
 
 
 def test_an_enable_right_behind_a_reset_waits_until_the_reset_is_taken(client: Any, gateway: GatewayAtHand) -> None:

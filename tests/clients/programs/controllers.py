@@ -449,6 +449,9 @@ class MbClient:
     Manuals call REQ a level, users have seen it want an edge: here it has to rise, which serves both.
     """
 
+    NO_ANSWER = 0x80C8
+    """STATUS of a request that was not answered in time; of a connection that has broken it is another."""
+
     def __init__(self, plc: "S7") -> None:
         self.plc, self.BUSY, self.DONE, self.ERROR, self.STATUS, self.asked = plc, False, False, False, 0x7000, None
         self.calls, self.MB_Unit_ID, self.RCV_TIMEOUT, self.was_asked = 0, 255, 2.0, False
@@ -491,7 +494,7 @@ class MbClient:
         try:
             pdu = self.plc.gateway.ask_unit(self.MB_Unit_ID, request)
         except Unplugged:
-            self.ERROR, self.STATUS = True, 0x80C8
+            self.ERROR, self.STATUS = True, self.NO_ANSWER
             return
         if pdu[0] & 0x80:
             self.ERROR, self.STATUS = True, 0x8380 + {1: 1, 2: 3}.get(pdu[1], 4)

@@ -31,6 +31,9 @@ def pdu_of(write: tuple[int, list[int]] | None, read: tuple[int, int] | None) ->
 class TwinCatRequest:
     """One of FB_MB...: starts with the rise of bExecute, bBusy from the same call on; keeps its own connection."""
 
+    NO_ANSWER = 1861
+    """nErrId of a request that was not answered in time: ADS error 16#745."""
+
     def __init__(self, gateway: GatewayAtHand) -> None:
         self.gateway, self.bBusy, self.bError, self.nErrId = gateway, False, False, 0
         self.executed, self.calls = False, 0
@@ -51,7 +54,7 @@ class TwinCatRequest:
         try:
             pdu = self.gateway.ask_unit(given["nUnitID"], pdu_of(write, read))
         except Unplugged:
-            self.bError, self.nErrId = True, 1861
+            self.bError, self.nErrId = True, self.NO_ANSWER
             return
         self.bError, self.nErrId = bool(pdu[0] & 0x80), 0x8000 + pdu[1] if pdu[0] & 0x80 else 0
         if read and not self.bError:
