@@ -216,3 +216,21 @@ def test_a_robot_s_task_that_starts_again_while_a_force_was_asked_for_says_that_
     client.enable(12.0)
     client.cycle(10.0)
     assert not client.ended
+
+
+def test_a_refusal_of_something_else_turns_no_pull_into_a_push(client: Any, gateway: GatewayAtHand) -> None:
+    """A tare that comes too early, between the program's choice of the direction and its enable."""
+    client.pull(pulls=True)
+    cycles(client)
+    refuse_tares(gateway)
+    client.tare()
+    cycles(client, 8)
+    client.enable(12.0)
+    cycles(client)
+    client.pull(pulls=False)
+    client.disable()
+    client.tare()
+    cycles(client, 8)
+    client.enable(12.0)
+    cycles(client)
+    assert commands(gateway) == [command(17, 1200), command(0, 0), command(1, 1200)]

@@ -462,7 +462,7 @@ static int fg_go_on(fg_client *client) {
     int was_on = client->good[FG_CONTROL_WORD] & FG_ENABLE, stays_on = client->want[FG_CONTROL_WORD] & FG_ENABLE, result;
     memcpy(client->want, client->good, sizeof client->want);
     client->once = 0;
-    if (was_on) client->pulls = (client->good[FG_CONTROL_WORD] & FG_VALVE_PULL) != 0;
+    if (was_on && stays_on) client->pulls = (client->good[FG_CONTROL_WORD] & FG_VALVE_PULL) != 0;
     if (!was_on || stays_on) return FG_OK;
     client->want[FG_CONTROL_WORD] = 0;
     client->want[FG_FORCE_SETPOINT] = 0;

@@ -68,7 +68,7 @@ MODULE ForceGateway
   !    refused  the last accepted command goes on (a refused write
   !             would not renew the lease); fgText says why
   !    ended    by a fault, another master or a restart: fgEnable is
-  !             FALSE and fgForce 0 again, until you set them
+  !             FALSE again, until you set it
   !    lost     the same; it connects again, waiting longer each time,
   !             and if it was enabled its first write is OFF
   !*******************************************************************
@@ -309,7 +309,6 @@ ${crc_table}];
       nQuiet:=nQuiet+1;
     ELSEIF fgEnable THEN
       fgEnable:=FALSE;
-      fgForce:=0;
       fgEnded:=TRUE;
       fgText:="off: T_ROB1 does not count fgAlive";
     ENDIF
@@ -392,15 +391,24 @@ ${crc_table}];
     FgFollow;
   ENDPROC
 
-  ! Behind a refusal the last accepted command goes on
+  ! Behind a refusal the last accepted command goes on; what was not
+  ! in the refused one, or was set meanwhile, stays
   LOCAL PROC FgGoOn()
+    VAR bool bSent;
     nOnce:=0;
-    nWant:=nGood;
     ! Never to TRUE: T_ROB1 may have taken it back meanwhile
     IF NOT FgIsOn() fgEnable:=FALSE;
-    fgForce:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};
-    fgPull:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
-    fgCommand:=nGood;
+    IF FgIsOn() AND FgHasBit(nWant{FG_C_CONTROL_WORD},FG_ENABLE) THEN
+      IF Round(fgForce*${force_counts})=nWant{FG_C_FORCE_SETPOINT} THEN
+        fgForce:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};
+      ENDIF
+      bSent:=FgHasBit(nWant{FG_C_CONTROL_WORD},FG_VALVE_PULL);
+      IF fgPull=bSent fgPull:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
+    ENDIF
+    FOR i FROM 1 TO COMMAND_WORDS DO
+      IF fgCommand{i}=nWant{i} fgCommand{i}:=nGood{i};
+    ENDFOR
+    nWant:=nGood;
   ENDPROC
 
   ! Why it was refused stands in the status
@@ -432,9 +440,11 @@ ${crc_table}];
   ENDFUNC
 
   LOCAL PROC FgForget()
-    IF fgEnable OR FgIsOn() fgEnded:=TRUE;
-    fgEnable:=FALSE;
-    fgForce:=0;
+    ! fgForce stays: between T_ROB1's two lines it would hold 0 N
+    IF fgEnable OR FgIsOn() THEN
+      fgEnable:=FALSE;
+      fgEnded:=TRUE;
+    ENDIF
     nWant{FG_C_CONTROL_WORD}:=0;
     nWant{FG_C_FORCE_SETPOINT}:=0;
     nGood:=nWant;

@@ -229,6 +229,7 @@ class UniversalRobot:
         library = {
             "first_index": 0,
             "typed": True,
+            "sliced": True,  # a thread whose time is used up stops within a statement
             "socket_open": values(self.open),
             "socket_close": values(lambda name: None),
             "socket_send_byte": values(self.send_byte),

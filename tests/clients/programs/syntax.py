@@ -637,9 +637,9 @@ class UrScript(Parser):
             value = self.expression()
             self.take("\n")
             return ("return", value)
-        if self.maybe("ENTER_CRITICAL", "EXIT_CRITICAL"):
+        if word := self.maybe("ENTER_CRITICAL", "EXIT_CRITICAL"):
             self.take("\n")
-            return ("block", [])
+            return ("critical", word == "ENTER_CRITICAL")
         scope = self.maybe("LOCAL", "GLOBAL")
         target = self.postfix(("name", self.name(), line))
         if self.word == "=":
