@@ -128,6 +128,20 @@ def test_what_a_rig_keeps_a_client_from_is_told_on_the_page_and_in_the_client(
         assert language != "rapid" or max(map(len, told.splitlines())) <= 80
 
 
+def test_a_lease_that_is_short_for_one_request_at_a_time_is_told_to_who_wires_an_s7(own_rig: Path) -> None:
+    """A heartbeat is two requests of MB_CLIENT, with some calls of the block each: 0.08 s at best."""
+    title, row = "Siemens S7-1200/1500: connection of MB_CLIENT", "call of the block below"
+    assert "set lease_s to 0.36 or more" in rows_of(page_of(own_rig), title)[row][0]
+    own_rig.write_text(own_rig.read_text().replace("lease_s: 0.2 ", "lease_s: 0.4 "))
+    assert "lease" not in rows_of(page_of(own_rig), title)[row][0]
+    plc = S7(render_client(MAP, "scl", Endpoint("10.0.0.1", 502, 1)), gateway := GatewayAtHand(MAP))
+    plc.enable(12.0)
+    plc.cycle(0.5)
+    seen = len(gateway.beats)
+    plc.cycle(1.0)
+    assert 1.0 / 0.12 <= len(gateway.beats) - seen <= 1.0 / 0.08
+
+
 def test_a_rig_that_no_robot_can_reach_is_told_so() -> None:
     assert "no robot can reach it" in call("wiring", "demo")
 

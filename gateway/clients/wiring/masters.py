@@ -25,6 +25,8 @@ _SHOWN: Final = ("status_word", "state", "force_measured", "fault_code", "refusa
 """What a robot wants to see that reads register by register."""
 SHORTEST_TIMER_LEASE_S: Final = 0.3
 """Three periods of RAPID's shortest cyclic timer, 0.1 s: two lost ones are not a loss of the master."""
+SHORTEST_S7_LEASE_S: Final = 0.36
+"""Three heartbeats of MB_CLIENT, one request at a time: 8 to 12 calls of the block of 10 ms each."""
 
 
 def network_sections(rig: Rig, called: str) -> Iterator[Section]:
@@ -162,6 +164,11 @@ def _requests(table: ExchangeTable) -> Iterator[tuple[str, bool, int, int]]:
 def _s7(rig: Rig, table: ExchangeTable) -> Section:
     where = table.where
     octets = where.host.split(".")
+    calls, lease_s = "a cyclic interrupt of 10 ms: a heartbeat every 80 to 120 ms", rig.control.supervision.lease_s
+    if lease_s is not None and lease_s < SHORTEST_S7_LEASE_S:
+        calls += (
+            f" (lease {lease_s:g} s: one that is late ends the force; set lease_s to {SHORTEST_S7_LEASE_S:g} or more)"
+        )
     shown = f"ADDR[1] .. ADDR[4] = {', '.join(octets)}" if len(octets) == 4 else where.host
     rows = (
         ("CONNECT (TCON_IP_v4)", "value"),
@@ -174,6 +181,7 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
         ("LocalPort", "0"),
         ("MB_Unit_ID", f"{where.unit}: static of the MB_CLIENT instance, 255 as it comes; the block below sets it"),
         ("MB_DATA_PTR", "an Array of Word in a DB without optimized access, at least MB_DATA_LEN long"),
+        ("call of the block below", calls),
     )
     stop = "A CPU goes on at an emergency stop: `enable` of the block has to fall with it (and with the guard, and the robot)."
     return Section("Siemens S7-1200/1500: connection of MB_CLIENT", (stop,), rows)
