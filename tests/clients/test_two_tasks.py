@@ -106,3 +106,33 @@ def test_an_edge_that_is_set_beside_another_goes_out_as_well_and_once(language: 
     for _, gateway in every_place(language, prepare, [lambda client: client.reset()]):
         edges = [words[0] for words in gateway.words if words[0]]
         assert sorted(edges) in ([RESET, TARE], [RESET | TARE]), edges
+
+
+def test_a_force_that_is_set_beside_a_refusal_of_another_is_the_one_that_holds() -> None:
+    """Too much was asked for, the program lowers it at once: the last accepted force must not come back over that."""
+
+    def prepare(client: Any, gateway: GatewayAtHand) -> None:
+        client.enable(7.0)
+        cycles(client, 2)
+        answer = gateway.answer
+
+        def refuse(request: bytes) -> bytes:
+            too_much = request[0] == 23 and request[12:14] == (4000).to_bytes(2, "big")
+            return bytes((request[0] | 0x80, 3)) if too_much else answer(request)
+
+        gateway.answer = refuse  # type: ignore[method-assign]
+        client.force(40.0)
+
+    for _, gateway in every_place("urscript", prepare, [lambda client: client.force(5.0)]):
+        assert gateway.bank.command.force_setpoint_n == 5.0
+
+
+@pytest.mark.parametrize("language", ["rapid", "urscript"])
+def test_a_disable_at_any_place_of_an_exchange_takes_the_force_off(language: str) -> None:
+    def prepare(client: Any, _gateway: GatewayAtHand) -> None:
+        client.enable(7.0)
+        cycles(client, 2)
+        client.force(9.0)
+
+    for client, gateway in every_place(language, prepare, [lambda client: client.disable()]):
+        assert gateway.bank.command.control_word == 0 and not client.enabled and not client.ended
