@@ -231,7 +231,7 @@ class UniversalRobot:
             "typed": True,
             "sliced": True,  # a thread whose time is used up stops within a statement
             "socket_open": values(self.open),
-            "socket_close": values(lambda name: None),
+            "socket_close": values(self.close),
             "socket_send_byte": values(self.send_byte),
             "socket_read_byte_list": values(self.read),
             "floor": values(math.floor),
@@ -249,6 +249,10 @@ class UniversalRobot:
         except Unplugged:
             return False
         return True
+
+    def close(self, _name: str) -> None:
+        """What nobody has read goes with the socket; no manual says that it goes with the program that opened it."""
+        self.received = b""
 
     def send_byte(self, value: int, _name: str) -> bool:
         assert isinstance(value, int) and 0 <= value <= 255
