@@ -55,11 +55,13 @@ class MissingRegisterError(LookupError):
 
 @dataclass(frozen=True)
 class Endpoint:
-    """Where the gateway listens: address, port, unit id."""
+    """Where the gateway listens: address, port, unit id. cautions: what of the rig makes a client less than it says, in
+    sentences that fit a line of RAPID."""
 
     host: str
     port: int
     unit: int
+    cautions: tuple[str, ...] = ()
 
     @property
     def shown_port(self) -> str:

@@ -4,13 +4,16 @@ The templates lie in templates/, one per language, and hold what a programmer of
 (constants, decoding, tables of texts) are spelled here, by gateway.clients.spellings.
 """
 
+from collections.abc import Iterator
 from importlib.resources import files
+from ipaddress import ip_address
 from string import Template
 from typing import Final
 
 from gateway import defaults
 from gateway.clients.exchange import Endpoint, ExchangeTable
 from gateway.clients.spellings import SPELLINGS
+from gateway.control.settings import LeaseAction
 from gateway.profiles import Rig
 from gateway.registers.map.register_map import RegisterMap
 
@@ -45,7 +48,7 @@ def render_client(register_map: RegisterMap, language: str, where: Endpoint) -> 
         raise ValueError(f"{language} is not one of {', '.join(LANGUAGES)}")
     table = ExchangeTable(register_map, where)
     text = files("gateway.clients").joinpath("templates", TEMPLATES[language]).read_text("utf-8")
-    remarks = where.to_fill_in(from_elsewhere=language not in _BESIDE_THE_GATEWAY)
+    remarks = (*where.to_fill_in(from_elsewhere=language not in _BESIDE_THE_GATEWAY), *where.cautions)
     fill_in = "".join(map(_REMARKS[language].format, remarks))
     return Template(text).substitute({**table.values(), **SPELLINGS[language](table), "fill_in": fill_in})
 
@@ -55,4 +58,29 @@ def endpoint_of(rig: Rig | None) -> Endpoint:
     if rig is None:
         return Endpoint(defaults.HOST, defaults.MODBUS_PORT, defaults.UNIT_ID)
     units = rig.network.units
-    return Endpoint(rig.network.bind, rig.network.port, defaults.UNIT_ID if defaults.UNIT_ID in units else units[0])
+    unit = defaults.UNIT_ID if defaults.UNIT_ID in units else units[0]
+    return Endpoint(rig.network.bind, rig.network.port, unit, tuple(_cautions(rig)))
+
+
+def _cautions(rig: Rig) -> Iterator[str]:
+    """Yield where this rig lets a client do less than its head says, or a force outlast it."""
+    supervision = rig.control.supervision
+    if not rig.network.plain:
+        yield "This rig has no plain Modbus TCP: this client cannot connect."
+    if supervision.lease_s is None:
+        yield "This rig has no lease: a force outlasts this program. Set lease_s."
+    elif supervision.lease_action is LeaseAction.HOLD:
+        yield "This rig's lease_action is hold: a force outlasts this program."
+    if is_no_address(rig.network.owner):
+        yield "This rig's owner is no address: from here one may read, and disable."
+
+
+def is_no_address(owner: str | None) -> bool:
+    """Return whether this owner of the setpoint is named, and no master on plain Modbus TCP: a serial face, a certificate."""
+    if owner is None:
+        return False
+    try:
+        ip_address(owner)
+    except ValueError:
+        return True
+    return False

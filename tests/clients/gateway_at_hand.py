@@ -72,6 +72,7 @@ class GatewayAtHand:
                 force_measured_n=force_n - 0.5,
                 force_requested_n=force_n,
                 fault_code=self.fault,
+                heartbeat_echo=self.bank.command.heartbeat,
             )
         )
 

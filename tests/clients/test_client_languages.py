@@ -111,6 +111,7 @@ def test_every_rapid_routine_runs_and_declares_what_it_uses() -> None:
         ("st", "FUNCTION F : INT\nVAR\n a : INT;\n A : INT;\nEND_VAR\nEND_FUNCTION"),
         ("urscript", "def f():\n  if True:\n    x = 1\nend\n"),
         ("urscript", "x == 1\n"),
+        ("urscript", "x = 5 % 3\n"),
     ],
 )
 def test_the_parsers_refuse_what_the_languages_do(language: str, wrong: str) -> None:

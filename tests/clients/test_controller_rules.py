@@ -247,3 +247,21 @@ def test_the_signals_of_a_robot_enable_by_the_bit_of_the_map() -> None:
     text = render_client(MAP, "urscript", WHERE)
     (bit,) = [bit for bit, name in MAP.find("control_word").bits.items() if name == "enable"]
     assert f'modbus_set_output_register("fg_control", {1 << bit}, False)' in text
+
+
+@pytest.mark.parametrize("kind", [S7, TwinCat, Codesys])
+@pytest.mark.parametrize("ramp_n_per_s", [7000.0, -4000.0, 1e38])
+def test_a_value_that_16_bits_cannot_hold_is_refused_instead_of_wrapped(kind: type[Plc], ramp_n_per_s: float) -> None:
+    """70000 counts wrapped are 4464: a ramp of 446 N/s that nobody has asked for."""
+    gateway = GatewayAtHand(MAP)
+    client = kind(TEXTS["scl" if kind is S7 else "st"], gateway)
+    client.enable(12.0)
+    cycles(client)
+    holder = client.structures[client.NAMES["command"]]
+    holder["FORCE_RAMP"] = ramp_n_per_s
+    cycles(client)
+    assert "W204 value out of range" in client.text and client.enabled
+    assert gateway.bank.command.force_ramp_n_per_s == 0.0
+    holder["FORCE_RAMP"] = 3276.7
+    cycles(client)
+    assert gateway.words[-1][2] == 32767

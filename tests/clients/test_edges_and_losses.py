@@ -149,6 +149,19 @@ def test_a_robot_s_program_waits_for_a_force_that_stands_and_for_no_other(gatewa
     assert wait() is False and not slept, "nobody waits for a gateway that has switched off"
 
 
+def test_a_program_that_starts_again_reads_no_answer_to_the_one_before(gateway: GatewayAtHand) -> None:
+    """Its transactions begin at 1 again: an answer left in a socket that the controller kept open would belong."""
+    robot = UniversalRobot(TEXTS["urscript"], gateway)
+    robot.enable(12.0)
+    cycles(robot, 2)
+    left = gateway.ask(bytes((0, 1, 0, 0, 0, 6, 1, 3, 0, 100, 0, 32)))
+    gateway.stop_from_elsewhere()
+    robot.machine.begin()
+    robot.received = left
+    robot.cycle()
+    assert robot.get("fg_connected") and not robot.enabled
+
+
 def control_word_of(request: bytes) -> int:
     """Of a request that writes from address 0 on; else 0."""
     at = {16: 6, 23: 10}.get(request[0], 0)

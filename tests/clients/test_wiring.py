@@ -97,6 +97,51 @@ def test_a_rig_without_a_lease_is_told_that_its_force_outlives_the_master() -> N
     assert told not in " ".join(call("wiring", "irc5-cell").split())
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "on_the_page", "in_the_client"),
+    [
+        (
+            "lease_action: fault",
+            "lease_action: hold",
+            "At the end of its lease this rig keeps the force",
+            "lease_action is hold",
+        ),
+        ("lease_s: 0.2 ", "lease_s: null ", "This rig has no lease", "This rig has no lease"),
+        ("owner: null", "owner: serial:1", "Only serial:1 may command here", "This rig's owner is no address"),
+        ("owner: null", "plain: false\n  owner: null", "Plain Modbus TCP is off", "This rig has no plain Modbus TCP"),
+    ],
+)
+def test_what_a_rig_keeps_a_client_from_is_told_on_the_page_and_in_the_client(
+    old: str, new: str, on_the_page: str, in_the_client: str, tmp_path: Path
+) -> None:
+    """A force that outlasts its program, and a client that nobody will listen to."""
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    assert text.count(old) == 1
+    face = "\nfieldbus:\n  - {type: rtu, port: /dev/ttyS7, baud: 38400, parity: even, stop_bits: 1, unit: 17}\n"
+    (tmp_path / "own.yaml").write_text(text.replace(old, new) + face)
+    assert on_the_page not in " ".join(call("wiring", "irc5-cell").split())
+    assert on_the_page in " ".join(call("wiring", str(tmp_path / "own.yaml")).split())
+    for language in ("rapid", "scl", "st", "urscript", "c", "python"):
+        told = call("registers", "--format", language, "--rig", str(tmp_path / "own.yaml"))
+        assert in_the_client in told
+        assert in_the_client not in call("registers", "--format", language, "--rig", "irc5-cell")
+        assert language != "rapid" or max(map(len, told.splitlines())) <= 80
+
+
+def test_a_lease_that_is_short_for_one_request_at_a_time_is_told_to_who_wires_an_s7(own_rig: Path) -> None:
+    """A heartbeat is two requests of MB_CLIENT, with some calls of the block each: 0.08 s at best."""
+    title, row = "Siemens S7-1200/1500: connection of MB_CLIENT", "call of the block below"
+    assert "set lease_s to 0.36 or more" in rows_of(page_of(own_rig), title)[row][0]
+    own_rig.write_text(own_rig.read_text().replace("lease_s: 0.2 ", "lease_s: 0.4 "))
+    assert "lease" not in rows_of(page_of(own_rig), title)[row][0]
+    plc = S7(render_client(MAP, "scl", Endpoint("10.0.0.1", 502, 1)), gateway := GatewayAtHand(MAP))
+    plc.enable(12.0)
+    plc.cycle(0.5)
+    seen = len(gateway.beats)
+    plc.cycle(1.0)
+    assert 1.0 / 0.12 <= len(gateway.beats) - seen <= 1.0 / 0.08
+
+
 def test_a_rig_that_no_robot_can_reach_is_told_so() -> None:
     assert "no robot can reach it" in call("wiring", "demo")
 

@@ -21,6 +21,7 @@ class _Dialect:
     text: str  # of a function's result in its CASE
     types: dict[str, str]
     bits_of: str
+    counts: tuple[str, str, str]  # what makes a word of a value: its name, its two inputs
 
 
 _SCL = _Dialect(
@@ -32,6 +33,7 @@ _SCL = _Dialect(
     text="#FG_{0} := ",
     types={"real": "Real", "uint": "UInt", "word": "Word", "dword": "DWord", "array": "Array[0..{0}] of Real"},
     bits_of="REAL_TO_DWORD({0})",
+    counts=('"FG_Counts"', "value", "countsPerUnit"),
 )
 _ST = _Dialect(
     local="",
@@ -42,6 +44,7 @@ _ST = _Dialect(
     text="F_Fg{0} := ",
     types={"real": "REAL", "uint": "UINT", "word": "WORD", "dword": "DWORD", "array": "ARRAY[0..{0}] OF REAL"},
     bits_of="F_FgBits(fValue := {0})",
+    counts=("F_FgCounts", "fValue", "fCountsPerUnit"),
 )
 
 
@@ -148,7 +151,8 @@ def _encode(register: Register, table: ExchangeTable, dialect: _Dialect) -> str:
     place = f"{dialect.arrays[0]}[{register.address - table.command_span[0]}]"
     value = f"{dialect.structures[0]}.{register.name}"
     if register.type == "int16":
-        return f"{place} := INT_TO_WORD(REAL_TO_INT({value} * {register.counts_per_unit}.0));"
+        function, given, counts = dialect.counts
+        return f"{place} := {function}({given} := {value}, {counts} := {register.counts_per_unit}.0);"
     return f"{place} := UINT_TO_WORD({value});"
 
 

@@ -411,11 +411,7 @@ static int fg_refresh(fg_client *client) {
 }
 
 /* Reads why: an exception carries one number, the refusal registers the reason, the address and the value. */
-static int fg_explain(fg_client *client) {
-    uint8_t exception = client->exception;
-    memcpy(client->want, client->good, sizeof client->want);
-    if (client->good[FG_CONTROL_WORD] & FG_ENABLE) client->pulls = (client->good[FG_CONTROL_WORD] & FG_VALVE_PULL) != 0;
-    client->once = 0;
+static int fg_explain(fg_client *client, uint8_t exception) {
     if (fg_refresh(client) == FG_LOST) return FG_LOST;
     client->exception = exception;
     snprintf(client->message, sizeof client->message, "refused: %s (exception %u, address %u, value %g)",
@@ -429,7 +425,7 @@ int fg_write(fg_client *client, uint16_t first, uint16_t count, const uint16_t *
     int result = fg_connect(client);
     if (result == FG_OK)
         result = fg_ask(client, frame, fg_frame_write(frame, ++client->transaction, client->unit, first, count, words));
-    return result == FG_REFUSED ? fg_explain(client) : result;
+    return result == FG_REFUSED ? fg_explain(client, client->exception) : result;
 }
 
 /* ---- the cycle ------------------------------------------------------------------------------------------------------ */
@@ -460,15 +456,35 @@ static int fg_prove_byte_order(fg_client *client) {
     return FG_OK;
 }
 
-int fg_exchange(fg_client *client) {
+/* Behind a refusal the last accepted command goes on; a disable beside what was refused goes out alone, at once. */
+static int fg_go_on(fg_client *client) {
     uint8_t frame[FG_FRAME];
-    uint16_t command[FG_COMMAND_WORDS];
+    int was_on = client->good[FG_CONTROL_WORD] & FG_ENABLE, stays_on = client->want[FG_CONTROL_WORD] & FG_ENABLE, result;
+    memcpy(client->want, client->good, sizeof client->want);
+    client->once = 0;
+    if (was_on && stays_on) client->pulls = (client->good[FG_CONTROL_WORD] & FG_VALVE_PULL) != 0;
+    if (!was_on || stays_on) return FG_OK;
+    client->want[FG_CONTROL_WORD] = 0;
+    client->want[FG_FORCE_SETPOINT] = 0;
+    result = fg_ask(client, frame, fg_frame_write(frame, ++client->transaction, client->unit, FG_COMMAND_FIRST,
+                                                  FG_COMMAND_WORDS, client->want));
+    if (result == FG_LOST) return FG_LOST;
+    if (result == FG_REFUSED) client->ended = 1;
+    memcpy(client->good, client->want, sizeof client->good);
+    return FG_OK;
+}
+
+int fg_exchange(fg_client *client) {
+    uint8_t frame[FG_FRAME], exception;
+    uint16_t sent[FG_COMMAND_WORDS], command[FG_COMMAND_WORDS];
     int result = fg_connect(client), changed = fg_has_changed(client);
     size_t length;
     if (result != FG_OK) return result;
     if (!changed && client->want[FG_CONTROL_WORD] == 0) return fg_refresh(client);
     if ((result = fg_prove_byte_order(client)) != FG_OK) return result;
-    memcpy(command, client->want, sizeof command);
+    memcpy(sent, client->want, sizeof sent);
+    if (client->once & FG_RESET_FAULT) sent[FG_CONTROL_WORD] = sent[FG_FORCE_SETPOINT] = 0; /* an enable behind it waits */
+    memcpy(command, sent, sizeof command);
     command[FG_CONTROL_WORD] |= client->once;
     command[FG_HEARTBEAT] = ++client->heartbeat;
     client->transaction++;
@@ -477,17 +493,19 @@ int fg_exchange(fg_client *client) {
     else
         length = fg_frame_exchange(frame, client->transaction, client->unit, FG_COMMAND_FIRST + FG_HEARTBEAT, 1,
                                    command + FG_HEARTBEAT);
-    client->asked = client->want[FG_CONTROL_WORD];
+    client->asked = sent[FG_CONTROL_WORD];
     result = fg_ask(client, frame, length);
     if (result == FG_REFUSED) {
+        exception = client->exception;
         client->off_pending = client->asked = 0;
-        result = fg_explain(client);
+        if (fg_go_on(client) == FG_LOST) return FG_LOST;
+        result = fg_explain(client, exception);
         if (!changed && result == FG_REFUSED) fg_end(client); /* not even the heartbeat: another master owns the setpoint */
         return result;
     }
     if (result == FG_OK) result = fg_take_words(client, frame, FG_STATUS_WORDS, client->words);
     if (result != FG_OK) return result;
-    memcpy(client->good, client->want, sizeof client->good);
+    memcpy(client->good, sent, sizeof client->good);
     client->once = 0;
     client->off_pending = client->asked = 0;
     fg_follow(client);

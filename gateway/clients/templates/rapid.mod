@@ -68,7 +68,7 @@ MODULE ForceGateway
   !    refused  the last accepted command goes on (a refused write
   !             would not renew the lease); fgText says why
   !    ended    by a fault, another master or a restart: fgEnable is
-  !             FALSE and fgForce 0 again, until you set them
+  !             FALSE again, until you set it
   !    lost     the same; it connects again, waiting longer each time,
   !             and if it was enabled its first write is OFF
   !*******************************************************************
@@ -158,6 +158,7 @@ ${crc_table}];
   LOCAL VAR num nException:=0;
   LOCAL VAR num nOnce:=0;
   LOCAL VAR bool bOffPending:=FALSE;
+  LOCAL VAR bool bOffRefused:=FALSE;
   ! Enable is on its way: without an answer nobody knows
   LOCAL VAR bool bAsking:=FALSE;
   ! A: fgAlive is watched, its last value, cycles it has stood still
@@ -218,9 +219,10 @@ ${crc_table}];
     nUploadStep:=0;
     nOnce:=0;
     nBackoff:=0;
-    FgForget;
     fgEnded:=FALSE;
+    FgForget;
     bOffPending:=FALSE;
+    bOffRefused:=FALSE;
     bAsking:=FALSE;
     ClkStop clRetry;
     ClkReset clRetry;
@@ -276,7 +278,7 @@ ${crc_table}];
     nWant{FG_C_HEARTBEAT}:=0;
     nWant{FG_C_FORCE_SETPOINT}:=0;
     IF fgReset THEN
-      fgEnable:=FALSE;
+      IF FgIsOn() fgEnable:=FALSE;
       nOnce:=nOnce+FgBitUnless(FG_RESET_FAULT);
       fgReset:=FALSE;
     ENDIF
@@ -288,7 +290,8 @@ ${crc_table}];
       nOnce:=nOnce+FgBitUnless(FG_TAKE_OWNERSHIP);
       fgTake:=FALSE;
     ENDIF
-    IF fgEnable THEN
+    ! A reset needs force 0: an enable beside it waits for its answer
+    IF fgEnable AND NOT FgHasBit(nOnce,FG_RESET_FAULT) THEN
       IF NOT FgIsOn() fgText:="";
       nWant{FG_C_CONTROL_WORD}:=FG_ENABLE;
       IF fgPull nWant{FG_C_CONTROL_WORD}:=FG_ENABLE+FG_VALVE_PULL;
@@ -306,7 +309,6 @@ ${crc_table}];
       nQuiet:=nQuiet+1;
     ELSEIF fgEnable THEN
       fgEnable:=FALSE;
-      fgForce:=0;
       fgEnded:=TRUE;
       fgText:="off: T_ROB1 does not count fgAlive";
     ENDIF
@@ -342,6 +344,7 @@ ${crc_table}];
 
   ! Words nFrom .. nTo of the command, counted from 1
   LOCAL PROC FgWriteAndRead(num nFrom,num nTo)
+    VAR bool bGivesUp;
     IF NOT bProven FgProveByteOrder;
     nHeartbeat:=(nHeartbeat+1) MOD 65536;
     FgFrameExchange nFrom,nTo;
@@ -350,12 +353,17 @@ ${crc_table}];
     bOffPending:=FALSE;
     IF nException<>0 THEN
       bAsking:=FALSE;
+      ! Not even the heartbeat, or an OFF behind one: another master
+      ! owns the setpoint
+      bGivesUp:=nFrom=nTo OR (bOffRefused AND nWant{FG_C_CONTROL_WORD}=0);
+      bOffRefused:=nWant{FG_C_CONTROL_WORD}=0;
+      FgGoOn;
       FgExplain;
-      ! Not even the heartbeat: another master owns the setpoint
-      IF nFrom=nTo FgForget;
+      IF bGivesUp FgForget;
       RETURN;
     ENDIF
     FgTakeWords STATUS_WORDS;
+    bOffRefused:=FALSE;
     nGood:=nWant;
     nOnce:=0;
     bAsking:=FALSE;
@@ -383,18 +391,31 @@ ${crc_table}];
     FgFollow;
   ENDPROC
 
-  ! Why it was refused stands in the status; then go on as before
+  ! Behind a refusal the last accepted command goes on; what was not
+  ! in the refused one, or was set meanwhile, stays
+  LOCAL PROC FgGoOn()
+    VAR bool bSent;
+    nOnce:=0;
+    ! Never to TRUE: T_ROB1 may have taken it back meanwhile
+    IF NOT FgIsOn() fgEnable:=FALSE;
+    IF FgIsOn() AND FgHasBit(nWant{FG_C_CONTROL_WORD},FG_ENABLE) THEN
+      IF Round(fgForce*${force_counts})=nWant{FG_C_FORCE_SETPOINT} THEN
+        fgForce:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};
+      ENDIF
+      bSent:=FgHasBit(nWant{FG_C_CONTROL_WORD},FG_VALVE_PULL);
+      IF fgPull=bSent fgPull:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
+    ENDIF
+    FOR i FROM 1 TO COMMAND_WORDS DO
+      IF fgCommand{i}=nWant{i} fgCommand{i}:=nGood{i};
+    ENDFOR
+    nWant:=nGood;
+  ENDPROC
+
+  ! Why it was refused stands in the status
   LOCAL PROC FgExplain()
     VAR num nCode;
     VAR string stReason;
     nCode:=nException;
-    nOnce:=0;
-    nWant:=nGood;
-    ! Never to TRUE: T_ROB1 may have taken it back meanwhile
-    IF NOT FgIsOn() fgEnable:=FALSE;
-    fgForce:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};
-    fgPull:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
-    fgCommand:=nGood;
     FgReadStatus;
     stReason:=FgRefusalText(fgStatus{FG_S_REFUSAL_REASON});
     fgText:="refused: "+stReason;
@@ -419,9 +440,11 @@ ${crc_table}];
   ENDFUNC
 
   LOCAL PROC FgForget()
-    IF fgEnable OR FgIsOn() fgEnded:=TRUE;
-    fgEnable:=FALSE;
-    fgForce:=0;
+    ! fgForce stays: between T_ROB1's two lines it would hold 0 N
+    IF fgEnable OR FgIsOn() THEN
+      fgEnable:=FALSE;
+      fgEnded:=TRUE;
+    ENDIF
     nWant{FG_C_CONTROL_WORD}:=0;
     nWant{FG_C_FORCE_SETPOINT}:=0;
     nGood:=nWant;

@@ -8,16 +8,25 @@ from typing import Final
 
 from gateway import defaults
 from gateway.clients.exchange import Endpoint, ExchangeTable
-from gateway.clients.rendering import endpoint_of
+from gateway.clients.rendering import endpoint_of, is_no_address
 from gateway.clients.wiring.section import Row, Section
+from gateway.control.settings import LeaseAction
 from gateway.profiles import Rig
 
 _HOLDING: Final = 40001
 """Name of holding register 0 in S7's MB_MODE 0 and 1."""
+_LOST: Final = {
+    LeaseAction.FAULT: "the safe voltage, and fault A310",
+    LeaseAction.HOLD: "a warning, and the force is kept (hold)",
+    LeaseAction.RAMP: "along the ramp to 0 N, and off",
+}
+"""What happens at the end of the lease."""
 _SHOWN: Final = ("status_word", "state", "force_measured", "fault_code", "refusal_reason")
 """What a robot wants to see that reads register by register."""
 SHORTEST_TIMER_LEASE_S: Final = 0.3
 """Three periods of RAPID's shortest cyclic timer, 0.1 s: two lost ones are not a loss of the master."""
+SHORTEST_S7_LEASE_S: Final = 0.36
+"""Three heartbeats of MB_CLIENT, one request at a time: 8 to 12 calls of the block of 10 ms each."""
 
 
 def network_sections(rig: Rig, called: str) -> Iterator[Section]:
@@ -56,7 +65,9 @@ def _network(rig: Rig, table: ExchangeTable) -> Section:
         ("owner", network.owner or "the first master that commands, until it lets go"),
         (
             "lease",
-            "none: a command lasts until the next one" if lease_s is None else f"{lease_s:g} s without a new heartbeat",
+            "none: a command lasts until the next one"
+            if lease_s is None
+            else f"{lease_s:g} s without a new heartbeat, then {_LOST[rig.control.supervision.lease_action]}",
         ),
         (
             "upload of models",
@@ -85,11 +96,7 @@ def _network_sentences(rig: Rig, table: ExchangeTable) -> tuple[str, ...]:
             f"network.port is 0: the gateway takes a free port at each start, {where.shown_port} below, and its banner says "
             "which. A robot or PLC needs one that stays: set network.port (502 is Modbus' own)."
         )
-    if rig.control.supervision.lease_s is None:
-        sentences.append(
-            "This rig has no lease: the force lasts when the master's program stops or its cable is pulled. Before a robot or "
-            f"PLC commands it, set supervision.lease_s ({defaults.LEASE_S:g})."
-        )
+    sentences += _rights(rig)
     if network.require_byte_order_echo:
         echo = table.map.find("byte_order_echo").address
         sentences.append(
@@ -97,6 +104,23 @@ def _network_sentences(rig: Rig, table: ExchangeTable) -> tuple[str, ...]:
             f"(4{echo + 1:04d}); the generated clients do it by themselves."
         )
     return tuple(sentences)
+
+
+def _rights(rig: Rig) -> Iterator[str]:
+    """Yield who may not command, and whose force outlasts it."""
+    supervision, owner = rig.control.supervision, rig.network.owner
+    if supervision.lease_s is None:
+        yield (
+            "This rig has no lease: the force lasts when the master's program stops or its cable is pulled. Before a robot or "
+            f"PLC commands it, set supervision.lease_s ({defaults.LEASE_S:g})."
+        )
+    elif supervision.lease_action is LeaseAction.HOLD:
+        yield (
+            "At the end of its lease this rig keeps the force (supervision.lease_action: hold): when a program stops "
+            "or its cable is pulled. Before a robot or PLC commands it, set fault or ramp."
+        )
+    if is_no_address(owner):
+        yield f"Only {owner} may command here (network.owner): a robot or PLC on plain Modbus TCP may read, and disable."
 
 
 def _irc5(rig: Rig, table: ExchangeTable) -> Section:
@@ -140,6 +164,11 @@ def _requests(table: ExchangeTable) -> Iterator[tuple[str, bool, int, int]]:
 def _s7(rig: Rig, table: ExchangeTable) -> Section:
     where = table.where
     octets = where.host.split(".")
+    calls, lease_s = "a cyclic interrupt of 10 ms: a heartbeat every 80 to 120 ms", rig.control.supervision.lease_s
+    if lease_s is not None and lease_s < SHORTEST_S7_LEASE_S:
+        calls += (
+            f" (lease {lease_s:g} s: one that is late ends the force; set lease_s to {SHORTEST_S7_LEASE_S:g} or more)"
+        )
     shown = f"ADDR[1] .. ADDR[4] = {', '.join(octets)}" if len(octets) == 4 else where.host
     rows = (
         ("CONNECT (TCON_IP_v4)", "value"),
@@ -152,6 +181,7 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
         ("LocalPort", "0"),
         ("MB_Unit_ID", f"{where.unit}: static of the MB_CLIENT instance, 255 as it comes; the block below sets it"),
         ("MB_DATA_PTR", "an Array of Word in a DB without optimized access, at least MB_DATA_LEN long"),
+        ("call of the block below", calls),
     )
     stop = "A CPU goes on at an emergency stop: `enable` of the block has to fall with it (and with the guard, and the robot)."
     return Section("Siemens S7-1200/1500: connection of MB_CLIENT", (stop,), rows)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import fields
+from ipaddress import ip_address
 
 from gateway.clients.rendering import endpoint_of
 from gateway.clients.wiring.device_wires import GENERAL, RS485, wires_of
@@ -74,7 +75,8 @@ def _tls_section(place: int, face: TlsFace, unit_option: str) -> Section:
         ("masters need", f"a certificate signed by {face.ca}, with a role: setpoint to command, calibration to upload"),
         ("not for", "the generated clients, which speak plain Modbus TCP: for masters with TLS of their own"),
     )
-    where = f"{face.bind}:{face.port or 'PORT'}{unit_option}"
+    host = "GATEWAY-ADDRESS" if ip_address(face.bind).is_unspecified else face.bind
+    where = f"{host}:{face.port or 'PORT'}{unit_option}"
     try_it = f"force-gateway read state --gateway {where} --tls {face.ca} --cert CLIENT.crt --key CLIENT.key"
     return Section(
         f"Face {place}: Modbus/TCP Security",

@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import Any, ClassVar
 
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
-from tests.clients.programs.iec_libraries import modbus_fb, tc2_modbus_srv
+from tests.clients.programs.iec_libraries import REQUEST_EXCEPTION, modbus_fb, tc2_modbus_srv
 from tests.clients.programs.machine import Frame, Machine, RapidError
 from tests.clients.programs.syntax import Node, parse
 
@@ -20,6 +20,13 @@ def values(act: Callable[..., Any]) -> Callable[[Machine, list[Node], Frame], An
         return act(*(machine.value(each[2] if each[0] == "named" else each, frame) for each in arguments))
 
     return call
+
+
+def real_to_int(number: float) -> int:
+    """TwinCAT: "outside the integer's range of values, you get an undefined result. An exception error is also possible!"""
+    if not -32768.5 < number < 32767.5:
+        raise OverflowError(f"REAL_TO_INT({number})")
+    return round(number)
 
 
 def nothing(*_: Any) -> None:
@@ -222,8 +229,9 @@ class UniversalRobot:
         library = {
             "first_index": 0,
             "typed": True,
+            "sliced": True,  # a thread whose time is used up stops within a statement
             "socket_open": values(self.open),
-            "socket_close": values(lambda name: None),
+            "socket_close": values(self.close),
             "socket_send_byte": values(self.send_byte),
             "socket_read_byte_list": values(self.read),
             "floor": values(math.floor),
@@ -241,6 +249,10 @@ class UniversalRobot:
         except Unplugged:
             return False
         return True
+
+    def close(self, _name: str) -> None:
+        """What nobody has read goes with the socket; no manual says that it goes with the program that opened it."""
+        self.received = b""
 
     def send_byte(self, value: int, _name: str) -> bool:
         assert isinstance(value, int) and 0 <= value <= 255
@@ -364,7 +376,7 @@ class Plc:
             "WORD_TO_INT": values(lambda word: word - 65536 if word > 32767 else word),
             "INT_TO_WORD": values(lambda number: number & 0xFFFF),
             "INT_TO_REAL": values(float),
-            "REAL_TO_INT": values(round),
+            "REAL_TO_INT": values(real_to_int),
             "REAL_TO_DWORD": values(lambda number: struct.unpack(">I", struct.pack(">f", number))[0]),
             "DWORD_TO_REAL": values(lambda bits: struct.unpack(">f", struct.pack(">I", bits))[0]),
             "SHL": values(lambda number, places: number << places & 0xFFFFFFFF),
@@ -442,6 +454,9 @@ class MbClient:
     Manuals call REQ a level, users have seen it want an edge: here it has to rise, which serves both.
     """
 
+    NO_ANSWER = 0x80C8
+    """STATUS of a request that was not answered in time; of a connection that has broken it is another."""
+
     def __init__(self, plc: "S7") -> None:
         self.plc, self.BUSY, self.DONE, self.ERROR, self.STATUS, self.asked = plc, False, False, False, 0x7000, None
         self.calls, self.MB_Unit_ID, self.RCV_TIMEOUT, self.was_asked = 0, 255, 2.0, False
@@ -484,7 +499,7 @@ class MbClient:
         try:
             pdu = self.plc.gateway.ask_unit(self.MB_Unit_ID, request)
         except Unplugged:
-            self.ERROR, self.STATUS = True, 0x80C8
+            self.ERROR, self.STATUS = True, self.NO_ANSWER
             return
         if pdu[0] & 0x80:
             self.ERROR, self.STATUS = True, 0x8380 + {1: 1, 2: 3}.get(pdu[1], 4)
@@ -576,3 +591,4 @@ class Codesys(StructuredText):
 
     def prepare(self) -> None:
         self.machine.blocks |= modbus_fb(self.gateway)
+        self.machine.library["MODBUSFB"] = {"ERROR": {"REQUESTEXCEPTION": REQUEST_EXCEPTION}}  # type: ignore[assignment]

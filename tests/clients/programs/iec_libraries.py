@@ -1,7 +1,7 @@
 """The Modbus blocks of TwinCAT and CODESYS, as far as the generated transports call them: edges, busy, done, what they refuse.
 
 Beckhoff Infosys, TF6250: FB_MBReadRegs, FB_MBWriteRegs, FB_MBReadWriteRegs. CODESYS, library ModbusFB: ClientTCP and its
-requests, whose xExecute, xDone and xError are those of ETrigTo.
+requests, whose xExecute, xDone and xError are those of ETrigTo, and enumeration Error.
 """
 
 import struct
@@ -12,6 +12,8 @@ from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
 
 SCANS = 2
 """Calls of a block that a request takes."""
+REQUEST_EXCEPTION, REPLY_TIMEOUT = 51, 56
+"""Numbers of ModbusFB.Error: the answer was an exception; there was none in time, and the connection stands."""
 
 
 def pdu_of(write: tuple[int, list[int]] | None, read: tuple[int, int] | None) -> bytes:
@@ -28,6 +30,9 @@ def pdu_of(write: tuple[int, list[int]] | None, read: tuple[int, int] | None) ->
 
 class TwinCatRequest:
     """One of FB_MB...: starts with the rise of bExecute, bBusy from the same call on; keeps its own connection."""
+
+    NO_ANSWER = 1861
+    """nErrId of a request that was not answered in time: ADS error 16#745."""
 
     def __init__(self, gateway: GatewayAtHand) -> None:
         self.gateway, self.bBusy, self.bError, self.nErrId = gateway, False, False, 0
@@ -49,7 +54,7 @@ class TwinCatRequest:
         try:
             pdu = self.gateway.ask_unit(given["nUnitID"], pdu_of(write, read))
         except Unplugged:
-            self.bError, self.nErrId = True, 1861
+            self.bError, self.nErrId = True, self.NO_ANSWER
             return
         self.bError, self.nErrId = bool(pdu[0] & 0x80), 0x8000 + pdu[1] if pdu[0] & 0x80 else 0
         if read and not self.bError:
@@ -126,7 +131,7 @@ class CodesysRequest:
 
     def __init__(self, gateway: GatewayAtHand, kind: str) -> None:
         self.gateway, self.kind, self.xDone, self.xError, self.xBusy = gateway, kind, False, False, False
-        self.executed, self.calls = False, 0
+        self.executed, self.calls, self.eErrorID = False, 0, 0
 
     def call(self, given: dict[str, Any]) -> None:
         assert 50_000 <= given["udiReplyTimeout"] < given["udiTimeOut"], "0, its own, would wait for ever"
@@ -159,10 +164,12 @@ class CodesysRequest:
             assert given["rClient"].xConnected
             pdu = self.gateway.ask_unit(given["uiUnitId"], pdu_of(write, read))
         except Unplugged:
-            self.xError = True
-            given["rClient"].lose()
+            self.xError, self.eErrorID = True, REPLY_TIMEOUT
+            if self.gateway.is_cut:
+                given["rClient"].lose()
             return
         self.xDone, self.xError = not pdu[0] & 0x80, bool(pdu[0] & 0x80)
+        self.eErrorID = REQUEST_EXCEPTION if self.xError else 0
         if read and self.xDone:
             target[: read[1]] = struct.unpack(f">{read[1]}H", pdu[2:])
 

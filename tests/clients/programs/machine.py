@@ -6,7 +6,6 @@ routine is also the check that everything is declared.
 """
 
 import copy
-import math
 import struct
 from collections.abc import Callable
 from functools import cache
@@ -90,6 +89,9 @@ class Machine:
         self.global_names: dict[str, Any] = {}
         self.blocks: dict[str, Callable[[], Any]] = {}
         self.steps = 0
+        self.is_critical = False
+        self.switch: Callable[[Node], object] = lambda _statement: None
+        """Called wherever another task or thread may run, with the statement that comes next."""
         self.called: set[str] = set()
 
     def key(self, name: str) -> str:
@@ -210,13 +212,22 @@ class Machine:
             self.steps += 1
             if self.steps > MOST_STEPS:
                 raise RecursionError("an endless loop")
+            if not self.is_critical:
+                self.switch(statement)
             getattr(self, f"run_{statement[0]}")(statement, frame)
+
+    def run_critical(self, node: Node, _frame: Frame) -> None:
+        """URScript: no other thread runs in here."""
+        self.is_critical = node[1]
 
     def run_block(self, node: Node, frame: Frame) -> None:
         self.run(node[1], frame)
 
     def run_assign(self, node: Node, frame: Frame) -> None:
-        self.assign(node[1], self.value(node[2], frame), frame, node[3] if len(node) > 3 else "")
+        value = self.value(node[2], frame)
+        if self.library.get("sliced") and not self.is_critical:
+            self.switch(node)
+        self.assign(node[1], value, frame, node[3] if len(node) > 3 else "")
 
     def assign(self, target: Node, value: Any, frame: Frame, scope: str = "") -> None:
         if target[0] == "index":
@@ -375,7 +386,6 @@ OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
     "/": lambda a, b: a / b,
     "DIV": lambda a, b: int(a) // int(b),
     "MOD": lambda a, b: int(a) % int(b),
-    "%": lambda a, b: math.fmod(a, b) if isinstance(a, float) else a % b,
     "AND": lambda a, b: a & b,
     "OR": lambda a, b: a | b,
     "XOR": lambda a, b: a ^ b,

@@ -573,7 +573,7 @@ class UrScript(Parser):
         "AND": 20,
         **dict.fromkeys(["==", "!=", "<", ">", "<=", ">="], 30),
         **dict.fromkeys(["+", "-"], 40),
-        **dict.fromkeys(["*", "/", "%"], 50),
+        **dict.fromkeys(["*", "/"], 50),  # no remainder: the script manual has none
     }
     UNARY: ClassVar[dict[str, int]] = {"NOT": 25}
     EQUAL = "=="
@@ -637,9 +637,9 @@ class UrScript(Parser):
             value = self.expression()
             self.take("\n")
             return ("return", value)
-        if self.maybe("ENTER_CRITICAL", "EXIT_CRITICAL"):
+        if word := self.maybe("ENTER_CRITICAL", "EXIT_CRITICAL"):
             self.take("\n")
-            return ("block", [])
+            return ("critical", word == "ENTER_CRITICAL")
         scope = self.maybe("LOCAL", "GLOBAL")
         target = self.postfix(("name", self.name(), line))
         if self.word == "=":

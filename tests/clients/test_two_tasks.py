@@ -1,0 +1,138 @@
+"""The program and the exchange run side by side, on IRC5 and Universal Robots: what one sets, the other does not lose."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from gateway.codes.faults import FaultCode
+from tests.clients.conftest import CONTROLLERS
+from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.syntax import Node
+from tests.clients.scenes import MAP, TEXTS, cycles
+from tests.clients.test_disables_beside_refusals import refuse_tares
+from tests.clients.test_edges_and_losses import TARE
+
+RESET = 2
+ENABLING: dict[str, list[Callable[[Any], object]]] = {
+    "rapid": [lambda client: client.set(fgForce=12.0), lambda client: client.set(fgEnable=True)],
+    "urscript": [lambda client: client.enable(12.0)],
+}
+"""What the program does, one thing at a time: RAPID sets two data."""
+
+
+class Switches:
+    """Lets the other task do its next thing at the place-th switch of tasks, and each further one `apart` later."""
+
+    def __init__(self, client: Any, acts: list[Callable[[Any], object]], place: int, apart: int = 1) -> None:
+        self.client, self.acts = client, acts
+        self.at = {place + k * apart: act for k, act in enumerate(acts)}
+        self.count, self.is_busy, self.met = 0, False, Counter[int]()
+        client.machine.switch = self.switch
+
+    def switch(self, statement: Node) -> None:
+        self.met[id(statement)] += 1
+        if self.is_busy or self.met[id(statement)] > 2:  # a loop's later turns show nothing new
+            return
+        self.count += 1
+        if act := self.at.pop(self.count, None):
+            self.is_busy = True
+            steps = self.client.machine.steps
+            act(self.client)
+            self.client.machine.steps, self.is_busy = steps, False
+
+    def end(self) -> None:
+        """Do now what was not done yet."""
+        self.client.machine.switch = lambda _statement: None
+        for act in self.at.values():
+            act(self.client)
+
+
+def every_place(
+    language: str, prepare: Callable[[Any, GatewayAtHand], object], acts: list[Callable[[Any], object]], apart: int = 1
+) -> Iterator[tuple[Any, GatewayAtHand]]:
+    """Run one cycle behind `prepare`, the program's acts at each of its places, and three cycles more."""
+    place, last = 1, 1
+    while place <= last:
+        gateway = GatewayAtHand(MAP)
+        client = CONTROLLERS[language](TEXTS[language], gateway)
+        prepare(client, gateway)
+        switches = Switches(client, acts, place, apart)
+        client.cycle(5.0)
+        last = switches.count
+        switches.end()
+        gateway.is_cut = False
+        for _ in range(3):
+            client.cycle(5.0)
+        yield client, gateway
+        place += 1
+
+
+def tare_that_is_refused(client: Any, gateway: GatewayAtHand) -> None:
+    refuse_tares(gateway)
+    client.tare()
+
+
+def nobody_there(_client: Any, gateway: GatewayAtHand) -> None:
+    gateway.is_cut = True
+
+
+def stopped_by_another(client: Any, gateway: GatewayAtHand) -> None:
+    client.enable(7.0)
+    cycles(client, 2)
+    gateway.stop_from_elsewhere()
+
+
+@pytest.mark.parametrize(("language", "apart"), [("rapid", 1), ("rapid", 4), ("urscript", 1)])
+@pytest.mark.parametrize("prepare", [tare_that_is_refused, nobody_there, stopped_by_another])
+def test_an_enable_beside_an_exchange_holds_its_own_force_or_none(language: str, prepare: Any, apart: int) -> None:
+    """In band at 0 N: the program would grind without force."""
+    for client, gateway in every_place(language, prepare, ENABLING[language], apart):
+        found = gateway.bank.command
+        assert (int(found.control_word), found.force_setpoint_n) in ((1, 12.0), (0, 0.0))
+        assert found.control_word or client.ended or "refused" in client.text
+
+
+@pytest.mark.parametrize("language", ["rapid", "urscript"])
+def test_an_edge_that_is_set_beside_another_goes_out_as_well_and_once(language: str) -> None:
+    def prepare(client: Any, gateway: GatewayAtHand) -> None:
+        cycles(client, 2)
+        gateway.fail(FaultCode.OVER_FORCE)
+        client.tare()
+
+    for _, gateway in every_place(language, prepare, [lambda client: client.reset()]):
+        edges = [words[0] for words in gateway.words if words[0]]
+        assert sorted(edges) in ([RESET, TARE], [RESET | TARE]), edges
+
+
+def test_a_force_that_is_set_beside_a_refusal_of_another_is_the_one_that_holds() -> None:
+    """Too much was asked for, the program lowers it at once: the last accepted force must not come back over that."""
+
+    def prepare(client: Any, gateway: GatewayAtHand) -> None:
+        client.enable(7.0)
+        cycles(client, 2)
+        answer = gateway.answer
+
+        def refuse(request: bytes) -> bytes:
+            too_much = request[0] == 23 and request[12:14] == (4000).to_bytes(2, "big")
+            return bytes((request[0] | 0x80, 3)) if too_much else answer(request)
+
+        gateway.answer = refuse  # type: ignore[method-assign]
+        client.force(40.0)
+
+    for _, gateway in every_place("urscript", prepare, [lambda client: client.force(5.0)]):
+        assert gateway.bank.command.force_setpoint_n == 5.0
+
+
+@pytest.mark.parametrize("language", ["rapid", "urscript"])
+def test_a_disable_at_any_place_of_an_exchange_takes_the_force_off(language: str) -> None:
+    def prepare(client: Any, _gateway: GatewayAtHand) -> None:
+        client.enable(7.0)
+        cycles(client, 2)
+        client.force(9.0)
+
+    for client, gateway in every_place(language, prepare, [lambda client: client.disable()]):
+        assert gateway.bank.command.control_word == 0 and not client.enabled and not client.ended
