@@ -27,6 +27,7 @@ from gateway.control.state_table import StateEvent
 from gateway.control.supervision.contact_detection import ContactDetector
 from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
 from gateway.control.supervision.one_shot_events import OneShotEvents
+from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.control.transitions import ControllerParts, Transitions
 from gateway.control.valve.turning import Turning
 from gateway.control.valve.valve_switch import ValveSwitch
@@ -66,7 +67,9 @@ class Controller:
         self._faults = FaultDetector(settings)
         self._faults.expect_noise(calibration.noise_n)
         self._conditioner = SampleConditioner(settings.supervision, compensation.cell)
-        self._turning = Turning(self._valve, self._commands, self._conditioner)
+        limits, lag_s = settings.limits, settings.supervision.response_lag_s
+        pressure = ExpectedForce(model, lag_s, limits.safe_voltage_v, limits.voltage_max_v)
+        self._turning = Turning(self._valve, self._commands, self._conditioner, pressure)
         self._edge_check = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self._most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._one_shot = OneShotEvents(settings.supervision.stuck_n)
@@ -114,6 +117,8 @@ class Controller:
         model = self._turning.model_of(self._calibration)
         timed = timing_of(self._calibration.response, self._rig_settings)
         self._loop.use(model, self._given_n, timed)
+        self._turning.pressure.retime(timed.supervision.response_lag_s)
+        self._turning.pressure.use(model)
         self._commands.use(model)
 
     def _most_pull_n(self) -> float:

@@ -30,6 +30,7 @@ class ValveSwitch:
         self._vented_s = inf
         self._told_s = -inf
         self._differs_s = inf
+        self._has_been_told = False  # of where it is to stand, or has stood there: before, it cannot be blamed
         self._status = ValveStatus()
 
     @property
@@ -57,7 +58,9 @@ class ValveSwitch:
         if wanted is not None and wanted is not self.commanded and self._may_switch(now_s):
             self.commanded, self._told_s = wanted, now_s
         is_confirmed = self.commanded is not None and status.stands is self.commanded
-        self._differs_s = inf if is_confirmed or status.stands is None else min(self._differs_s, now_s)
+        self._has_been_told = self._has_been_told or is_confirmed or self.order is not None
+        is_known = self._has_been_told and status.stands is not None
+        self._differs_s = min(self._differs_s, now_s) if is_known and not is_confirmed else inf
         has_dwelt = now_s - self._told_s >= self.settings.dwell_s
         is_wanted = wanted is None or wanted is self.commanded
         self.is_switching = not (is_confirmed and has_dwelt and is_wanted)
