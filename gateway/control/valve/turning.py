@@ -52,7 +52,7 @@ class Turning:
         pulls = bool(self._commands.command.control_word & _PULL)
         wanted = valve.wanted(pulls=pulls, is_enabled=machine.is_enabled)
         is_left = self._follow_pressure(now_s, line.standing_v, parts.loop)
-        is_vented = parts.loop.voltage_v <= 0.0 and abs(parts.loop.compute_expected_rise()) <= _VENTED_N and not is_left
+        is_vented = parts.loop.voltage_v <= 0.0 and not is_left
         is_vented = is_vented and line.standing_v is not None and line.standing_v <= _VENTED_V
         if not valve.step(now_s, wanted, status, is_vented=is_vented):
             return False
