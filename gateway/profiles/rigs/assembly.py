@@ -72,12 +72,13 @@ FAULTS: Final = (
 WARNINGS: Final = (
     *checks.WARNINGS,
     *line_checks.WARNINGS,
+    *valve_checks.WARNINGS,
     *wire_checks.WARNINGS,
     *network_checks.WARNINGS,
     *face_checks.WARNINGS,
     *tls_checks.WARNINGS,
 )
-HARDWARE: Final = (*line_checks.HARDWARE, *face_checks.HARDWARE)
+HARDWARE: Final = (*line_checks.HARDWARE, *valve_checks.HARDWARE, *face_checks.HARDWARE)
 
 
 @dataclass(frozen=True, slots=True)
