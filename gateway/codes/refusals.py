@@ -173,7 +173,7 @@ class RefusalReason(IntEnum):
         Explanation(
             "W214",
             "the output device is faulty",
-            "Enable was asked for while the DAC or regulator does not answer properly.",
+            "Enable was asked for while the DAC or regulator does not answer properly, or a reset while it does not answer.",
             "No power, a cable, or a device that refuses.",
             "Check its power, its cable and its baud; `force-gateway explain E111` for a silent line.",
         ),

@@ -27,7 +27,6 @@ from gateway.control.state_table import StateEvent
 from gateway.control.supervision.contact_detection import ContactDetector
 from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
 from gateway.control.supervision.one_shot_events import OneShotEvents
-from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.control.transitions import ControllerParts, Transitions
 from gateway.control.valve.turning import Turning
 from gateway.control.valve.valve_switch import ValveSwitch
@@ -53,11 +52,10 @@ class Controller:
         compensation: Compensation = NO_COMPENSATION,
     ) -> None:
         model = calibration.model
-        self._calibration = calibration
+        self._calibration, self._compensation = calibration, compensation
         self._valve = ValveSwitch(settings.valve) if settings.valve else None
         self._rig_settings = compensation.settings(settings)
         self._settings = settings = timing_of(calibration.response, self._rig_settings)
-        self._compensation = compensation
         self.calibration_id = calibration.number
         self._commands = CommandTracker(settings)
         self._commands.use(model)
@@ -67,9 +65,7 @@ class Controller:
         self._faults = FaultDetector(settings)
         self._faults.expect_noise(calibration.noise_n)
         self._conditioner = SampleConditioner(settings.supervision, compensation.cell)
-        limits, lag_s = settings.limits, settings.supervision.response_lag_s
-        pressure = ExpectedForce(model, lag_s, limits.safe_voltage_v, limits.voltage_max_v)
-        self._turning = Turning(self._valve, self._commands, self._conditioner, pressure)
+        self._turning = Turning(self._valve, self._commands, self._conditioner, settings, model)
         self._edge_check = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self._most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._one_shot = OneShotEvents(settings.supervision.stuck_n)
@@ -117,8 +113,7 @@ class Controller:
         model = self._turning.model_of(self._calibration)
         timed = timing_of(self._calibration.response, self._rig_settings)
         self._loop.use(model, self._given_n, timed)
-        self._turning.pressure.retime(timed.supervision.response_lag_s)
-        self._turning.pressure.use(model)
+        self._turning.use(model, timed)
         self._commands.use(model)
 
     def _most_pull_n(self) -> float:
@@ -204,6 +199,7 @@ class Controller:
             self._supervise(now_s, line)
         if self._machine.is_enabled:
             self._move(now_s, dt_s)
+        self._machine.check_rest(now_s, line)
         return self._loop.voltage_v
 
     @property

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import Final
 
+from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.inputs import LineStatus
@@ -35,7 +36,8 @@ _NAMES: Final = {
 }
 _WHOLE: Final = ControlBit(0)
 _PUSHING: Final = "and a run is made pushing (bit 4 0, enable, wait until status bits 8, 9 are 0)"
-_OFF: Final = State.OFF
+_UNKNOWN: Final = "whether air still presses is not known"
+_OFF, _LOST = State.OFF, FaultCode.OUTPUT_LOST
 _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
     State.FAULT: RefusalReason.FAULT_LATCHED,
     State.CALIBRATING: RefusalReason.CALIBRATING,
@@ -46,7 +48,7 @@ _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
 class Situation:
     """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; excuse: the
     machine, where that is the cause of it; line_fault: what the output line reports, with its code; is_output_known: that the
-    output answers, so that its voltage is ours;
+    output answers, so that its voltage is ours; is_output_heard: that it answers at all;
     expected_n: force that the voltages of late still make, by the model; repeats: that the load cell seems to be frozen;
     ramps_down: the force goes to 0, and then the output off."""
 
@@ -58,6 +60,7 @@ class Situation:
     excuse: str
     line_fault: str
     is_output_known: bool
+    is_output_heard: bool
     voltage_v: float
     applied_n: float
     expected_n: float
@@ -89,6 +92,7 @@ class Readiness:
             excuse=self._parts.faults.excuse(block, now_s, reading, line),
             line_fault=f"{line.fault.code} {line_words(line)}" if line.fault else "",
             is_output_known=line.acknowledged_v is not None and block is not RefusalReason.OUTPUT_FAULT,
+            is_output_heard=line.fault is not _LOST and not self._parts.faults.is_silent(now_s, line),
             voltage_v=loop.voltage_v,
             applied_n=loop.applied_n,
             expected_n=loop.compute_expected_rise(),
@@ -207,6 +211,9 @@ class EdgeCheck:
             return EdgeRefusal(RefusalReason.RESET_NEEDS_ZERO, ControlBit.RESET_FAULT, text)
         if at.state is State.OFF:
             return None  # as many programs begin: there is no fault latched, and that is what was asked for
+        if not at.is_output_heard:
+            text = f"reset refused: {at.line_fault or 'the output device does not answer'}: {_UNKNOWN}"
+            return EdgeRefusal(RefusalReason.OUTPUT_FAULT, ControlBit.RESET_FAULT, text)
         if not self._commands.would_beat_since(at.faulted_s, at.now_s, command):
             text = f"reset refused: heartbeat = {command.heartbeat} as at the fault: write another value with the reset"
             return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.RESET_FAULT, text)
@@ -222,7 +229,7 @@ class EdgeCheck:
         if at.state in ENABLED_STATES and at.voltage_v > 0.0:
             return f"{at.voltage_v:.2f} V are out: disable the output or set the force to 0 first"
         if not at.is_output_known:
-            return f"{at.line_fault or 'the output does not answer'}: whether air still presses is not known"
+            return f"{at.line_fault or 'the output does not answer'}: {_UNKNOWN}"
         if not at.reading.is_fresh:
             return "no fresh load-cell sample"
         if at.repeats:

@@ -7,6 +7,7 @@ from gateway.control.command_edges import CommandTracker
 from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.inputs import CalibrationInUse, LineStatus
 from gateway.control.sample_conditioning import SampleConditioner
+from gateway.control.settings import ControlSettings
 from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.control.transitions import Transitions
 from gateway.control.valve.pull_model import scale_forces
@@ -19,7 +20,7 @@ _VENTED_V = 0.05  # a device answers in steps of its own
 
 
 class Turning:
-    """valve: None on a rig without one, then everything pushes. pressure: what may be behind the valve, by the model; at the
+    """valve: None on a rig without one, then everything pushes. What pressure may be behind it is followed by the model; at the
     beginning as much as the rig allows, for whoever was in charge before may have been killed while the tool pressed."""
 
     def __init__(
@@ -27,12 +28,20 @@ class Turning:
         valve: ValveSwitch | None,
         commands: CommandTracker,
         conditioner: SampleConditioner,
-        pressure: ExpectedForce,
+        settings: ControlSettings,
+        model: Bsfm,
     ) -> None:
-        self.valve, self.pressure = valve, pressure
+        limits, lag_s = settings.limits, settings.supervision.response_lag_s
+        self.valve = valve
+        self._pressure = ExpectedForce(model, lag_s, limits.safe_voltage_v, limits.voltage_max_v)
         self._commands, self._conditioner = commands, conditioner
         self._last_s = inf
         self._may_stand_v: float | None = None  # highest voltage that may be out; None: as at the beginning
+
+    def use(self, model: Bsfm, settings: ControlSettings) -> None:
+        """Follow the pressure by another model, at the pace of these settings."""
+        self._pressure.retime(settings.supervision.response_lag_s)
+        self._pressure.use(model)
 
     def model_of(self, calibration: CalibrationInUse) -> Bsfm:
         """Return the model of the direction in effect."""
@@ -73,5 +82,5 @@ class Turning:
         if standing_v is None and before_v is not None:
             self._may_stand_v = max(before_v, loop.voltage_v)
         if self._may_stand_v is not None:
-            self.pressure.advance(self._may_stand_v, dt_s)
-        return abs(self.pressure.rise_n(loop.branch_share)) > _VENTED_N
+            self._pressure.advance(self._may_stand_v, dt_s)
+        return abs(self._pressure.rise_n(loop.branch_share)) > _VENTED_N

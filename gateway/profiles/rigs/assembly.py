@@ -72,7 +72,6 @@ FAULTS: Final = (
 WARNINGS: Final = (
     *checks.WARNINGS,
     *line_checks.WARNINGS,
-    *valve_checks.WARNINGS,
     *wire_checks.WARNINGS,
     *network_checks.WARNINGS,
     *face_checks.WARNINGS,

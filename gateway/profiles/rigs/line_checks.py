@@ -137,9 +137,10 @@ def check_watchdog_time(parts: Parts) -> Found:
 
 def check_ports_stable(parts: Parts) -> Found:
     """Yield a warning for a port whose name depends on the order of plugging."""
-    for key, line, _ in lines_of(parts):
-        if line.port is not None and line.port.startswith(UNSTABLE_PATHS):
-            yield f"{key}.port", f"{line.port} {UNSTABLE}"
+    named = {key: line.port for key, line, _ in lines_of(parts)} | {"valve": parts.valve.port if parts.valve else None}
+    for key, port in named.items():
+        if port is not None and port.startswith(UNSTABLE_PATHS):
+            yield f"{key}.port", f"{port} {UNSTABLE}"
 
 
 def check_baud(parts: Parts) -> Found:

@@ -4,7 +4,7 @@ from typing import Final
 
 from gateway.devices import DeviceRole
 from gateway.profiles.rigs.checks import Check, Found, Parts
-from gateway.profiles.rigs.line_checks import UNSTABLE, UNSTABLE_PATHS, is_same_port, why_no_path
+from gateway.profiles.rigs.line_checks import is_same_port, why_no_path
 from gateway.profiles.strict_yaml.fault_sentences import volt
 
 
@@ -50,16 +50,7 @@ def check_valve_pressure(parts: Parts) -> Found:
             yield f"limits.{key}", f"{volt(value)}: a rig with a valve needs 0 V, it is switched without pressure only"
 
 
-def check_valve_port_stable(parts: Parts) -> Found:
-    """Yield a warning for a port whose name depends on the order of plugging."""
-    port = parts.valve.port if parts.valve else None
-    if port is not None and port.startswith(UNSTABLE_PATHS):
-        yield "valve.port", f"{port} {UNSTABLE}"
-
-
 HARDWARE: Final[tuple[Check, ...]] = (check_valve_port,)
 """Faults that a run with simulated devices does not mind."""
 
 FAULTS: Final[tuple[Check, ...]] = (check_valve_device, check_valve_simulated_port, check_valve_pressure)
-
-WARNINGS: Final[tuple[Check, ...]] = (check_valve_port_stable,)
