@@ -47,8 +47,8 @@ _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
 @dataclass(frozen=True, slots=True)
 class Situation:
     """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; excuse: the
-    machine, where that is the cause of it; line_fault: what the output line reports, with its code; is_output_known: that the
-    output answers, so that its voltage is ours; is_output_heard: that it answers at all;
+    machine, where that is the cause of it, or what the valve does; line_fault: what the output line reports, with its code;
+    is_output_known: that the output answers, so that its voltage is ours; is_output_heard: that it answers at all;
     expected_n: force that the voltages of late still make, by the model; repeats: that the load cell seems to be frozen;
     ramps_down: the force goes to 0, and then the output off."""
 
@@ -71,8 +71,8 @@ class Situation:
 class Readiness:
     """Tells whether an enable would be accepted now, and where the controller stands; changes nothing of what it is given."""
 
-    def __init__(self, parts: ControllerParts, machine: Transitions) -> None:
-        self._parts, self._machine = parts, machine
+    def __init__(self, parts: ControllerParts, machine: Transitions, valve: ValveSwitch | None = None) -> None:
+        self._parts, self._machine, self._valve = parts, machine, valve
 
     def enable_block(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
         """Return why an enable would be refused now; NONE where it would be accepted, or has been."""
@@ -89,7 +89,7 @@ class Readiness:
             faulted_s=machine.faulted_s,
             reading=reading,
             block=block,
-            excuse=self._parts.faults.excuse(block, now_s, reading, line),
+            excuse=self._excuse(block, now_s, reading, line),
             line_fault=f"{line.fault.code} {line_words(line)}" if line.fault else "",
             is_output_known=line.acknowledged_v is not None and block is not RefusalReason.OUTPUT_FAULT,
             is_output_heard=line.fault is not _LOST and not self._parts.faults.is_silent(now_s, line),
@@ -103,7 +103,18 @@ class Readiness:
     def _block_in_off(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
         if self._machine.is_stopping:
             return RefusalReason.NOT_READY
-        return self._parts.faults.enable_block(now_s, reading, line)
+        block = self._parts.faults.enable_block(now_s, reading, line)
+        return block or (RefusalReason.VALVE_UNKNOWN if self._valve_words(now_s) else block)
+
+    def _excuse(self, block: RefusalReason, now_s: float, reading: Reading, line: LineStatus) -> str:
+        if block is RefusalReason.VALVE_UNKNOWN:
+            return self._valve_words(now_s)
+        return self._parts.faults.excuse(block, now_s, reading, line)
+
+    def _valve_words(self, now_s: float) -> str:
+        """What would be a fault of the valve right behind an enable; empty where nothing would."""
+        cause = self._valve.first_cause(now_s) if self._valve else None
+        return cause.sentence if cause else ""
 
 
 class EdgeCheck:

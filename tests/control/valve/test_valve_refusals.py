@@ -1,11 +1,13 @@
 """What the valve refuses: to move under a latched fault, and to have a run begin while it moves."""
 
+from collections.abc import Callable
+
 import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.control.inputs import ValveStatus
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.registers.words import ControlBit, State
+from gateway.registers.words import ControlBit, State, StatusBit
 from gateway.registers.writes.proposed_write import ProposedWrite
 from tests.control.valve.valve_bench import BIT_4, PULL, PUSH, ValveBench
 
@@ -53,3 +55,39 @@ def test_where_the_valves_port_is_lost_nothing_is_enabled_however_it_stood() -> 
     enable = bench.command._replace(control_word=ControlBit.ENABLE, number=bench.command.number + 1)
     refused = bench.controller.refusal_of(bench.now_s, ProposedWrite(enable, lambda: ()), line)
     assert refused and refused.reason is RefusalReason.VALVE_UNKNOWN
+
+
+def silent(bench: ValveBench) -> None:
+    bench.is_silent, bench.silent_s = True, bench.now_s
+
+
+def stuck_elsewhere(bench: ValveBench) -> None:
+    bench.obeys = False
+    bench.turn(PULL)
+
+
+@pytest.mark.parametrize(
+    ("fails", "words"), [(silent, "A355 no answer"), (stuck_elsewhere, "A356 the valve reads back pull")]
+)
+def test_ready_is_not_said_and_no_enable_taken_where_the_valve_would_be_a_fault_at_once(
+    fails: Callable[[ValveBench], None], words: str
+) -> None:
+    """While off as well: an enable that is taken and ends in a fault in the same moment was none."""
+    bench = ValveBench(timeout_s=0.5)
+    bench.run(2.0)
+    assert bench.status() & StatusBit.READY
+    fails(bench)
+    bench.run(0.4)
+    assert bench.status() & StatusBit.READY, "its time is not over yet"
+    bench.run(0.3)
+    assert not bench.status() & StatusBit.READY
+    bench.enable(12.0)
+    assert bench.refused and bench.refused.reason is RefusalReason.VALVE_UNKNOWN
+    assert words in bench.refused.text
+    bench.run(1.0)
+    assert bench.last.state is State.OFF
+    bench.is_silent, bench.obeys = False, True
+    bench.run(1.0)
+    bench.enable(12.0)
+    bench.run(2.0)
+    assert bench.refused is None and bench.last.state is State.HOLDING
