@@ -51,8 +51,7 @@ class Controller:
         unclean_restart: bool = False,
         compensation: Compensation = NO_COMPENSATION,
     ) -> None:
-        model = calibration.model
-        self._calibration, self._compensation = calibration, compensation
+        self._calibration, self._compensation, model = calibration, compensation, calibration.model
         self._valve = ValveSwitch(settings.valve) if settings.valve else None
         self._rig_settings = compensation.settings(settings)
         self._settings = settings = timing_of(calibration.response, self._rig_settings)
@@ -87,8 +86,9 @@ class Controller:
 
     @property
     def has_stopped(self) -> bool:
-        """Decide whether a `stop` has led to a disabled output."""
-        return self._machine.is_stopping and not self._machine.is_enabled
+        """Decide whether a `stop` has led to a disabled output, and the valve to where it rests."""
+        is_off = self._machine.is_stopping and not self._machine.is_enabled
+        return is_off and not (self._valve and self._valve.is_going_to_rest)
 
     @property
     def zero_n(self) -> float:

@@ -26,7 +26,7 @@ class ValveSwitch:
         self.settings = settings
         self.direction = PUSH
         self.commanded = _SAFE.get(settings.safe)
-        self.is_switching = True
+        self.is_switching, self._is_well = True, False
         self._vented_s = inf
         self._told_s = -inf
         self._differs_s = inf
@@ -42,6 +42,12 @@ class ValveSwitch:
     def order(self) -> ValveDirection | None:
         """Direction that the device may be told now; None while there is pressure: then nobody moves it."""
         return self.commanded if self._vented_s < inf else None
+
+    @property
+    def is_going_to_rest(self) -> bool:
+        """Decide whether a valve of an output that is off may be waited for: it is not where the rig says, and will come."""
+        rest = _SAFE.get(self.settings.safe, self.commanded)
+        return self._is_well and (self.is_switching or self.commanded is not rest)
 
     def wanted(self, *, pulls: bool, is_enabled: bool) -> ValveDirection | None:
         """Return where the valve is to stand. pulls: control_word bit 4; None: where it is."""
@@ -64,6 +70,7 @@ class ValveSwitch:
         has_dwelt = now_s - self._told_s >= self.settings.dwell_s
         is_wanted = wanted is None or wanted is self.commanded
         self.is_switching = not (is_confirmed and has_dwelt and is_wanted)
+        self._is_well = self.first_cause(now_s) is None
         if self.is_switching or self.commanded is None or self.commanded is self.direction:
             return False
         self.direction = self.commanded

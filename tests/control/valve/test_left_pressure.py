@@ -1,4 +1,5 @@
-"""Pressure that control has not put out itself, or has lost sight of: the valve waits until it surely has left."""
+"""Pressure that control has not put out itself, or has lost sight of: the valve waits until it surely has left, and a stop for
+the valve."""
 
 import pytest
 
@@ -76,3 +77,29 @@ def test_a_pull_that_is_asked_for_right_after_the_start_waits_for_what_may_be_le
     assert not bench.switched
     bench.run(4.0)
     assert bench.stands is PULL and bench.last.state is State.HOLDING
+
+
+def seconds_to_stop(bench: ValveBench) -> float:
+    began_s = bench.now_s
+    bench.controller.stop()
+    while not bench.controller.has_stopped:
+        bench.run(0.01)
+        assert bench.now_s - began_s < 4.0, "the guardian waits no longer"
+    return bench.now_s - began_s
+
+
+def test_a_stop_ends_with_the_valve_where_the_rig_says_and_not_in_a_pull_that_nobody_ends_any_more() -> None:
+    bench = ValveBench(dwell_s=DWELL_S).pulling(15.0)
+    assert DWELL_S < seconds_to_stop(bench) < 2.0
+    assert bench.stands is PUSH and bench.switched[-1][2] == 0.0
+
+
+def test_a_stop_waits_for_no_valve_that_rests_already_or_does_not_come() -> None:
+    pushing = ValveBench(dwell_s=DWELL_S)
+    pushing.run(1.5)
+    pushing.enable(12.0)
+    pushing.run(2.0)
+    assert seconds_to_stop(pushing) < DWELL_S
+    stuck = ValveBench(dwell_s=DWELL_S, timeout_s=0.5).pulling(15.0)
+    stuck.obeys = False
+    assert seconds_to_stop(stuck) < 3.0 and stuck.stands is PULL
