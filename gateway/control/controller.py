@@ -117,7 +117,7 @@ class Controller:
         self._commands.use(model)
 
     def _most_pull_n(self) -> float:
-        return self._turning.model_of_pull(self._calibration).force_range_n[1]
+        return self._turning.most_pull_n(self._calibration)
 
     def _inform_runs(self, calibration: CalibrationInUse) -> None:
         timed = timing_of(calibration.response, self._rig_settings)

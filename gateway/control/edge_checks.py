@@ -207,8 +207,9 @@ class EdgeCheck:
         bit = ControlBit.VALVE_PULL
         if at.state is State.FAULT and edges.rises & bit and not edges.rises & _RESET:
             return EdgeRefusal(RefusalReason.VALVE_REFUSED, bit, "valve refused: a fault is latched, reset it first")
-        most_n = self._most_pull_n()
-        if command.force_setpoint_n > most_n:
+        # what stands from before a calibration that pulls less is lowered by control: a heartbeat beside it is no request
+        asks = edges.rises & (bit | _ENABLE) or command.force_setpoint_n != self._commands.command.force_setpoint_n
+        if asks and command.force_setpoint_n > (most_n := self._most_pull_n()):
             text = f"force_setpoint {command.force_setpoint_n:.2f} N with valve_pull: pulling reaches {most_n:.1f} N"
             return EdgeRefusal(RefusalReason.PULL_RANGE, bit, text)
         return None

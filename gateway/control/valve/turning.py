@@ -52,6 +52,12 @@ class Turning:
         share = self.valve.settings.pull_area_share if self.valve else 1.0
         return calibration.pull_model or scale_forces(calibration.model, share)
 
+    def most_pull_n(self, calibration: CalibrationInUse) -> float:
+        """Return the largest pull: what the model reaches, and what its limits allow, which control holds to as well."""
+        model = self.model_of_pull(calibration)
+        most_n = model.force_range_n[1]
+        return most_n if model.limits_n is None else min(most_n, model.limits_n[1])
+
     def follow(self, now_s: float, line: LineStatus, machine: Transitions) -> bool:
         """Follow the valve; return whether the direction has changed: then the caller takes the other model. A regulator that
         hears nothing keeps its pressure, so what is wanted of it does not count, but what surely stands there."""

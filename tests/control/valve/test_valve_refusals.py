@@ -1,15 +1,18 @@
 """What the valve refuses: to move under a latched fault, and to have a run begin while it moves."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
+from gateway.bsfm import Bsfm
 from gateway.codes.refusals import RefusalReason
-from gateway.control.inputs import ValveStatus
+from gateway.control.inputs import CalibrationInUse, ValveStatus
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.registers.words import ControlBit, State, StatusBit
 from gateway.registers.writes.proposed_write import ProposedWrite
-from tests.control.valve.valve_bench import BIT_4, PULL, PUSH, ValveBench
+from tests.control.bench import bsfm
+from tests.control.valve.valve_bench import BIT_4, ENABLE, PULL, PUSH, SHARE, ValveBench
 
 
 def test_a_latched_fault_keeps_the_valve_unless_the_same_write_resets_it() -> None:
@@ -91,3 +94,28 @@ def test_ready_is_not_said_and_no_enable_taken_where_the_valve_would_be_a_fault_
     bench.enable(12.0)
     bench.run(2.0)
     assert bench.refused is None and bench.last.state is State.HOLDING
+
+
+@pytest.mark.parametrize("less", [replace(bsfm(), limits_n=(0.0, 32.0)), bsfm(0.56)], ids=["limits", "reach"])
+def test_a_calibration_that_pulls_less_takes_no_heartbeat_from_the_master(less: Bsfm) -> None:
+    """The setpoint that stands was good when it was written: refused with each beat, the lease would end for it."""
+    bench = ValveBench().pulling(30.0)
+    bench.controller.use(CalibrationInUse(less, 2))
+    for beat in range(1, 20):
+        bench.write(heartbeat=beat)
+        bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=30.0, heartbeat=100 + beat)
+        assert bench.refused is None
+    bench.write(force_setpoint_n=29.0)
+    assert bench.refused and bench.refused.reason is RefusalReason.PULL_RANGE, "what is asked for anew is looked at"
+    bench.write(control_word=ENABLE, force_setpoint_n=30.0)
+    bench.write(control_word=ENABLE | BIT_4)
+    assert bench.refused.reason is RefusalReason.PULL_RANGE
+
+
+def test_a_pull_beyond_the_limits_of_a_calibration_is_refused_and_not_silently_a_smaller_one() -> None:
+    bench = ValveBench()
+    bench.controller.use(CalibrationInUse(replace(bsfm(), limits_n=(0.0, 32.0)), 2))
+    bench.pulling(SHARE * 32.0 + 1.0)
+    assert bench.refused and "pulling reaches 24.0 N" in bench.refused.text
+    bench.pulling(SHARE * 32.0)
+    assert bench.refused is None and bench.last.force_measured_n == pytest.approx(-SHARE * 32.0, abs=1.0)
