@@ -273,7 +273,7 @@ class Controller:
         cause = stop_cause(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
         cause = cause or self._faults.first_cause(now_s, self._reading, line, self._loop.compute_expected_rise)
         if self._valve and line.valve is not None:
-            cause = cause or self._valve.first_cause(now_s)
+            cause = self._valve.blame(now_s, cause)
         if cause:
             self._machine.fail(now_s, cause)
         elif self._goes_on_alone or not self._commands.is_lease_lost(now_s, line.owner_connected):

@@ -79,6 +79,14 @@ class ValveSwitch:
     def _may_switch(self, now_s: float) -> bool:
         return now_s - self._vented_s >= self.settings.dwell_s
 
+    def blame(self, now_s: float, cause: StopCause | None) -> StopCause | None:
+        """Return the first cause, where the valve counts as well. cause: what others have found goes before, but for a force
+        that went the wrong way while the valve stands elsewhere: who then turns the cell round has two faults."""
+        if cause and cause.fault is FaultCode.SIGN_INVERTED and self._differs_s < inf:
+            observation = f"the valve reads back {self._status.stands} and was told {self.commanded}"
+            return stop_cause(FaultCode.VALVE_ALTERED, f"{observation}: the force has turned with it")
+        return cause or self.first_cause(now_s)
+
     def first_cause(self, now_s: float) -> StopCause | None:
         """Return the fault of the valve, None where there is none."""
         status, bound_s = self._status, self.settings.timeout_s
