@@ -33,7 +33,8 @@ class SafeVoltageCheck:
             self._asked_s = now_s
         if self._asked_s is None:
             return None
-        stands_v = line.acknowledged_v if line.standing_v is None else line.standing_v
+        # what was confirmed before the setting that is on its way may not stand any more
+        stands_v = line.acknowledged_v if line.sent_v is None else line.standing_v
         if stands_v is not None and abs(stands_v - self._faults.safe_voltage_v) <= _NEAR_V:
             self._asked_s = None
             return None

@@ -106,6 +106,19 @@ def test_once_the_safe_voltage_stands_such_an_output_only_keeps_an_enable_back(f
             wired.write(0, ENABLE, 1200)
 
 
+def test_a_voltage_that_was_on_its_way_at_the_disable_is_not_taken_for_the_one_before_it() -> None:
+    """0 V were confirmed, and then the first volt of a force has gone out: its answer is not here when the force is let go."""
+    wired = Wired(strict()).ready()
+    wired.run(0.5)
+    wired.write(0, ENABLE, 1200)
+    wired.until(lambda: wired.observer.settings[-1].voltage_v > 0.0, 0.2)
+    wired.world.simulate({"do": "sim", "set": {"output.refuse": True}})
+    disable(wired)
+    wired.run(1.0)
+    assert wired.twin.pressure_pa > 0.0
+    assert wired.state is State.FAULT and wired.fault_code is FaultCode.OUTPUT_REFUSED
+
+
 def test_an_output_that_obeys_is_off_and_no_fault() -> None:
     wired = Wired(strict())
     for force_n in (3.0, 12.0, 20.0):
