@@ -173,7 +173,7 @@ class RefusalReason(IntEnum):
         Explanation(
             "W214",
             "the output device is faulty",
-            "Enable was asked for while the DAC or regulator does not answer properly.",
+            "Enable was asked for while the DAC or regulator does not answer properly, or a reset while it does not answer.",
             "No power, a cable, or a device that refuses.",
             "Check its power, its cable and its baud; `force-gateway explain E111` for a silent line.",
         ),
@@ -408,9 +408,10 @@ class RefusalReason(IntEnum):
         Explanation(
             "W308",
             "nobody knows where the valve stands",
-            "Enable was asked for before the valve's relay has read its direction back.",
-            "No power, a cable, a wrong baud rate or address of the relay.",
-            "Check the relay's power, cable and address.",
+            "Enable was asked for before the valve's relay has read its direction back, while it is silent, or stands "
+            "elsewhere than told.",
+            "No power, a cable, a wrong baud rate or address of the relay; or it was switched by hand, or does not move.",
+            "Check the relay's power, cable and address, and that the valve follows it.",
         ),
     )
     PULL_RANGE = (

@@ -51,12 +51,10 @@ class Controller:
         unclean_restart: bool = False,
         compensation: Compensation = NO_COMPENSATION,
     ) -> None:
-        model = calibration.model
-        self._calibration = calibration
+        self._calibration, self._compensation, model = calibration, compensation, calibration.model
         self._valve = ValveSwitch(settings.valve) if settings.valve else None
         self._rig_settings = compensation.settings(settings)
         self._settings = settings = timing_of(calibration.response, self._rig_settings)
-        self._compensation = compensation
         self.calibration_id = calibration.number
         self._commands = CommandTracker(settings)
         self._commands.use(model)
@@ -66,7 +64,7 @@ class Controller:
         self._faults = FaultDetector(settings)
         self._faults.expect_noise(calibration.noise_n)
         self._conditioner = SampleConditioner(settings.supervision, compensation.cell)
-        self._turning = Turning(self._valve, self._commands, self._conditioner)
+        self._turning = Turning(self._valve, self._commands, self._conditioner, settings, model)
         self._edge_check = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self._most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._one_shot = OneShotEvents(settings.supervision.stuck_n)
@@ -76,7 +74,7 @@ class Controller:
         self._moved_by: LoopInputs | None = None  # what the force loop has just moved by
         parts = ControllerParts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)
         self._machine = Transitions(parts, is_restarted=unclean_restart)
-        self._readiness = Readiness(parts, self._machine)
+        self._readiness = Readiness(parts, self._machine, self._valve)
         self._composer = OutputComposer(parts, self._machine, self._readiness, self._valve)
 
     # -- for the service
@@ -88,8 +86,9 @@ class Controller:
 
     @property
     def has_stopped(self) -> bool:
-        """Decide whether a `stop` has led to a disabled output."""
-        return self._machine.is_stopping and not self._machine.is_enabled
+        """Decide whether a `stop` has led to a disabled output, and the valve to where it rests."""
+        is_off = self._machine.is_stopping and not self._machine.is_enabled
+        return is_off and not (self._valve and self._valve.is_going_to_rest)
 
     @property
     def zero_n(self) -> float:
@@ -114,10 +113,11 @@ class Controller:
         model = self._turning.model_of(self._calibration)
         timed = timing_of(self._calibration.response, self._rig_settings)
         self._loop.use(model, self._given_n, timed)
+        self._turning.use(model, timed)
         self._commands.use(model)
 
     def _most_pull_n(self) -> float:
-        return self._turning.model_of_pull(self._calibration).force_range_n[1]
+        return self._turning.most_pull_n(self._calibration)
 
     def _inform_runs(self, calibration: CalibrationInUse) -> None:
         timed = timing_of(calibration.response, self._rig_settings)
@@ -199,6 +199,7 @@ class Controller:
             self._supervise(now_s, line)
         if self._machine.is_enabled:
             self._move(now_s, dt_s)
+        self._machine.check_rest(now_s, line)
         return self._loop.voltage_v
 
     @property
@@ -272,7 +273,7 @@ class Controller:
         cause = stop_cause(FaultCode.NOT_FINITE, f"{name} in an accepted command") if name else None
         cause = cause or self._faults.first_cause(now_s, self._reading, line, self._loop.compute_expected_rise)
         if self._valve and line.valve is not None:
-            cause = cause or self._valve.first_cause(now_s)
+            cause = self._valve.blame(now_s, cause)
         if cause:
             self._machine.fail(now_s, cause)
         elif self._goes_on_alone or not self._commands.is_lease_lost(now_s, line.owner_connected):

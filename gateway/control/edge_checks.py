@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import Final
 
+from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.inputs import LineStatus
@@ -35,7 +36,8 @@ _NAMES: Final = {
 }
 _WHOLE: Final = ControlBit(0)
 _PUSHING: Final = "and a run is made pushing (bit 4 0, enable, wait until status bits 8, 9 are 0)"
-_OFF: Final = State.OFF
+_UNKNOWN: Final = "whether air still presses is not known"
+_OFF, _LOST = State.OFF, FaultCode.OUTPUT_LOST
 _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
     State.FAULT: RefusalReason.FAULT_LATCHED,
     State.CALIBRATING: RefusalReason.CALIBRATING,
@@ -45,8 +47,8 @@ _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
 @dataclass(frozen=True, slots=True)
 class Situation:
     """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; excuse: the
-    machine, where that is the cause of it; line_fault: what the output line reports, with its code; is_output_known: that the
-    output answers, so that its voltage is ours;
+    machine, where that is the cause of it, or what the valve does; line_fault: what the output line reports, with its code;
+    is_output_known: that the output answers, so that its voltage is ours; is_output_heard: that it answers at all;
     expected_n: force that the voltages of late still make, by the model; repeats: that the load cell seems to be frozen;
     ramps_down: the force goes to 0, and then the output off."""
 
@@ -58,6 +60,7 @@ class Situation:
     excuse: str
     line_fault: str
     is_output_known: bool
+    is_output_heard: bool
     voltage_v: float
     applied_n: float
     expected_n: float
@@ -68,8 +71,8 @@ class Situation:
 class Readiness:
     """Tells whether an enable would be accepted now, and where the controller stands; changes nothing of what it is given."""
 
-    def __init__(self, parts: ControllerParts, machine: Transitions) -> None:
-        self._parts, self._machine = parts, machine
+    def __init__(self, parts: ControllerParts, machine: Transitions, valve: ValveSwitch | None = None) -> None:
+        self._parts, self._machine, self._valve = parts, machine, valve
 
     def enable_block(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
         """Return why an enable would be refused now; NONE where it would be accepted, or has been."""
@@ -86,9 +89,10 @@ class Readiness:
             faulted_s=machine.faulted_s,
             reading=reading,
             block=block,
-            excuse=self._parts.faults.excuse(block, now_s, reading, line),
+            excuse=self._excuse(block, now_s, reading, line),
             line_fault=f"{line.fault.code} {line_words(line)}" if line.fault else "",
             is_output_known=line.acknowledged_v is not None and block is not RefusalReason.OUTPUT_FAULT,
+            is_output_heard=line.fault is not _LOST and not self._parts.faults.is_silent(now_s, line),
             voltage_v=loop.voltage_v,
             applied_n=loop.applied_n,
             expected_n=loop.compute_expected_rise(),
@@ -99,7 +103,18 @@ class Readiness:
     def _block_in_off(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
         if self._machine.is_stopping:
             return RefusalReason.NOT_READY
-        return self._parts.faults.enable_block(now_s, reading, line)
+        block = self._parts.faults.enable_block(now_s, reading, line)
+        return block or (RefusalReason.VALVE_UNKNOWN if self._valve_words(now_s) else block)
+
+    def _excuse(self, block: RefusalReason, now_s: float, reading: Reading, line: LineStatus) -> str:
+        if block is RefusalReason.VALVE_UNKNOWN:
+            return self._valve_words(now_s)
+        return self._parts.faults.excuse(block, now_s, reading, line)
+
+    def _valve_words(self, now_s: float) -> str:
+        """What would be a fault of the valve right behind an enable; empty where nothing would."""
+        cause = self._valve.first_cause(now_s) if self._valve else None
+        return cause.sentence if cause else ""
 
 
 class EdgeCheck:
@@ -192,8 +207,9 @@ class EdgeCheck:
         bit = ControlBit.VALVE_PULL
         if at.state is State.FAULT and edges.rises & bit and not edges.rises & _RESET:
             return EdgeRefusal(RefusalReason.VALVE_REFUSED, bit, "valve refused: a fault is latched, reset it first")
-        most_n = self._most_pull_n()
-        if command.force_setpoint_n > most_n:
+        # what stands from before a calibration that pulls less is lowered by control: a heartbeat beside it is no request
+        asks = edges.rises & (bit | _ENABLE) or command.force_setpoint_n != self._commands.command.force_setpoint_n
+        if asks and command.force_setpoint_n > (most_n := self._most_pull_n()):
             text = f"force_setpoint {command.force_setpoint_n:.2f} N with valve_pull: pulling reaches {most_n:.1f} N"
             return EdgeRefusal(RefusalReason.PULL_RANGE, bit, text)
         return None
@@ -207,6 +223,9 @@ class EdgeCheck:
             return EdgeRefusal(RefusalReason.RESET_NEEDS_ZERO, ControlBit.RESET_FAULT, text)
         if at.state is State.OFF:
             return None  # as many programs begin: there is no fault latched, and that is what was asked for
+        if not at.is_output_heard:
+            text = f"reset refused: {at.line_fault or 'the output device does not answer'}: {_UNKNOWN}"
+            return EdgeRefusal(RefusalReason.OUTPUT_FAULT, ControlBit.RESET_FAULT, text)
         if not self._commands.would_beat_since(at.faulted_s, at.now_s, command):
             text = f"reset refused: heartbeat = {command.heartbeat} as at the fault: write another value with the reset"
             return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.RESET_FAULT, text)
@@ -222,7 +241,7 @@ class EdgeCheck:
         if at.state in ENABLED_STATES and at.voltage_v > 0.0:
             return f"{at.voltage_v:.2f} V are out: disable the output or set the force to 0 first"
         if not at.is_output_known:
-            return f"{at.line_fault or 'the output does not answer'}: whether air still presses is not known"
+            return f"{at.line_fault or 'the output does not answer'}: {_UNKNOWN}"
         if not at.reading.is_fresh:
             return "no fresh load-cell sample"
         if at.repeats:

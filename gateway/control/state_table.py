@@ -31,7 +31,7 @@ _CALIBRATING = State.CALIBRATING
 
 TRANSITIONS: Final[dict[tuple[State, StateEvent], State]] = {
     (_OFF, StateEvent.ENABLE): _READY,
-    (_OFF, StateEvent.FAILED): _FAULT,  # only an internal error fails while off
+    (_OFF, StateEvent.FAILED): _FAULT,  # an internal error, or a safe voltage that is not confirmed
     (_OFF, StateEvent.CALIBRATE): _CALIBRATING,
     (_READY, StateEvent.CALIBRATE): _CALIBRATING,
     (_READY, StateEvent.WAIT): _READY,

@@ -9,12 +9,14 @@ from math import inf
 from gateway.codes.faults import FaultCode
 from gateway.control.command_edges import CommandTracker
 from gateway.control.force_loop.force_loop import ForceLoop
+from gateway.control.inputs import LineStatus
 from gateway.control.messages import fault_sentence
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.settings import LeaseAction
 from gateway.control.state_table import ENABLED_STATES, StateEvent, next_state
 from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
 from gateway.control.supervision.one_shot_events import OneShotEvents
+from gateway.control.supervision.safe_voltage import SafeVoltageCheck
 from gateway.registers.words import State
 
 
@@ -57,6 +59,7 @@ class Transitions:
         self.is_restarted = is_restarted
         self.outcome = StepOutcome()
         self.parts = self._parts = parts
+        self._safe_voltage = SafeVoltageCheck(parts.faults)
 
     def begin_step(self) -> None:
         """Begin a step with an empty outcome."""
@@ -106,6 +109,11 @@ class Transitions:
         """Latch a first cause: the safe voltage at once, and the command with it."""
         self._latch(now_s, cause.fault)
         self._let_go(cause.sentence)
+
+    def check_rest(self, now_s: float, line: LineStatus) -> None:
+        """Latch that the safe voltage does not stand which a way to OFF has asked for: OFF says that nothing presses."""
+        if cause := self._safe_voltage.cause(now_s, self.state, line):
+            self.fail(now_s, cause)
 
     def fail_internally(self, now_s: float) -> None:
         """Latch INTERNAL after an exception, with the safe voltage, unless another fault is latched already."""

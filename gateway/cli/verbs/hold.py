@@ -179,7 +179,7 @@ def _report_end(beat: "HeartbeatThread", where: str, *, as_json: bool) -> None:
     if end is HoldEnd.DISABLED:
         raise CliError(f"{_describe_disabled(beat)} ({where})")
     if not as_json:
-        click.echo("0 N, disabled: the output is at the safe voltage", err=True)
+        click.echo("0 N, disabled: the output has been told the safe voltage", err=True)
 
 
 def _describe_disabled(beat: "HeartbeatThread") -> str:
@@ -190,16 +190,22 @@ def _describe_disabled(beat: "HeartbeatThread") -> str:
         return "A310 the lease ran out: the gateway has ramped to 0 N and let go; a busy machine? --rig tells the lease"
     if beat.warned & WarningBit.RESTARTED:
         return "A401 the gateway has started anew, in OFF: its log has the first cause"
-    return "W336 somebody else has cleared enable; the output is at the safe voltage"
+    return "W336 somebody else has cleared enable; the output has been told the safe voltage"
 
 
 def _describe_fault(beat: "HeartbeatThread") -> str:
-    """Return the fault's sentence, and how to go on."""
+    """Return the fault's sentence, what is known of the output, and how to go on."""
+    from gateway.codes.faults import FaultCode
+
     assert beat.status
     entry = beat.status.fault.explanation
+    obeys = "The output is at the safe voltage"
+    doubted = (FaultCode.OUTPUT_SILENT, FaultCode.OUTPUT_REFUSED, FaultCode.OUTPUT_ALTERED, FaultCode.OUTPUT_LOST)
+    if beat.status.fault in doubted:
+        obeys = "The output is told the safe voltage, and nobody knows whether it obeys: look at the tool"
     when = f"while holding {beat.hold.force_n:g} N" if beat.hold.is_pressing else "is latched"
     return (
-        f"{entry.code} {entry.title}, {when}: {entry.seen} The output is at the safe voltage\n"
+        f"{entry.code} {entry.title}, {when}: {entry.seen} {obeys}\n"
         f"  {entry.do} (force-gateway explain {entry.code})\n"
         f"  then: force-gateway hold {beat.hold.force_n:g} --reset"
     )

@@ -2,7 +2,7 @@
 
 Checks run in a fixed order and the first one found is the cause: what makes others follow comes first (our own loop,
 then the output line, then the cell, then what the cell says, then the master). While disabled the same facts only
-refuse an enable.
+refuse an enable, but for an output that does not confirm the safe voltage (`safe_voltage.py`): then the force may stand.
 """
 
 from collections.abc import Callable
@@ -43,6 +43,8 @@ _LINE_WORDS: Final = {
     FaultCode.WRONG_DEVICE: "another device answers than the rig names: check the plug and the profile",
     FaultCode.WATCHDOG_NOT_ARMED: "the output device's watchdog does not arm: check its profile, or accept it in the rig",
 }
+_NOT_OBEYED: Final = (FaultCode.OUTPUT_REFUSED, FaultCode.OUTPUT_ALTERED, FaultCode.OUTPUT_LOST)
+_MAY_PRESS: Final = "the safe voltage is not confirmed, so what pressed may press still"
 
 
 def line_words(line: LineStatus) -> str:
@@ -80,6 +82,7 @@ class FaultDetector:
 
     def __init__(self, settings: ControlSettings) -> None:
         self._limits = settings.limits
+        self.safe_voltage_v = settings.limits.safe_voltage_v
         self._bounds = settings.supervision
         self._rise = RiseCheck(settings.defaults.contact_threshold_n)
         self._frozen = StuckSensorCheck(settings.supervision)
@@ -149,7 +152,7 @@ class FaultDetector:
 
     def enable_block(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
         """Return why an enable would be refused now, apart from a latched fault."""
-        if line.fault or self._is_silent(now_s, line):
+        if line.fault or self.is_silent(now_s, line):
             return RefusalReason.OUTPUT_FAULT
         if line.cell_lost or not reading.is_fresh:
             return RefusalReason.CELL_SILENT
@@ -188,7 +191,18 @@ class FaultDetector:
         """Return the first cause of a fault, None where there is none. expected_n: asked for the model's rise by sentences."""
         return self._of_line(now_s, line) or self._of_cell(reading, line) or self._of_force(reading, expected_n)
 
-    def _is_silent(self, now_s: float, line: LineStatus) -> bool:
+    def cause_at_rest(self, now_s: float, line: LineStatus, rest_s: float) -> StopCause | None:
+        """Return why the safe voltage that was asked for rest_s ago does not stand, None where it may be on its way still."""
+        has_had_time = line.fault is FaultCode.OUTPUT_LOST or rest_s > self._bounds.output_timeout_s
+        if line.fault in _NOT_OBEYED and has_had_time:
+            return stop_cause(line.fault, f"{line_words(line)}; {_MAY_PRESS}")
+        if not line.fault and self.is_silent(now_s, line):
+            cause = self._no_answer(now_s, line)
+            return StopCause(cause.fault, f"{cause.sentence}; {_MAY_PRESS}")
+        return None
+
+    def is_silent(self, now_s: float, line: LineStatus) -> bool:
+        """Decide whether the output device has not answered for longer than it may."""
         since_s = line.unanswered_since_s
         return since_s is not None and now_s - since_s > self._bounds.output_timeout_s
 
@@ -197,7 +211,7 @@ class FaultDetector:
             return _lateness(line, self._bounds.stall_s)
         if line.fault:
             return stop_cause(line.fault, line_words(line))
-        if self._is_silent(now_s, line):
+        if self.is_silent(now_s, line):
             return self._no_answer(now_s, line)
         return None
 

@@ -38,10 +38,11 @@ _RIGHT, _WRONG_GAIN = FaultCode.NONE, FaultCode.GAIN_WRONG
 class ExpectedForce:
     """What the model expects now: both branches at the lagged voltage, N of cell force above rest."""
 
-    def __init__(self, model: Bsfm, lag_s: float, rest_v: float) -> None:
+    def __init__(self, model: Bsfm, lag_s: float, rest_v: float, stands_v: float | None = None) -> None:
+        """stands_v: voltage whose pressure stands at the beginning, None for rest_v."""
         self._lag_s = lag_s
         self._rest_v = rest_v
-        self._lagged_v = rest_v
+        self._lagged_v = rest_v if stands_v is None else stands_v
         self.use(model)
 
     def retime(self, lag_s: float) -> None:

@@ -1,9 +1,14 @@
 """Turn control round with the valve: readings, weight, model and limits count along the direction that its readback shows."""
 
+from math import inf
+
 from gateway.bsfm import Bsfm
 from gateway.control.command_edges import CommandTracker
+from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.inputs import CalibrationInUse, LineStatus
 from gateway.control.sample_conditioning import SampleConditioner
+from gateway.control.settings import ControlSettings
+from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.control.transitions import Transitions
 from gateway.control.valve.pull_model import scale_forces
 from gateway.control.valve.valve_switch import ValveSwitch
@@ -15,11 +20,28 @@ _VENTED_V = 0.05  # a device answers in steps of its own
 
 
 class Turning:
-    """valve: None on a rig without one, then everything pushes."""
+    """valve: None on a rig without one, then everything pushes. What pressure may be behind it is followed by the model; at the
+    beginning as much as the rig allows, for whoever was in charge before may have been killed while the tool pressed."""
 
-    def __init__(self, valve: ValveSwitch | None, commands: CommandTracker, conditioner: SampleConditioner) -> None:
+    def __init__(
+        self,
+        valve: ValveSwitch | None,
+        commands: CommandTracker,
+        conditioner: SampleConditioner,
+        settings: ControlSettings,
+        model: Bsfm,
+    ) -> None:
+        limits, lag_s = settings.limits, settings.supervision.response_lag_s
         self.valve = valve
+        self._pressure = ExpectedForce(model, lag_s, limits.safe_voltage_v, limits.voltage_max_v)
         self._commands, self._conditioner = commands, conditioner
+        self._last_s = inf
+        self._may_stand_v: float | None = None  # highest voltage that may be out; None: as at the beginning
+
+    def use(self, model: Bsfm, settings: ControlSettings) -> None:
+        """Follow the pressure by another model, at the pace of these settings."""
+        self._pressure.retime(settings.supervision.response_lag_s)
+        self._pressure.use(model)
 
     def model_of(self, calibration: CalibrationInUse) -> Bsfm:
         """Return the model of the direction in effect."""
@@ -30,6 +52,12 @@ class Turning:
         share = self.valve.settings.pull_area_share if self.valve else 1.0
         return calibration.pull_model or scale_forces(calibration.model, share)
 
+    def most_pull_n(self, calibration: CalibrationInUse) -> float:
+        """Return the largest pull: what the model reaches, and what its limits allow, which control holds to as well."""
+        model = self.model_of_pull(calibration)
+        most_n = model.force_range_n[1]
+        return most_n if model.limits_n is None else min(most_n, model.limits_n[1])
+
     def follow(self, now_s: float, line: LineStatus, machine: Transitions) -> bool:
         """Follow the valve; return whether the direction has changed: then the caller takes the other model. A regulator that
         hears nothing keeps its pressure, so what is wanted of it does not count, but what surely stands there."""
@@ -38,7 +66,8 @@ class Turning:
             return False
         pulls = bool(self._commands.command.control_word & _PULL)
         wanted = valve.wanted(pulls=pulls, is_enabled=machine.is_enabled)
-        is_vented = parts.loop.voltage_v <= 0.0 and abs(parts.loop.compute_expected_rise()) <= _VENTED_N
+        is_left = self._follow_pressure(now_s, line.standing_v, parts.loop)
+        is_vented = parts.loop.voltage_v <= 0.0 and not is_left
         is_vented = is_vented and line.standing_v is not None and line.standing_v <= _VENTED_V
         if not valve.step(now_s, wanted, status, is_vented=is_vented):
             return False
@@ -50,3 +79,14 @@ class Turning:
         parts.loop.rest()
         machine.tell("the valve pulls" if valve.is_pulling else "the valve pushes")
         return True
+
+    def _follow_pressure(self, now_s: float, standing_v: float | None, loop: ForceLoop) -> bool:
+        """Return whether pressure may be left. Where nobody knows what stands, what stood before may stand still."""
+        dt_s, self._last_s = max(0.0, now_s - self._last_s), now_s
+        before_v = self._may_stand_v
+        self._may_stand_v = standing_v
+        if standing_v is None and before_v is not None:
+            self._may_stand_v = max(before_v, loop.voltage_v)
+        if self._may_stand_v is not None:
+            self._pressure.advance(self._may_stand_v, dt_s)
+        return abs(self._pressure.rise_n(loop.branch_share)) > _VENTED_N

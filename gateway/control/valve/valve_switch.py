@@ -26,10 +26,11 @@ class ValveSwitch:
         self.settings = settings
         self.direction = PUSH
         self.commanded = _SAFE.get(settings.safe)
-        self.is_switching = True
+        self.is_switching, self._is_well = True, False
         self._vented_s = inf
         self._told_s = -inf
         self._differs_s = inf
+        self._has_been_told = False  # of where it is to stand, or has stood there: before, it cannot be blamed
         self._status = ValveStatus()
 
     @property
@@ -41,6 +42,12 @@ class ValveSwitch:
     def order(self) -> ValveDirection | None:
         """Direction that the device may be told now; None while there is pressure: then nobody moves it."""
         return self.commanded if self._vented_s < inf else None
+
+    @property
+    def is_going_to_rest(self) -> bool:
+        """Decide whether a valve of an output that is off may be waited for: it is not where the rig says, and will come."""
+        rest = _SAFE.get(self.settings.safe, self.commanded)
+        return self._is_well and (self.is_switching or self.commanded is not rest)
 
     def wanted(self, *, pulls: bool, is_enabled: bool) -> ValveDirection | None:
         """Return where the valve is to stand. pulls: control_word bit 4; None: where it is."""
@@ -57,10 +64,13 @@ class ValveSwitch:
         if wanted is not None and wanted is not self.commanded and self._may_switch(now_s):
             self.commanded, self._told_s = wanted, now_s
         is_confirmed = self.commanded is not None and status.stands is self.commanded
-        self._differs_s = inf if is_confirmed or status.stands is None else min(self._differs_s, now_s)
+        self._has_been_told = self._has_been_told or is_confirmed or self.order is not None
+        is_known = self._has_been_told and status.stands is not None
+        self._differs_s = min(self._differs_s, now_s) if is_known and not is_confirmed else inf
         has_dwelt = now_s - self._told_s >= self.settings.dwell_s
         is_wanted = wanted is None or wanted is self.commanded
         self.is_switching = not (is_confirmed and has_dwelt and is_wanted)
+        self._is_well = self.first_cause(now_s) is None
         if self.is_switching or self.commanded is None or self.commanded is self.direction:
             return False
         self.direction = self.commanded
@@ -68,6 +78,14 @@ class ValveSwitch:
 
     def _may_switch(self, now_s: float) -> bool:
         return now_s - self._vented_s >= self.settings.dwell_s
+
+    def blame(self, now_s: float, cause: StopCause | None) -> StopCause | None:
+        """Return the first cause, where the valve counts as well. cause: what others have found goes before, but for a force
+        that went the wrong way while the valve stands elsewhere: who then turns the cell round has two faults."""
+        if cause and cause.fault is FaultCode.SIGN_INVERTED and self._differs_s < inf:
+            observation = f"the valve reads back {self._status.stands} and was told {self.commanded}"
+            return stop_cause(FaultCode.VALVE_ALTERED, f"{observation}: the force has turned with it")
+        return cause or self.first_cause(now_s)
 
     def first_cause(self, now_s: float) -> StopCause | None:
         """Return the fault of the valve, None where there is none."""

@@ -77,7 +77,7 @@ WARNINGS: Final = (
     *face_checks.WARNINGS,
     *tls_checks.WARNINGS,
 )
-HARDWARE: Final = (*line_checks.HARDWARE, *face_checks.HARDWARE)
+HARDWARE: Final = (*line_checks.HARDWARE, *valve_checks.HARDWARE, *face_checks.HARDWARE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from gateway.profiles.rigs.addresses import is_certificate
 from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.profiles.rigs.edit_marks import PLACEHOLDER
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
-from gateway.profiles.rigs.line_checks import UNSTABLE_PATHS, lines_of
+from gateway.profiles.rigs.line_checks import UNSTABLE, UNSTABLE_PATHS, lines_of
 from gateway.registers.writes.ownership import LARGEST_SERIAL_PLACE, serial_place
 
 
@@ -78,7 +78,8 @@ def check_face_ports_given(parts: Parts) -> Found:
 
 def check_face_ports_differ(parts: Parts) -> Found:
     """Yield a fault for a serial face on a port that a device or another face has; by-id names are followed."""
-    taken = {os.path.realpath(line.port): f"{key}.port" for key, line, _ in lines_of(parts) if line.port is not None}
+    named = {key: line.port for key, line, _ in lines_of(parts)} | {"valve": parts.valve.port if parts.valve else None}
+    taken = {os.path.realpath(port): f"{key}.port" for key, port in named.items() if port is not None}
     for path, face in _rtu_faces(parts):
         if face.port is None:
             continue
@@ -97,8 +98,7 @@ def check_face_ports_stable(parts: Parts) -> Found:
     """Yield a warning for a serial face whose port's name depends on the order of plugging."""
     for path, face in _rtu_faces(parts):
         if face.port is not None and face.port.startswith(UNSTABLE_PATHS):
-            reason = "may be another adapter after a replug: `force-gateway ports` lists its /dev/serial/by-id/... path"
-            yield f"{path}.port", f"{face.port} {reason}"
+            yield f"{path}.port", f"{face.port} {UNSTABLE}"
 
 
 HARDWARE: Final[tuple[Check, ...]] = (check_face_ports_given, check_face_ports_differ)

@@ -1,5 +1,6 @@
 """Whether the two serial lines of a rig fit: the right device at each end, and stable ports. How fast they are: wire_checks."""
 
+import os
 from collections.abc import Iterator
 from typing import Final
 
@@ -13,6 +14,7 @@ from gateway.profiles.strict_yaml.fault_sentences import number, second, volt
 
 UNSTABLE_PATHS: Final = ("/dev/ttyUSB", "/dev/ttyACM")
 """Ports that are numbered in the order of plugging."""
+UNSTABLE: Final = "may be another adapter after a replug: `force-gateway ports` lists its /dev/serial/by-id/... path"
 
 _POLLED_S: Final = 0.3  # three questions of an idle line: what a watchdog that any sentence feeds must outlast
 _ROLES: Final = {"output": DeviceRole.OUTPUT, "load_cell": DeviceRole.LOAD_CELL}
@@ -54,19 +56,27 @@ def check_ports_given(parts: Parts) -> Found:
                 f"{key}.port",
                 "is missing: `force-gateway ports` lists what is plugged in (no hardware: `simulated: true`)",
             )
-        elif PLACEHOLDER.search(line.port):
-            reason = (
-                "is the placeholder that init wrote: put your adapter's path here, `force-gateway ports` lists them"
-            )
-            yield f"{key}.port", f"{line.port} {reason}"
-        elif not line.port.startswith("/"):
-            yield f"{key}.port", f'"{line.port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
+        elif reason := why_no_path(line.port):
+            yield f"{key}.port", reason
+
+
+def why_no_path(port: str) -> str:
+    """Return why this is no path of a device, empty where it is one."""
+    if PLACEHOLDER.search(port):
+        cure = "put your adapter's path here, `force-gateway ports` lists them"
+        return f"{port} is the placeholder that init wrote: {cure}"
+    return "" if port.startswith("/") else f'"{port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
+
+
+def is_same_port(one: str | None, other: str | None) -> bool:
+    """Decide whether both name one adapter: by-id names are followed."""
+    return one is not None and other is not None and os.path.realpath(one) == os.path.realpath(other)
 
 
 def check_ports_differ(parts: Parts) -> Found:
     """Yield a fault for a port that both lines name."""
     output, cell = parts.output, parts.load_cell
-    if output and cell and output.port is not None and output.port == cell.port:
+    if output and cell and is_same_port(output.port, cell.port):
         yield "load_cell.port", "is the output's port too: each device has its own"
 
 
@@ -127,10 +137,10 @@ def check_watchdog_time(parts: Parts) -> Found:
 
 def check_ports_stable(parts: Parts) -> Found:
     """Yield a warning for a port whose name depends on the order of plugging."""
-    for key, line, _ in lines_of(parts):
-        if line.port is not None and line.port.startswith(UNSTABLE_PATHS):
-            reason = "may be another adapter after a replug: `force-gateway ports` lists its /dev/serial/by-id/... path"
-            yield f"{key}.port", f"{line.port} {reason}"
+    named = {key: line.port for key, line, _ in lines_of(parts)} | {"valve": parts.valve.port if parts.valve else None}
+    for key, port in named.items():
+        if port is not None and port.startswith(UNSTABLE_PATHS):
+            yield f"{key}.port", f"{port} {UNSTABLE}"
 
 
 def check_baud(parts: Parts) -> Found:

@@ -187,11 +187,15 @@ class Admission:
 
     def _ask(self, command: Command, values: Values, write: Write) -> None:
         refused = self.decide(ProposedWrite(command, lambda: self._changes(values)))
-        if refused and refused.bit:
-            word_at = self._commands.address(write.block, CONTROL_WORD)
-            raise Refusal(refused.reason, word_at, refused.text, value=float(command.control_word))
-        if refused:
+        if not refused:
+            return
+        if not refused.bit:
             raise Refusal(refused.reason, write.address, refused.text)
+        offsets = self._offsets(write)
+        if CONTROL_WORD not in offsets:  # the bit stands: what was written beside it cannot be
+            raise Refusal(refused.reason, write.address, refused.text, value=values[offsets.start])
+        word_at = self._commands.address(write.block, CONTROL_WORD)
+        raise Refusal(refused.reason, word_at, refused.text, value=float(command.control_word))
 
     def _changes(self, values: Values) -> tuple[str, ...]:
         before = self._commands.values

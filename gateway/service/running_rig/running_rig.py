@@ -77,12 +77,12 @@ class RunningRig:
         self.ring: SampleRing | None = None
         self.failed = asyncio.Event()
         asyncio.get_running_loop().set_exception_handler(self._on_internal_error)
-        host = output_host(rig.output.device)
-        self._safe_frame, self._last_frame = host.safe_frame(rig.control.limits.safe_voltage_v), host.last_frame
+        host, rest_v = output_host(rig.output.device), rig.control.limits.safe_voltage_v
+        self._safe_frame, self._last_frame = host.safe_frame(rest_v), host.last_frame
         frame, reply, end = self._safe_frame, host.safe_reply, rig.output.device.terminator_bytes
         self._ports = RigPorts(rig, ports, lambda descriptor: guardian.hand_over(descriptor, frame, reply, end), log)
         checks = DeviceChecks(host, is_waived=rig.accept_no_device_watchdog)
-        self._line = OutputExchange(host, self._ports.write_output, rig.output.device.reply_timeout_s, checks)
+        self._line = OutputExchange(host, self._ports.write_output, rig.output.device.reply_timeout_s, checks, rest_v)
         self._counters = SchedulerCounters(os.getpid())
         self._lateness = Lateness(1.0 / rig.loop_hz)
         self._follow_rig()

@@ -45,8 +45,8 @@ def test_the_first_signal_ramps_down_and_the_second_drops(number: int) -> None:
         assert beat.dropping.is_set()
 
 
-def ended(end: HoldEnd) -> Any:
-    status = StatusReading(State.FAULT, FaultCode.SAMPLE_STALE)
+def ended(end: HoldEnd, fault: FaultCode = FaultCode.SAMPLE_STALE) -> Any:
+    status = StatusReading(State.FAULT, fault)
     run = SimpleNamespace(end=end, force_n=12.0, is_pressing=True)
     return SimpleNamespace(hold=run, failure=None, status=status, warned=WarningBit(0))
 
@@ -57,6 +57,20 @@ def test_only_an_end_as_asked_is_none_to_tell_a_script_of() -> None:
         _report_end(ended(HoldEnd.FAULT), "127.0.0.1:5020", as_json=True)
     with pytest.raises(CliError, match="W336"):
         _report_end(ended(HoldEnd.DISABLED), "127.0.0.1:5020", as_json=True)
+
+
+OUTPUT_FAULTS = [fault for fault in FaultCode if fault.name.startswith("OUTPUT_")]
+
+
+@pytest.mark.parametrize(
+    "fault", [FaultCode.SAMPLE_STALE, FaultCode.MASTER_LOST, *OUTPUT_FAULTS], ids=lambda one: one.name
+)
+def test_of_an_output_that_does_not_obey_nobody_is_told_that_it_is_at_the_safe_voltage(fault: FaultCode) -> None:
+    with pytest.raises(CliError) as told:
+        _report_end(ended(HoldEnd.FAULT, fault), "127.0.0.1:5020", as_json=False)
+    is_sure = "The output is at the safe voltage" in told.value.format_message()
+    assert is_sure is (fault not in OUTPUT_FAULTS)
+    assert is_sure or "look at the tool" in told.value.format_message()
 
 
 def test_it_lets_go_when_the_force_is_down_and_no_sooner() -> None:

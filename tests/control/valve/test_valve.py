@@ -113,6 +113,20 @@ def test_a_valve_that_turns_by_itself_or_falls_silent_is_a_fault() -> None:
     assert silent.last.fault is FaultCode.VALVE_SILENT and silent.last.voltage_v == 0.0
 
 
+def test_a_force_that_turns_with_the_valve_is_blamed_on_the_valve_and_not_on_the_cells_wires() -> None:
+    """It is seen in the force sooner than timeout_s is over."""
+    bench = ValveBench(timeout_s=2.0).pulling(20.0)
+    bench.obeys = False
+    bench.turn(PUSH)
+    bench.run(1.5)
+    assert bench.last.fault is FaultCode.VALVE_ALTERED and bench.last.voltage_v == 0.0
+    assert any(event.startswith("A356") and "reads back push and was told pull" in event for event in bench.events)
+    right = ValveBench().pulling(20.0)
+    right.plant.sign = 1.0
+    right.run(1.5)
+    assert right.last.fault is FaultCode.SIGN_INVERTED, "where it stands right the cell is blamed as ever"
+
+
 def test_enable_is_refused_until_the_relay_has_read_back() -> None:
     bench = ValveBench()
     bench.obeys = False

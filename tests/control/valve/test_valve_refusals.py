@@ -1,13 +1,18 @@
 """What the valve refuses: to move under a latched fault, and to have a run begin while it moves."""
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import pytest
 
+from gateway.bsfm import Bsfm
 from gateway.codes.refusals import RefusalReason
-from gateway.control.inputs import ValveStatus
+from gateway.control.inputs import CalibrationInUse, ValveStatus
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.registers.words import ControlBit, State
+from gateway.registers.words import ControlBit, State, StatusBit
 from gateway.registers.writes.proposed_write import ProposedWrite
-from tests.control.valve.valve_bench import BIT_4, PULL, PUSH, ValveBench
+from tests.control.bench import bsfm
+from tests.control.valve.valve_bench import BIT_4, ENABLE, PULL, PUSH, SHARE, ValveBench
 
 
 def test_a_latched_fault_keeps_the_valve_unless_the_same_write_resets_it() -> None:
@@ -53,3 +58,64 @@ def test_where_the_valves_port_is_lost_nothing_is_enabled_however_it_stood() -> 
     enable = bench.command._replace(control_word=ControlBit.ENABLE, number=bench.command.number + 1)
     refused = bench.controller.refusal_of(bench.now_s, ProposedWrite(enable, lambda: ()), line)
     assert refused and refused.reason is RefusalReason.VALVE_UNKNOWN
+
+
+def silent(bench: ValveBench) -> None:
+    bench.is_silent, bench.silent_s = True, bench.now_s
+
+
+def stuck_elsewhere(bench: ValveBench) -> None:
+    bench.obeys = False
+    bench.turn(PULL)
+
+
+@pytest.mark.parametrize(
+    ("fails", "words"), [(silent, "A355 no answer"), (stuck_elsewhere, "A356 the valve reads back pull")]
+)
+def test_ready_is_not_said_and_no_enable_taken_where_the_valve_would_be_a_fault_at_once(
+    fails: Callable[[ValveBench], None], words: str
+) -> None:
+    """While off as well: an enable that is taken and ends in a fault in the same moment was none."""
+    bench = ValveBench(timeout_s=0.5)
+    bench.run(2.0)
+    assert bench.status() & StatusBit.READY
+    fails(bench)
+    bench.run(0.4)
+    assert bench.status() & StatusBit.READY, "its time is not over yet"
+    bench.run(0.3)
+    assert not bench.status() & StatusBit.READY
+    bench.enable(12.0)
+    assert bench.refused and bench.refused.reason is RefusalReason.VALVE_UNKNOWN
+    assert words in bench.refused.text
+    bench.run(1.0)
+    assert bench.last.state is State.OFF
+    bench.is_silent, bench.obeys = False, True
+    bench.run(1.0)
+    bench.enable(12.0)
+    bench.run(2.0)
+    assert bench.refused is None and bench.last.state is State.HOLDING
+
+
+@pytest.mark.parametrize("less", [replace(bsfm(), limits_n=(0.0, 32.0)), bsfm(0.56)], ids=["limits", "reach"])
+def test_a_calibration_that_pulls_less_takes_no_heartbeat_from_the_master(less: Bsfm) -> None:
+    """The setpoint that stands was good when it was written: refused with each beat, the lease would end for it."""
+    bench = ValveBench().pulling(30.0)
+    bench.controller.use(CalibrationInUse(less, 2))
+    for beat in range(1, 20):
+        bench.write(heartbeat=beat)
+        bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=30.0, heartbeat=100 + beat)
+        assert bench.refused is None
+    bench.write(force_setpoint_n=29.0)
+    assert bench.refused and bench.refused.reason is RefusalReason.PULL_RANGE, "what is asked for anew is looked at"
+    bench.write(control_word=ENABLE, force_setpoint_n=30.0)
+    bench.write(control_word=ENABLE | BIT_4)
+    assert bench.refused.reason is RefusalReason.PULL_RANGE
+
+
+def test_a_pull_beyond_the_limits_of_a_calibration_is_refused_and_not_silently_a_smaller_one() -> None:
+    bench = ValveBench()
+    bench.controller.use(CalibrationInUse(replace(bsfm(), limits_n=(0.0, 32.0)), 2))
+    bench.pulling(SHARE * 32.0 + 1.0)
+    assert bench.refused and "pulling reaches 24.0 N" in bench.refused.text
+    bench.pulling(SHARE * 32.0)
+    assert bench.refused is None and bench.last.force_measured_n == pytest.approx(-SHARE * 32.0, abs=1.0)

@@ -155,6 +155,8 @@ def test_a_real_rig_needs_its_two_ports_and_two_different_ones(tmp_path: Path) -
     assert [message.split(":")[0] for message in gone] == ["output.port", "load_cell.port"]
     same = messages(report(tmp_path, CELL, (second, first)).faults)
     assert same == ["load_cell.port: is the output's port too: each device has its own"]
+    other_name = first.replace("/dev/", "/dev/./")
+    assert messages(report(tmp_path, CELL, (second, other_name)).faults) == same, "one adapter by two names"
     named = messages(report(tmp_path, CELL, (first, "  port: ttyUSB0")).faults)
     assert named == ['output.port: "ttyUSB0" is not the path of a device, such as /dev/serial/by-id/usb-...']
 

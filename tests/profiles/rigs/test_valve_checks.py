@@ -58,12 +58,35 @@ def test_what_does_not_fit_is_told(tmp_path: Path, old: str, new: str, told: str
             ", port: /dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A10K2CEL-if00-port0",
             "valve.port: is the port of load_cell too",
         ),
+        (
+            ", port: /dev/./serial/by-id/usb-FTDI_FT232R_USB_UART_A10K1ITV-if00-port0",
+            "valve.port: is the port of output too",
+        ),
+        (", port: ttyUSB2", 'valve.port: "ttyUSB2" is not the path of a device'),
     ],
 )
-def test_a_real_valve_needs_a_port_of_its_own(tmp_path: Path, port: str, told: str) -> None:
+def test_a_real_valve_needs_a_port_of_its_own_and_a_simulated_one_none(tmp_path: Path, port: str, told: str) -> None:
     source = CELL.replace("limits:\n", f"valve: {{device: mcu-valve, baud: 115200{port}}}\nlimits:\n", 1)
     (tmp_path / "rig.yaml").write_text(source, encoding="utf-8")
     assert any(told in message for message in messages(check_report(tmp_path / "rig.yaml").faults))
+    simulated = check_report(tmp_path / "rig.yaml", simulated=True)
+    assert simulated.rig, messages(simulated.faults)
+    assert any(told in note for note in simulated.rig.notes), "it is said what is left to edit"
+
+
+def test_a_master_is_not_served_on_the_valves_adapter(tmp_path: Path) -> None:
+    valve = "valve: {device: mcu-valve, baud: 115200, port: /dev/serial/by-id/usb-x-port0}\n"
+    face = "fieldbus: [{type: rtu, port: /dev/serial/by-id/usb-x-port0}]\n"
+    (tmp_path / "rig.yaml").write_text(CELL.replace("limits:\n", f"{valve}{face}limits:\n", 1), encoding="utf-8")
+    (told,) = messages(check_report(tmp_path / "rig.yaml").faults)
+    assert told.startswith("fieldbus[0].port: is the valve's port too"), told
+
+
+def test_a_valves_port_that_is_numbered_by_plugging_is_warned_of(tmp_path: Path) -> None:
+    valve = "valve: {device: mcu-valve, baud: 115200, port: /dev/ttyUSB2}\n"
+    (tmp_path / "rig.yaml").write_text(CELL.replace("limits:\n", f"{valve}limits:\n", 1), encoding="utf-8")
+    warnings = messages(check_report(tmp_path / "rig.yaml").warnings)
+    assert any(told.startswith("valve.port: /dev/ttyUSB2 may be another adapter") for told in warnings), warnings
 
 
 def test_a_measured_pull_comes_from_its_own_calibration(tmp_path: Path) -> None:

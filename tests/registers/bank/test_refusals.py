@@ -152,6 +152,20 @@ def test_what_control_says_no_to_is_the_answer_to_the_write(bank, master, reason
     assert master.refusal(bank.mask_write, 0, 0xFFFE, 1, master.peer).reason is reason
 
 
+def test_what_a_standing_bit_forbids_is_told_of_the_register_that_was_written(bank, master):
+    """A pull that stands, and a setpoint that it does not reach: the setpoint is refused, and its register is named."""
+    bank.on_asked = lambda asked: EdgeRefusal(R.PULL_RANGE, ControlBit.VALVE_PULL, "pulling reaches 12 N")
+    for write, words, address in (
+        (master.write, (1, 1300), 1),
+        (master.write, (1, 1300, 20), 1),
+        (master.write_float, (202, 13.0), 202),
+        (master.write_float_cdab, (302, 13.0), 302),
+    ):
+        refusal = master.refusal(write, *words)
+        assert (refusal.reason, refusal.address, refusal.value) == (R.PULL_RANGE, address, 13.0)
+    assert master.refusal(master.write, 0, 1, 1300).address == 0
+
+
 def test_control_is_asked_before_anything_is_stored_and_told_what_would_change(bank, master, commands):
     asked = []
     bank.on_asked = lambda one: asked.append((one.command, one.changes(), len(commands)))

@@ -33,6 +33,7 @@ from gateway.devices.messages import (
     OutputReply,
     OutputRequest,
     Pressure,
+    ReadPressure,
     ReadVoltage,
     Refused,
     SetVoltage,
@@ -42,6 +43,7 @@ from gateway.service.running_rig.lines.device_checks import DeviceChecks
 
 _FAILURES_BEFORE_FAULT = 3  # in a row; one bad echo is noise on the line
 _POLL_PERIOD_S = 0.1
+_REPEATED_S = 0.5  # of a setting at rest
 _MOST_OUT = 4  # questions that were given up and may still be answered, each so many reply times later at most
 _AWAY_S = 0.5  # of silence: what answers then may be another device, or one that was switched on again
 _AFTER_SIGN_OF_LIFE_S = 0.005  # nothing tells when the device is through with a sentence that it does not answer
@@ -72,8 +74,10 @@ class OutputExchange:
         write: Callable[[bytes], None],
         reply_timeout_s: float,
         checks: DeviceChecks | None = None,
+        rest_v: float = 0.0,
     ) -> None:
-        self._host = host
+        """rest_v: voltage that stands while nothing is wanted."""
+        self._host, self._rest_v = host, rest_v
         self.checks = checks or DeviceChecks(host, is_waived=False)
         self._write = write
         self._sent_v = self._setting_s = nan
@@ -103,7 +107,7 @@ class OutputExchange:
         self._is_altered = False  # the last echo was another voltage
         self._quiet_until_s = 0.0
         self._sent_s = 0.0
-        self._next_poll_s = 0.0
+        self._next_poll_s = self._said_s = 0.0
         self._failures: dict[object, int] = {}
         self.acknowledged_v: float | None = None
         self.unanswered_since_s: float | None = None
@@ -199,7 +203,14 @@ class OutputExchange:
             self._send(AskDevice(step), now_s)
         elif now_s >= self._next_poll_s and not self.checks.is_tripped:
             self._next_poll_s = now_s + _POLL_PERIOD_S
-            self._send(self._host.idle_question or SetVoltage(self._asked_v), now_s)
+            self._send(self._poll(now_s), now_s)
+
+    def _poll(self, now_s: float) -> OutputRequest:
+        """Of a device that is asked about its pressure alone nobody would notice that it stands elsewhere: set at its panel, by
+        a second talker, or by a dip of its supply. At rest it is told where to stand again and again, which moves nothing."""
+        question = self._host.idle_question or SetVoltage(self._asked_v)
+        is_due = now_s - self._said_s >= _REPEATED_S and self._asked_v == self._rest_v
+        return SetVoltage(self._rest_v) if is_due and isinstance(question, ReadPressure) else question
 
     def _is_confirmed(self, voltage_v: float) -> bool:
         """Within half a step of what surely stands there is nothing to send. After a question without an answer nothing
@@ -213,6 +224,7 @@ class OutputExchange:
 
     def _send(self, request: OutputRequest, now_s: float) -> None:
         self._in_flight, self._sent_s, self._is_behind = request, now_s, False
+        self._said_s = now_s if isinstance(request, SetVoltage) else self._said_s
         self.counts.asked += 1
         if self.unanswered_since_s is None:
             self.unanswered_since_s = now_s
