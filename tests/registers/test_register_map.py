@@ -224,7 +224,7 @@ LIES = [
     ({"min": 5, "max": 4}, "min 5 is above max 4"),
     ({"max": 40000}, "40000 does not fit in int16"),
     ({"values": {"one": "a"}}, "one: a is not a number"),
-    ({"bits": {16: "a"}}, "16: a is not a number 0 .. 15"),
+    ({"bits": {15: "a", 16: "b"}}, "^[^;]*: 16: b is not a number 0 .. 15[^;]*$"),
     ({"address": True}, "True is not a whole number"),
     ({"text": 3}, "text is not text"),
     ({"max": True}, "True is not a number"),
@@ -272,14 +272,30 @@ def test_every_fault_is_told_at_once_with_its_place():
     document = small() | {"version": 0}
     document["blocks"]["only"]["registers"][0]["access"] = "W"
     document["blocks"]["twin"] = {"first": 5, "last": 20, "repeats": {"onyl": 5}}
+    document["blocks"]["third"] = {"first": 30, "last": 31, "registers": {}, "txet": ""}
     with pytest.raises(MapError) as caught:
         read_map(document)
-    assert [place for place, *_ in caught.value.faults] == [
-        ("blocks", "twin"),
-        ("blocks", "only", "registers", 0, "access"),
-        ("blocks", "twin", "repeats", "onyl"),
-        ("version",),
+    assert [(fault.place, fault.is_of_key) for fault in caught.value.faults] == [
+        (("blocks", "third", "txet"), True),
+        (("blocks", "twin"), False),
+        (("blocks", "only", "registers", 0, "access"), False),
+        (("blocks", "third", "registers"), False),
+        (("blocks", "twin", "repeats", "onyl"), False),
+        (("version",), False),
     ]
+    assert "twin: starts at 5 inside block only, which ends at 9" in str(caught.value)
+
+
+def test_a_plc_numbers_words_with_five_digits_from_40001_to_49999():
+    document = small()
+    document["blocks"]["far"] = {"first": 9998, "last": 50000, "registers": []}
+    for address in (9998, 9999, 50000):
+        far = {"name": f"far_{address}", "address": address, "type": "int16", "text": "c"}
+        document["blocks"]["far"]["registers"].append(far)
+    register_map = read_map(document)
+    for number, address in (("49999", 9998), ("9999", 9999), ("50000", 50000)):
+        with pytest.raises(UnknownRegister, match=f"of far_{address}, so"):
+            register_map.find(number)
 
 
 def test_a_document_that_is_no_map_is_told_so():
