@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 
 from gateway.modbus import Peer, answer
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.modbus.crc import crc16
+from gateway.modbus.bits import pack_bits, unpack_bits
+from gateway.modbus.crc import checksum_end, crc16
 from gateway.modbus.identification import identification_request
 from gateway.modbus.rtu import RtuFault, answer_length, decode_adu, encode_adu, request_length
 from tests.modbus.memory_bank import MemoryBank
@@ -29,6 +30,19 @@ REQUESTS = [
 
 def test_the_checksum_is_the_catalogue_s() -> None:
     assert crc16(b"123456789") == 0x4B37
+
+
+def test_a_frame_ends_where_its_checksum_does_and_nowhere_without_one() -> None:
+    frame = encode_adu(1, P.read_request(3, 0, 2))
+    assert checksum_end(frame + b"more", 4) == len(frame)
+    assert checksum_end(frame, len(frame) + 1) == checksum_end(frame[:-1], 4) == checksum_end(b"", 4) == 0
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 16, 17])
+def test_coils_fill_as_many_bytes_as_they_need(count: int) -> None:
+    coils = [place % 3 == 0 for place in range(count)]
+    assert len(pack_bits(coils)) == -(-count // 8)
+    assert unpack_bits(pack_bits(coils), count) == coils
 
 
 def test_a_frame_known_from_elsewhere() -> None:
