@@ -124,6 +124,7 @@ def test_a_bad_set_is_refused_with_index_and_reason(change, index, reason):
 def test_length_crc_slot_and_unused_word_are_checked():
     fault = fault_of(staged(length=139))
     assert (fault.index, fault.reason) == (WHOLE, UploadReason.LENGTH)
+    assert fault.text == "length 139: 190 is a whole set, 140 one without slip stops and response"
     assert fault_of(staged(crc=0)).reason is UploadReason.CRC
     assert fault_of(staged(slot=8)).reason is UploadReason.TARGET_SLOT
     for unused in (1, 151):
