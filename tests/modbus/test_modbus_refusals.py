@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from gateway.modbus import ModbusError, Peer, RequestError, RequestFault, answer
 from gateway.modbus import pdu as P  # noqa: N812
+from gateway.modbus.diagnostics import ServerId, report_answer
 from gateway.modbus.errors import NAMES
 from gateway.modbus.peer import NOBODY
 from gateway.modbus.server import refuse_unit
@@ -263,6 +264,8 @@ def test_an_exception_without_a_sentence_of_its_own_says_what_its_code_means(cod
 def test_a_request_of_a_wrong_length_is_told_both_lengths() -> None:
     with pytest.raises(RequestError, match=r"3 bytes.*5"):
         P.parse_read(bytes(3), 10)
+    with pytest.raises(RequestError, match=r"2 bytes.*1"):
+        report_answer(b"\x11\x00", ServerId(0, True, b""))
 
 
 def test_a_bug_in_the_bank_is_not_dressed_up_as_an_exception_answer() -> None:
