@@ -188,6 +188,20 @@ def test_proofs_of_many_hosts_are_forgotten_oldest_first(make_bank, master_of):
     masters[1].write(0, 1)
 
 
+def test_who_has_enabled_needs_no_new_proof_for_what_it_writes_then(make_bank, master_of):
+    """Its own may be the oldest of many by then, and a tare in the cycle of its writes would be refused, and its lease end."""
+    bank = make_bank(require_byte_order_echo=True)
+    one = master_of(bank, "10.0.0.1")
+    one.write_float(416, 1234.5)
+    one.write(0, 1, 1200)
+    for k in range(64):
+        master_of(bank, f"10.0.1.{k}").write_float(416, 1234.5)
+    one.write(0, int(ControlBit.ENABLE | ControlBit.TARE), 1100)
+    assert bank.command.force_setpoint_n == 11.0
+    one.write(0, 0)
+    assert one.refusal(one.write, 0, 1).reason is R.BYTE_ORDER_UNPROVEN
+
+
 def test_the_echo_reads_back_as_written_in_either_order(bank, master):
     told = []
     bank.on_accepted = lambda sentence, peer: told.append((sentence, peer))
