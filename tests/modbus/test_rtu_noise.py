@@ -56,12 +56,14 @@ def test_a_frame_whose_end_only_its_checksum_tells_does_not_reach_across_a_silen
     assert Bus().send(around).requests() == []
 
 
-def test_a_request_behind_a_silence_is_one_though_noise_before_it_makes_a_frame_with_the_same_end() -> None:
+@pytest.mark.parametrize("pdu", [WRITE, ODD])
+def test_a_request_behind_a_silence_is_one_though_noise_before_it_makes_a_frame_with_the_same_end(pdu: bytes) -> None:
     """An answer of unit 9, checksum and all: the checksum of what noise has made so far is what one begins with."""
-    begun = (bytes((9, 3, 9, *two, 0)) for two in product(range(256), repeat=2))
+    request = encode_adu(1, pdu)
+    begun = (bytes((9, 3, 1 + len(request), *two, 0)) for two in product(range(256), repeat=2))
     made = next(each for each in begun if crc16(each) == 0xFFFF)
-    assert len(made + COMMAND) == 3 + made[2] + 2 and crc16(made + COMMAND) == 0
-    assert Bus().send(made, COMMAND, pause_s=0.01).requests() == answered(WRITE)
+    assert len(made + request) == 3 + made[2] + 2 and crc16(made + request) == 0
+    assert Bus().send(made, request, pause_s=0.01).requests() == answered(pdu)
 
 
 def test_our_own_refusal_of_a_function_that_nobody_knows_is_heard_as_an_echo_in_noise() -> None:
