@@ -137,6 +137,22 @@ def test_what_waits_when_the_port_is_closed_is_sent_first(ear: Any, line: Pty, m
     assert asyncio.run(scene()) == bytes(heard)
 
 
+def test_what_comes_when_there_is_room_again_goes_behind_what_waits(ear: Any, line: Pty) -> None:
+    """The driver may have taken bytes meanwhile, and the loop not have heard of it."""
+
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        sent = filled(port) + b"SET 0\r\n"
+        heard = read_all(line.fd)
+        assert heard and port._unsent
+        assert port.write(b"SET 0\r\n")
+        assert heard + await gather(line.fd, len(sent) - len(heard)) == sent
+        port.close()
+
+    asyncio.run(scene())
+
+
 def test_who_has_sent_all_asks_for_room_no_more(ear: Any, line: Pty) -> None:
     """A writable descriptor would wake the loop for ever."""
 
