@@ -179,3 +179,20 @@ def test_an_open_port_tells_what_its_adapter_is_slow_at(ear: Any, line: Pty, mon
         port.close()
 
     asyncio.run(scene())
+
+
+def test_what_waited_before_a_loss_is_not_sent_after_it_and_nothing_looks_at_a_closed_port(ear: Any, line: Pty) -> None:
+    async def scene() -> None:
+        port, other = ear.port(line.path), Pty()
+        await port.open()
+        filled(port)
+        port.move(other.path)
+        assert port.is_open and port.unsent_bytes == 0
+        assert not asyncio.get_running_loop().remove_writer(ear.opened[0]), "its number may be another's by now"
+        assert port.write(b"SET 0\r\n")
+        assert await gather(other.fd, 7) == b"SET 0\r\n"
+        port.close()
+        assert port._look.cancelled()
+        other.close()
+
+    asyncio.run(scene())
