@@ -50,6 +50,15 @@ def test_behind_the_ramp_the_plant_passes_the_stair_by_a_thirtieth_at_most(dampi
     assert response(damping, command, natural_s).max() < 1.033
 
 
+def test_a_plant_that_rang_in_fewer_than_half_of_its_stairs_does_not_ring():
+    """Somebody may have knocked at the tool."""
+    approach = observed(0.3, 0.05, noise_n=0.03)
+    assert approach.ramp_s > 0.0
+    for _ in range(3):
+        approach.observe([(0.01 * k, min(10.0, 0.5 * k)) for k in range(100)], 0.0, 10.0, 0.03)
+    assert approach.ramp_s == 0.0
+
+
 @pytest.mark.parametrize("damping", [0.9, 1.0, 2.0])
 def test_a_plant_that_does_not_ring_is_stepped_at_once(damping):
     assert observed(damping, 0.05, noise_n=0.1).ramp_s == 0.0
