@@ -5,7 +5,6 @@ from copy import deepcopy
 
 import pytest
 
-from gateway.profiles import load_register_map
 from gateway.registers import MapError, UnknownRegister
 from gateway.registers.map.map_reader import read_map
 from gateway.registers.residual_cause import ResidualCause
@@ -30,18 +29,6 @@ BLOCKS = {
     "active": (1500, 1699),
 }
 SCALES = {"s": 1, "N": 0.01, "N/s": 0.1, "mV": 1, "deg": 0.1, "ms": 1, "g": 1, "us": 1, "kPa": 1, "permille": 1, "": 1}
-
-
-@pytest.mark.parametrize(
-    ("number", "name"),
-    [("40103", "force_measured"), ("30103", "force_measured"), ("102", "force_measured"), ("40001", "control_word")],
-)
-def test_a_number_for_a_name_says_whose_it_is(number, name):
-    register_map = load_register_map("force-v1")
-    with pytest.raises(
-        LookupError, match=f"{number} is not a register by name: {number} is the .* of {name}, so use {name}"
-    ):
-        register_map.find(number)
 
 
 def test_blocks_are_those_of_the_contract(register_map):
@@ -284,18 +271,6 @@ def test_every_fault_is_told_at_once_with_its_place():
         (("version",), False),
     ]
     assert "twin: starts at 5 inside block only, which ends at 9" in str(caught.value)
-
-
-def test_a_plc_numbers_words_with_five_digits_from_40001_to_49999():
-    document = small()
-    document["blocks"]["far"] = {"first": 9998, "last": 50000, "registers": []}
-    for address in (9998, 9999, 50000):
-        far = {"name": f"far_{address}", "address": address, "type": "int16", "text": "c"}
-        document["blocks"]["far"]["registers"].append(far)
-    register_map = read_map(document)
-    for number, address in (("49999", 9998), ("9999", 9999), ("50000", 50000)):
-        with pytest.raises(UnknownRegister, match=f"of far_{address}, so"):
-            register_map.find(number)
 
 
 def test_a_document_that_is_no_map_is_told_so():
