@@ -104,12 +104,11 @@ class RtuReceiver:
         """Return the requests that the silence has ended, in order; none while more may belong to the last one."""
         if not self._burst or now_s < self._last_s + self._wait_s:
             return []
-        longest_s = max(SPLIT_S, self._silence_s)
-        is_final = self._wait_s >= longest_s  # not by the time alone: a program that was late first reads what has come
+        is_final = self._wait_s >= SPLIT_S  # not by the time alone: a program that was late first reads what has come
         found, noise, pending = self._scan(is_final=is_final)
         is_waiting = pending > (_STRAY_BYTES if found and self._burst[found[-1][0]] == self._unit else 0)
         if is_waiting and not is_final:
-            self._wait_s = longest_s
+            self._wait_s = SPLIT_S
             return []
         requests = self._requests(found)
         self.frames += len(found)
@@ -130,7 +129,6 @@ class RtuReceiver:
     def _drop(self, count: int) -> None:
         del self._burst[:count]
         self._marks = [mark - count for mark in self._marks if mark > count]
-        self._wait_s = self._silence_s
 
     def _shorten(self) -> None:
         """Drop the frames that can be made out, then what is older than the longest frame."""
@@ -166,18 +164,18 @@ class RtuReceiver:
     def _scan(self, *, is_final: bool) -> tuple[list[tuple[int, int]], int, int]:
         """Return (the frames as place and size, bytes of noise, bytes at the end that may begin a frame)."""
         found: list[tuple[int, int]] = []
-        at, noise, is_start = 0, 0, True
+        at = noise = 0
         while at < len(self._burst):
-            if size := self._frame_size(at, is_start=is_start):
+            if size := self._frame_size(at, is_start=True):
                 found.append((at, size))
                 self._note_unit(at)
-                at, is_start = at + size, True
+                at += size
                 continue
             resumed, is_pending = self._resume(at, is_final=is_final)
             if resumed is None:
                 rest = len(self._burst) - at
                 return found, noise + rest, rest if is_pending else 0
-            noise, at, is_start = noise + resumed - at, resumed, resumed in self._marks
+            noise, at = noise + resumed - at, resumed
         return found, noise, 0
 
     def _resume(self, noise_at: int, *, is_final: bool) -> tuple[int | None, bool]:
@@ -190,8 +188,7 @@ class RtuReceiver:
         while (at := self._next_beginning(at + 1)) < end:
             is_marked = at in self._marks
             if size := self._frame_size(at, is_start=is_marked):
-                is_stray = at <= claimer + _STRAY_BYTES
-                is_apart = is_stray or claimed <= at or claimed < at + size
+                is_apart = at <= claimer + _STRAY_BYTES or claimed < at + size
                 is_decided = is_final or longest <= end
                 if is_marked or (is_apart and is_decided and self._is_all_frames(at + size)):
                     return at, False
@@ -209,16 +206,11 @@ class RtuReceiver:
     def _next_beginning(self, at: int) -> int:
         """Return the next place at which a frame may begin, or may be claimed to. Most bytes of noise are told by themselves
         and the one behind them: half a kilobyte of it must not take the time of a control step."""
-        burst, marks, units = self._burst, self._marks, self._units
+        burst, marks = self._burst, self._marks
         echoed = self._echo.frame[0] if self._echo.frame else None
         for place in range(at, len(burst) - 1):
             unit = burst[place]
-            if (
-                unit in units
-                or unit == echoed
-                or place in marks
-                or (unit <= LARGEST_UNIT and burst[place + 1] in _FRAMED)
-            ):
+            if unit == echoed or place in marks or (unit <= LARGEST_UNIT and burst[place + 1] in _FRAMED):
                 return place
         return max(at, len(burst) - 1)
 

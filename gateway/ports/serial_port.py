@@ -157,7 +157,7 @@ class SerialPort:
 
     def _open(self) -> None:
         self._descriptor = open_descriptor(self._path, self._settings)
-        self._failure, self._unsent, self._backoff_s, self._refusals = None, b"", _FIRST_BACKOFF_S, 0
+        self._failure, self._backoff_s, self._refusals = None, _FIRST_BACKOFF_S, 0
         self.warning = set_low_latency(self._descriptor, self._path)
         asyncio.get_running_loop().add_reader(self._descriptor, self._on_readable)
         self._set_to = settings_of(self._descriptor)

@@ -7,6 +7,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import CalibrationInUse
 from gateway.control.controller import Controller
+from gateway.control.decision import safe_output
 from gateway.control.state_table import ENABLED_STATES, TRANSITIONS, StateEvent, TransitionError, next_state
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State, StatusBit
@@ -26,6 +27,13 @@ def test_a_pair_that_the_table_lacks_raises():
         next_state(State.FAULT, StateEvent.FAILED)  # a second first cause
     with pytest.raises(TransitionError):
         next_state(State.OFF, StateEvent.MOVE)
+
+
+def test_where_a_step_raised_the_answer_is_a_latched_fault_at_the_safe_voltage():
+    output = safe_output(FaultCode.INTERNAL, 0.5)
+    assert (output.voltage_v, output.state, output.fault) == (0.5, State.FAULT, FaultCode.INTERNAL)
+    assert output.enable_block is RefusalReason.FAULT_LATCHED and output.status == StatusBit.FAULT
+    assert output.clear_command and output.events[0].startswith(FaultCode.INTERNAL.code)
 
 
 def test_every_enabled_state_can_be_left_by_disable_and_by_a_fault():

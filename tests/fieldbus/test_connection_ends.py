@@ -14,9 +14,13 @@ def test_half_a_request_is_waited_for_no_longer_than_partial_s(stand: Any, deliv
     made = stand(partial_s=5.0)
     connection, far = made.connect()
     deliver(connection, far, framed(READ)[:7])
-    made.wait(4.5)
+    made.clock.advance(0.5)
+    connection.sweep(made.clock.time())
+    made.clock.advance(4.25)
+    connection.sweep(made.clock.time())
     assert not far.ended
-    made.wait(1.5)
+    made.clock.advance(0.25)
+    connection.sweep(made.clock.time())
     assert (far.ended, made.log[0][0]) == ("closed", "partial")
 
 

@@ -32,20 +32,23 @@ class Face:
 
     bank: NotingBank = field(default_factory=NotingBank)
     log: list[str] = field(default_factory=list)
+    causes: list[str] = field(default_factory=list)
     gone: list[Peer] = field(default_factory=list)
     server: Any = None
 
     @asynccontextmanager
     async def serving(self, path: str | None) -> AsyncIterator["Face"]:
         settings = RtuSettings(path, LINE, unit=3, peer=FACE)
-        self.server = ModbusRtuServer(
-            self.bank, settings, on_peer_closed=self.gone.append, log=lambda _, told: self.log.append(told)
-        )
+        self.server = ModbusRtuServer(self.bank, settings, on_peer_closed=self.gone.append, log=self.note)
         await self.server.start()
         try:
             yield self
         finally:
             await self.server.close()
+
+    def note(self, cause: str, told: str) -> None:
+        self.log.append(told)
+        self.causes.append(cause)
 
     async def until_told(self, part: str) -> str:
         while not (told := [line for line in self.log if part in line]):
@@ -109,6 +112,9 @@ def test_a_port_that_was_unplugged_is_served_again(tmp_path: Path) -> None:
             assert face.gone == [FACE] and face.server.peers == ()
             name.symlink_to(lines[1].path)
             await face.until_told("is back")
+            assert {cause for cause, told in zip(face.causes, face.log, strict=True) if "latency" not in told} == {
+                f"face {FACE}"
+            }
             os.write(lines[1].fd, encode_adu(3, READ)[5:])  # the other half is no request together with the first
             await asyncio.sleep(0.05)
             assert is_silent(lines[1].fd)

@@ -27,6 +27,10 @@ def test_what_comes_behind_a_standstill_is_known_although_nobody_has_noted_it_ye
     assert kept(0.1, 4.0, 4.0 + 0.9 * AFTERMATH_S, 4.0 + 1.1 * AFTERMATH_S) == [False, True, True, False]
 
 
+def test_a_standstill_is_one_from_a_second_on() -> None:
+    assert kept(0.1, 0.1 + 1.1 * STANDSTILL_S) == [False, True]
+
+
 def test_a_slow_process_does_not_stand_still() -> None:
     assert not any(kept(*(0.9 * STANDSTILL_S * step for step in range(20))))
 

@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 
 from gateway.modbus import Peer, answer
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.modbus.crc import crc16
+from gateway.modbus.bits import pack_bits, unpack_bits
+from gateway.modbus.crc import checksum_end, crc16
 from gateway.modbus.identification import identification_request
 from gateway.modbus.rtu import RtuFault, answer_length, decode_adu, encode_adu, request_length
 from tests.modbus.memory_bank import MemoryBank
@@ -17,6 +18,7 @@ REQUESTS = [
     P.read_request(3, 3, 125),
     P.read_request(4, 3, 1),
     P.write_coil_request(3, True),
+    P.write_coil_request(3, False),
     P.write_register_request(3, 5),
     P.write_coils_request(3, [True] * 11),
     P.write_registers_request(3, bytes(10)),
@@ -29,6 +31,19 @@ REQUESTS = [
 
 def test_the_checksum_is_the_catalogue_s() -> None:
     assert crc16(b"123456789") == 0x4B37
+
+
+def test_a_frame_ends_where_its_checksum_does_and_nowhere_without_one() -> None:
+    frame = encode_adu(1, P.read_request(3, 0, 2))
+    assert checksum_end(frame + b"more", 4) == len(frame)
+    assert checksum_end(frame, len(frame) + 1) == checksum_end(frame[:-1], 4) == checksum_end(b"", 4) == 0
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 16, 17])
+def test_coils_fill_as_many_bytes_as_they_need(count: int) -> None:
+    coils = [place % 3 == 0 for place in range(count)]
+    assert len(pack_bits(coils)) == -(-count // 8)
+    assert unpack_bits(pack_bits(coils), count) == coils
 
 
 def test_a_frame_known_from_elsewhere() -> None:
@@ -57,7 +72,7 @@ def test_what_cannot_be_a_frame_is_refused_by_its_length(size: int) -> None:
 
 @pytest.mark.parametrize("request_pdu", REQUESTS, ids=lambda pdu: pdu.hex()[:10])
 def test_lengths_are_known_before_the_frame_ends_and_never_wrong(request_pdu: bytes) -> None:
-    bank = MemoryBank(words=200, bits=100, identity={0: b"vendor", 1: b"product", 2: b"1.0"})
+    bank = MemoryBank(words=200, bits=100, identity={0: b"vendor", 1: b"product", 2: b""})
     frames = [
         (encode_adu(1, request_pdu), request_length),
         (encode_adu(1, answer(request_pdu, bank, Peer("serial"))), answer_length),
@@ -66,6 +81,10 @@ def test_lengths_are_known_before_the_frame_ends_and_never_wrong(request_pdu: by
         told = [predict(frame[:size]) for size in range(len(frame) + 1)]
         assert told[len(frame) - 2] == len(frame), "known at the latest when only the checksum is missing"
         assert set(told) == {None, len(frame)}, "and the same from then on"
+
+
+def test_a_coil_is_written_as_the_specification_has_it() -> None:
+    assert [P.write_coil_request(172, value).hex() for value in (True, False)] == ["0500acff00", "0500ac0000"]
 
 
 def test_the_length_of_an_unknown_function_is_unknown() -> None:

@@ -3,8 +3,8 @@
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.diagnostics import loopback_request, report_request
 from gateway.modbus.rtu import encode_adu
-from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuRequest
-from tests.modbus.rtu_bus import SILENCE_S, Bus
+from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuRequest
+from tests.modbus.rtu_bus import BAUD, CHARACTER_S, SILENCE_S, Bus
 from tests.modbus.test_rtu_receiver import COMMAND, INSIDE, OURS, READ, WRITE, answered
 
 
@@ -15,6 +15,13 @@ def test_a_silence_is_one_from_its_first_moment() -> None:
         bus = Bus()
         assert bus.send(encode_adu(2, READ)).requests() == []
         assert bus.send(begun, OURS, pause_s=silences * SILENCE_S).requests() == heard, silences
+    receiver = RtuReceiver(1, BAUD, CHARACTER_S)
+    receiver.receive(encode_adu(2, READ), 0.0)
+    receiver.take(1.0)
+    receiver.receive(begun, 0.0)
+    silent_s = receiver.deadline_s or 0.0
+    receiver.receive(OURS, silent_s)
+    assert receiver.take(silent_s + SILENCE_S) == answered(), "from the moment on at which it would be taken"
 
 
 def test_stray_bytes_behind_a_request_do_not_delay_its_answer() -> None:
@@ -61,6 +68,14 @@ def test_what_was_dropped_without_a_silence_has_told_its_unit() -> None:
     assert bus.send(INSIDE[:7] + OURS).requests() == []
 
 
+def test_of_a_flood_no_more_is_dropped_than_there_is_no_room_for() -> None:
+    """Frames that are made out make room: what is behind them stays, though it is longer than the longest frame."""
+    long = encode_adu(7, P.write_registers_request(0, bytes(242)))
+    flood = encode_adu(7, READ) * (MOST_BYTES // len(OURS) - len(long) // len(OURS))
+    assert len(flood + COMMAND + long) > MOST_BYTES
+    assert Bus().send(flood + b"\x55" + COMMAND + long).requests() == [RtuRequest(1, WRITE, False)]
+
+
 def test_where_silences_were_is_forgotten_with_the_port() -> None:
     at = INSIDE.index(COMMAND)
     bus = Bus().send(b"\x07" * at, b"\x07", pause_s=0.006)
@@ -100,7 +115,11 @@ def test_an_answer_waits_for_the_silence_and_only_where_more_may_come_for_the_lo
         assert bus.send(*chunks[:-1], pause_s=0.01).heard == []
         begin_s = bus.now_s
         assert bus.send(chunks[-1]).pause(1.0).heard == [(begin_s + SILENCE_S, RtuRequest(1, READ, True))], chunks
-    for stray, pdu in ((b"\x00", report_request()), (b"\x01", WRITE)):  # its first bytes could claim more than there is
+    for stray, pdu in (
+        (b"\x00", report_request()),  # its first bytes could claim more than there is
+        (b"\x01", WRITE),
+        (b"\x09", P.read_request(4, 100, 12)),  # or just as much: an answer of 9 to FC01
+    ):
         bus = Bus()
         begin_s = bus.now_s
         heard = [(begin_s + SILENCE_S, RtuRequest(1, pdu, True))]
@@ -114,6 +133,7 @@ def test_a_frame_without_a_length_is_heard_behind_another_and_behind_a_silence()
     frame = encode_adu(1, LONG_ECHO)
     assert Bus().send(COMMAND + frame).requests() == [RtuRequest(1, WRITE, False), RtuRequest(1, LONG_ECHO, True)]
     assert Bus().send(b"\x00", frame, pause_s=0.016).requests() == answered(LONG_ECHO)
+    assert Bus().send(b"\x00" + frame).requests() == [], "in noise a checksum alone is too little"
 
 
 def test_each_byte_that_is_no_part_of_a_frame_is_counted_once() -> None:
@@ -147,6 +167,15 @@ def test_a_begun_frame_hides_what_follows_only_where_a_frame_may_begin_and_its_u
 
 def test_behind_another_s_frame_in_noise_a_silence_still_begins_the_next() -> None:
     assert known(7).send(b"\x07\x03\xf0" + encode_adu(7, READ), OURS, pause_s=0.01).requests() == answered()
+
+
+def test_what_begins_behind_a_silence_inside_of_another_s_frame_in_noise_is_heard_unless_that_one_is_known() -> None:
+    """Noise makes frames of units that are not there, checksum and all; a silence is not made so easily."""
+    around = encode_adu(9, bytes((3, 2 + len(COMMAND))) + b"\x55" + COMMAND + b"\x55")
+    at = around.index(COMMAND)
+    for heard_before, heard in (((7,), answered(WRITE)), ((7, 9), [])):
+        bus = known(*heard_before).send(b"\x07\x03\xf0" + around[:at], around[at:], pause_s=0.01)
+        assert bus.requests() == heard, heard_before
 
 
 def test_behind_a_stray_byte_a_frame_counts_where_frames_reach_to_the_next_silence() -> None:

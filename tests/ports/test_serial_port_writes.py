@@ -137,6 +137,22 @@ def test_what_waits_when_the_port_is_closed_is_sent_first(ear: Any, line: Pty, m
     assert asyncio.run(scene()) == bytes(heard)
 
 
+def test_what_comes_when_there_is_room_again_goes_behind_what_waits(ear: Any, line: Pty) -> None:
+    """The driver may have taken bytes meanwhile, and the loop not have heard of it."""
+
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        sent = filled(port) + b"SET 0\r\n"
+        heard = read_all(line.fd)
+        assert heard and port._unsent
+        assert port.write(b"SET 0\r\n")
+        assert heard + await gather(line.fd, len(sent) - len(heard)) == sent
+        port.close()
+
+    asyncio.run(scene())
+
+
 def test_who_has_sent_all_asks_for_room_no_more(ear: Any, line: Pty) -> None:
     """A writable descriptor would wake the loop for ever."""
 
@@ -161,5 +177,22 @@ def test_an_open_port_tells_what_its_adapter_is_slow_at(ear: Any, line: Pty, mon
         await port.open()
         assert port.warning == f"W332 {line.path} waits"
         port.close()
+
+    asyncio.run(scene())
+
+
+def test_what_waited_before_a_loss_is_not_sent_after_it_and_nothing_looks_at_a_closed_port(ear: Any, line: Pty) -> None:
+    async def scene() -> None:
+        port, other = ear.port(line.path), Pty()
+        await port.open()
+        filled(port)
+        port.move(other.path)
+        assert port.is_open and port.unsent_bytes == 0
+        assert not asyncio.get_running_loop().remove_writer(ear.opened[0]), "its number may be another's by now"
+        assert port.write(b"SET 0\r\n")
+        assert await gather(other.fd, 7) == b"SET 0\r\n"
+        port.close()
+        assert port._look.cancelled()
+        other.close()
 
     asyncio.run(scene())

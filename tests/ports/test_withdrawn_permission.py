@@ -65,3 +65,24 @@ def test_a_replug_without_permission_is_told_once_and_opens_when_it_is_given(
         other.close()
 
     asyncio.run(scene())
+
+
+def test_a_refusal_is_told_anew_when_the_port_has_been_open_since(line: Pty) -> None:
+    refusals: list[PortError] = []
+
+    async def scene() -> None:
+        nothing = lambda *_: None  # noqa: E731
+        port = SerialPort(line.path, SerialSettings(baud=9600), PortEvents(nothing, nothing, nothing, refusals.append))
+        await port.open()
+        for told in (1, 2):
+            for code in ("E101", "E103", "E102", "E101", "E101"):
+                port._note_refusal(PortError(code, "may not open it, or it is not there"))
+            assert len(refusals) == told - 1, "not three in a row"
+            for _ in range(3):
+                port._note_refusal(PortError("E101", "may not open it"))
+            assert len(refusals) == told
+            port._release()
+            port._open()
+        port.close()
+
+    asyncio.run(scene())

@@ -40,6 +40,7 @@ class Master:
             act(*arguments)
         assert memory(self.bank) == before
         assert (self.bank.command, self.bank.owner) == (command, owner)
+        assert "None" not in caught.value.sentence
         return caught.value
 
     def word(self, address: int) -> int:

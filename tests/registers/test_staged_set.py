@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.bsfm import CoefficientLimits, CoefficientReason, Coefficients, Response
-from gateway.bsfm.coefficients import RADII_FROM, SHARES_FROM
+from gateway.bsfm.coefficients import RADII_FROM, SHARES_FROM, WHOLE
 from gateway.bsfm.slip.slip_stops import STOPS_CARRIED, STOPS_MAX
 from gateway.registers.upload.coefficients import BLOCK_BYTES, SET_BYTES, CoefficientSet, set_crc, words_of_block
 from gateway.registers.upload.staging import StagedFault, check_staged
@@ -122,7 +122,9 @@ def test_a_bad_set_is_refused_with_index_and_reason(change, index, reason):
 
 
 def test_length_crc_slot_and_unused_word_are_checked():
-    assert fault_of(staged(length=139)).reason is UploadReason.LENGTH
+    fault = fault_of(staged(length=139))
+    assert (fault.index, fault.reason) == (WHOLE, UploadReason.LENGTH)
+    assert fault.text == "length 139: 190 is a whole set, 140 one without slip stops and response"
     assert fault_of(staged(crc=0)).reason is UploadReason.CRC
     assert fault_of(staged(slot=8)).reason is UploadReason.TARGET_SLOT
     for unused in (1, 151):

@@ -103,3 +103,26 @@ def test_what_came_while_the_process_stood_still_presses_nothing_and_a_stop_stop
 )
 def test_a_stop_is_what_clears_the_control_word_and_sets_nothing(payload: bytes, stops: bool) -> None:
     assert is_stop(payload) is stops
+
+
+def test_who_waits_for_the_next_message_lets_others_run() -> None:
+    """Also behind one that has come: else nothing else would ever happen in this process."""
+
+    async def scene(queue: CommandQueue, clock: Clock) -> None:
+        waits, wait = 0, queue._ready.wait
+
+        async def counted() -> bool:
+            nonlocal waits
+            waits += 1
+            assert waits < 10, "it asks without end"
+            return await wait()
+
+        queue._ready.wait = counted  # type: ignore[method-assign]
+        queue.put("command", b"1")
+        assert (await queue.get())[0].payload == b"1"
+        waiting = asyncio.create_task(queue.get())
+        await asyncio.sleep(0.0)
+        queue.put("command", b"2")
+        assert (await waiting)[0].payload == b"2"
+
+    play(scene)

@@ -12,6 +12,8 @@ KILLED: Final = (1, 3)
 """Exit codes of mutmut that mean seen: a failing test, an internal error of pytest."""
 TIMED_OUT: Final = (24, 36, 152, 255, -24)
 """Exit codes of mutmut: more time than the tests may need."""
+SEEN_BY_ALL: Final = 1001
+"""No exit code: not seen by the tests that mutmut asked, but by others of the room."""
 UNASKED: Final = 33
 """Exit code of mutmut: no test calls this function."""
 

@@ -212,16 +212,14 @@ class MeasuredTrim:
     def _estimate_noise(self, now_n2: float, share: float) -> None:
         self._noise_n2 += share * (now_n2 - self._noise_n2)
         self._lately_n2 += max(share, 1.0 / LATELY_SAMPLES) * (now_n2 - self._lately_n2)
-        if self._noise_n2 > NOISY_N**2:
-            self._noise_n2 = min(self._noise_n2, max(NOISY_N**2, CEASED * self._lately_n2))
+        self._noise_n2 = min(self._noise_n2, max(NOISY_N**2, CEASED * self._lately_n2))
 
     def _zone_n(self) -> float:
         smoothed = sqrt(self._noise_n2 * min(1.0, self._interval_s / min(2.0 * SMOOTHING_S, self._seen_s)))
         return float(max(ZONE_SHARE * self._settings.dead_zone_n, SIGMAS * smoothed) * WIDER**self._turns)
 
     def _rest(self) -> None:
-        self._way, self._smooth_n, self._seen_s, self._interval_s = 0, 0.0, 0.0, 0.0
-        self._before_n = None
+        self._way, self._seen_s, self._before_n = 0, 0.0, None
 
     def _calm(self) -> None:
         self._turns = self._last_way = 0

@@ -175,7 +175,7 @@ class LadderRun:
 
     def _voltage_v(self, now_s: float) -> float:
         """On the way to the stair, or at it."""
-        if self._stair_s is None or not self.stairs or self.is_done:
+        if self._stair_s is None or self.is_done:
             return self._rest_v
         stair_v = self._stair.voltage_v
         share = self._approach.share(now_s - self._stair_s) if self._ramp_s else 1.0

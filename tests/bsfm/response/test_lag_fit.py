@@ -4,8 +4,21 @@ from random import Random
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
-from gateway.bsfm.response.lag_fit import ONE_LAG, TWO_LAGS, _compute_held_out_loss, choose_shapes, fit_lags, interval
+from gateway.bsfm.response.lag_fit import (
+    ONE_LAG,
+    RINGING,
+    TWO_LAGS,
+    Shapes,
+    _compute_held_out_loss,
+    _loss,
+    _residual_at,
+    _scale_n,
+    choose_shapes,
+    fit_lags,
+    interval,
+)
 from gateway.bsfm.response.response_model import JoinedSteps, Lags, StepResponse, missing_share
 from gateway.bsfm.response.second_order import SecondOrder
 
@@ -123,3 +136,12 @@ def test_steps_without_noise_give_their_lags_back_and_no_answer_comes_before_its
     for seed in range(8):
         noisy = fit_lags([step(Random(seed), lags, 50.0, 2.0) for _ in range(2)], ONE_LAG)
         assert noisy.dead_time_s >= 0.0
+
+
+@pytest.mark.parametrize(("lags", "shapes"), [(Lags(0.02, 0.1, 0.1, 0.3), RINGING), (Lags(0.1, 0.9, 0.8), TWO_LAGS)])
+def test_a_fit_goes_on_until_no_other_dead_time_or_lag_is_better(lags: Lags, shapes: Shapes) -> None:
+    steps = [step(Random(seed), lags, 50.0, 0.05) for seed in range(6)]
+    fit, scale_n = fit_lags(steps, shapes), _scale_n(steps)
+    residual = _residual_at(steps, fit.shape)
+    best = minimize(lambda place: _loss(residual(np.maximum(place, 0.0)), scale_n), fit.place, method="Nelder-Mead")
+    assert fit.loss <= 1.001 * best.fun

@@ -114,6 +114,24 @@ def test_a_heartbeat_that_is_refused_is_not_repeated(monkeypatch: pytest.MonkeyP
     run.close()
 
 
+def test_a_heartbeat_goes_round(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a run of hours: behind the last number of a word comes 0, and the beats go on."""
+    monkeypatch.setattr(remote_run, "DEFAULT_PERIOD_S", 0.0)
+    run = remote(client := PlayedClient(CalibrationPhase.IDLE))
+    beats: list[int] = []
+
+    def hear(assignments: Sequence[Assignment]) -> None:
+        beats.append(int.from_bytes(assignments[0].data, "big"))
+        if len(beats) > 0x10000:
+            raise RefusedError(6, "write 1 at 4")
+
+    monkeypatch.setattr(client, "write_values", hear)
+    run.begin()
+    run._beat.join(20.0)
+    assert not run._beat.is_alive() and beats == [*range(1, 0x10000), 0, 1]
+    run.close()
+
+
 def test_a_heartbeat_whose_answer_is_lost_is_followed_by_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
     """One that noise took must not be the last: the lease would end the run."""
     monkeypatch.setattr(remote_run, "DEFAULT_PERIOD_S", 0.001)

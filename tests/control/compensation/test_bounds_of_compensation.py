@@ -34,6 +34,15 @@ def test_both_branches_are_told_at_the_volts_that_are_sent(voltage_v: float) -> 
     assert model.branch_forces_n(voltage_v) != bsfm().branch_forces_n(voltage_v)
 
 
+@pytest.mark.parametrize(
+    ("sent_v", "straight_v"),
+    [(5.0, 5.5), (2.5, 2.5 + 0.375 - 0.15), (7.5, 7.5 + 0.375 + 0.15), (9.0, 9.0 + 0.18 + 0.1152)],
+)
+def test_a_bow_is_widest_in_the_middle_and_an_s_turns_round_there(sent_v: float, straight_v: float) -> None:
+    """Shares of 10 V, worked out by hand from the parabola and its product with the way from the middle."""
+    assert BOWED.straight_v(sent_v) == pytest.approx(straight_v)
+
+
 @pytest.mark.parametrize("voltage_v", [-0.5, 0.0, 10.0, 10.5])
 def test_outside_of_its_range_nothing_is_bent(voltage_v: float) -> None:
     assert BOWED.sent_v(voltage_v) == BOWED.straight_v(voltage_v) == voltage_v

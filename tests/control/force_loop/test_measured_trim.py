@@ -6,7 +6,7 @@ import pytest
 
 from gateway.bsfm.response.second_order import SecondOrder
 from gateway.control import Trim
-from gateway.control.force_loop.measured_trim import MOST_TURNS, NEW_TARGET_N, STOOD_S, MeasuredTrim
+from gateway.control.force_loop.measured_trim import LEAST_SEEN_S, MOST_TURNS, NEW_TARGET_N, STOOD_S, MeasuredTrim
 from gateway.control.settings import LoopTiming
 from gateway.registers.words import LimitedBy
 
@@ -31,6 +31,20 @@ def held(one: MeasuredTrim, error_n: float, seconds: float, noise_n: float = 0.0
 
 def test_an_error_is_corrected_beyond_the_edge_of_the_zone():
     assert abs(held(trim(), 1.0, 3.0)) < 0.07
+
+
+def test_a_correction_that_has_begun_goes_on_to_a_third_of_the_zone():
+    """Left at its edge, every error would stay as large as the zone is wide."""
+    assert abs(held(trim(dead_zone_n=2.0), 1.2, 5.0)) < 0.45
+
+
+def test_an_error_is_believed_once_it_has_been_seen_for_a_while():
+    """One sample that is off is the cell's."""
+    one = trim()
+    held(one, 1.0, LEAST_SEEN_S - SAMPLE_S)
+    assert one.value_n == 0.0
+    held(one, 1.0, 2.0 * SAMPLE_S)
+    assert one.value_n > 0.0
 
 
 def test_errors_within_the_zone_are_left_to_stiction():

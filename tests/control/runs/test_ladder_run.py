@@ -109,7 +109,7 @@ def test_progress_never_falls_and_the_eta_reaches_the_end() -> None:
 def test_bit_5_starts_it_and_clearing_it_ends_it_along_the_ramp() -> None:
     bench = Bench(seed=7)
     bench.run(0.5)
-    bench.write(control_word=ControlBit.START_CALIBRATION)
+    assert "calibration begun by 10.0.0.5" in bench.write(control_word=ControlBit.START_CALIBRATION).events
     bench.run(4.0)
     assert bench.last.state is State.CALIBRATING
     standing_v, standing_n = bench.last.voltage_v, bench.last.force_applied_n

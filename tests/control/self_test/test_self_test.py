@@ -124,6 +124,7 @@ def test_where_friction_leaves_no_room_that_is_said_and_not_taken_for_a_fault() 
     assert report.result is SelfTestResult.WARNED
     assert rig.peak_n < 5.0
     assert "leave no room below self_test.force_n = 5 N: raise it" in report.sentences[3]
+    assert rig.output and rig.output.calibration_progress == 1.0, "over is over, however early"
 
 
 def test_clearing_bit_6_ends_it_and_nothing_is_claimed() -> None:

@@ -24,6 +24,7 @@ from gateway.control.self_test.judgement import (
     judge_output_line,
     judge_resolution,
     judge_response,
+    judge_rest,
     judge_scale,
     judge_zero,
 )
@@ -73,6 +74,22 @@ def test_what_was_measured_is_told_in_the_units_that_it_says() -> None:
 def test_the_longest_gap_is_the_longest_wherever_it_was() -> None:
     found = intervals_of([0.0, 0.01, 0.02, 0.06, 0.07, 0.08])
     assert (found.median_s, found.longest_s, found.missing) == (pytest.approx(0.01), pytest.approx(0.04), 3)
+
+
+def test_readings_of_one_moment_miss_none_between_them() -> None:
+    assert intervals_of([1.0, 1.0, 1.0]) == (0.0, 0.0, 0)
+
+
+@pytest.mark.parametrize(
+    ("readings", "words"), [(19, "all of 19 readings are the same: too few to tell"), (20, "too quiet")]
+)
+def test_a_cell_that_repeats_itself_has_no_noise_to_judge_and_of_few_readings_nothing_is_claimed(
+    readings: int, words: str
+) -> None:
+    noise, resolution, zero = judge_rest([(0.01 * k, 0.1) for k in range(readings)], RIG)
+    assert noise == Finding(Item.NOISE, NOT_TESTED, "all readings are the same")
+    assert (resolution.item, resolution.verdict, zero.verdict) == (Item.RESOLUTION, NOT_TESTED, PASSED)
+    assert words in resolution.text
 
 
 def test_the_slowest_exchange_is_the_slowest_wherever_it_was() -> None:

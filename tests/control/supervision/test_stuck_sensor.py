@@ -88,6 +88,8 @@ def test_the_noise_that_is_told_is_the_least_that_is_found_in_time() -> None:
     for rate_hz in RATES:
         counts, bound_s = counts_found_within(2.0, rate_hz), 2.0 - 1.0 / rate_hz
         assert seconds_to_find(1.01 * counts, rate_hz, 0.5) <= bound_s < seconds_to_find(0.97 * counts, rate_hz, 0.5)
+        between = ceil(equal_samples(counts, rate_hz)) - 1  # n equal samples lie n - 1 periods apart
+        assert seconds_to_find(counts, rate_hz, 0.0) == pytest.approx(between / rate_hz)
     assert counts_found_within(2.0, 4.0) == inf
 
 

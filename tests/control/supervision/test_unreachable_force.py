@@ -93,6 +93,15 @@ def test_without_a_pressure_what_was_right_before_counts_and_no_more_is_claimed(
     assert told(never).endswith("no air, valve closed or no contact")
 
 
+@pytest.mark.parametrize("pressure_pa", [nan, 24e3, 99e3, 140e3])
+@pytest.mark.parametrize("factor", [0.02, 0.102, 0.6, 3.0, 9.81])
+def test_whatever_is_seen_is_told_with_the_pressure_that_was_measured(pressure_pa: float, factor: float) -> None:
+    seen = Evidence(voltage_v=1.0, measured_n=8.0 * factor, expected_n=8.0, pressure_pa=pressure_pa, expected_pa=100e3)
+    told = unreachable_words(seen)
+    assert "None" not in told and "nan" not in told
+    assert told.startswith(f"{pressure_pa / 1e3:.0f} kPa measured, 100 kPa expected") or pressure_pa != pressure_pa
+
+
 def test_a_force_that_was_right_before_this_enable_counts_for_nothing() -> None:
     bench = holding(Bench(seed=5))
     bench.disable()

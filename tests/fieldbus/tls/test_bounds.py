@@ -68,10 +68,11 @@ def test_one_address_that_says_nothing_does_not_keep_the_others_out(face: Face) 
     assert not face.accept("10.0.0.8").socket.ended
 
 
-def test_one_address_has_twenty_handshakes_a_second(face: Face) -> None:
+def test_one_address_has_twenty_handshakes_a_second_and_costs_no_other_any(face: Face) -> None:
     for _ in range(30):
         face.accept("10.0.0.7").socket.leave()
     assert face.log and all("more than 20 handshakes a second" in told for told in face.log)
+    assert not face.accept("10.0.0.8").socket.ended
     face.clock.advance(1.0)
     face.handshakes.sweep(face.clock.time())
     assert not face.handshakes.rates

@@ -164,6 +164,12 @@ def test_a_role_that_cannot_be_read_is_none_that_is_known(folder: Folder, said: 
     assert shown.role is not None and shown.role not in ROLES
 
 
+@pytest.mark.parametrize("der", ["3080", "30850000000000", "30850000000001ff"])
+def test_a_length_of_no_bytes_or_of_more_than_four_is_none(der: str) -> None:
+    with pytest.raises(ValueError, match="a length that no certificate has"):
+        read_certificate(bytes.fromhex(der))
+
+
 def test_no_bytes_break_the_reading(folder: Folder) -> None:
     der = ssl.PEM_cert_to_DER_cert(Path(folder.crt("setpoint")).read_text())
     for cut in range(len(der)):

@@ -5,7 +5,9 @@ import math
 import pytest
 
 from gateway.codes.refusals import RefusalReason
+from gateway.registers.image import RegisterImage
 from gateway.registers.words import ControlBit
+from gateway.registers.writes.byte_order_echo import ByteOrderEcho
 from gateway.registers.writes.proposed_write import EdgeRefusal
 
 R = RefusalReason
@@ -200,14 +202,37 @@ def test_proofs_of_many_hosts_are_forgotten_oldest_first(make_bank, master_of):
     masters[1].write(0, 1)
 
 
+def test_who_has_enabled_needs_no_new_proof_for_what_it_writes_then(make_bank, master_of):
+    """Its own may be the oldest of many by then, and a tare in the cycle of its writes would be refused, and its lease end."""
+    bank = make_bank(require_byte_order_echo=True)
+    one = master_of(bank, "10.0.0.1")
+    one.write_float(416, 1234.5)
+    one.write(0, 1, 1200)
+    for k in range(64):
+        master_of(bank, f"10.0.1.{k}").write_float(416, 1234.5)
+    one.write(0, int(ControlBit.ENABLE | ControlBit.TARE), 1100)
+    assert bank.command.force_setpoint_n == 11.0
+    one.write(0, 0)
+    assert one.refusal(one.write, 0, 1).reason is R.BYTE_ORDER_UNPROVEN
+
+
 def test_the_echo_reads_back_as_written_in_either_order(bank, master):
     told = []
-    bank.on_accepted = lambda sentence, peer: told.append(sentence)
+    bank.on_accepted = lambda sentence, peer: told.append((sentence, peer))
     master.write_float_cdab(416, 1234.5)
     assert bank.read_registers(416, 2) == bytes.fromhex("5000449A")
     master.write_float(416, 1234.5)
     assert bank.read_registers(416, 2) == bytes.fromhex("449A5000")
-    assert told == ["byte_order_echo CDAB: use block 300", "byte_order_echo ABCD: use block 200"]
+    sentences = "byte_order_echo CDAB: use block 300", "byte_order_echo ABCD: use block 200"
+    assert told == [(sentence, master.peer) for sentence in sentences]
+
+
+def test_reserved_words_right_before_the_echo_prove_nothing(register_map):
+    """In a map of one's own: in ours the words before it are read only."""
+    echo = ByteOrderEcho(register_map.find("byte_order_echo"), RegisterImage(register_map))
+    assert echo.write(414, bytes(4), "10.0.0.1") is None
+    assert not echo.is_proven_by("10.0.0.1")
+    assert echo.write(414, bytes(4) + bytes.fromhex("449A5000"), "10.0.0.1") == "abcd"
 
 
 def test_the_rig_may_narrow_the_voltage_but_zero_stays(make_bank, master_of):

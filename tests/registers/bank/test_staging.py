@@ -168,9 +168,9 @@ def test_who_commits_and_who_chooses_a_slot_is_told_to_the_audit(bank, master):
 
 def test_a_slot_is_selected_by_its_number(bank, master):
     seen = []
-    bank.staging.on_select = lambda slot, peer: seen.append(slot)
+    bank.staging.on_select = lambda slot, peer: seen.append((slot, peer))
     master.write(1149, 3)
-    assert (seen, master.word(1149)) == ([3], 3)
+    assert (seen, master.word(1149)) == ([(3, master.peer)], 3)
 
 
 def test_the_active_set_is_read_back_with_its_crc(bank, register_map):

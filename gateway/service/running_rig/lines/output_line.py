@@ -122,7 +122,7 @@ class OutputExchange:
     @property
     def said(self) -> str:
         """Words of the device about itself, where that is the fault; else empty."""
-        return self.checks.said if self.checks.fault else ""
+        return self.checks.said
 
     @property
     def confirmed_v(self) -> float | None:

@@ -44,6 +44,16 @@ def test_a_watchdog_may_fail_to_arm_twice_and_not_three_times(fails: int) -> Non
     assert (checks.fault, checks.is_armed) == (expected, fails < MOST_TRIES)
 
 
+def test_a_device_s_words_are_told_with_the_fault_that_they_were_said_of_and_no_longer() -> None:
+    checks = checks_of("icpdas-702x")
+    output = OutputExchange(output_host(load_device("icpdas-702x")), lambda _: None, 0.06, checks)
+    arm(checks, fails=MOST_TRIES)
+    assert (output.fault, output.said) == (FaultCode.WATCHDOG_NOT_ARMED, checks.said) and output.said
+    output.clear_faults()
+    arm(checks)
+    assert (output.fault, output.said) == (FaultCode.NONE, "")
+
+
 def test_what_failed_before_it_was_armed_does_not_count_when_it_has_to_be_armed_again() -> None:
     """A device that tells no more than its state is armed anew where that says `off`, however often it has worked before."""
     profile = load_device("icpdas-702x")

@@ -1,0 +1,76 @@
+"""Which frames count in noise and behind a silence, and what may hide one: claims of units, known or not, and their ends."""
+
+from itertools import product
+
+import pytest
+
+from gateway.modbus import pdu as P  # noqa: N812
+from gateway.modbus.crc import crc16
+from gateway.modbus.rtu import encode_adu
+from tests.modbus.rtu_bus import SILENCE_S, Bus
+from tests.modbus.test_rtu_receiver import COMMAND, OURS, READ, WRITE, answered, registers_answer
+from tests.modbus.test_rtu_receiver_limits import known
+
+ODD = b"\x41\x01\x02"  # of a function that nobody knows: its checksum alone tells its end
+
+
+def test_a_unit_that_is_not_here_takes_no_claim_away() -> None:
+    """Another's answer of 21 bytes is begun and cut off; its second byte may begin a longer frame of unit 3."""
+    command = encode_adu(1, P.write_register_request(1, 0x2000))
+    assert known(7).send(b"\x07\x03\x10" + command).requests() == []
+    assert Bus().send(b"\x07\x03\x10" + command).requests() == answered(command[1:-2])
+
+
+def test_of_two_claims_with_one_end_the_first_keeps_its_stray_bytes() -> None:
+    pdu = P.write_registers_request(0, bytes(2))
+    assert known(7, 18).send(b"\x07\x03\x12" + encode_adu(1, pdu)).requests() == []
+
+
+@pytest.mark.parametrize(("stray", "heard"), [(b"\x55\x66", []), (b"\x55\x66\x55", answered())])
+def test_a_claim_may_stand_behind_two_stray_bytes(stray: bytes, heard: list[object]) -> None:
+    assert known(7).send(stray + b"\x07\x03\xf0" + OURS).requests() == heard
+
+
+def test_noise_that_could_have_been_just_as_long_is_not_waited_for() -> None:
+    """A read of unit 9 with a wrong checksum: its last byte is there, so nothing more can come of it."""
+    bus = Bus()
+    begin_s = bus.now_s
+    bus.send(COMMAND + bytes.fromhex("09 04 0001 0002 ff ff")).pause(1.0)
+    assert [(heard_s, request.pdu) for heard_s, request in bus.heard] == [(begin_s + SILENCE_S, WRITE)]
+
+
+def test_the_last_byte_of_noise_may_begin_a_request() -> None:
+    assert Bus().send(b"\xfe\xff" + OURS[:1], OURS[1:], pause_s=0.01).requests() == answered()
+
+
+def test_an_answer_under_our_own_number_is_no_request() -> None:
+    """Whoever sends it, another device that was given our number or an echo."""
+    assert Bus().send(registers_answer(1, bytes(4))).requests() == []
+    assert Bus().send(registers_answer(1, bytes(24)) + OURS).requests()[-1:] == answered()
+
+
+def test_a_frame_whose_end_only_its_checksum_tells_does_not_reach_across_a_silence() -> None:
+    around = encode_adu(7, b"\x41\x55" + COMMAND + b"\x55")
+    at = around.index(COMMAND)
+    assert Bus().send(around[:at], around[at:], pause_s=0.01).requests() == answered(WRITE)
+    assert Bus().send(around).requests() == []
+
+
+@pytest.mark.parametrize("pdu", [WRITE, ODD])
+def test_a_request_behind_a_silence_is_one_though_noise_before_it_makes_a_frame_with_the_same_end(pdu: bytes) -> None:
+    """An answer of unit 9, checksum and all: the checksum of what noise has made so far is what one begins with."""
+    request = encode_adu(1, pdu)
+    begun = (bytes((9, 3, 1 + len(request), *two, 0)) for two in product(range(256), repeat=2))
+    made = next(each for each in begun if crc16(each) == 0xFFFF)
+    assert len(made + request) == 3 + made[2] + 2 and crc16(made + request) == 0
+    assert Bus().send(made, request, pause_s=0.01).requests() == answered(pdu)
+
+
+def test_our_own_refusal_of_a_function_that_nobody_knows_is_heard_as_an_echo_in_noise() -> None:
+    bus = Bus().send(encode_adu(1, ODD))
+    (request,) = bus.requests()
+    refusal = encode_adu(1, b"\xc1\x01")
+    bus.receiver.note_sent(request, refusal, bus.now_s)
+    assert bus.send(b"\x55\x66\x55\x66" + refusal).requests() == []
+    assert (bus.receiver.frames, bus.receiver.noise_bytes) == (2, 4)
+    assert bus.send(encode_adu(1, READ)).requests() == answered()

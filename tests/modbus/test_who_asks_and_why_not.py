@@ -1,0 +1,38 @@
+"""What a bank is told of who asks, and what an exception says to people."""
+
+import pytest
+
+from gateway.modbus import ModbusError, Peer, RequestError, answer
+from gateway.modbus import pdu as P  # noqa: N812
+from gateway.modbus.diagnostics import ServerId, report_answer
+from gateway.modbus.errors import NAMES
+from gateway.modbus.peer import NOBODY
+from tests.modbus.test_modbus_refusals import PEER, FussyBank
+
+
+def test_the_bank_is_told_at_each_turn_who_asks() -> None:
+    class Asked(FussyBank):
+        def read_registers(self, address: int, count: int, _peer: Peer = NOBODY) -> bytes:
+            peers.append(_peer)
+            return super().read_registers(address, count)
+
+        def check_registers_readable(self, address: int, count: int, _peer: Peer = PEER) -> None:
+            peers.append(_peer)
+
+    for request in (P.read_request(3, 0, 1), P.read_request(4, 0, 1), P.read_write_request(0, 1, 0, b"\x12\x34")):
+        peers: list[Peer] = []
+        answer(request, Asked(), PEER)
+        assert set(peers) == {PEER}
+
+
+@pytest.mark.parametrize("code", [*NAMES, 99])
+def test_an_exception_without_a_sentence_of_its_own_says_what_its_code_means(code: int) -> None:
+    assert str(ModbusError(code)) == NAMES.get(code, "exception 99")
+    assert str(ModbusError(code, "no such thing")) == "no such thing"
+
+
+def test_a_request_of_a_wrong_length_is_told_both_lengths() -> None:
+    with pytest.raises(RequestError, match=r"3 bytes.*5"):
+        P.parse_read(bytes(3), 10)
+    with pytest.raises(RequestError, match=r"2 bytes.*1"):
+        report_answer(b"\x11\x00", ServerId(0, True, b""))
