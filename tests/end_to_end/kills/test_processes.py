@@ -100,7 +100,7 @@ def test_a_rig_file_that_is_edited_meanwhile_is_for_the_next_start(tmp_path):
         pressing(gateway)
         os.kill(gateway.ready["pids"]["rig"], signal.SIGKILL)
         gateway.wait_until(lambda status: status["state"] == FAULT)
-        gateway.write(0, 2, 0)
+        gateway.wait_until(lambda status: not gateway.write(0, 2, 0).isError())  # once the rig is there again
         gateway.wait_until(lambda status: status["status_word"] & 2 and abs(status["force_measured"]) < 200)
         pressing(gateway)
     finally:
