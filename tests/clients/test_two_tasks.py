@@ -22,6 +22,13 @@ ENABLING: dict[str, list[Callable[[Any], object]]] = {
     "urscript": [lambda client: client.enable(12.0)],
 }
 """What the program does, one thing at a time: RAPID sets two data."""
+EVERY = 3
+"""Of so many places one is tried in the push gate."""
+
+
+@pytest.fixture(autouse=True)
+def try_each_place_in_the_long_run(budget: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(f"{__name__}.EVERY", 1 if budget > 1 else EVERY)
 
 
 class Switches:
@@ -68,7 +75,7 @@ def every_place(
         for _ in range(3):
             client.cycle(5.0)
         yield client, gateway
-        place += 1
+        place += EVERY
 
 
 def tare_that_is_refused(client: Any, gateway: GatewayAtHand) -> None:
