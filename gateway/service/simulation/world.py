@@ -97,7 +97,7 @@ class SimulatedRig:
     def on_valve_bytes(self, chunk: bytes, now_s: float) -> bytes:
         """Return the answers of the valve's relay; its valve moves a moment later, and swaps the chambers."""
         self.advance(now_s)
-        return self.valve.receive(chunk, now_s)
+        return self._through_noise(self.valve.receive(chunk, now_s))
 
     def _swap_chambers(self) -> None:
         """The other chamber gets the regulator's pressure, and the one that had it is vented."""

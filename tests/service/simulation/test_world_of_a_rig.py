@@ -239,3 +239,13 @@ def test_what_is_set_lasts_when_the_valve_moves() -> None:
     pulls.set(air__off=False)
     pulls.wait(3.0)
     assert float(pulls.twin.pressure_pa) > 1e4, "and what is commanded, too"
+
+
+def test_noise_on_the_wires_reaches_the_valve_too() -> None:
+    """Else a cell that is rehearsed with noise has one line that is better than it will be."""
+    world = SimulatedRig(load_rig("paper-pull"), send_output=lambda data: None, send_cell=lambda data: None, now_s=0.0)
+    question = bytes.fromhex("0101000000083DCC")
+    clean = world.on_valve_bytes(question, 0.1)
+    assert len(clean) == 6
+    world.simulate({"do": "sim", "set": {"wire.noise": 0.5}})
+    assert any(world.on_valve_bytes(question, 0.1 + 0.1 * turn) != clean for turn in range(5))
