@@ -256,6 +256,8 @@ class EdgeCheck:
             return f"state {at.state.name}, {begins}"
         if at.state is State.READY and at.applied_n > 0.0:
             return f"state READY with {at.applied_n:.1f} N applied, {begins}"
+        if at.block is RefusalReason.VALVE_UNKNOWN:
+            return at.excuse
         if self._valve is not None and (self._valve.is_pulling or self._valve.is_switching):
             return f"the valve pulls or is switching, {_PUSHING}"
         try:

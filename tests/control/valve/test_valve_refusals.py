@@ -87,6 +87,8 @@ def test_ready_is_not_said_and_no_enable_taken_where_the_valve_would_be_a_fault_
     bench.enable(12.0)
     assert bench.refused and bench.refused.reason is RefusalReason.VALVE_UNKNOWN
     assert words in bench.refused.text
+    bench.write(control_word=ControlBit.START_SELF_TEST)
+    assert bench.refused and words in bench.refused.text
     bench.run(1.0)
     assert bench.last.state is State.OFF
     bench.is_silent, bench.obeys = False, True
