@@ -4,7 +4,7 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.control.inputs import ValveStatus
-from gateway.control.settings import ValveControl
+from gateway.control.settings import SafeDirection, ValveControl
 from gateway.control.valve.valve_switch import ValveSwitch
 from gateway.devices.valve_profile import ValveDirection
 
@@ -29,3 +29,15 @@ def test_a_readback_that_is_wrong_for_less_than_the_bound_is_none_of_its_faults_
         switch.step(0.01 * k, PUSH, ValveStatus(PULL if differs else PUSH), is_vented=False)
         faults.append(switch.first_cause(0.01 * k) is not None)
     assert faults.index(True) == pytest.approx(650, abs=2) and all(faults[652:])
+
+
+@pytest.mark.parametrize(
+    ("safe", "waits"), [(SafeDirection.PUSH, True), (SafeDirection.PULL, False), (SafeDirection.KEEP, False)]
+)
+def test_a_pulling_valve_is_waited_for_only_where_the_rig_has_it_rest_elsewhere(
+    safe: SafeDirection, waits: bool
+) -> None:
+    switch = ValveSwitch(ValveControl(pull_area_share=0.75, dwell_s=0.0, safe=safe))
+    for k in range(5):
+        switch.step(0.01 * k, PULL, ValveStatus(PULL), is_vented=True)
+    assert switch.is_pulling and switch.is_going_to_rest is waits
