@@ -57,7 +57,9 @@ def test_what_was_confirmed_before_the_setting_on_its_way_confirms_nothing() -> 
 
 
 def test_a_start_has_let_nothing_go() -> None:
-    assert fault_at(at_rest(), 2.0 * BOUND_S, refusing()) is None
+    check = at_rest()
+    assert fault_at(check, 0.0, refusing()) is None
+    assert fault_at(check, 2.0 * BOUND_S, refusing()) is None
 
 
 def test_the_time_counts_from_each_way_to_off_and_only_there() -> None:
@@ -67,6 +69,11 @@ def test_the_time_counts_from_each_way_to_off_and_only_there() -> None:
     assert check.cause(6.0, State.OFF, refusing()) is None
     assert fault_at(check, 6.0 + 0.99 * BOUND_S, refusing()) is None
     assert fault_at(check, 6.0 + 1.01 * BOUND_S, refusing()) is FaultCode.OUTPUT_REFUSED
+
+
+@pytest.mark.parametrize("fault", [FaultCode.OUTPUT_REFUSED, FaultCode.OUTPUT_ALTERED])
+def test_a_device_that_puts_out_something_else_has_not_obeyed(fault: FaultCode) -> None:
+    assert fault_at(let_go(), 2.0 * BOUND_S, LineStatus(fault=fault)) is fault
 
 
 def test_a_port_that_went_away_needs_no_time_and_a_silence_its_own() -> None:
