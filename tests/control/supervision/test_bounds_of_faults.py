@@ -5,6 +5,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control import LineStatus
+from gateway.control.blame_for_silence import Held
 from gateway.control.inputs import ValveStatus
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.fault_detection import FaultDetector
@@ -123,8 +124,8 @@ def test_an_enable_waits_behind_a_stall_for_as_long_as_one_may_last_and_is_told_
 
 
 def test_a_fault_that_the_line_reports_is_no_silence_that_something_else_is_blamed_for() -> None:
-    held = READY._replace(unanswered_since_s=3.0)
+    held = READY._replace(unanswered_since_s=3.0, output_held=Held(loop_late_s=0.9))
     one = detector()
-    quiet = one.excuse(RefusalReason.OUTPUT_FAULT, NOW_S, WELL, held)
+    assert "our own loop came" in one.excuse(RefusalReason.OUTPUT_FAULT, NOW_S, WELL, held)
     assert one.excuse(RefusalReason.OUTPUT_FAULT, NOW_S, WELL, held._replace(fault=FaultCode.OUTPUT_LOST)) == ""
-    assert one.excuse(RefusalReason.NONE, NOW_S, WELL, READY) == "" and isinstance(quiet, str)
+    assert one.excuse(RefusalReason.NONE, NOW_S, WELL, held) == ""

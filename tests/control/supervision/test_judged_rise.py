@@ -6,9 +6,11 @@ from typing import Any
 
 import pytest
 
+from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.codes.faults import FaultCode
 from gateway.control.sample_conditioning import Reading
-from gateway.control.supervision.plausibility import RiseCheck
+from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
+from tests.control.bench import bsfm
 
 TICK_S, LASTS = 0.0625, 5  # so many samples are 0.3 s
 RIGHT, SIGN, GAIN = FaultCode.NONE, FaultCode.SIGN_INVERTED, FaultCode.GAIN_WRONG
@@ -124,3 +126,15 @@ def test_a_new_start_holds_nothing_back_that_the_one_before_did() -> None:
     assert rise.check.is_too_high
     rise.check.start()
     assert not rise.check.is_too_high
+
+
+def test_what_a_model_expects_is_above_its_force_at_rest_and_friction_has_no_sign() -> None:
+    crossed = Bsfm(Branches(bsfm().branches.falling, bsfm().branches.rising), LinearBlend(6.0))
+    for model in (bsfm(), crossed):
+        expected = ExpectedForce(model, 0.1, 0.0, stands_v=4.0)
+        assert expected.width_n == pytest.approx(4.0) and expected.kept_n == 0.0
+        assert expected.rise_n(1.0) == pytest.approx(model.force_n(4.0, 1.0))
+    sinking = Bsfm(Branches(*(RationalBezier(0.0, 8.0, [-3.0, 26.0, 57.0], [1.0] * 3),) * 2), LinearBlend(6.0))
+    expected = ExpectedForce(sinking, 0.1, 0.0)
+    assert expected.kept_n == 0.0, "below 0 nothing is pressed"
+    assert expected.rise_n(1.0) == 0.0 and expected.force_n(1.0) == -3.0
