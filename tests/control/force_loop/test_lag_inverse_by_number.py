@@ -119,3 +119,31 @@ def test_what_is_asked_for_stays_within_the_range_and_what_an_output_cannot_reso
     inverse.first_v = inverse.second_v = 4.0
     assert inverse.compensated_v(4.00001, 4.0) == 4.00001
     assert 0.0 <= inverse.compensated_v(0.5, 4.0) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("lags", "wire_s", "damping"),
+    [
+        (FAST, 0.03, 1.0),  # it lets go by itself, down as up
+        (SLOW, 0.03, 0.9),  # the shorter lag outlasts a setting
+        (SecondOrder(0.15, 0.02), 0.03, 1.4 - 0.5 * 0.02 / 0.03),
+        (SecondOrder(0.3, 0.01), 0.03, 1.2),
+    ],
+)
+def test_far_above_the_wish_a_way_down_is_damped_by_what_the_shorter_lag_lets_go(
+    lags: SecondOrder, wire_s: float, damping: float
+) -> None:
+    inverse = LagInverse(lags, LIMITS)
+    inverse.set_wire_time(wire_s)
+    speed, h_s = (0.5 - 0.7) / lags.second_lag_s, inverse.horizon_s
+    linear = inverse._linear(0.5, 0.7)
+    bend = (linear - 0.7 - lags.delay_s * speed) / lags.bend_s2
+    assert bend == pytest.approx(-(0.7 / h_s + 2.0 * damping * speed) / h_s)
+
+
+def test_half_as_far_above_the_wish_half_of_the_difference_counts() -> None:
+    lags = SecondOrder(0.3, 0.01)
+    inverse = LagInverse(lags, LIMITS)
+    speed, h_s = (0.2 - 0.3) / lags.second_lag_s, inverse.horizon_s
+    bend = (inverse._linear(0.2, 0.3) - 0.3 - lags.delay_s * speed) / lags.bend_s2
+    assert bend == pytest.approx(-(0.3 / h_s + 2.0 * 0.5 * (0.9 + 1.2) * speed) / h_s)
