@@ -103,3 +103,26 @@ def test_a_stop_is_taken_from_a_run_and_on_the_way_to_0_whatever_else_it_writes(
             command = Command(force_setpoint_n=5.0, number=1, stops=stops)
             refused = check().refusal(ProposedWrite(command, lambda: ("force_setpoint",)), at)
             assert (refused is None) is is_taken
+
+
+@pytest.mark.parametrize(
+    ("line_fault", "words"), [("", "the output device does not answer"), ("A322 its port went away", "A322 its port")]
+)
+def test_a_fault_is_not_reset_behind_an_output_that_is_not_heard(line_fault: str, words: str) -> None:
+    deaf = replace(REST, state=State.FAULT, is_output_heard=False, line_fault=line_fault)
+    refused = refusal(deaf, ControlBit.RESET_FAULT, heartbeat=1)
+    assert refused and (refused.reason, refused.bit) == (RefusalReason.OUTPUT_FAULT, ControlBit.RESET_FAULT)
+    assert words in refused.text and "whether air still presses is not known" in refused.text
+    assert refusal(replace(deaf, state=State.OFF), ControlBit.RESET_FAULT) is None, "there is no fault latched"
+
+
+def test_a_reset_needs_a_beat_that_came_behind_the_fault_where_there_is_a_lease() -> None:
+    commands = CommandTracker(settings(lease_s=1.0))
+    commands.take(0.0, Command(heartbeat=7, number=1))
+    asked = EdgeCheck(commands, SampleConditioner(settings().supervision), ActiveRun(settings(), bsfm()))
+    at = replace(REST, state=State.FAULT, faulted_s=0.5)
+    for heartbeat, is_taken in ((7, False), (8, True)):
+        command = Command(control_word=ControlBit.RESET_FAULT, heartbeat=heartbeat, number=2)
+        refused = asked.refusal(ProposedWrite(command), at)
+        assert (refused is None) is is_taken
+        assert refused is None or refused.reason is RefusalReason.HEARTBEAT_STALE

@@ -147,3 +147,21 @@ def test_half_as_far_above_the_wish_half_of_the_difference_counts() -> None:
     speed, h_s = (0.2 - 0.3) / lags.second_lag_s, inverse.horizon_s
     bend = (inverse._linear(0.2, 0.3) - 0.3 - lags.delay_s * speed) / lags.bend_s2
     assert bend == pytest.approx(-(0.3 / h_s + 2.0 * 0.5 * (0.9 + 1.2) * speed) / h_s)
+
+
+@pytest.mark.parametrize("lags", [SLOW, SecondOrder(0.3, 0.2), RINGING])
+def test_a_push_that_is_not_along_a_limit_can_be_braked_within_the_range(lags: SecondOrder) -> None:
+    pushed = 0
+    for from_v in (0.0, 1.0, 2.0, 4.0, 6.0, 8.0):
+        for to_v in (0.5, 1.5, 3.0, 5.0, 7.0):
+            for moving_v in (-0.5, 0.0, 0.5):
+                inverse = LagInverse(lags, LIMITS)
+                inverse.first_v, inverse.second_v = from_v + moving_v, from_v
+                asked_v = inverse.compensated_v(to_v, from_v)
+                first_v, second_v = from_v + moving_v - to_v, from_v - to_v
+                for pulses in inverse._pulses:
+                    if asked_v == pytest.approx(to_v + pulses.a1 * first_v + pulses.a2 * second_v, abs=1e-9):
+                        brake_v = to_v + pulses.b1 * first_v + pulses.b2 * second_v
+                        assert -1e-9 <= brake_v <= LIMITS.voltage_max_v + 1e-9
+                        pushed += asked_v != to_v
+    assert pushed

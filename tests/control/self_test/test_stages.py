@@ -84,6 +84,8 @@ def test_a_rig_whose_self_test_moves_nothing_ends_behind_the_rest() -> None:
     }
     assert all(played.verdicts()[item] is NOT_TESTED for item in FORCE_ITEMS)
     assert played.run.findings[Item.SIGN].text == "self_test.force_n is 0: nothing moves"
+    small = Known(replace(settings(), self_test=SelfTestSettings(force_n=0.9)), bsfm())
+    assert "raise it" in Played(of=small).to_the_end().run.findings[Item.SIGN].text, "it wants a force, and has no room"
     with pytest.raises(ValueError, match="offers no self-test"):
         SelfTestRun(SelfTestPlan(), Known(settings(), bsfm()))
 
