@@ -3,9 +3,10 @@
 import pytest
 
 from gateway.codes.refusals import RefusalReason
-from gateway.control import CalibrationInUse
+from gateway.control import CalibrationInUse, Controller
+from gateway.control.compensation.compensation import Compensation, OutsideForce
 from gateway.registers.words import State
-from tests.control.bench import Bench, bsfm, enabled
+from tests.control.bench import Bench, bsfm, enabled, settings
 
 
 def test_what_nobody_has_asked_to_stop_has_not_stopped() -> None:
@@ -40,6 +41,14 @@ def test_a_force_that_is_missed_is_told_with_the_weight_that_presses() -> None:
     bench.run(5.0)
     (told,) = (event for event in bench.events if event.startswith("A301"))
     assert "4.9 N measured" in told
+
+
+@pytest.mark.parametrize(("direction", "outside_n"), [(1.0, 5.0), (-1.0, -5.0)])
+def test_what_presses_from_outside_is_against_a_pull(direction: float, outside_n: float) -> None:
+    known = Compensation(outside=OutsideForce(tilt_n=5.0))
+    controller = Controller(settings(), CalibrationInUse(bsfm(), 1), compensation=known)
+    controller._conditioner.direction = direction
+    assert controller._outside_n == outside_n and controller._given_n == outside_n
 
 
 def test_a_payload_that_presses_alone_is_no_residual_of_the_model() -> None:
