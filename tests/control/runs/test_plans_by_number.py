@@ -123,3 +123,9 @@ def test_a_swing_is_half_of_its_size_up_and_down_and_ends_where_it_began() -> No
     seen = [moved.voltage_v(at_s) for at_s in times_s]
     assert seen == pytest.approx([3.25, 3.5, 3.5, 3.0, 2.5, 2.5, 3.0, 3.5, 2.5, 2.75, 3.0])
     assert moved.duration_s == pytest.approx(swings.duration_s)
+
+
+def test_a_move_to_0_goes_to_0() -> None:
+    for goal in ({"to_v": 0.0}, {"to_share": 0.0}, {"to_n": 0.0}):
+        moved = schedule(Move(do=MoveKind.STEP, to_v=3.0, hold_s=1.0), Move(do=MoveKind.STEP, hold_s=1.0, **goal))  # type: ignore[arg-type]
+        assert [moved.voltage_v(at_s) for at_s in (0.5, 1.5)] == pytest.approx([3.0, 0.0])
