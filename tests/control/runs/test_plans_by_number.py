@@ -39,9 +39,9 @@ def test_the_highest_voltage_is_a_whole_hundredth_that_model_rig_and_both_forces
 def test_a_top_that_is_asked_for_may_make_just_the_force_that_the_rig_allows(field: str, words: str) -> None:
     force_n = bsfm().force_n(6.0, 1.0)
     plan = CalibrationPlan(v_max_v=6.0)
-    assert stairs_of(plan, replace(WIDE, **{field: force_n + 0.01}), bsfm())
+    assert stairs_of(plan, replace(WIDE, **{field: force_n + 0.01}), bsfm())  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=words):
-        stairs_of(plan, replace(WIDE, **{field: force_n - 0.01}), bsfm())
+        stairs_of(plan, replace(WIDE, **{field: force_n - 0.01}), bsfm())  # type: ignore[arg-type]
 
 
 def test_beyond_the_model_s_end_the_force_is_taken_to_grow_with_the_voltage() -> None:
