@@ -31,9 +31,11 @@ def test_direct_voltage_goes_out_as_it_came_within_range_and_slew():
     assert 0.0 < bench.voltage(3.0).voltage_v <= 1.0  # one tick of 100 V/s
     output = bench.run(0.5)
     assert (output.voltage_v, output.state, output.trim_v) == (3.0, State.HOLDING, 0.0)
+    assert output.feedforward_v == 3.0 and not output.status & StatusBit.LIMITED
     output = bench.voltage(9.9)
     output = bench.run(0.3)
     assert (output.voltage_v, output.limited_by) == (9.0, LimitedBy.VOLTAGE_RANGE)
+    assert output.feedforward_v == 9.9 and output.status & StatusBit.LIMITED
 
 
 def test_direct_voltage_is_still_supervised_for_over_force():

@@ -111,3 +111,11 @@ def test_a_force_that_creeps_up_at_a_held_voltage_ends_it_before_the_stated_one(
 def test_a_fault_of_the_supervision_fails_the_item_that_it_is_about(fault: FaultCode, item: Item) -> None:
     report = report_of(1, {}, RunEnding(fault, is_done=False, wants_force=True))
     assert [found.item for found in report.findings if found.verdict is FAILED] == [item]
+
+
+def test_a_cell_that_says_nothing_usable_fails_its_line_and_nothing_is_pressed() -> None:
+    run, volts = SelfTestRun(SelfTestPlan(), known()), set()
+    for k in range(400):
+        volts.add(run.step(0.01 * k, Reading(is_new=True)).voltage_v)
+    assert run.is_done and volts == {0.0}
+    assert run.findings[Item.CELL_LINE].verdict is FAILED and "no reading" in run.findings[Item.CELL_LINE].text

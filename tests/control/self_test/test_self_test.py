@@ -67,7 +67,7 @@ def test_a_healthy_machine_passes_within_20_s_and_below_the_stated_force(seed: i
     rig = SelfTestRig(seed, FORCE_N)
     report = (rig.worked() if has_worked else rig).tested()
     assert report.result is SelfTestResult.PASSED, report.sentences
-    assert all(found.verdict is PASSED for found in report.findings)
+    assert all(found.verdict is PASSED and found.text for found in report.findings)
     assert rig.took_s < LONGEST_S
     assert 0.5 * FORCE_N < rig.peak_n < FORCE_N
     assert rig.controller.state is State.OFF and rig.output and rig.output.voltage_v == 0.0

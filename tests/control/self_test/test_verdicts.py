@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.codes.faults import FaultCode
 from gateway.control.inputs import LineStatus, WireCounts
 from gateway.control.self_test.items import (
@@ -34,6 +35,7 @@ from gateway.control.settings import SelfTestSettings
 from gateway.registers.words import SelfTestResult, SelfTestVerdict
 from tests.control.bench import bsfm, settings
 
+CURVE = RationalBezier(0.0, 8.0, [0.0, 26.0, 57.0], [1.0, 1.0, 1.0])
 RIG = Known(replace(settings(), self_test=SelfTestSettings()), bsfm())
 MEASURED = replace(RIG, noise_n=0.05)
 BOUNDS = {
@@ -173,3 +175,17 @@ def test_lost_answers_are_counted(counts: WireCounts | None, verdict: object, wo
 
 def test_counts_are_taken_from_each_other() -> None:
     assert WireCounts(10, 8, 3).since(WireCounts(4, 5, 1)) == WireCounts(6, 3, 2)
+
+
+def test_bounds_that_follow_the_band_grow_with_it() -> None:
+    wide = replace(
+        RIG, settings=replace(RIG.settings, defaults=replace(RIG.settings.defaults, in_band_tolerance_n=2.0))
+    )
+    words = "allowed 0.500 N, fails above 1.000 N (in_band_tolerance_n 2 N)"
+    assert words in judge_noise(0.1, wide).text and judge_noise(0.49, wide).verdict is PASSED
+
+
+def test_what_friction_may_keep_at_rest_is_told_beside_the_bound_of_a_zero() -> None:
+    keeping = Bsfm(Branches(CURVE, RationalBezier(0.0, 8.0, [4.0, 34.0, 57.0], [1.0, 1.0, 1.0])), LinearBlend(6.0))
+    assert "that friction may keep" in judge_zero(0.1, replace(RIG, model=keeping)).text
+    assert "friction" not in judge_zero(0.1, RIG).text

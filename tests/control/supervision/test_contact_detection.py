@@ -1,5 +1,9 @@
 """When the tool touches, and when it does not any more."""
 
+from math import nan
+
+import pytest
+
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.contact_detection import ContactDetector
 
@@ -19,3 +23,12 @@ def test_two_samples_touch_and_a_tenth_of_a_second_without_a_break_releases() ->
     assert felt(detector, 0.6, *[0.4] * 4)
     assert felt(detector, *[0.5, 0.4, 0.4] * 20), "a break begins the tenth anew"
     assert not felt(detector, *[0.4] * 5)
+
+
+@pytest.mark.parametrize("nothing", [{"is_new": False}, {"is_usable": False, "contact_n": nan, "overload": True}])
+def test_a_reading_that_is_old_or_none_neither_counts_nor_breaks_a_count(nothing: dict[str, object]) -> None:
+    detector, pressed = ContactDetector(0.5), Reading(1.0, 1.0, 0.0, 0.01, True, True, True)
+    between = pressed._replace(**nothing)  # type: ignore[arg-type]
+    assert not detector.update(pressed)
+    assert not detector.update(between)
+    assert detector.update(pressed)

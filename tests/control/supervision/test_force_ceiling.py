@@ -70,3 +70,39 @@ def test_a_stair_on_the_way_down_says_nothing_of_how_the_force_rises() -> None:
         ceiling.observe_row(LadderRow(PlannedStair(voltage_v, way, 0, CalibrationPhase.LADDER), force_n, 1.0, True))
     assert 2.0 * model.force_n(4.0, 1.0) > MOST_N
     assert ceiling.is_beyond(4.0, 0.0)
+
+
+def model_n(voltage_v: float) -> float:
+    return bsfm().force_n(voltage_v, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "next_v", "expected_n"),
+    [
+        ([(3.0, 2.0 * model_n(3.0))], 4.0, 2.0 * model_n(4.0)),
+        ([(2.0, 2.0 * model_n(2.0)), (3.0, 2.0 * model_n(3.0))], 4.0, 2.0 * model_n(4.0)),
+        ([(2.0, 8.0), (3.0, 8.0 + model_n(3.0) - model_n(2.0))], 4.0, 8.0 + model_n(4.0) - model_n(2.0)),
+        ([(2.0, 30.0), (3.0, 25.0)], 4.0, 25.0),  # what has fallen does not go on falling
+        ([(3.0, 30.0), (3.0, 31.0)], 4.0, 31.0),  # nothing to tell the slope by
+        ([(3.0, 30.0)], 3.0, 0.0),
+        ([(3.0, 30.0)], 2.0, 0.0),
+        ([], 4.0, 0.0),
+    ],
+)
+def test_the_force_of_a_higher_stair_goes_on_as_it_rose_in_the_shape_of_the_calibration(
+    rows: list[tuple[float, float]], next_v: float, expected_n: float
+) -> None:
+    for room_n, is_beyond in ((0.35, True), (0.45, False)):
+        ceiling = ForceCeiling(expected_n + room_n, bsfm(), 0.0)
+        for voltage_v, force_n in rows:
+            ceiling.observe_row(LadderRow(PlannedStair(voltage_v, 1, 0, CalibrationPhase.LADDER), force_n, 1.0, True))
+        assert ceiling.is_beyond(next_v, 0.0) is is_beyond
+
+
+@pytest.mark.parametrize(
+    ("noise_n", "below_n", "is_reached"), [(0.0, 0.39, True), (0.0, 0.41, False), (0.4, 1.19, True), (0.4, 1.21, False)]
+)
+def test_the_room_below_the_largest_force_is_three_sigma_and_four_counts_at_least(
+    noise_n: float, below_n: float, is_reached: bool
+) -> None:
+    assert ceiling_at(MOST_N - below_n, 0.0).is_reached(noise_n) is is_reached

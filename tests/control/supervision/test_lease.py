@@ -16,6 +16,13 @@ def test_a_lease_is_over_behind_its_length_and_at_once_where_its_owner_has_gone(
     assert not lease.is_lost(12.4, True)
 
 
+def test_the_first_0_is_no_beat() -> None:
+    """A block that nobody has written yet reads 0."""
+    lease = Lease(0.5)
+    lease.observe(10.0, 0)
+    assert lease.is_lost(10.0, True)
+
+
 def test_without_a_lease_nobody_is_lost() -> None:
     lease = Lease(None)
     assert not lease.is_lost(1e6, False) and lease.is_fresh_since(1e6, 2e6)

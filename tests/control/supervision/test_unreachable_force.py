@@ -158,3 +158,8 @@ def test_a_tenth_of_a_small_force_names_kgf_beside_the_missing_contact(
     assert "air is there, so no contact with the workpiece" in unreachable_words(seen)
     assert ("kgf read as N" in unreachable_words(seen)) == is_told
     assert ("(A303): check the unit on the amplifier" in unreachable_words(seen)) == is_told
+
+
+def test_without_a_pressure_less_than_half_of_the_force_may_be_no_air_and_half_of_it_is_not() -> None:
+    words = [unreachable_words(Evidence(voltage_v=3.0, measured_n=n, expected_n=10.0)) for n in (4.9, 5.0)]
+    assert words[0] == "no air, valve closed or no contact" and words[1].startswith("target not reached")

@@ -4,7 +4,8 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.control.inputs import ValveStatus
-from gateway.control.settings import ValveControl
+from gateway.control.settings import SafeDirection, ValveControl
+from gateway.control.supervision.fault_detection import stop_cause
 from gateway.control.valve.valve_switch import ValveSwitch
 from gateway.devices.valve_profile import ValveDirection
 
@@ -29,3 +30,45 @@ def test_a_readback_that_is_wrong_for_less_than_the_bound_is_none_of_its_faults_
         switch.step(0.01 * k, PUSH, ValveStatus(PULL if differs else PUSH), is_vented=False)
         faults.append(switch.first_cause(0.01 * k) is not None)
     assert faults.index(True) == pytest.approx(650, abs=2) and all(faults[652:])
+
+
+@pytest.mark.parametrize(
+    ("safe", "waits"), [(SafeDirection.PUSH, True), (SafeDirection.PULL, False), (SafeDirection.KEEP, False)]
+)
+def test_a_pulling_valve_is_waited_for_only_where_the_rig_has_it_rest_elsewhere(
+    safe: SafeDirection, waits: bool
+) -> None:
+    switch = ValveSwitch(ValveControl(pull_area_share=0.75, dwell_s=0.0, safe=safe))
+    for k in range(5):
+        switch.step(0.01 * k, PULL, ValveStatus(PULL), is_vented=True)
+    assert switch.is_pulling and switch.is_going_to_rest is waits
+
+
+def test_each_time_of_a_switch_is_kept_to_the_step() -> None:
+    """Without pressure for the dwell, then told; once read back and told for the dwell, in effect."""
+    switch = ValveSwitch(ValveControl(pull_area_share=0.75, dwell_s=0.25, timeout_s=0.5))
+    told_at, turned_at = [], []
+    for k in range(20):
+        now_s = 0.0625 * k
+        stands = PULL if switch.commanded is PULL else PUSH
+        if switch.step(now_s, PULL, ValveStatus(stands), is_vented=True):
+            turned_at.append(now_s)
+        if switch.commanded is PULL:
+            told_at.append(now_s)
+    assert (told_at[0], turned_at) == (0.25, [0.5])
+
+
+@pytest.mark.parametrize("status", [ValveStatus(PULL), ValveStatus(PUSH, unanswered_since_s=0.0)])
+def test_a_fault_of_the_valve_is_one_behind_its_bound_and_not_at_it(status: ValveStatus) -> None:
+    switch = ValveSwitch(SETTINGS)
+    for k in range(9):
+        switch.step(0.0625 * k, PUSH, status, is_vented=True)
+    assert switch.first_cause(0.5) is None and switch.first_cause(0.5625) is not None
+
+
+def test_what_others_have_found_goes_before_a_fault_of_the_valve() -> None:
+    switch = ValveSwitch(SETTINGS)
+    switch.step(0.0, PUSH, ValveStatus(PUSH, lost=True), is_vented=True)
+    alone, lost = switch.blame(0.0, None), stop_cause(FaultCode.CELL_LOST, "its plug")
+    assert alone and alone.fault is FaultCode.VALVE_SILENT
+    assert switch.blame(0.0, lost) == lost

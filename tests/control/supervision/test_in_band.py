@@ -1,0 +1,124 @@
+"""Moving, waiting or settled: by how long the force has been in band, and what begins the wait anew."""
+
+import pytest
+
+from gateway.control.demand import Demand, demand_of
+from gateway.control.inputs import LoopInputs
+from gateway.control.sample_conditioning import Reading
+from gateway.control.state_table import StateEvent
+from gateway.control.supervision.in_band import InBandTimer, SettlingCheck
+from gateway.registers.command import Command
+from tests.control.bench import settings
+
+WAIT, MOVE, SETTLE = StateEvent.WAIT, StateEvent.MOVE, StateEvent.SETTLE
+UNREACHABLE_S = 2.0
+
+
+def demand(force_n: float = 10.0, voltage_v: float = 3.0) -> Demand:
+    asked = demand_of(Command(force_setpoint_n=force_n), settings())
+    return asked._replace(voltage_v=voltage_v, tolerance_n=1.0, in_band_time_s=0.25)
+
+
+def at(now_s: float, contact_n: float = 10.0, *, touching: bool = True, expected_n: float = 10.0) -> LoopInputs:
+    return LoopInputs(now_s, 0.01, Reading(contact_n=contact_n), touching, expected_n)
+
+
+def test_both_times_are_kept_to_the_step_and_begin_anew_with_each_change() -> None:
+    timer = InBandTimer(0.5)
+    seen = []
+    for k, is_inside in enumerate([True] * 3 + [False] * 5 + [True] * 3):
+        timer.update(0.125 * k, is_inside, 0.25)
+        seen.append((timer.in_band, timer.unreachable))
+    neither, inside, out = (False, False), (True, False), (False, True)
+    assert seen == [neither, neither, inside, *[neither] * 4, out, neither, neither, inside]
+
+
+@pytest.mark.parametrize("contact_n", [9.0, 11.0])
+def test_a_force_at_its_tolerance_settles_and_beyond_it_does_not(contact_n: float) -> None:
+    for off_n, event in ((contact_n, SETTLE), (2.0 * contact_n - 10.0, MOVE)):
+        check = SettlingCheck(UNREACHABLE_S)
+        check.judge_force(demand(), at(0.0, off_n), 10.0, 10.0)
+        assert check.judge_force(demand(), at(0.25, off_n), 10.0, 10.0) is event
+
+
+@pytest.mark.parametrize(
+    ("inputs", "goal_n", "applied_n"),
+    [
+        (at(0.0, touching=False), 10.0, 10.0),
+        (at(0.0), 10.0, 8.5),
+        (at(0.0), 8.0, 8.0),  # held back: the target is not at the setpoint
+        (at(0.0, 8.0), 10.0, 10.0),
+    ],
+)
+def test_what_is_not_at_its_setpoint_in_contact_begins_the_wait_anew(
+    inputs: LoopInputs, goal_n: float, applied_n: float
+) -> None:
+    check = SettlingCheck(UNREACHABLE_S)
+    check.judge_force(demand(), at(0.0), 10.0, 10.0)
+    assert check.judge_force(demand(), at(0.25), 10.0, 10.0) is SETTLE
+    assert check.judge_force(demand(), inputs._replace(now_s=0.5), goal_n, applied_n) is not SETTLE
+    assert check.judge_force(demand(), at(0.625), 10.0, 10.0) is MOVE and not check.in_band
+
+
+@pytest.mark.parametrize(
+    ("force_n", "touching", "goal_n", "applied_n", "event"),
+    [
+        (0.0, True, 0.0, 0.0, WAIT),
+        (0.0, True, 0.0, 0.5, MOVE),
+        (10.0, False, 2.0, 2.0, WAIT),
+        (10.0, False, 2.0, 1.5, MOVE),
+        (10.0, True, 10.0, 10.0, MOVE),
+    ],
+)
+def test_only_what_has_nothing_more_to_do_by_itself_waits(
+    force_n: float, touching: bool, goal_n: float, applied_n: float, event: StateEvent
+) -> None:
+    check = SettlingCheck(UNREACHABLE_S)
+    assert check.judge_force(demand(force_n), at(0.0, 0.0, touching=touching), goal_n, applied_n) is event
+
+
+def test_no_setpoint_and_a_target_on_its_way_are_not_unreachable() -> None:
+    for force_n, applied_n in ((0.0, 0.0), (10.0, 5.0)):
+        check = SettlingCheck(UNREACHABLE_S)
+        check.judge_force(demand(), at(0.0, 0.0), 10.0, 10.0)
+        check.judge_force(demand(force_n), at(1.0, 0.0), force_n, applied_n)
+        check.judge_force(demand(), at(1.5, 0.0), 10.0, 10.0)
+        check.judge_force(demand(), at(3.0, 0.0), 10.0, 10.0)
+        assert not check.unreachable
+        check.judge_force(demand(), at(3.5, 0.0), 10.0, 10.0)
+        assert check.unreachable
+
+
+@pytest.mark.parametrize(
+    ("expected_n", "touching", "is_slewing", "is_unreachable"),
+    [(2.0, False, False, True), (1.9, False, False, False), (9.0, True, False, False), (9.0, False, True, False)],
+)
+def test_a_voltage_is_unanswered_where_a_force_is_expected_and_nothing_is_felt(
+    expected_n: float, touching: bool, is_slewing: bool, is_unreachable: bool
+) -> None:
+    check = SettlingCheck(UNREACHABLE_S)
+    for now_s in (0.0, UNREACHABLE_S):
+        check.judge_voltage(demand(), at(now_s, touching=touching, expected_n=expected_n), is_slewing=is_slewing)
+    assert check.unreachable is is_unreachable
+    check.judge_force(demand(0.0), at(UNREACHABLE_S), 0.0, 0.0)
+    assert not check.unreachable, "in force mode the voltage is not what is asked for"
+
+
+def test_a_restart_forgets_both_waits() -> None:
+    check = SettlingCheck(UNREACHABLE_S)
+    for now_s in (0.0, UNREACHABLE_S):
+        check.judge_voltage(demand(), at(now_s, touching=False), is_slewing=False)
+    assert check.unreachable and check.in_band
+    check.restart()
+    assert not check.unreachable and not check.in_band
+
+
+def test_a_voltage_settles_where_it_is_out_and_not_on_its_way_or_at_none() -> None:
+    check, asked = SettlingCheck(UNREACHABLE_S), demand()
+    off = demand(voltage_v=0.0)
+    assert check.judge_voltage(asked, at(0.0), is_slewing=True) is MOVE
+    assert check.judge_voltage(asked, at(0.25), is_slewing=False) is MOVE
+    assert check.judge_voltage(asked, at(0.5), is_slewing=False) is SETTLE
+    assert check.judge_voltage(off, at(0.75), is_slewing=False) is WAIT
+    assert check.judge_voltage(off, at(0.8), is_slewing=True) is MOVE
+    assert check.judge_voltage(asked, at(0.875), is_slewing=False) is MOVE

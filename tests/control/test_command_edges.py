@@ -1,0 +1,70 @@
+"""The command block from write to write: what rises, what stops, and what of it acts again."""
+
+from dataclasses import replace
+
+import pytest
+
+from gateway.control.command_edges import NO_EDGES, CommandTracker
+from gateway.registers.command import Command
+from gateway.registers.words import ControlBit
+from tests.control.bench import bsfm, settings
+
+NONE, ENABLE, TARE, RUN = ControlBit(0), ControlBit.ENABLE, ControlBit.TARE, ControlBit.START_CALIBRATION
+
+
+def tracker(word: ControlBit = NONE) -> CommandTracker:
+    commands = CommandTracker(settings(lease_s=1.0))
+    commands.take(0.0, Command(control_word=word, number=1))
+    return commands
+
+
+@pytest.mark.parametrize(("word", "stops"), [(NONE, True), (ENABLE, False), (RUN, False), (ENABLE | RUN, False)])
+def test_an_enable_that_falls_stops_unless_a_run_takes_its_place(word: ControlBit, stops: bool) -> None:
+    assert tracker(ENABLE).edges_of(Command(control_word=word, number=2)).stops is stops
+    assert not tracker().edges_of(Command(control_word=word, number=2)).stops, "nothing was on"
+
+
+def test_behind_a_stop_no_bit_stands_and_each_that_is_written_rises_anew() -> None:
+    commands = tracker(ENABLE)
+    edges = commands.take(1.0, Command(control_word=ENABLE, number=2, stops=True))
+    assert edges.stops and not edges.rises
+    assert commands.take(2.0, Command(control_word=ENABLE, number=3)).rises == ENABLE
+
+
+def test_a_momentary_bit_acts_with_each_write_and_with_none_of_the_bank_s_own() -> None:
+    commands = tracker(TARE)
+    assert commands.edges_of(Command(control_word=TARE, number=1)).rises == 0
+    assert commands.edges_of(Command(control_word=TARE, number=2)).rises == TARE
+
+
+def test_the_same_command_has_no_edges_and_is_no_beat() -> None:
+    commands = tracker()
+    command = Command(control_word=ENABLE, heartbeat=5, number=2)
+    assert commands.take(1.0, command).rises == ENABLE
+    assert commands.take(2.0, command) == NO_EDGES and commands.lease_age_s(2.0) == 1.0
+
+
+def test_only_the_first_value_behind_a_clearing_is_the_bank_s_and_the_next_one_is_a_beat() -> None:
+    commands = tracker()
+    commands.take(1.0, Command(heartbeat=3, number=2))
+    commands.expect_clearing()
+    commands.take(2.0, Command(heartbeat=0, number=3))
+    assert commands.lease_age_s(2.5) == 1.5
+    commands.take(3.0, Command(heartbeat=4, number=4))
+    assert commands.lease_age_s(3.5) == 0.5
+
+
+def test_limits_of_a_calibration_end_with_it() -> None:
+    """A smaller one before leaves no trace."""
+    commands = CommandTracker(settings())
+    commands.take(0.0, Command(force_setpoint_n=30.0, number=1))
+    for limits_n, force_n in (((0.0, 20.0), 20.0), ((0.0, 40.0), 30.0), (None, 30.0)):
+        commands.use(replace(bsfm(), limits_n=limits_n))
+        assert commands.demand.force_n == force_n
+
+
+def test_who_commands_is_the_peer_where_one_is_known() -> None:
+    commands = tracker()
+    assert commands.who == "a command"
+    commands.take(1.0, Command(number=2, peer="10.0.0.5"))
+    assert commands.who == "10.0.0.5"
