@@ -20,6 +20,7 @@ from tests.simulation.kernel.virtual_time import VirtualClock
 from tests.simulation.masters.integrator import Sets
 from tests.simulation.masters.spelling import floats_pdu, mask_pdu, setpoints_of, write_one_pdu, write_pdu
 from tests.simulation.masters.tcp_master import Master
+from tests.simulation.schedule import run_schedule
 
 BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05, output_timeout_s=0.2)
 OWNER, OTHER = "10.0.0.1", "10.0.0.2"
@@ -280,3 +281,10 @@ def test_a_cause_that_is_named_by_what_a_client_has_chosen_is_seen() -> None:
     assert log.internal_errors == []
     log("accepted force_setpoint 12.5", "")
     assert log.internal_errors[0].startswith("I12")
+
+
+def test_a_watchdog_that_has_forgotten_and_is_not_looked_at_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    events = [Event(3.0, "output", "power", (0.0827, 0.0)), Event(3.7, "rival", "hold", (14.49,))]
+    assert not run_schedule(2076, events, 8.0).broken
+    monkeypatch.setattr("gateway.service.running_rig.lines.device_checks._LOOK_PERIOD_S", 1e9)
+    assert {line.partition(" at ")[0] for line in run_schedule(2076, events, 8.0).broken} == {"I6"}
