@@ -158,3 +158,17 @@ class GatewayAtHand:
             elif request[0] == 6 and address >= 1000:
                 found.append((address, request[3:]))
         return found
+
+
+def refuse_commands(gateway: GatewayAtHand) -> list[bytes]:
+    """As where another master has the setpoint; return where each command will be noted."""
+    answer, asked = gateway.answer, list[bytes]()
+
+    def refuse(request: bytes) -> bytes:
+        if request[0] == 23 or (request[0] in (6, 16) and int.from_bytes(request[1:3], "big") < 16):
+            asked.append(request)
+            return bytes((request[0] | 0x80, 6))
+        return answer(request)
+
+    gateway.answer = refuse  # type: ignore[method-assign]
+    return asked

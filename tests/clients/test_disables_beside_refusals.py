@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from gateway.registers.words import CommitStatus
-from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
+from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged, refuse_commands
 from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import S7, Irc5, MbClient, TwinCat
 from tests.clients.programs.iec_libraries import TwinCatRequest
@@ -60,15 +60,7 @@ def test_a_disable_beside_a_tare_that_is_refused_is_no_less_a_disable(client: An
 def test_who_may_not_even_disable_asks_for_it_no_more_than_twice(client: Any, gateway: GatewayAtHand) -> None:
     client.enable(12.0)
     cycles(client)
-    answer, asked = gateway.answer, list[bytes]()
-
-    def refuse(request: bytes) -> bytes:
-        if request[0] == 23 or (request[0] in (6, 16) and int.from_bytes(request[1:3], "big") < 16):
-            asked.append(request)
-            return bytes((request[0] | 0x80, 6))
-        return answer(request)
-
-    gateway.answer = refuse  # type: ignore[method-assign]
+    asked = refuse_commands(gateway)
     client.disable()
     cycles(client, 10)
     assert 1 <= len(asked) <= 2

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from gateway.clients import render_client
-from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
+from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged, refuse_commands
 from tests.clients.scenes import MAP, WHERE, command, commands, cycles
 
 
@@ -56,15 +56,7 @@ def test_an_off_that_is_refused_behind_a_loss_is_not_asked_for_again_and_again(
     gateway.is_cut = True
     cycles(client, 3)
     gateway.is_cut = False
-    answer, asked = gateway.answer, list[bytes]()
-
-    def refuse(request: bytes) -> bytes:
-        if request[0] == 23 or (request[0] in (6, 16) and int.from_bytes(request[1:3], "big") < 16):
-            asked.append(request)
-            return bytes((request[0] | 0x80, 6))
-        return answer(request)
-
-    gateway.answer = refuse  # type: ignore[method-assign]
+    asked = refuse_commands(gateway)
     client.CYCLE_S = 0.05
     for _ in range(8):
         client.cycle(1.0)

@@ -345,7 +345,7 @@ DEFECTS = (
     Defect("a silent regulator is taken to have obeyed", "control/valve/turning.py",
            "max(before_v, loop.voltage_v)", "loop.voltage_v", ("control/valve",)),
     Defect("the valve takes a voltage that is wanted for one that stands", "control/valve/turning.py",
-           "        is_vented = is_vented and line.standing_v is not None and line.standing_v <= _VENTED_V\n", "",
+           "        is_vented = is_vented and line.standing_v is not None and line.standing_v <= NEAR_V\n", "",
            ("control/valve",)),
     Defect("a recording is not put on the disk once it has begun", "service/run_recording.py",
            "        self._disk(self._open, tell)\n        self._begin(self._sync)\n",

@@ -13,7 +13,7 @@ from gateway.control.supervision.fault_detection import FaultDetector, StopCause
 from gateway.registers.words import State
 
 _OFF: Final = State.OFF
-_NEAR_V: Final = 0.05  # a device answers in steps of its own
+NEAR_V: Final = 0.05  # a device answers in steps of its own
 
 
 class SafeVoltageCheck:
@@ -35,7 +35,7 @@ class SafeVoltageCheck:
             return None
         # what was confirmed before the setting that is on its way may not stand any more
         stands_v = line.acknowledged_v if line.sent_v is None else line.standing_v
-        if stands_v is not None and abs(stands_v - self._faults.safe_voltage_v) <= _NEAR_V:
+        if stands_v is not None and abs(stands_v - self._faults.safe_voltage_v) <= NEAR_V:
             self._asked_s = None
             return None
         return self._faults.cause_at_rest(now_s, line, now_s - self._asked_s)

@@ -9,6 +9,7 @@ from gateway.control.inputs import CalibrationInUse, LineStatus
 from gateway.control.sample_conditioning import SampleConditioner
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.plausibility import ExpectedForce
+from gateway.control.supervision.safe_voltage import NEAR_V
 from gateway.control.transitions import Transitions
 from gateway.control.valve.pull_model import scale_forces
 from gateway.control.valve.valve_switch import ValveSwitch
@@ -16,7 +17,6 @@ from gateway.registers.words import ControlBit
 
 _PULL = int(ControlBit.VALVE_PULL)
 _VENTED_N = 0.5  # expected above rest: less than friction holds
-_VENTED_V = 0.05  # a device answers in steps of its own
 
 
 class Turning:
@@ -68,7 +68,7 @@ class Turning:
         wanted = valve.wanted(pulls=pulls, is_enabled=machine.is_enabled)
         is_left = self._follow_pressure(now_s, line.standing_v, parts.loop)
         is_vented = parts.loop.voltage_v <= 0.0 and not is_left
-        is_vented = is_vented and line.standing_v is not None and line.standing_v <= _VENTED_V
+        is_vented = is_vented and line.standing_v is not None and line.standing_v <= NEAR_V
         if not valve.step(now_s, wanted, status, is_vented=is_vented):
             return False
         direction = -1.0 if valve.is_pulling else 1.0

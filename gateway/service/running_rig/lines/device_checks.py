@@ -44,7 +44,7 @@ class DeviceChecks:
         self.begin()
 
     def begin(self) -> None:
-        """Begin anew: the port has been opened, and another device may be behind it."""
+        """Begin anew: the port has been opened, or nothing was heard for long, and another device may be behind it."""
         self._waiting = deque(self._known_of(DeviceStep.IDENTITY, DeviceStep.STATUS, *self._arming))
         self._tries = 0
         self._next_look_s = 0.0

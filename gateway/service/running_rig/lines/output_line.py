@@ -101,9 +101,7 @@ class OutputExchange:
         self._heard_s = -inf  # an answer of nobody knows which: none that was asked before counts as silent any more
         self.answer_late_s = 0.0
         self._is_behind = False  # the answer to one of them came, that to the last question is out
-        self._refused_v = (
-            nan  # refused a moment ago: perhaps the watchdog has tripped, which is asked before it is tried again
-        )
+        self._refused_v = nan  # a moment ago: perhaps the watchdog has tripped, which is asked before the next try
         self._is_altered = False  # the last echo was another voltage
         self._quiet_until_s = 0.0
         self._sent_s = 0.0

@@ -43,7 +43,7 @@ class WatchdogRegister:
             self._show(word)
         if self._checks.times_forgotten != self._told:
             self._told = self._checks.times_forgotten
-            self._log("device", f"{_FORGOTTEN}; it is armed again")
+            self._log("device", f"{_FORGOTTEN}; it is being armed again")
 
 
 def device_fault_note(line: OutputExchange) -> str:
