@@ -125,6 +125,13 @@ KEPT: list[tuple[int, list[Event]]] = [
         ],
     ),
     (2076, [Event(6.6042, "output", "power", (0.0827, 0.0)), Event(7.3518, "rival", "hold", (14.49,))]),
+    (
+        17561,
+        [
+            Event(5.792, "rival", "pull", (18.66,), way="mask"),
+            Event(7.1986, "rival", "ask", (0,), b"\x10\x00\x00\x00\x01\x02\x00\x01"),
+        ],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

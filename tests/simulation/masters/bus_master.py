@@ -5,7 +5,7 @@ Its own bytes can be spoiled on the way, too: then nobody answers, as nobody may
 been done all the same.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from tests.simulation.judges.heard import crc16
@@ -21,7 +21,7 @@ STRANGE_S = 1.0
 MOST_WAITING = 3
 LONGEST_GAP_S = 0.05
 """Inside of a request: who waits longer has given it up."""
-UNIT = 1
+UNIT, BROADCAST = 1, 0
 
 
 class BusMaster(Master):
@@ -62,16 +62,19 @@ class BusMaster(Master):
         self._stream, self._number = b"", self._number + 1
         self._question = Asked(self._number, pdu, control_of(pdu))
         frame = bytes((unit,)) + pdu
-        self._put(frame + crc16(frame).to_bytes(2, "little"))
+        pieces = self._pieces(frame + crc16(frame).to_bytes(2, "little"))
+        self._put(pieces, self._number if unit == BROADCAST else 0)
         self._outside.call_later(PATIENCE_S, self._on_silence, self._number)
 
-    def _put(self, frame: bytes) -> None:
-        """Put a request on the bus, with a gap inside where it is to be split."""
-        (first, gap_s), *rest = self._pieces(frame)
-        CABLES["bus"].send_to_host(first)
-        gap_s = min(gap_s, LONGEST_GAP_S) + CABLES["bus"].backlog_s
-        for piece, _ in rest:
-            self._outside.call_later(gap_s, CABLES["bus"].send_to_host, piece)
+    def _put(self, pieces: Sequence[tuple[bytes, float]], broadcast: int) -> None:
+        """Put a request on the bus, with a gap inside where it is to be split. broadcast: its number, which nobody answers: it
+        has been done as soon as it is through; 0: none."""
+        bus, ((piece, gap_s), *rest) = CABLES["bus"], pieces
+        bus.send_to_host(piece)
+        if rest:
+            self._outside.call_later(min(gap_s, LONGEST_GAP_S) + bus.backlog_s, self._put, rest, broadcast)
+        elif broadcast:
+            self._outside.call_later(bus.backlog_s, self._on_silence, broadcast)
 
     def burst(self, count: float, is_read_wrong: float) -> None:
         """A bus has one question at a time."""
