@@ -147,6 +147,16 @@ def test_whoever_ends_one_before_its_file_is_there_gets_it_whole(recordings: Rec
     disk.let_go()
 
 
+def test_a_start_that_has_ended_before_the_disk_answers_is_told_nothing(
+    recordings: Recordings, disk: HangingDisk, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert recordings.try_start().cancel()
+    disk.let_go()
+    assert recordings.status()["recording"] and not caplog.records
+    recordings.stop()
+    disk.let_go()
+
+
 def test_one_that_the_disk_refuses_after_somebody_has_ended_it_does_not_come_again(
     recordings: Recordings, disk: HangingDisk, tmp_path: Path
 ) -> None:

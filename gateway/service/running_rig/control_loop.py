@@ -271,7 +271,7 @@ class ControlLoop:
             voltage_v = self.controller.decide(now_s, self.bank.command, self.sample, line)
         except Exception:
             return self._make_safe(now_s)
-        self.output.set_voltage(voltage_v, now_s)
+        self._send(voltage_v, now_s)
         try:
             return self.controller.explain(now_s)
         except Exception:
@@ -282,8 +282,13 @@ class ControlLoop:
         sentence = "A499 internal error, please report it; safe voltage written:\n"
         self._log("internal", sentence + traceback.format_exc())
         decision = self.controller.fail_internally(now_s)
-        self.output.set_voltage(decision.voltage_v, now_s)
+        self._send(decision.voltage_v, now_s)
         return decision
+
+    def _send(self, voltage_v: float, now_s: float) -> None:
+        """To a port that is away nothing is sent, whatever registers and recordings would make of it."""
+        if not self.output_lost:
+            self.output.set_voltage(voltage_v, now_s)
 
     def _step(self, now_s: float) -> None:
         decision = self._decide(now_s)

@@ -130,7 +130,8 @@ class Recordings:
 
         def started(answer: Future[Answer]) -> None:
             error = answer.exception()
-            notes.set_result((f"not recording: {error}",) if error else ())
+            if not notes.cancelled():  # by a start that has ended before the disk answered
+                notes.set_result((f"not recording: {error}",) if error else ())
 
         self._start(NO_LABEL, 0.0, waits_for_room=True).add_done_callback(started)
         return notes

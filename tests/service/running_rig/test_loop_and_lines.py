@@ -1,6 +1,6 @@
 """What the control loop makes of its lines: another load cell, a lost valve, a restart, rows of a pull, idle ticks."""
 
-from math import nan
+from math import isnan, nan
 from types import SimpleNamespace
 
 from gateway.codes.faults import FaultCode
@@ -32,6 +32,21 @@ def test_another_cell_behind_the_port_stops_a_force_and_is_asked_again_by_a_rese
     wired.run(0.3)
     wired.write(0, ENABLE, 1200)
     assert wired.loop.decision and wired.loop.decision.enable_block is RefusalReason.NONE
+
+
+def test_nothing_counts_as_sent_to_a_port_that_is_away() -> None:
+    """A recording would tell that the safe voltage had gone out, where the output stands as it stood."""
+    wired = Wired().pressing(12.0)
+    assert wired.exchange.line.sent_v > 0.0
+    wired.unplug()
+    asked = wired.exchange.counts.asked
+    for _ in wired.samples(0.5):
+        assert isnan(wired.exchange.line.sent_v) and isnan(wired.exchange.line.sent_s)
+    wired.loop._make_safe(wired.now_s)
+    assert wired.exchange.counts.asked == asked and isnan(wired.exchange.line.sent_v)
+    wired.replug()
+    wired.run(0.2)
+    assert wired.exchange.line.sent_v == 0.0
 
 
 def test_where_each_sample_decides_no_tick_decides_beside_it() -> None:

@@ -51,7 +51,7 @@ _AFTER_SIGN_OF_LIFE_S = 0.005  # nothing tells when the device is through with a
 
 class LineState(NamedTuple):
     """What a recording keeps of the line. pressure_pa: last measured; sent_v: the last voltage that was written to the wire,
-    and when, sent_s; nan before the first."""
+    and when, sent_s; nan before the first on a port that is open."""
 
     pressure_pa: float = nan
     sent_v: float = nan
@@ -80,7 +80,6 @@ class OutputExchange:
         self._host, self._rest_v = host, rest_v
         self.checks = checks or DeviceChecks(host, is_waived=False)
         self._write = write
-        self._sent_v = self._setting_s = nan
         self._reply_timeout_s = reply_timeout_s
         self.garbage_bytes = 0
         self.counts = WireCounts()
@@ -95,6 +94,7 @@ class OutputExchange:
         self._wanted_v: float | None = None
         self._in_flight: OutputRequest | None = None
         self._asked_v = self._before_v = inf
+        self._sent_v = self._setting_s = nan
         self.standing_v: float | None = None
         self._is_overdue = False  # a question was given up, its answer may still come
         self._given_up: list[tuple[OutputRequest, float]] = []  # in a row, with their send times
