@@ -21,6 +21,7 @@ from gateway.service.running_rig.recordings import Recordings
 from tests.control.bench import bsfm
 from tests.disk.at_once import AtOnce
 from tests.disk.threads import join_disk_threads
+from tests.service.kept_log import Log
 from tests.service.rigs import demo
 
 DECISION = Controller(demo().control, CalibrationInUse(bsfm(), 1)).safe_output(FaultCode.NONE)
@@ -51,11 +52,6 @@ class HangingDisk:
     def let_go(self, all_but: int = 0) -> None:
         while len(self._waiting) > all_but:
             self._waiting.pop(0)()
-
-
-class Log(list[str]):
-    def __call__(self, cause: str, sentence: str) -> None:
-        self.append(sentence)
 
 
 def rows_until(recording: RunRecording | Recordings, end_s: float, begin_s: float = 0.0) -> None:

@@ -69,6 +69,7 @@ def _shake(simulation: "Simulation", event: Event) -> None:
         simulation.service.terminate()
     elif event.what == "stop" and simulation.service.is_guarded:
         simulation.service.stop_control(event.numbers[0])
+        simulation.observer.history.awoken.append(simulation.clock.now_s + event.numbers[0])
         if event.numbers[0] > simulation.observer.bounds.stall_s:
             simulation._lose_control()
     elif event.what == "clock_jump":
@@ -85,6 +86,7 @@ def _kill_guardian(simulation: "Simulation") -> None:
     time, for which the device has its watchdog."""
     if simulation.service.is_serving:
         simulation.service.kill_guardian()
+        simulation.observer.history.cuts.append(simulation.clock.now_s)
         simulation.observer.note_disabled(simulation.clock.now_s)
 
 

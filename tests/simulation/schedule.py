@@ -13,12 +13,13 @@ from typing import Any
 from gateway.control import LeaseAction
 from gateway.profiles import Rig
 from tests.simulation.draws.event import Event
-from tests.simulation.draws.rigs import LEASE_S, draw_badges, draw_rig, store_plants
+from tests.simulation.draws.rigs import DEMO_CELL, LEASE_S, draw_badges, draw_rig, store_plants
 from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, RATE_S, count_answers, heal
 from tests.simulation.judges.audit_judge import judge_audit
 from tests.simulation.judges.held_force import HeldForce
 from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
+from tests.simulation.judges.recording_judge import judge_recordings
 from tests.simulation.judges.status_witness import StatusWitness
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_edges
@@ -29,13 +30,15 @@ from tests.simulation.kernel.virtual_time import BEGIN_S, VirtualClock, VirtualL
 from tests.simulation.masters.bus_master import make_master
 from tests.simulation.masters.integrator import Integrator, Sets
 from tests.simulation.masters.socket_user import SocketUser
-from tests.simulation.masters.spelling import BITS, DISABLED_BY_BIT, ENABLE, read_pdu
-from tests.simulation.masters.tcp_master import BEATS_S, RESET, RUNS, Master
+from tests.simulation.masters.spelling import BITS, DISABLED_BY_BIT, ENABLE, control_of, read_pdu
+from tests.simulation.masters.tcp_master import BEATS_S, RESET, RUNS, TARE, Master
 from tests.simulation.surroundings import Surroundings
 
 RUN_BIT, SELF_TEST = RUNS.values()
 PLANTS_EVERY = 8
 """Of so many rigs one has numbered plants stored, which somebody may take into use."""
+RECORDED_EVERY, RECORDED = 8, 1
+"""Of so many gateways one records from its start."""
 POLL_S = 0.1
 """Until an output device is asked something where nothing changes."""
 LOOK_S = 0.02
@@ -67,6 +70,8 @@ class Simulation:
         self.rates: dict[str, int] = {}
         self.clock, self.chance = VirtualClock(), Random(~seed)
         self.observer = drawn.observer(self._bounds_of(rig))
+        self.observer.history.is_plain = rig.load_cell.device.name == DEMO_CELL
+        self.observer.history.has_valve = rig.valve is not None
         self.outside = VirtualLoop(self.clock)
         self.outside.set_exception_handler(self._on_error)
         self.log = Log(self.clock)
@@ -85,7 +90,9 @@ class Simulation:
         SimulatedFit.on_stored, SimulatedFit.ended = staticmethod(lambda mark: self.sets.expect_mark(mark)), []
         self.status = StatusWitness(self.observer, lambda: CABLES["load_cell"].heard_s)
         self.held_force = HeldForce(self.observer, BEGIN_S + 2.0)
-        self.service = SimulatedService(rig, folder, self.outside, self.log, self.clock)
+        self.service = SimulatedService(
+            rig, folder, self.outside, self.log, self.clock, records=seed % RECORDED_EVERY == RECORDED
+        )
         self.service.on_death = self._on_death
         self.masters = {
             name: make_master(name, "bus" in CABLES)(
@@ -143,6 +150,8 @@ class Simulation:
         self.held_force.end()
         self._heal()
         self.observer.broken += judge_audit(self._folder, self.masters["healer"].name)
+        if self.observer.history.is_whole:
+            self.observer.broken += judge_recordings(self._folder, self.observer.history)
         for client in (*self.clients, self.person):
             self.observer.broken += client.complaints
         self.observer.broken += self.log.internal_errors
@@ -182,6 +191,8 @@ class Simulation:
 
     def _note_pdu(self, host: str, pdu: bytes, is_answered: bool) -> None:
         self.status.note_write(host if is_answered else "", pdu, self.clock.now_s)
+        if (control := control_of(pdu)) is not None and control & TARE:
+            self.observer.history.tares.append(self.clock.now_s)
 
     def _on_write(self, control: int | None, is_answered: bool) -> None:
         if control == DISABLED_BY_BIT:  # which ends no run; a reset may be among the other bits

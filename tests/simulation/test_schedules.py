@@ -132,6 +132,7 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(7.1986, "rival", "ask", (0,), b"\x10\x00\x00\x00\x01\x02\x00\x01"),
         ],
     ),
+    (38582, [Event(9.7026, "worker", "take", (3.53,)), Event(15.05, "rival", "self_test")]),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

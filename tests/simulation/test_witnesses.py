@@ -1,17 +1,13 @@
 """Those who judge a schedule see what they are there for: each lie of the registers, each mixed set, each right overstepped."""
 
 import struct
-from collections.abc import Callable
 from dataclasses import replace
 from math import inf
-from pathlib import Path
 
 import pytest
 
-from gateway.audit.chain import ChainEnd, seal_line
 from tests.simulation.draws.event import Event
 from tests.simulation.draws.rare_events import draw_rare_events
-from tests.simulation.judges.audit_judge import judge_audit
 from tests.simulation.judges.held_force import HeldForce
 from tests.simulation.judges.observer import STATUS_WORDS, Bounds, Observer
 from tests.simulation.judges.status_witness import StatusWitness
@@ -82,31 +78,16 @@ def test_a_voltage_that_stands_behind_over_force_is_seen(
     assert [line.partition(" at ")[0] for line in observer.broken] == ["I3 over-force"] * is_over
 
 
-AUDIT = tuple(
-    {"what": what, "result": "accepted", "peer": f"{OWNER}:40001", "new": 1.0} for what in ("start", "enable")
-)
-
-
-@pytest.mark.parametrize(
-    ("spoil", "seen"),
-    [
-        (lambda lines: lines, []),
-        (lambda lines: lines[:1], [f"audit: {OWNER} has enabled, and no line of the last 20 says so"]),
-        (lambda lines: lines[1:], ["audit: line 2 stands behind line 0"]),
-        (lambda lines: [lines[0].replace(b"start", b"stars"), lines[1]], ["audit: line 1 was changed"]),
-        (lambda lines: [lines[0], lines[1].replace(b"40001", b"40002")], ["audit: line 2 was changed"]),
-    ],
-)
-def test_an_audit_that_was_touched_is_seen(
-    spoil: Callable[[list[bytes]], list[bytes]], seen: list[str], tmp_path: Path
+@pytest.mark.parametrize(("later_s", "is_broken"), [(0.01, False), (0.03, True)])
+def test_of_answers_that_come_together_nobody_knows_which_is_the_older(
+    observer: Observer, later_s: float, is_broken: bool
 ) -> None:
-    (tmp_path / "audit").mkdir()
-    lines, end = list[bytes](), ChainEnd()
-    for fields in AUDIT:
-        line, end = seal_line(fields, end)
-        lines.append(line)
-    (tmp_path / "audit" / "1.jsonl").write_bytes(b"".join(spoil(lines)))
-    assert list(judge_audit(tmp_path, OWNER)) == seen
+    observer.note_accepted(1, 1.0)
+    observer.hear(b"SET 0\r\nSET 40\r\n", 1.0)
+    observer.note_accepted(0, 1.0 + later_s)
+    observer.cell_heard_s = 1.2
+    observer.look(1.2)
+    assert [line.partition(" at ")[0] for line in observer.broken] == ["I4"] * is_broken
 
 
 HELD_N = 20.0

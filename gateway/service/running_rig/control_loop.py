@@ -223,9 +223,8 @@ class ControlLoop:
 
     def _used_since_tick(self) -> ProcessorTime | None:
         """Return what this process has had of a processor since the last tick."""
-        if self._last_processor_time is None:
-            return None
-        return time_between(self._last_processor_time, self.processor_time())
+        last = self._last_processor_time
+        return time_between(last, self.processor_time()) if last else None
 
     def _processor_held(self, since_s: float | None, now_s: float) -> Held:
         """Asked of the kernel only once a device has not been heard for a while."""
@@ -271,7 +270,8 @@ class ControlLoop:
             voltage_v = self.controller.decide(now_s, self.bank.command, self.sample, line)
         except Exception:
             return self._make_safe(now_s)
-        self._send(voltage_v, now_s)
+        if not self.output_lost:  # else registers and recordings would tell of a voltage that never went out
+            self.output.set_voltage(voltage_v, now_s)
         try:
             return self.controller.explain(now_s)
         except Exception:
@@ -279,16 +279,11 @@ class ControlLoop:
 
     def _make_safe(self, now_s: float) -> Output:
         """An exception of ours is being handled: the safe voltage, and a sentence."""
-        sentence = "A499 internal error, please report it; safe voltage written:\n"
-        self._log("internal", sentence + traceback.format_exc())
+        self._log("internal", f"A499 internal error, please report it; safe voltage written:\n{traceback.format_exc()}")
         decision = self.controller.fail_internally(now_s)
-        self._send(decision.voltage_v, now_s)
-        return decision
-
-    def _send(self, voltage_v: float, now_s: float) -> None:
-        """To a port that is away nothing is sent, whatever registers and recordings would make of it."""
         if not self.output_lost:
-            self.output.set_voltage(voltage_v, now_s)
+            self.output.set_voltage(decision.voltage_v, now_s)
+        return decision
 
     def _step(self, now_s: float) -> None:
         decision = self._decide(now_s)

@@ -17,12 +17,8 @@ from gateway.service.running_rig.recorded_row import COLUMNS, row_of
 from gateway.service.running_rig.recordings import LONGEST_S, Recordings
 from tests.control.bench import bsfm
 from tests.disk.at_once import AtOnce
+from tests.service.kept_log import Log
 from tests.service.rigs import demo
-
-
-class Log(list[str]):
-    def __call__(self, cause: str, sentence: str) -> None:
-        self.append(sentence)
 
 
 @pytest.fixture

@@ -39,7 +39,7 @@ SLOW_HZ = 25
 OTHER_RATES_HZ = (50, 50, 250)
 CELL_SHARES = (0.5, 1.0 / 3.0, 2.0)
 """Of a load cell's rate in the loop's, where they differ."""
-DEMO_OUTPUT = "smc-itv-rc"
+DEMO_OUTPUT, DEMO_CELL = "smc-itv-rc", "stream-st-gs"
 CELLS = ("hbm-aed", "hbm-aed-binary", "laumas-tlb", "mantracourt-dsc", "hx711-line", "adam-4016")
 COUNTS_N = {"adam-4016": 10.0}
 UNITS = {"mantracourt-dsc": ", unit: N", "laumas-tlb": ""}

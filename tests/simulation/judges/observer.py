@@ -11,8 +11,10 @@ import re
 import struct
 from dataclasses import dataclass, field
 from hashlib import sha256
-from math import inf
+from math import inf, nan
 from typing import Any
+
+from tests.simulation.judges.recording_judge import History
 
 COUNT_V = 10.0 / 1023
 FAULT = 4
@@ -39,6 +41,7 @@ class Bounds:
 
 ENABLE, RESET, RUN_BITS = 1, 2, 32 | 64
 DOWN_S = 4.0  # a run's end, whoever ends it, is a ramp down that needs no master; it takes this long at the most
+ORDER_S = 0.02  # by which the answer to an earlier write may come after that to a later one, on another wire
 UNHEARD_S = 0.1  # so late a write may be taken whose master has hung up, or fallen silent on a bus
 SENTENCE = re.compile(
     rb"(ST|US|OL),(?:GS|NT),([ +\-.0-9]{8})(kg| N)\r\n"
@@ -54,6 +57,7 @@ class Observer:
 
     bounds: Bounds
     broken: list[str] = field(default_factory=list)
+    history: History = field(default_factory=History)
     settings: int = 0
     setting_s: float = 0.0
     voltage_v: float = 0.0
@@ -79,6 +83,7 @@ class Observer:
     _fault: int | None = None
     _reset_s: float = -1.0
     _unheard_s: float = -1.0
+    _enabled_s: float = -1.0
 
     # -- the wire
 
@@ -95,18 +100,19 @@ class Observer:
     def hear_cell(self, chunk: bytes, now_s: float) -> None:
         """What has reached the gateway from its load cell, most often a sentence."""
         found = SENTENCE.fullmatch(chunk)
+        self.history.readings.append((now_s, _force_n(found) if found and found[1] != b"OL" else None))
         self._over = self._over + 1 if found and self._is_over(found) else 0
         self.over_s = (self.over_s or now_s) if self._over >= OVER_READINGS else None
 
     def _is_over(self, found: re.Match[bytes]) -> bool:
         if found[1] == b"OL":
             return True
-        force_n = float(found[2].replace(b" ", b"")) * (9.80665 if found[3] == b"kg" else 1.0)
-        return abs(force_n) >= self.bounds.over_force_n + ZERO_N
+        return abs(_force_n(found)) >= self.bounds.over_force_n + ZERO_N
 
     def note_cut(self, until_s: float) -> None:
         """The sender was cut off, or the plug pulled: half a sentence may stand before the next, and the first that is begun
         now must be safe. until_s: what is on the wire already is through by then."""
+        self.history.cuts.append(until_s)
         self._is_cut = self._must_be_safe = True
         self._begun_s = until_s
 
@@ -123,6 +129,7 @@ class Observer:
         allowed_v = self.bounds.slew_v_per_s * (now_s - before_s + 0.02) + COUNT_V
         if self.settings and voltage_v - before_v > allowed_v + 1e-9:
             self.complain("I2", f"{before_v:.3f} -> {voltage_v:.3f} V in {now_s - before_s:.4f} s", now_s)
+        self.history.settings.append((now_s, voltage_v))
         self.setting_s, self.voltage_v, self.largest_v = now_s, voltage_v, max(self.largest_v, voltage_v)
         self.settings += 1
         self.fingerprint.update(f"{now_s:.6f} {voltage_v:.4f}\n".encode())
@@ -139,9 +146,10 @@ class Observer:
                 self.run_ended_s = now_s
             self.is_run = bool(control & RUN_BITS)
         if control == -1 or self.is_run or control & ENABLE:
-            self.disabled_s = None
+            self.disabled_s, self._enabled_s = None, now_s
         elif self.disabled_s is None:
-            self.disabled_s = self._lease_end_s(now_s) if now_s - self._unheard_s < UNHEARD_S else now_s
+            is_last = now_s - self._unheard_s >= UNHEARD_S and now_s - self._enabled_s >= ORDER_S
+            self.disabled_s = now_s if is_last else self._lease_end_s(now_s)
         if control & RESET:
             self._reset_s = now_s
 
@@ -219,3 +227,11 @@ class Observer:
     def complain(self, law: str, words: str, now_s: float) -> None:
         if len(self.broken) < 20:
             self.broken.append(f"{law} at {now_s:.4f}: {words}")
+
+
+def _force_n(found: re.Match[bytes]) -> float:
+    try:
+        number = float(found[2].replace(b" ", b""))
+    except ValueError:
+        return nan
+    return number * (9.80665 if found[3] == b"kg" else 1.0)

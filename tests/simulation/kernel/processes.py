@@ -136,7 +136,10 @@ class SimulatedService:
     on_death: control is gone; restarts: how many guardians came after the first.
     """
 
-    def __init__(self, rig: Rig, state: Path, outside: VirtualLoop, log: Log, clock: VirtualClock) -> None:
+    def __init__(
+        self, rig: Rig, state: Path, outside: VirtualLoop, log: Log, clock: VirtualClock, *, records: bool = False
+    ) -> None:
+        self._options = RunOptions(bind=("127.0.0.1", PORT), record=records)
         self._rig, self._state, self._outside, self._log, self._clock = rig, state, outside, log, clock
         self._processes: list[SimulatedProcess] = []
         self._guardian: Guardian | None = None
@@ -233,7 +236,7 @@ class SimulatedService:
         self.restarts += 1
         self._signals = SimulatedSignals()
         self._guardian = guardian = Guardian(
-            RunOptions(bind=("127.0.0.1", PORT)),
+            self._options,
             self._state,
             SimulatedStarter(self._spawn),  # type: ignore[arg-type]
             self._signals,  # type: ignore[arg-type]
