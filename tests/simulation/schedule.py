@@ -19,6 +19,7 @@ from tests.simulation.healing import ANSWER_S, RATE_S, count_answers, heal
 from tests.simulation.judges.audit_judge import judge_audit
 from tests.simulation.judges.held_force import HeldForce
 from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
+from tests.simulation.judges.reason_judge import MACHINE, ReasonJudge
 from tests.simulation.judges.recording_judge import judge_recordings
 from tests.simulation.judges.status_witness import StatusWitness
 from tests.simulation.kernel.cables import CABLES
@@ -89,6 +90,7 @@ class Simulation:
         )
         SimulatedFit.on_stored, SimulatedFit.ended = staticmethod(lambda mark: self.sets.expect_mark(mark)), []
         self.status = StatusWitness(self.observer, lambda: CABLES["load_cell"].heard_s)
+        self.reasons = ReasonJudge(self.observer)
         self.held_force = HeldForce(self.observer, BEGIN_S + 2.0)
         self.service = SimulatedService(
             rig, folder, self.outside, self.log, self.clock, records=seed % RECORDED_EVERY == RECORDED
@@ -238,6 +240,9 @@ class Simulation:
         if self.observer.control_lost_s is not None and self.service.is_serving:
             self.observer.control_lost_s = None
         self.around.look()
+        self.around.tell_reasons(self.reasons)
+        if self.service.is_standing:
+            self.reasons.note(MACHINE, self.clock.now_s)
         self.observer.look(self.clock.now_s)
         self.outside.call_later(LOOK_S, self._look)
 
@@ -246,6 +251,7 @@ class Simulation:
             if pdu[0] == 3 and len(pdu) == 2 + 2 * STATUS_WORDS:
                 self.observer.note_status(pdu, at_s)
                 self.status.note(pdu[2:], at_s - DELAY_S)
+                self.reasons.judge(pdu[2:], at_s - DELAY_S)
                 self.held_force.note(pdu[2:], at_s - DELAY_S)
         self.reader.heard.clear()
         self.reader.ask(read_pdu(STATUS_FIRST, STATUS_WORDS))

@@ -10,6 +10,7 @@ from gateway.devices.device_checks.watchdog import WatchdogState
 from gateway.profiles import Rig
 from gateway.service.simulation.world import SimulatedRig
 from tests.simulation.judges.observer import Observer
+from tests.simulation.judges.reason_judge import CELL, OUTPUT, ReasonJudge
 from tests.simulation.kernel.cables import CABLES, lay_cables
 from tests.simulation.kernel.virtual_time import VirtualLoop
 
@@ -131,6 +132,18 @@ class Surroundings:
         if (has_moved := self._move_valve(now_s)) and self._observer.voltage_v > 0.0 and not is_loose:
             self._observer.broken.append(f"valve at {now_s:.4f}: it moves under {self._observer.voltage_v:.3f} V")
         return has_moved
+
+    def tell_reasons(self, reasons: ReasonJudge) -> None:
+        """Say what is disturbed now."""
+        now_s = self._outside.time()
+        reasons.note_settings(self.world.settings.values, now_s)
+        for line, cable in CABLES.items():
+            if cable.is_disturbed:
+                reasons.note(line, now_s)
+        if self.cell_pace != 1.0:
+            reasons.note(CELL, now_s)
+        if now_s < self._dark_until_s:
+            reasons.note(OUTPUT, now_s)
 
     # -- their wires
 

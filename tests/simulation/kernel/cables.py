@@ -20,6 +20,8 @@ from tests.simulation.kernel.virtual_time import VirtualLoop
 MOST_QUEUED = 4096
 """Characters on one direction of a wire; a UART's driver drops what is more."""
 
+STRANGE_S = 0.05
+
 
 class Direction:
     """One direction of a wire. through_s: when its last byte is through; is_cut: what is on it arrives nowhere."""
@@ -64,6 +66,12 @@ class Cable:
     def through_s(self) -> float:
         """When the host's last byte will have arrived."""
         return max(self._outside.time(), self._to_device.through_s + 2e-9)
+
+    @property
+    def is_disturbed(self) -> bool:
+        """Whether what its device says does not arrive as it says it, or has not a moment ago."""
+        is_strange = self._outside.time() - max(self.strange_s, self.spoiled_s) < STRANGE_S
+        return is_strange or bool(self._spoils) or not self.is_plugged or self.reworded[0] != self.reworded[1]
 
     def send_to_device(self, data: bytes) -> None:
         """Put a host's bytes on the wire."""

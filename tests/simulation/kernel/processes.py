@@ -165,6 +165,11 @@ class SimulatedService:
         return self.inside is not None and bool(self.inside.servers) and not self.inside.is_halted
 
     @property
+    def is_standing(self) -> bool:
+        """Whether control does nothing now: it is gone, not there yet, or stopped."""
+        return not self.is_serving or self._processes[-1].loop.is_halted
+
+    @property
     def is_guarded(self) -> bool:
         return self._guardian is not None
 

@@ -1,0 +1,44 @@
+"""Who judges the causes of faults sees each that blames somebody who did nothing."""
+
+import struct
+
+import pytest
+
+from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Bounds, Observer
+from tests.simulation.judges.reason_judge import REASONS, ReasonJudge
+
+BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05)
+SETTINGS = {"load_cell": "cell.silent", "output": "output.refuse", "valve": "valve.stuck", "force": "air.off"}
+
+
+def look(judge: ReasonJudge, fault: int, at_s: float) -> None:
+    words = [0] * STATUS_WORDS
+    words[1], words[10] = FAULT if fault else 0, fault
+    judge.judge(struct.pack(f">{STATUS_WORDS}H", *words), at_s)
+
+
+@pytest.mark.parametrize("fault", [1, 13, 14, 15, *REASONS])
+@pytest.mark.parametrize("disturbed", [None, *SETTINGS, "machine"])
+def test_a_fault_without_its_reason_is_seen(fault: int, disturbed: str | None) -> None:
+    observer = Observer(BOUNDS)
+    judge = ReasonJudge(observer)
+    if disturbed in SETTINGS:
+        judge.note_settings((SETTINGS[disturbed],), 9.0)
+    elif disturbed:
+        judge.note(disturbed, 9.0)
+    touched = {disturbed} | ({"force"} if disturbed in ("load_cell", "output", "valve") else set())
+    has_reason = fault == 1 or bool(touched & set(REASONS.get(fault, ())))
+    look(judge, fault, 10.0)
+    look(judge, fault, 10.1)
+    assert len(observer.broken) == (not has_reason), "and told once"
+
+
+def test_a_reason_of_long_ago_is_none() -> None:
+    observer = Observer(BOUNDS)
+    judge = ReasonJudge(observer)
+    judge.note("output", 9.0)
+    look(judge, 7, 10.0)
+    look(judge, 0, 10.1)
+    assert not observer.broken
+    look(judge, 7, 10.6)
+    assert [line.partition(" at ")[0] for line in observer.broken] == ["reason"]
