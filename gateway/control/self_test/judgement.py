@@ -249,11 +249,13 @@ def judge_output_line(counts: WireCounts | None, slowest_s: float, known: Known)
     return Finding(Item.OUTPUT_LINE, verdict, f"{text}, {_LOST_BOUNDS}")
 
 
-def judge_cell_line(intervals: Intervals, counts: WireCounts | None, known: Known) -> Finding:
-    """Judge how regularly the cell was heard. counts: of this test."""
-    if intervals.median_s <= 0.0:
-        return Finding(Item.CELL_LINE, FAILED, "no reading came")
+def judge_cell_line(intervals: Intervals, counts: WireCounts | None, known: Known, heard_for_s: float) -> Finding:
+    """Judge how regularly the cell was heard. counts: of this test, which has listened for heard_for_s."""
     bound_s = known.settings.supervision.sample_timeout_s
+    if intervals.median_s <= 0.0:
+        if heard_for_s <= bound_s:
+            return Finding(Item.CELL_LINE, NOT_TESTED, "it ended before a second reading was due")
+        return Finding(Item.CELL_LINE, FAILED, "no reading came")
     garbled, heard = (counts.garbled, counts.heard) if counts else (0, 0)
     total = heard + garbled if heard else round(1.0 / intervals.median_s)
     late = intervals.longest_s - intervals.median_s

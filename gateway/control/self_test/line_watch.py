@@ -35,13 +35,13 @@ class LineWatch:
         """Note the time of a usable reading."""
         self._times_s.append(at_s)
 
-    def findings(self, known: Known) -> tuple[Finding, ...]:
-        """Return the verdicts on both lines."""
+    def findings(self, known: Known, elapsed_s: float) -> tuple[Finding, ...]:
+        """Return the verdicts on both lines. elapsed_s: for which the test has run."""
         outputs, cells = self._before or (None, None)
         now = self._line
         counted = now.output_counts.since(outputs) if now.output_counts and outputs else None
         heard = now.cell_counts.since(cells) if now.cell_counts and cells else None
         return (
             judgement.judge_output_line(counted, self._slowest_s, known),
-            judgement.judge_cell_line(intervals_of(self._times_s), heard, known),
+            judgement.judge_cell_line(intervals_of(self._times_s), heard, known, elapsed_s),
         )

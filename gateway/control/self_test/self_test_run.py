@@ -147,7 +147,7 @@ class SelfTestRun:
     def report(self, number: int, fault: FaultCode) -> SelfTestReport:
         """Return what has been found. fault: of the supervision, that ended it."""
         if self._elapsed_s > 0.0:
-            for finding in self._lines.findings(self._known):
+            for finding in self._lines.findings(self._known, self._elapsed_s):
                 self._set(finding)
         return report_of(number, self.findings, RunEnding(fault, self.is_done, self._force_n > 0.0))
 
@@ -262,7 +262,10 @@ class SelfTestRun:
             self._stop_below(force_n)
         elif expected_n >= _LEAST_EXPECTED_N and self._rest_n - force_n >= least_fall_n:
             text = f"{force_n - self._rest_n:+.1f} N where {expected_n:+.1f} N are expected"
-            self._set(Finding(Item.SIGN, FAILED, f"{text}: turn load_cell.sign in the rig file, or the cell's wires"))
+            text += ": turn load_cell.sign in the rig file, or the cell's wires"
+            if force_n > -least_fall_n:  # what was there at rest is gone, and no more
+                text += "; or what it pressed on at rest was taken away"
+            self._set(Finding(Item.SIGN, FAILED, text))
             self._set(Finding(Item.ZERO, NOT_TESTED, "a force at rest has the wrong sign, too"))
             self._leave_force("the sign is wrong")
 

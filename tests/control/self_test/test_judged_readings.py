@@ -52,16 +52,21 @@ REGULAR = Intervals(0.01, 0.012, 0)
 def test_a_cell_line_is_as_good_as_what_it_lost_and_its_longest_gap(
     intervals: Intervals, counts: WireCounts | None, verdict: SelfTestVerdict
 ) -> None:
-    found = judge_cell_line(intervals, counts, RIG)
+    found = judge_cell_line(intervals, counts, RIG, 1.0)
     assert (found.item, found.verdict) == (Item.CELL_LINE, verdict)
 
 
 def test_a_cell_line_is_told_in_readings_per_second_and_milliseconds() -> None:
-    text = judge_cell_line(Intervals(0.01, 0.03, 2), WireCounts(0, 300, 1), RIG).text
+    text = judge_cell_line(Intervals(0.01, 0.03, 2), WireCounts(0, 300, 1), RIG, 1.0).text
     assert text.startswith(
         "100 readings per second, 2 missing, 1 unreadable, longest gap 30 ms of 50 ms, allowed 2 % lost"
     )
-    assert judge_cell_line(Intervals(0.0, 0.0, 0), None, RIG).text == "no reading came"
+    bound_s = RIG.settings.supervision.sample_timeout_s
+    silent, short = (
+        judge_cell_line(Intervals(0.0, 0.0, 0), None, RIG, 1.0 * wait_s) for wait_s in (1.01 * bound_s, bound_s)
+    )
+    assert (silent.verdict, silent.text) == (FAILED, "no reading came")
+    assert short.verdict is NOT_TESTED, "whoever stops it before one is due learns nothing of the cell"
 
 
 def test_an_answer_that_was_never_timed_is_not_told_as_one_of_0_ms() -> None:

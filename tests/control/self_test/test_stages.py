@@ -108,6 +108,15 @@ def test_what_is_wrong_with_the_force_ends_it_with_its_item_and_nothing_is_claim
     assert verdicts[Item.LEAK] is NOT_TESTED and played.course[-1][0] < REST_S + RISE_S + 2.0 * SETTLING_S + 0.1
 
 
+@pytest.mark.parametrize(("at_rest_n", "pressed_n", "is_gone"), [(1.0, 0.0, True), (-1.0, -1.8, False)])
+def test_a_force_at_rest_that_goes_away_may_have_lost_its_workpiece(
+    at_rest_n: float, pressed_n: float, is_gone: bool
+) -> None:
+    found = Played(lambda volts: pressed_n if volts > 0.5 else at_rest_n).to_the_end().run.findings[Item.SIGN]
+    assert found.verdict is FAILED and "turn load_cell.sign" in found.text
+    assert ("what it pressed on at rest was taken away" in found.text) is is_gone
+
+
 def test_a_pressure_that_falls_while_the_force_holds_is_a_leak_and_one_before_the_hold_is_not() -> None:
     for leaks, verdict in ((True, FAILED), (False, PASSED)):
         played = Played()

@@ -98,7 +98,7 @@ def test_the_slowest_exchange_is_the_slowest_wherever_it_was() -> None:
     watch = LineWatch()
     for asked, wire_s in enumerate((0.01, 0.08, 0.01), start=1):
         watch.observe(LineStatus(wire_s=wire_s, output_counts=WireCounts(asked, asked, 0)))
-    assert "the slowest within 80 ms of 100 ms" in watch.findings(RIG)[0].text
+    assert "the slowest within 80 ms of 100 ms" in watch.findings(RIG, 1.0)[0].text
 
 
 @pytest.mark.parametrize("verdict", [PASSED, WARNED, FAILED])
