@@ -1,5 +1,10 @@
-"""The lock of a state directory: its file `lock`, held by the gateway that runs there, or by who changes what it would read."""
+"""The lock of a state directory: its file `lock`, held by the gateway that runs there, or by who changes what it would read.
 
+The directory itself is locked beside it, where its file system does that: a hand may delete the file, and the next gateway
+would lock another one.
+"""
+
+import errno
 import fcntl
 import os
 from collections.abc import Iterator
@@ -10,14 +15,20 @@ from typing import Final
 from gateway.plain_file import open_plain
 
 NAME: Final = "lock"
+_NO_LOCKS: Final = (errno.ENOLCK, errno.EBADF, errno.EINVAL, errno.ENOTSUP)  # network file systems, of a directory
 
 
 @contextmanager
 def hold_state_lock(directory: Path) -> Iterator[bool]:
     """Yield whether the lock is ours; while it is nobody else gets it. OSError where its file cannot be opened, or is none."""
-    descriptor = _open(directory / NAME)
+    with _closing(_open(directory / NAME)) as file, _closing(os.open(directory, os.O_RDONLY | os.O_DIRECTORY)) as whole:
+        yield _is_taken(file) and _is_taken(whole, _NO_LOCKS)
+
+
+@contextmanager
+def _closing(descriptor: int) -> Iterator[int]:
     try:
-        yield _is_taken(descriptor)
+        yield descriptor
     finally:
         os.close(descriptor)
 
@@ -32,9 +43,12 @@ def _open(path: Path) -> int:
         return open_plain(path)
 
 
-def _is_taken(descriptor: int) -> bool:
+def _is_taken(descriptor: int, excused: tuple[int, ...] = ()) -> bool:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
+    except OSError as error:
+        if error.errno not in excused:
+            raise
     return True

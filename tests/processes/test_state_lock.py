@@ -1,0 +1,52 @@
+"""A state directory has one user at a time, whatever a hand does to its files meanwhile."""
+
+import errno
+import fcntl
+from pathlib import Path
+
+import pytest
+
+from gateway.processes.state_lock import NAME, hold_state_lock
+
+
+def test_one_at_a_time_and_the_next_one_behind_it(tmp_path: Path) -> None:
+    with hold_state_lock(tmp_path) as first:
+        with hold_state_lock(tmp_path) as second:
+            assert (first, second) == (True, False)
+        with hold_state_lock(tmp_path) as third:
+            assert not third, "who has not got it gives nothing back"
+    with hold_state_lock(tmp_path) as fourth:
+        assert fourth
+
+
+@pytest.mark.parametrize("spoil", [Path.unlink, lambda path: path.rename(path.with_name("moved"))])
+def test_a_lock_file_that_is_deleted_or_moved_lets_nobody_else_in(tmp_path: Path, spoil: object) -> None:
+    with hold_state_lock(tmp_path) as first:
+        spoil(tmp_path / NAME)  # type: ignore[operator]
+        with hold_state_lock(tmp_path) as second:
+            assert (first, second) == (True, False)
+
+
+def test_a_file_system_that_locks_no_directories_locks_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flock, calls = fcntl.flock, []
+
+    def refuse_directory(descriptor: int, how: int) -> None:
+        calls.append(descriptor)
+        if len(calls) % 2 == 0:
+            raise OSError(errno.ENOLCK, "No locks available")
+        flock(descriptor, how)
+
+    monkeypatch.setattr(fcntl, "flock", refuse_directory)
+    with hold_state_lock(tmp_path) as first:
+        calls.clear()
+        with hold_state_lock(tmp_path) as second:
+            assert (first, second) == (True, False)
+    monkeypatch.setattr(fcntl, "flock", lambda descriptor, how: refuse_file())
+    with pytest.raises(OSError, match="No locks"), hold_state_lock(tmp_path):
+        pass
+
+
+def refuse_file() -> None:
+    raise OSError(errno.ENOLCK, "No locks available")
