@@ -10,12 +10,13 @@ from typing import Final
 
 from gateway import defaults
 from gateway.cli.errors import CliError
-from gateway.cli.force_hold.sequence import HoldRun, HoldWrite, StatusReading, status_reading_of
+from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, HoldWrite, StatusReading, status_reading_of
 from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
 from gateway.cli.master.refusal_text import explain_refusals
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.processes import exit_codes
+from gateway.registers.words import State
 
 _ACTIONS: Final = {
     "fault": "safe voltage, fault A310",
@@ -26,6 +27,7 @@ _BEATS_PER_LEASE: Final = 4.0
 DEFAULT_PERIOD_S: Final = defaults.LEASE_S / _BEATS_PER_LEASE  # where the rig's lease is unknown
 _SHORTEST_PERIOD_S: Final = 0.005
 _LOOK_S: Final = 0.1
+_OBEYED_S: Final = 0.3  # three times the usual bound on an output's silence
 _LOOKS_AFTER_A_LOSS_S: Final = 2.0  # without a lease, or one that we do not know
 
 
@@ -59,6 +61,7 @@ class HeartbeatThread(threading.Thread):
         self.failure: Exception | None = None
         self.stopping = threading.Event()
         self.dropping = threading.Event()
+        self._pause = threading.Event()  # nobody ends it
         self._client = client
         self._lease = lease
         self._period_s = lease.period_s if lease else DEFAULT_PERIOD_S
@@ -79,6 +82,8 @@ class HeartbeatThread(threading.Thread):
                 if self.hold.end is None:
                     self._wait(self._period_s - (self._clock() - began_s))
             self._look()
+            if self.hold.is_pressing and self.hold.end is HoldEnd.STOPPED:
+                self._watch_output()
         except CliError as error:
             self.failure = error
         except Exception as error:  # a defect, or a gateway that says what this version does not know
@@ -86,6 +91,17 @@ class HeartbeatThread(threading.Thread):
             if self.hold.is_pressing:
                 with suppress(Exception):  # the first one is told
                     self._send(self.hold.at_once())
+
+    def _watch_output(self) -> None:
+        """An output that does not obey the safe voltage is a fault behind the disable, which nobody else may look at."""
+        end_s = self._clock() + _OBEYED_S
+        with suppress(CliError):  # a gateway that ends meanwhile has been told to let go
+            while self._clock() < end_s:
+                self._pause.wait(_SHORTEST_PERIOD_S)
+                self._look()
+                if self.status and self.status.state is State.FAULT:
+                    self.hold.end = HoldEnd.FAULT
+                    return
 
     def _wait(self, seconds: float) -> None:
         """The order to drop everything is not waited for."""

@@ -11,6 +11,7 @@ from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, HoldWrite, StatusR
 from gateway.cli.master.client import GatewayClient
 from gateway.cli.master.wires import TcpWire
 from gateway.cli.verbs.hold import _report_end
+from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.modbus.peer import NOBODY
 from gateway.processes import exit_codes
@@ -91,10 +92,51 @@ def test_a_status_that_nobody_here_understands_ends_at_the_safe_voltage_and_is_t
 
 
 def beating(client: LossyClient, length_s: float | None, step_s: float = 0.001) -> HeartbeatThread:
-    times = iter(range(100_000))
-    return HeartbeatThread(
-        client, HoldRun(12.0, heartbeat=0, resets=False), KnownLease(length_s), lambda: step_s * next(times)
-    )
+    times, run = iter(range(100_000)), HoldRun(12.0, heartbeat=0, resets=False)
+    beat = HeartbeatThread(client, run, KnownLease(length_s), lambda: step_s * next(times))
+    beat._pause.set()
+    return beat
+
+
+@pytest.mark.parametrize(("looks", "is_seen"), [(1, True), (60, True), (400, False)])
+def test_an_output_that_does_not_obey_the_last_safe_voltage_ends_it_as_a_fault(
+    looks: int, is_seen: bool, register_map: RegisterMap
+) -> None:
+    """It was told as `0 N, disabled`, with exit code 0, while the tool went on pressing."""
+    bank = PlainBank(register_map)
+    bank.set("state", State.HOLDING)
+    client = LossyClient(bank, 0)
+    beat = beating(client, None)
+    client.on_enabled = beat.dropping.set
+    looked, look = [0], beat._look
+
+    def look_again() -> None:
+        looked[0] += beat.hold.end is not None
+        if looked[0] == looks:
+            bank.set("state", State.FAULT)
+            bank.set("fault_code", FaultCode.OUTPUT_SILENT)
+        look()
+
+    beat._look = look_again  # type: ignore[method-assign]
+    beat.run()
+    assert beat.hold.end is (HoldEnd.FAULT if is_seen else HoldEnd.STOPPED) and beat.failure is None
+
+
+def test_a_gateway_that_ends_behind_a_hold_is_none_that_was_lost(register_map: RegisterMap) -> None:
+    bank = PlainBank(register_map)
+    bank.set("state", State.HOLDING)
+    client = LossyClient(bank, 0)
+    beat = beating(client, None)
+    client.on_enabled = beat.dropping.set
+    watch = beat._watch_output
+
+    def watch_nobody() -> None:
+        client.deaf = 10
+        watch()
+
+    beat._watch_output = watch_nobody  # type: ignore[method-assign]
+    beat.run()
+    assert beat.failure is None and beat.hold.end is HoldEnd.STOPPED
 
 
 def test_an_enable_is_looked_at_before_anything_is_made_of_it(register_map: RegisterMap) -> None:
