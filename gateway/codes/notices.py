@@ -130,10 +130,11 @@ NOTICES: Final = (
     ),
     Explanation(
         "W304",
-        "force at the safe voltage",
-        "The output is at the safe voltage and the load cell still measures a force.",
-        "The tool is stuck in contact, a valve is open, or the zero has moved.",
-        "Free the tool; if nothing touches it, tare.",
+        "force with the output disabled",
+        "The output is disabled, told the safe voltage, and the load cell still measures a force.",
+        "The tool is stuck in contact, a valve is open, or the zero has moved; or the output does not obey (then ready is 0, "
+        "and W214 says why).",
+        "Free the tool; if nothing touches it, tare. Where the output does not obey, see to its plug first.",
     ),
     Explanation(
         "W314",

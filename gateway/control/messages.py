@@ -60,10 +60,10 @@ def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float) -
 
 
 def stuck_sentence(measured_n: float, limit_n: float) -> str:
-    """Return W304: a force at the safe voltage."""
+    """Return W304: a force where none is commanded. Whether the safe voltage stands is not said: the port may be away."""
     return (
-        f"W304 {measured_n:.1f} N measured at the safe voltage, allowed +-{limit_n:.1f} N: stuck in contact, valve open or "
-        "zero moved; free the tool or tare"
+        f"W304 {measured_n:.1f} N measured with the output disabled, allowed +-{limit_n:.1f} N: stuck in contact, valve "
+        "open or zero moved; free the tool or tare"
     )
 
 
