@@ -224,7 +224,7 @@ class SimulatedPort:
             self._drop_descriptor()
             self._buffer.clear()
             self._reopening = self._loop.call_later(self._backoff_s, self._reopen)
-            self._events.on_lost(PortError("A317", f"A317 {self.path} is disconnected"))
+            self._events.on_lost(PortError("A317", f"{self.path} is disconnected"))
 
     def _reopen(self) -> None:
         if not self._is_wanted:
