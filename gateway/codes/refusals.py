@@ -162,8 +162,8 @@ class RefusalReason(IntEnum):
             "W213",
             "not ready",
             "Enable was asked for before everything was.",
-            "The gateway has just started or ends, its loop has just stood still, the cell is overloaded, a force stays at the "
-            "safe voltage, or a stop is under way.",
+            "The gateway has just started or ends, its loop has just stood still, the cell reads over_force_n, a force stays "
+            "at the safe voltage, or a stop is under way.",
             "Wait for bit 1 (ready) of status_word.",
         ),
     )

@@ -151,12 +151,15 @@ def test_equal_readings_before_an_enable_are_no_frozen_cell_behind_it() -> None:
     assert bench.run(0.1).fault is FaultCode.NONE
 
 
-def test_an_overload_before_an_enable_does_not_count_behind_it() -> None:
+def test_an_overload_before_an_enable_keeps_it_back_and_does_not_count_behind_it() -> None:
     bench = Bench()
     bench.run(0.5)
     bench.alter_sample = lambda sample: replace(sample, force_n=70.0)
     bench.run(0.025)
-    bench.alter_sample = lambda sample: replace(sample, force_n=0.0, time_s=bench.now_s)
+    bench.enable(0.0)
+    assert bench.refused is not None and bench.last.state is State.OFF
+    bench.alter_sample = lambda sample: sample
+    bench.run(0.01)
     bench.enable(0.0)
     assert bench.refused is None
     bench.alter_sample = lambda sample: replace(sample, force_n=70.0)

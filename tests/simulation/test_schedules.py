@@ -133,6 +133,28 @@ KEPT: list[tuple[int, list[Event]]] = [
         ],
     ),
     (38582, [Event(9.7026, "worker", "take", (3.53,)), Event(15.05, "rival", "self_test")]),
+    (
+        12132,
+        [
+            Event(6.533, "worker", "calibrate"),
+            Event(10.7101, "rival", "reset"),
+            Event(10.9922, "machine", "kill_guardian", (0.2925, 877828.9304839643)),
+        ],
+    ),
+    (
+        29311,
+        [
+            Event(10.5327, "world", "sim", data=b'{"do": "sim", "set": {"cell.scale": 3.81}}'),
+            Event(11.2408, "rival", "hold", (10.42,), way="floats"),
+            Event(11.7767, "machine", "kill", (0.0585, 451923.49456660775)),
+            Event(12.3815, "load_cell", "unit", data=b"lb"),
+            Event(13.5627, "rival", "hold", (27.36,), way="singles"),
+            Event(14.4458, "world", "sim", data=b'{"do": "sim", "set": {"cell.frozen": true}}'),
+            Event(14.8747, "load_cell", "unit", data=b"kg"),
+            Event(15.2692, "machine", "kill_guardian", (0.2082, -714766.5213258836)),
+            Event(16.6975, "worker", "hold", (50.83,)),
+        ],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

@@ -160,7 +160,7 @@ class FaultDetector:
             return RefusalReason.VALVE_UNKNOWN
         if self._stall_words(now_s, line):
             return RefusalReason.NOT_READY
-        if line.acknowledged_v is None or not reading.is_usable or self.is_stuck:
+        if line.acknowledged_v is None or not reading.is_usable or self.is_stuck or self._over:
             return RefusalReason.NOT_READY
         return RefusalReason.NONE
 

@@ -45,6 +45,19 @@ def test_the_largest_force_itself_is_over_it_and_what_was_counted_before_an_enab
     assert fault(one) is FaultCode.NONE
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_nothing_begins_on_one_reading_of_the_largest_force(sign: float) -> None:
+    """Three in a row are a fault under force; one is enough not to begin to press."""
+    one, most_n = detector(), settings().limits.over_force_n
+    for contact_n, reason in (
+        (most_n - 0.01, RefusalReason.NONE),
+        (most_n, RefusalReason.NOT_READY),
+        (most_n - 0.01, RefusalReason.NONE),
+    ):
+        observe(one, sign * contact_n, 1)
+        assert one.enable_block(NOW_S, WELL, READY) is reason
+
+
 def test_a_force_is_stuck_behind_one_second_without_a_break() -> None:
     one = detector()
     for contact_n, readings, is_stuck in ((16.0, 15, False), (15.0, 1, False), (16.0, 15, False), (-16.0, 1, True)):

@@ -192,8 +192,9 @@ class Observer:
 
     def note_disabled(self, now_s: float) -> None:
         """Nobody may press from now on, nor go down slowly."""
+        is_going_down = self.is_run or now_s - self.run_ended_s < DOWN_S
         self.is_run, self.run_ended_s = False, now_s - DOWN_S
-        if self.disabled_s is None:
+        if self.disabled_s is None or is_going_down:
             self.disabled_s = now_s
 
     def look(self, now_s: float) -> None:
