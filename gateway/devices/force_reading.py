@@ -69,7 +69,7 @@ class ForceReading:
     unit: ForceUnit | None = None  # absent: the frame says it, or the rig must
     newton_per_count: Annotated[float, Gt(0)] | None = None  # of raw counts: one count in newtons, usually the rig's
     zero_count: float = 0.0  # of raw counts: reading without a force
-    end_count: Annotated[float, Gt(0)] | None = None  # of raw counts: where the converter ends; counts as an overload
+    end_count: Annotated[float, Gt(0)] | None = None  # where the converter ends, as it is sent; counts as an overload
     quality: Mapping[str, Quality] = field(
         default_factory=dict
     )  # word of {status:...} -> how far to believe the reading
@@ -139,6 +139,13 @@ class ForceReading:
         return number.decimals if isinstance(number, Decimals | Scientific | Plain) else 0
 
     @property
+    def end(self) -> float | None:
+        """End of the converter, in the device's unit: a count of registers is sent without its point."""
+        if self.end_count is None:
+            return None
+        return self.end_count / 10.0**self.modbus.decimals if self.modbus else self.end_count
+
+    @property
     def step(self) -> float:
         """One count of the display, in the device's unit."""
         return float(10.0**-self.decimals)
@@ -146,8 +153,8 @@ class ForceReading:
     @property
     def largest_shown(self) -> float:
         """The largest number that the display has digits for, with room for a sign, in the device's unit."""
-        if self.end_count:
-            return self.end_count
+        if self.end is not None:
+            return self.end
         if self.modbus:
             return self.modbus.largest_shown
         number = self.template.field(FORCE)
@@ -196,6 +203,10 @@ def _check_reading(template: Template, reading: ForceReading) -> None:
     _check_units(template, reading)
     _check_signs(template, number)
     status = template.field(STATUS)
+    if status and not isinstance(status, Choice):
+        raise TemplateError(
+            f"{quote(template.text)}: {{{STATUS}:...}} is words, each with its meaning in quality: ST|OL"
+        )
     words = set(status.words if isinstance(status, Choice) else ())
     if odd := sorted(words ^ set(reading.quality)):
         told = ", ".join(f"{word!r} is {'not named' if word in words else 'no word of it'}" for word in odd)

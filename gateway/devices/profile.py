@@ -233,8 +233,7 @@ def _check_output(profile: DeviceProfile) -> None:
     check_direction(profile.read_voltage.modbus if profile.read_voltage else None, reads=True)
     if profile.stream or profile.read_force:
         raise ValueError("stream and read_force belong to a load cell")
-    if profile.number_in(profile.set_voltage.ask) is None:
-        raise TemplateError(f"{quote(profile.set_voltage.ask)} carries no number")
+    _check_setting(profile, profile.set_voltage.ask)
     if profile.set_voltage.answer:
         profile.number_in(profile.set_voltage.answer)
     elif profile.read_voltage is None:
@@ -244,9 +243,19 @@ def _check_output(profile: DeviceProfile) -> None:
         )
     for exchange in (profile.read_voltage, profile.read_pressure):
         if exchange and profile.number_in(exchange.ask) is not None:
-            raise TemplateError(f"{quote(exchange.ask)} asks for a number and must not carry one")
+            raise TemplateError(f"{quote(exchange.ask)} asks for a number and must not carry one but under `constants`")
         if exchange and (not exchange.answer or profile.number_in(exchange.answer) is None):
             raise TemplateError(f"{quote(exchange.answer)} carries no number")
+
+
+def _check_setting(profile: DeviceProfile, ask: str) -> None:
+    """A setting carries one number; whatever else changes in it is known beforehand."""
+    number = profile.number_in(ask)
+    if number is None:
+        raise TemplateError(f"{quote(ask)} carries no number")
+    for one in compile_template(ask).fields:
+        if one != number and one.name not in profile.constants and not isinstance(one, Choice):
+            raise TemplateError(f"{quote(ask)}: {{{one.name}:...}} would go out as nothing: say it under `constants`")
 
 
 def _check_valve(profile: DeviceProfile) -> None:

@@ -74,7 +74,7 @@ class TemplateCellHost:
         if unit and self._reading.template.field(UNIT):
             raise ValueError(f"{profile.name} says its unit in each frame: the rig's unit ({unit}) is one too many")
         self._newton_per_unit = newton_per_unit(profile, unit)
-        self._sign = sign
+        self._sign, self._end = sign, self._reading.end
         self._lines = self._grammar.answers()
         self._known: dict[bytes, _KnownReading] = {}  # a force at rest says the same few sentences
         self._beyond_range = {
@@ -146,8 +146,7 @@ class TemplateCellHost:
         return self._sign * (raw - self._reading.zero_count) * per_unit
 
     def _quality(self, raw: float, values: dict[str, Value]) -> Quality:
-        end = self._reading.end_count
-        if isnan(raw) or (end is not None and abs(raw) >= end):
+        if isnan(raw) or (self._end is not None and abs(raw) >= self._end):
             return Quality.OVERLOAD
         return self._reading.quality[str(values[STATUS])] if STATUS in values else Quality.OK
 
