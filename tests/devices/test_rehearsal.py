@@ -110,6 +110,10 @@ def test_an_output_that_could_not_work_is_told(changes: dict[str, Any], told: st
         ({"stream": {"frame": "{force:+04X}", "newton_per_count": 1, "rate_hz": 10, "end_count": 32767}}, None),
         ({"stream": {"frame": "{force:+04X}", "newton_per_count": 1, "rate_hz": 10, "end_count": 99999}},
          "stream.end_count: 99999 does not fit into '{force:+04X}'"),
+        ({"stream__frame": "{status:ST|US|OL},{force:08.2f}", "stream__negative": ["UL"]}, "negative names words of {status"),
+        ({"stream__frame": "{status:ST|US|OL},{force:08.2f}", "stream__negative": ["US"]}, None),
+        ({"stream__frame": "{status:ST|US|OL},{force:+08.2f}", "stream__negative": ["US"]}, "the force stands here twice"),
+        ({"stream": {"frame": "{force:+04X}", "newton_per_count": 1, "rate_hz": 10}}, None),
         ({"stream": None, "read_force": {"ask": "W?", "frame": "{force:+08.2f}"}}, None),
     ],
 )  # fmt: skip
