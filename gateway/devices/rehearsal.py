@@ -6,14 +6,14 @@ refusal, a display without room for a minus sign.
 """
 
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
 from math import inf
 from typing import Final
 
 from gateway.devices.codecs import cell_device, cell_host, output_device, output_host
+from gateway.devices.device_checks.sentences import Found, misspelt
 from gateway.devices.fields import Choice, HexNumber, Text, ValueRefused
 from gateway.devices.force_reading import FORCE, STATUS, UNIT, ForceReading
-from gateway.devices.framing import LONGEST_LINE_BYTES, no_terminator
+from gateway.devices.framing import LONGEST_LINE_BYTES
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import (
     Accepted,
@@ -37,50 +37,18 @@ from gateway.devices.template import quote
 from gateway.devices.valve import ValveDevice, ValveHost
 from gateway.devices.valve_profile import ValveDirection
 
-Found = Iterator[tuple[tuple[str | int, ...], str]]
-"""(place in the profile, sentence)."""
-
 _NOW_S: Final = 0.0
-_SAID_BY_US: Final = ("ask", "before", "start", "feed")
 _NO_ROUND_PART: Final = 0.7361  # of the range: an answer with fewer digits than the setting shows it here
 _LONGEST_SHOWN: Final = 60  # of a line, in a sentence
 
 
 def rehearse(profile: DeviceProfile) -> Found:
     """Return what keeps the two ends of this profile from understanding each other; nothing when they do."""
-    if wrong := [*_terminators(profile), *_cut_sentences(profile)]:
+    if wrong := [*misspelt(profile)]:
         yield from wrong
         return
     talk = {DeviceRole.OUTPUT: _output, DeviceRole.LOAD_CELL: _cell, DeviceRole.VALVE: _valve}
     yield from talk[profile.role](profile)
-
-
-def _terminators(profile: DeviceProfile) -> Found:
-    for name in ("terminator", "question_terminator"):
-        if why := no_terminator(getattr(profile, name)):
-            yield (name,), why
-
-
-def _cut_sentences(profile: DeviceProfile) -> Found:
-    """Sentences with the end of a line in their middle."""
-    groups = ((one.name, getattr(profile, one.name)) for one in fields(profile))
-    for name, group in () if profile.is_modbus or profile.is_raw else groups:
-        for place, text in _sentences(group, (name,)) if is_dataclass(group) else ():
-            ours = place[-1] in _SAID_BY_US
-            terminator = (profile.question_terminator if ours else "") or profile.terminator
-            if terminator in text:
-                yield place, f"{quote(text)} has the terminator in its middle: the line would end there"
-
-
-def _sentences(group: object, place: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    if isinstance(group, str):
-        yield place, group
-    elif isinstance(group, tuple):
-        for index, one in enumerate(group):
-            yield from _sentences(one, (*place, index))
-    elif is_dataclass(group):
-        for one in fields(group):
-            yield from _sentences(getattr(group, one.name), (*place, one.name))
 
 
 def _valve(profile: DeviceProfile) -> Found:
