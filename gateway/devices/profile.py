@@ -241,6 +241,7 @@ def _check_output(profile: DeviceProfile) -> None:
             "set_voltage has no answer and there is no read_voltage: nothing would tell a device that is silent, refuses or "
             "alters a setting; say its acknowledgement in answer, or how to read the setting back"
         )
+    _check_echo(profile, profile.set_voltage)
     for exchange in (profile.read_voltage, profile.read_pressure):
         if exchange and profile.number_in(exchange.ask) is not None:
             raise TemplateError(f"{quote(exchange.ask)} asks for a number and must not carry one but under `constants`")
@@ -256,6 +257,16 @@ def _check_setting(profile: DeviceProfile, ask: str) -> None:
     for one in compile_template(ask).fields:
         if one != number and one.name not in profile.constants and not isinstance(one, Choice):
             raise TemplateError(f"{quote(ask)}: {{{one.name}:...}} would go out as nothing: say it under `constants`")
+
+
+def _check_echo(profile: DeviceProfile, setting: VoltageExchange) -> None:
+    """An adapter that hears itself brings our own words back, whether or not there is a device."""
+    is_echo = setting.ask == setting.answer and profile.question_terminator_bytes == profile.terminator_bytes
+    if is_echo and not (profile.read_voltage or profile.read_pressure):
+        raise ValueError(
+            "set_voltage is answered by its own words and nothing is read: an adapter that echoes would answer for a device "
+            "that is off; say read_voltage or read_pressure"
+        )
 
 
 def _check_valve(profile: DeviceProfile) -> None:
