@@ -23,14 +23,14 @@ def _sum_complement(body: bytes) -> bytes:
 
 
 def _xor(body: bytes) -> bytes:
-    """Exclusive or of all characters after a star, as NMEA 0183 does."""
-    return b"*%02X" % reduce(xor, body, 0)
+    """Exclusive or of all characters behind a leading `$`, after a star, as NMEA 0183 does."""
+    return b"*%02X" % reduce(xor, body.removeprefix(b"$"), 0)
 
 
 def _xor_hex(body: bytes) -> bytes:
     r"""Exclusive or of what stands between the signs that frame a sentence, as two digits: a leading STX (Yaohua XK3190-A23p,
-    page 24) or `&`, and a `\` behind (Laumas TLB and TLU, continuous transmission), are left out."""
-    inner = body[1:] if body[:1] in (b"\x02", b"&") else body
+    page 24), `&` or `$`, and a `\` behind (Laumas TLB and TLU: continuous transmission, ASCII questions), are left out."""
+    inner = body[1:] if body[:1] in (b"\x02", b"&", b"$") else body
     return b"%02X" % reduce(xor, inner.removesuffix(b"\\"), 0)
 
 

@@ -69,10 +69,11 @@ class ForceReading:
     unit: ForceUnit | None = None  # absent: the frame says it, or the rig must
     newton_per_count: Annotated[float, Gt(0)] | None = None  # of raw counts: one count in newtons, usually the rig's
     zero_count: float = 0.0  # of raw counts: reading without a force
-    end_count: Annotated[float, Gt(0)] | None = None  # of raw counts: where the converter ends; counts as an overload
+    end_count: Annotated[float, Gt(0)] | None = None  # where the converter ends, as it is sent; counts as an overload
     quality: Mapping[str, Quality] = field(
         default_factory=dict
     )  # word of {status:...} -> how far to believe the reading
+    negative: tuple[str, ...] = ()  # words of {status:...} that are a minus besides: of a character whose bits are both
     blank_is_overload: bool = False  # blanks instead of digits mean beyond the range
     overload: tuple[str, ...] = ()  # sentences of their own that mean beyond the range: ["S +"]
     underload: tuple[str, ...] = ()  # beyond its other end: ["S -"]; without it the device says overload there, too
@@ -139,6 +140,13 @@ class ForceReading:
         return number.decimals if isinstance(number, Decimals | Scientific | Plain) else 0
 
     @property
+    def end(self) -> float | None:
+        """End of the converter, in the device's unit: a count of registers is sent without its point."""
+        if self.end_count is None:
+            return None
+        return self.end_count / 10.0**self.modbus.decimals if self.modbus else self.end_count
+
+    @property
     def step(self) -> float:
         """One count of the display, in the device's unit."""
         return float(10.0**-self.decimals)
@@ -146,23 +154,29 @@ class ForceReading:
     @property
     def largest_shown(self) -> float:
         """The largest number that the display has digits for, with room for a sign, in the device's unit."""
-        if self.end_count:
-            return self.end_count
+        if self.end is not None:
+            return self.end
         if self.modbus:
             return self.modbus.largest_shown
         number = self.template.field(FORCE)
         if isinstance(number, HexNumber):
-            return float(16**number.width - 1)
+            return float(16**number.width // (2 if number.is_signed else 1) - 1)
         width = number.width if isinstance(number, Decimals | WholeNumber) else 0
         if not width:
             return 999999.0
-        digits = width - (self.template.field(SIGN) is None) - (self.decimals + 1 if self.decimals else 0)
+        digits = width - (not self.has_sign_apart) - (self.decimals + 1 if self.decimals else 0)
         return max(0.0, float(10.0**digits) - self.step)
 
-    def word(self, quality: Quality) -> str | None:
+    @property
+    def has_sign_apart(self) -> bool:
+        """Decide whether the minus stands in a word of its own, or in that of the status."""
+        return bool(self.negative) or self.template.field(SIGN) is not None
+
+    def word(self, quality: Quality, *, is_negative: bool = False) -> str | None:
         """Return the status word that means this, None where the frame has none; a device may know unstable readings only."""
         qualities = (quality, Quality.UNSTABLE) if quality is Quality.OK else (quality,)
-        return next((word for one in qualities for word, meaning in self.quality.items() if meaning == one), None)
+        words = [word for one in qualities for word, meaning in self.quality.items() if meaning == one]
+        return next((word for word in words if (word in self.negative) is is_negative), next(iter(words), None))
 
     def sign_word(self, number: float) -> str | None:
         """Return the word that says which sign a number has, None where its digits do."""
@@ -194,8 +208,12 @@ def _check_reading(template: Template, reading: ForceReading) -> None:
     if reading.blank_is_overload and (number.is_open or not isinstance(number, Decimals)):
         raise TemplateError(f"{quote(template.text)}: blank_is_overload needs decimals of fixed width")
     _check_units(template, reading)
-    _check_signs(template, number)
+    _check_signs(template, number, reading)
     status = template.field(STATUS)
+    if status and not isinstance(status, Choice):
+        raise TemplateError(
+            f"{quote(template.text)}: {{{STATUS}:...}} is words, each with its meaning in quality: ST|OL"
+        )
     words = set(status.words if isinstance(status, Choice) else ())
     if odd := sorted(words ^ set(reading.quality)):
         told = ", ".join(f"{word!r} is {'not named' if word in words else 'no word of it'}" for word in odd)
@@ -233,14 +251,17 @@ def _check_spelt_unit(template: Template, reading: ForceReading) -> None:
         raise TemplateError(f"{quote(template.text)} says {word[1]}, which is not unit: {reading.unit}; {cure}")
 
 
-def _check_signs(template: Template, number: Field) -> None:
+def _check_signs(template: Template, number: Field, reading: ForceReading) -> None:
     """A minus apart from its digits is read where the field is called `sign`, and nowhere else."""
     sign = template.field(SIGN)
     if sign and (not isinstance(sign, Choice) or [word.strip() for word in sign.words].count(MINUS) != 1):
         raise TemplateError(
             f"{quote(template.text)}: {{{SIGN}:...}} is the sign of the force: one of its words is a minus"
         )
-    if sign and isinstance(number, Decimals | WholeNumber | Scientific | Plain) and number.sign:
+    if odd := sorted(set(reading.negative) - set(reading.quality)):
+        raise TemplateError(f"{quote(template.text)}: negative names words of {{{STATUS}:...}}, and {odd[0]!r} is none")
+    says_itself = isinstance(number, Decimals | WholeNumber | Scientific | Plain) and number.sign
+    if (sign and reading.negative) or (reading.has_sign_apart and says_itself):
         raise TemplateError(f"{quote(template.text)}: the sign of the force stands here twice")
     for one in template.fields:
         signs = {word.strip() for word in one.words} if isinstance(one, Choice) else set()

@@ -233,8 +233,7 @@ def _check_output(profile: DeviceProfile) -> None:
     check_direction(profile.read_voltage.modbus if profile.read_voltage else None, reads=True)
     if profile.stream or profile.read_force:
         raise ValueError("stream and read_force belong to a load cell")
-    if profile.number_in(profile.set_voltage.ask) is None:
-        raise TemplateError(f"{quote(profile.set_voltage.ask)} carries no number")
+    _check_setting(profile, profile.set_voltage.ask)
     if profile.set_voltage.answer:
         profile.number_in(profile.set_voltage.answer)
     elif profile.read_voltage is None:
@@ -242,11 +241,32 @@ def _check_output(profile: DeviceProfile) -> None:
             "set_voltage has no answer and there is no read_voltage: nothing would tell a device that is silent, refuses or "
             "alters a setting; say its acknowledgement in answer, or how to read the setting back"
         )
+    _check_echo(profile, profile.set_voltage)
     for exchange in (profile.read_voltage, profile.read_pressure):
         if exchange and profile.number_in(exchange.ask) is not None:
-            raise TemplateError(f"{quote(exchange.ask)} asks for a number and must not carry one")
+            raise TemplateError(f"{quote(exchange.ask)} asks for a number and must not carry one but under `constants`")
         if exchange and (not exchange.answer or profile.number_in(exchange.answer) is None):
             raise TemplateError(f"{quote(exchange.answer)} carries no number")
+
+
+def _check_setting(profile: DeviceProfile, ask: str) -> None:
+    """A setting carries one number; whatever else changes in it is known beforehand."""
+    number = profile.number_in(ask)
+    if number is None:
+        raise TemplateError(f"{quote(ask)} carries no number")
+    for one in compile_template(ask).fields:
+        if one != number and one.name not in profile.constants and not isinstance(one, Choice):
+            raise TemplateError(f"{quote(ask)}: {{{one.name}:...}} would go out as nothing: say it under `constants`")
+
+
+def _check_echo(profile: DeviceProfile, setting: VoltageExchange) -> None:
+    """An adapter that hears itself brings our own words back, whether or not there is a device."""
+    is_echo = setting.ask == setting.answer and profile.question_terminator_bytes == profile.terminator_bytes
+    if is_echo and not (profile.read_voltage or profile.read_pressure):
+        raise ValueError(
+            "set_voltage is answered by its own words and nothing is read: an adapter that echoes would answer for a device "
+            "that is off; say read_voltage or read_pressure"
+        )
 
 
 def _check_valve(profile: DeviceProfile) -> None:

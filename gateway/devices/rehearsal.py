@@ -6,14 +6,14 @@ refusal, a display without room for a minus sign.
 """
 
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
 from math import inf
 from typing import Final
 
 from gateway.devices.codecs import cell_device, cell_host, output_device, output_host
+from gateway.devices.device_checks.sentences import Found, misspelt
 from gateway.devices.fields import Choice, HexNumber, Text, ValueRefused
-from gateway.devices.force_reading import STATUS, UNIT
-from gateway.devices.framing import LONGEST_LINE_BYTES, no_terminator
+from gateway.devices.force_reading import FORCE, STATUS, UNIT, ForceReading
+from gateway.devices.framing import LONGEST_LINE_BYTES
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import (
     Accepted,
@@ -32,55 +32,23 @@ from gateway.devices.messages import (
     SetVoltage,
 )
 from gateway.devices.profile import DeviceProfile, DeviceRole
-from gateway.devices.roles import CellHost
+from gateway.devices.roles import CellDevice, CellHost
 from gateway.devices.template import quote
 from gateway.devices.valve import ValveDevice, ValveHost
 from gateway.devices.valve_profile import ValveDirection
 
-Found = Iterator[tuple[tuple[str | int, ...], str]]
-"""(place in the profile, sentence)."""
-
 _NOW_S: Final = 0.0
-_SAID_BY_US: Final = ("ask", "before", "start", "feed")
 _NO_ROUND_PART: Final = 0.7361  # of the range: an answer with fewer digits than the setting shows it here
 _LONGEST_SHOWN: Final = 60  # of a line, in a sentence
 
 
 def rehearse(profile: DeviceProfile) -> Found:
     """Return what keeps the two ends of this profile from understanding each other; nothing when they do."""
-    if wrong := [*_terminators(profile), *_cut_sentences(profile)]:
+    if wrong := [*misspelt(profile)]:
         yield from wrong
         return
     talk = {DeviceRole.OUTPUT: _output, DeviceRole.LOAD_CELL: _cell, DeviceRole.VALVE: _valve}
     yield from talk[profile.role](profile)
-
-
-def _terminators(profile: DeviceProfile) -> Found:
-    for name in ("terminator", "question_terminator"):
-        if why := no_terminator(getattr(profile, name)):
-            yield (name,), why
-
-
-def _cut_sentences(profile: DeviceProfile) -> Found:
-    """Sentences with the end of a line in their middle."""
-    groups = ((one.name, getattr(profile, one.name)) for one in fields(profile))
-    for name, group in () if profile.is_modbus or profile.is_raw else groups:
-        for place, text in _sentences(group, (name,)) if is_dataclass(group) else ():
-            ours = place[-1] in _SAID_BY_US
-            terminator = (profile.question_terminator if ours else "") or profile.terminator
-            if terminator in text:
-                yield place, f"{quote(text)} has the terminator in its middle: the line would end there"
-
-
-def _sentences(group: object, place: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    if isinstance(group, str):
-        yield place, group
-    elif isinstance(group, tuple):
-        for index, one in enumerate(group):
-            yield from _sentences(one, (*place, index))
-    elif is_dataclass(group):
-        for one in fields(group):
-            yield from _sentences(getattr(group, one.name), (*place, one.name))
 
 
 def _valve(profile: DeviceProfile) -> Found:
@@ -89,9 +57,15 @@ def _valve(profile: DeviceProfile) -> Found:
     for direction in ValveDirection:
         for place, question in (("set_valve", direction), ("read_valve", None)):
             asked = [question] if question is None or settings.of(question).answer else [question, None]
-            if device.receive(host.request(question)) != asked:
+            try:
+                is_known = device.receive(host.request(question)) == asked
+                is_understood = host.receive(b"".join(device.reply(one, direction) for one in asked)) == [direction]
+            except ValueRefused as error:
+                yield (place,), str(error)
+                return
+            if not is_known:
                 yield (place,), f"{direction}: the device's end takes our question for another"
-            elif host.receive(b"".join(device.reply(one, direction) for one in asked)) != [direction]:
+            elif not is_understood:
                 yield (place,), f"{direction}: our end does not understand the answer"
 
 
@@ -187,26 +161,48 @@ def _cell(profile: DeviceProfile) -> Found:
         if complaints := list(_beyond_range(profile, unit, place)):
             yield from complaints
             return
-        for counts in (0, 1, -1):
-            force_n = counts * host.resolution_n
-            frame = device.frame(force_n)
-            samples = host.receive(frame, _NOW_S)
-            if [type(one) for one in samples] != [ForceSample]:
-                names = " and ".join(map(_name, samples)) or "nothing"
-                yield place, f"{force_n:.3g} N, shown as {_line(frame)}, is read as {names}{_too_long(frame)}"
-                return
-            sample = samples[0]
-            assert isinstance(sample, ForceSample)
-            if sample.quality is Quality.OVERLOAD or abs(sample.force_n - force_n) > 0.6 * host.resolution_n:
-                sign = (
-                    ": there is no room for a minus sign, and noise needs it"
-                    if counts < 0
-                    else ": it needs more digits"
-                )
-                yield place, f"{force_n:.3g} N cannot be shown by {quote(reading.frame)}{sign}"
-                return
+        if complaint := next(filter(None, (_shown(host, device, reading, counts) for counts in (0, 1, -1))), ""):
+            yield place, complaint
+        elif reading.end is not None and not _tells_its_end(host, device):
+            yield (*place, "end_count"), f"{reading.end_count:g} does not fit into {_shown_by(reading)}"
     except (ValueRefused, UnicodeEncodeError) as error:
         yield place, str(error)
+
+
+def _shown(host: CellHost, device: CellDevice, reading: ForceReading, counts: int) -> str:
+    """Return why so many counts are not read as they are shown, or nothing."""
+    force_n = counts * host.resolution_n
+    frame = device.frame(force_n)
+    samples = host.receive(frame, _NOW_S)
+    if len(samples) != 1 or not isinstance(sample := samples[0], ForceSample):
+        names = " and ".join(map(_name, samples)) or "nothing"
+        return f"{force_n:.3g} N, shown as {_line(frame)}, is read as {names}{_too_long(frame)}"
+    if sample.quality is Quality.OVERLOAD or abs(sample.force_n - force_n) > 0.6 * host.resolution_n:
+        return f"{force_n:.3g} N cannot be shown by {_shown_by(reading)}: {_why_not(reading, counts)}"
+    return ""
+
+
+def _shown_by(reading: ForceReading) -> str:
+    return f"a weight of type {reading.modbus.type}" if reading.modbus else quote(reading.frame)
+
+
+def _why_not(reading: ForceReading, counts: int) -> str:
+    if counts >= 0:
+        return "it needs more digits"
+    cure = ""
+    if reading.modbus:
+        cure = f": say {reading.modbus.type.removeprefix('u')}, or which bit is the sign in `negative`"
+    elif isinstance(number := reading.template.field(FORCE), HexNumber):
+        cure = f": {{force:+0{number.width}{number.letter}}} is the two's complement"
+    return f"there is no room for a minus sign, and noise needs it{cure}"
+
+
+def _tells_its_end(host: CellHost, device: CellDevice) -> bool:
+    try:
+        samples = host.receive(device.frame(inf), _NOW_S)
+    except ValueRefused:
+        return False
+    return [isinstance(one, ForceSample) and one.quality is Quality.OVERLOAD for one in samples] == [True]
 
 
 def _read_over(profile: DeviceProfile) -> str:

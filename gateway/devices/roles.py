@@ -26,8 +26,8 @@ class OutputHost(Protocol):
         """One step of the output, V."""
 
     @property
-    def idle_question(self) -> OutputRequest | None:
-        """Question for a device that has nothing to do; None where it can only be told its setting again."""
+    def idle_questions(self) -> tuple[OutputRequest, ...]:
+        """Questions for a device that has nothing to do, in turn; none where it can only be told its setting again."""
 
     def confirms(self, voltage_v: float, reply: Accepted, question: OutputRequest) -> bool:
         """Return whether this answer to `question` says that the setting stands, up to the rounding of the numbers on the

@@ -83,7 +83,7 @@ def _encode_field(field: Field, values: Mapping[str, Value], may_be_blank: str) 
     if value is None and isinstance(field, Choice):
         return field.words[0]
     if value is None:
-        raise ValueRefused(f"{field.name} is not given")
+        raise ValueRefused(f"{field.name} is not given: say it under `constants`")
     if isinstance(field, Decimals) and field.name == may_be_blank and isinstance(value, float) and isnan(value):
         return field.blank
     return field.encode(value)

@@ -87,8 +87,10 @@ class ValveDevice:
         """Return the answer to a question, with the direction that stands."""
         if question is not None:
             answer = self._settings.of(question).answer
-            return self._grammar.line(self._grammar.encode(answer)) if answer else b""
-        return self._grammar.line(self._grammar.encode(self._reading.answer, {STATE: self._reading.word_of(stands)}))
+            return self._grammar.line(self._grammar.encode_filled(answer, {})) if answer else b""
+        return self._grammar.line(
+            self._grammar.encode_filled(self._reading.answer, {STATE: self._reading.word_of(stands)})
+        )
 
     def _question(self, line: Line) -> Question | Garbage:
         body = self._grammar.body(line)

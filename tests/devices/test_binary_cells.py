@@ -6,7 +6,7 @@ from math import inf
 import pytest
 
 from gateway.devices import DeviceProfile, cell_device, cell_host
-from gateway.devices.binary.register_access import WordOrder
+from gateway.devices.binary.register_access import RegisterType, WordOrder
 from gateway.devices.binary.rtu_framing import rtu_frame
 from gateway.devices.binary.weight_registers import RegisterBit, WeightRegisters
 from gateway.devices.force_reading import ForceReading
@@ -129,3 +129,29 @@ def test_a_zero_that_is_none_and_the_lower_byte_first_are_those_of_both_ends() -
         assert sample.force_n == pytest.approx(12.0, abs=host.resolution_n)
         assert device.frame(12.0) != usual
     assert device.frame(12.0)[:4] == usual[3::-1]
+
+
+def at_its_end(kind: RegisterType, end_count: float, decimals: int = 0) -> DeviceProfile:
+    """An amplifier that says nothing of an overload but stands at its converter's end."""
+    registers = WeightRegisters(function=4, first=0, last=1, weight=0, type=kind, decimals=decimals)
+    reading = ForceReading(modbus=registers, newton_per_count=0.01, end_count=end_count)
+    return replace(load_device("laumas-tlb"), read_force=reading)
+
+
+@pytest.mark.parametrize(
+    ("profile", "registers", "quality"),
+    [
+        (at_its_end("int16", 32767), "7FFF0000", Quality.OVERLOAD),
+        (at_its_end("int16", 32767), "80000000", Quality.OVERLOAD),
+        (at_its_end("int16", 32767), "7FFE0000", Quality.OK),
+        (at_its_end("int16", 32767, decimals=2), "7FFF0000", Quality.OVERLOAD),  # the count, not the 327.67 that it is
+        (at_its_end("int32", 0x7FFFFFFF), "7FFFFFFF", Quality.OVERLOAD),
+    ],
+)
+def test_a_register_at_its_converters_end_is_an_overload(
+    profile: DeviceProfile, registers: str, quality: Quality
+) -> None:
+    (sample,) = cell_host(profile).receive(rtu_frame(1, f"0404{registers}".encode()), 0.0)
+    assert isinstance(sample, ForceSample) and sample.quality is quality
+    (shown,) = cell_host(profile).receive(cell_device(profile).frame(inf), 0.0)
+    assert isinstance(shown, ForceSample) and shown.quality is Quality.OVERLOAD

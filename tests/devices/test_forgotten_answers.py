@@ -34,5 +34,5 @@ def test_half_an_answer_of_before_a_loss_is_no_part_of_the_next_line(name: str) 
 @pytest.mark.parametrize("name", OUTPUTS)
 def test_an_idle_output_is_asked_for_its_pressure_else_for_its_setting_else_for_nothing(name: str) -> None:
     profile = load_device(name)
-    expected = ReadPressure() if profile.read_pressure else ReadVoltage() if profile.read_voltage else None
-    assert output_host(profile).idle_question == expected
+    expected = [ReadPressure()] if profile.read_pressure else [ReadVoltage()] if profile.read_voltage else []
+    assert output_host(profile).idle_questions == tuple(expected)

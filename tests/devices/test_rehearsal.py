@@ -70,6 +70,12 @@ def loaded(folder: Path, name: str, **changes: Any) -> list[str]:
             {"set_voltage__ask": "SET {a:02X}{counts:d}", "constants": {"a": 300}},
             "set_voltage: 0 V: a = 12C: does not fit in 2 characters",
         ),
+        (
+            {"set_voltage__ask": "SET {channel:d},{value:d}"},
+            "{channel:...} would go out as nothing: say it under `const",
+        ),
+        ({"set_voltage__ask": "SET {channel:d},{value:d}", "constants": {"channel": 2}}, None),
+        ({"read_voltage__ask": "REQ {channel:d}"}, "must not carry one but under `constants`"),
         ({"set_voltage__ask": "S" * 130 + "{counts:d}"}, "a line has at most 128 characters"),
         ({"serial__baud": 57600}, None),
         ({"serial__baud": 57601}, "serial.baud: 57601 is not one of 300, 600, "),
@@ -97,10 +103,39 @@ def test_an_output_that_could_not_work_is_told(changes: dict[str, Any], told: st
         ({"stream__quality": {"ST": "unstable", "US": "unstable", "OL": "overload"}}, None),
         ({"stream__frame": "{status:ST|US|OL},{mode:GS|NT},{force:+08.2f}{unit:lb|N}"}, "never says kg: unit is one of lb, N"),
         ({"stream__frame": "{status:ST|US|OL},{force:+08.2f}{unit:lb|N} {n:04X} {text:8s}", "stream__unit": None}, None),
-        ({"stream": None, "read_force": {"ask": "#{address:02X}", "frame": "{force:+08.2f}"}}, "address is not given"),
+        ({"stream": None, "read_force": {"ask": "#{address:02X}", "frame": "{force:+08.2f}"}}, "address is not given: say"),
+        ({"stream__frame": "{status:02X}{force:+08.2f}", "stream__quality": None}, "{status:...} is words, each with its"),
+        ({"stream__frame": "{status:1s}{force:+08.2f}", "stream__quality": None}, "{status:...} is words, each with its"),
+        ({"stream": {"frame": "{force:04X}", "newton_per_count": 1, "rate_hz": 10}}, "{force:+04X} is the two's complement"),
+        ({"stream": {"frame": "{force:+04X}", "newton_per_count": 1, "rate_hz": 10, "end_count": 32767}}, None),
+        ({"stream": {"frame": "{force:+04X}", "newton_per_count": 1, "rate_hz": 10, "end_count": 99999}},
+         "stream.end_count: 99999 does not fit into '{force:+04X}'"),
+        ({"stream__frame": "{status:ST|US|OL},{force:08.2f}", "stream__negative": ["UL"]}, "negative names words of {status"),
+        ({"stream__frame": "{status:ST|US|OL},{force:08.2f}", "stream__negative": ["US"]}, None),
+        ({"stream__frame": "{status:ST|US|OL},{force:+08.2f}", "stream__negative": ["US"]}, "the force stands here twice"),
+        ({"stream": {"frame": "{force:+04X}", "newton_per_count": 1, "rate_hz": 10}}, None),
         ({"stream": None, "read_force": {"ask": "W?", "frame": "{force:+08.2f}"}}, None),
     ],
 )  # fmt: skip
 def test_a_load_cell_that_could_not_work_is_told(changes: dict[str, Any], told: str | None, tmp_path: Path) -> None:
     faults = loaded(tmp_path, "stream-st-gs", **changes)
     assert (faults == []) if told is None else any(told in fault for fault in faults), faults
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"constants": None, "read_valve__ask": "V{address:02X}"}, "read_valve: address is not given: say it under"),
+        ({"read_valve__answer": "V {state:PUSH|PULL},{inputs:04X}"}, None),  # what else stands in an answer is read over
+    ],
+)  # fmt: skip
+def test_a_valve_that_could_not_work_is_told(changes: dict[str, Any], told: str | None, tmp_path: Path) -> None:
+    faults = loaded(tmp_path, "mcu-valve", **changes)
+    assert (faults == []) if told is None else any(told in fault for fault in faults), faults
+
+
+def test_a_weight_in_registers_without_a_sign_is_told_by_its_type(tmp_path: Path) -> None:
+    registers = {"function": 4, "first": 0, "last": 1, "weight": 0, "type": "uint32", "decimals": 2}
+    (fault,) = loaded(tmp_path, "laumas-tlb", read_force={"modbus": registers, "unit": "kg"})
+    assert "cannot be shown by a weight of type uint32: there is no room for a minus sign" in fault
+    assert fault.endswith("say int32, or which bit is the sign in `negative`")

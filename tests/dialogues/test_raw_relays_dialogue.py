@@ -93,7 +93,7 @@ def test_both_ends_understand_each_other_however_the_bytes_come(profile: DeviceP
     [
         ("FF010", "a sentence of raw bytes has two digits for each"),
         ("FF01", "the sentences to a device that speaks in raw bytes have one length"),
-        ("relay1", "a sentence of raw bytes is hexadecimal digits, and words of equal length"),
+        ("relay1", "a sentence of raw bytes is hexadecimal digits in capitals"),
         ("FF{x:0|01}00", "words of equal length"),
         ("FF01{x:02X}", "words of equal length"),
     ],

@@ -45,6 +45,21 @@ LAUMAS_FAST = replace(  # TLB, fast continuous transmission, TD: the sum is that
     checksum="xor-hex",
 )
 
+LAUMAS_ASKED = replace(  # W100, ASCII protocol: what stands between $ or & and the sum, without a \\, counts
+    cell(
+        terminator="\r",
+        constants={"address": 1},
+        read_force=ForceReading(ask="${address:02d}t", frame="&{address:02d}{force:06d}t\\", newton_per_count=0.1),
+    ),
+    checksum="xor-hex",
+)
+
+
+def test_a_leading_dollar_is_no_part_of_an_exclusive_or() -> None:
+    assert cell_host(LAUMAS_ASKED).poll() == b"$01t75\r"
+    assert cell_device(LAUMAS_ASKED).receive(b"$01t75\r", 0.0) == 1
+    assert add_checksum(b"$GPGLL,5057.970,N,00146.110,E,142451,A", "xor").endswith(b"A*27")  # NMEA 0183
+
 
 def test_a_question_with_an_exclusive_or_in_digits_is_the_manual_s() -> None:
     assert cell_host(YAOHUA).poll() == bytes.fromhex("02 41 42 30 33 03")

@@ -90,6 +90,17 @@ FLINTEC = replace(  # FT-10, page 46: address, command, S steady or D dynamic, s
 YAOHUA_A26 = cell(  # XK3190-A26, page 11, format 2: lines that begin with =, and have no other end
     terminator="=", stream=ForceReading(frame="{force:8.3f}", unit="kg", rate_hz=10.0)
 )
+_SWB = "0123456789:;<=>?"  # status byte B, in kilograms: bit 0 is net, 1 the minus, 2 beyond the range, 3 in motion
+TOLEDO = cell(  # Mettler Toledo, continuous: STX, status bytes A (`,` is two decimals), B and C, weight, tare, CR
+    terminator="\r",
+    stream=ForceReading(
+        frame=f"\x02,{{status:{'|'.join(_SWB)}}}{{print: |(}}{{force:06d}}{{tare:06d}}",
+        newton_per_count=0.01 * KG_N,
+        quality=dict.fromkeys("0123", OK) | dict.fromkeys("89:;", UNSTABLE) | dict.fromkeys("4567<=>?", OVERLOAD),
+        negative=tuple("2367:;>?"),
+        rate_hz=17.0,
+    ),
+)
 EXPONENT = cell(read_force=ForceReading(ask="MEAS?", frame="{force:+.6E}", unit="N"))
 COMPLEMENT = cell(  # ADAM-4016 in its hexadecimal format
     read_force=ForceReading(ask="#01", frame=">{force:+04X}", newton_per_count=0.01, end_count=32767)
@@ -136,6 +147,14 @@ def sample(raw: float, per_unit: float, quality: Quality = OK) -> ForceSample:
         (YAOHUA_A26, b"0003.000=", sample(3.0, KG_N)),
         (YAOHUA_A26, b"-001.000=", sample(-1.0, KG_N)),
         (YAOHUA_A26, b"000.3000=", Garbage(b"000.3000=")),  # format 1: the digits of 3.000 in reverse order
+        (TOLEDO, b"\x02,0 001234000000\r", sample(1234, 0.01 * KG_N)),
+        (TOLEDO, b"\x02,3   1234   500\r", sample(-1234, 0.01 * KG_N)),
+        (TOLEDO, b"\x02,:(000007000000\r", sample(-7, 0.01 * KG_N, UNSTABLE)),
+        (TOLEDO, b"\x02,4 999999000000\r", sample(999999, 0.01 * KG_N, OVERLOAD)),
+        (TOLEDO, b"\x02,6 000012000000\r", sample(-12, 0.01 * KG_N, OVERLOAD)),
+        (TOLEDO, b"\x02,2 -01234000000\r", Garbage(b"\x02,2 -01234000000\r")),  # a minus behind a minus
+        (TOLEDO, b"\x02+0 001234000000\r", Garbage(b"\x02+0 001234000000\r")),  # set to one decimal
+        (TOLEDO, b"\x02,  001234000000\r", Garbage(b"\x02,  001234000000\r")),  # pounds
         (EXPONENT, b"+1.234567E+01\r\n", sample(12.34567, 1.0)),
         (EXPONENT, b"-9.876543E-03\r\n", sample(-9.876543e-3, 1.0)),
         (EXPONENT, b"+9.900000E+37\r\n", sample(9.9e37, 1.0)),  # what SCPI calls infinity is over-force by its size
@@ -163,7 +182,7 @@ def test_the_checksums_are_those_that_the_manual_works_out() -> None:
 
 
 @pytest.mark.parametrize(
-    "profile", [KERN, SARTORIUS, SMA, RADWAG, NCI, YAOHUA_A12, YAOHUA_A26, FLINTEC, EXPONENT, COMPLEMENT]
+    "profile", [KERN, SARTORIUS, SMA, RADWAG, NCI, YAOHUA_A12, YAOHUA_A26, FLINTEC, TOLEDO, EXPONENT, COMPLEMENT]
 )
 def test_the_simulated_one_is_read_as_what_it_shows(profile: DeviceProfile) -> None:
     device, host = cell_device(profile), cell_host(profile)

@@ -32,7 +32,9 @@ class ModbusCellHost(TemplateCellHost):
     def _quality(self, raw: float, values: dict[str, Value]) -> Quality:
         if any(_is_set(bit, values) for bit in self._registers.overload):
             return Quality.OVERLOAD
-        return Quality.UNSTABLE if any(_is_set(bit, values) for bit in self._registers.unstable) else Quality.OK
+        believed = super()._quality(raw, values)  # a count at the converter's end
+        is_unstable = any(_is_set(bit, values) for bit in self._registers.unstable)
+        return Quality.UNSTABLE if is_unstable and believed is Quality.OK else believed
 
 
 class ModbusCellDevice(TemplateCellDevice):
@@ -45,7 +47,7 @@ class ModbusCellDevice(TemplateCellDevice):
     def _tell_registers(self, values: dict[str, Value], quality: Quality) -> None:
         registers, raw = self._registers, float(values[FORCE])
         weight = raw if registers.is_float else round(raw * 10.0**registers.decimals)
-        if abs(raw) > registers.largest_shown or (weight < 0 and not registers.is_signed):
+        if abs(raw) > self._reading.largest_shown or (weight < 0 and not registers.is_signed):
             raise ValueRefused(f"{raw} is more than the amplifier shows")
         values[FORCE] = abs(weight) if registers.negative else weight
         meant = [(registers.negative, weight < 0)] if registers.negative else []

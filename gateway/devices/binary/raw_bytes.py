@@ -14,7 +14,9 @@ def byte_count(template: str) -> int:
     lengths = [{len(word) for word in each} for each in words]
     digits = "".join(word for each in words for word in each)
     if any(len(each) != 1 for each in lengths) or any(one not in "0123456789ABCDEF" for one in digits):
-        raise ValueError("a sentence of raw bytes is hexadecimal digits, and words of equal length")
+        raise ValueError(
+            "a sentence of raw bytes is hexadecimal digits in capitals, nothing between them, and words of equal length"
+        )
     count, odd = divmod(sum(each.pop() for each in lengths), 2)
     if odd:
         raise ValueError("a sentence of raw bytes has two digits for each")

@@ -74,7 +74,7 @@ class TemplateCellHost:
         if unit and self._reading.template.field(UNIT):
             raise ValueError(f"{profile.name} says its unit in each frame: the rig's unit ({unit}) is one too many")
         self._newton_per_unit = newton_per_unit(profile, unit)
-        self._sign = sign
+        self._sign, self._end = sign, self._reading.end
         self._lines = self._grammar.answers()
         self._known: dict[bytes, _KnownReading] = {}  # a force at rest says the same few sentences
         self._beyond_range = {
@@ -131,7 +131,7 @@ class TemplateCellHost:
         values = self._grammar.read(self._reading.frame, body, self._reading.may_be_blank)
         if values is None:
             return None
-        if SIGN in values and float(values[FORCE]) < 0.0:  # a minus behind a sign: which one counts?
+        if self._reading.has_sign_apart and float(values[FORCE]) < 0.0:  # a minus behind a sign: which one counts?
             return None
         raw = self._raw(values)
         return _KnownReading(raw, self._newtons(raw, values), self._quality(raw, values))
@@ -139,15 +139,15 @@ class TemplateCellHost:
     def _raw(self, values: dict[str, Value]) -> float:
         """The number of the device, in its own unit."""
         number = float(values[FORCE])
-        return -number if str(values.get(SIGN, "")).strip() == MINUS else number
+        is_negative = str(values.get(SIGN, "")).strip() == MINUS or values.get(STATUS) in self._reading.negative
+        return -number if is_negative else number
 
     def _newtons(self, raw: float, values: dict[str, Value]) -> float:
         per_unit = NEWTON_PER_UNIT[str(values[UNIT]).strip()] if UNIT in values else self._newton_per_unit
         return self._sign * (raw - self._reading.zero_count) * per_unit
 
     def _quality(self, raw: float, values: dict[str, Value]) -> Quality:
-        end = self._reading.end_count
-        if isnan(raw) or (end is not None and abs(raw) >= end):
+        if isnan(raw) or (self._end is not None and abs(raw) >= self._end):
             return Quality.OVERLOAD
         return self._reading.quality[str(values[STATUS])] if STATUS in values else Quality.OK
 
@@ -201,7 +201,9 @@ class TemplateCellDevice:
         values = {**self._around, FORCE: number}
         if sign := self._reading.sign_word(number):
             values |= {SIGN: sign, FORCE: abs(number)}
-        word = self._reading.word(quality)
+        if self._reading.negative:
+            values[FORCE] = abs(number)
+        word = self._reading.word(quality, is_negative=number < 0.0)
         if word is not None:
             values[STATUS] = word
         if self._reading.modbus:

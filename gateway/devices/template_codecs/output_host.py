@@ -57,7 +57,7 @@ class TemplateOutputHost:
         self._setting = VoltageSentence(grammar)
         self._is_read_back = self._confirmation is not grammar.set_voltage
         self._questions: dict[str, bytes] = {}  # by template: they carry no number
-        self.idle_question = _idle_question(profile)
+        self.idle_questions = _idle_questions(profile)
         self.resolution_v = self._step_v(self._grammar.set_voltage, self._grammar.set_voltage.ask)
         self._tolerance_v: dict[type, float] = {SetVoltage: _ROUNDING * self._steps_between(self._confirmation)}
         if profile.read_voltage:
@@ -170,7 +170,9 @@ class TemplateOutputHost:
         return Refused(text) if text else None
 
 
-def _idle_question(profile: DeviceProfile) -> OutputRequest | None:
-    if profile.read_pressure:
-        return ReadPressure()
-    return ReadVoltage() if profile.read_voltage else None
+def _idle_questions(profile: DeviceProfile) -> tuple[OutputRequest, ...]:
+    """The pressure, else the setting; both where the answer to a setting says that it was obeyed, but not with which number."""
+    answer = profile.set_voltage.answer if profile.set_voltage else ""
+    is_unread = bool(answer) and profile.number_in(answer) is None
+    questions: list[OutputRequest] = [ReadPressure()] if profile.read_pressure else []
+    return (*questions, ReadVoltage()) if profile.read_voltage and (is_unread or not questions) else tuple(questions)

@@ -125,6 +125,8 @@ def drawn_cell(rng: Random) -> Profile:
             [("ST|US|OL", {"ST": "ok", "US": "unstable", "OL": "overload"}), ("G|B", {"G": "ok", "B": "unstable"})]
         )
         frame = f"{{status:{words}}},{frame}"
+        if words == "G|B" and "{force:+" not in frame:
+            reading["negative"] = ["B"]
     if rng.random() < 0.2:
         frame = frame.replace("{force:", "{sign: |-}{force:").replace("{force:+", "{force:")
     if rng.random() < 0.4:

@@ -90,7 +90,7 @@ async def listen_at(line: OutputLine | CellLine, path: str, baud: int) -> ProbeR
 
 def _question(device: DeviceProfile) -> OutputRequest:
     """Return what moves nothing: a reading, or, where a device cannot be asked, the least voltage that it can be set to."""
-    return output_host(device).idle_question or SetVoltage(device.voltage_range_v[0])
+    return next(iter(output_host(device).idle_questions), SetVoltage(device.voltage_range_v[0]))
 
 
 def _question_and_receiver(

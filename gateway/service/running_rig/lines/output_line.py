@@ -1,9 +1,10 @@
 """The output device's line: at most one question on the wire, and of waiting setpoints only the last.
 
-A serial device at 9600 baud takes 15 ms for a setting and its echo, the loop decides every 4-10 ms: a queue would make
-the wire an ever older past. Setpoints go before polls; polls fill the idle wire and keep a silent device from going
-unnoticed: the pressure where the device measures it, else the setting that stands, else, of a device that cannot be asked
-anything, the same setting once more. Time comes in as an argument, so that tests run it in virtual time.
+A serial device at 9600 baud takes 15 ms for a setting and its echo, the loop decides every 4-10 ms: a queue would make the
+wire an ever older past. Setpoints go before polls; polls fill the idle wire and keep a silent device from going unnoticed:
+the pressure where the device measures it, else the setting that stands (both in turn where a setting is answered without its
+number), else, of a device that cannot be asked anything, the same setting once more. Time comes in as an argument, so that
+tests run it in virtual time.
 
 An answer may come after its time has run out, when the next question is already out, and a bare number does not say what
 it answers. Taken for the next question's, each following answer would be one behind for as long as the setpoint moves, and
@@ -106,6 +107,7 @@ class OutputExchange:
         self._quiet_until_s = 0.0
         self._sent_s = 0.0
         self._next_poll_s = self._said_s = 0.0
+        self._polls = 0
         self._failures: dict[object, int] = {}
         self.acknowledged_v: float | None = None
         self.unanswered_since_s: float | None = None
@@ -193,7 +195,7 @@ class OutputExchange:
             if wanted_v != self._asked_v:
                 self._before_v = self._asked_v
             self._asked_v, self.standing_v = wanted_v, None
-            if self._host.idle_question is None or self.checks.is_tripped:  # this is what a poll would say
+            if not self._host.idle_questions or self.checks.is_tripped:  # this is what a poll would say
                 self._next_poll_s = now_s + _POLL_PERIOD_S
             self._sent_v, self._setting_s = wanted_v, now_s
             self._send(SetVoltage(wanted_v), now_s)
@@ -206,7 +208,9 @@ class OutputExchange:
     def _poll(self, now_s: float) -> OutputRequest:
         """Of a device that is asked about its pressure alone nobody would notice that it stands elsewhere: set at its panel, by
         a second talker, or by a dip of its supply. At rest it is told where to stand again and again, which moves nothing."""
-        question = self._host.idle_question or SetVoltage(self._asked_v)
+        questions = self._host.idle_questions or (SetVoltage(self._asked_v),)
+        self._polls += 1
+        question = questions[self._polls % len(questions)]
         is_due = now_s - self._said_s >= _REPEATED_S and self._asked_v == self._rest_v
         return SetVoltage(self._rest_v) if is_due and isinstance(question, ReadPressure) else question
 

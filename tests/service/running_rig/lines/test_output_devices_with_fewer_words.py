@@ -60,6 +60,20 @@ def test_a_setting_that_somebody_else_has_changed_is_set_anew_and_at_last_a_faul
     assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED, "its echo says one thing, its reading another"
 
 
+def test_a_device_that_acknowledges_without_the_number_is_asked_for_both_in_turn() -> None:
+    """One that clips a setting and says `done`, as function 16 of Modbus does, is seen though it tells its pressure."""
+    wire = with_words(set_voltage=OBEYED)
+    wire.set_voltage(512)
+    wire.answer(">")
+    asked = []
+    while wire.exchange.fault is FaultCode.NONE and len(asked) < 40:
+        wire.tick(0.2)
+        asked.append(wire.last)
+        wire.answer({"REQ": "400", "MON": "0"}.get(wire.last, ">"))
+    assert wire.exchange.fault is FaultCode.OUTPUT_ALTERED
+    assert {"REQ", "MON", "SET 512"} == set(asked)
+
+
 def test_a_device_that_says_nothing_to_a_setting_is_read_back_in_the_same_breath() -> None:
     wire = with_words(read_pressure=None, set_voltage=TELLS_NOTHING)
     wire.set_voltage(512)

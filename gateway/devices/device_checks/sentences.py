@@ -1,0 +1,100 @@
+"""What a profile's sentences say each by itself, before its two ends talk: their ends, their digits, the constants in them."""
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import Final
+
+from gateway.devices.framing import no_terminator
+from gateway.devices.profile import ADDRESS, DeviceProfile
+from gateway.devices.template import compile_template, quote
+from gateway.modbus.crc import checksum_end
+
+Place = tuple[str | int, ...]
+Found = Iterator[tuple[Place, str]]
+"""(place in the profile, sentence)."""
+
+_SAID_BY_US: Final = ("ask", "before", "start", "feed")
+_SAID: Final = (*_SAID_BY_US, "answer", "or_answer", "frame", "text", "unknown", "refusal", "overload", "underload")
+_DIGITS: Final = frozenset("0123456789ABCDEF")
+_LEAST_FRAME: Final = 4  # bytes: unit, function, checksum
+
+
+def misspelt(profile: DeviceProfile) -> Found:
+    """Return what is wrong with single sentences."""
+    yield from _terminators(profile)
+    yield from _cut_sentences(profile)
+    yield from _no_pdus(profile)
+    yield from _unused_constants(profile)
+
+
+def _terminators(profile: DeviceProfile) -> Found:
+    for name in ("terminator", "question_terminator"):
+        if why := no_terminator(getattr(profile, name)):
+            yield (name,), why
+
+
+def _cut_sentences(profile: DeviceProfile) -> Found:
+    """Sentences with the end of a line in their middle."""
+    for place, text in () if profile.is_modbus or profile.is_raw else _all_texts(profile):
+        ours = place[-1] in _SAID_BY_US
+        terminator = (profile.question_terminator if ours else "") or profile.terminator
+        if terminator in text:
+            yield place, f"{quote(text)} has the terminator in its middle: the line would end there"
+
+
+def _no_pdus(profile: DeviceProfile) -> Found:
+    """Sentences of a Modbus device that are no hexadecimal digits, or have what is added to them."""
+    for place, text in _said(profile) if profile.is_modbus else ():
+        pieces = compile_template(text).pieces
+        if not all(_DIGITS.issuperset(one) for one in pieces if isinstance(one, str)):
+            yield place, f"{quote(text)} is no PDU: hexadecimal digits in capitals, nothing between them"
+        elif len(pieces) == 1 and len(text) % 2 == 0 and _is_whole_frame(text):
+            yield (
+                place,
+                f"{quote(text)} has its unit and checksum, which are added: leave out two digits and the last four",
+            )
+
+
+def _is_whole_frame(digits: str) -> bool:
+    data = bytes.fromhex(digits)
+    return checksum_end(data, max(len(data), _LEAST_FRAME)) == len(data)
+
+
+def _unused_constants(profile: DeviceProfile) -> Found:
+    """Constants that stand in no sentence: whoever wrote one believes that it is sent."""
+    said = {one.name for _, text in _said(profile) for one in compile_template(text).fields}
+    said |= {ADDRESS} if profile.is_modbus else set()
+    for name in profile.constants:
+        if name not in said:
+            yield ("constants", name), f"no sentence has a field {{{name}:...}}" + _cure(profile)
+
+
+def _cure(profile: DeviceProfile) -> str:
+    return f"; a Modbus device's unit is its {ADDRESS}" if profile.is_modbus else ""
+
+
+def _said(profile: DeviceProfile) -> Iterator[tuple[Place, str]]:
+    """What goes over the wire, as templates."""
+    return (
+        (place, text)
+        for place, text in _all_texts(profile)
+        if text and next(one for one in reversed(place) if isinstance(one, str)) in _SAID
+    )
+
+
+def _all_texts(profile: DeviceProfile) -> Iterator[tuple[Place, str]]:
+    for one in fields(profile):
+        group = getattr(profile, one.name)
+        if is_dataclass(group) or isinstance(group, tuple):
+            yield from _texts(group, (one.name,))
+
+
+def _texts(group: object, place: Place) -> Iterator[tuple[Place, str]]:
+    if isinstance(group, str):
+        yield place, group
+    elif isinstance(group, tuple):
+        for index, one in enumerate(group):
+            yield from _texts(one, (*place, index))
+    elif is_dataclass(group):
+        for one in fields(group):
+            yield from _texts(getattr(group, one.name), (*place, one.name))
