@@ -41,11 +41,11 @@ from gateway.devices.messages import (
     WatchdogTripped,
 )
 from gateway.service.running_rig.lines.device_checks import DeviceChecks
+from gateway.service.running_rig.lines.given_up_questions import GivenUpQuestions
 
 _FAILURES_BEFORE_FAULT = 3  # in a row; one bad echo is noise on the line
 _POLL_PERIOD_S = 0.1
 _REPEATED_S = 0.5  # of a setting at rest
-_MOST_OUT = 4  # questions that were given up and may still be answered, each so many reply times later at most
 _AWAY_S = 0.5  # of silence: what answers then may be another device, or one that was switched on again
 _AFTER_SIGN_OF_LIFE_S = 0.005  # nothing tells when the device is through with a sentence that it does not answer
 
@@ -82,6 +82,7 @@ class OutputExchange:
         self.checks = checks or DeviceChecks(host, is_waived=False)
         self._write = write
         self._reply_timeout_s = reply_timeout_s
+        self._given_up = GivenUpQuestions(reply_timeout_s)
         self.garbage_bytes = 0
         self.counts = WireCounts()
         self.round_trip_s = nan
@@ -98,8 +99,7 @@ class OutputExchange:
         self._sent_v = self._setting_s = nan
         self.standing_v: float | None = None
         self._is_overdue = False  # a question was given up, its answer may still come
-        self._given_up: list[tuple[OutputRequest, float]] = []  # in a row, with their send times
-        self._heard_s = -inf  # an answer of nobody knows which: none that was asked before counts as silent any more
+        self._given_up.forget()
         self.answer_late_s = 0.0
         self._is_behind = False  # the answer to one of them came, that to the last question is out
         self._refused_v = nan  # a moment ago: perhaps the watchdog has tripped, which is asked before the next try
@@ -167,11 +167,8 @@ class OutputExchange:
         self._host.forget()
         if not isinstance(question, ReadVoltage):  # which tells anew what stands
             self.standing_v = None
-        self._note_still_out(question)
+        self._given_up.note(question, self._sent_s)
         self._in_flight, self._is_overdue = None, True
-
-    def _note_still_out(self, question: OutputRequest) -> None:
-        self._given_up = [*self._given_up[1 - _MOST_OUT :], (question, self._sent_s)]
 
     def _send_next(self, now_s: float) -> None:
         wanted_v = self._wanted_v
@@ -238,7 +235,7 @@ class OutputExchange:
             self.counts.garbled += 1
             if self._in_flight is None:  # unasked: that was it
                 self._is_overdue = False
-                del self._given_up[:1]
+                del self._given_up.questions[:1]
             return
         request, self._in_flight = self._in_flight, None
         self._free_s = max(self._free_s, now_s + self._host.gap_s)
@@ -249,12 +246,12 @@ class OutputExchange:
             self.checks.begin()
         self.unanswered_since_s = None
         if self._is_overdue and not self._is_echo(request, reply):
-            self._heard_s = now_s
+            self._given_up.note_strange(now_s)
             if request is not None:
-                self._note_still_out(request)  # if what came was of an older one
+                self._given_up.note(request, self._sent_s)  # if what came was of an older one
             self._is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
             return
-        self._given_up.clear()
+        self._given_up.questions.clear()
         self.answer_late_s = 0.0
         self.round_trip_s = now_s - self._sent_s
         if isinstance(request, AskDevice):
@@ -275,17 +272,16 @@ class OutputExchange:
         never will be: what is out stays so, and the silence is as old as the oldest of it."""
         if not (isinstance(request, SetVoltage) and isinstance(reply, Accepted)) or self._is_echo(request, reply):
             return False
-        for index, (question, sent_s) in enumerate(self._given_up):
-            is_its = not isinstance(question, SetVoltage) or self._is_echo(question, reply)
-            if is_its and now_s - sent_s <= _MOST_OUT * self._reply_timeout_s:
-                del self._given_up[: index + 1]
-                self.answer_late_s = now_s - sent_s
-                still_out_s = (sent_s for _, sent_s in self._given_up if sent_s > self._heard_s)
-                self.unanswered_since_s = next(still_out_s, self._sent_s)
-                self._in_flight, self._is_behind = request, True
-                self._host.expect(request)
-                return True
-        return False
+        sent_s = self._given_up.take_answer(
+            lambda question: not isinstance(question, SetVoltage) or self._is_echo(question, reply), now_s
+        )
+        if sent_s is None:
+            return False
+        since_s = self._given_up.silent_since_s
+        self.answer_late_s, self.unanswered_since_s = now_s - sent_s, self._sent_s if since_s is None else since_s
+        self._in_flight, self._is_behind = request, True
+        self._host.expect(request)
+        return True
 
     def _take_check(self, request: AskDevice, reply: OutputReply) -> None:
         if isinstance(reply, DeviceAnswer):

@@ -153,7 +153,7 @@ def test_a_device_that_is_silent_for_long_leaves_no_more_than_its_last_questions
     wire.settle(200)
     for _ in range(1000):
         wire.tick(REPLY_TIMEOUT_S + 0.001)
-    assert len(wire.exchange._given_up) <= 4
+    assert len(wire.exchange._given_up.questions) <= 4
     assert wire.exchange.unanswered_since_s == pytest.approx(wire.now_s - 61.0, abs=0.2)
     wire.set_voltage(300)
     wire.tick(REPLY_TIMEOUT_S + 0.001)
@@ -161,7 +161,7 @@ def test_a_device_that_is_silent_for_long_leaves_no_more_than_its_last_questions
     assert wire.now_s - (wire.exchange.unanswered_since_s or 0.0) < 3.0
     wire.set_voltage(200)
     wire.answer("200")
-    assert wire.exchange._given_up == [] and wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
+    assert wire.exchange._given_up.questions == [] and wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
 
 
 def late_out_of_three(wire: Wire) -> list[float]:
