@@ -109,6 +109,8 @@ class DeviceChecks:
         elif answer.step is DeviceStep.STATUS:
             if DeviceStep.CLEAR not in self._waiting:  # else it was asked before the reset
                 self._take_state(WatchdogState(answer.text), is_due=is_due)
+        elif self.is_tripped:
+            pass  # until it is cleared: its time reads back as before
         elif answer.step is DeviceStep.VERIFY and not (answer.is_right and self._is_proved_by_state):
             self._take_proof(is_armed=answer.is_right)
         self._settle()
@@ -122,7 +124,7 @@ class DeviceChecks:
             self._waiting.clear()
         elif step is DeviceStep.CLEAR:
             self.trip()
-        elif step in (DeviceStep.SET_TIME, DeviceStep.ARM, DeviceStep.VERIFY):
+        elif step in (DeviceStep.SET_TIME, DeviceStep.ARM, DeviceStep.VERIFY) and not self.is_tripped:
             self._take_proof(is_armed=False, words=words)
         self._settle()
 
