@@ -14,6 +14,7 @@ from gateway.devices.device_checks.watchdog import WatchdogState
 from gateway.devices.messages import DeviceAnswer, DeviceStep
 
 _LOOK_PERIOD_S = 1.0  # between two looks at the watchdog: a device that was off for a moment has forgotten its arming
+_WAITS_S = 0.5  # of a look for an idle wire: on a slow one a setpoint that never rests leaves none
 _TRIES = 3  # of arming; then it does not arm
 
 
@@ -72,6 +73,11 @@ class DeviceChecks:
             self._next_look_s = now_s + _LOOK_PERIOD_S
             return self._looks[0]
         return None
+
+    def is_late(self, now_s: float) -> bool:
+        """Decide whether a question is due that has waited for an idle wire for long enough, or that arms the watchdog anew."""
+        is_look_late = bool(self._looks) and self.fault in _GOES_ON and now_s >= self._next_look_s + _WAITS_S
+        return bool(self._waiting) or is_look_late
 
     def trip(self) -> None:
         """Note that the device's watchdog has tripped: it said so in place of an answer. Where its clearing waits already, that
