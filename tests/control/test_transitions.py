@@ -123,12 +123,31 @@ def test_each_wish_of_a_step_is_one_and_is_gone_with_the_next_step(wish: str) ->
 
 
 def test_an_enable_right_behind_a_clearing_is_a_sign_of_life_and_the_clearing_itself_none() -> None:
-    for control_word, age_s in ((ControlBit.ENABLE, 0.0), (ControlBit(0), 5.0)):
+    for control_word, heartbeat, age_s in (
+        (ControlBit.ENABLE, 0, 0.0),
+        (ControlBit(0), 0, 5.0),
+        (ControlBit(0), 4, 0.0),
+    ):
         tracker = CommandTracker(settings(lease_s=1.0))
         tracker.take(0.0, Command(heartbeat=3, number=1))
         tracker.expect_clearing()
-        tracker.take(5.0, Command(control_word=control_word, heartbeat=0, number=2))
+        tracker.take(5.0, Command(control_word=control_word, heartbeat=heartbeat, number=2))
         assert tracker.lease_age_s(5.0) == age_s
+
+
+def test_a_beat_behind_a_fault_in_off_where_nothing_was_left_to_clear_lets_a_reset_through() -> None:
+    bench = Bench(settings(lease_s=0.5))
+    bench.run(0.5)
+    bench.enable(10.0, heartbeat=1)
+    bench.run(0.3)
+    bench.line = bench.line._replace(sent_v=0.0, unanswered_since_s=bench.now_s)
+    bench.disable()
+    bench.ignores_clearing = True
+    assert bench.run(0.2).fault is FaultCode.OUTPUT_SILENT
+    bench.heal()
+    bench.write(control_word=ControlBit(0), heartbeat=7)
+    bench.write(control_word=ControlBit.RESET_FAULT, heartbeat=7)
+    assert (bench.refused, bench.last.state) == (None, State.OFF)
 
 
 def test_a_run_beside_which_the_gateway_stops_ends_and_says_so() -> None:
