@@ -96,7 +96,7 @@ class DeviceChecks:
             self.is_tripped = (
                 DeviceStep.CLEAR in self._known
             )  # lasts until that is answered; without it any setting ends it
-            self._tries = 0
+            self._tries, self._is_said = 0, False
             self._waiting = deque(self._known_of(DeviceStep.CLEAR, DeviceStep.STATUS, *self._arming))
         elif self.fault in _ASKED_AGAIN:
             self.begin()
