@@ -52,8 +52,8 @@ class CommandTracker:
         self._update_demand()
 
     def expect_clearing(self) -> None:
-        """Note that the bank is asked to zero the command: no bit stands any more, and the next heartbeat value is its doing
-        and not a beat."""
+        """Note that the bank is asked to zero the command: no bit stands any more, and a heartbeat of 0 is its doing and not a
+        beat."""
         self._word = 0
         self._adopt_heartbeat = True
 
@@ -77,7 +77,7 @@ class CommandTracker:
         self.command = command
         if self._adopt_heartbeat:
             self._adopt_heartbeat = False
-            if not command.control_word:
+            if not command.control_word and not command.heartbeat:  # any other value is a master's
                 self._lease.adopt(command.heartbeat)
         self._lease.observe(now_s, command.heartbeat)
         self._update_demand()

@@ -20,7 +20,7 @@ from gateway.control.inputs import CalibrationInUse, LineStatus, LoopInputs, Out
 from gateway.control.messages import master_lost_sentence
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.control.sample_conditioning import NO_READING, SampleConditioner, at_time
+from gateway.control.sample_conditioning import NO_READING, SampleConditioner, at_time, turned
 from gateway.control.self_test.items import SelfTestPlan
 from gateway.control.settings import ControlSettings
 from gateway.control.state_table import StateEvent
@@ -68,9 +68,8 @@ class Controller:
         self._edge_check = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self._most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._one_shot = OneShotEvents(settings.supervision.stuck_n)
-        self._reading = NO_READING
+        self._reading, self._line = NO_READING, LineStatus()
         self._last_s: float | None = None
-        self._line = LineStatus()
         self._moved_by: LoopInputs | None = None  # what the force loop has just moved by
         parts = ControllerParts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)
         self._machine = Transitions(parts, is_restarted=unclean_restart)
@@ -194,6 +193,8 @@ class Controller:
         self._sense(now_s, sample, line)
         self._obey(now_s, edges)
         if self._valve is not None and self._turning.follow(now_s, line, self._machine):
+            self._reading = turned(self._reading)
+            self._contact.restart()
             self._use_model()
         if self._machine.is_enabled:
             self._supervise(now_s, line)
@@ -252,8 +253,7 @@ class Controller:
 
     def _obey_this_machine(self, now_s: float) -> None:
         """A run that was asked for at this machine; refused, it leaves everything as it is."""
-        plan = self.active_run.take_asked()
-        if plan is None:
+        if (plan := self.active_run.take_asked()) is None:
             return
         self.active_run.refused = self.refusal_of_run(now_s, plan)
         if self.active_run.refused:

@@ -37,6 +37,11 @@ def at_time(reading: Reading, later_s: float, supervision: Supervision) -> Readi
     return reading._replace(age_s=age_s, interval_s=0.0, is_new=False, is_fresh=is_fresh)
 
 
+def turned(reading: Reading) -> Reading:
+    """Return the same reading counted the other way."""
+    return reading._replace(cell_n=-reading.cell_n, contact_n=-reading.contact_n)
+
+
 class SampleConditioner:
     """Turns samples into readings; a sample given twice is not new the second time. direction: -1 where the tool pulls, so that
     a pull is a positive force in all that follows."""

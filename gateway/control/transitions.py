@@ -117,9 +117,10 @@ class Transitions:
 
     def fail_internally(self, now_s: float) -> None:
         """Latch INTERNAL after an exception, with the safe voltage, unless another fault is latched already."""
-        self._rest()
         if self.state is not State.FAULT:
             self._latch(now_s, FaultCode.INTERNAL)
+        self._rest()
+        self.is_ramping_down = self.is_master_lost = False
         self._parts.commands.expect_clearing()
 
     def reset(self) -> None:

@@ -18,9 +18,16 @@ import termios
 from typing import Final
 
 from gateway.devices import SerialSettings
-from gateway.ports.errors import SERIAL_FAILURES, PortError, explain_changed_settings, explain_loss
+from gateway.ports.errors import (
+    SERIAL_FAILURES,
+    PortError,
+    explain_changed_settings,
+    explain_loss,
+    explain_open_failure,
+)
 from gateway.ports.identity import PtyIdentity
 from gateway.ports.latency import set_low_latency
+from gateway.ports.listing import present_paths
 from gateway.ports.opening import TerminalSettings, let_send, open_descriptor, restore_settings, settings_of
 from gateway.ports.port import WRITE_DEADLINE_S, PortEvents, monotonic_s
 
@@ -156,11 +163,16 @@ class SerialPort:
             self._release()
 
     def _open(self) -> None:
-        self._descriptor = open_descriptor(self._path, self._settings)
+        descriptor = open_descriptor(self._path, self._settings)
+        try:
+            self._set_to = settings_of(descriptor)
+        except SERIAL_FAILURES as error:  # gone again: a plug that bounces
+            os.close(descriptor)
+            raise explain_open_failure(self._path, error, present_paths()) from error
+        self._descriptor = descriptor
         self._failure, self._backoff_s, self._refusals = None, _FIRST_BACKOFF_S, 0
         self.warning = set_low_latency(self._descriptor, self._path)
         asyncio.get_running_loop().add_reader(self._descriptor, self._on_readable)
-        self._set_to = settings_of(self._descriptor)
         self._look = asyncio.get_running_loop().call_later(_LOOK_S, self._look_at_settings)
         self._on_open(self._descriptor)
 

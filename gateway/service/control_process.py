@@ -147,6 +147,7 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
         }
         descriptors = (listener.fileno() for listener in listeners.sockets.values())
         guardian.ready(announcement, rig.control.supervision.stall_s, *descriptors)
+        running.loop.is_watched = True
         await _wait_first(guardian.told_to_stop, running.failed)
         if running.failed.is_set():
             return exit_codes.FAILED

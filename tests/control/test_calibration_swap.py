@@ -9,7 +9,7 @@ from gateway.control import CalibrationInUse, Controller
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.self_test.items import SelfTestPlan
 from gateway.control.settings import SelfTestSettings
-from gateway.registers.words import LimitedBy, State, StatusBit
+from gateway.registers.words import LimitedBy, Mode, State, StatusBit
 from tests.control.bench import Bench, bsfm, enabled, settings
 
 
@@ -128,3 +128,17 @@ def test_a_run_of_this_machine_that_cannot_begin_says_why_once_in_the_log():
     assert bench.controller.active_run.refused.startswith("W305 ")
     assert bench.events.count(bench.controller.active_run.refused) == 1
     assert bench.controller.state is State.HOLDING
+
+
+@pytest.mark.parametrize("scale", [0.7, 1.4])
+def test_a_set_that_is_swapped_in_voltage_mode_carries_nothing_over_into_force_mode(scale: float):
+    """The voltage was the master's, so none has to fade: it goes on from the force that the new set expects of it."""
+    bench = enabled(gain_n_per_v=7.4 * scale)
+    bench.voltage(3.0)
+    bench.run(2.0)
+    bench.controller.use(CalibrationInUse(bsfm(scale=scale), 2))
+    assert bench.run(1.0).voltage_v == 3.0
+    expected_n = bsfm(scale=scale).force_n(3.0, 1.0)
+    bench.write(mode=Mode.FORCE, force_setpoint_n=expected_n, voltage_setpoint_v=0.0)
+    assert bench.last.voltage_v == pytest.approx(3.0, abs=0.05)
+    assert bench.run(0.1).feedforward_v == pytest.approx(3.0, abs=0.05)

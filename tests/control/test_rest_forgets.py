@@ -177,3 +177,19 @@ def test_what_is_off_is_neither_in_band_nor_unreachable() -> None:
         assert bench.run(4.0).status & bit
         assert not bench.disable().status & (StatusBit.IN_BAND | StatusBit.TARGET_UNREACHABLE)
         bench.run(1.0)
+
+
+def test_a_force_that_was_pressed_from_outside_before_an_enable_is_not_stuck_behind_it() -> None:
+    """What stays is measured from the moment at which the output goes off, and not from before it went on."""
+    bench = Bench(settings(response_lag_s=0.2), lag_s=0.2)
+    bench.run(0.5)
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 20.0)
+    bench.run(0.95)
+    bench.alter_sample = lambda sample: sample
+    bench.enable(40.0)
+    assert bench.refused is None
+    bench.run(2.0)
+    bench.disable()
+    output = bench.run(0.25)
+    assert output.force_measured_n > bench.settings.supervision.stuck_n, "it is on its way to 0"
+    assert not output.enable_block and not any("stuck" in sentence for sentence in bench.events)

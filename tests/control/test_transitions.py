@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
 from gateway.control import CalibrationInUse, Controller
 from gateway.control.command_edges import CommandTracker
 from gateway.control.runs.ladder_stairs import CalibrationPlan
@@ -122,12 +123,31 @@ def test_each_wish_of_a_step_is_one_and_is_gone_with_the_next_step(wish: str) ->
 
 
 def test_an_enable_right_behind_a_clearing_is_a_sign_of_life_and_the_clearing_itself_none() -> None:
-    for control_word, age_s in ((ControlBit.ENABLE, 0.0), (ControlBit(0), 5.0)):
+    for control_word, heartbeat, age_s in (
+        (ControlBit.ENABLE, 0, 0.0),
+        (ControlBit(0), 0, 5.0),
+        (ControlBit(0), 4, 0.0),
+    ):
         tracker = CommandTracker(settings(lease_s=1.0))
         tracker.take(0.0, Command(heartbeat=3, number=1))
         tracker.expect_clearing()
-        tracker.take(5.0, Command(control_word=control_word, heartbeat=0, number=2))
+        tracker.take(5.0, Command(control_word=control_word, heartbeat=heartbeat, number=2))
         assert tracker.lease_age_s(5.0) == age_s
+
+
+def test_a_beat_behind_a_fault_in_off_where_nothing_was_left_to_clear_lets_a_reset_through() -> None:
+    bench = Bench(settings(lease_s=0.5))
+    bench.run(0.5)
+    bench.enable(10.0, heartbeat=1)
+    bench.run(0.3)
+    bench.line = bench.line._replace(sent_v=0.0, unanswered_since_s=bench.now_s)
+    bench.disable()
+    bench.ignores_clearing = True
+    assert bench.run(0.2).fault is FaultCode.OUTPUT_SILENT
+    bench.heal()
+    bench.write(control_word=ControlBit(0), heartbeat=7)
+    bench.write(control_word=ControlBit.RESET_FAULT, heartbeat=7)
+    assert (bench.refused, bench.last.state) == (None, State.OFF)
 
 
 def test_a_run_beside_which_the_gateway_stops_ends_and_says_so() -> None:
@@ -142,3 +162,35 @@ def test_a_run_beside_which_the_gateway_stops_ends_and_says_so() -> None:
     assert not bench.controller.active_run.running
     assert "calibration stopped: ramping down" in bench.events
     assert bench.controller.state in (State.CALIBRATING, State.OFF)
+
+
+def test_an_internal_error_lets_go_like_any_fault_and_a_run_is_told_of_it() -> None:
+    """A way to 0 that outlived it would switch the next enable off."""
+    parts, told = enabled(), []
+    parts.machine.is_ramping_down = parts.machine.is_master_lost = True
+    parts.machine.parts.run.rest = told.append  # type: ignore[method-assign]
+    parts.machine.fail_internally(3.0)
+    assert not parts.machine.is_ramping_down and not parts.machine.is_master_lost
+    assert told == [FaultCode.INTERNAL]
+
+
+def test_behind_an_internal_error_on_the_way_to_0_an_enable_stays() -> None:
+    bench = Bench(settings(lease_s=0.2, lease_action=LeaseAction.RAMP))
+    bench.run(0.5)
+    bench.enable(40.0, heartbeat=1)
+    bench.heartbeat_every_ms = 50
+    bench.run(1.0)
+    bench.heartbeat_every_ms = 0
+    bench.seconds_until(lambda output: bool(output.warnings & WarningBit.MASTER_LOST), 0.3)
+    assert bench.last.state is State.RAMPING
+    bench.line, line = None, bench.line  # type: ignore[assignment]
+    with pytest.raises(AttributeError):
+        bench.controller.step(bench.now_s, bench.command, bench.sample, bench.line)
+    bench.line, bench.voltage_v = line, 0.0
+    bench.run(0.5)
+    assert bench.last.fault is FaultCode.INTERNAL and not bench.last.warnings
+    bench.heartbeat_every_ms = 50
+    bench.write(control_word=ControlBit(0), force_setpoint_n=0.0)
+    bench.reset()
+    bench.enable(20.0)
+    assert bench.run(0.5).force_accepted_n == 20.0

@@ -3,6 +3,7 @@
 import asyncio
 import errno
 import os
+import termios
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,10 @@ import pytest
 
 from gateway.devices import SerialSettings
 from gateway.ports import PortError, Pty
+from gateway.ports.errors import explain_loss
 from gateway.ports.opening import open_descriptor
 from tests.ports.raw_bytes import gather, read_all
+from tests.service.supervisor.scripted_children import open_descriptors
 
 
 def test_a_pulled_plug_is_told_once_and_the_port_opens_again(ear: Any, line: Pty, tmp_path: Path) -> None:
@@ -260,4 +263,32 @@ def test_a_failing_write_is_a_loss_that_is_told_outside_the_write(
         await ear.until(lambda: bool(ear.losses))
         port.close()
 
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize("is_open", [False, True])
+def test_a_plug_that_bounces_while_it_is_opened_is_a_port_that_does_not_open(
+    ear: Any, line: Pty, monkeypatch: pytest.MonkeyPatch, is_open: bool
+) -> None:
+    """And no error of ours, which would end the process: nothing is left open, and a lost port is tried again."""
+
+    async def scene() -> None:
+        port, before = ear.port(line.path), open_descriptors()
+        if is_open:
+            await port.open()
+            port._lose(explain_loss(line.path, None))
+        with monkeypatch.context() as patched:
+            patched.setattr("gateway.ports.serial_port.settings_of", lambda _: (_ for _ in ()).throw(gone))
+            if is_open:
+                port._reopen()
+            else:
+                with pytest.raises(PortError, match="E102"):
+                    await port.open()
+        assert not port.is_open and open_descriptors() == before
+        if is_open:
+            await ear.until(lambda: len(ear.opened) == 2)
+            assert port.is_open
+        port.close()
+
+    gone = termios.error(errno.EIO, "Input/output error")
     asyncio.run(scene())

@@ -195,7 +195,9 @@ class Feedforward:
         return 1.0 / (share / slopes[0] + (1.0 - share) / slopes[1])
 
     def take_over(self, force_n: float, branch_share: float = RISING) -> None:
-        """Follow a force that another mode drives, so that coming back to force mode makes no bump."""
+        """Follow a force that another mode drives, so that coming back to force mode makes no bump: what a swapped calibration
+        carries over was for a voltage of ours."""
+        self._carry_over_v = 0.0
         self.applied_n = self.aimed_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
         self._delayed.restart(self.applied_n)
         self._remember(self.model.reversal.at(branch_share))

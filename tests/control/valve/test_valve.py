@@ -1,6 +1,7 @@
 """Bit 4: the force goes to 0, the valve is switched without pressure, its readback is awaited, and then the tool pulls."""
 
 from dataclasses import replace
+from random import Random
 
 import pytest
 
@@ -9,6 +10,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.settings import SafeDirection
 from gateway.control.valve.pull_model import scale_forces
+from gateway.devices.messages import ForceSample
 from gateway.devices.valve_profile import ValveDirection
 from gateway.registers.words import State, StatusBit
 from tests.control.bench import bsfm
@@ -212,3 +214,24 @@ def test_a_scale_that_was_right_pushing_is_looked_at_again_pulling() -> None:
     bench.plant.unit = 9.80665
     bench.run(2.0)
     assert bench.last.fault is FaultCode.GAIN_WRONG
+
+
+def test_behind_a_turn_the_tool_looks_for_its_contact_anew() -> None:
+    """What friction keeps pressed is no contact of a pull: a tool that is free then came with 20 N, not with the approach's
+    2 N, and the force of the step at the turn was told with the other sign."""
+    bench, rng = ValveBench(), Random(3)
+    bench.run(1.0)
+    bench.write(control_word=ENABLE, force_setpoint_n=12.0)
+    bench.run(2.0)
+
+    def kept(sample: ForceSample) -> ForceSample:
+        return replace(sample, force_n=max(sample.force_n, 3.0) + rng.gauss(0.0, 0.1))
+
+    bench.alter_sample = kept
+    bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=30.0)
+    bench.seconds_until(lambda output: bool(output.status & StatusBit.PULLING), 3.0)
+    bench.plant.contact = False
+    assert bench.last.force_measured_n == pytest.approx(3.0, abs=0.5) and not bench.last.status & StatusBit.CONTACT
+    first = len(bench.history)
+    bench.run(0.2)
+    assert max(record.output.force_applied_n for record in bench.history[first:]) <= 2.0

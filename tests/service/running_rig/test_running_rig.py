@@ -52,6 +52,7 @@ def with_running_rig(devices: OwnDevices, scene: Scene, restarted: Ending | None
         rig = RunningRig(profile, profile.ports(), state, guardian, log)
         try:
             await rig.start(["127.0.0.1", 0], record=False, restarted=restarted)
+            rig.loop.is_watched = True  # as behind READY
             async with asyncio.timeout(10):
                 await scene(rig, ours)
         finally:

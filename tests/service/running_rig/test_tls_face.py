@@ -60,6 +60,32 @@ def test_both_faces_serve_one_bank_and_the_certificate_owns(folder: Folder) -> N
     asyncio.run(asyncio.wait_for(scene(), 20.0))
 
 
+def test_a_certificate_that_is_connected_to_one_face_still_has_not_gone_with_its_connection_to_another(
+    folder: Folder,
+) -> None:
+    """A program that only looks, beside the master's own: the end of the first took the force of the second."""
+
+    async def scene() -> None:
+        rig = rig_with(folder)
+        served = Served(replace(rig, fieldbus=(*rig.fieldbus, *rig.fieldbus)))
+        async with served.running():
+            _, here, there = (face.facts["port"] for face in served.told)
+            context, request = client(folder, "setpoint"), pdu.read_request(3, 0, 1)
+            reader, writer = await asyncio.open_connection("127.0.0.1", here, ssl=context)
+            writer.write(framed(request))
+            await reader.readexactly(11)
+            await ask(there, request, context)
+            while len(served.faces.peers) > 1:
+                await asyncio.sleep(0.001)
+            assert served.closed == []
+            writer.transport.abort()
+            while not served.closed:
+                await asyncio.sleep(0.001)
+            assert [peer.identity for peer in served.closed] == ["certificate setpoint"]
+
+    asyncio.run(asyncio.wait_for(scene(), 20.0))
+
+
 def test_who_is_revoked_in_the_rig_file_stays_out(folder: Folder) -> None:
     async def scene() -> None:
         rig = rig_with(folder)

@@ -136,9 +136,7 @@ def test_a_safe_voltage_that_nobody_acknowledges_is_told_at_the_end_too(scene, p
     monkeypatch.setattr(SafeLine, "write_safe", lambda line: False)
     one.signals.send()
     assert one.run() == 0
-    assert one.said[-1].startswith(
-        "A314 stopped as asked: safe voltage written, not acknowledged: the tool may still press"
-    )
+    assert one.said[-1].startswith("A314 stopped as asked: safe voltage not acknowledged: the tool may still press")
     assert not any("stopped as asked" in line for line in one.noted)
 
 

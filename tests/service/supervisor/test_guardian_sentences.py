@@ -81,6 +81,6 @@ def test_a_line_of_ready_that_goes_out_in_pieces_is_whole(monkeypatch):
     os.close(reader)
 
 
-def test_what_was_not_acknowledged_is_not_called_so():
+def test_what_was_not_acknowledged_is_not_called_so_nor_written_where_the_port_may_be_away():
     said = [words.describe_acknowledgement(one) for one in (True, False, None)]
-    assert said == ["acknowledged", "written, not acknowledged", "no line was open"]
+    assert said == ["acknowledged", "not acknowledged", "no line was open"]

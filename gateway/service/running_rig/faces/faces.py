@@ -40,21 +40,22 @@ def with_rtu_face(rig: Rig, port: str) -> Rig:
 
 
 class Faces:
-    """Every face of a rig. on_peer_closed: the last connection of a peer has closed, or its serial port was lost."""
+    """Every face of a rig. on_peer_closed: the last connection of a peer has closed, on whichever face, or its serial port
+    was lost."""
 
     def __init__(self, rig: Rig, bank: RegisterBank, on_peer_closed: Callable[[Peer], None], log: Log) -> None:
-        self._rig, self._log = rig, log
+        self._rig, self._log, self._on_peer_closed = rig, log, on_peer_closed
         self._tcp = (
-            ModbusTcpServer(bank, server_settings(rig), on_peer_closed=on_peer_closed, log=log)
+            ModbusTcpServer(bank, server_settings(rig), on_peer_closed=self._on_closed, log=log)
             if rig.network.plain
             else None
         )
         self._serial = [
-            ModbusRtuServer(bank, _rtu_settings(rig, face, place), on_peer_closed=on_peer_closed, log=log)
+            ModbusRtuServer(bank, _rtu_settings(rig, face, place), on_peer_closed=self._on_closed, log=log)
             for place, face in enumerate(rig.fieldbus, start=1)
             if isinstance(face, RtuFace)
         ]
-        self._make_tls = partial(make_tls_server, rig, bank=bank, on_peer_closed=on_peer_closed, log=log)
+        self._make_tls = partial(make_tls_server, rig, bank=bank, on_peer_closed=self._on_closed, log=log)
         self._tls: list[ModbusTlsServer] = []
         self.modbus: tuple[str, int] | None = None  # where plain Modbus TCP is bound, once it is
         self.on_served: Callable[[], None] = lambda: None  # one that a restart could not serve is served
@@ -73,6 +74,11 @@ class Faces:
     @property
     def _all(self) -> list[ModbusTcpServer | ModbusRtuServer]:
         return [*([self._tcp] if self._tcp else []), *self._tls, *self._serial]
+
+    def _on_closed(self, peer: Peer) -> None:
+        """A certificate may be connected to more than one face."""
+        if all(other.identity != peer.identity for other in self.peers):
+            self._on_peer_closed(peer)
 
     async def start(self, bind: list[Any] | None, *, is_restart: bool) -> tuple[ServedFace, ...]:
         """Serve on every face; what each is. bind: HOST, PORT of plain Modbus TCP instead of the rig's. StartError says

@@ -14,6 +14,7 @@ from gateway.devices.device_checks.watchdog import WatchdogState
 from gateway.devices.messages import DeviceAnswer, DeviceStep
 
 _LOOK_PERIOD_S = 1.0  # between two looks at the watchdog: a device that was off for a moment has forgotten its arming
+_WAITS_S = 0.5  # of a look for an idle wire: on a slow one a setpoint that never rests leaves none
 _TRIES = 3  # of arming; then it does not arm
 
 
@@ -73,6 +74,11 @@ class DeviceChecks:
             return self._looks[0]
         return None
 
+    def is_late(self, now_s: float) -> bool:
+        """Decide whether a question is due that has waited for an idle wire for long enough, or that arms the watchdog anew."""
+        is_look_late = bool(self._looks) and self.fault in _GOES_ON and now_s >= self._next_look_s + _WAITS_S
+        return bool(self._waiting) or is_look_late
+
     def trip(self) -> None:
         """Note that the device's watchdog has tripped: it said so in place of an answer. Where its clearing waits already, that
         was a setting of before the reset."""
@@ -90,7 +96,7 @@ class DeviceChecks:
             self.is_tripped = (
                 DeviceStep.CLEAR in self._known
             )  # lasts until that is answered; without it any setting ends it
-            self._tries = 0
+            self._tries, self._is_said = 0, False
             self._waiting = deque(self._known_of(DeviceStep.CLEAR, DeviceStep.STATUS, *self._arming))
         elif self.fault in _ASKED_AGAIN:
             self.begin()
@@ -109,6 +115,8 @@ class DeviceChecks:
         elif answer.step is DeviceStep.STATUS:
             if DeviceStep.CLEAR not in self._waiting:  # else it was asked before the reset
                 self._take_state(WatchdogState(answer.text), is_due=is_due)
+        elif self.is_tripped:
+            pass  # until it is cleared: its time reads back as before
         elif answer.step is DeviceStep.VERIFY and not (answer.is_right and self._is_proved_by_state):
             self._take_proof(is_armed=answer.is_right)
         self._settle()
@@ -122,7 +130,7 @@ class DeviceChecks:
             self._waiting.clear()
         elif step is DeviceStep.CLEAR:
             self.trip()
-        elif step in (DeviceStep.SET_TIME, DeviceStep.ARM, DeviceStep.VERIFY):
+        elif step in (DeviceStep.SET_TIME, DeviceStep.ARM, DeviceStep.VERIFY) and not self.is_tripped:
             self._take_proof(is_armed=False, words=words)
         self._settle()
 

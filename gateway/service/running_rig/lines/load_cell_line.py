@@ -21,6 +21,7 @@ from gateway.service.running_rig.lines.unread_lines import UnreadLines
 _START_AGAIN_S: Final = (
     1.0  # a stream that has been silent for so long is begun anew: the amplifier had no power, perhaps
 )
+_AWAY_S: Final = 0.5  # of silence of a cell that is asked, beyond its period: what answers then may be another one
 _FASTEST_HZ: Final = 250.0  # the loop's fastest tick: more readings would only cost processor time
 
 
@@ -51,6 +52,7 @@ class CellExchange:
         self.identity.begin()
         self._sent_s: float | None = None
         self._next_s, self._start_s = -inf, -inf
+        self._heard_s = inf  # before the first answer: what it is, is asked anyway
         self._is_overdue = False  # an answer is missing, and may still come
         self._is_heard = False  # one has come since the question that is out: its own, or the one that was missing
 
@@ -70,7 +72,7 @@ class CellExchange:
                 self._start_s = now_s + _START_AGAIN_S
             return messages
         if any(not isinstance(one, Garbage) for one in messages):
-            self._next_s = max(self._next_s, now_s + self._host.gap_s)
+            self._heard_s, self._next_s = now_s, max(self._next_s, now_s + self._host.gap_s)
             if self._is_overdue:
                 self._is_overdue, self._is_heard = False, True  # the question that is out has its time all the same
             else:
@@ -94,6 +96,9 @@ class CellExchange:
         if self._sent_s is not None and now_s - self._sent_s > self._reply_timeout_s:
             self._host.forget()
             self._sent_s, self._is_overdue, self._next_s = None, not self._is_heard, now_s
+            if now_s - self._heard_s > _AWAY_S + self._period_s:
+                self._heard_s = inf
+                self.identity.begin()
         self._send_next(now_s)
 
     def _send_next(self, now_s: float) -> None:

@@ -181,13 +181,17 @@ class OutputExchange:
             if not (self._is_behind and is_fall):
                 return
             self._give_up(self._in_flight)
+        # where something presses and does not fall; every other time at most, or one that is not answered looks like silence
+        gives_way = (
+            self._asked_v <= wanted_v != self._rest_v and self._said_s == self._sent_s and self.checks.is_late(now_s)
+        )
         if self._host.sign_of_life and now_s >= self._next_feed_s:
             self._next_feed_s, self._free_s = now_s + self._host.feed_period_s, now_s + _AFTER_SIGN_OF_LIFE_S
             self._write(self._host.sign_of_life)
         elif wanted_v == self._refused_v and (step := self.checks.next_step(now_s)):
             self._refused_v = nan
             self._send(AskDevice(step), now_s)
-        elif not self._is_confirmed(wanted_v) and self._may_obey(wanted_v, now_s):
+        elif not (gives_way or self._is_confirmed(wanted_v)) and self._may_obey(wanted_v, now_s):
             self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
             if wanted_v != self._asked_v:
                 self._before_v = self._asked_v

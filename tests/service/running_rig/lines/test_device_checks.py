@@ -113,6 +113,17 @@ def test_a_trip_is_believed_when_it_is_said_twice_and_asked_again_at_once() -> N
     assert state(checks, "tripped", 12.0) is FaultCode.WATCHDOG_TRIPPED
 
 
+def test_behind_a_reset_a_trip_is_asked_for_twice_again() -> None:
+    checks = checks_of("icpdas-7024")
+    arm(checks)
+    assert [state(checks, "tripped", 10.0) for _ in range(2)][1] is FaultCode.WATCHDOG_TRIPPED
+    checks.clear()
+    checks.take(DeviceAnswer(CLEAR, is_right=True))
+    assert [state(checks, text, 11.0) for text in ("tripped", "off")] == 2 * [FaultCode.NONE]
+    arm(checks)
+    assert checks.is_armed and checks.is_done
+
+
 def test_before_it_is_armed_a_trip_is_asked_for_twice_too() -> None:
     checks = checks_of("icpdas-7024")
     checks.take(DeviceAnswer(DeviceStep.IDENTITY, is_right=True))

@@ -153,6 +153,27 @@ def test_behind_a_plug_may_be_another_cell() -> None:
         assert (wire.asked[-1] == b"W?\r\n") is (fault is FaultCode.NONE)
 
 
+@pytest.mark.parametrize(("away_s", "is_asked"), [(0.3, False), (0.8, True), (5.0, True)])
+def test_behind_a_silence_may_be_another_cell_too(away_s: float, is_asked: bool) -> None:
+    """On a bus the adapter stays where it is: one that shows another unit or range was read as the one before."""
+    wire = Wire(replace(POLLED, identity=Identity(ask="ID?", answer="ID {model:s}", models=("A1",))))
+    wire.tick()
+    wire.exchange.receive(b"ID A1\r\n", wire.now_s)
+    wire.answer()
+    for _ in range(round(away_s / 0.01)):
+        wire.tick()
+    assert (wire.asked[-1] == b"ID?\r\n") is is_asked
+    wire.answer()
+    assert (len(wire.samples) == 1) is is_asked
+    wire.exchange.receive(b"ID B2\r\n", wire.now_s)
+    assert (wire.exchange.identity.fault is FaultCode.WRONG_DEVICE) is is_asked
+    wire.exchange.clear_faults()
+    wire.tick()
+    wire.exchange.receive(b"ID A1\r\n", wire.now_s)
+    wire.answer()
+    assert wire.samples and wire.exchange.identity.fault is FaultCode.NONE
+
+
 def test_questions_are_counted_and_a_stream_has_none(wire: Wire) -> None:
     """What the metrics call asked: the answered, the lost and the one that is out."""
     for _ in range(3):

@@ -8,9 +8,13 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.devices import output_host
 from gateway.devices.exchange import VoltageExchange, VoltageRange
+from gateway.devices.messages import DeviceAnswer
+from gateway.service.running_rig.lines.device_checks import DeviceChecks, DeviceLevel
 from gateway.service.running_rig.lines.output_line import OutputExchange
+from tests.profile_files import load_device
 from tests.service.rigs import demo
 from tests.service.running_rig.lines.played_output import REPLY_TIMEOUT_S, Wire
+from tests.service.running_rig.lines.test_device_checks import MOST_TRIES, arm
 
 
 def with_words(**words: object) -> Wire:
@@ -102,3 +106,23 @@ def test_an_answer_that_counts_in_coarser_steps_confirms_and_is_not_asked_for_ev
     assert len(wire.written) == 1
     wire.exchange.set_voltage(1.240, wire.now_s + 0.02)
     assert wire.last == "V 1.240"
+
+
+@pytest.mark.parametrize("is_told", [True, False])
+def test_a_trip_stays_until_a_reset_where_a_device_tells_of_its_watchdog_no_more_than_the_time(is_told: bool) -> None:
+    """Which reads back as before, or not at all while it has tripped: neither is a word about the trip."""
+    profile = load_device("icpdas-702x")
+    watchdog = profile.own_watchdog
+    assert watchdog
+    terse = replace(profile, watchdog=replace(watchdog, status=None, refusal="?01"))
+    checks = DeviceChecks(output_host(terse), is_waived=False)
+    arm(checks)
+    checks.trip()
+    for now_s in range(10, 10 + 2 * MOST_TRIES):
+        if step := checks.next_step(float(now_s)):
+            checks.take(DeviceAnswer(step, is_right=True)) if is_told else checks.refuse(step, "TRIPPED")
+        assert (checks.fault, checks.is_done) == (FaultCode.WATCHDOG_TRIPPED, False)
+        assert checks.level == DeviceLevel(has_one=True, is_armed=False, is_tripped=True)
+    checks.clear()
+    arm(checks)
+    assert checks.is_armed and checks.is_done

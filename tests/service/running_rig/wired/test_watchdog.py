@@ -3,6 +3,7 @@ latched when it trips, and cleared by a reset alone; and a wrong device is never
 
 from dataclasses import replace
 from functools import cache
+from math import sin
 
 import pytest
 
@@ -235,6 +236,23 @@ def test_one_that_has_forgotten_is_armed_again_and_the_force_stays(name: str) ->
         assert wired.state is State.HOLDING and wired.force_n == pytest.approx(12.0, abs=1.0)
     assert wired.exchange.checks.is_armed and watchdog.ticks
     assert wired.exchange.checks.times_forgotten == 1
+
+
+@pytest.mark.parametrize("name", ["adam-4024", "icpdas-702x", "mcu-line"])
+def test_it_is_so_where_a_setpoint_that_never_rests_leaves_a_slow_wire_no_rest_either(name: str) -> None:
+    profile = load_device(name)
+    profile = replace(profile, serial=profile.serial.at(9600))
+    supervision = replace(demo().control.supervision, output_timeout_s=0.3)
+    rig = replace(rig_with(profile), control=replace(demo().control, supervision=supervision))
+    wired = Wired(replace(rig, output=replace(rig.output, baud=9600))).pressing(12.0)
+    watchdog = wired.world._output.watchdog  # type: ignore[attr-defined]
+    watchdog.state, watchdog.ticks = WatchdogState.OFF, 0
+    for step in range(100):
+        wired.write(1, round(1200 + 300 * sin(0.06 * step)))
+        wired.run(0.02)
+    assert watchdog.state is WatchdogState.ARMED and watchdog.ticks
+    assert (wired.fault_code, wired.exchange.checks.times_forgotten) == (FaultCode.NONE, 1)
+    assert wired.force_n == pytest.approx(wired.value("force_setpoint"), abs=1.0)
 
 
 def test_a_load_cell_that_says_that_it_is_another_one_is_not_read() -> None:
