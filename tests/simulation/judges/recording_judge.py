@@ -61,7 +61,11 @@ def judge_rows(rows: list[Row], history: History) -> list[str]:
     best = MOST_TOLD * ["it fits nowhere"]
     readings = {_key(at_s): force_n for at_s, force_n in history.readings}
     settings = sorted(history.settings)
-    for begun_s, _ in history.readings:
+    anchors_s = (
+        rows[0]["time_s"],
+        rows[len(rows) // 2]["time_s"],
+    )  # a reading that has waited for control to awake came before
+    for begun_s in (at_s - anchor_s for anchor_s in anchors_s for at_s, _ in history.readings):
         found = list(islice(_judge_laid(rows, begun_s, readings, settings, history), len(best)))
         if not found:
             return []
