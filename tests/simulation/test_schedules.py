@@ -155,6 +155,14 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(16.6975, "worker", "hold", (50.83,)),
         ],
     ),
+    (
+        840,
+        [
+            Event(5.1799, "worker", "drive", (6.67,)),
+            Event(6.5771, "machine", "stop", (0.2127, 493466.6087133491)),
+            Event(6.8542, "worker", "hold", (27.89,), way="coils"),
+        ],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

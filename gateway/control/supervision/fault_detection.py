@@ -252,7 +252,7 @@ class FaultDetector:
         if self._response_fault is _WRONG_SIGN:
             return StopCause(FaultCode.SIGN_INVERTED, sign_sentence(self._rise.measured_rise_n, expected_n()))
         if self._response_fault is _WRONG_GAIN:
-            return StopCause(FaultCode.GAIN_WRONG, gain_sentence(self._rise.measured_rise_n, expected_n()))
+            return StopCause(FaultCode.GAIN_WRONG, gain_sentence(self._rise.wrong_rise_n, expected_n()))
         return None
 
     def _over_words(self, reading: Reading, expected_n: float) -> str:

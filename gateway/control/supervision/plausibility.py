@@ -8,8 +8,9 @@ one rise has passed;
 later the same signature means lost air, which only warns, and so does a force that stays where it was: friction keeps a vented
 tool pressed. A force that is still rising is not too low yet: on a rig that has not been calibrated nobody knows how slow the
 plant is. While the first rise is too high the target is held back
-(`is_too_high`), so that a wrong gain is named before it becomes over-force. Below the contact threshold a cell that
-reads ten times too little looks like air: the tool waits, and the warning A301 tells.
+(`is_too_high`), so that a wrong gain is named before it becomes over-force. What pressed already when the output was enabled,
+and still leaves, has not risen: too high is judged by the rise above the lowest force since then. Below the contact threshold
+a cell that reads ten times too little looks like air: the tool waits, and the warning A301 tells.
 """
 
 from typing import Final
@@ -97,6 +98,7 @@ class RiseCheck:
         """Take the force at rest, at an enable. A positive rest counts as residual force in contact, not as zero error."""
         self._at_rest_n = self.smooth_n
         self._base_n = min(self.smooth_n, self._threshold_n)
+        self._lowest_n = self.smooth_n
         self._wrong_sign_s = self._wrong_gain_s = self._right_gain_s = 0.0
         self._proven = False
         self.is_too_high = False
@@ -106,12 +108,23 @@ class RiseCheck:
         """Rise of the measured force since the check began, N."""
         return self.smooth_n - self._base_n
 
+    @property
+    def rise_since_lowest_n(self) -> float:
+        """The same without what pressed at the beginning and has left since, N."""
+        return self.smooth_n - max(self._base_n, self._lowest_n)
+
+    @property
+    def wrong_rise_n(self) -> float:
+        """Rise that a wrong gain is told with, N."""
+        return self.rise_since_lowest_n if self.is_too_high else self.measured_rise_n
+
     def smooth(self, reading: Reading) -> None:
         """Smooth a new sample, enabled or not. The first ones are averaged: an enable right after the start has a rest too."""
         if reading.is_usable:
             self._readings += 1
             weight = max(1.0 / self._readings, reading.interval_s / (_SMOOTHING_S + reading.interval_s))
             self.smooth_n += (reading.cell_n - self.smooth_n) * weight
+            self._lowest_n = min(self._lowest_n, self.smooth_n)
             self._behind_n += (self.smooth_n - self._behind_n) * reading.interval_s / (_TREND_S + reading.interval_s)
 
     def shift(self, moved_n: float) -> None:
@@ -119,6 +132,7 @@ class RiseCheck:
         self.smooth_n -= moved_n
         self._behind_n -= moved_n
         self._at_rest_n -= moved_n
+        self._lowest_n -= moved_n
         self._base_n = min(self._at_rest_n, self._threshold_n)
 
     def judge(self, response: "ExpectedForce", branch_share: float, touching: bool, interval_s: float) -> FaultCode:
@@ -136,7 +150,8 @@ class RiseCheck:
 
     def _judge_gain(self, expected_n: float, slack_n: float, kept_n: float, interval_s: float) -> FaultCode:
         off_n = self.measured_rise_n - expected_n
-        self.is_too_high = off_n > slack_n + kept_n and self.measured_rise_n > _HIGHEST_SHARE * expected_n
+        risen_n = self.rise_since_lowest_n
+        self.is_too_high = risen_n - expected_n > slack_n + kept_n and risen_n > _HIGHEST_SHARE * expected_n
         coming_n = max(0.0, self.smooth_n - self._behind_n) * _UNKNOWN_LAG_S / _TREND_S
         too_low = -off_n > slack_n and self.measured_rise_n + coming_n < _LOWEST_SHARE * (expected_n - slack_n)
         has_moved = self.smooth_n - self._at_rest_n > _MOVED_SHARE * expected_n

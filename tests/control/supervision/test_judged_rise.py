@@ -120,6 +120,23 @@ def test_a_rest_above_the_contact_threshold_is_force_and_below_it_zero_error() -
         assert rise.check.smooth_n == pytest.approx(rest_n) and rise.check.measured_rise_n == pytest.approx(rise_n)
 
 
+def test_what_pressed_at_the_enable_and_leaves_is_no_rise() -> None:
+    """Right behind a restart the pressure of before still leaves, while the model expects what is set from now on."""
+    rise = Rise(30.0).at(7.0)
+    assert rise.judged(2.0) is RIGHT and not rise.check.is_too_high
+    assert rise.check.measured_rise_n == pytest.approx(6.5) and rise.check.rise_since_lowest_n == pytest.approx(0.0)
+    rise.hold(14.5)
+    assert rise.judged(2.0) is GAIN and rise.check.wrong_rise_n == pytest.approx(7.5)
+    rise.check.shift(3.0)
+    assert rise.check.wrong_rise_n == pytest.approx(7.5)
+
+
+def test_a_force_below_its_rest_has_not_risen_by_more_than_from_rest() -> None:
+    rise = Rise().at(-5.0).at(3.9)
+    assert rise.check.rise_since_lowest_n == pytest.approx(3.9)
+    assert rise.judged(1.0) is RIGHT
+
+
 def test_a_new_start_holds_nothing_back_that_the_one_before_did() -> None:
     rise = Rise().at(37.0)
     rise.judged(12.0, 1)
