@@ -118,6 +118,7 @@ class Simulation:
         self.person = SocketUser(lambda: self.service.inside, self.service.answer_socket)
         self.person.on_write = lambda control: self._on_write(control, True)
         self.person.on_model = self._expect_any_model
+        self.person.on_tare = self._note_tare
         for client in (*self.masters.values(), self.person):
             client.on_pdu = partial(self._note_pdu, client.name if type(client) is Master else "")
         self.clients = (*self.masters.values(), self.reader, *self.integrators.values())
@@ -194,7 +195,10 @@ class Simulation:
     def _note_pdu(self, host: str, pdu: bytes, is_answered: bool) -> None:
         self.status.note_write(host if is_answered else "", pdu, self.clock.now_s)
         if (control := control_of(pdu)) is not None and control & TARE:
-            self.observer.history.tares.append(self.clock.now_s)
+            self._note_tare()
+
+    def _note_tare(self) -> None:
+        self.observer.history.tares.append(self.clock.now_s)
 
     def _on_write(self, control: int | None, is_answered: bool) -> None:
         if control == DISABLED_BY_BIT:  # which ends no run; a reset may be among the other bits

@@ -163,6 +163,15 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(6.8542, "worker", "hold", (27.89,), way="coils"),
         ],
     ),
+    (
+        7641,
+        [
+            Event(2.9404, "world", "cell-cut", (1.0,)),
+            Event(4.1968, "machine", "terminate", (0.2675, 682964.0017498303)),
+            Event(11.0691, "world", "cell-cut", (0.0,)),
+            Event(12.7957, "person", "say", data=b'{"do": "calibrate", "plan": {"tare": true}, "name": "3"}'),
+        ],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

@@ -22,7 +22,7 @@ Answer = dict[str, Any]
 
 class SocketUser:
     """on_write(control): a Modbus request was taken that came this way; on_model: another set may be in use from now on;
-    complaints: broken answers. watched_s: when a run of this person's was looked at last, None where there is none."""
+    on_tare: a run has begun that tares; complaints: broken answers. watched_s: when a run of this person's was looked at last, None where there is none."""
 
     watched_s: float | None = None
 
@@ -35,6 +35,7 @@ class SocketUser:
         self.on_write: Callable[[int | None], None] = lambda control: None
         self.on_pdu: Callable[[bytes, bool], None] = lambda pdu, is_answered: None
         self.on_model: Callable[[], None] = lambda: None
+        self.on_tare: Callable[[], None] = lambda: None
         self._patience = self._run = 0
 
     def say(self, line: bytes) -> None:
@@ -71,6 +72,8 @@ class SocketUser:
                 self.on_model()
             case "calibrate" if request.get("plan") is not None and not request.get("dry_run"):
                 self._patience = int(request.get("name", "0") or 0)
+                if request["plan"].get("tare"):
+                    self.on_tare()
                 self._watch(inside)
             case "calibrate" if answer.get("running") and self.watched_s is not None:
                 self.watched_s = inside.time()  # a question is a look, too
