@@ -16,7 +16,7 @@ OnOpen = Callable[[int], None]  # descriptor
 class PortEvents:
     """Callbacks of a serial port: bytes with their time of arrival, the loss of the port, each opening with its descriptor,
     why a lost one that is there again does not open (permission, another program), once, and that another program had set it
-    otherwise."""
+    otherwise. on_open may refuse the opening by a PortError: the port is closed again, and tried as any that does not open."""
 
     on_bytes: OnBytes
     on_lost: OnLost

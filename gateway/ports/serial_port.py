@@ -174,7 +174,11 @@ class SerialPort:
         self.warning = set_low_latency(self._descriptor, self._path)
         asyncio.get_running_loop().add_reader(self._descriptor, self._on_readable)
         self._look = asyncio.get_running_loop().call_later(_LOOK_S, self._look_at_settings)
-        self._on_open(self._descriptor)
+        try:
+            self._on_open(self._descriptor)
+        except PortError:
+            self._release()
+            raise
 
     def _look_at_settings(self) -> None:
         self._look = asyncio.get_running_loop().call_later(_LOOK_S, self._look_at_settings)

@@ -56,9 +56,11 @@ class GuardianLine:
 
     def hand_over(self, descriptor: int, safe_frame: bytes, safe_reply: bytes, reply_end: bytes) -> None:
         """Give the guardian the line, before the first non-safe write and after each reopen: it can then do the final
-        safe-voltage write itself. reply_end: see SafeLine."""
+        safe-voltage write itself. reply_end: see SafeLine. OSError where there is no descriptor left for it: nobody would
+        guard the line."""
         told = {"safe_frame": safe_frame.hex(), "safe_reply": safe_reply.hex(), "reply_end": reply_end.hex()}
-        self._tell(guardian_link.LINE, told, descriptor)
+        self._waiting.append((guardian_link.LINE, told, (os.dup(descriptor),)))
+        self._send_waiting()
 
     def first_cause(self, cause: str) -> None:
         """Tell the guardian of an internal error, in words: this process is about to end."""
@@ -85,7 +87,7 @@ class GuardianLine:
             self._memory = None
 
     def _tell(self, tag: str, body: dict[str, Any], *descriptors: int) -> None:
-        with contextlib.suppress(OSError):  # a port that is lost already is handed over after its next opening
+        with contextlib.suppress(OSError):  # a listener that is closed already is not kept
             self._waiting.append((tag, body, tuple(os.dup(descriptor) for descriptor in descriptors)))
         self._send_waiting()
 

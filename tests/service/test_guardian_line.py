@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import errno
 import os
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,23 @@ def test_the_end_of_the_guardian_is_heard_once_and_what_it_would_have_been_told_
     asyncio.run(scene())
     for descriptor in (reader, writer):
         os.close(descriptor)
+
+
+def test_a_line_that_cannot_be_handed_over_says_so(ends: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(descriptor: int) -> int:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        monkeypatch.setattr(os, "dup", full)
+        with pytest.raises(OSError, match="Too many"):
+            guardian.hand_over(ends[1].fileno(), b"SET 0\r\n", b"0\r\n", b"\r\n")
+        guardian.close()
+
+    asyncio.run(scene())
+    ends[0].setblocking(False)
+    assert message_link.receive(ends[0]) is None, "nothing was told of it"
 
 
 def test_what_has_waited_until_the_end_is_still_told(ends: Pair) -> None:

@@ -14,7 +14,8 @@ from gateway.service.running_rig.starting import open_again
 
 
 class RigPorts:
-    """paths: by line, `output`, `load_cell`, `valve`. hand_over: called with the descriptor of each opened output.
+    """paths: by line, `output`, `load_cell`, `valve`. hand_over: called with the descriptor of each opened output;
+    OSError where the guardian cannot be given it.
 
     loop: to be set before `open`.
     """
@@ -25,6 +26,7 @@ class RigPorts:
         self._hand_over, self._log = hand_over, log
         self._is_closing = False
         self.is_guarded = False  # the guardian has the output's descriptor
+        self._unguarded = ""  # why it has not, once that is told
         self.not_opened: dict[str, PortError] = {}  # after a restart, by path
         self.output = SerialPort(
             paths["output"],
@@ -113,8 +115,15 @@ class RigPorts:
         self.loop.on_output_bytes(chunk, now_s)
 
     def _on_output_open(self, descriptor: int) -> None:
-        self._hand_over(descriptor)
-        self.is_guarded = True
+        try:
+            self._hand_over(descriptor)
+        except OSError as error:
+            refusal = _explain_unguarded(self.output.path, error)
+            if str(refusal) != self._unguarded:
+                self._log("port", str(refusal))
+            self._unguarded = str(refusal)
+            raise refusal from error
+        self.is_guarded, self._unguarded = True, ""
         self.loop.on_output_opened()
         self._warn_of_latency(self.output)
 
@@ -155,3 +164,8 @@ class RigPorts:
     def _warn_of_latency(self, port: SerialPort) -> None:
         if port.warning:
             self._log("port", port.warning)
+
+
+def _explain_unguarded(path: str, error: OSError) -> PortError:
+    reason = f"the guardian, which writes the last safe voltage, cannot be given this port ({error})"
+    return PortError("E102", f"{path} is closed again, and tried again: {reason}")

@@ -1,6 +1,7 @@
 """The ports of a running rig: what came over a wire before a question is no answer to it."""
 
 import asyncio
+import errno
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -105,6 +106,7 @@ class Scene:
         self.far_ends, self.ear, self.folder = far_ends, Ear(), folder
         self.said: list[str] = []
         self.guarded: list[tuple[str, list[str]]] = []
+        self.refusals: list[OSError] = []
         self.paths = {name: self.plug(name, name) for name in far_ends}
         self.ports = RigPorts(
             load_rig("paper-pull"), self.paths, self._hand_over, lambda _, text: self.said.append(text)
@@ -121,6 +123,8 @@ class Scene:
         self.far_ends[line].close()
 
     def _hand_over(self, descriptor: int) -> None:
+        if self.refusals:
+            raise self.refusals.pop()
         self.guarded.append((os.ttyname(descriptor), [*self.ear.told]))
 
 
@@ -215,6 +219,29 @@ def test_an_adapter_that_waits_before_it_tells_is_told_to_people(
         one = Scene(far_ends, tmp_path)
         await one.ports.open(is_restart=False)
         assert one.said == [f"W241 {path} waits" for path in one.paths.values()]
+        one.ports.close()
+
+    asyncio.run(scene())
+
+
+def test_an_output_that_nobody_would_guard_is_no_open_output(far_ends: dict[str, Pty], tmp_path: Path) -> None:
+    """With it open, control would set voltages that no guardian could take back."""
+    full = OSError(errno.EMFILE, "Too many open files")
+
+    async def scene() -> None:
+        one = Scene(far_ends, tmp_path)
+        one.refusals = [full, full]
+        with pytest.raises(
+            PortError, match=r"^E102 .*output is closed again, .* cannot be given this port \(.*Too many open"
+        ):
+            await one.ports.open(is_restart=False)
+        assert not one.ports.output.is_open and not one.ports.is_guarded and one.ear.told == []
+        one.ports.output.begin_lost(PortError("E102", "as after a restart"))
+        await one.ear.hears("output closed", "output opened")
+        assert one.ports.is_guarded and not one.refusals
+        assert [text.partition(" is closed")[0] for text in one.said if "closed again" in text] == [
+            f"E102 {one.paths['output']}"
+        ]
         one.ports.close()
 
     asyncio.run(scene())
