@@ -22,7 +22,8 @@ Answer = dict[str, Any]
 
 class SocketUser:
     """on_write(control): a Modbus request was taken that came this way; on_model: another set may be in use from now on;
-    on_tare: a run has begun that tares; complaints: broken answers. watched_s: when a run of this person's was looked at last, None where there is none."""
+    on_tare: a run has begun that tares; complaints: broken answers. watched_s: when a run of this person's was looked at last,
+    None where there is none."""
 
     watched_s: float | None = None
 
