@@ -196,9 +196,9 @@ class FaultCode(IntEnum):
         Explanation(
             "A355",
             "the valve's device is silent",
-            "The relay that switches push and pull did not answer within valve.timeout_s, or its port went away.",
-            "No power, a cable, a wrong baud rate or address.",
-            "Check power, cable and address of the relay, then reset with setpoint 0.",
+            "The relay that switches push and pull did not answer the question within valve.timeout_s, or its port is away.",
+            "No power, a cable, a wrong baud rate or address; a relay that refuses (the log says in which words).",
+            "Check power, cable, address and channel of the relay, then reset with setpoint 0.",
         ),
     )
     VALVE_ALTERED = (

@@ -47,11 +47,12 @@ class WireCounts:
 
 class ValveStatus(NamedTuple):
     """What the valve's line knows. stands: direction by the last readback, None before the first; unanswered_since_s: time of
-    the oldest question without an answer, None if all are answered; lost: its port is away."""
+    the oldest question without an answer, None if all are answered; said: what came in its place; lost: its port is away."""
 
     stands: ValveDirection | None = None
     unanswered_since_s: float | None = None
     lost: bool = False
+    said: str = ""
 
 
 class LineStatus(NamedTuple):

@@ -1,20 +1,23 @@
 """Both ends of the wire to a directional valve: our questions and the device's answers. Bytes in, directions out."""
 
+import re
 from collections import deque
 from typing import Final
 
 from gateway.devices.binary.raw_bytes import ByteSplitter, byte_count
-from gateway.devices.binary.rtu_framing import quiet_s
+from gateway.devices.binary.rtu_framing import exception_text, quiet_s
 from gateway.devices.framing import Line
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import Garbage
 from gateway.devices.profile import DeviceProfile, DeviceRole
+from gateway.devices.template import TEXT_CHARACTERS, quote
 from gateway.devices.valve_profile import STATE, ValveDirection, ValveReading, ValveSettings
 
 Question = ValveDirection | None
 """A direction to take, or None: which one stands?"""
 
 _DIRECTIONS: Final = tuple(ValveDirection)
+_TEXT: Final = re.compile(f"[{TEXT_CHARACTERS}]{{1,40}}".encode("ascii"))
 
 
 def _words_of(profile: DeviceProfile) -> tuple[ValveSettings, ValveReading]:
@@ -24,13 +27,15 @@ def _words_of(profile: DeviceProfile) -> tuple[ValveSettings, ValveReading]:
 
 
 class ValveHost:
-    """Our end: at most one question is out. ValueError for a profile of another role."""
+    """Our end: at most one question is out. said: what the device has said last in place of an answer, until somebody empties
+    it; empty where that is nothing, or no text. ValueError for a profile of another role."""
 
     def __init__(self, profile: DeviceProfile) -> None:
         self._settings, self._reading = _words_of(profile)
         self._grammar = Grammar(profile)
         self._lines = self._grammar.answers()
         self._expected: deque[Question] = deque(maxlen=1)
+        self.said = ""
         self.gap_s = quiet_s(profile.serial.character_s) if profile.is_modbus else 0.0
 
     def request(self, question: Question) -> bytes:
@@ -56,7 +61,7 @@ class ValveHost:
 
     def _answer(self, line: Line) -> ValveDirection | Garbage:
         body = self._grammar.body(line)
-        if body is None or not self._expected:
+        if not self._expected:
             return Garbage(line.data)
         question = self._expected[0]
         if question is not None and (answer := self._settings.of(question).answer):
@@ -66,9 +71,15 @@ class ValveHost:
             values = self._grammar.read(self._reading.answer, body)
             told = self._reading.words.get(str(values[STATE])) if values else None
         if told is None:
+            self.said = self._text_of(line, body)
             return Garbage(line.data)
         self._expected.clear()
         return told
+
+    def _text_of(self, line: Line, body: bytes | None) -> str:
+        if self._grammar.profile.is_modbus:
+            return exception_text(body) if body else ""
+        return quote(line.body.decode("ascii")) if _TEXT.fullmatch(line.body) else ""
 
 
 class ValveDevice:

@@ -97,8 +97,13 @@ class ValveSwitch:
         if status.unanswered_since_s is not None and now_s - status.unanswered_since_s > bound_s:
             silent_s = now_s - status.unanswered_since_s
             observation = f"no answer from the valve for {1e3 * silent_s:.0f} ms, allowed {1e3 * bound_s:.0f} ms"
-            return stop_cause(FaultCode.VALVE_SILENT, f"{observation}: power or wires")
+            return stop_cause(FaultCode.VALVE_SILENT, f"{observation}: {_suspects(status) or 'power or wires'}")
         if now_s - self._differs_s > bound_s:
             observation = f"the valve reads back {status.stands} and was told {self.commanded}"
-            return stop_cause(FaultCode.VALVE_ALTERED, f"{observation} {1e3 * bound_s:.0f} ms ago")
+            said = f": {suspects}" if (suspects := _suspects(status)) else ""
+            return stop_cause(FaultCode.VALVE_ALTERED, f"{observation} {1e3 * bound_s:.0f} ms ago{said}")
         return None
+
+
+def _suspects(status: ValveStatus) -> str:
+    return f"it says {status.said}; address, channel or profile of the relay?" if status.said else ""

@@ -66,6 +66,29 @@ def test_a_fault_of_the_valve_is_one_behind_its_bound_and_not_at_it(status: Valv
     assert switch.first_cause(0.5) is None and switch.first_cause(0.5625) is not None
 
 
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [
+        (ValveStatus(PULL), "told push 500 ms ago"),
+        (
+            ValveStatus(PULL, said="exception 2"),
+            "told push 500 ms ago: it says exception 2; address, channel or profile",
+        ),
+        (ValveStatus(PUSH, 0.0), "allowed 500 ms: power or wires"),
+        (
+            ValveStatus(PUSH, 0.0, said='"ERR 7"'),
+            'allowed 500 ms: it says "ERR 7"; address, channel or profile of the relay?',
+        ),
+    ],
+)
+def test_what_the_relay_says_instead_is_quoted_and_no_wire_blamed_for_it(status: ValveStatus, words: str) -> None:
+    switch = ValveSwitch(SETTINGS)
+    for k in range(9):
+        switch.step(0.0625 * k, PUSH, status, is_vented=True)
+    cause = switch.first_cause(0.5625)
+    assert cause and words in cause.sentence and ("wires" in words) == ("wires" in cause.sentence)
+
+
 def test_what_others_have_found_goes_before_a_fault_of_the_valve() -> None:
     switch = ValveSwitch(SETTINGS)
     switch.step(0.0, PUSH, ValveStatus(PUSH, lost=True), is_vented=True)

@@ -115,6 +115,11 @@ class RigPorts:
         self.loop.on_output_bytes(chunk, now_s)
 
     def _on_output_open(self, descriptor: int) -> None:
+        self._have_guarded(descriptor)
+        self.loop.on_output_opened()
+        self._warn_of_latency(self.output)
+
+    def _have_guarded(self, descriptor: int) -> None:
         try:
             self._hand_over(descriptor)
         except OSError as error:
@@ -124,8 +129,6 @@ class RigPorts:
             self._unguarded = str(refusal)
             raise refusal from error
         self.is_guarded, self._unguarded = True, ""
-        self.loop.on_output_opened()
-        self._warn_of_latency(self.output)
 
     def _on_output_lost(self, error: PortError) -> None:
         self._log("port", str(error))

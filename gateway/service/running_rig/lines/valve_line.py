@@ -28,6 +28,7 @@ class ValveExchange:
     def reset(self) -> None:
         """Forget all that was received before: the port has been opened (again)."""
         self._host.forget()
+        self._host.said = ""
         self._stands: ValveDirection | None = None
         self._asked: ValveDirection | None = None
         self._told: ValveDirection | None = None
@@ -38,7 +39,7 @@ class ValveExchange:
     @property
     def status(self) -> ValveStatus:
         """State of the valve's line now."""
-        return ValveStatus(self._stands, self._unanswered_since_s, self.lost)
+        return ValveStatus(self._stands, self._unanswered_since_s, self.lost, self._host.said)
 
     def set_direction(self, order: ValveDirection | None, now_s: float) -> None:
         """Have the valve stand there; None leaves it where it is."""
@@ -57,6 +58,8 @@ class ValveExchange:
                 continue
             if self._asked is None:
                 self._stands = reply
+                if self._order in (None, reply):  # else it may have refused to go there
+                    self._host.said = ""
                 self._next_s = now_s if self._is_untold else self._sent_s + _POLL_PERIOD_S
             else:
                 self._next_s = now_s  # read back at once

@@ -7,6 +7,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.control.settings import ValveControl
 from gateway.devices import DeviceProfile, ValveDevice, ValveDirection, ValveHost
+from gateway.devices.binary.rtu_framing import rtu_frame
 from gateway.registers.words import State
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from tests.control.bench import settings
@@ -24,6 +25,7 @@ class Relay:
         self.device, self.stands = ValveDevice(profile), stands
         self.now_s = 0.0
         self.is_deaf = self.is_stuck = False
+        self.refusal = b""  # of each setting
         self.asked: list[tuple[float, ValveDirection | None]] = []
         self.answers: list[tuple[float, bytes]] = []
         self.shown: set[ValveDirection | None] = set()
@@ -36,9 +38,10 @@ class Relay:
         assert question is None or isinstance(question, ValveDirection)
         assert not self.answers, "a second question while one is out"
         self.asked.append((self.now_s, question))
-        if question is not None and not self.is_stuck:
+        if question is not None and not self.is_stuck and not self.refusal:
             self.stands = question
-        self.answers.append((self.now_s + 0.02, self.device.reply(question, self.stands)))
+        answer = self.refusal if self.refusal and question else self.device.reply(question, self.stands)
+        self.answers.append((self.now_s + 0.02, answer))
 
     def run(self, seconds: float, order: ValveDirection | None = None) -> "Relay":
         for _ in range(round(seconds * 200)):
@@ -59,8 +62,32 @@ def test_nothing_is_known_before_the_first_readback_which_is_repeated() -> None:
     relay = Relay(PULL)
     assert relay.line.status.stands is None
     relay.run(1.0)
-    assert relay.line.status == (PULL, None, False) and relay.orders == []
+    assert relay.line.status == (PULL, None, False, "") and relay.orders == []
     assert 9 <= len(relay.asked) <= 11
+
+
+@pytest.mark.parametrize(
+    ("name", "refusal", "words"),
+    [
+        ("waveshare-relay", rtu_frame(1, b"8502"), "exception 2 (illegal data address)"),
+        ("mcu-valve", b"ERR 7\n", "'ERR 7'"),
+    ],
+)
+def test_a_relay_that_refuses_is_quoted_until_it_obeys_or_the_order_is_gone(
+    name: str, refusal: bytes, words: str
+) -> None:
+    relay = Relay(profile=load_device(name))
+    relay.run(0.3, PULL)
+    relay.refusal = refusal
+    relay.run(0.5, PUSH)
+    assert relay.line.status.stands is PULL and relay.line.status.said == words
+    assert relay.run(0.3, PULL).line.status.said == "", "it stands where it is to stand"
+    assert relay.run(0.5, PUSH).line.status.said == words
+    relay.refusal = b""
+    assert relay.run(0.5, PUSH).line.status.stands is PUSH and relay.line.status.said == ""
+    relay.refusal = refusal
+    relay.run(0.5, PULL).line.reset()
+    assert relay.line.status.said == "", "another device may be behind the port"
 
 
 def test_an_order_waits_until_the_valve_has_said_where_it_stands() -> None:
