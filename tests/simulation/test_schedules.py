@@ -172,6 +172,14 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(12.7957, "person", "say", data=b'{"do": "calibrate", "plan": {"tare": true}, "name": "3"}'),
         ],
     ),
+    (
+        4457,
+        [
+            Event(0.4551, "rival", "take", (30.77,)),
+            Event(3.2871, "machine", "stop", (0.0675, 774278.8785676397)),
+            Event(3.4592, "rival", "hold", (31.12,)),
+        ],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

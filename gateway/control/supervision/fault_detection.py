@@ -96,11 +96,15 @@ class FaultDetector:
         self._frozen.expect_noise(noise_n)
 
     def start(self) -> None:
-        """Forget what was counted before, at an enable."""
-        self._rise.start()
+        """Forget what was counted before, at an enable; what is over its bound is so, and keeps the enable back."""
+        self.start_rise()
         self._frozen.start()
+        self._stuck_s = 0.0
+
+    def start_rise(self) -> None:
+        """Take the force of now for the one at rest, which the first rise is judged from."""
+        self._rise.start()
         self._response_fault = FaultCode.NONE
-        self._over, self._stuck_s = 0, 0.0
 
     def observe(self, reading: Reading, response: ExpectedForce, branch_share: float, touching: bool) -> None:
         """Count a new sample, enabled or not."""

@@ -69,7 +69,10 @@ class Turning:
         is_left = self._follow_pressure(now_s, line.standing_v, parts.loop)
         is_vented = parts.loop.voltage_v <= 0.0 and not is_left
         is_vented = is_vented and line.standing_v is not None and line.standing_v <= NEAR_V
+        was_switching = valve.is_switching
         if not valve.step(now_s, wanted, status, is_vented=is_vented):
+            if was_switching and not valve.is_switching:
+                parts.faults.start_rise()  # what was left when the output was enabled has gone meanwhile
             return False
         direction = -1.0 if valve.is_pulling else 1.0
         self._conditioner.direction = direction

@@ -33,12 +33,12 @@ def observe(one: FaultDetector, contact_n: float, times: int) -> None:
         one.observe(WELL._replace(contact_n=contact_n), response, 1.0, True)
 
 
-def test_the_largest_force_itself_is_over_it_and_what_was_counted_before_an_enable_is_not() -> None:
+def test_the_largest_force_itself_is_over_it_and_stays_so_over_a_start() -> None:
     one, most_n = detector(), settings().limits.over_force_n
     observe(one, most_n, 2)
-    one.start()
-    observe(one, most_n, 2)
     assert fault(one) is FaultCode.NONE
+    one.start()
+    assert one.enable_block(NOW_S, WELL, READY) is RefusalReason.NOT_READY, "a valve's turn is no new beginning for it"
     observe(one, most_n, 1)
     assert fault(one) is FaultCode.OVER_FORCE
     observe(one, most_n - 0.01, 1)

@@ -34,7 +34,10 @@ class Stand:
         note = self.did.append
         self.loop = SimpleNamespace(voltage_v=0.0, branch_share=-1.0, rest=lambda: note("loop rests"))
         faults = SimpleNamespace(
-            measured_n=1.5, shift_zero=lambda n: note(f"shifted {n}"), start=lambda: note("faults start")
+            measured_n=1.5,
+            shift_zero=lambda n: note(f"shifted {n}"),
+            start=lambda: note("faults start"),
+            start_rise=lambda: note("the rise starts"),
         )
         parts = SimpleNamespace(loop=self.loop, faults=faults)
         self.machine: Any = SimpleNamespace(parts=parts, is_enabled=False, tell=note)
@@ -92,6 +95,16 @@ def test_with_the_readback_everything_turns_once() -> None:
     assert not stand.did
     stand.run(3 * TICK_S, 0.0, PULL)
     assert stand.did == ["shifted 3.0", "faults start", "loop rests", "the valve pulls"]
+
+
+def test_behind_a_switch_that_turned_nothing_the_rise_is_judged_from_there() -> None:
+    """Behind a restart the valve may still pull while control begins to push: what has gone by then has not risen."""
+    stand = Stand()
+    stand.commands.take(0.0, Command(number=2))
+    stand.run(1.0, 0.0, PULL)
+    assert stand.switch.is_switching and not stand.did
+    stand.run(1.0, 0.0, PUSH)
+    assert stand.did == ["the rise starts"]
 
 
 @pytest.mark.parametrize(("limit_n", "most_n"), [(20.0, 20.0), (100.0, 42.75)])
