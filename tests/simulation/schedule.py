@@ -31,7 +31,7 @@ from tests.simulation.kernel.virtual_time import BEGIN_S, VirtualClock, VirtualL
 from tests.simulation.masters.bus_master import make_master
 from tests.simulation.masters.integrator import Integrator, Sets
 from tests.simulation.masters.socket_user import SocketUser
-from tests.simulation.masters.spelling import BITS, DISABLED_BY_BIT, ENABLE, control_of, read_pdu
+from tests.simulation.masters.spelling import BITS, DISABLED_BY_BIT, ENABLE, control_of, hangs_payload, read_pdu
 from tests.simulation.masters.tcp_master import BEATS_S, RESET, RUNS, TARE, Master
 from tests.simulation.surroundings import Surroundings
 
@@ -153,6 +153,7 @@ class Simulation:
         self.held_force.end()
         self._heal()
         self.observer.broken += judge_audit(self._folder, self.masters["healer"].name)
+        self.observer.history.cuts.append(self.clock.now_s)  # what is on the wire now comes no more
         if self.observer.history.is_whole:
             self.observer.broken += judge_recordings(self._folder, self.observer.history)
         for client in (*self.clients, self.person):
@@ -196,6 +197,8 @@ class Simulation:
         self.status.note_write(host if is_answered else "", pdu, self.clock.now_s)
         if (control := control_of(pdu)) is not None and control & TARE:
             self._note_tare()
+        if hangs_payload(pdu):
+            self.observer.history.weighed_s = min(self.observer.history.weighed_s, self.clock.now_s)
 
     def _note_tare(self) -> None:
         self.observer.history.tares.append(self.clock.now_s)

@@ -13,6 +13,14 @@ from zlib import crc32
 import pytest
 
 from tests.simulation.judges.recording_judge import History, Row, judge_recordings, judge_rows
+from tests.simulation.masters.spelling import (
+    coil_pdu,
+    hangs_payload,
+    mask_pdu,
+    read_and_write_pdu,
+    write_one_pdu,
+    write_pdu,
+)
 
 COLUMNS = ("time_s", "force_n", "sent_v", "sent_age_s")
 
@@ -82,3 +90,35 @@ def test_a_tare_moves_the_zero_and_a_pulling_valve_turns_the_sign(tmp_path: Path
     assert judge_rows(rows, history) == []
     assert len(judge_rows(rows, replace(history, has_valve=False))) > 1
     assert len(judge_rows(rows, replace(history, tares=deque()))) == 1
+
+
+def test_a_payload_that_somebody_has_hung_moves_the_zero(tmp_path: Path) -> None:
+    history = History(weighed_s=1.5)
+    history.readings.extend((1.0 + 0.05 * number, 7.0 + 0.1 * number**2) for number in range(20))
+    row = {"sent_v": nan, "sent_age_s": nan}
+    rows = [
+        row | {"time_s": at_s - 1.0, "force_n": (force_n or 0.0) - (0.3 if at_s > 1.52 else 0.0)}
+        for at_s, force_n in history.readings
+    ]
+    assert judge_rows(rows, history) == []
+    assert "the zero at" in judge_rows(rows, replace(history, weighed_s=1.8))[0]
+
+
+@pytest.mark.parametrize(
+    ("pdu", "hangs"),
+    [
+        (write_pdu(9, 33), True),
+        (write_pdu(0, *9 * [1], 0), False),
+        (write_pdu(0, *9 * [0], 1), True),
+        (write_pdu(10, 7), False),
+        (write_pdu(218, 0x4204, 0), True),
+        (write_pdu(300, *18 * [1], 0, 0x4204), True),
+        (write_one_pdu(9, 1), True),
+        (write_one_pdu(8, 1), False),
+        (mask_pdu(9, 0xFFFF, 1), True),
+        (read_and_write_pdu(100, 1, 8, 0, 5), True),
+        (coil_pdu(9, on=True), False),
+    ],
+)
+def test_who_hangs_a_payload_is_told_by_the_request(pdu: bytes, hangs: bool) -> None:
+    assert hangs_payload(pdu) is hangs

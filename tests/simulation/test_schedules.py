@@ -180,6 +180,7 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(3.4592, "rival", "hold", (31.12,)),
         ],
     ),
+    (5017, [Event(4.2694, "worker", "ask", (0,), b"\x10\x00\t\x00\x01\x02\x00!")]),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

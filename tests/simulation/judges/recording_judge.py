@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from zlib import crc32
 
@@ -32,10 +32,12 @@ Row = dict[str, float]
 class History:
     """What came from the load cell, N (None where it was no plain reading), what reached the output, V, and when somebody
     tared, a line was cut, or control went on after a standstill; each with its time, s. is_plain: readings are sentences whose
-    number is the force; has_valve: one that pulls turns its sign."""
+    number is the force; has_valve: one that pulls turns its sign; weighed_s: from then on a payload may hang at the cell, whose
+    weight the gateway takes off."""
 
     is_plain: bool = True
     has_valve: bool = False
+    weighed_s: float = inf
     readings: deque[tuple[float, float | None]] = field(default_factory=lambda: deque(maxlen=MOST))
     settings: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=MOST))
     tares: deque[float] = field(default_factory=lambda: deque(maxlen=2_000))
@@ -113,7 +115,8 @@ def _judge_laid(
         else:
             zeros_n, before_n = _zeros(row["force_n"], force_n, history), zeros_n
             same_n = tuple(one for one in before_n if any(abs(one - other) < COUNT_N for other in zeros_n))
-            if before_n and not same_n and not _is_near(history.tares, at_s, NEW_ZERO_S):
+            is_new = at_s >= history.weighed_s or _is_near(history.tares, at_s, NEW_ZERO_S)
+            if before_n and not same_n and not is_new:
                 yield f"{force_n:.2f} N came at {at_s:.4f}, and it tells {row['force_n']:.2f} N, the zero at {before_n} N"
             zeros_n = same_n or zeros_n
         if isfinite(row["sent_v"]) and not _was_sent(row, at_s - row["sent_age_s"], settings, history):

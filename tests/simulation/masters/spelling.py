@@ -126,6 +126,17 @@ def setpoints_of(pdu: bytes) -> tuple[float, ...]:
     return ()
 
 
+PAYLOAD = (9, 1), (218, 2), (318, 2)
+"""Where it stands, and in how many words."""
+
+
+def hangs_payload(pdu: bytes) -> bool:
+    """Decide whether a write may set another payload than 0, whose weight then counts as the cell's zero."""
+    data = {6: pdu[3:5], 16: pdu[6:], 22: pdu[3:7], 23: pdu[10:]}.get(pdu[0], b"")
+    at = [(2 * (first - written_address(pdu)), 2 * count) for first, count in PAYLOAD] if data else []
+    return any(begin >= 0 and any(data[begin : begin + count]) for begin, count in at)
+
+
 def control_of(pdu: bytes) -> int | None:
     """The control word that a write would set, None where it is not among what it writes; BITS where it changes single bits,
     DISABLED_BY_BIT where enable is cleared among them."""
