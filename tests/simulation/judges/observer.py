@@ -44,8 +44,9 @@ DOWN_S = 4.0  # a run's end, whoever ends it, is a ramp down that needs no maste
 ORDER_S = 0.02  # by which the answer to an earlier write may come after that to a later one, on another wire
 UNHEARD_S = 0.1  # so late a write may be taken whose master has hung up, or fallen silent on a bus
 SENTENCE = re.compile(
-    rb"(ST|US|OL),(?:GS|NT),([ +\-.0-9]{8})(kg| N)\r\n"
+    rb"(ST|US|OL),(?:GS|NT),([ +\-.0-9]{8})(kg| N|lb)\r\n"
 )  # of the demo rig's cell; OL: beyond its range
+UNITS_N = {b"kg": 9.80665, b" N": 1.0, b"lb": 4.4482216152605}
 OVER_READINGS = 3  # in a row are over-force
 ZERO_N = 8.0  # so far may the zero have been moved by somebody who has tared
 GRACE_S = 0.05  # and two periods: a tick decides nothing within one of a sample
@@ -235,4 +236,4 @@ def _force_n(found: re.Match[bytes]) -> float:
         number = float(found[2].replace(b" ", b""))
     except ValueError:
         return nan
-    return number * (9.80665 if found[3] == b"kg" else 1.0)
+    return number * UNITS_N[found[3]]
