@@ -5,15 +5,15 @@ import struct
 import pytest
 
 from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Bounds, Observer
-from tests.simulation.judges.reason_judge import REASONS, ReasonJudge
+from tests.simulation.judges.reason_judge import REASONS, REFUSED, ReasonJudge
 
 BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05)
 SETTINGS = {"load_cell": "cell.silent", "output": "output.refuse", "valve": "valve.stuck", "force": "air.off"}
 
 
-def look(judge: ReasonJudge, fault: int, at_s: float) -> None:
+def look(judge: ReasonJudge, fault: int, at_s: float, *, refusal: int = 0) -> None:
     words = [0] * STATUS_WORDS
-    words[1], words[10] = FAULT if fault else 0, fault
+    words[1], words[10], words[19] = FAULT if fault else 0, fault, refusal
     judge.judge(struct.pack(f">{STATUS_WORDS}H", *words), at_s)
 
 
@@ -42,3 +42,15 @@ def test_a_reason_of_long_ago_is_none() -> None:
     assert not observer.broken
     look(judge, 7, 10.6)
     assert [line.partition(" at ")[0] for line in observer.broken] == ["reason"]
+
+
+@pytest.mark.parametrize("refusal", [5, *REFUSED])
+@pytest.mark.parametrize("disturbed", [None, "load_cell", "output", "valve", "machine", "force"])
+def test_a_refusal_that_blames_somebody_who_did_nothing_is_seen(refusal: int, disturbed: str | None) -> None:
+    observer = Observer(BOUNDS)
+    judge = ReasonJudge(observer)
+    if disturbed:
+        judge.note(disturbed, 9.0)
+    look(judge, 0, 10.0, refusal=refusal)
+    look(judge, 0, 10.1, refusal=refusal)
+    assert len(observer.broken) == (refusal in REFUSED and disturbed not in REFUSED[refusal]), "and told once"

@@ -18,7 +18,7 @@ from tests.simulation.judges.recording_judge import History
 
 COUNT_V = 10.0 / 1023
 FAULT = 4
-STATUS_FIRST, STATUS_WORDS = 100, 18
+STATUS_FIRST, STATUS_WORDS = 100, 20
 
 
 @dataclass(frozen=True)

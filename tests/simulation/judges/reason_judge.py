@@ -1,6 +1,7 @@
-"""Whether a fault's cause was there: who blames the load cell must have had a reason to. Knows what was done to the world and
-its wires, and no code of the gateway. Whether a master was lost (1) is judged by those who know what it had written:
-held_force.py, observer.py.
+"""Whether the cause of a fault or of a refusal was there: who blames the load cell must have had a reason to. Knows what was done
+to the world and its wires, and no code of the gateway. Whether a master was lost (1) is judged by those who know what it had
+written: held_force.py, observer.py. What is refused because of a fault, a run or an owner is not judged: these may come and go
+between two looks.
 """
 
 import struct
@@ -33,6 +34,13 @@ REASONS: dict[int, tuple[str, ...]] = {
 }
 """Of a number in fault_code: whose disturbance may be its cause. Of those that are not here none ever is."""
 MASTER_LOST = 1
+REFUSED: dict[int, tuple[str, ...]] = {
+    12: (CELL, OUTPUT, VALVE, MACHINE, FORCE),
+    13: (OUTPUT, MACHINE),
+    14: (CELL, MACHINE),
+    33: (VALVE, MACHINE),
+}
+"""The same of refusal_reason, where it is not the master that is blamed."""
 DISTURBS = {"cell": (CELL, FORCE), "output": (OUTPUT, FORCE), "wire": (CELL, OUTPUT, VALVE), "valve": (VALVE, FORCE)}
 """By what its name begins with: whom a setting of the simulated rig disturbs; the others the force."""
 
@@ -43,7 +51,7 @@ class ReasonJudge:
     def __init__(self, observer: Observer) -> None:
         self._observer = observer
         self._last_s: dict[str, float] = {}
-        self._fault = 0
+        self._fault = self._refusal = 0
 
     def note(self, whom: str, now_s: float) -> None:
         """This is disturbed now."""
@@ -56,12 +64,20 @@ class ReasonJudge:
                 self.note(whom, now_s)
 
     def judge(self, block: bytes, at_s: float) -> None:
-        """Judge the status block as it was at at_s: a fault that is new."""
+        """Judge the status block as it was at at_s: a fault or a refusal that is new."""
         words = struct.unpack(f">{STATUS_WORDS}H", block)
+        self._judge_refusal(words[19], at_s)
         before, self._fault = self._fault, words[10] if words[1] == FAULT else 0
         if self._fault in (0, before, MASTER_LOST):
             return
-        reasons = REASONS.get(self._fault, ())
+        self._judge_blame(f"fault {self._fault}", REASONS.get(self._fault, ()), at_s)
+
+    def _judge_refusal(self, refusal: int, at_s: float) -> None:
+        before, self._refusal = self._refusal, refusal
+        if refusal in REFUSED and refusal != before:
+            self._judge_blame(f"refusal {refusal}", REFUSED[refusal], at_s)
+
+    def _judge_blame(self, told: str, reasons: tuple[str, ...], at_s: float) -> None:
         if all(at_s - self._last_s.get(whom, -inf) > AFTER_S for whom in reasons):
-            told = {whom: f"{at_s - last_s:.1f} s ago" for whom, last_s in self._last_s.items()}
-            self._observer.complain("reason", f"fault {self._fault}, and what was disturbed is {told}", at_s)
+            last = {whom: f"{at_s - last_s:.1f} s ago" for whom, last_s in self._last_s.items()}
+            self._observer.complain("reason", f"{told}, and what was disturbed is {last}", at_s)
