@@ -1,7 +1,7 @@
-"""Whether the cause of a fault or of a refusal was there: who blames the load cell must have had a reason to. Knows what was done
-to the world and its wires, and no code of the gateway. Whether a master was lost (1) is judged by those who know what it had
-written: held_force.py, observer.py. What is refused because of a fault, a run or an owner is not judged: these may come and go
-between two looks.
+"""Whether the cause of a fault or of a refusal was there: who blames the load cell must have had a reason to. Knows what was
+done to the world and its wires, and no code of the gateway. Whether a master was lost (1) is judged by those who know what it
+had written: held_force.py, observer.py. What is refused because of a fault, a run or an owner is not judged: these may come
+and go between two looks.
 """
 
 import struct
