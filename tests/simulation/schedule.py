@@ -184,6 +184,8 @@ class Simulation:
 
     def _happen_then(self, event: Event, events: Iterator[Event]) -> None:
         happen(self, event)
+        if event.what == "terminate":
+            self.reasons.note(MACHINE, self.clock.now_s + DOWN_S)
         self._happen_next(events)
 
     def _expect_any_model(self) -> None:

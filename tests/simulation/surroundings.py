@@ -18,6 +18,8 @@ LOOSE_S = 0.1
 """In which a valve that was stuck goes where its relay has it."""
 UNWATCHED_S = 2.0
 """In which a device's watchdog that is not armed is looked at, and armed; a spoiled answer costs another look."""
+NOTICED_S = 0.1
+"""So long behind a loss of power it is still told: it may be shorter than from one look to the next."""
 FIRST_SETTING_S = 0.3
 """On a line that is back: a watchdog is fed before the safe voltage goes out."""
 
@@ -142,7 +144,7 @@ class Surroundings:
                 reasons.note(line, now_s)
         if self.cell_pace != 1.0:
             reasons.note(CELL, now_s)
-        if now_s < self._dark_until_s:
+        if now_s < self._dark_until_s + NOTICED_S:
             reasons.note(OUTPUT, now_s)
 
     # -- their wires

@@ -5,15 +5,15 @@ import struct
 import pytest
 
 from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Bounds, Observer
-from tests.simulation.judges.reason_judge import REASONS, REFUSED, ReasonJudge
+from tests.simulation.judges.reason_judge import REASONS, REFUSED, WARNED, ReasonJudge
 
 BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05)
 SETTINGS = {"load_cell": "cell.silent", "output": "output.refuse", "valve": "valve.stuck", "force": "air.off"}
 
 
-def look(judge: ReasonJudge, fault: int, at_s: float, *, refusal: int = 0) -> None:
+def look(judge: ReasonJudge, fault: int, at_s: float, *, refusal: int = 0, warnings: int = 0) -> None:
     words = [0] * STATUS_WORDS
-    words[1], words[10], words[19] = FAULT if fault else 0, fault, refusal
+    words[1], words[10], words[11], words[19] = FAULT if fault else 0, fault, warnings, refusal
     judge.judge(struct.pack(f">{STATUS_WORDS}H", *words), at_s)
 
 
@@ -53,4 +53,24 @@ def test_a_refusal_that_blames_somebody_who_did_nothing_is_seen(refusal: int, di
         judge.note(disturbed, 9.0)
     look(judge, 0, 10.0, refusal=refusal)
     look(judge, 0, 10.1, refusal=refusal)
-    assert len(observer.broken) == (refusal in REFUSED and disturbed not in REFUSED[refusal]), "and told once"
+    is_judged = refusal in REFUSED
+    assert len(observer.broken) == (is_judged and disturbed not in REFUSED[refusal]), "and told once"
+    for at_s, number in ((12.1, 0), (12.2, refusal)):
+        look(judge, 0, at_s, refusal=number)
+    assert len(observer.broken) == (1 + (disturbed not in REFUSED[refusal]) if is_judged else 0), "long ago"
+
+
+@pytest.mark.parametrize("bit", [5, *WARNED])
+@pytest.mark.parametrize("disturbed", [None, "load_cell", "output", "valve", "machine", "force"])
+def test_a_warning_without_its_reason_is_seen_once(bit: int, disturbed: str | None) -> None:
+    observer = Observer(BOUNDS)
+    judge = ReasonJudge(observer)
+    if disturbed:
+        judge.note(disturbed, 9.0)
+    for number in range(3):
+        look(judge, 0, 10.0 + 0.1 * number, warnings=1 << bit | 1 << 5)
+    after_s, reasons = WARNED.get(bit, (0.0, ()))
+    assert len(observer.broken) == (bit in WARNED and disturbed not in reasons)
+    look(judge, 0, 10.5)
+    look(judge, 0, 9.1 + after_s, warnings=1 << bit)
+    assert len(observer.broken) == 2 * (bit in WARNED and disturbed not in reasons) + (disturbed in reasons)

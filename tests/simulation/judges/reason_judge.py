@@ -12,6 +12,10 @@ from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Observer
 
 AFTER_S = 1.5
 """So long after its cause has ended a fault may still begin: the longest bound on silence, and two looks."""
+REOPENED_S = 3.0
+"""So long one may be refused: a port that is back is opened within two seconds."""
+WINDOW_S = 11.5
+"""So long of what is counted over ten seconds."""
 CELL, OUTPUT, VALVE, MACHINE, FORCE = "load_cell", "output", "valve", "machine", "force"
 REASONS: dict[int, tuple[str, ...]] = {
     2: (CELL, MACHINE),
@@ -42,6 +46,12 @@ REFUSED: dict[int, tuple[str, ...]] = {
 }
 """The same of refusal_reason, where it is not the master that is blamed."""
 DISTURBS = {"cell": (CELL, FORCE), "output": (OUTPUT, FORCE), "wire": (CELL, OUTPUT, VALVE), "valve": (VALVE, FORCE)}
+WARNED = {
+    0: (AFTER_S, (MACHINE,)),
+    3: (WINDOW_S, (CELL, OUTPUT, VALVE, MACHINE)),
+    4: (WINDOW_S, (MACHINE,)),
+}
+"""The same of a bit in warning_word, and how long ago that may be."""
 """By what its name begins with: whom a setting of the simulated rig disturbs; the others the force."""
 
 
@@ -51,7 +61,7 @@ class ReasonJudge:
     def __init__(self, observer: Observer) -> None:
         self._observer = observer
         self._last_s: dict[str, float] = {}
-        self._fault = self._refusal = 0
+        self._fault = self._refusal = self._warned = 0
 
     def note(self, whom: str, now_s: float) -> None:
         """This is disturbed now."""
@@ -67,6 +77,10 @@ class ReasonJudge:
         """Judge the status block as it was at at_s: a fault or a refusal that is new."""
         words = struct.unpack(f">{STATUS_WORDS}H", block)
         self._judge_refusal(words[19], at_s)
+        new, self._warned = words[11] & ~self._warned, words[11]
+        for bit, (after_s, reasons) in WARNED.items():
+            if new & 1 << bit:
+                self._judge_blame(f"warning {bit}", reasons, at_s, after_s)
         before, self._fault = self._fault, words[10] if words[1] == FAULT else 0
         if self._fault in (0, before, MASTER_LOST):
             return
@@ -75,9 +89,9 @@ class ReasonJudge:
     def _judge_refusal(self, refusal: int, at_s: float) -> None:
         before, self._refusal = self._refusal, refusal
         if refusal in REFUSED and refusal != before:
-            self._judge_blame(f"refusal {refusal}", REFUSED[refusal], at_s)
+            self._judge_blame(f"refusal {refusal}", REFUSED[refusal], at_s, REOPENED_S)
 
-    def _judge_blame(self, told: str, reasons: tuple[str, ...], at_s: float) -> None:
-        if all(at_s - self._last_s.get(whom, -inf) > AFTER_S for whom in reasons):
+    def _judge_blame(self, told: str, reasons: tuple[str, ...], at_s: float, after_s: float = AFTER_S) -> None:
+        if all(at_s - self._last_s.get(whom, -inf) > after_s for whom in reasons):
             last = {whom: f"{at_s - last_s:.1f} s ago" for whom, last_s in self._last_s.items()}
             self._observer.complain("reason", f"{told}, and what was disturbed is {last}", at_s)
