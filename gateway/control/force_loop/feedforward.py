@@ -194,6 +194,11 @@ class Feedforward:
         slopes = [max(LEAST_SLOPE_N_PER_V, curve.slope(curve.inverse(force_n)[0])) for curve in (rising, falling)]
         return 1.0 / (share / slopes[0] + (1.0 - share) / slopes[1])
 
+    def begin_at(self, contact_n: float) -> None:
+        """Begin the expected course at the force that is left of before, N: right behind a disable or a restart it still goes,
+        and a trim that took it for an error would pull the new one down with it."""
+        self.reference_n = max(0.0, contact_n)
+
     def take_over(self, force_n: float, branch_share: float = RISING) -> None:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump: what a swapped calibration
         carries over was for a voltage of ours."""

@@ -239,7 +239,10 @@ class ForceLoop:
         if self._was_touching and not inputs.touching:
             law.fall_back(goal_n)
         given_n = demand.gravity_n + inputs.outside_n
+        was_at_rest = law.applied_n <= 0.0
         moved_n = law.advance(goal_n, rate_n_per_s, inputs.dt_s, given_n)
+        if was_at_rest:
+            law.begin_at(inputs.reading.contact_n if inputs.touching else 0.0)
         self._learn(inputs, moved_n, given_n)
         model_v, by_model = law.compute_voltage(given_n)
         if isinstance(self._trim, MeasuredTrim) and self._is_correcting:

@@ -161,3 +161,28 @@ def test_a_rest_forgets_everything_that_the_output_did() -> None:
     loop.rest()
     assert (loop.voltage_v, loop.applied_n, loop.trim_v, loop.feedforward_v) == (0.0, 0.0, 0.0, 0.0)
     assert loop.limited_by is LimitedBy.NONE and not loop.in_band and not loop.unreachable and not loop.is_trim_at_limit
+
+
+@pytest.mark.parametrize("rests", [True, False])
+def test_what_is_left_of_the_force_before_is_no_error_for_the_trim(rests: bool) -> None:
+    """Behind a disable and an enable in the same tenth of a second 40 N still go: learned as an error of 35 N they would take
+    the new force away."""
+    loop = pressed(loop_of(), 40.0)
+    if rests:
+        loop.rest()
+    left_n, trims_v = 40.0, []
+    for _ in range(60):
+        left_n += (5.0 - left_n) * 0.1
+        loop.elapse(0.01, LINE)
+        loop.step(wish(5.0, ramp_n_per_s=1e3), inputs(left_n))
+        trims_v.append(loop.trim_v)
+    assert min(trims_v) > -0.1
+
+
+def test_out_of_contact_the_course_begins_at_nothing() -> None:
+    loop = loop_of()
+    loop.step(wish(5.0, ramp_n_per_s=1e3), inputs(3.0, touching=False))
+    assert loop.feedforward.reference_n < 1.0
+    again = loop_of()
+    again.step(wish(5.0, ramp_n_per_s=1e3), inputs(-3.0))
+    assert again.feedforward.reference_n == 0.0
