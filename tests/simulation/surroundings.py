@@ -110,7 +110,8 @@ class Surroundings:
         """A sentence that fits is a sample, or an answer, whoever says it: cell and output are lost from then on."""
         observer = self._observer
         observer.cell_heard_s = CABLES["load_cell"].heard_s
-        observer.answer_spoiled_s = CABLES["output"].spoiled_s
+        is_noisy = self.world.settings.number("wire.noise") > 0.0
+        observer.answer_spoiled_s = self._outside.time() if is_noisy else CABLES["output"].spoiled_s
         if observer.cell_lost_s is not None:
             observer.cell_lost_s = max(observer.cell_lost_s, CABLES["load_cell"].strange_s)
         if observer.answers_lost_s is not None:

@@ -181,6 +181,16 @@ KEPT: list[tuple[int, list[Event]]] = [
         ],
     ),
     (5017, [Event(4.2694, "worker", "ask", (0,), b"\x10\x00\t\x00\x01\x02\x00!")]),
+    (
+        11927,
+        [
+            Event(3.779, "rival", "take", (57.21,), way="read_and_write"),
+            Event(8.6198, "world", "sim", data=b'{"do": "sim", "set": {"wire.noise": 0.03135}}'),
+            Event(9.3032, "world", "sim", data=b'{"do": "sim", "set": {"cell.scale": 4.65}}'),
+            Event(9.4556, "worker", "take", (52.25,), way="read_and_write"),
+            Event(9.6263, "rival", "reset"),
+        ],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,
