@@ -1,5 +1,7 @@
 """An output that was lost owes no answer, and what is asked of one that has nothing to do."""
 
+from dataclasses import replace
+
 import pytest
 
 from gateway.devices import DeviceRole, output_device, output_host
@@ -36,3 +38,12 @@ def test_an_idle_output_is_asked_for_its_pressure_else_for_its_setting_else_for_
     profile = load_device(name)
     expected = [ReadPressure()] if profile.read_pressure else [ReadVoltage()] if profile.read_voltage else []
     assert output_host(profile).idle_questions == tuple(expected)
+
+
+@pytest.mark.parametrize("answer", ["", "OK"])
+def test_an_idle_output_that_answers_without_a_number_is_asked_for_both(answer: str) -> None:
+    """A setting that somebody has changed at its panel shows in the pressure only where that has room to move."""
+    profile = load_device("smc-itv-rc")
+    assert profile.set_voltage
+    profile = replace(profile, set_voltage=replace(profile.set_voltage, answer=answer))
+    assert output_host(profile).idle_questions == (ReadPressure(), ReadVoltage())

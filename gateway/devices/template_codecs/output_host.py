@@ -171,8 +171,9 @@ class TemplateOutputHost:
 
 
 def _idle_questions(profile: DeviceProfile) -> tuple[OutputRequest, ...]:
-    """The pressure, else the setting; both where the answer to a setting says that it was obeyed, but not with which number."""
+    """The pressure, else the setting; both where nothing is answered to a setting, or that it was obeyed, but not with which
+    number."""
     answer = profile.set_voltage.answer if profile.set_voltage else ""
-    is_unread = bool(answer) and profile.number_in(answer) is None
+    is_unread = not answer or profile.number_in(answer) is None
     questions: list[OutputRequest] = [ReadPressure()] if profile.read_pressure else []
     return (*questions, ReadVoltage()) if profile.read_voltage and (is_unread or not questions) else tuple(questions)
