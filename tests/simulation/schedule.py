@@ -17,6 +17,7 @@ from tests.simulation.draws.rigs import DEMO_CELL, LEASE_S, draw_badges, draw_ri
 from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, RATE_S, count_answers, heal
 from tests.simulation.judges.audit_judge import judge_audit
+from tests.simulation.judges.explained_force import ExplainedForce
 from tests.simulation.judges.held_force import HeldForce
 from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
 from tests.simulation.judges.reason_judge import MACHINE, ReasonJudge
@@ -91,6 +92,7 @@ class Simulation:
         SimulatedFit.on_stored, SimulatedFit.ended = staticmethod(lambda mark: self.sets.expect_mark(mark)), []
         self.status = StatusWitness(self.observer, lambda: CABLES["load_cell"].heard_s)
         self.reasons = ReasonJudge(self.observer)
+        self.explained = ExplainedForce(self.observer)
         self.held_force = HeldForce(self.observer, BEGIN_S + 2.0)
         self.service = SimulatedService(
             rig, folder, self.outside, self.log, self.clock, records=seed % RECORDED_EVERY == RECORDED
@@ -262,6 +264,7 @@ class Simulation:
                 self.status.note(pdu[2:], at_s - DELAY_S)
                 self.reasons.judge(pdu[2:], at_s - DELAY_S)
                 self.held_force.note(pdu[2:], at_s - DELAY_S)
+                self.explained.note(pdu[2:], at_s - DELAY_S, self.reasons.disturbed_s)
         self.reader.heard.clear()
         self.reader.ask(read_pdu(STATUS_FIRST, STATUS_WORDS))
         self.outside.call_later(READ_S, self._read_status)

@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Bounds, Observer
-from tests.simulation.judges.reason_judge import REASONS, REFUSED, WARNED, ReasonJudge
+from tests.simulation.judges.reason_judge import EVER_S, REASONS, REFUSED, WARNED, ReasonJudge
 
 BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05)
 SETTINGS = {"load_cell": "cell.silent", "output": "output.refuse", "valve": "valve.stuck", "force": "air.off"}
@@ -53,11 +53,12 @@ def test_a_refusal_that_blames_somebody_who_did_nothing_is_seen(refusal: int, di
         judge.note(disturbed, 9.0)
     look(judge, 0, 10.0, refusal=refusal)
     look(judge, 0, 10.1, refusal=refusal)
-    is_judged = refusal in REFUSED
-    assert len(observer.broken) == (is_judged and disturbed not in REFUSED[refusal]), "and told once"
-    for at_s, number in ((12.1, 0), (12.2, refusal)):
-        look(judge, 0, at_s, refusal=number)
-    assert len(observer.broken) == (1 + (disturbed not in REFUSED[refusal]) if is_judged else 0), "long ago"
+    after_s, reasons = REFUSED.get(refusal, (EVER_S, ()))
+    is_lie = refusal in REFUSED and disturbed not in reasons
+    assert len(observer.broken) == is_lie, "and told once"
+    look(judge, 0, 12.1)
+    look(judge, 0, 12.2, refusal=refusal)
+    assert len(observer.broken) == is_lie + (is_lie or after_s < EVER_S), "long ago"
 
 
 @pytest.mark.parametrize("bit", [5, *WARNED])

@@ -14,6 +14,7 @@ AFTER_S = 1.5
 """So long after its cause has ended a fault may still begin: the longest bound on silence, and two looks."""
 REOPENED_S = 3.0
 """So long one may be refused: a port that is back is opened within two seconds."""
+EVER_S = 1e6
 WINDOW_S = 11.5
 """So long of what is counted over ten seconds."""
 CELL, OUTPUT, VALVE, MACHINE, FORCE = "load_cell", "output", "valve", "machine", "force"
@@ -38,13 +39,14 @@ REASONS: dict[int, tuple[str, ...]] = {
 }
 """Of a number in fault_code: whose disturbance may be its cause. Of those that are not here none ever is."""
 MASTER_LOST = 1
-REFUSED: dict[int, tuple[str, ...]] = {
-    12: (CELL, OUTPUT, VALVE, MACHINE, FORCE),
-    13: (OUTPUT, MACHINE),
-    14: (CELL, MACHINE),
-    33: (VALVE, MACHINE),
+REFUSED: dict[int, tuple[float, tuple[str, ...]]] = {
+    12: (REOPENED_S, (CELL, OUTPUT, VALVE, MACHINE, FORCE)),
+    13: (EVER_S, (OUTPUT, MACHINE)),
+    14: (REOPENED_S, (CELL, MACHINE)),
+    33: (REOPENED_S, (VALVE, MACHINE)),
 }
-"""The same of refusal_reason, where it is not the master that is blamed."""
+"""The same of refusal_reason, where it is not the master that is blamed, and how long ago that may be: an output whose own
+watchdog has tripped obeys nothing until somebody resets it."""
 DISTURBS = {"cell": (CELL, FORCE), "output": (OUTPUT, FORCE), "wire": (CELL, OUTPUT, VALVE), "valve": (VALVE, FORCE)}
 WARNED = {
     0: (AFTER_S, (MACHINE,)),
@@ -62,6 +64,11 @@ class ReasonJudge:
         self._observer = observer
         self._last_s: dict[str, float] = {}
         self._fault = self._refusal = self._warned = 0
+
+    @property
+    def disturbed_s(self) -> float:
+        """When anybody was disturbed last."""
+        return max(self._last_s.values(), default=-inf)
 
     def note(self, whom: str, now_s: float) -> None:
         """This is disturbed now."""
@@ -89,7 +96,8 @@ class ReasonJudge:
     def _judge_refusal(self, refusal: int, at_s: float) -> None:
         before, self._refusal = self._refusal, refusal
         if refusal in REFUSED and refusal != before:
-            self._judge_blame(f"refusal {refusal}", REFUSED[refusal], at_s, REOPENED_S)
+            after_s, reasons = REFUSED[refusal]
+            self._judge_blame(f"refusal {refusal}", reasons, at_s, after_s)
 
     def _judge_blame(self, told: str, reasons: tuple[str, ...], at_s: float, after_s: float = AFTER_S) -> None:
         if all(at_s - self._last_s.get(whom, -inf) > after_s for whom in reasons):
