@@ -1,5 +1,5 @@
-"""Whether a force that is off is explained: where nothing is disturbed, nothing limits and no warning says why, it is where it was
-asked for. No code of the gateway is used here.
+"""Whether a force that is off is explained: where nothing is disturbed, nothing limits and no warning says why, it is where it
+was asked for. No code of the gateway is used here.
 """
 
 import struct
