@@ -112,6 +112,20 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
             {"ok": False, "written": [], "error": "force_ramp: E999 not now"},
             ["100002000102" + "0032"],
         ),
+        (
+            b'{"force_ramp": 0, "control_word": 0}',
+            {"ok": False, "written": ["control_word"], "error": "force_ramp: E999 not now"},
+            ["100000000102" + "0000", "100002000102" + "0000"],  # a stop is one, whatever stands before it
+        ),
+        (
+            b'{"no_such": 0, "control_word@float_abcd": 0}',
+            {
+                "ok": False,
+                "written": ["control_word@float_abcd"],
+                "error": "no_such is not a register; force-gateway registers lists them",
+            },
+            ["1000c8000204" + "00000000"],
+        ),
         (b'{"control_word": 0.7}', None, []),
         (b'{"control_word": 1.5}', None, []),
         (b'{"heartbeat": 0.5}', None, []),
