@@ -89,8 +89,9 @@ class SettlingCheck:
         return _MOVE if inputs.touching or applied_n != goal_n else _WAIT
 
     def judge_voltage(self, demand: Demand, inputs: LoopInputs, *, is_slewing: bool) -> StateEvent:
-        """Return the event of a step in voltage mode. is_slewing: the output is still on its way. A lower voltage is out at once,
-        and what was held before has not been held at this one."""
+        """Return the event of a step in voltage mode. is_slewing: the output is still on its way.
+
+        A lower voltage is out at once: what was held before has not been held at this one."""
         answered = is_slewing or inputs.touching or inputs.expected_n < _ANSWER_N
         self._answer.update(inputs.now_s, answered, inf)
         if is_slewing or demand.voltage_v != self._driven_v:
