@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from gateway.live.control_link import ControlLink
+from gateway.live.live_state import LiveAlarm
 from gateway.processes.json_socket.server import JsonLineServer
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.telemetry.broker_session import BrokerMessage
@@ -66,6 +67,24 @@ def test_events_wait_for_the_broker_and_forces_do_not() -> None:
     assert [one for one in drain(session) if one[0] != "online"] == [
         ("events", {"time_unix_s": 2.0, "event": "state", "value": "fault"}, False),
         ("events", {"time_unix_s": 2.0, "event": "cleared", "code": "W301"}, False),
+    ]
+
+
+def test_what_a_restart_of_control_has_changed_is_told_as_events() -> None:
+    """Who keeps an alarm log by the events hears of the restart, and that nothing presses any more."""
+    session = JsonTopics("cell", None)
+    session.begin()
+    session.greet()
+    for state, time_s in ((holding(), 1.0), (None, 2.0)):
+        session.offer(state, time_s)
+    drain(session)
+    restarted = LiveAlarm(code="W302", title="restarted", cure="look", since_unix_s=2.5)
+    session.offer(replace(holding(), state="off", warnings=(restarted,)), 3.0)
+    events = [content for name, content, _ in drain(session) if name == "events"]
+    assert [{key: event[key] for key in ("event", "value", "code") if key in event} for event in events] == [
+        {"event": "state", "value": "off"},
+        {"event": "raised", "code": "W302"},
+        {"event": "cleared", "code": "W301"},
     ]
 
 
