@@ -86,6 +86,7 @@ class CalibrationRuns:
         elif query.plan is not None:
             self._start(query)
         if refused := self._calibrating.take_refused():
+            self._continues, self._name = (), ""  # or a master's next run would bear them
             raise ValueError(refused)
         return self.status()
 
