@@ -224,6 +224,7 @@ class CalibrationRuns:
         self._is_closing = False
         self._recording.begin(self._on_opened)
         self._continues, self._name = (), ""
+        self._ended, self._result = "", {}  # of the run before, whoever has begun it
 
     def _on_opened(self, error: OSError | None) -> None:
         if error and self._calibrating.running:
