@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from gateway.codes.faults import FaultCode
 from gateway.control.runs.ladder_stairs import QUICK
 from gateway.recording import read_recording
 from gateway.registers.words import CalibrationPhase, State
@@ -251,23 +250,6 @@ def test_a_masters_run_continues_none_of_this_machines(tmp_path: Path) -> None:
         headers.append(read_recording(Path(runs.status()["recording"])).header)
     assert [(header["continues"], header["name"]) for header in headers] == [([7], "Monday"), ([], "")]
     assert headers[0]["zero_n"] == rig.controller.zero_n > 5.0
-
-
-def test_a_run_that_is_refused_in_its_step_leaves_its_name_to_no_other(tmp_path: Path) -> None:
-    """The output has refused a voltage between the last decision and the request."""
-    rig, runs, disk = on_a_hanging_disk(tmp_path)
-    runs.decide, rig.wire.fault = rig.loop.refresh, FaultCode.OUTPUT_REFUSED
-    with pytest.raises(ValueError, match="W305 calibration refused"):
-        runs.answer({"plan": SHORT, "continues": [7], "name": "Monday"})
-    rig.wire.fault = FaultCode.NONE
-    rig.run(0.1)
-    rig.write(0, CALIBRATE)
-    rig.run(0.5)
-    rig.write(0, 0)
-    rig.until(State.OFF).run(0.1)
-    disk.let_go()
-    header = read_recording(Path(runs.status()["recording"])).header
-    assert (header["continues"], header["name"]) == ([], "")
 
 
 def test_a_ladder_behind_which_no_sample_comes_is_closed_all_the_same(
