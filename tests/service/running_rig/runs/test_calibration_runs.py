@@ -224,13 +224,6 @@ def test_a_fit_that_refuses_leaves_room_for_the_next_run(tmp_path: Path, fits: F
     fits.on_result({"refused": "A332 no"})
     assert (runs.status()["phase"], runs.status()["result"]) == ("refused", {"refused": "A332 no"})
     assert rig.controller.refusal_of_run(rig.now(), QUICK) == ""
-    rig.write(0, CALIBRATE)
-    rig.run(0.5)
-    assert (runs.status()["ended"], runs.status()["result"]) == ("", {}), "that of before is none of a master's run"
-    rig.write(0, 0)
-    rig.until(State.OFF).run(0.1)
-    disk.let_go()
-    assert "stopped by 10.0.0.5" in runs.status()["ended"] and runs.status()["result"] == {}
 
 
 def test_a_masters_run_continues_none_of_this_machines(tmp_path: Path) -> None:

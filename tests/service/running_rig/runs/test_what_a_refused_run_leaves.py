@@ -1,4 +1,4 @@
-"""A run that is refused leaves nothing of itself to the next one."""
+"""A run that is refused, in its step or by its fit, leaves nothing of itself to the next one."""
 
 from pathlib import Path
 
@@ -26,3 +26,16 @@ def test_a_run_that_is_refused_in_its_step_leaves_its_name_to_no_other(tmp_path:
     disk.let_go()
     header = read_recording(Path(runs.status()["recording"])).header
     assert (header["continues"], header["name"]) == ([], "")
+
+
+def test_what_a_fit_has_refused_is_not_told_of_the_run_of_a_master_behind_it(tmp_path: Path) -> None:
+    rig, runs, disk = on_a_hanging_disk(tmp_path)
+    runs._on_result({"refused": "A332 no"})
+    assert runs.status()["result"] == {"refused": "A332 no"}
+    rig.write(0, CALIBRATE)
+    rig.run(0.5)
+    assert (runs.status()["ended"], runs.status()["result"]) == ("", {})
+    rig.write(0, 0)
+    rig.until(State.OFF).run(0.1)
+    disk.let_go()
+    assert "stopped by 10.0.0.5" in runs.status()["ended"] and runs.status()["result"] == {}
