@@ -43,7 +43,7 @@ from gateway.registers.writes.command_block import (
     CommandBlock,
     check_zeros,
 )
-from gateway.registers.writes.ownership import LastWriters, Ownership, ip_number
+from gateway.registers.writes.ownership import LastWriters, Ownership
 from gateway.registers.writes.proposed_write import Decide
 
 BITS: Final = 16
@@ -83,7 +83,6 @@ class RegisterBank:
         self._watchdogs = next((one for one in register_map.registers if one.name == "watchdogs"), None)
         self._image.put(register_map.find("map_hash"), register_map.map_hash)
         self._bits = (register_map.find("control_word").address, register_map.find("status_word").address)
-        self._shown_owner: str | None = None
         self._owner_peer = NOBODY
         self._show_owner()
         self.publish(Status())
@@ -320,10 +319,7 @@ class RegisterBank:
         self._show_owner()
 
     def _show_owner(self) -> None:
-        if self._ownership.owner != self._shown_owner:
-            self._shown_owner = self._ownership.owner
-            is_known = self._owner_peer.identity == self._shown_owner  # else the rig names it, and it has not commanded
-            self._status.show_owner(ip_number(self._owner_peer.host if is_known else self._shown_owner))
+        self._status.show_owner(self._ownership.owner, self._owner_peer)
 
     def _tell(self, sentence: str, peer: Peer) -> None:
         if self.on_accepted is not None and sentence:

@@ -11,6 +11,7 @@ from operator import attrgetter
 from struct import Struct
 from typing import Final, NamedTuple
 
+from gateway.modbus import Peer
 from gateway.registers.command import Status
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.register_map import Register, RegisterMap
@@ -22,6 +23,7 @@ from gateway.registers.values import (
     carried_by_float32,
     words_swapped_from_little_endian,
 )
+from gateway.registers.writes.ownership import ip_number
 
 _SOURCES: Final = {
     "status_word": "status_word",
@@ -101,6 +103,7 @@ class StatusBlock:
         self._scales = tuple(_scale(register) for register in published)
         self._runs = tuple(_runs(register_map, published))
         self._own = {name: _faces(register_map, name) for name in BANK_REGISTERS}
+        self._shown_owner: tuple[str | None, str] | None = None
 
     def publish(self, status: Status) -> None:
         """Write everything that control and service know into all three faces."""
@@ -128,9 +131,15 @@ class StatusBlock:
             low_first = words_swapped_from_little_endian(run.low_first.pack(*floats))
             data[run.low_first_at : run.low_first_at + len(low_first)] = low_first
 
-    def show_owner(self, number: int) -> None:
-        """Show who may command: the owner's IPv4 address as a number, 0 for nobody."""
-        self._put("owner_ip", number)
+    def show_owner(self, owner: str | None, commander: Peer) -> None:
+        """Show who may command, and from where: its IPv4 address as a number, 0 for nobody. commander: the owner that commanded
+        last; one by its certificate may come from another address than before."""
+        shown = owner, commander.host
+        if shown == self._shown_owner:
+            return
+        self._shown_owner = shown
+        is_known = commander.identity == owner  # else the rig names it, and it has not commanded
+        self._put("owner_ip", ip_number(commander.host if is_known else owner))
 
     def show_refusal(self, refusal: Refusal) -> None:
         """Show the last refused write: its address, reason and value."""

@@ -43,6 +43,9 @@ class JsonTopics:
         self._offered: BrokerMessage | None = None
         self._is_connected = False
         self._state: LiveState | None = None
+        self._answered: LiveState | None = (
+            None  # the last one that was: what a restart of control has changed is an event, too
+        )
         self._told: dict[str, Any] | None = None
         self._told_s = 0.0
 
@@ -67,12 +70,12 @@ class JsonTopics:
 
     def offer(self, state: LiveState | None, time_unix_s: float) -> None:
         """Keep what is to be told of it."""
-        for event in _events(self._state, state):
+        for event in _events(self._answered, state):
             self._keep(self._message("events", {"time_unix_s": time_unix_s} | event))
         if (state is None) != (self._state is None):
             self._state = state
             self._keep(self._online())
-        self._state = state
+        self._state, self._answered = state, state or self._answered
         told = _slow_part(state)
         if (
             told != self._told or abs(time_unix_s - self._told_s) >= _STATE_AGAIN_S

@@ -2,6 +2,8 @@
 
 `{"force_setpoint": 12.0, "control_word": 1}` asks for 12 N and enables; `{"control_word": 0}` stops. The first refusal ends
 a command; the answer says what was written. A rig with a lease wants `heartbeat` from whoever commands, as from every master.
+What does nothing but stop begins with the control word, wherever that stands: it is granted to every master, and what a master
+without the setpoint is refused before it would be the end of the stop.
 """
 
 import json
@@ -26,7 +28,7 @@ class RegisterCommands:
         """Write what the payload says; return what was written, and why no more."""
         written: list[str] = []
         try:
-            for name, value in _registers(payload).items():
+            for name, value in _in_order(_registers(payload)):
                 await self._write(name, value)
                 written.append(name)
         except (OSError, ValueError, LookupError, OverflowError) as error:
@@ -48,7 +50,22 @@ def is_stop(payload: bytes) -> bool:
         registers = _registers(payload)
     except ValueError:
         return False
-    return not any(registers.values()) and any(name.partition("@")[0] == "control_word" for name in registers)
+    return _does_stop(registers)
+
+
+def _does_stop(registers: dict[str, float]) -> bool:
+    return not any(registers.values()) and any(_is_control_word(name) for name in registers)
+
+
+def _is_control_word(name: str) -> bool:
+    return name.partition("@")[0] == "control_word"
+
+
+def _in_order(registers: dict[str, float]) -> list[tuple[str, float]]:
+    """Return them as they are to be written."""
+    if not _does_stop(registers):
+        return list(registers.items())
+    return sorted(registers.items(), key=lambda register: not _is_control_word(register[0]))
 
 
 def _registers(payload: bytes) -> dict[str, float]:

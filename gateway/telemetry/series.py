@@ -49,8 +49,11 @@ def _known(value: float | None) -> Iterator[Sample]:
 
 
 def _error_n(state: LiveState) -> float | None:
+    """Setpoints are positive where the tool pulls, too, and the measured force is negative there."""
     measured_n = state.force.measured_n
-    return None if measured_n is None else state.force.applied_n - measured_n
+    if measured_n is None:
+        return None
+    return state.force.applied_n - (-measured_n if "pulling" in state.status else measured_n)
 
 
 def _pressure_pa(state: LiveState) -> float | None:
@@ -106,10 +109,12 @@ _FORCE: Final = (
     _gauge("setpoint_requested_newtons", "N", "Force that the master asks for.", lambda s: s.force.requested_n),
     _gauge("setpoint_accepted_newtons", "N", "Force that control has accepted.", lambda s: s.force.accepted_n),
     _gauge("setpoint_applied_newtons", "N", "Force that control aims at now (ramped).", lambda s: s.force.applied_n),
-    _gauge("force_error_newtons", "N", "Applied setpoint less measured force.", _error_n),
+    _gauge("force_error_newtons", "N", "Applied setpoint less measured force, in the tool's direction.", _error_n),
     _gauge("tolerance_newtons", "N", "Half the band that counts as holding.", lambda s: s.limits.tolerance_n),
     _gauge("force_max_newtons", "N", "Largest setpoint that is allowed.", lambda s: s.limits.force_max_n),
-    _gauge("model_residual_newtons", "N", "Model less measured force.", lambda s: s.force.model_residual_n),
+    _gauge(
+        "model_residual_newtons", "N", "Measured force less what the model expects.", lambda s: s.force.model_residual_n
+    ),
     _gauge("voltage_volts", "V", "Voltage at the output.", lambda s: s.force.voltage_v),
     _gauge("feedforward_volts", "V", "The model's share of it.", lambda s: s.force.feedforward_v),
     _gauge("trim_volts", "V", "The trim's share of it.", lambda s: s.force.trim_v),

@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.map.register_map import Register
-from gateway.registers.words import ControlBit
+from gateway.registers.words import ControlBit, Mode
 from gateway.web.context import WebContext
 
 GRACE_S: Final = 2.5
@@ -84,16 +84,17 @@ class Commands:
         stops = self._stops
         if self._context.profile.network.require_byte_order_echo:
             await self._write("byte_order_echo@proof", _PROOF)
-        word = await self._control_word() | ControlBit.ENABLE
+        words = await self._words_of_force(force_n)
         if stops != self._stops:
             raise RefusedCommand("stopped meanwhile: nothing was enabled")
-        await self._write_command(word, self._checked(force_n))
+        words[0] |= int(ControlBit.ENABLE)
+        await self._write_words("control_word", words)
         if stops == self._stops:  # else the stop is right behind it
             self._begin_to_beat(viewer)
 
     async def set_force(self, viewer: str, force_n: float) -> None:
         """Change the setpoint, N."""
-        await self._write("force_setpoint", self._checked(force_n))
+        await self._write_words("force_setpoint", (await self._words_of_force(force_n))[1:])
         self._begin_to_beat(viewer)
 
     async def stop(self) -> None:
@@ -115,7 +116,7 @@ class Commands:
         words = (await self.words("command"))[: beat + 1 - first]
         words[0], words[self._find("force_setpoint").address - first] = words[0] | int(ControlBit.RESET_FAULT), 0
         words[-1] = self._number = words[-1] % 65535 + 1
-        await self._send(P.write_registers_request(first, struct.pack(f">{len(words)}H", *words)))
+        await self._write_words("control_word", words)
         self._begin_to_beat(viewer)
 
     async def tare(self) -> None:
@@ -152,25 +153,24 @@ class Commands:
             raise RefusedCommand("a force in newtons is expected")
         return force_n
 
-    async def _control_word(self) -> int:
-        word = int.from_bytes(await self._read("control_word"), "big")
-        return word & ~(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
+    async def _words_of_force(self, force_n: float) -> list[int]:
+        """Return control_word, with the bits that stand, and force_setpoint; where another master has left voltage for a mode,
+        in which a force would mean nothing, what lies between them and force as mode as well: all for one write."""
+        setpoint = self._encode(self._find("force_setpoint"), self._checked(force_n))
+        place = self._find("mode").address - self._find("control_word").address
+        words = await self.words("command")
+        words[1], is_force = int.from_bytes(setpoint, "big"), words[place] == Mode.FORCE
+        words[place] = int(Mode.FORCE)
+        return words[: 2 if is_force else place + 1]
 
-    async def _write_command(self, control_word: int, force_n: float) -> None:
-        """Word and setpoint in one write: control decides about both together."""
-        word, force = self._find("control_word"), self._find("force_setpoint")
-        if force.address != word.address + 1:
-            raise RefusedCommand("this register map has the setpoint elsewhere than behind the control word")
-        data = word.encode(control_word) + self._encode(force, force_n)
-        await self._send(P.write_registers_request(word.address, data))
+    async def _write_words(self, name: str, words: list[int]) -> None:
+        """Write a row of registers that begins with this one."""
+        data = struct.pack(f">{len(words)}H", *words)
+        await self._send(P.write_registers_request(self._find(name).address, data))
 
     async def _set_bit(self, bit: ControlBit) -> None:
         address = self._find("control_word").address
         await self._send(P.mask_write_request(address, 0xFFFF & ~int(bit), int(bit)))
-
-    async def _read(self, name: str) -> bytes:
-        register = self._find(name)
-        return (await self._send(P.read_request(P.READ_HOLDING_REGISTERS, register.address, register.words)))[2:]
 
     async def _write(self, name: str, value: float) -> None:
         register = self._find(name)

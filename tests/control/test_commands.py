@@ -15,7 +15,7 @@ from gateway.control.command_edges import CommandTracker
 from gateway.control.demand import demand_of
 from gateway.devices.messages import Quality
 from gateway.registers.command import Command
-from gateway.registers.words import LimitedBy, State, StatusBit
+from gateway.registers.words import ControlBit, LimitedBy, Mode, State, StatusBit
 from tests.control.bench import Bench, settings
 
 
@@ -98,6 +98,20 @@ def test_in_band_is_left_when_the_force_leaves():
     bench.run(0.02)
     assert bench.last.state is State.RAMPING
     assert not bench.last.status & StatusBit.IN_BAND
+
+
+@pytest.mark.parametrize("before", [{"mode": Mode.VOLTAGE, "voltage_setpoint_v": 5.0}, {"force_setpoint_n": 30.0}])
+def test_in_band_begins_anew_at_each_voltage_also_at_a_lower_one_that_is_out_at_once(before):
+    bench = enabled()
+    bench.write(control_word=ControlBit.ENABLE, in_band_time_s=0.5, **before)
+    assert bench.run(2.0).status & StatusBit.IN_BAND
+    output = bench.write(mode=Mode.VOLTAGE, voltage_setpoint_v=2.0)
+    assert (output.voltage_v, output.state) == (2.0, State.RAMPING)
+    assert not output.status & StatusBit.IN_BAND, "the force is still that of before"
+    held_s = bench.seconds_until(lambda output: bool(output.status & StatusBit.IN_BAND), 2.0)
+    assert held_s == pytest.approx(0.5, abs=0.02)
+    bench.write(heartbeat=7)
+    assert bench.last.status & StatusBit.IN_BAND, "the same voltage again changes nothing"
 
 
 def test_stop_ramps_to_zero_within_the_time_and_ends_in_off():

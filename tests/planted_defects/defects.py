@@ -377,7 +377,7 @@ DEFECTS = (
            "        self._ownership.release()\n        self._show_owner()\n", "        self._ownership.release()\n",
            ("registers/bank/test_ownership.py",)),
     Defect("an enable from the page turns the valve", "web/commands.py",
-           "word = await self._control_word() | ControlBit.ENABLE", "word = ControlBit.ENABLE",
+           "words[0] |= int(ControlBit.ENABLE)", "words[0] = int(ControlBit.ENABLE)",
            ("web/test_commands.py",)),
     Defect("a browser that closes one of two tabs is gone", "web/events.py",
            "if not any(other.name == name for other in self._viewers):", "if True:",

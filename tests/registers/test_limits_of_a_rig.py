@@ -6,7 +6,7 @@ import pytest
 
 from gateway.codes.refusals import RefusalReason
 
-FORCE, FORCE_FLOAT, MODE_FLOAT, PRECONTACT = 1, 202, 206, 7
+FORCE, FORCE_FLOAT, MODE_FLOAT, PRECONTACT, VOLTAGE = 1, 202, 206, 7, 5
 
 
 def test_the_least_force_of_a_rig_and_0_are_taken_in_words_and_floats(make_bank, master_of):
@@ -51,3 +51,32 @@ def test_a_limit_is_told_with_what_has_set_it(make_bank, master_of):
     assert "(calibration 3)" in master.refusal(master.write, FORCE, 6001).sentence
     assert "(rig demo)" in master.refusal(master.write, 5, 8001).sentence
     assert "(map force-v1)" in master.refusal(master.write, 8, 10001).sentence
+
+
+def test_a_number_is_the_same_command_as_a_word_and_as_a_float(make_bank, master_of):
+    """2.3 and 40.2 are no float32: the nearest one is a little less, or a little more, than what is meant."""
+    bank = make_bank(force_max_n=327.67)
+    master = master_of(bank, "10.0.0.1")
+    for count in range(1, 32768, 37):
+        master.write(FORCE, count)
+        by_word = bank.command.force_setpoint_n
+        master.write_float(FORCE_FLOAT, count / 100)
+        assert bank.command.force_setpoint_n == by_word
+        assert master.float(FORCE_FLOAT) == struct.unpack(">f", struct.pack(">f", count / 100))[0], "as it was written"
+
+
+@pytest.mark.parametrize("limit_n", [40.2, 40.205, 40.200000123])
+def test_a_float_at_the_limit_is_the_limit_and_no_more(make_bank, master_of, limit_n):
+    bank = make_bank(force_max_n=limit_n)
+    master_of(bank, "10.0.0.1").write_float(FORCE_FLOAT, limit_n)
+    assert bank.command.force_setpoint_n <= limit_n
+
+
+def test_the_largest_voltage_of_a_rig_is_taken_whatever_it_is(make_bank, master_of):
+    """1000 times 8.03 is 8029.999999999999."""
+    for millivolts in range(1, 10001, 7):
+        master = master_of(make_bank(voltage_max_v=millivolts / 1000), "10.0.0.1")
+        master.write(VOLTAGE, millivolts)
+        assert master.word(VOLTAGE) == millivolts
+        if millivolts < 10000:
+            master.refusal(master.write, VOLTAGE, millivolts + 1)

@@ -270,3 +270,23 @@ def test_a_refusal_names_the_register_of_the_bad_float_and_not_the_first_one(mas
     for words in ((226, 1.0), (224, 0.0, 1.0)):
         refusal = master.refusal(master.write_float, *words)
         assert (refusal.reason, refusal.address) == (RefusalReason.RESERVED, 226)
+
+
+@pytest.mark.parametrize("other_word", [0, 1, RESET])
+def test_behind_a_run_no_other_master_lets_its_bit_go(make_bank, master_of, other_word: int) -> None:
+    """Else a Stop or a reset from the page would have the controller that holds the bit begin the next run at once."""
+    bank = make_bank(supported_bits=ALL)
+    holder, other = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
+    for _ in range(2):
+        holder.write(0, TEST)
+    bank.clear_command()  # the run has ended, and nobody owns
+    assert holder.refusal(holder.write, 0, TEST).reason is RefusalReason.CALIBRATION_HELD
+    other.write(0, other_word)
+    other.write(0, 0)
+    assert holder.refusal(holder.write, 0, TEST).reason is RefusalReason.CALIBRATION_HELD
+    other.write(0, TEST)  # it has held nothing
+    bank.clear_command()
+    assert holder.refusal(holder.write, 0, TEST).reason is RefusalReason.CALIBRATION_HELD
+    holder.write(0, 0)
+    holder.write(0, TEST)
+    assert bank.command.control_word == TEST

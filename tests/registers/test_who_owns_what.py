@@ -14,6 +14,7 @@ from gateway.registers.writes.ownership import (
     serial_host,
     serial_place,
 )
+from tests.registers.conftest import Master
 
 COMMANDS, COMMANDS_NOTHING = (
     {"takes_over": False, "stops": False, "asks": True},
@@ -163,3 +164,14 @@ def test_the_byte_order_of_sixty_four_hosts_is_remembered(make_bank, master_of, 
             assert bank._echo.is_proven_by("10.0.1.0")
         master_of(bank, f"10.0.1.{number}").write_float(address, 1234.5)
     assert not bank._echo.is_proven_by("10.0.1.0") and bank._echo.is_proven_by("10.0.1.1")
+
+
+def test_the_owner_s_address_is_that_of_its_last_command(make_bank, register_map) -> None:
+    """One certificate, two addresses: a pair of controllers of which the other one has gone on."""
+    bank, address = make_bank(), register_map.find("owner_ip").address
+    first, second = (Master(bank, host, name="plc") for host in ("10.0.0.1", "10.0.0.2"))
+    shown = []
+    for master in (first, second, first):
+        master.write(0, 1, 1200)
+        shown.append(bank.read_registers(address, 2)[-1])
+    assert shown == [1, 2, 1] and bank.owner == "certificate plc"

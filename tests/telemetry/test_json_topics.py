@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from gateway.live.control_link import ControlLink
+from gateway.live.live_state import LiveAlarm
 from gateway.processes.json_socket.server import JsonLineServer
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.telemetry.broker_session import BrokerMessage
@@ -69,6 +70,24 @@ def test_events_wait_for_the_broker_and_forces_do_not() -> None:
     ]
 
 
+def test_what_a_restart_of_control_has_changed_is_told_as_events() -> None:
+    """Who keeps an alarm log by the events hears of the restart, and that nothing presses any more."""
+    session = JsonTopics("cell", None)
+    session.begin()
+    session.greet()
+    for state, time_s in ((holding(), 1.0), (None, 2.0)):
+        session.offer(state, time_s)
+    drain(session)
+    restarted = LiveAlarm(code="W302", title="restarted", cure="look", since_unix_s=2.5)
+    session.offer(replace(holding(), state="off", warnings=(restarted,)), 3.0)
+    events = [content for name, content, _ in drain(session) if name == "events"]
+    assert [{key: event[key] for key in ("event", "value", "code") if key in event} for event in events] == [
+        {"event": "state", "value": "off"},
+        {"event": "raised", "code": "W302"},
+        {"event": "cleared", "code": "W301"},
+    ]
+
+
 def test_a_control_that_does_not_answer_is_offline_without_an_old_state() -> None:
     session = JsonTopics("cell", None)
     session.begin()
@@ -111,6 +130,20 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
             b'{"force_ramp": 5, "control_word": 1}',
             {"ok": False, "written": [], "error": "force_ramp: E999 not now"},
             ["100002000102" + "0032"],
+        ),
+        (
+            b'{"force_ramp": 0, "control_word": 0}',
+            {"ok": False, "written": ["control_word"], "error": "force_ramp: E999 not now"},
+            ["100000000102" + "0000", "100002000102" + "0000"],  # a stop is one, whatever stands before it
+        ),
+        (
+            b'{"no_such": 0, "control_word@float_abcd": 0}',
+            {
+                "ok": False,
+                "written": ["control_word@float_abcd"],
+                "error": "no_such is not a register; force-gateway registers lists them",
+            },
+            ["1000c8000204" + "00000000"],
         ),
         (b'{"control_word": 0.7}', None, []),
         (b'{"control_word": 1.5}', None, []),

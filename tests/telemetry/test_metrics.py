@@ -19,7 +19,7 @@ from gateway.processes.json_socket.server import JsonLineServer
 from gateway.telemetry import metrics_process
 from gateway.telemetry.exposition import exposition
 from gateway.telemetry.metrics_process import ReadingCollector, make_metrics_app, read_gateway
-from gateway.telemetry.series import SERIES
+from gateway.telemetry.series import SERIES, GatewayReading
 from gateway.web.impatient_http import ImpatientProtocol
 from tests.telemetry.readings import HEALTH, holding, reading, without_sample
 from tests.web.asgi import call
@@ -85,6 +85,15 @@ def test_without_a_gateway_the_scrape_says_down(tmp_path: Path) -> None:
 def test_a_series_has_its_value_in_base_units(name: str, labels: dict[str, str], value: float) -> None:
     found = samples("\n".join(exposition(reading())) + "\n")
     assert found["force_gateway_" + name, frozenset(labels.items())] == pytest.approx(value)
+
+
+def test_the_error_of_a_pull_is_that_of_the_push_it_mirrors() -> None:
+    """Its setpoint is positive, and what the cell measures is negative."""
+    state = holding()
+    pull = replace(state, status=("enabled", "pulling"), force=replace(state.force, measured_n=-11.5))
+    found = samples("\n".join(exposition(GatewayReading(pull, HEALTH))) + "\n")
+    assert found["force_gateway_force_newtons", frozenset()] == -11.5
+    assert found["force_gateway_force_error_newtons", frozenset()] == pytest.approx(0.5)
 
 
 def test_a_force_that_is_not_measured_is_left_out() -> None:

@@ -72,6 +72,26 @@ def test_a_force_is_held_changed_and_stopped(tmp_path: Path) -> None:
     play(tmp_path, scene)
 
 
+def test_a_force_is_a_force_whatever_mode_another_master_has_left(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
+        commands.join("me")
+        wired.write(0, 1, 0, 55, 1, 0, 2000)
+        wired.run(1.0)
+        wired.write(0, 0)
+        await commands.enable("me", 12.0)
+        wired.until(lambda: wired.state is State.HOLDING, 3.0)
+        assert abs(wired.force_n - 12.0) < 1.0 and wired.word("force_ramp") == 55
+        await commands.stop()
+        wired.write(0, 1, 0, 0, 1, 0, 2000)
+        wired.run(1.0)
+        await commands.take_ownership("me")
+        await commands.set_force("me", 8.0)
+        wired.until(lambda: abs(wired.force_n - 8.0) < 1.0, 3.0)
+
+    play(tmp_path, scene)
+
+
 def test_stop_ends_the_force_of_another_master_and_nothing_else_does(tmp_path: Path) -> None:
     async def scene(commands: Commands, stage: Stage) -> None:
         wired = stage.wired
@@ -137,7 +157,7 @@ def test_an_enable_leaves_the_valve_where_it_stands() -> None:
         async def ask(self, request: dict[str, Any]) -> dict[str, Any]:
             pdu = bytes.fromhex(request["pdu"])
             if pdu[0] == P.READ_HOLDING_REGISTERS:
-                return {"pdu": bytes((pdu[0], 2, 0, ControlBit.VALVE_PULL)).hex()}
+                return {"pdu": bytes((pdu[0], 2 * pdu[4], 0, ControlBit.VALVE_PULL, *bytes(2 * pdu[4] - 2))).hex()}
             written.append(pdu)
             return {"pdu": pdu[:5].hex()}
 

@@ -66,7 +66,8 @@ def test_a_beat_that_is_refused_now_and_then_ends_nothing() -> None:
             beats[0] += is_beat
             if is_beat and beats[0] % 3:
                 return {"pdu": bytes((pdu[0] | 0x80, 6)).hex()}
-            return {"pdu": (bytes((3, 2, 0, 0)) if pdu[0] == P.READ_HOLDING_REGISTERS else pdu[:5]).hex()}
+            is_read = pdu[0] == P.READ_HOLDING_REGISTERS
+            return {"pdu": (bytes((3, 2 * pdu[4], *bytes(2 * pdu[4]))) if is_read else pdu[:5]).hex()}
 
     async def run() -> None:
         context = WebContext(Path(), "demo", True, Moody())  # type: ignore[arg-type]

@@ -18,7 +18,7 @@ WINDOW_S: Final = 60.0
 
 @dataclass(frozen=True, slots=True)
 class TrackPoint:
-    """Setpoint and measured force of one poll, N; time in s."""
+    """Setpoint of one poll, and the force measured in the tool's direction, N; time in s."""
 
     time_s: float
     measured_n: float
@@ -61,7 +61,7 @@ class Track:
         self.readings = {reading.register.name: reading for reading in readings}
         for name, reading in self.readings.items():
             self._note_change(name, reading.words)
-        point = TrackPoint(time_s, self.value("force_measured"), self.wanted_n)
+        point = TrackPoint(time_s, self.acting_n, self.wanted_n)
         self._settle(point)
         self.points.append(point)
         while self.points[0].time_s < time_s - WINDOW_S:
@@ -81,6 +81,12 @@ class Track:
     def wanted_n(self) -> float:
         """The setpoint; in a calibration or an experiment its own target, N."""
         return self.value("force_accepted" if self.is_calibrating else "force_requested")
+
+    @property
+    def acting_n(self) -> float:
+        """The measured force in the tool's direction, as setpoints count: the register is negative where the tool pulls."""
+        measured_n = self.value("force_measured")
+        return -measured_n if self.has_status(StatusBit.PULLING) else measured_n
 
     def change_age_s(self, name: str) -> float | None:
         """Return how long ago a register changed; None when it has not since the monitor began."""

@@ -97,7 +97,7 @@ def _numbers(view: View) -> list[Text]:
     numbers = (
         ("measured N", measured_n, 2, "-", "bold cyan"),
         ("target N" if track.is_calibrating else "setpoint N", setpoint_n, 2, "-", "yellow"),
-        ("error N", measured_n - setpoint_n, 2, "+", "green" if track.has_status(StatusBit.IN_BAND) else "white"),
+        ("error N", track.acting_n - setpoint_n, 2, "+", "green" if track.has_status(StatusBit.IN_BAND) else "white"),
         ("output V", track.value("output_voltage") / 1e3, 3, "-", "magenta"),
     )
     boxes = []

@@ -8,7 +8,7 @@ from gateway.cli.command_line.numbers import describe_allowed
 from gateway.cli.master.client import RegisterReading
 from gateway.registers import Register
 from gateway.registers.values import RAW_LIMITS
-from gateway.registers.writes.ownership import LARGEST_SERIAL_PLACE, serial_host
+from gateway.registers.writes.ownership import LARGEST_SERIAL_PLACE, NOT_IPV4, serial_host
 
 
 def parse_value(register: Register, text: str) -> bytes:
@@ -60,6 +60,8 @@ def format_value(reading: RegisterReading) -> str:
 def _owner(number: int) -> str:
     if number == 0:
         return "nobody"
+    if number == NOT_IPV4:
+        return "somebody without an IPv4 address"
     return serial_host(number) if number <= LARGEST_SERIAL_PLACE else str(IPv4Address(number))
 
 

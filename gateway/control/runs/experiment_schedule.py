@@ -7,7 +7,7 @@ from itertools import accumulate, pairwise
 from math import isfinite
 from typing import Final
 
-from gateway.bsfm import Bsfm, InverseStatus
+from gateway.bsfm import RISING, Bsfm, InverseStatus
 from gateway.control.runs.experiment_plan import MOST_SEGMENTS, ExperimentPlan, Move, MoveKind, plan_faults
 from gateway.control.runs.ladder_stairs import highest_voltage_v
 from gateway.control.settings import Limits
@@ -49,17 +49,17 @@ class _Range:
         return self.check_level_v(float(volts or 0.0), level_text)
 
     def _of_force(self, force_n: float) -> tuple[float, str]:
-        volts, status = self.model.branches.rising.inverse(force_n)
+        volts, status = self.model.voltage_v(force_n, RISING)
         if status is InverseStatus.HIGH:
             raise ValueError(
-                f"{force_n:g} N, allowed up to {self.model.branches.rising.value(self.top_v):.1f} N (calibration in use)"
+                f"{force_n:g} N, allowed up to {self.model.force_n(self.top_v, RISING):.1f} N (calibration in use)"
             )
         return max(volts, self.low_v), f"{force_n:g} N"
 
     def check_level_v(self, volts: float, level_text: str) -> float:
         """Return a voltage of the plan; ValueError where it is outside the rig's range. level_text: how the plan names it."""
         if not (isfinite(volts) and self.low_v - _SLACK_V <= volts <= self.top_v + _SLACK_V):
-            low_n, high_n = (self.model.branches.rising.value(end_v) for end_v in (self.low_v, self.top_v))
+            low_n, high_n = (self.model.force_n(end_v, RISING) for end_v in (self.low_v, self.top_v))
             raise ValueError(
                 f"{level_text}, allowed {self.low_v:g} .. {self.top_v:g} V (about {max(0.0, low_n):.0f} .. {high_n:.0f} N): "
                 f"beyond lie the rig's limits (force_max_n = {self.limits.force_max_n:g} N), the end of the calibration in "

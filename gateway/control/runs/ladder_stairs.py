@@ -85,7 +85,7 @@ def highest_voltage_v(limits: Limits, model: Bsfm) -> float:
     """Return how high limits and calibration let a run go, to a hundredth of a volt: not near the over-force trip or
     force_max_n."""
     allowed_v = min(limits.voltage_max_v, model.voltage_range_v[1])
-    force_v, _ = model.branches.rising.inverse(highest_force_n(limits))
+    force_v, _ = model.voltage_v(highest_force_n(limits), float(RISING))
     return int(100.0 * min(allowed_v, force_v) + 1.0e-6) / 100.0
 
 
@@ -132,7 +132,7 @@ def _check(plan: CalibrationPlan, top_v: float) -> None:
 
 def check_stairs(top_v: float, model: Bsfm) -> tuple[PlannedStair, ...]:
     """Return the coarse cycle at the beginning of a run, up to top_v."""
-    first_v, _ = model.branches.rising.inverse(FIRST_STAIR_N + model.branches.rising.value(0.0))
+    first_v, _ = model.voltage_v(FIRST_STAIR_N + model.branches.rising.value(0.0), float(RISING))
     voltages = [min(first_v, 0.2 * top_v), *(share * top_v for share in CHECK_SHARES)]
     ways = [RISING if b > a else FALLING for a, b in zip([0.0, *voltages], voltages, strict=False)]
     return tuple(

@@ -120,9 +120,9 @@ def verdict_of(findings: dict[Item, Finding], item: Item) -> SelfTestVerdict:
 
 
 def _result(findings: tuple[Finding, ...], ending: RunEnding) -> SelfTestResult:
-    if ending.fault:
+    if ending.fault and ending.fault is not FaultCode.MASTER_LOST:
         return SelfTestResult.FAILED
-    if not ending.is_done:
+    if not ending.is_done:  # also by a master that has gone, where the rig makes a fault of it: that is about no item
         return SelfTestResult.STOPPED
     worst = max(found.verdict for found in findings)
     is_whole = not ending.wants_force or all(

@@ -7,7 +7,7 @@ below the stated force, there are none.
 
 from typing import Final
 
-from gateway.bsfm.ladder.plan import RISING
+from gateway.bsfm.ladder.plan import FALLING, RISING
 from gateway.control.self_test.judgement import Known
 
 FORCE_SHARE: Final = 0.8  # of the stated force: what is meant to be reached
@@ -69,12 +69,11 @@ class Levels:
     def _loosened_v(self) -> float:
         """Voltage that stays below the stated force even if something (a spindle) shakes the friction loose: then the slide
         presses with what lies between the branches."""
-        branches = self._known.model.branches
-        most_n = (1.0 - NEAR_SHARE) * self._force_n
-        low_v, high_v = branches.falling.inverse(most_n)[0], branches.rising.inverse(most_n)[0]
+        model, most_n = self._known.model, (1.0 - NEAR_SHARE) * self._force_n
+        low_v, high_v = model.voltage_v(most_n, float(FALLING))[0], model.voltage_v(most_n, float(RISING))[0]
         for _ in range(_HALVINGS):
             mid_v = 0.5 * (low_v + high_v)
-            if self._known.model.force_n(mid_v, 0.0) > most_n:
+            if model.force_n(mid_v, 0.0) > most_n:
                 high_v = mid_v
             else:
                 low_v = mid_v
@@ -82,4 +81,4 @@ class Levels:
 
     def _voltage_v(self, force_n: float) -> float:
         limits = self._known.settings.limits
-        return min(limits.voltage_max_v, self._known.model.branches.rising.inverse(force_n)[0])
+        return min(limits.voltage_max_v, self._known.model.voltage_v(force_n, float(RISING))[0])

@@ -53,6 +53,7 @@ class SettlingCheck:
     def __init__(self, unreachable_s: float) -> None:
         self._band = InBandTimer(unreachable_s)
         self._answer = InBandTimer(unreachable_s)
+        self._driven_v: float | None = None  # that the band is of; None: it is of a force, or of nothing
 
     @property
     def in_band(self) -> bool:
@@ -68,10 +69,12 @@ class SettlingCheck:
         """Restart all timers: no setpoint is pursued."""
         self._band.restart()
         self._answer.restart()
+        self._driven_v = None
 
     def judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float, applied_n: float) -> StateEvent:
         """Return the event of a step in force mode. goal_n: where the ramp of the applied force leads."""
         self._answer.restart()
+        self._driven_v = None
         if demand.force_n <= 0.0:
             self._band.restart()
             return _WAIT if applied_n <= 0.0 else _MOVE
@@ -86,9 +89,14 @@ class SettlingCheck:
         return _MOVE if inputs.touching or applied_n != goal_n else _WAIT
 
     def judge_voltage(self, demand: Demand, inputs: LoopInputs, *, is_slewing: bool) -> StateEvent:
-        """Return the event of a step in voltage mode. is_slewing: the output is still on its way."""
+        """Return the event of a step in voltage mode. is_slewing: the output is still on its way.
+
+        A lower voltage is out at once: what was held before has not been held at this one."""
         answered = is_slewing or inputs.touching or inputs.expected_n < _ANSWER_N
         self._answer.update(inputs.now_s, answered, inf)
+        if is_slewing or demand.voltage_v != self._driven_v:
+            self._driven_v = demand.voltage_v
+            self._band.restart()
         if is_slewing or demand.voltage_v <= 0.0:
             self._band.restart()
             return _MOVE if is_slewing else _WAIT

@@ -38,6 +38,7 @@ STARTS: Final = ENABLE | RUN_BITS
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
 ALL_BITS: Final = 0xFFFF
+_MOST_HOLDERS: Final = 64  # memory stays bounded whoever writes
 _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
 
 
@@ -53,7 +54,7 @@ class Write(NamedTuple):
 
 class AdmittedWrite(NamedTuple):
     """values: to store; kept: control word that reads back; command: what control gets, edge bits included; is_stop: the
-    output goes off; is_taken_over: this host owns from now on, explicitly; held: bits of runs that stay at 1."""
+    output goes off; is_taken_over: this host owns from now on, explicitly; held: bits of runs that this host keeps at 1."""
 
     values: Values
     kept: int
@@ -96,7 +97,7 @@ class Admission:
         self._ownership = ownership
         self._echo = echo
         self._rules = rules
-        self._held = 0
+        self._held: dict[str, int] = {}
 
     def admit(self, write: Write, number: int, now_s: float) -> AdmittedWrite | None:
         """Return what a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
@@ -129,13 +130,18 @@ class Admission:
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered."""
-        self._held = admitted.held
+        host = admitted.command.peer
+        self._held.pop(host, None)
+        if admitted.held:
+            self._held[host] = admitted.held
+            if len(self._held) > _MOST_HOLDERS:
+                del self._held[next(iter(self._held))]
         self.lowered_from_n = admitted.command.lowered_from_n
 
     def _is_plain(self, host: str, word: int) -> bool:
-        """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, none was held, nothing
+        """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, it held none, nothing
         was lowered, no run has the output. What the checks below would find is known."""
-        is_usual = not (self._held or self.lowered_from_n or self.is_calibrating or word & RUN_BITS_OR_EDGES)
+        is_usual = not (host in self._held or self.lowered_from_n or self.is_calibrating or word & RUN_BITS_OR_EDGES)
         return is_usual and self._ownership.admits(host)
 
     # -- what the write asks for
@@ -175,13 +181,16 @@ class Admission:
         return self._commands.offsets(write.block, write.address, len(write.data) // 2)
 
     def _held_by(self, write: Write, written: int) -> int:
-        """Return the bits of a run that a master that writes in cycles holds at 1: only its own 0 lets the next 1 count."""
-        if not self._held and not written & RUN_BITS:
+        """Return the bits of a run that a master that writes in cycles holds at 1: only its own 0 lets the next 1 count.
+
+        By another master's 0 behind the run, a Stop from the page say, the holder's next cycle would begin another run."""
+        held = self._held.get(write.host, 0)
+        if not held and not written & RUN_BITS:
             return 0
         if CONTROL_WORD not in self._offsets(write) or not self._ownership.admits(write.host):
-            return self._held
-        stands = self._held | int(self._commands.values[CONTROL_WORD])
-        return self._held & ~write.touched | stands & written & write.touched & RUN_BITS
+            return held
+        stands = held | int(self._commands.values[CONTROL_WORD])
+        return held & ~write.touched | stands & written & write.touched & RUN_BITS
 
     # -- why not
 
@@ -211,7 +220,7 @@ class Admission:
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
     def _check_starts(self, host: str, rises: int, written: int, word_at: int) -> None:
-        if held := rises & self._held:
+        if held := rises & self._held.get(host, 0):
             name = str(ControlBit(held & -held).name).lower()
             text = f"{name} was kept at 1 beyond the end of its run: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))

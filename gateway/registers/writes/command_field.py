@@ -2,6 +2,8 @@
 
 Checked before a value is looked at any further: finite, in range, whole where it counts something, and in the right word order.
 12.0 N with its words swapped reads 2.34e-41 N, which is in range: hence no float between 0 and 1e-3 is accepted.
+A float is taken as the decimal that it stands for: 40.2 as float32 is a little more than a limit of 40.2, and 2.3 a little
+less than a least force of 2.3, and neither is what the master means.
 0 is always in range; it means "the rig's default" or "nothing".
 """
 
@@ -14,7 +16,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.registers.map.register_map import Register
 from gateway.registers.refusal import Refusal, allowed_range, quantity
 from gateway.registers.rig_rules import BankRules
-from gateway.registers.values import WordOrder, float32, pack_number, unpack_number
+from gateway.registers.values import WordOrder, decimal, float32, pack_number, unpack_number
 
 SMALLEST_MEANT: Final = 1.0e-3
 FORCES: Final = ("force_setpoint", "precontact_force")
@@ -51,8 +53,10 @@ class CommandField:
         if not value:
             return 0.0  # -0.0 too
         if self.float_low <= value <= self.float_high and (value >= SMALLEST_MEANT or value <= -SMALLEST_MEANT):
-            if not self.is_whole or value == int(value):
+            if value == int(value):
                 return value
+            if not self.is_whole:
+                return max(self.low, min(self.high, decimal(value)))
             raise Refusal(
                 RefusalReason.OUT_OF_RANGE, address, f"{self.name} = {value:g} is not a whole number", value=value
             )
@@ -133,4 +137,11 @@ def _rig_limits(name: str, rules: BankRules) -> tuple[float, float] | None:
         if name == FORCES[0] and rules.setpoint_min_n > 0.0:
             return rules.setpoint_min_n, rules.force_max_n
         return 0.0, rules.force_max_n
-    return (1000.0 * rules.voltage_min_v, 1000.0 * rules.voltage_max_v) if name == "voltage_setpoint" else None
+    if name != "voltage_setpoint":
+        return None
+    return _millivolts(rules.voltage_min_v), _millivolts(rules.voltage_max_v)
+
+
+def _millivolts(volts: float) -> float:
+    """1000 times 8.03 is a little less than 8030, which is meant."""
+    return round(1000.0 * volts, 6)

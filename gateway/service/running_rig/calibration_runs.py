@@ -86,6 +86,7 @@ class CalibrationRuns:
         elif query.plan is not None:
             self._start(query)
         if refused := self._calibrating.take_refused():
+            self._continues, self._name = (), ""  # or a master's next run would bear them
             raise ValueError(refused)
         return self.status()
 
@@ -223,6 +224,7 @@ class CalibrationRuns:
         self._is_closing = False
         self._recording.begin(self._on_opened)
         self._continues, self._name = (), ""
+        self._ended, self._result = "", {}  # of the run before, whoever has begun it
 
     def _on_opened(self, error: OSError | None) -> None:
         if error and self._calibrating.running:

@@ -77,6 +77,16 @@ def test_leaving_the_band_forgets_the_settling_and_coming_back_counts_from_the_s
     assert holding.settling.after_s == pytest.approx(26.0)
 
 
+def test_a_pull_that_is_held_has_no_error_though_its_force_is_negative(register_map: RegisterMap) -> None:
+    track = Track()
+    pulls = {"force_requested": 15, "force_measured": -14.98, "status_word": IN_BAND | StatusBit.PULLING}
+    for tick in range(20):
+        track.add(tick * 0.1, poll_of(register_map, **pulls))
+    assert track.value("force_measured") == pytest.approx(-14.98)
+    assert track.largest_error_n(5.0) == pytest.approx(0.02, abs=1e-6)
+    assert track.points[-1].measured_n == pytest.approx(14.98), "the chart begins at 0 N"
+
+
 def test_what_settled_before_the_monitor_has_no_settling_time(register_map: RegisterMap) -> None:
     track = Track()
     track.add(5.0, poll_of(register_map, force_measured=12, force_requested=12, status_word=IN_BAND))

@@ -9,6 +9,7 @@ import pytest
 from gateway.cli.master.client import Assignment, GatewayClient
 from gateway.cli.master.wires import TcpWire
 from gateway.codes.refusals import RefusalReason
+from gateway.registers.writes.ownership import NOT_IPV4
 
 
 def test_read_shows_units_names_and_bits(fake, call) -> None:
@@ -232,3 +233,10 @@ def test_values_written_by_a_program_travel_the_same_way(fake) -> None:
         client.write_values([Assignment(register, register.encode(wanted[register.name])) for register in registers])
         assert [reading.value for reading in client.read_values(registers)] == list(wanted.values())
     assert fake.bank.writes == [(0, (1, 1200)), (416, (0x449A, 0x5000))]
+
+
+def test_an_owner_without_an_ipv4_address_is_told_as_such(fake, call) -> None:
+    """The page, say, or a master by IPv6: 255.255.255.255 is nobody's address."""
+    fake.bank.set("owner_ip", NOT_IPV4)
+    answer = call("read", "owner_ip", "--gateway", fake.address)
+    assert "somebody without an IPv4 address" in answer.output and "255.255" not in answer.output

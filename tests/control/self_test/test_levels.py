@@ -7,11 +7,12 @@ import pytest
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.codes.faults import FaultCode
 from gateway.control.sample_conditioning import Reading
-from gateway.control.self_test.items import FAILED, Item, RunEnding, SelfTestPlan, report_of
+from gateway.control.self_test.items import FAILED, NOT_TESTED, Item, RunEnding, SelfTestPlan, report_of
 from gateway.control.self_test.judgement import Known
 from gateway.control.self_test.levels import FORCE_SHARE, NEAR_SHARE, Levels
 from gateway.control.self_test.self_test_run import SelfTestRun
 from gateway.control.settings import SelfTestSettings
+from gateway.registers.words import SelfTestResult
 from tests.control.bench import bsfm, settings
 
 FORCE_N = 20.0
@@ -111,6 +112,13 @@ def test_a_force_that_creeps_up_at_a_held_voltage_ends_it_before_the_stated_one(
 def test_a_fault_of_the_supervision_fails_the_item_that_it_is_about(fault: FaultCode, item: Item) -> None:
     report = report_of(1, {}, RunEnding(fault, is_done=False, wants_force=True))
     assert [found.item for found in report.findings if found.verdict is FAILED] == [item]
+
+
+def test_a_master_that_is_lost_has_stopped_the_test_and_failed_no_item() -> None:
+    """Whether its loss is a fault or a way to 0 N is the rig's choice, and says nothing of the machine."""
+    report = report_of(1, {}, RunEnding(FaultCode.MASTER_LOST, is_done=False, wants_force=True))
+    assert report.result is SelfTestResult.STOPPED
+    assert {found.verdict for found in report.findings} == {NOT_TESTED}
 
 
 def test_a_cell_that_says_nothing_usable_fails_its_line_and_nothing_is_pressed() -> None:

@@ -13,6 +13,12 @@ function decode(register, words) {
   return read ? view[read](0) : NaN;
 }
 
+function ownerInWords(number) {
+  if (number === 0) return "nobody";
+  if (number === 0xffffffff) return "somebody without an IPv4 address"; // this page, say
+  return number < 256 ? `serial:${number}` : [24, 16, 8, 0].map((shift) => (number >>> shift) & 255).join(".");
+}
+
 function inWords(register, words) {
   const number = decode(register, words);
   if (register.type === "int16" && number === -32768) return "not known";
@@ -21,7 +27,7 @@ function inWords(register, words) {
   const bits = Object.entries(register.bits).filter(([bit]) => (number >> bit) & 1).map(([, name]) => name);
   if (Object.keys(register.bits).length) return bits.join(", ") || "none";
   const scaled = number * register.scale;
-  if (register.name === "owner_ip") return [24, 16, 8, 0].map((shift) => (number >>> shift) & 255).join(".");
+  if (register.name === "owner_ip") return ownerInWords(number);
   const digits = register.type === "float32" ? Math.max(register.decimals, 2) : Math.round(Math.max(0, -Math.log10(register.scale)));
   return `${register.unit ? scaled.toFixed(digits) : scaled} ${register.unit}`.trim();
 }

@@ -64,7 +64,9 @@ export function makeSteering(api) {
       wanted.value.textContent = newton(state.force.requested_n);
       voltage.value.textContent = state.force.voltage_v === null ? "–" : state.force.voltage_v.toFixed(3);
       const measured = state.force.measured_n;
-      error.value.textContent = isOn && measured !== null && state.force.requested_n ? newton(measured - state.force.requested_n) : "–";
+      if (measured === null || state.status.includes("pulling")) force.value.textContent = newton(measured); // no sample comes
+      const along = state.status.includes("pulling") ? -measured : measured; // a pull is measured negative, its setpoint is not
+      error.value.textContent = isOn && measured !== null && state.force.requested_n ? newton(along - state.force.requested_n) : "–";
       input.max = state.limits.force_max_n;
       range.textContent = `${newton(state.limits.force_min_n)} .. ${newton(state.limits.force_max_n)} N`
         + (state.limits.lease_s ? `; lease ${Math.round(1000 * state.limits.lease_s)} ms, kept while this page is open` : "");

@@ -1,0 +1,38 @@
+"""The big figures of the page: they say what is measured now, also where no sample of the ring comes."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from gateway.live.live_state import LiveForce, LiveState
+from tests.web.tabs.test_tabs_in_chromium import open_tab
+
+FIGURES = """async (state) => {
+  const { makeSteering } = await import("/static/live/steering.js");
+  const steering = makeSteering({});
+  steering.samples({ force_n: [12.0] });
+  steering.state(state);
+  return Array.from(steering.element.querySelectorAll("dd:not(.unit)"), (figure) => figure.textContent);
+}"""
+
+
+@pytest.mark.parametrize(
+    ("status", "measured_n", "force", "error"),
+    [
+        (("enabled",), 11.98, "12.00", "-0.02"),
+        (("enabled", "pulling"), -11.98, "-11.98", "-0.02"),
+        (("enabled",), None, "–", "–"),
+    ],
+    ids=["pushing", "pulling", "no sample"],
+)
+def test_the_force_is_that_of_now_and_the_error_of_a_pull_is_that_of_a_push(
+    page, chromium, status: tuple[str, ...], measured_n: float | None, force: str, error: str
+) -> None:
+    """The ring holds no sample of a pull, nor of a cell that is silent: the last one is old."""
+    force_state = LiveForce(requested_n=12.0, measured_n=measured_n, voltage_v=1.5)
+    base = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="holding")
+    window: Any = open_tab(chromium, page.address, "wiring")
+    shown = window.evaluate(FIGURES, replace(base, status=status, force=force_state).to_json())
+    assert shown == [force, "12.00", error, "1.500"]
+    window.close()
