@@ -62,9 +62,11 @@ def main(arguments: list[str]) -> int:
 
 
 def _report_start_failure(log: EventLog, sentence: str, exit_code: int, event: str) -> int:
-    """Say why on stderr, as any verb does, and keep it in the event file; return the exit code."""
-    print(sentence, file=sys.stderr)
+    """Keep it in the event file and say why on stderr, as any verb does; return the exit code. A pipe that nobody reads any
+    more must not take it away: the guardian starts again whoever ends without a reason."""
     log.note("start", event)
+    with contextlib.suppress(OSError):
+        print(sentence, file=sys.stderr)
     return exit_code
 
 
