@@ -122,6 +122,7 @@ def test_an_unplugged_regulator_is_a_fault_and_its_successor_hears_the_safe_volt
     real.wait_until(lambda status: status["state"] == FAULT)
     assert real.words(110, 1) == [10], "output_lost"
     assert "unplugged" in real.said("E102")
+    assert [held for pid in real.ready["pids"].values() for held in deleted_terminals(pid)] == []
     plugged_at_s = time.monotonic()
     devices.plug_output()
     deadline_s = time.monotonic() + 6
@@ -136,6 +137,12 @@ def test_an_unplugged_regulator_is_a_fault_and_its_successor_hears_the_safe_volt
     os.kill(real.ready["pids"]["control"], signal.SIGKILL)
     assert devices.until_safe(killed_at_s) < 0.5
     restarted(real)
+
+
+def deleted_terminals(pid: int) -> list[str]:
+    """Ports that a process has open and that are not there any more: the next adapter would not get their names."""
+    files = (str(file.readlink()) for file in Path(f"/proc/{pid}/fd").iterdir())
+    return [file for file in files if file.startswith("/dev/pts/") and file.endswith("(deleted)")]
 
 
 def stopping(gateway: RunningGateway, devices: OwnDevices, signal_number: int) -> float:
