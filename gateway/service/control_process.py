@@ -10,6 +10,7 @@ import contextlib
 import errno
 import gc
 import json
+import signal
 import socket
 import sys
 from dataclasses import replace
@@ -42,6 +43,9 @@ def main(arguments: list[str]) -> int:
     link.setblocking(False)
     options = json.loads(arguments[1])
     priority.set_nice(priority.LOOP_NICE)
+    # A machine that shuts down, or `pkill`, tells every process: the guardian answers, and asks us to ramp. A handler, for
+    # what is ignored stays so in a child.
+    signal.signal(signal.SIGTERM, lambda *_: None)
     with EventLog(source="control", file=EventFile(Path(options["state"]))) as log:
         try:
             rig = kept_rig(options["rig"], simulated=options["simulate"])
