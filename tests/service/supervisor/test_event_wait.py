@@ -84,6 +84,24 @@ def test_the_exit_code_of_a_child_is_heard_where_who_started_us_ignores_the_ends
         signal.signal(signal.SIGCHLD, before)
 
 
+def test_a_stop_that_comes_while_signals_begin_to_be_heard_is_heard(monkeypatch):
+    """Between the handler, which does nothing, and the pipe it was swallowed: `systemctl stop` right behind a start waited for
+    its own time-out."""
+    act = signal.signal
+
+    def handled(number, handler):
+        before = act(number, handler)
+        if number == signal.SIGTERM:
+            os.kill(os.getpid(), number)
+        return before
+
+    with monkeypatch.context() as patch:
+        patch.setattr(signal, "signal", handled)
+        signals = SignalPipe().__enter__()
+    assert signals.take() == 1
+    signals.__exit__(None, None, None)
+
+
 def test_two_signals_at_once_are_two():
     """The second one says that nothing is to be waited for."""
     with SignalPipe() as signals:
