@@ -57,16 +57,23 @@ def errno_of(error: Exception) -> int | None:
 
 def explain_open_failure(path: str, error: Exception, present: Sequence[str]) -> PortError:
     """Return the reason why a port did not open. present: the ports that are there, by-id names where they exist."""
+    match classify_open_failure(error):
+        case "E101":
+            return PortError("E101", _permission(path))
+        case "E103":
+            return PortError("E103", describe_holders(path))
     number = errno_of(error)
-    if number in _DENIED:
-        return PortError("E101", _permission(path))
     if number in _ABSENT:
         return PortError("E102", _missing(path, present))
-    if number in _HELD:
-        return PortError("E103", describe_holders(path))
     if number in _NO_PORT:
         return PortError("E102", f"{path} is no serial port: `force-gateway ports` lists those of this machine")
     return PortError("E102", f"{path} does not open as a serial port: {error}")
+
+
+def classify_open_failure(error: Exception) -> PortCode:
+    """Return the code alone of why a port did not open, which takes no time."""
+    number = errno_of(error)
+    return "E101" if number in _DENIED else "E103" if number in _HELD else "E102"
 
 
 def explain_loss(path: str, error: Exception | None) -> PortError:

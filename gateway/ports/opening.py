@@ -3,20 +3,33 @@
 import errno
 import os
 import termios
+from collections.abc import Callable
 from typing import Any, Final
 
 import serial
 
 from gateway.devices import SerialSettings
-from gateway.ports.errors import SERIAL_FAILURES, explain_open_failure
+from gateway.ports.errors import SERIAL_FAILURES, PortError, classify_open_failure, explain_open_failure
 from gateway.ports.listing import present_paths
 
 _PARITY: Final = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN, "odd": serial.PARITY_ODD}
 _MINIMUM, _TIME = termios.VMIN, termios.VTIME
 TerminalSettings = list[Any]  # as termios.tcgetattr returns them
+Explain = Callable[[str, Exception], PortError]
 
 
-def open_descriptor(path: str, settings: SerialSettings) -> int:
+def explain_in_full(path: str, error: Exception) -> PortError:
+    """Return the reason why a port did not open, for people. Who holds it is looked for among all that every process has open,
+    which may take longer than a control loop has."""
+    return explain_open_failure(path, error, present_paths())
+
+
+def explain_in_brief(path: str, error: Exception) -> PortError:
+    """Return the same in no time, for one try of many."""
+    return PortError(classify_open_failure(error), f"{path} does not open: {error}")
+
+
+def open_descriptor(path: str, settings: SerialSettings, explain: Explain = explain_in_full) -> int:
     """Return a raw, non-blocking, exclusively locked descriptor of the port, input flushed. PortError says why there is none.
 
     The lock is flock's: TIOCEXCL would outlive a killed process as EBUSY for the guardian too. Ptys have no modem lines,
@@ -25,7 +38,7 @@ def open_descriptor(path: str, settings: SerialSettings) -> int:
     try:
         return _take_descriptor(_open_quietly(path, settings))
     except (*SERIAL_FAILURES, ValueError) as error:  # ValueError: a baud rate that termios does not know
-        raise explain_open_failure(path, error, present_paths()) from error
+        raise explain(path, error) from error
 
 
 def open_serial(path: str, settings: SerialSettings, timeout_s: float) -> serial.Serial:
@@ -36,7 +49,7 @@ def open_serial(path: str, settings: SerialSettings, timeout_s: float) -> serial
     try:
         return _open_quietly(path, settings, timeout_s)
     except (*SERIAL_FAILURES, ValueError) as error:
-        raise explain_open_failure(path, error, present_paths()) from error
+        raise explain_in_full(path, error) from error
 
 
 def settings_of(descriptor: int) -> TerminalSettings:

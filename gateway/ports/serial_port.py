@@ -15,21 +15,24 @@ import os
 import select
 import struct
 import termios
-from typing import Final
+from typing import Any, Final
 
 from gateway.devices import SerialSettings
-from gateway.ports.errors import (
-    SERIAL_FAILURES,
-    PortError,
-    explain_changed_settings,
-    explain_loss,
-    explain_open_failure,
-)
+from gateway.ports.errors import SERIAL_FAILURES, PortError, explain_changed_settings, explain_loss
 from gateway.ports.identity import PtyIdentity
 from gateway.ports.latency import set_low_latency
-from gateway.ports.listing import present_paths
-from gateway.ports.opening import TerminalSettings, let_send, open_descriptor, restore_settings, settings_of
+from gateway.ports.opening import (
+    Explain,
+    TerminalSettings,
+    explain_in_brief,
+    explain_in_full,
+    let_send,
+    open_descriptor,
+    restore_settings,
+    settings_of,
+)
 from gateway.ports.port import WRITE_DEADLINE_S, PortEvents, monotonic_s
+from gateway.processes.disk_worker import DiskWorker
 
 MOST_UNSENT_BYTES: Final = 4096  # beyond it the line is stuck: no command here is longer than 40 bytes
 _CHUNK_BYTES: Final = 4096
@@ -162,13 +165,13 @@ class SerialPort:
                 self._send_the_rest(monotonic_s() + _CLOSE_DEADLINE_S)
             self._release()
 
-    def _open(self) -> None:
-        descriptor = open_descriptor(self._path, self._settings)
+    def _open(self, explain: Explain = explain_in_full) -> None:
+        descriptor = open_descriptor(self._path, self._settings, explain)
         try:
             self._set_to = settings_of(descriptor)
         except SERIAL_FAILURES as error:  # gone again: a plug that bounces
             os.close(descriptor)
-            raise explain_open_failure(self._path, error, present_paths()) from error
+            raise explain(self._path, error) from error
         self._descriptor = descriptor
         self._failure, self._backoff_s, self._refusals = None, _FIRST_BACKOFF_S, 0
         self.warning = set_low_latency(self._descriptor, self._path)
@@ -262,7 +265,7 @@ class SerialPort:
         if self._identity.is_gone:
             return
         try:
-            self._open()
+            self._open(explain_in_brief)
         except PortError as error:
             self._backoff_s = min(2.0 * self._backoff_s, _LONGEST_BACKOFF_S)
             self._reopen_after(self._backoff_s)
@@ -272,8 +275,20 @@ class SerialPort:
         """It is there again and does not open: told once, and not at the first time, for udev gives permissions a moment after
         the name."""
         self._refusals = self._refusals + 1 if error.code in _REFUSALS else 0
-        if self._refusals == _REFUSALS_TOLD:
-            self._on_refused(error)
+        if self._refusals == _REFUSALS_TOLD and isinstance(error.__cause__, Exception):
+            self._tell_refusal(self._path, error.__cause__)
+
+    def _tell_refusal(self, path: str, error: Exception) -> None:
+        """In a thread: on a machine with a desktop's ten thousand open files it took 0.2 s until it was known who holds a port,
+        and a control loop that stands still so long is killed for it."""
+
+        def tell(refusal: Any) -> None:
+            if self._is_wanted and self._refusals:  # else it has been opened, or is away, by now
+                self._on_refused(refusal if isinstance(refusal, PortError) else explain_in_brief(path, error))
+
+        asking = DiskWorker()
+        asking(lambda: explain_in_full(path, error), tell)
+        asking.close()
 
     def _still_unsent(self) -> int:
         if not self.is_open:

@@ -16,6 +16,9 @@ from typing import Any, Final
 
 HEARTBEAT: Final = "h"  # control -> guardian, each tick of the loop
 LINE: Final = "l"  # control -> guardian: {"safe_frame": hex, "safe_reply": hex, "reply_end": hex} + descriptor
+LINE_LOST: Final = (
+    "g"  # control -> guardian: the line's port is gone; who kept it open would keep its name from the next one
+)
 NEED_RIG: Final = "n"  # control -> guardian: {"rig": name or path}: start the simulated rig
 READY: Final = (
     "r"  # control -> guardian: {"banner": text, "info": {...}, "stall_s": s, "optional": ..., "listening": ...}

@@ -75,8 +75,13 @@ def read_recording(path: Path) -> Recording:
 
 
 def list_recordings(state_directory: Path) -> list[RecordingEntry]:
-    """Return the recordings of one state directory by number; unreadable ones are listed with their fault."""
-    return [read_entry(path) for path in recording_paths(state_directory)]
+    """Return the recordings of one state directory by number; unreadable ones are listed with their fault, and not those that
+    are deleted meanwhile: reading the ones before takes its time."""
+    entries: list[RecordingEntry] = []
+    for path in recording_paths(state_directory):
+        with contextlib.suppress(FileNotFoundError):
+            entries.append(read_entry(path))
+    return entries
 
 
 def recording_paths(state_directory: Path) -> list[Path]:
@@ -99,11 +104,13 @@ def find_recording(state_directory: Path, number: int) -> Path:
 
 
 def read_entry(path: Path) -> RecordingEntry:
-    """Return what a list says of one file; one that cannot be read has a fault."""
+    """Return what a list says of one file; one that cannot be read has a fault. FileNotFoundError where there is none."""
     number, size_bytes = int(path.stem), path.stat().st_size
     try:
         data = memoryview(path.read_bytes())
         header, offset = _header(data, path)
+    except FileNotFoundError:
+        raise
     except (RecordingError, OSError) as error:
         return RecordingEntry(number, path, {}, 0, 0.0, size_bytes, True, str(error))
     row_size = len(header["columns"]) * _ROW_ITEM

@@ -10,6 +10,7 @@ import contextlib
 import errno
 import gc
 import json
+import signal
 import socket
 import sys
 from dataclasses import replace
@@ -42,6 +43,9 @@ def main(arguments: list[str]) -> int:
     link.setblocking(False)
     options = json.loads(arguments[1])
     priority.set_nice(priority.LOOP_NICE)
+    # A machine that shuts down, or `pkill`, tells every process: the guardian answers, and asks us to ramp. A handler, for
+    # what is ignored stays so in a child.
+    signal.signal(signal.SIGTERM, lambda *_: None)
     with EventLog(source="control", file=EventFile(Path(options["state"]))) as log:
         try:
             rig = kept_rig(options["rig"], simulated=options["simulate"])
@@ -62,9 +66,11 @@ def main(arguments: list[str]) -> int:
 
 
 def _report_start_failure(log: EventLog, sentence: str, exit_code: int, event: str) -> int:
-    """Say why on stderr, as any verb does, and keep it in the event file; return the exit code."""
-    print(sentence, file=sys.stderr)
+    """Keep it in the event file and say why on stderr, as any verb does; return the exit code. A pipe that nobody reads any
+    more must not take it away: the guardian starts again whoever ends without a reason."""
     log.note("start", event)
+    with contextlib.suppress(OSError):
+        print(sentence, file=sys.stderr)
     return exit_code
 
 

@@ -62,6 +62,11 @@ class GuardianLine:
         self._waiting.append((guardian_link.LINE, told, (os.dup(descriptor),)))
         self._send_waiting()
 
+    def take_back(self) -> None:
+        """Have the guardian close a line that is lost: while anybody has it open an adapter that is plugged in again gets
+        another name, ttyUSB1 for ttyUSB0, and is not found."""
+        self._tell(guardian_link.LINE_LOST, {})
+
     def first_cause(self, cause: str) -> None:
         """Tell the guardian of an internal error, in words: this process is about to end."""
         self._tell(guardian_link.FIRST_CAUSE, {"text": cause})

@@ -1,7 +1,9 @@
 """A permission that is withdrawn changes nothing while the port is open; after a replug it is told, and given back it opens."""
 
 import asyncio
+import errno
 import os
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ import pytest
 
 from gateway.devices import SerialSettings
 from gateway.ports import PortError, PortEvents, Pty, SerialPort
+from gateway.ports.opening import explain_in_brief, open_descriptor
 from tests.ports.raw_bytes import gather
 from tests.ports.test_port_failures import denying
 
@@ -52,8 +55,8 @@ def test_a_replug_without_permission_is_told_once_and_opens_when_it_is_given(
             name.symlink_to(other.path)
             line.close()
             async with asyncio.timeout(10):
-                while len(tries) < 12:
-                    await asyncio.sleep(0)
+                while len(tries) < 12 or not refusals:
+                    await asyncio.sleep(0.001)
         (refusal,) = refusals
         assert refusal.code == "E101"
         assert "may not open it" in str(refusal) and "udev rule" in str(refusal)
@@ -67,22 +70,72 @@ def test_a_replug_without_permission_is_told_once_and_opens_when_it_is_given(
     asyncio.run(scene())
 
 
+def failure(code: str) -> PortError:
+    numbers = {"E101": errno.EACCES, "E102": errno.ENOENT, "E103": errno.EAGAIN}
+    refusal = explain_in_brief("/dev/ttyX", OSError(numbers[code], "refused"))
+    assert refusal.code == code
+    refusal.__cause__ = OSError(numbers[code], "refused")
+    return refusal
+
+
 def test_a_refusal_is_told_anew_when_the_port_has_been_open_since(line: Pty) -> None:
-    refusals: list[PortError] = []
+    refusals: asyncio.Queue[PortError] = asyncio.Queue()
 
     async def scene() -> None:
         nothing = lambda *_: None  # noqa: E731
-        port = SerialPort(line.path, SerialSettings(baud=9600), PortEvents(nothing, nothing, nothing, refusals.append))
+        events = PortEvents(nothing, nothing, nothing, refusals.put_nowait)
+        port = SerialPort(line.path, SerialSettings(baud=9600), events)
         await port.open()
-        for told in (1, 2):
+        for _ in range(2):
             for code in ("E101", "E103", "E102", "E101", "E101"):
-                port._note_refusal(PortError(code, "may not open it, or it is not there"))
-            assert len(refusals) == told - 1, "not three in a row"
+                port._note_refusal(failure(code))
+            assert refusals.empty(), "not three in a row"
             for _ in range(3):
-                port._note_refusal(PortError("E101", "may not open it"))
-            assert len(refusals) == told
+                port._note_refusal(failure("E101"))
+            async with asyncio.timeout(5):
+                assert (await refusals.get()).code == "E101"
             port._release()
             port._open()
         port.close()
+        assert refusals.empty()
 
+    asyncio.run(scene())
+
+
+def test_who_holds_a_port_is_looked_for_once_and_beside_the_loop(
+    ear: Any, line: Pty, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A replugged port that ModemManager had taken first stopped the loop for 0.2 s at each try, where a machine's processes
+    had ten thousand files open: five kills for it, and the gateway ended."""
+    name, asked, refusals = tmp_path / "usb-FTDI-port0", list[bool](), list[PortError]()
+    name.symlink_to(line.path)
+
+    def looking(path: str) -> str:
+        asked.append(threading.current_thread() is threading.main_thread())
+        return f"{path} is held by ModemManager (pid 7)"
+
+    async def scene() -> None:
+        events = PortEvents(ear.on_bytes, ear.on_lost, ear.on_open, refusals.append)
+        port = SerialPort(str(name), SerialSettings(baud=9600), events)
+        await port.open()
+        other = Pty()
+        holder = open_descriptor(other.path, SerialSettings(baud=9600))
+        name.unlink()
+        name.symlink_to(other.path)
+        line.close()
+        await ear.until(lambda: bool(ear.losses))
+        for _ in range(6):
+            port._stop_reopening()
+            port._reopen()
+        async with asyncio.timeout(5):
+            while not refusals:
+                await asyncio.sleep(0.001)
+        assert [str(refusal) for refusal in refusals] == [f"E103 {name} is held by ModemManager (pid 7)"]
+        assert asked == [False], "once, and not in the loop's thread"
+        os.close(holder)
+        await ear.until(lambda: len(ear.opened) == 2)
+        port.close()
+        other.close()
+
+    monkeypatch.setattr("gateway.ports.errors.describe_holders", looking)
     asyncio.run(scene())

@@ -67,3 +67,20 @@ def test_recordings_are_listed_by_number_and_not_by_the_letters_of_their_names(t
         shutil.copy(first, first.with_name(f"{number:04d}.fgr"))
     assert [entry.number for entry in list_recordings(tmp_path)] == [1, 9999, 10000, 123456]
     assert record(tmp_path / "recordings", 1).name == "123457.fgr"
+
+
+def test_a_recording_that_is_deleted_while_others_are_read_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fit that looked for its ladder ended with `No such file` when old recordings were pruned at the same time."""
+    paths = [record(tmp_path / "recordings", 1) for _ in range(3)]
+    read = Path.read_bytes
+
+    def prune_meanwhile(path: Path) -> bytes:
+        if path == paths[0]:
+            paths[1].unlink()
+        return read(path)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "read_bytes", prune_meanwhile)
+        assert [(entry.number, entry.fault) for entry in list_recordings(tmp_path)] == [(1, ""), (3, "")]

@@ -73,6 +73,17 @@ def test_a_line_that_cannot_be_handed_over_says_so(ends: Pair, monkeypatch: pyte
     assert message_link.receive(ends[0]) is None, "nothing was told of it"
 
 
+def test_a_line_that_is_lost_is_taken_back(ends: Pair) -> None:
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        guardian.take_back()
+        guardian.close()
+
+    asyncio.run(scene())
+    assert message_link.receive(ends[0]) == message_link.Message(message_link.LINE_LOST)
+
+
 def test_what_has_waited_until_the_end_is_still_told(ends: Pair) -> None:
     """The cause of the end among it."""
 

@@ -11,6 +11,7 @@ A gateway works without it, so a place where no socket can be made is a sentence
 
 import asyncio
 import contextlib
+import errno
 import json
 import os
 import socket
@@ -22,6 +23,7 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.processes.disk_worker import DiskWorker
 from gateway.processes.json_socket.connection import JsonConnection, SocketLimits, close_with_sentence
 from gateway.processes.json_socket.messages import Answer, encode_answer, error_answer, refuse_constant, why_too_large
 
@@ -32,6 +34,7 @@ _LONGEST_ANSWER: Final = 1 << 20
 _SHARE: Final = 0.1  # of the loop's time
 _LONGEST_REST_S: Final = 0.5
 _NO_DESCRIPTOR_S: Final = 0.1
+_LOOK_BOUND_S: Final = 0.1  # a disk that takes longer keeps the file
 
 
 class JsonLineServer:
@@ -57,6 +60,7 @@ class JsonLineServer:
         self._queue: deque[Callable[[], None]] = deque()
         self._turn: asyncio.TimerHandle | None = None
         self._sweep_timer: asyncio.TimerHandle | None = None
+        self._is_looking = False  # where its file leads: a disk may keep that waiting
         self._told = ""  # why its file leads elsewhere
 
     async def start(self) -> str:
@@ -105,7 +109,10 @@ class JsonLineServer:
             if timer:
                 timer.cancel()
         self._queue.clear()
-        if self._why_lost() == "":
+        ends_s = self.loop.time() + _LOOK_BOUND_S
+        while self._is_looking and self.loop.time() < ends_s:
+            await asyncio.sleep(1e-3)
+        if not self._is_looking and self._why_lost() == "":
             with contextlib.suppress(OSError):
                 self._path.unlink(missing_ok=True)
 
@@ -121,14 +128,29 @@ class JsonLineServer:
         except OSError as error:
             return error.strerror or str(error)
 
-    def _keep_file(self) -> None:
+    def _look_at_file(self) -> None:
+        """In a thread: of a network's folder whose server is away the mere question has no end, and the loop would stand."""
+        if self._is_looking:
+            return
+        self._is_looking = True
+        looking = DiskWorker()
+        looking(self._why_lost, self._on_looked)
+        looking.close()
+
+    def _on_looked(self, why: str | BaseException | None) -> None:
+        self._is_looking = False
+        if self._listener is not None and not isinstance(why, BaseException):  # else no thread was to be had
+            self._keep_file(why)
+
+    def _keep_file(self, why: str | None) -> None:
         """Make a new file where it is gone: who cleans up a folder must not part a gateway from its tools. What others have
-        put in its place stays theirs."""
-        why = self._why_lost()
+        put in its place stays theirs. why: it leads elsewhere."""
         if why is None and self._listener is not None:
             try:
                 fresh = self._bind()
             except OSError as error:
+                if error.errno == errno.EADDRINUSE:
+                    return  # another file has come since: the next look tells what it is
                 why = error.strerror or str(error)
             else:
                 self.loop.remove_reader(self._listener)
@@ -209,7 +231,7 @@ class JsonLineServer:
         oldest_s = self.loop.time() - self.limits.idle_s
         for caller in [caller for caller in self._callers if caller.spoke_s <= oldest_s]:
             caller.dismiss(f"no whole request for {self.limits.idle_s:g} s")
-        self._keep_file()
+        self._look_at_file()
         self._sweep_timer = self.loop.call_later(self.limits.idle_s / 4.0, self._sweep)
 
     # -- requests

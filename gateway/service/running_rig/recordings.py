@@ -62,15 +62,18 @@ class Recordings:
         """Begin a recording; ValueError when one is running. The answer is the status, or OSError where the disk takes none:
         one that waits for room goes on waiting. for_s: it ends by itself so long after the next tick, 0: it does not."""
         if self._current:
-            raise ValueError(f"already recording to {self._current.path}")
+            raise ValueError(f"already recording to {self._current.path or self._directory}")
         return self._start(label, for_s, waits_for_room=False)
 
     def _start(self, label: RecordingLabel, for_s: float, *, waits_for_room: bool) -> Future[Answer]:
+        before = self._label, self._for_s, self._ends_s
         self._label, self._for_s, self._ends_s = label, for_s, None
         answer: Future[Answer] = Future()
 
         def opened(fresh: RunRecording, error: OSError | None) -> None:
             if error:
+                if not waits_for_room:  # another one may: it is still the one that it was
+                    self._label, self._for_s, self._ends_s = before
                 answer.set_exception(OSError(f"{self._directory}: {tell_refusal(error)}"))
             else:
                 self._again.forget()

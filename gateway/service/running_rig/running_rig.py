@@ -5,6 +5,7 @@ import contextlib
 import os
 import time
 import traceback
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +81,8 @@ class RunningRig:
         host, rest_v = output_host(rig.output.device), rig.control.limits.safe_voltage_v
         self._safe_frame, self._last_frame = host.safe_frame(rest_v), host.last_frame
         frame, reply, end = self._safe_frame, host.safe_reply, rig.output.device.terminator_bytes
-        self._ports = RigPorts(rig, ports, lambda descriptor: guardian.hand_over(descriptor, frame, reply, end), log)
+        handed = partial(guardian.hand_over, safe_frame=frame, safe_reply=reply, reply_end=end)
+        self._ports = RigPorts(rig, ports, handed, log, guardian.take_back)
         checks = DeviceChecks(host, is_waived=rig.accept_no_device_watchdog)
         self._line = OutputExchange(host, self._ports.write_output, rig.output.device.reply_timeout_s, checks, rest_v)
         self._counters = SchedulerCounters(os.getpid())

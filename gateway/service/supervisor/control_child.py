@@ -37,6 +37,7 @@ class ControlChild:
     heartbeat: Heartbeat = field(default_factory=Heartbeat)
     memory: HeartbeatMemory | None = None  # where its loop beats; without it each beat is a message
     safe_line: SafeLine | None = None  # stays after a death until the safe voltage has gone through it
+    is_line_lost: bool = False  # its port is gone, and no other has been handed over since
     reported_cause: Ending | None = None  # what control gave as its own first cause
     is_link_ended: bool = False
     is_safe: bool = False  # it has sent the safe voltage as its last one, and no loop beats any more
@@ -113,12 +114,13 @@ class ControlChild:
     def write_safe_voltage(self) -> bool | None:
         """Kill control and write the safe voltage through the newest line that it has handed over.
 
-        Return whether the device acknowledged it; None where there was no line.
+        Return whether the device acknowledged it, False where its port is gone; None where there was no line.
         """
         if self.process:
             self.process.kill()
             self.read_messages()
-        acknowledged = self.safe_line.write_safe() if self.safe_line else None
+        acknowledged = self.safe_line.write_safe() if self.safe_line else False if self.is_line_lost else None
+        self.is_line_lost = False
         self._drop_line()  # our copy of the descriptor carries the port's lock, which the next control process needs
         return acknowledged
 
@@ -137,6 +139,9 @@ class ControlChild:
                 self.starter.on_born()
         elif message.tag == message_link.LINE:
             self._take_line(message)
+        elif message.tag == message_link.LINE_LOST:
+            self._drop_line()
+            self.is_line_lost = True
         elif message.tag == message_link.NEED_RIG:
             self.on_rig_needed()
         elif message.tag == message_link.SAFE:
@@ -152,6 +157,7 @@ class ControlChild:
             raise message_link.ProtocolError("a line without its port")
         frame, reply, end = (bytes.fromhex(message.body[name]) for name in ("safe_frame", "safe_reply", "reply_end"))
         self._drop_line()
+        self.is_line_lost = False
         self.safe_line = SafeLine(message.descriptors.pop(0), frame, reply, end)
 
     def _drop_line(self) -> None:

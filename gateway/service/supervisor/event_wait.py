@@ -43,7 +43,8 @@ class SignalPipe:
     and SIGHUP where who starts us ignores it: nohup says that the end of its terminal is not ours.
 
     Who starts us may have signals blocked (a thread of a Qt or Java program), and that is inherited: nothing but SIGKILL would
-    stop us and our children then.
+    stop us and our children then. Or he ignores the ends of children (`trap '' CHLD`), which is inherited too: the kernel
+    keeps no exit code then, and a gateway whose rig file is at fault would be started again and again.
     """
 
     def __init__(self) -> None:
@@ -63,12 +64,13 @@ class SignalPipe:
         return 0
 
     def __enter__(self) -> Self:
+        signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)  # first: a handler does nothing
         for number in _SIGNALS:
             if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
                 signal.signal(number, lambda *_: None)
         for number in _STRAY:
             signal.signal(number, signal.SIG_IGN)
-        signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_SETMASK, ())
         return self
 

@@ -154,6 +154,7 @@ class Guardian:
     def _on_signal(self, count: int) -> None:
         """The first one asks control to ramp down, where there is a line to ramp on; a second one waits for nothing."""
         self.stops += count
+        self.others.is_stopping = True
         is_up = self.control.safe_line is not None or self.control.heartbeat.is_up
         self.stop_deadline_s = self.clock() + (STOP_BOUND_S if self.stops == 1 and is_up else 0.0)
         self.manager.stopping()

@@ -6,6 +6,7 @@ library only.
 
 from collections.abc import Callable
 from functools import partial
+from math import inf
 from typing import Any, Final
 
 from gateway.processes.event_log import EventLog
@@ -23,7 +24,10 @@ _WORDS: Final = {
 
 
 class OtherChildren:
-    """tell: an answer for control about the simulated rig. Times are monotonic seconds."""
+    """tell: an answer for control about the simulated rig. is_stopping: the gateway ends, so none that ends now is started
+    again, or said to be; but the simulated rig, on which the force is ramped down. Times are monotonic seconds."""
+
+    is_stopping = False
 
     def __init__(self, starter: ChildStarter, log: EventLog, tell: Callable[[Answer], None]) -> None:
         self._starter, self._log, self._tell = starter, log, tell
@@ -33,12 +37,12 @@ class OtherChildren:
     @property
     def sources(self) -> list[int]:
         """Descriptors that become readable when a child says something or has died."""
-        return [source for one in self._all for source in one.sources]
+        return [source for one in self._watched for source in one.sources]
 
     @property
     def due_s(self) -> float:
         """Time at which `poll_children` has something to do without an event, s."""
-        return min(one.due_s for one in self._all)
+        return min((one.due_s for one in self._watched), default=inf)
 
     @property
     def pids(self) -> dict[str, int | None]:
@@ -51,7 +55,7 @@ class OtherChildren:
 
     def poll_children(self, readable: set[int], now_s: float) -> None:
         """Let each look after its process; to be called after each wait."""
-        for one in self._all:
+        for one in self._watched:
             one.poll_child(readable, now_s)
 
     def provide_rig(self, now_s: float) -> None:
@@ -73,6 +77,10 @@ class OtherChildren:
         for one in (self._rig, *self._optional.values(), self._starter):
             if one:
                 one.end()
+
+    @property
+    def _watched(self) -> list[ChildStarter | RigSupervisor | OptionalChildSupervisor]:
+        return [one for one in self._all if one is self._rig] if self.is_stopping else self._all
 
     @property
     def _all(self) -> list[ChildStarter | RigSupervisor | OptionalChildSupervisor]:

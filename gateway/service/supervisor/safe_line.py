@@ -47,7 +47,7 @@ class SafeLine:
         deadline_s = time.monotonic() + timeout_s
         received = b""
         while (left_s := deadline_s - time.monotonic()) > 0:
-            if not select.select([self.descriptor], [], [], left_s)[0]:
+            if not _is_ready(self.descriptor, select.POLLIN, left_s):
                 return False
             chunk = os.read(self.descriptor, 256)
             if not chunk:
@@ -65,13 +65,21 @@ class SafeLine:
 
 
 def _drop_input(descriptor: int) -> None:
-    while select.select([descriptor], [], [], 0)[0] and os.read(descriptor, 256):
+    while _is_ready(descriptor, select.POLLIN, 0.0) and os.read(descriptor, 256):
         pass
 
 
 def _write_all(descriptor: int, data: bytes, timeout_s: float) -> None:
     view = memoryview(data)
     while view:
-        if not select.select([], [descriptor], [], timeout_s)[1]:
+        if not _is_ready(descriptor, select.POLLOUT, timeout_s):
             raise OSError("the line does not take bytes")
         view = view[os.write(descriptor, view) :]
+
+
+def _is_ready(descriptor: int, event: int, timeout_s: float) -> bool:
+    """Wait until it can be read or written, or is no port any more, which the next call finds. By poll: for select a descriptor
+    of 1024 and more, as who starts us with a thousand files open makes it, is an error, and the voltage would stand."""
+    poll = select.poll()
+    poll.register(descriptor, event)
+    return bool(poll.poll(timeout_s * 1e3))

@@ -122,6 +122,7 @@ def test_an_unplugged_regulator_is_a_fault_and_its_successor_hears_the_safe_volt
     real.wait_until(lambda status: status["state"] == FAULT)
     assert real.words(110, 1) == [10], "output_lost"
     assert "unplugged" in real.said("E102")
+    assert [held for pid in real.ready["pids"].values() for held in deleted_terminals(pid)] == []
     plugged_at_s = time.monotonic()
     devices.plug_output()
     deadline_s = time.monotonic() + 6
@@ -138,13 +139,20 @@ def test_an_unplugged_regulator_is_a_fault_and_its_successor_hears_the_safe_volt
     restarted(real)
 
 
-def stopping(gateway: RunningGateway, devices: OwnDevices, signal_number: int) -> float:
+def deleted_terminals(pid: int) -> list[str]:
+    """Ports that a process has open and that are not there any more: the next adapter would not get their names."""
+    files = (str(file.readlink()) for file in Path(f"/proc/{pid}/fd").iterdir())
+    return [file for file in files if file.startswith("/dev/pts/") and file.endswith("(deleted)")]
+
+
+def stopping(gateway: RunningGateway, devices: OwnDevices, signal_number: int, *pids: int) -> float:
     """Press with 30 N, ask for a stop, and wait until the ramp has begun, which takes two seconds at 15 N/s. Returns when it
-    was asked for, s."""
+    was asked for, s. pids: who is asked, the gateway's own by default."""
     assert not gateway.write(0, 1, 3000, 0, 0, 0, 0).isError()
     gateway.wait_until(lambda status: status["force_measured"] > 2700, within_s=8.0)
     began_s = time.monotonic()
-    gateway.process.send_signal(signal_number)
+    for pid in pids or [gateway.process.pid]:
+        os.kill(pid, signal_number)
     while len({heard.voltage_v for heard in devices.settings_since(began_s)}) < 5:
         assert time.monotonic() - began_s < 2.0, "no ramp"
         time.sleep(0.005)
@@ -161,6 +169,17 @@ def test_what_ctrl_c_ramps_a_second_one_cuts(real, devices):
     assert devices.until_safe(cut_s) < 0.3
     assert real.process.wait(3) == 0
     assert devices.heard[-1].voltage_v == 0.0
+
+
+def test_a_stop_that_every_process_is_asked_for_has_its_ramp(real, devices):
+    """As a machine does that shuts down, a session that ends, or `pkill -f`: control died of it, and the force fell at once."""
+    began_s = stopping(real, devices, signal.SIGTERM, *real.ready["pids"].values())
+    assert real.process.wait(8) == 0
+    on_the_way = [heard.voltage_v for heard in devices.settings_since(began_s)]
+    assert all(after <= before for before, after in pairwise(on_the_way))
+    assert max(before - after for before, after in pairwise(on_the_way)) < 1.0, "a ramp, not a fall"
+    assert on_the_way[-1] == 0.0
+    assert "A401" not in real.log.read_text()
 
 
 def test_control_that_stands_still_on_the_last_ramp_is_answered_as_at_any_time(real, devices):

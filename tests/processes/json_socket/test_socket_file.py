@@ -2,9 +2,11 @@
 
 import asyncio
 import json
+import os
 import shutil
 import socket
 import stat
+import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
@@ -85,3 +87,32 @@ def test_a_later_socket_of_another_gateway_is_not_taken_for_its_own(tmp_path: Pa
 
     beside_a_server(path, scene)
     assert path.is_socket()
+
+
+def test_a_disk_that_does_not_say_where_the_file_is_holds_up_nobody(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder of a network whose server is away: control stood in the kernel, and was killed while it pressed."""
+    path, asked, goes_on = tmp_path / "state" / "control.sock", threading.Event(), threading.Event()
+    look = Path.stat
+
+    def hang(one: Path, **options: bool) -> os.stat_result:
+        if one == path and threading.current_thread() is not threading.main_thread():
+            asked.set()
+            goes_on.wait(10.0)
+        return look(one, **options)
+
+    async def scene(said: asyncio.Queue[str]) -> None:
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "stat", hang)
+            while not asked.is_set():
+                await asyncio.sleep(0.001)
+            assert await answer(path)
+            path.unlink()
+            await asyncio.sleep(OFTEN.idle_s)
+            assert said.empty()
+            goes_on.set()
+            assert "it is served again" in await said.get()
+        assert await answer(path)
+
+    beside_a_server(path, scene)

@@ -1,5 +1,6 @@
 """Recordings of a running rig: what a user says of one stands in it, and one with a time ends by itself."""
 
+import errno
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -65,6 +66,28 @@ def test_a_recording_with_a_time_ends_by_the_loops_clock(recordings: Recordings)
     recordings.flush(102.0)
     assert recordings.status() == {"recording": None}
     assert [line for line in recordings._log if "ends after 2 s" in line]
+
+
+def test_a_refused_recording_changes_nothing_of_the_one_that_waits_for_room(
+    recordings: Recordings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It went on under the name of the refused one, and ended when that one would have."""
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as disk:
+        disk.setattr("gateway.service.running_rig.recordings.Recorder", full)
+        assert recordings.try_start().result()
+        with pytest.raises(OSError, match="No space"):
+            recordings.start(RecordingLabel("short try", ""), for_s=5.0).result()
+        assert "No space" in recordings.status()["waits"]
+    recordings.flush(100.0)
+    recordings.flush(200.0)
+    recordings.flush(300.0)
+    assert recordings.status()["recording"], "it was not asked to end"
+    assert label_of(list_recordings(tmp_path)[0].header) == RecordingLabel("", "")
+    recordings.stop()
 
 
 def test_another_plant_takes_label_and_end_along(recordings: Recordings, tmp_path: Path) -> None:

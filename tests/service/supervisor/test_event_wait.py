@@ -73,6 +73,35 @@ def test_a_signal_that_who_started_us_had_blocked_is_heard(number):
         signal.signal(number, handler)
 
 
+def test_the_exit_code_of_a_child_is_heard_where_who_started_us_ignores_the_ends_of_his():
+    """Control said that the rig file is at fault, by its exit code, and was started again five times for it."""
+    before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        with SignalPipe():
+            pid = os.posix_spawn(sys.executable, [sys.executable, "-S", "-c", "raise SystemExit(78)"], os.environ)
+            assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 78
+    finally:
+        signal.signal(signal.SIGCHLD, before)
+
+
+def test_a_stop_that_comes_while_signals_begin_to_be_heard_is_heard(monkeypatch):
+    """Between the handler, which does nothing, and the pipe it was swallowed: `systemctl stop` right behind a start waited for
+    its own time-out."""
+    act = signal.signal
+
+    def handled(number, handler):
+        before = act(number, handler)
+        if number == signal.SIGTERM:
+            os.kill(os.getpid(), number)
+        return before
+
+    with monkeypatch.context() as patch:
+        patch.setattr(signal, "signal", handled)
+        signals = SignalPipe().__enter__()
+    assert signals.take() == 1
+    signals.__exit__(None, None, None)
+
+
 def test_two_signals_at_once_are_two():
     """The second one says that nothing is to be waited for."""
     with SignalPipe() as signals:

@@ -197,3 +197,21 @@ def test_whatever_ends_the_guardian_the_safe_voltage_goes_first(scene, port, mon
         one.run()
     one.guardian._close()
     assert port.wrote() == SAFE_FRAME
+
+
+def test_who_is_told_to_end_with_the_guardian_is_not_said_to_be_started_again(scene, port):
+    """A machine that shuts down tells every process. It said that control went on, and when there would be another page."""
+    ready = READY | {"optional": {"watch": {}}}
+
+    def script(child):
+        dies_after(5, port, None)(child)
+        child.say(message_link.READY, ready)
+
+    one = scene(script)
+    assert_comes_up(one)
+    one.signals.send()
+    one.starter.optionals_started[0].dies(-15)
+    one.run(lambda: one.guardian.stops == 1)
+    one.child.dies(0)
+    assert one.run() == 0
+    assert (one.said, len(one.starter.optionals)) == ([], 1)

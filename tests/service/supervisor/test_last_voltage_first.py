@@ -1,5 +1,7 @@
 """What comes first where control ends: the kill, so that it writes nothing more, then the safe voltage, then all that waits."""
 
+import os
+
 import pytest
 
 from gateway.processes import message_link
@@ -72,6 +74,25 @@ def test_the_line_that_was_handed_over_as_the_last_is_the_one_that_gets_the_safe
         one.run(lambda: len(one.starter.started) == 2)
     assert (port.wrote(), opened_again.wrote()) == (b"", SAFE_FRAME)
     opened_again.close()
+
+
+def test_a_line_that_is_lost_is_kept_open_by_nobody_and_its_device_is_not_taken_for_told(scene, port):
+    """An adapter that is plugged in again gets the name of the port, ttyUSB0, only when all have closed it."""
+    lost = Port()
+    one = scene(lives(lost), lives(port))
+    assert_comes_up(one)
+    one.child.say(message_link.LINE_LOST, {})
+    one.run(lambda: one.guardian.control.safe_line is None)
+    os.close(lost.writer)
+    assert os.read(lost._reader, 64) == b"", "the end: nobody else could write there"
+    os.close(lost._reader)
+    one.child.dies(-9)
+    one.run(lambda: len(one.starter.started) == 2)
+    assert "safe voltage not acknowledged" in one.said[-1]
+    assert_comes_up(one)
+    one.child.dies(-9)
+    one.run(lambda: len(one.starter.started) == 3)
+    assert "safe voltage acknowledged" in one.said[-1], "the next one has a line of its own"
 
 
 def test_nonsense_is_an_end_at_once_and_nothing_that_follows_it_counts(scene, port):

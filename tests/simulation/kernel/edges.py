@@ -16,6 +16,7 @@ import pytest
 
 from gateway.recording import Recorder
 from gateway.service.running_rig.running_rig import RunningRig
+from tests.disk.at_once import AtOnce
 from tests.disk.failing_disks import FailingDisk
 from tests.disk.watched_disk import watching
 from tests.simulation.kernel.cables import CABLES, SimulatedPort
@@ -264,6 +265,7 @@ def simulated_edges(fit: Any = _no_fit) -> Any:
             "gateway.service.running_rig.recordings",
         ):
             patch.setattr(f"{user}.DiskWorker", SimulatedDisk)
+        patch.setattr("gateway.processes.json_socket.server.DiskWorker", AtOnce)
         collector = SimpleNamespace(collect=lambda: None, freeze=lambda: None)
         patch.setattr("gateway.service.control_process.gc", collector)
         patch.setattr(f"{_SUPERVISOR}.control_child.SafeLine", SimulatedSafeLine)

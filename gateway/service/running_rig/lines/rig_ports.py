@@ -15,15 +15,22 @@ from gateway.service.running_rig.starting import open_again
 
 class RigPorts:
     """paths: by line, `output`, `load_cell`, `valve`. hand_over: called with the descriptor of each opened output;
-    OSError where the guardian cannot be given it.
+    OSError where the guardian cannot be given it. take_back: called when that port is lost.
 
     loop: to be set before `open`.
     """
 
     loop: ControlLoop
 
-    def __init__(self, rig: Rig, paths: dict[str, str], hand_over: Callable[[int], None], log: Log) -> None:
-        self._hand_over, self._log = hand_over, log
+    def __init__(
+        self,
+        rig: Rig,
+        paths: dict[str, str],
+        hand_over: Callable[[int], None],
+        log: Log,
+        take_back: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._hand_over, self._take_back, self._log = hand_over, take_back, log
         self._is_closing = False
         self.is_guarded = False  # the guardian has the output's descriptor
         self._unguarded = ""  # why it has not, once that is told
@@ -132,6 +139,8 @@ class RigPorts:
 
     def _on_output_lost(self, error: PortError) -> None:
         self._log("port", str(error))
+        if self.is_guarded:
+            self._take_back()
         self.is_guarded = False
         self.loop.on_output_closed()
 
