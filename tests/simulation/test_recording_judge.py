@@ -92,6 +92,18 @@ def test_a_tare_moves_the_zero_and_a_pulling_valve_turns_the_sign(tmp_path: Path
     assert len(judge_rows(rows, replace(history, tares=deque()))) == 1
 
 
+def test_a_tare_among_readings_that_were_no_plain_ones_has_moved_the_zero() -> None:
+    history = History(tares=deque([1.3]))
+    history.readings.extend((1.0 + 0.05 * number, 7.0 if number < 5 or number > 50 else None) for number in range(60))
+    row = {"sent_v": nan, "sent_age_s": nan}
+    rows = [
+        row | {"time_s": at_s - 1.0, "force_n": nan if force_n is None else force_n - (1.0 if at_s > 1.3 else 0.0)}
+        for at_s, force_n in history.readings
+    ]
+    assert judge_rows(rows, history) == []
+    assert "the zero at" in judge_rows(rows, replace(history, tares=deque()))[0]
+
+
 def test_a_payload_that_somebody_has_hung_moves_the_zero(tmp_path: Path) -> None:
     history = History(weighed_s=1.5)
     history.readings.extend((1.0 + 0.05 * number, 7.0 + 0.1 * number**2) for number in range(20))

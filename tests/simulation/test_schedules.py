@@ -191,6 +191,14 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(9.6263, "rival", "reset"),
         ],
     ),
+    (
+        32809,
+        [
+            Event(2.5207, "machine", "terminate", (0.1833, 443850.56564310007)),
+            Event(5.3815, "world", "cell-cut", (1.0,)),
+            Event(5.3856, "worker", "tare"),
+        ],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

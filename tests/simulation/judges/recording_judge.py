@@ -100,7 +100,7 @@ def _judge_laid(
     history: History,
 ) -> Iterator[str]:
     """Say what does not hold where the first row is the reading of begun_s."""
-    zeros_n: tuple[float, ...] = ()
+    zeros_n, known_s = tuple[float, ...](), begun_s
     for row in rows:
         at_s = begun_s + row["time_s"]
         if _is_near(history.awoken, at_s, AWAKE_S):
@@ -115,7 +115,8 @@ def _judge_laid(
         else:
             zeros_n, before_n = _zeros(row["force_n"], force_n, history), zeros_n
             same_n = tuple(one for one in before_n if any(abs(one - other) < COUNT_N for other in zeros_n))
-            is_new = at_s >= history.weighed_s or _is_near(history.tares, at_s, NEW_ZERO_S)
+            since_s, known_s = at_s - known_s + NEW_ZERO_S, at_s  # what came between was no plain reading
+            is_new = at_s >= history.weighed_s or _is_near(history.tares, at_s, since_s)
             if before_n and not same_n and not is_new:
                 yield f"{force_n:.2f} N came at {at_s:.4f}, and it tells {row['force_n']:.2f} N, the zero at {before_n} N"
             zeros_n = same_n or zeros_n
