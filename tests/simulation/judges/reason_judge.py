@@ -1,7 +1,7 @@
 """Whether the cause of a fault or of a refusal was there: who blames the load cell must have had a reason to. Knows what was
 done to the world and its wires, and no code of the gateway. Whether a master was lost (1) is judged by those who know what it
 had written: held_force.py, observer.py. What is refused because of a fault, a run or an owner is not judged: these may come
-and go between two looks.
+and go between two looks; nor what is not ready, for after a tare under force it is not until the next one.
 """
 
 import struct
@@ -40,7 +40,6 @@ REASONS: dict[int, tuple[str, ...]] = {
 """Of a number in fault_code: whose disturbance may be its cause. Of those that are not here none ever is."""
 MASTER_LOST = 1
 REFUSED: dict[int, tuple[float, tuple[str, ...]]] = {
-    12: (REOPENED_S, (CELL, OUTPUT, VALVE, MACHINE, FORCE)),
     13: (EVER_S, (OUTPUT, MACHINE)),
     14: (REOPENED_S, (CELL, MACHINE)),
     33: (REOPENED_S, (VALVE, MACHINE)),

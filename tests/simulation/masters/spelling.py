@@ -75,7 +75,7 @@ class Wish:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        return (float(self.control), self.force_n, 0.0, float(self.voltage_v is not None), float(self.beat))
+        return (float(self.control), self.force_n, 0.0, float(self.voltage_v is not None), float(self.beat & 0xFFFF))
 
 
 @dataclass(frozen=True)
