@@ -15,7 +15,7 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control.blame_for_silence import cause_of_silence
 from gateway.control.inputs import LineStatus
-from gateway.control.messages import fault_sentence, gain_sentence, sign_sentence
+from gateway.control.messages import fault_sentence, gain_sentence, sign_sentence, stuck_sentence
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
@@ -169,13 +169,22 @@ class FaultDetector:
         return RefusalReason.NONE
 
     def excuse(self, block: RefusalReason, now_s: float, reading: Reading, line: LineStatus) -> str:
-        """Return why it is not the device that keeps an enable back, or what a cell says in place of readings; else empty."""
+        """Return why it is not the device that keeps an enable back, what a cell says in place of readings, or what force is
+        there; else empty."""
         if block is RefusalReason.CELL_SILENT:
             return _unheard(cause_of_silence(FaultCode.SAMPLE_STALE, reading.age_s, line.cell_held, line.cell_says)[1])
         if block is RefusalReason.OUTPUT_FAULT and line.unanswered_since_s is not None and not line.fault:
             silent_s = now_s - line.unanswered_since_s
             return _unheard(cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, "")[1])
-        return self._stall_words(now_s, line) if block is RefusalReason.NOT_READY else ""
+        return self._stall_words(now_s, line) or self._rest_words(reading) if block is RefusalReason.NOT_READY else ""
+
+    def _rest_words(self, reading: Reading) -> str:
+        """Which force at rest keeps an enable back, empty where there is none."""
+        if self._over and reading.overload:
+            return self._over_words(reading, 0.0)
+        if self._over:
+            return f"{reading.contact_n:.1f} N on the load cell, over-force is {self._limits.over_force_n:.1f} N: free the tool"
+        return stuck_sentence(reading.contact_n, self._bounds.stuck_n) if self.is_stuck else ""
 
     def _stall_words(self, now_s: float, line: LineStatus) -> str:
         """Why nothing begins right behind a stall, empty where there was none: what is asked for may have waited in a socket,

@@ -58,6 +58,24 @@ def test_nothing_begins_on_one_reading_of_the_largest_force(sign: float) -> None
         assert one.enable_block(NOW_S, WELL, READY) is reason
 
 
+def test_a_force_at_rest_that_keeps_an_enable_back_is_told() -> None:
+    """To a master that was not there when it began."""
+    one, most_n = detector(), settings().limits.over_force_n
+    reading = WELL._replace(contact_n=most_n + 1.0)
+    assert one.excuse(RefusalReason.NOT_READY, NOW_S, reading, READY) == ""
+    observe(one, most_n + 1.0, 1)
+    told = one.excuse(RefusalReason.NOT_READY, NOW_S, reading, READY)
+    assert f"{most_n + 1.0:.1f} N on the load cell, over-force is {most_n:.1f} N" in told
+    saturated = one.excuse(RefusalReason.NOT_READY, NOW_S, reading._replace(overload=True), READY)
+    assert "over-force, open or shorted wires" in saturated
+    observe(one, 20.0, 1)
+    for _ in range(200):
+        one.observe_rest(WELL._replace(contact_n=20.0, interval_s=0.01))
+    told = one.excuse(RefusalReason.NOT_READY, NOW_S, WELL._replace(contact_n=20.0), READY)
+    assert one.is_stuck and told.startswith("W304 20.0 N measured with the output disabled")
+    assert one.excuse(RefusalReason.CELL_SILENT, NOW_S, WELL, READY) != told
+
+
 def test_a_force_is_stuck_behind_one_second_without_a_break() -> None:
     one = detector()
     for contact_n, readings, is_stuck in ((16.0, 15, False), (15.0, 1, False), (16.0, 15, False), (-16.0, 1, True)):
