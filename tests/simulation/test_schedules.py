@@ -17,7 +17,10 @@ from tests.simulation.shrinking import shrink
 PUSH_SEEDS, LONG_SEEDS = 500, 50_000
 HELD_EVERY, HELD = 8, 3
 """Of so many schedules one has a force that is held, and only what may not cost it happens beside."""
-SHARDS = 20
+SHARD = 25
+"""So many seeds are one test, ten times as many in a long run."""
+SHRUNK = 3
+"""Of a shard's broken seeds so many are shrunk, which takes a minute each; the others are told as they are."""
 SECONDS = float(os.environ.get("SIMULATION_SECONDS", "24"))
 """Of events; with its start and its healing a schedule is one of 30 s."""
 KEPT: list[tuple[int, list[Event]]] = [
@@ -216,31 +219,41 @@ def laws(outcome: Outcome) -> set[str]:
     return {line.partition(" at ")[0] for line in outcome.broken}
 
 
-def tell(seed: int, events: list[Event], outcome: Outcome) -> str:
-    """The shortest list of events that breaks one of the same laws."""
-    was = laws(outcome)
-    few = shrink(events, lambda some: bool(laws(run_schedule(seed, some, SECONDS)) & was))
-    told = "\n".join([f"seed {seed}, {SECONDS:g} s", *outcome.broken, "the shortest that breaks it:", *map(repr, few)])
-    return f"{told}\n(again: SIMULATION_SEEDS={seed}:{seed + 1})"
+def tell(seed: int, events: list[Event], outcome: Outcome, *, shortest: bool) -> str:
+    """What a seed broke, and the shortest list of events that breaks one of the same laws."""
+    told = [f"seed {seed}, {SECONDS:g} s (again: SIMULATION_SEEDS={seed}:{seed + 1})", *outcome.broken]
+    if shortest:
+        was = laws(outcome)
+        few = shrink(events, lambda some: bool(laws(run_schedule(seed, some, SECONDS)) & was))
+        told += ["the shortest that breaks it:", *map(repr, few)]
+    return "\n".join(told)
 
 
-def seeds(shard: int, *, is_long: bool) -> range:
-    if chosen := os.environ.get("SIMULATION_SEEDS"):
-        first, end = map(int, chosen.split(":"))
-        return range(first + shard, end, SHARDS)
-    return range(shard, LONG_SEEDS if is_long else PUSH_SEEDS, SHARDS)
+def shards(*, is_long: bool) -> list[range]:
+    """The seeds of each test."""
+    chosen = os.environ.get("SIMULATION_SEEDS", f"0:{LONG_SEEDS if is_long else PUSH_SEEDS}")
+    first, end = map(int, chosen.split(":"))
+    size = 10 * SHARD if is_long else SHARD
+    return [range(start, min(start + size, end)) for start in range(first, end, size)]
 
 
-@pytest.mark.parametrize("shard", range(SHARDS))
-def test_whatever_happens_no_law_is_broken_and_the_force_comes_back(shard: int, budget: int) -> None:
-    commits, count = 0, 0
-    for seed in seeds(shard, is_long=budget > 1):
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    if "shard" in metafunc.fixturenames:
+        is_long = metafunc.config.getoption("--long")
+        metafunc.parametrize("shard", shards(is_long=is_long), ids=lambda seeds: f"{seeds.start}-{seeds.stop - 1}")
+
+
+def test_whatever_happens_no_law_is_broken_and_the_force_comes_back(shard: range) -> None:
+    commits, broken = 0, list[str]()
+    for seed in shard:
         draw = draw_harmless_events if seed % HELD_EVERY == HELD else draw_events
         events = list(draw(seed, SECONDS))
         outcome = run_schedule(seed, events, SECONDS)
-        assert not outcome.broken, tell(seed, events, outcome)
-        commits, count = commits + outcome.commits, count + 1
-    assert commits or count < 20, "uploads are refused, or not told as committed"
+        if outcome.broken:
+            broken.append(tell(seed, events, outcome, shortest=len(broken) < SHRUNK))
+        commits += outcome.commits
+    assert not broken, "\n\n".join(broken)
+    assert commits or len(shard) < 20, "uploads are refused, or not told as committed"
 
 
 def test_a_seed_gives_the_same_run_bit_for_bit_and_another_one_another() -> None:
