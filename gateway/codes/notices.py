@@ -129,6 +129,15 @@ NOTICES: Final = (
         "Look at the device's plug and supply; let nobody else talk to it. Where it cannot be armed again, A334 says so.",
     ),
     Explanation(
+        "W250",
+        "another calibration or plant since the restart",
+        "Control was started again and found another calibration or plant in use than the process before it had: forces may "
+        "be off by the difference.",
+        "The state directory, or the document's file in it, is gone or damaged; or another one was chosen meanwhile.",
+        "force-gateway calibration list shows what there is: choose with calibration use N, upload it anew, or restore a "
+        "backup.",
+    ),
+    Explanation(
         "W304",
         "force with the output disabled",
         "The output is disabled, told the safe voltage, and the load cell still measures a force.",

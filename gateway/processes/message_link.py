@@ -23,6 +23,9 @@ NEED_RIG: Final = "n"  # control -> guardian: {"rig": name or path}: start the s
 READY: Final = (
     "r"  # control -> guardian: {"banner": text, "info": {...}, "stall_s": s, "optional": ..., "listening": ...}
 )
+KEEP: Final = (
+    "c"  # control -> guardian: {"recording": ..., "calibration": ...}: what the next control process is to know
+)
 SAFE: Final = "s"  # control -> guardian: the safe voltage has gone out as the last one; no loop beats any more
 FIRST_CAUSE: Final = "f"  # control -> guardian: {"text": ...}, kept for the next start
 BORN: Final = "b"  # a forked child -> guardian: {"pid": number}, before anything else

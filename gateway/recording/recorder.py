@@ -1,5 +1,5 @@
 """Writes a recording: one os.write per batch of rows. When, says whoever records: a gateway each 0.1 s, in a thread beside its
-control loop (service/run_recording.py), for a disk may keep any of these calls waiting.
+control loop (service/running_rig/recording/run_recording.py), for a disk may keep any of these calls waiting.
 
 Decisions
 - Rows go into one buffer that is reused; a batch is complete, with its CRC, before its single write. A kill -9 at any

@@ -32,7 +32,8 @@ from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.control_loop import Log
 from gateway.service.running_rig.faces.faces import with_rtu_face
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.handover import Handover
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.service.running_rig.running_rig import RunningRig
 from gateway.service.running_rig.starting import StartError
 
@@ -140,7 +141,9 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
     guardian.on_ports = running.move_ports
     try:
         ready = await running.start(
-            options["bind"], record=options["record"], restarted=Ending.from_json(options["restarted"])
+            options["bind"],
+            Handover(options["kept"], record=options["record"]),
+            restarted=Ending.from_json(options["restarted"]),
         )
         ready = replace(ready, notes=ready.notes + notes, http=listeners.addresses)
         gc.collect()

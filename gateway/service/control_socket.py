@@ -23,7 +23,7 @@ from gateway.recording.label import RecordingLabel
 from gateway.service.live_answers import LiveAnswers, LiveParts
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.control_loop import ControlLoop
-from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.rig_plants import RigPlants
 from gateway.service.simulation.requests import SimulationRequests
 from gateway.service.socket_requests import CalibrationRequest, EmptyRequest, RecordRequest, parse_request

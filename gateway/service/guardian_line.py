@@ -67,6 +67,10 @@ class GuardianLine:
         another name, ttyUSB1 for ttyUSB0, and is not found."""
         self._tell(guardian_link.LINE_LOST, {})
 
+    def keep(self, **facts: Any) -> None:
+        """Have the guardian tell the next control process; each name's newest fact counts."""
+        self._tell(guardian_link.KEEP, facts)
+
     def first_cause(self, cause: str) -> None:
         """Tell the guardian of an internal error, in words: this process is about to end."""
         self._tell(guardian_link.FIRST_CAUSE, {"text": cause})

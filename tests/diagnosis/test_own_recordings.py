@@ -17,7 +17,7 @@ from gateway.diagnosis.bench.bench import bench_of
 from gateway.diagnosis.model_fit.initial_state import fit_initial_states
 from gateway.profiles import load_rig
 from gateway.registers.residual_cause import ResidualCause
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.twin.plant import with_value
 from gateway.watch.plant_comparison import PlantComparison
 from gateway.watch.reference import WatchReference

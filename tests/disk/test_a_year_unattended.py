@@ -15,8 +15,8 @@ from gateway.profiles.recordings_section import Retention
 from gateway.recording import list_recordings, recording_paths
 from gateway.recording.care.keeping import keep_recording, prune_recordings
 from gateway.recording.label import RecordingLabel
-from gateway.service.running_rig.recorded_row import COLUMNS
-from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recordings import Recordings
 from tests.disk.at_once import AtOnce
 from tests.disk.failing_disks import FailingDisk
 from tests.disk.watched_disk import watching
@@ -51,10 +51,10 @@ class Calendar:
 def calendar(monkeypatch: pytest.MonkeyPatch) -> Calendar:
     calendar = Calendar()
     monkeypatch.setattr("time.time", lambda: calendar.now_s)
-    for user in ("recording_retention", "running_rig.recordings"):
-        monkeypatch.setattr(f"gateway.service.{user}.DiskWorker", AtOnce)
+    for user in ("retention", "recordings"):
+        monkeypatch.setattr(f"gateway.service.running_rig.recording.{user}.DiskWorker", AtOnce)
     monkeypatch.setattr(
-        "gateway.service.run_recording.sync_recording", lambda path: None
+        "gateway.service.running_rig.recording.run_recording.sync_recording", lambda path: None
     )  # the power-cut tests ask for it
     return calendar
 

@@ -12,7 +12,7 @@ from gateway.control import CellMap
 from gateway.recording import Recording, RecordingError, list_recordings, read_recording
 from gateway.registers.words import State
 from gateway.service.replayed_control import ReplaySetup, SignalDifference, compare_decisions, replay_control
-from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.recording.recordings import Recordings
 from tests.disk.at_once import AtOnce
 from tests.service.wired import ENABLE, Wired
 

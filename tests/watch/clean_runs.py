@@ -20,7 +20,7 @@ from gateway.diagnosis.experiments.blocks import BLOCKS
 from gateway.profiles import Rig
 from gateway.recording import Recorder
 from gateway.registers.words import State
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from tests.service.rigs import demo
 from tests.service.wired import ENABLE, STEP_S, Wired, _Absent
 

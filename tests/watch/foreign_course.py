@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from gateway.recording import Recorder
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from tests.diagnosis.changes.foreign_rig import Floats, Wish, record
 
 _PLACES: Final = {name: COLUMNS.index(name) for name in ("time_s", "command_v", "force_n", "sent_v")}

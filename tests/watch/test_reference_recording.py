@@ -15,7 +15,7 @@ from gateway.numbered_documents.selection import Selection, SelectionState, writ
 from gateway.processes import exit_codes
 from gateway.processes.durable_file import lock_directory, make_directory
 from gateway.recording import Recorder
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.watch import reference_recording
 from gateway.watch.reference_recording import (
     FirstGoodRecording,

@@ -15,7 +15,7 @@ import pytest
 from gateway.diagnosis import Diagnosis
 from gateway.profiles import load_rig
 from gateway.recording.ring import RingReader, SampleRing
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.twin.plant import plain_section
 from gateway.watch.memory import return_memory
 from gateway.watch.plant_comparison import PlantComparison

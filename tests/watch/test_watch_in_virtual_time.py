@@ -15,7 +15,7 @@ from gateway.diagnosis import Diagnosis, Verdict
 from gateway.diagnosis.result import Baseline, Cause, Estimate, Extended, Gain, Leftover
 from gateway.recording.ring import RingReader, SampleRing
 from gateway.registers.residual_cause import ResidualCause
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.twin import Plant
 from gateway.twin.plant import with_value
 from gateway.watch.plant_comparison import PlantComparison

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.watch.window import Window, window_of
 
 HZ = 100

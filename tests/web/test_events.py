@@ -14,7 +14,7 @@ from gateway.live.ring_rows import RingRows
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.recording.ring import SampleRing
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.web import events
 from gateway.web.events import EventSource
 

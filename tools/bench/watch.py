@@ -30,7 +30,7 @@ from gateway.profiles import load_rig
 from gateway.progress import report
 from gateway.recording import Recorder
 from gateway.recording.ring import RingReader, SampleRing
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.twin.plant import with_value
 from gateway.twin.replay.replay import Drive, Replay
 from gateway.watch.memory import resident_mb

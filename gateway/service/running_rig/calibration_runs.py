@@ -26,11 +26,11 @@ from gateway.profiles import Rig
 from gateway.profiles.kinds.plans import plan_document, plan_of
 from gateway.recording import Recorder
 from gateway.registers.words import CalibrationPhase
-from gateway.service.run_recording import RunRecording
 from gateway.service.running_rig.fit_launcher import FitLauncher, Result
 from gateway.service.running_rig.lines.output_line import LineState
-from gateway.service.running_rig.recorded_row import COLUMNS
-from gateway.service.running_rig.recordings import END_BOUND_S
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recordings import END_BOUND_S
+from gateway.service.running_rig.recording.run_recording import RunRecording
 from gateway.service.socket_requests import CalibrateRequest, EmptyRequest, parse_request
 
 FOLLOWED_S: Final = 3.0

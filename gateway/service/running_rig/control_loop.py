@@ -35,8 +35,8 @@ from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
 from gateway.service.running_rig.rate_warnings import LineNoise, SlowLoop
-from gateway.service.running_rig.recorded_row import row_of
-from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.recording.recorded_row import row_of
+from gateway.service.running_rig.recording.recordings import Recordings
 
 _FRESH_PERIODS: Final = 1.05  # a tick decides nothing so soon after a sample or a command; more than 1: a cell's jitter
 _ENDING: Final = int(WarningBit.SERIAL_NOISE | WarningBit.SLOW_LOOP)

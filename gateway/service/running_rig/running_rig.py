@@ -33,23 +33,27 @@ from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
 from gateway.service.running_rig.faces.faces import Faces
+from gateway.service.running_rig.handover import Handover
 from gateway.service.running_rig.lateness import Lateness
-from gateway.service.running_rig.lines.baud_probe import explain_silent_device
 from gateway.service.running_rig.lines.device_checks import DeviceChecks
 from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from gateway.service.running_rig.lines.watchdog_word import WatchdogRegister, device_fault_note, watchdog_word
-from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.rig_calibrations import RigCalibrations
 from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
-from gateway.service.running_rig.starting import cause_of_restart, lasting_warnings, warning_notes
+from gateway.service.running_rig.starting import (
+    cause_of_restart,
+    lasting_warnings,
+    waiting_s,
+    warning_notes,
+    why_silent,
+)
 from gateway.service.simulation.requests import SimulationRequests
 from gateway.service.watch_reports import WatchReports
 
-_FIRST_WORDS_S = 3.0  # how long READY waits for both devices' first words before it says that one is silent
-_WORDS_AGAIN_S = 0.5  # the same after a restart: what is silent now was not a moment ago, and masters wait
 _STOP_BOUND_S = 4.5  # the guardian waits 5 s
 
 
@@ -103,7 +107,8 @@ class RunningRig:
     def _wire(self, cause: FaultCode) -> None:
         """Make bank, controller and the loop between them, and who serves both."""
         self._wire_loop(cause)
-        rig = self._rig
+        rig, keep = self._rig, self._guardian.keep
+        self._recordings.on_wanted = lambda wanted: keep(recording=wanted.as_facts() if wanted else None)
         self._calibration_runs = CalibrationRuns(self.controller, rig, self._state, time.monotonic, self._log)
         self.loop.calibration_runs, self._calibration_runs.decide = self._calibration_runs, self.loop.refresh
         self._faces = Faces(rig, self.bank, self._on_peer_closed, self._log)
@@ -170,16 +175,21 @@ class RunningRig:
         self.loop.restart_cause = cause
         self.loop.warnings = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
 
-    async def start(self, bind: list[Any] | None, *, record: bool, restarted: Ending | None) -> banner.Ready:
+    async def start(self, bind: list[Any] | None, handover: Handover, *, restarted: Ending | None) -> banner.Ready:
         """Open the ports, greet both devices, then serve Modbus: nobody is answered before there is an answer."""
         self._wire(cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
         await self._ports.open(is_restart=bool(restarted))
         self._tick.start()
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._spoke.wait(), _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S)
+            await asyncio.wait_for(self._spoke.wait(), waiting_s(is_restart=bool(restarted)))
+        for change in handover.changes(**self._in_use()):
+            self._log("start", change)
+        self._guardian.keep(**self._in_use())
         notes = await self._notes(restarted)
-        if record:
-            notes += await asyncio.wrap_future(self._recordings.try_start())
+        if wanted := handover.recording(time.monotonic()):
+            notes += await asyncio.wrap_future(self._recordings.try_start(wanted))
+            if restarted and (path := self._recordings.status()["recording"]):
+                self._log("recording", f"it goes on behind the restart: recording to {path}")
         if unserved := await self._control_socket.start():
             notes += (f"E152 {unserved}",)
         for note in notes:
@@ -205,11 +215,11 @@ class RunningRig:
 
     def _note_start(self, restarted: Ending | None) -> None:
         """So that the audit shows what was changed while no gateway ran."""
-        calibration, plant = self._calibration, self._plants.status()["active"]
         after = restarted.sentence if restarted else ""
-        self._audit.note_gateway(
-            "start", rig=self._rig.name, calibration=calibration.number, plant=plant, version=VERSION, after=after
-        )
+        self._audit.note_gateway("start", rig=self._rig.name, **self._in_use(), version=VERSION, after=after)
+
+    def _in_use(self) -> dict[str, int]:
+        return {"calibration": self._calibration.number, "plant": self._plants.status()["active"]}
 
     def _follow_rig(self) -> None:
         pid = self._guardian.rig_pid
@@ -231,29 +241,18 @@ class RunningRig:
         if self._line.checks.fault:
             notes.append(device_fault_note(self._line))
         elif self._line.acknowledged_v is None:
-            notes.append(await self._why_silent(self._ports.output, self._rig.output, restarted))
+            notes.append(await self._why_silent(self._ports.output, self._rig.output, is_restart=bool(restarted)))
         if self.loop.sample is None:
-            notes.append(await self._why_silent(self._ports.cell, self._rig.load_cell, restarted))
+            notes.append(await self._why_silent(self._ports.cell, self._rig.load_cell, is_restart=bool(restarted)))
         return tuple(notes)
 
-    async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine, restarted: Ending | None) -> str:
-        """Return why a device says nothing. Its port is closed while the probe listens at other speeds, and opened again.
-
-        Not after a restart: seconds of listening would tell what the start has told already. Nor where the machine did not
-        let us, or a simulated rig, run.
-        """
-        if restarted and port.path in self._ports.not_opened:
+    async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine, *, is_restart: bool) -> str:
+        if is_restart and port.path in self._ports.not_opened:
             return str(self._ports.not_opened[port.path])
-        waited_s, now_s = _WORDS_AGAIN_S if restarted else _FIRST_WORDS_S, time.monotonic()
+        waited_s, now_s = waiting_s(is_restart=is_restart), time.monotonic()
         held = self._lateness.since(now_s - waited_s, now_s, self._counters.waited_s())
         _, blamed = cause_of_silence(FaultCode.OUTPUT_SILENT, waited_s, held, "")
-        if restarted or blamed:
-            start = "restart" if restarted else "start"
-            return f"E111 {port.path}: nothing heard within {waited_s:g} s of the {start}; {blamed or 'power, wires?'}"
-        port.close()
-        sentence = await explain_silent_device(line, port.path)
-        await port.open()
-        return sentence
+        return await why_silent(port, line, blamed, is_restart=is_restart)
 
     async def ramp_down(self) -> None:
         """Ramp the force to 0, then send the safe voltage (at most 4.5 s); at once where nobody guards it, or it fails."""
@@ -270,10 +269,8 @@ class RunningRig:
         reply_s = self._rig.output.device.reply_timeout_s
         # Nothing is decided any more, and what masters read grows old: they go while the device is let go.
         await asyncio.gather(self._faces.close(), self._ports.let_go_output(self._last_frame, reply_s))
-        await self._control_socket.close()
-        await self._recordings.close()
-        await self._calibration_runs.close()
-        await self._audit.close()
+        for waiting in (self._control_socket, self._recordings, self._calibration_runs, self._audit):
+            await waiting.close()
         for part in (self._ports, self._upload, self._plants, self._counters, self._lateness):
             part.close()
         self._shutdown_marker.clear()
@@ -306,6 +303,7 @@ class RunningRig:
         self.controller.use(self._rig.calibration_in_use(active.calibration, active.model))
         self._recordings.calibration = active.calibration
         self._audit.note_gateway("calibration in use", new=active.calibration.number)
+        self._guardian.keep(**self._in_use())
         lowered = self.bank.set_active_model(active.calibration, active.pointer.active.slot_word)
         if lowered:
             self._log("calibration", lowered)
@@ -317,6 +315,7 @@ class RunningRig:
         self.controller.compensate(rig.control, rig.compensation, rig.calibration_in_use(self._calibration))
         self._recordings.use_plant(rig)
         self._audit.note_gateway("plant in use", new=self._plants.status()["active"])
+        self._guardian.keep(**self._in_use())
         self._follow_plant()
         self.loop.refresh()
 

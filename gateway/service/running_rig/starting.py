@@ -12,10 +12,13 @@ from gateway.fieldbus import BindError, ModbusTcpServer
 from gateway.ports import PortError, SerialPort
 from gateway.processes import exit_codes
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.profiles import Rig
+from gateway.profiles import CellLine, OutputLine, Rig
+from gateway.service.running_rig.lines.baud_probe import explain_silent_device
 
 _HELD_BOUND_S: Final = 0.5  # how long a restart waits for a port that somebody holds who is about to end
 _RETRY_S: Final = 0.05  # between two attempts within that time
+_FIRST_WORDS_S: Final = 3.0  # how long READY waits for both devices' first words before it says that one is silent
+_WORDS_AGAIN_S: Final = 0.5  # the same after a restart: what is silent now was not a moment ago, and masters wait
 
 
 class StartError(Exception):
@@ -72,6 +75,26 @@ async def open_again(port: SerialPort) -> PortError | None:
                 port.begin_lost(error)
                 return error
         await asyncio.sleep(_RETRY_S)
+
+
+def waiting_s(*, is_restart: bool) -> float:
+    """Return how long a start waits for both devices' first words, s."""
+    return _WORDS_AGAIN_S if is_restart else _FIRST_WORDS_S
+
+
+async def why_silent(port: SerialPort, line: OutputLine | CellLine, blamed: str, *, is_restart: bool) -> str:
+    """Return why a device says nothing. Its port is closed while the probe listens at other speeds, and opened again.
+
+    Not after a restart: seconds of listening would tell what the start has told already. Nor where blamed says that the
+    machine did not let us, or a simulated rig, run.
+    """
+    if is_restart or blamed:
+        start, waited_s = "restart" if is_restart else "start", waiting_s(is_restart=is_restart)
+        return f"E111 {port.path}: nothing heard within {waited_s:g} s of the {start}; {blamed or 'power, wires?'}"
+    port.close()
+    sentence = await explain_silent_device(line, port.path)
+    await port.open()
+    return sentence
 
 
 async def listen(server: ModbusTcpServer, host: str, port: int, instead: str = "") -> tuple[str, int]:

@@ -39,6 +39,7 @@ class ControlChild:
     safe_line: SafeLine | None = None  # stays after a death until the safe voltage has gone through it
     is_line_lost: bool = False  # its port is gone, and no other has been handed over since
     reported_cause: Ending | None = None  # what control gave as its own first cause
+    kept: dict[str, Any] = field(default_factory=dict)  # what the last one has told for the next one
     is_link_ended: bool = False
     is_safe: bool = False  # it has sent the safe voltage as its last one, and no loop beats any more
     _beat_s: float = 0.0  # what the memory said last
@@ -144,6 +145,8 @@ class ControlChild:
             self.is_line_lost = True
         elif message.tag == message_link.NEED_RIG:
             self.on_rig_needed()
+        elif message.tag == message_link.KEEP:
+            self.kept |= message.body
         elif message.tag == message_link.SAFE:
             self.is_safe = True
         elif message.tag == message_link.FIRST_CAUSE:

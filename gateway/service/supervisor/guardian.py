@@ -281,6 +281,7 @@ class Guardian:
                     "rtu": self.options.rtu,
                     "state": str(self.state),
                     "record": self.options.record,
+                    "kept": dict(self.control.kept),
                     "realtime": self.options.realtime,
                     "restarted": self.next_start.to_json() if self.next_start else None,
                     "ring": self.ring,

@@ -15,7 +15,7 @@ from gateway.plants.store import PlantStore
 from gateway.processes import exit_codes
 from gateway.profiles.kinds.plant_writer import plant_text
 from gateway.recording import Recorder
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from tests.cli.verbs.test_diagnose import table
 from tests.plants.test_plant_store import bowed
 from tests.reports.fake_diagnosis import diagnosis

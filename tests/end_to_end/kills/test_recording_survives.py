@@ -54,3 +54,6 @@ def test_kill_minus_nine_loses_at_most_one_batch(running):
     assert float(rows[-1]["time_s"]) >= lasted_s - BATCH_S - 0.05
     assert abs(float(rows[-1]["force_n"]) - 12.0) <= 1.0
     assert "1" in gateway_says("recordings", "list", "--state", state)
+    running.said("it goes on behind the restart: recording to")
+    assert "0002.fgr" in gateway_says("record", "status", "--state", state)
+    assert "0002.fgr" in gateway_says("record", "off", "--state", state)

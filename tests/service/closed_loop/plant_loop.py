@@ -10,7 +10,7 @@ from gateway.plants.store import NumberedPlant
 from gateway.profiles import Rig
 from gateway.recording import Recording, list_recordings, read_recording
 from gateway.registers.words import State
-from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.twin.plant import with_value
 from tests.disk.at_once import AtOnce
 from tests.service.rigs import demo

@@ -19,7 +19,7 @@ from gateway.processes.json_socket.server import JsonLineServer
 from gateway.registers.words import State
 from gateway.service.control_socket import ControlSocket, RunningParts
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
-from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.rig_calibrations import RigCalibrations
 from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
 from gateway.service.simulation.requests import SimulationRequests

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,6 +25,7 @@ from gateway.processes.exit_cause import EndCause, Ending
 from gateway.profiles import load_rig
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.running_rig.faces.faces import Faces
+from gateway.service.running_rig.handover import Handover
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.end_to_end.own_devices import OwnDevices
@@ -38,8 +40,10 @@ def devices(tmp_path: Path) -> Iterator[OwnDevices]:
         yield devices
 
 
-def with_running_rig(devices: OwnDevices, scene: Scene, restarted: Ending | None = None) -> list[str]:
-    """Start a rig, play the scene, close it; return what was logged."""
+def with_running_rig(
+    devices: OwnDevices, scene: Scene, restarted: Ending | None = None, kept: dict[str, Any] | None = None
+) -> list[str]:
+    """Start a rig, play the scene, close it; return what was logged. kept: what the process before has left for this one."""
     lines: list[str] = []
     state = devices.directory / "state"
     state.mkdir()
@@ -51,7 +55,7 @@ def with_running_rig(devices: OwnDevices, scene: Scene, restarted: Ending | None
         guardian = GuardianLine(theirs)
         rig = RunningRig(profile, profile.ports(), state, guardian, log)
         try:
-            await rig.start(["127.0.0.1", 0], record=False, restarted=restarted)
+            await rig.start(["127.0.0.1", 0], Handover(kept or {}, record=False), restarted=restarted)
             rig.loop.is_watched = True  # as behind READY
             async with asyncio.timeout(10):
                 await scene(rig, ours)

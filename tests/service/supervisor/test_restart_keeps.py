@@ -12,7 +12,7 @@ from gateway.processes.systemd.service_manager import ServiceManager
 from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.supervisor import guardian
 from gateway.service.supervisor.run_options import RunOptions
-from tests.service.supervisor.guarded import PTYS, READY, FakeChild, Scene, port
+from tests.service.supervisor.guarded import PTYS, READY, FakeChild, Scene, Script, port
 from tests.service.supervisor.scripted_children import assert_comes_up, dies_after, lives, rig_lives, scene
 
 __all__ = ["port", "scene"]
@@ -249,3 +249,18 @@ def test_a_second_gateway_on_the_same_state_starts_nothing(tmp_path, monkeypatch
     with hold_state_lock(tmp_path) as is_ours:
         assert is_ours
         assert guardian.run(RunOptions(state=tmp_path)) == exit_codes.DEVICE
+
+
+def test_what_control_has_kept_is_told_to_the_next_one_in_its_newest_form(scene, port):
+    def keeps(*facts: dict[str, object]) -> Script:
+        def script(child: FakeChild) -> None:
+            dies_after(6, port, None)(child)
+            for fact in facts:
+                child.say(message_link.KEEP, fact)
+            child.dies(-9)
+
+        return script
+
+    one = scene(keeps({"calibration": 2, "recording": None}, {"calibration": 3}), keeps(), lives(port))
+    one.run(lambda: len(one.starter.started) == 3)
+    assert [asked["kept"] for asked in one.starter.arguments] == [{}, *2 * [{"calibration": 3, "recording": None}]]

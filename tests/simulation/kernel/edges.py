@@ -254,15 +254,15 @@ def simulated_edges(fit: Any = _no_fit) -> Any:
         patch.setattr("gateway.fieldbus.tcp_server.Listener", MemoryListener)
         NotedRunningRig.of.clear()
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
-        patch.setattr(f"{_RIG}.explain_silent_device", _explain)
+        patch.setattr("gateway.service.running_rig.starting.explain_silent_device", _explain)
         patch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", fit)
         for user in (
             "gateway.calibrations.upload",
             "gateway.service.running_rig.rig_plants",
             "gateway.audit.audit_log",
-            "gateway.service.recording_retention",
+            "gateway.service.running_rig.recording.retention",
             "gateway.service.running_rig.calibration_runs",
-            "gateway.service.running_rig.recordings",
+            "gateway.service.running_rig.recording.recordings",
         ):
             patch.setattr(f"{user}.DiskWorker", SimulatedDisk)
         patch.setattr("gateway.processes.json_socket.server.DiskWorker", AtOnce)

@@ -11,7 +11,7 @@ from gateway.processes import message_link
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.lines.rig_ports import RigPorts
-from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.rig_plants import RigPlants
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.end_to_end.own_devices import OwnDevices

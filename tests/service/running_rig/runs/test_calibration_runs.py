@@ -9,13 +9,13 @@ import pytest
 from gateway.control.runs.ladder_stairs import QUICK
 from gateway.recording import read_recording
 from gateway.registers.words import CalibrationPhase, State
-from gateway.service.run_recording import HANGS_S
 from gateway.service.running_rig.calibration_runs import FOLLOWED_S, CalibrationRuns
 from gateway.service.running_rig.fit_launcher import Result
+from gateway.service.running_rig.recording.run_recording import HANGS_S
 from tests.disk.at_once import AtOnce
 from tests.service.rigs import demo
+from tests.service.running_rig.recording.test_run_recording import HangingDisk
 from tests.service.running_rig.simulated_rig import CALIBRATE, TARE, SmallRig
-from tests.service.test_run_recording import HangingDisk
 from tests.service.wired import ENABLE, Wired
 
 PLAN = {"step_v": QUICK.step_v, "groups": QUICK.groups, "minor_points": QUICK.minor_points}

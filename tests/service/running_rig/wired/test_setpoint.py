@@ -12,9 +12,9 @@ from gateway.devices.messages import ForceSample
 from gateway.recording import Recorder, read_recording
 from gateway.registers import Refusal
 from gateway.registers.words import State
-from gateway.service.run_recording import RunRecording
 from gateway.service.running_rig.lines.output_line import LineState
-from gateway.service.running_rig.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.run_recording import RunRecording
 from tests.disk.at_once import AtOnce
 from tests.service.rigs import demo, without_trim
 from tests.service.wired import ENABLE, Wired

@@ -10,8 +10,7 @@ import pytest
 from gateway.profiles.recordings_section import Retention
 from gateway.recording import recording_paths
 from gateway.recording.care import keeping
-from gateway.service import recording_retention
-from gateway.service.recording_retention import RecordingRetention
+from gateway.service.running_rig.recording.retention import RecordingRetention
 from tests.recording.test_care import record
 
 
@@ -69,7 +68,7 @@ def test_a_disk_that_refuses_is_told_and_is_not_the_loops_business(
         threads.append(threading.current_thread().name)
         raise OSError("read-only file system")
 
-    monkeypatch.setattr(recording_retention, "prune_recordings", refuse)
+    monkeypatch.setattr("gateway.service.running_rig.recording.retention.prune_recordings", refuse)
     assert asyncio.run(prune_at(tmp_path, 1.0)) == ["recordings were not pruned: read-only file system"]
     assert threads != [threading.main_thread().name]
 
@@ -80,7 +79,9 @@ def test_the_rigs_reference_stays_however_old_it_is(
 ) -> None:
     path = record(tmp_path, days_ago=1_000)
     reference = SimpleNamespace(name=path.name) if is_reference else None
-    monkeypatch.setattr(recording_retention, "read_reference_recording", lambda state: reference)
+    monkeypatch.setattr(
+        "gateway.service.running_rig.recording.retention.read_reference_recording", lambda state: reference
+    )
     retention = RecordingRetention(tmp_path, Retention(days=30.0), Said())
     gone = retention._prune()
     retention.close()

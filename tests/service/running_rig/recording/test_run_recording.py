@@ -14,10 +14,11 @@ from gateway.devices.messages import ForceSample, Quality
 from gateway.processes.disk_worker import DiskWorker
 from gateway.recording import Recorder, list_recordings, read_recording
 from gateway.recording.label import RecordingLabel
-from gateway.service.run_recording import HANGS_S, RunRecording
 from gateway.service.running_rig.lines.output_line import LineState
-from gateway.service.running_rig.recorded_row import COLUMNS
-from gateway.service.running_rig.recordings import Recordings
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recordings import Recordings
+from gateway.service.running_rig.recording.run_recording import HANGS_S, RunRecording
+from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 from tests.control.bench import bsfm
 from tests.disk.at_once import AtOnce
 from tests.disk.threads import join_disk_threads
@@ -146,7 +147,7 @@ def test_whoever_ends_one_before_its_file_is_there_gets_it_whole(recordings: Rec
 def test_a_start_that_has_ended_before_the_disk_answers_is_told_nothing(
     recordings: Recordings, disk: HangingDisk, caplog: pytest.LogCaptureFixture
 ) -> None:
-    assert recordings.try_start().cancel()
+    assert recordings.try_start(WantedRecording()).cancel()
     disk.let_go()
     assert recordings.status()["recording"] and not caplog.records
     recordings.stop()
@@ -157,7 +158,7 @@ def test_one_that_the_disk_refuses_after_somebody_has_ended_it_does_not_come_aga
     recordings: Recordings, disk: HangingDisk, tmp_path: Path
 ) -> None:
     (tmp_path / "recordings").write_text("no folder")
-    begun = recordings.try_start()
+    begun = recordings.try_start(WantedRecording())
     ended = recordings.stop()
     disk.let_go()
     assert "not recording" in begun.result()[0]
@@ -209,7 +210,8 @@ def test_a_file_is_put_on_the_disk_once_it_has_begun_and_once_it_has_ended(
     """Without its header a file is nothing; a power cut in between may cost rows."""
     synced: list[int] = []
     monkeypatch.setattr(
-        "gateway.service.run_recording.sync_recording", lambda path: synced.append(read_recording(path).rows)
+        "gateway.service.running_rig.recording.run_recording.sync_recording",
+        lambda path: synced.append(read_recording(path).rows),
     )
     recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())  # type: ignore[arg-type]
     recordings.start()
@@ -223,7 +225,7 @@ def test_what_may_not_outlive_a_power_cut_is_said(tmp_path: Path, log: Log, monk
     def refuse(path: Path) -> None:
         raise OSError(5, "Input/output error")
 
-    monkeypatch.setattr("gateway.service.run_recording.sync_recording", refuse)
+    monkeypatch.setattr("gateway.service.running_rig.recording.run_recording.sync_recording", refuse)
     recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())  # type: ignore[arg-type]
     recordings.start()
     assert "0001.fgr may not outlive a power cut: Input/output error" in log[0]
@@ -269,7 +271,7 @@ def test_a_file_that_nobody_waits_for_any_more_is_not_made(
 def test_a_disk_that_comes_back_behind_the_end_is_no_internal_error(
     recordings: Recordings, disk: HangingDisk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gateway.service.running_rig.recordings.END_BOUND_S", 0.0)
+    monkeypatch.setattr("gateway.service.running_rig.recording.recordings.END_BOUND_S", 0.0)
 
     async def main() -> None:
         recordings.start()

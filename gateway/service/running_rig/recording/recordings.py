@@ -20,11 +20,12 @@ from gateway.processes.event_log import EventLog
 from gateway.profiles import Rig
 from gateway.recording import Recorder
 from gateway.recording.label import NO_LABEL, RecordingLabel
-from gateway.service.recording_retention import RecordingRetention
-from gateway.service.run_recording import RunRecording
 from gateway.service.running_rig.lines.output_line import LineState
-from gateway.service.running_rig.recorded_row import COLUMNS
-from gateway.service.running_rig.recording_again import RecordingAgain
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
+from gateway.service.running_rig.recording.recording_again import RecordingAgain
+from gateway.service.running_rig.recording.retention import RecordingRetention
+from gateway.service.running_rig.recording.run_recording import RunRecording
+from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 
 LONGEST_BYTES: Final = 256 << 20
 LONGEST_S: Final = 86400.0
@@ -37,7 +38,8 @@ Opened = Callable[[RunRecording, OSError | None], None]
 
 class Recordings:
     """Recordings of a rig: at most one open file, each under its time. disk: a thread by default. What is asked here is
-    answered by a future of the loop: it is done when the disk has done its part."""
+    answered by a future of the loop: it is done when the disk has done its part. on_wanted: told what is recorded, and goes
+    on in the next process if this one dies; None: nothing any more."""
 
     def __init__(self, directory: Path, rig: Rig, log: EventLog, disk: DiskWorker | None = None) -> None:
         self._directory = directory
@@ -52,9 +54,8 @@ class Recordings:
         self._longest_bytes = LONGEST_BYTES if most is None else min(LONGEST_BYTES, most // _SHARES)
         self._longest_s = LONGEST_S if days is None else min(LONGEST_S, days * 86400.0 / _SHARES)
         self._began_s: float | None = None
-        self._label = NO_LABEL
-        self._for_s = 0.0
-        self._ends_s: float | None = None
+        self._wanted = WantedRecording()
+        self.on_wanted: Callable[[WantedRecording | None], None] = lambda wanted: None
         self.calibration = rig.calibration
         self.plant_in_use = in_use_facts(rig)
 
@@ -63,20 +64,21 @@ class Recordings:
         one that waits for room goes on waiting. for_s: it ends by itself so long after the next tick, 0: it does not."""
         if self._current:
             raise ValueError(f"already recording to {self._current.path or self._directory}")
-        return self._start(label, for_s, waits_for_room=False)
+        return self._start(WantedRecording(label, for_s), waits_for_room=False)
 
-    def _start(self, label: RecordingLabel, for_s: float, *, waits_for_room: bool) -> Future[Answer]:
-        before = self._label, self._for_s, self._ends_s
-        self._label, self._for_s, self._ends_s = label, for_s, None
+    def _start(self, wanted: WantedRecording, *, waits_for_room: bool) -> Future[Answer]:
+        before, self._wanted = self._wanted, wanted
         answer: Future[Answer] = Future()
 
         def opened(fresh: RunRecording, error: OSError | None) -> None:
             if error:
                 if not waits_for_room:  # another one may: it is still the one that it was
-                    self._label, self._for_s, self._ends_s = before
+                    self._wanted = before
                 answer.set_exception(OSError(f"{self._directory}: {tell_refusal(error)}"))
             else:
                 self._again.forget()
+                if self._current is fresh:  # else somebody has ended it meanwhile
+                    self.on_wanted(self._wanted)
                 answer.set_result(_facts_of(fresh))
 
         self._begin(opened, waits_for_room=waits_for_room)
@@ -84,9 +86,9 @@ class Recordings:
 
     def _begin(self, opened: Opened, *, waits_for_room: bool = True) -> None:
         """Begin a file. waits_for_room: where the disk takes none it is tried again, unless somebody has ended it by then."""
-        rig, label = self._rig, self._label
+        rig = self._rig
         header = {
-            **label.as_header(),
+            **self._wanted.label.as_header(),
             "rig": rig.name,
             "rig_fingerprint": rig.fingerprint,
             "rig_texts": dict(rig.texts),
@@ -127,8 +129,8 @@ class Recordings:
         self._end(ended, lambda: None)
         self._begin(opened)
 
-    def try_start(self) -> Future[tuple[str, ...]]:
-        """Begin a recording; a sentence where the disk takes none, which is no reason not to control."""
+    def try_start(self, wanted: WantedRecording) -> Future[tuple[str, ...]]:
+        """Begin a recording; a sentence where the disk takes none, which is no reason not to control: it goes on waiting."""
         notes: Future[tuple[str, ...]] = Future()
 
         def started(answer: Future[Answer]) -> None:
@@ -136,14 +138,22 @@ class Recordings:
             if not notes.cancelled():  # by a start that has ended before the disk answered
                 notes.set_result((f"not recording: {error}",) if error else ())
 
-        self._start(NO_LABEL, 0.0, waits_for_room=True).add_done_callback(started)
+        self.on_wanted(wanted)
+        self._start(wanted, waits_for_room=True).add_done_callback(started)
         return notes
 
     def stop(self) -> Future[Answer]:
         """End the recording, if there is one; return where it is and how many rows the disk has taken, and as `fault` why not
         all of them."""
-        answer: Future[Answer] = Future()
+        self._want_no_more()
+        return self._stop()
+
+    def _want_no_more(self) -> None:
         self._again.forget()
+        self.on_wanted(None)
+
+    def _stop(self) -> Future[Answer]:
+        answer: Future[Answer] = Future()
         if not (ended := self._current):
             answer.set_result({"recording": None})
             return answer
@@ -169,8 +179,9 @@ class Recordings:
         ended.close(tell, drops_empty=bool(ended.failure))
 
     async def close(self) -> None:
-        """End the recording, if there is one, for good. A disk that takes nothing for a second is not waited for."""
-        ended = asyncio.wrap_future(self.stop())
+        """End the recording, if there is one, with this process. A disk that takes nothing for a second is not waited for."""
+        self._again.forget()
+        ended = asyncio.wrap_future(self._stop())
         await asyncio.wait([ended], timeout=END_BOUND_S)  # not cancelled: the disk may still tell its end
         self._retention.close()
         self._disk.close()
@@ -197,6 +208,7 @@ class Recordings:
             if recording.failure:
                 self._end_failed(recording, now_s)
             elif self._is_over(now_s):
+                self._want_no_more()
                 self._end(recording, lambda: self._tell_over(recording))
             elif self._is_long(recording.size_bytes, now_s):
                 self._go_on_in_another(recording, "as long as one may be")
@@ -205,7 +217,7 @@ class Recordings:
             self._try_again(now_s)
 
     def _tell_over(self, ended: RunRecording) -> None:
-        self._log("recording", f"{ended.path} ends after {self._for_s:g} s, {ended.rows_written} rows")
+        self._log("recording", f"{ended.path} ends after {self._wanted.for_s:g} s, {ended.rows_written} rows")
 
     def _end_failed(self, recording: RunRecording, now_s: float) -> None:
         self._end(recording, lambda: None)
@@ -219,7 +231,7 @@ class Recordings:
                 self._log("recording", f"it goes on: recording to {fresh.path}")
 
         if self._is_over(now_s):
-            self._again.forget()
+            self._want_no_more()
         else:
             self._begin(opened)
 
@@ -229,9 +241,10 @@ class Recordings:
         return size_bytes >= self._longest_bytes or now_s - self._began_s >= self._longest_s
 
     def _is_over(self, now_s: float) -> bool:
-        if self._for_s and self._ends_s is None:
-            self._ends_s = now_s + self._for_s
-        return self._ends_s is not None and now_s >= self._ends_s
+        if (wanted := self._wanted.with_end(now_s)) is not self._wanted:
+            self._wanted = wanted
+            self.on_wanted(wanted)
+        return wanted.is_over(now_s)
 
 
 def _facts_of(recording: RunRecording) -> Answer:

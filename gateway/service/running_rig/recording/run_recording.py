@@ -18,7 +18,7 @@ from gateway.processes.disk_worker import DiskWorker
 from gateway.recording import Recorder
 from gateway.recording.recorder import sync_recording
 from gateway.service.running_rig.lines.output_line import LineState
-from gateway.service.running_rig.recorded_row import row_of
+from gateway.service.running_rig.recording.recorded_row import row_of
 
 HANGS_S: Final = 30.0
 FLUSH_S: Final = 0.1

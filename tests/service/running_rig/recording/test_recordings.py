@@ -14,8 +14,9 @@ from gateway.recording import list_recordings
 from gateway.recording.label import RecordingLabel, label_of
 from gateway.recording.recorder import sync_recording
 from gateway.service.running_rig.lines.output_line import LineState
-from gateway.service.running_rig.recorded_row import COLUMNS, row_of
-from gateway.service.running_rig.recordings import LONGEST_S, Recordings
+from gateway.service.running_rig.recording.recorded_row import COLUMNS, row_of
+from gateway.service.running_rig.recording.recordings import LONGEST_S, Recordings
+from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 from tests.control.bench import bsfm
 from tests.disk.at_once import AtOnce
 from tests.service.kept_log import Log
@@ -77,8 +78,8 @@ def test_a_refused_recording_changes_nothing_of_the_one_that_waits_for_room(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as disk:
-        disk.setattr("gateway.service.running_rig.recordings.Recorder", full)
-        assert recordings.try_start().result()
+        disk.setattr("gateway.service.running_rig.recording.recordings.Recorder", full)
+        assert recordings.try_start(WantedRecording()).result()
         with pytest.raises(OSError, match="No space"):
             recordings.start(RecordingLabel("short try", ""), for_s=5.0).result()
         assert "No space" in recordings.status()["waits"]
@@ -175,7 +176,7 @@ def test_whoever_ends_one_that_waits_for_room_has_ended_it(
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(os, "write", lambda descriptor, data: 3)
-        assert "No space left" in recordings.try_start().result()[0]
+        assert "No space left" in recordings.try_start(WantedRecording()).result()[0]
         recordings.flush(0.0)
     assert recordings.stop().result() == {"recording": None}
     recordings.flush(1000.0)
@@ -198,7 +199,7 @@ def test_whoever_begins_one_in_vain_leaves_it_waiting_for_room(
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(os, "write", lambda descriptor, data: 3)
-        recordings.try_start()
+        recordings.try_start(WantedRecording())
         with pytest.raises(OSError, match=r"recordings: No space left on device: the disk is full$"):
             recordings.start().result()
         recordings.flush(0.0)
@@ -214,7 +215,7 @@ def test_what_was_deleted_while_it_is_synced_need_not_outlive_a_power_cut(
         path.unlink(missing_ok=True)
         sync_recording(path)
 
-    monkeypatch.setattr("gateway.service.run_recording.sync_recording", delete_first)
+    monkeypatch.setattr("gateway.service.running_rig.recording.run_recording.sync_recording", delete_first)
     log = Log()
     recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())
     recordings.start()

@@ -1,6 +1,6 @@
 """When a recording that the disk has ended is begun again: seldom, and never more seldom than once an hour."""
 
-from gateway.service.running_rig.recording_again import RecordingAgain
+from gateway.service.running_rig.recording.recording_again import RecordingAgain
 
 
 def pause_s(again: RecordingAgain, now_s: float = 0.0) -> float:

@@ -1,0 +1,35 @@
+"""What a control process leaves, through the guardian, to the one that is started when it dies: the recording goes on, and a
+calibration or a plant that is another one now (their files are gone, say) is told. By itself a start knows only what it finds.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from gateway.service.running_rig.recording.wanted_recording import WantedRecording
+
+_OWN: Final = "the rig's own"
+
+
+class Handover:
+    """kept: each fact by its name, as the process before has told it last, empty for the first one; record: whether the first
+    one records from its start."""
+
+    def __init__(self, kept: Mapping[str, Any], *, record: bool) -> None:
+        self._kept = kept
+        self._record = record
+
+    def recording(self, now_s: float) -> WantedRecording | None:
+        """Return what is to be recorded; None: nothing, or its time is over by now_s (monotonic)."""
+        if "recording" not in self._kept:
+            return WantedRecording() if self._record else None
+        facts = self._kept["recording"]
+        wanted = WantedRecording.from_facts(facts) if facts else None
+        return None if wanted is None or wanted.is_over(now_s) else wanted
+
+    def changes(self, **in_use: int) -> tuple[str, ...]:
+        """Return W250 for each number in use that is not the one before. in_use: what is in use now, by its noun."""
+        return tuple(
+            f"W250 {noun} {before} was in use before the restart, now it is {number or _OWN}: see `force-gateway {noun} list`"
+            for noun, number in in_use.items()
+            if (before := self._kept.get(noun, number)) != number
+        )

@@ -1,0 +1,119 @@
+"""What goes on when a control process dies: the next one is told what the one before had kept with the guardian."""
+
+import asyncio
+import socket
+from pathlib import Path
+from typing import Any
+
+from gateway.processes import message_link
+from gateway.processes.exit_cause import EndCause, Ending
+from gateway.recording import list_recordings
+from gateway.recording.label import RecordingLabel, label_of
+from gateway.service.running_rig.handover import Handover
+from gateway.service.running_rig.recording.recordings import Recordings
+from gateway.service.running_rig.recording.wanted_recording import WantedRecording
+from gateway.service.running_rig.running_rig import RunningRig
+from tests.disk.at_once import AtOnce
+from tests.service.kept_log import Log
+from tests.service.rigs import demo
+from tests.service.running_rig.test_running_rig import OwnDevices, devices, with_running_rig
+
+__all__ = ["devices"]
+
+NAMED = RecordingLabel("the worn seal", "left cylinder")
+
+
+class Process:
+    """The recordings of a control process, and what it has kept for the next one."""
+
+    def __init__(self, state: Path, kept: dict[str, Any]) -> None:
+        self.kept = kept
+        self.recordings = Recordings(state / "recordings", demo(), Log(), AtOnce())  # type: ignore[arg-type]
+        self.recordings.on_wanted = self._keep
+
+    def _keep(self, wanted: WantedRecording | None) -> None:
+        self.kept["recording"] = wanted.as_facts() if wanted else None
+
+    def wanted(self, now_s: float, *, record: bool = False) -> WantedRecording | None:
+        return Handover(self.kept, record=record).recording(now_s)
+
+
+def test_a_recording_goes_on_with_its_name_and_ends_when_it_would_have(tmp_path: Path) -> None:
+    dead = Process(tmp_path, {})
+    dead.recordings.start(NAMED, for_s=60.0)
+    dead.recordings.flush(100.0)
+    again = Process(tmp_path, dict(dead.kept))
+    wanted = again.wanted(110.0)
+    assert wanted == WantedRecording(NAMED, 60.0, 160.0)
+    assert again.recordings.try_start(wanted).result() == ()
+    again.recordings.flush(159.9)
+    assert again.recordings.status()["recording"].endswith("0002.fgr")
+    again.recordings.flush(160.0)
+    assert again.recordings.status() == {"recording": None}
+    assert again.wanted(160.0) is None
+    assert [label_of(entry.header) for entry in list_recordings(tmp_path)] == [NAMED, NAMED]
+    dead.recordings.stop()
+
+
+def test_one_whose_time_is_over_by_then_is_not_begun_again(tmp_path: Path) -> None:
+    dead = Process(tmp_path, {})
+    dead.recordings.start(for_s=60.0)
+    dead.recordings.flush(100.0)
+    assert dead.wanted(159.9) and not dead.wanted(160.0)
+    dead.recordings.stop()
+
+
+def test_what_was_recorded_from_the_start_is_not_once_somebody_has_ended_it(tmp_path: Path) -> None:
+    first = Process(tmp_path, {})
+    wanted = first.wanted(0.0, record=True)
+    assert wanted == WantedRecording()
+    first.recordings.try_start(wanted)
+    assert first.wanted(0.0, record=True) == wanted, "it goes on while nobody has"
+    first.recordings.stop()
+    assert first.wanted(0.0, record=True) is None
+
+
+def test_one_that_the_disk_refuses_is_wanted_only_where_it_waits_for_room(tmp_path: Path) -> None:
+    (tmp_path / "recordings").write_text("no folder")
+    asked, at_start = Process(tmp_path, {}), Process(tmp_path, {})
+    assert asked.recordings.start().exception()
+    assert asked.wanted(0.0) is None, "who asked was told no"
+    at_start.recordings.try_start(WantedRecording())
+    assert at_start.wanted(0.0) == WantedRecording()
+    for process in (asked, at_start):
+        process.recordings.stop()
+
+
+def test_a_process_that_ends_by_itself_leaves_what_is_wanted(tmp_path: Path) -> None:
+    """By an internal error, say: it closes its recording whole, and the next one goes on."""
+    one = Process(tmp_path, {})
+    one.recordings.start(NAMED)
+    asyncio.run(one.recordings.close())
+    assert one.wanted(0.0) == WantedRecording(NAMED)
+
+
+def test_another_calibration_or_plant_than_before_is_told_and_the_same_is_not() -> None:
+    kept = {"calibration": 3, "plant": 2}
+    assert Handover({}, record=False).changes(calibration=1, plant=0) == ()
+    assert Handover(kept, record=False).changes(calibration=3, plant=2) == ()
+    words = Handover(kept, record=False).changes(calibration=1, plant=0)
+    assert [word.partition(":")[0] for word in words] == [
+        "W250 calibration 3 was in use before the restart, now it is 1",
+        "W250 plant 2 was in use before the restart, now it is the rig's own",
+    ]
+
+
+def test_another_calibration_than_before_the_restart_is_told_by_name_and_kept_for_the_next(devices: OwnDevices) -> None:
+    told: list[message_link.Message] = []
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        while (message := message_link.receive(guardian)) is not None:
+            told.append(message)
+            message.drop_descriptors()
+            if message.tag == message_link.KEEP:
+                return
+
+    died = Ending(EndCause.DIED, "control process died")
+    lines = with_running_rig(devices, scene, died, {"calibration": 7})
+    [number] = {message.body["calibration"] for message in told if message.tag == message_link.KEEP}
+    assert any(f"W250 calibration 7 was in use before the restart, now it is {number}: " in line for line in lines)
