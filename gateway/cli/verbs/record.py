@@ -9,9 +9,11 @@ import click
 
 from gateway.cli.duration import parse_duration_s
 from gateway.cli.options import StateChoice, calibration_name, json_option, state_options
+from gateway.processes import exit_codes
 
 _ON = {"on": True, "off": False}
 _LOOK_S: Final = 0.2
+_MOST_LOOKS: Final = 25  # five seconds, in which control is started again
 _LONGEST_NOTE: Final = 1000  # gateway.recording.label
 _LONGEST_S: Final = 31 * 86400.0
 
@@ -69,33 +71,51 @@ def command(*, what: str | None, state: StateChoice, as_json: bool, for_s: float
 
 
 def _follow(state: Path, recording: str, for_s: float) -> dict[str, Any]:
-    """Wait for the end of a recording, and return what it has become."""
-    from gateway.cli.control_socket import ask
+    """Wait for the end of a recording, and return what it has become. recording: the path that it began in; behind a restart of
+    control, or in use of another plant, it goes on in another file."""
     from gateway.cli.diagnosis.progress_line import show_progress
     from gateway.recording import read_entry
 
-    is_stopped = False
+    paths, is_stopped = [recording], False
     try:
         with show_progress("record"):
-            _wait(state, for_s)
+            _wait(state, paths, for_s)
     except KeyboardInterrupt:
         is_stopped = True
-        ask(state, {"do": "record", "on": False})
-    entry = read_entry(Path(recording))
-    answer = {"recording": None, "written": recording, "rows": entry.rows, "duration_s": round(entry.duration_s, 6)}
-    return {**answer, "stopped": is_stopped}
+        _ask_patiently(state, {"do": "record", "on": False})
+    entries = [read_entry(Path(path)) for path in paths]
+    duration_s = round(sum(entry.duration_s for entry in entries), 6)
+    answer = {"recording": None, "written": recording, "rows": sum(entry.rows for entry in entries)}
+    return {**answer, "duration_s": duration_s, "files": paths, "stopped": is_stopped}
 
 
-def _wait(state: Path, for_s: float) -> None:
-    """Look now and then until nothing is recorded any more, and tell how much of the time is over."""
-    from gateway.cli.control_socket import ask
+def _wait(state: Path, paths: list[str], for_s: float) -> None:
+    """Look now and then until it is recorded no more, and tell how much of the time is over. paths: its files, the first at
+    first; each further one is added."""
     from gateway.progress import report
 
     began_s = time.monotonic()
-    while (status := ask(state, {"do": "record"}))["recording"]:
+    while (status := _ask_patiently(state, {"do": "record"})).get("began_in") == paths[0]:
+        if status["recording"] not in paths:
+            paths.append(status["recording"])
         spent_s = time.monotonic() - began_s
         report(f"{Path(status['recording']).name}, seconds", min(int(spent_s), round(for_s)), max(round(for_s), 1))
         time.sleep(min(_LOOK_S, max(for_s - spent_s, 0.02)))
+
+
+def _ask_patiently(state: Path, request: dict[str, Any]) -> dict[str, Any]:
+    """Ask control, which answers nobody for a moment while it is started again."""
+    from gateway.cli.control_socket import ask
+    from gateway.cli.errors import CliError
+
+    for _ in range(_MOST_LOOKS):
+        try:
+            return ask(state, request)
+        except CliError as error:
+            if error.exit_code != exit_codes.DEVICE:
+                raise
+            time.sleep(_LOOK_S)
+    return ask(state, request)
 
 
 def _sentence(answer: dict[str, Any]) -> str:
@@ -105,5 +125,6 @@ def _sentence(answer: dict[str, Any]) -> str:
         stopped = "stopped; " if answer.get("stopped") else ""
         length = f" ({answer['duration_s']:.1f} s)" if "duration_s" in answer else ""
         fault = f"; {answer['fault']}" if answer.get("fault") else ""
-        return f"{stopped}recorded {answer.get('rows', 0)} rows{length} to {answer['written']}{fault}"
+        files = ", ".join(answer.get("files", [answer["written"]]))
+        return f"{stopped}recorded {answer.get('rows', 0)} rows{length} to {files}{fault}"
     return f"not recording: {answer['waits']}; it begins again by itself" if answer.get("waits") else "not recording"

@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from gateway.cli.errors import CliError
+from gateway.processes import exit_codes
 from gateway.recording import Recorder, list_recordings
 
 
@@ -16,17 +18,32 @@ class ScriptedGateway:
         self.state, self.looks = state, looks
         self.asked: list[dict[str, Any]] = []
         self.recorder: Recorder | None = None
+        self.began_in = Path()
+        self.restarts_at = self.replaced_at = 0
 
     def ask(self, state: Path, request: dict[str, Any]) -> dict[str, Any]:
         self.asked.append(request)
         if request.get("on"):
             header = {key: request[key] for key in ("name", "note") if key in request}
-            self.recorder = Recorder(self.state / "recordings", header, ("time_s",))
-            self.recorder.append((0.0,))
-            self.recorder.append((1.5,))
+            self.began_in = self._begin(header)
+        elif len(self.asked) == self.restarts_at:
+            self._end()
+            self._begin({})
+            raise CliError("E140 no gateway answers", exit_codes.DEVICE)
+        elif len(self.asked) == self.replaced_at:
+            self._end()
+            self.began_in = self._begin({})
         elif request.get("on") is False or len(self.asked) > self.looks:
             self._end()
-        return {"recording": str(self.recorder.path) if self.recorder and self.recorder.is_open else None}
+        if not (self.recorder and self.recorder.is_open):
+            return {"recording": None}
+        return {"recording": str(self.recorder.path), "began_in": str(self.began_in)}
+
+    def _begin(self, header: dict[str, Any]) -> Path:
+        self.recorder = Recorder(self.state / "recordings", header, ("time_s",))
+        self.recorder.append((0.0,))
+        self.recorder.append((1.5,))
+        return self.recorder.path
 
     def _end(self) -> None:
         assert self.recorder
@@ -48,6 +65,24 @@ def test_it_waits_for_the_end_and_says_what_was_recorded(gateway: ScriptedGatewa
     assert gateway.asked[0] == {"do": "record", "on": True, "name": "a b", "note": "why", "for_s": 90.0}
     assert gateway.asked[-1] == {"do": "record"}
     assert list_recordings(tmp_path)[0].header["note"] == "why"
+
+
+def test_a_restart_of_control_in_between_is_waited_for_and_its_other_file_told(
+    gateway: ScriptedGateway, call, tmp_path: Path
+) -> None:
+    gateway.restarts_at = 2
+    answer = call("record", "--for", "90s", "--state", tmp_path)
+    assert answer.exit_code == 0, answer.output
+    first, second = (tmp_path / "recordings" / name for name in ("0001.fgr", "0002.fgr"))
+    assert f"recorded 4 rows (3.0 s) to {first}, {second}" in answer.output
+
+
+def test_another_recording_behind_ours_is_not_waited_for(gateway: ScriptedGateway, call, tmp_path: Path) -> None:
+    gateway.replaced_at, gateway.looks = 3, 10_000
+    answer = call("record", "--for", "90s", "--state", tmp_path)
+    assert f"recorded 2 rows (1.5 s) to {tmp_path / 'recordings' / '0001.fgr'}\n" in answer.output
+    assert len(gateway.asked) == 3
+    gateway.ask(tmp_path, {"do": "record", "on": False})
 
 
 def test_ctrl_c_ends_it_and_keeps_it(

@@ -244,7 +244,7 @@ def _no_fit(*_: Any) -> None:
 def simulated_edges(fit: Any = _no_fit) -> Any:
     """Everything that reaches for the kernel, replaced. fit: what stands for `FitLauncher`."""
     with pytest.MonkeyPatch.context() as patch:
-        for maker in ("calibration_runs", "recordings"):
+        for maker in ("calibration_runs", "recording.recordings"):
             patch.setattr(f"gateway.service.running_rig.{maker}.Recorder", NotedRecorder)
         patch.setattr("gateway.twin.simulation.STEP_S", TWIN_STEP_S)
         patch.setattr("gateway.service.running_rig.lines.rig_ports.SerialPort", SimulatedPort)

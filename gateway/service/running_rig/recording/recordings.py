@@ -77,9 +77,7 @@ class Recordings:
                 answer.set_exception(OSError(f"{self._directory}: {tell_refusal(error)}"))
             else:
                 self._again.forget()
-                if self._current is fresh:  # else somebody has ended it meanwhile
-                    self.on_wanted(self._wanted)
-                answer.set_result(_facts_of(fresh))
+                answer.set_result(self._facts_of(fresh))
 
         self._begin(opened, waits_for_room=waits_for_room)
         return answer
@@ -105,6 +103,9 @@ class Recordings:
                 self._current = None
                 if waits_for_room:
                     self._again.ask(tell_refusal(error))
+            elif self._current is recording:  # else somebody has ended it meanwhile
+                self._wanted = self._wanted.in_file(str(recording.path))
+                self.on_wanted(self._wanted)
             opened(recording, error)
 
         self._current, self._began_s = recording, None
@@ -187,9 +188,10 @@ class Recordings:
         self._disk.close()
 
     def status(self) -> Answer:
-        """Return where the current recording is and how many rows it has; `waits`: why there is none until there is room."""
+        """Return where the current recording is, how many rows it has there, and in which file it began; `waits`: why there is
+        none until there is room."""
         if self._current and self._current.path:
-            return _facts_of(self._current)
+            return self._facts_of(self._current)
         return {"recording": None, "waits": self._again.why} if self._again.why else {"recording": None}
 
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
@@ -246,6 +248,6 @@ class Recordings:
             self.on_wanted(wanted)
         return wanted.is_over(now_s)
 
-
-def _facts_of(recording: RunRecording) -> Answer:
-    return {"recording": str(recording.path), "rows": recording.rows}
+    def _facts_of(self, recording: RunRecording) -> Answer:
+        path, began_in = str(recording.path), self._wanted.began_in if recording is self._current else ""
+        return {"recording": path, "rows": recording.rows, "began_in": began_in or path}

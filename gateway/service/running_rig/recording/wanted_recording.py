@@ -1,7 +1,7 @@
 """What a recording was asked for, as it goes on: in another file, behind a full disk, and in the next control process."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from gateway.recording.label import NO_LABEL, RecordingLabel
@@ -10,15 +10,20 @@ from gateway.recording.label import NO_LABEL, RecordingLabel
 @dataclass(frozen=True, slots=True)
 class WantedRecording:
     """for_s: it ends by itself so long after its first tick, 0: it does not; ends_s: the monotonic time of that end, None
-    before the tick."""
+    before the tick; began_in: the path of its first file, empty before that is open."""
 
     label: RecordingLabel = NO_LABEL
     for_s: float = 0.0
     ends_s: float | None = None
+    began_in: str = ""
 
     def with_end(self, now_s: float) -> "WantedRecording":
         """Return what it is from its first tick on."""
         return replace(self, ends_s=now_s + self.for_s) if self.for_s and self.ends_s is None else self
+
+    def in_file(self, path: str) -> "WantedRecording":
+        """Return what it is once a file of it is open."""
+        return self if self.began_in else replace(self, began_in=path)
 
     def is_over(self, now_s: float) -> bool:
         """Decide whether its time is over."""
@@ -26,9 +31,9 @@ class WantedRecording:
 
     def as_facts(self) -> dict[str, Any]:
         """Return it as JSON takes it."""
-        return {"name": self.label.name, "note": self.label.note, "for_s": self.for_s, "ends_s": self.ends_s}
+        return asdict(self)
 
     @classmethod
     def from_facts(cls, facts: Mapping[str, Any]) -> "WantedRecording":
         """Return what `as_facts` has told."""
-        return cls(RecordingLabel(facts["name"], facts["note"]), facts["for_s"], facts["ends_s"])
+        return cls(**{**facts, "label": RecordingLabel(**facts["label"])})
