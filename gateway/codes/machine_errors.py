@@ -31,7 +31,8 @@ MACHINE_ERRORS: Final = (
         "E104",
         "another gateway runs on this state directory",
         "The state directory's lock is held.",
-        "A gateway for this rig already runs, as a service or in another terminal.",
+        "A gateway for this rig already runs, as a service or in another terminal; or, for a moment, a command such as "
+        "`calibration use` or `restore` holds it.",
         "Use the one that runs, stop it, or give this one its own --state DIR.",
     ),
     Explanation(

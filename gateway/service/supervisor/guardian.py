@@ -48,7 +48,8 @@ def run(options: RunOptions) -> int:
     with hold_state_lock(state) as is_ours:
         if not is_ours:
             words.print_error(
-                f"E104 another gateway already runs on {state}; stop it, or give this one its own --state DIR"
+                f"E104 another gateway already runs on {state} (or a command is changing it at this moment: then try again); "
+                "stop it, or give this one its own --state DIR"
             )
             return exit_codes.DEVICE
         priority.set_nice(priority.LOOP_NICE)

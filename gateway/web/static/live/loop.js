@@ -61,7 +61,7 @@ export function makeLoop(samples, api) {
       if (plot.isShown) plot.chart.redraw(false);
     },
     state(state) {
-      const key = `${state.calibration.number} ${state.calibration.name}`;
+      const key = `${state.calibration.number} ${state.calibration.name} ${state.plant.number}`;
       if (key !== shown) load(key);
     },
   };
