@@ -8,37 +8,15 @@ routine is also the check that everything is declared.
 import copy
 import struct
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
+from tests.clients.programs.code import Given, RapidError, Returned, code_of, constant_code, keeper_code, key_of
+from tests.clients.programs.kept import FIRST_VALUES, KEEPERS, Keeps
 from tests.clients.programs.syntax import Node, Routine, Unit
-
-WIDTHS = {"WORD": 16, "UINT": 16, "BYTE": 8, "USINT": 8, "DWORD": 32, "UDINT": 32}
-SIGNED = {"INT": 16, "DINT": 32}
-MOST_STEPS = 400_000
-"""Statements of one call from outside: more is an endless loop."""
-
-
-@cache
-def folded(name: str) -> str:
-    return name.lstrip("#").strip('"').upper()
-
-
-class Returned(Exception):  # noqa: N818
-    def __init__(self, value: Any) -> None:
-        self.value = value
-
-
-class RapidError(Exception):
-    """An error number of RAPID, for the ERROR handler of a routine or of its callers."""
 
 
 class TaskStopped(Exception):  # noqa: N818
     """RAPID: an error within an ERROR handler goes to the system's error handler, which stops the task."""
-
-
-LARGEST_NUM = 8_388_608
-"""RAPID: whole numbers are exact in num up to here (data type num)."""
 
 
 class Block:
@@ -48,7 +26,7 @@ class Block:
         self.machine, self.routine = machine, routine
         entries = routine.variables.items()
         self.fields = {machine.key(name): machine.fresh(kind, initial) for name, (kind, initial, _) in entries}
-        self.frame = Frame(machine, routine, self.fields)
+        self.frame = Frame(self.fields, machine.declared_by(routine))
 
     def call(self, given: dict[str, Any]) -> None:
         for name, _, section in self.routine.parameters:
@@ -69,13 +47,30 @@ class Union(dict[str, Any]):
 
 
 class Frame:
-    """One call: its variables, and their types."""
+    """One call: its variables, and what each of them keeps of a value."""
 
-    def __init__(self, machine: "Machine", routine: Routine | None, variables: dict[str, Any]) -> None:
-        self.routine, self.variables = routine, variables
-        entries = routine.variables if routine else {}
-        self.types = {machine.key(name): entry[0] for name, entry in entries.items()}
-        self.constants = {machine.key(name) for name, entry in entries.items() if "CONST" in entry[2]}
+    def __init__(self, variables: dict[str, Any], declared: "Declared | None" = None) -> None:
+        self.variables = variables
+        self.keepers = declared.keepers if declared else {}
+        self.constants = declared.constants if declared else frozenset()
+
+
+class Declared:
+    """What a routine declares, as one machine needs it for each call."""
+
+    def __init__(self, machine: "Machine", routine: Routine) -> None:
+        key, entries = machine.key, routine.variables.items()
+        self.keepers = {key(name): machine.keeper_of(kind) for name, (kind, _, _) in entries}
+        self.constants = frozenset(key(name) for name, (_, _, section) in entries if "CONST" in section)
+        self.parameters = [(key(name), machine.keeper_of(kind)) for name, kind, _ in routine.parameters]
+        given = {name for name, _ in self.parameters}
+        local = [(key(name), kind, initial) for name, (kind, initial, _) in entries if key(name) not in given]
+        if routine.kind == "FUNCTION":
+            local.append((key(routine.name), routine.result, None))
+        self.made = [each for each in local if each[2] is not None or not machine.is_plain(each[1])]
+        self.plain = {
+            name: machine.fresh(kind) for name, kind, initial in local if initial is None and machine.is_plain(kind)
+        }
 
 
 class Machine:
@@ -88,33 +83,38 @@ class Machine:
         self.types = {self.key(name): members for name, members in unit.types.items()}
         self.global_names: dict[str, Any] = {}
         self.blocks: dict[str, Callable[[], Any]] = {}
+        self.known: dict[str, Declared] = {}
+        self.first_index = int(library.get("first_index", 0))  # type: ignore[call-overload]
+        self.is_typed, self.is_sliced, self.has_words = (
+            bool(library.get(name)) for name in ("typed", "sliced", "words")
+        )
         self.steps = 0
         self.is_critical = False
-        self.switch: Callable[[Node], object] = lambda _statement: None
+        self.switch: Callable[[Node], object] | None = None
         """Called wherever another task or thread may run, with the statement that comes next."""
         self.called: set[str] = set()
 
     def key(self, name: str) -> str:
         """Return the name as the language compares it."""
-        return folded(name) if self.fold else name
+        return key_of(name, self.fold)
 
     def begin(self) -> None:
         """Give the module's variables their first values."""
         for name, (kind, initial, _) in self.unit.variables.items():
             self.global_names[self.key(name)] = self.fresh(kind, initial)
-        self.frame = Frame(self, None, {})
-        self.run(self.unit.body, self.frame)
+        self.frame = Frame({})
+        code_of(self.unit.body, self.fold)(self, self.frame)
 
     # -- values
 
     def fresh(self, kind: Any, initial: Node | None = None) -> Any:
         """Return the first value of a variable of this type."""
         if initial is not None:
-            return self.store(kind, self.value(initial, Frame(self, None, {})))
+            return self.store(self.keeper_of(kind), self.value(initial, Frame({})))
         if isinstance(kind, tuple):
             first, last = kind[1], kind[2]
             if isinstance(last, tuple):
-                last = self.value(last, Frame(self, None, {}))
+                last = self.value(last, Frame({}))
             return [self.fresh(kind[3]) for _ in range(int(last) - int(first) + 1)]
         name = self.key(str(kind))
         if name in self.types:
@@ -126,65 +126,39 @@ class Machine:
             return self.blocks[name]()
         if name in self.routines and self.routines[name].kind == "FUNCTION_BLOCK":
             return Block(self, self.routines[name])
-        return {"BOOL": False, "REAL": 0.0, "NUM": 0, "DNUM": 0, "STRING": "", "TIME": 0.0}.get(name, 0)
+        return FIRST_VALUES.get(name, 0)
 
-    def store(self, kind: Any, value: Any) -> Any:
-        """Return what a variable of this type holds after an assignment."""
-        if value is True or value is False:
+    def is_plain(self, kind: Any) -> bool:
+        """Decide whether a variable of this type holds one number, text or truth value."""
+        name = None if isinstance(kind, tuple) else self.key(str(kind))
+        return name is not None and name not in self.types and name not in self.blocks and name not in self.routines
+
+    def declared_by(self, routine: Routine) -> Declared:
+        if (found := self.known.get(routine.name)) is None:
+            found = self.known[routine.name] = Declared(self, routine)
+        return found
+
+    def keeper_of(self, kind: Any) -> Keeps | None:
+        """Return what makes of a value what a variable of this type keeps of it; None where that is the value."""
+        return None if isinstance(kind, tuple) else KEEPERS.get(self.key(str(kind)))
+
+    @staticmethod
+    def store(keep: Keeps | None, value: Any) -> Any:
+        """Return what a variable holds after an assignment. keep: as `keeper_of` returns it."""
+        kind = type(value)
+        if kind is bool:
             return value
-        if isinstance(value, (list, dict)) and not isinstance(value, Union):
+        if kind is list or kind is dict:
             return copy.deepcopy(value)
-        name = self.key(str(kind)) if not isinstance(kind, tuple) else ""
-        if name in WIDTHS:
-            return int(value) & ((1 << WIDTHS[name]) - 1)
-        if name in SIGNED and not -(1 << SIGNED[name] - 1) <= value < 1 << SIGNED[name] - 1:
-            raise OverflowError(f"{value} in {kind}")
-        if name == "NUM" and isinstance(value, int) and abs(value) > LARGEST_NUM:
-            raise OverflowError(f"{value} is not exact in num")
-        if name in ("REAL", "NUM") and isinstance(value, float):
-            return struct.unpack(">f", struct.pack(">f", value))[0]
-        if name == "STRING" and len(value) > 80:
-            raise OverflowError(f"{value!r} is longer than 80 characters")
-        return value
+        return keep(value) if keep else value
 
     def value(self, node: Node, frame: Frame) -> Any:
-        kind = node[0]
-        if kind == "value":
-            return node[1]
-        if kind == "name":
-            name = folded(node[1]) if self.fold else node[1]
-            return frame.variables[name] if name in frame.variables else self.look_up(node, frame)
-        if kind == "binary":
-            return self.binary(node[1], node[2], node[3], frame)
-        if kind == "list":
-            return [self.value(each, frame) for each in node[1]]
-        if kind == "index":
-            return self.value(node[1], frame)[self.place(node, frame)]
-        if kind == "field":
-            return self.member(self.value(node[1], frame), node[2])
-        if kind == "bit":
-            word = self.value(node[1], frame)
-            return bool(word >> node[3] & 1) if node[2] == "X" else word >> 16 * node[3] & 0xFFFF
-        if kind == "unary":
-            inside = self.value(node[2], frame)
-            if node[1] == "-":
-                return -inside
-            return not inside if isinstance(inside, bool) else ~inside
-        return self.call(node, frame)
+        return code_of(node, self.fold)(self, frame)
 
-    def binary(self, operator: str, left_node: Node, right_node: Node, frame: Frame) -> Any:
-        left = self.value(left_node, frame)
-        if isinstance(left, bool) and operator in ("AND", "OR") and not isinstance(self.library.get("strict"), bool):
-            return self.value(right_node, frame) if left == (operator == "AND") else left
-        right = self.value(right_node, frame)
-        return OPERATIONS[operator](left, right)
-
-    def place(self, node: Node, frame: Frame) -> int:
-        index = self.value(node[2][0], frame)
-        first = self.library.get("first_index", 0)
-        if index != int(index) or index < first:  # type: ignore[operator]
+    def place(self, index: Any) -> int:
+        if index != int(index) or index < self.first_index:
             raise IndexError(f"index {index}")
-        return int(index) - first  # type: ignore[operator]
+        return int(index) - self.first_index
 
     def member(self, holder: Any, name: str) -> Any:
         if isinstance(holder, Union):
@@ -195,10 +169,8 @@ class Machine:
             return holder.fields[self.key(name)]
         return getattr(holder, name)
 
-    def look_up(self, node: Node, frame: Frame) -> Any:
-        name = self.key(node[1])
-        if name in frame.variables:
-            return frame.variables[name]
+    def look_up(self, name: str, node: Node) -> Any:
+        """Return what is no variable of the routine: of the module, or known to the controller."""
         if name in self.global_names:
             return self.global_names[name]
         if name in self.library and not callable(self.library[name]):
@@ -207,148 +179,51 @@ class Machine:
 
     # -- statements
 
-    def run(self, body: list[Node], frame: Frame) -> None:
-        for statement in body:
-            self.steps += 1
-            if self.steps > MOST_STEPS:
-                raise RecursionError("an endless loop")
-            if not self.is_critical:
-                self.switch(statement)
-            getattr(self, f"run_{statement[0]}")(statement, frame)
-
-    def run_critical(self, node: Node, _frame: Frame) -> None:
-        """URScript: no other thread runs in here."""
-        self.is_critical = node[1]
-
-    def run_block(self, node: Node, frame: Frame) -> None:
-        self.run(node[1], frame)
-
-    def run_assign(self, node: Node, frame: Frame) -> None:
-        value = self.value(node[2], frame)
-        if self.library.get("sliced") and not self.is_critical:
-            self.switch(node)
-        self.assign(node[1], value, frame, node[3] if len(node) > 3 else "")
-
     def assign(self, target: Node, value: Any, frame: Frame, scope: str = "") -> None:
-        if target[0] == "index":
-            holder, place = self.value(target[1], frame), self.place(target, frame)
-            kind = "WORD" if self.library.get("words") else ""
-            if self.library.get("typed"):
-                self.keep_type(str(target[1]), holder[place], value)
-            holder[place] = self.store(kind if isinstance(value, int) and not isinstance(value, bool) else "", value)
-            return
-        if target[0] == "field":
-            holder = self.value(target[1], frame)
-            if not isinstance(holder, dict):  # a static of a block of the controller's own
-                holder.set_static(target[2], value)
-                return
-            holder[target[2] if isinstance(holder, Union) else self.key(target[2])] = self.store("", value)
-            return
-        name = self.key(target[1])
-        if self.library.get("typed"):
-            known = {} if scope == "LOCAL" else frame.variables if name in frame.variables else self.global_names
-            self.keep_type(target[1], known.get(name, value), value)
-        if name in frame.variables and scope != "GLOBAL":
+        keeper_code(target, self.fold)(self, frame, value, scope)
+
+    def keep_variable(self, name: str, node: Node, value: Any, frame: Frame, scope: str) -> None:
+        """Assign to a variable. name: as the language compares it."""
+        variables = frame.variables
+        if self.is_typed:
+            known = {} if scope == "LOCAL" else variables if name in variables else self.global_names
+            self.keep_type(node[1], known.get(name, value), value)
+        if name in variables and scope != "GLOBAL":
             if name in frame.constants:
                 raise TypeError(f"{name} is a constant")
-            frame.variables[name] = self.store(frame.types.get(name, ""), value)
+            variables[name] = self.store(frame.keepers.get(name), value)
         elif scope == "LOCAL":
-            frame.variables[name] = self.store("", value)
+            variables[name] = self.store(None, value)
         elif scope == "GLOBAL" or name in self.global_names:
             declared = self.declared.get(name)
             if declared and declared[2] == "CONST":
-                raise TypeError(f"{target[1]} is a constant")
-            self.global_names[name] = self.store(declared[0] if declared else "", value)
+                raise TypeError(f"{node[1]} is a constant")
+            self.global_names[name] = self.store(self.keeper_of(declared[0]) if declared else None, value)
         else:
-            raise NameError(f"line {target[2]}: {target[1]} is not declared")
+            raise NameError(f"line {node[2]}: {node[1]} is not declared")
+
+    @staticmethod
+    def is_union(members: dict[str, Any]) -> bool:
+        return isinstance(members, Union)
 
     def keep_type(self, name: str, before: Any, value: Any) -> None:
         """URScript: "The type of a variable is deduced from the first assignment of the variable" (script manual, 1.3)."""
         if type(before) is not type(value):
             raise TypeError(f"{name} is {type(before).__name__}, not {type(value).__name__}")
 
-    def run_if(self, node: Node, frame: Frame) -> None:
-        for condition, body in node[1]:
-            decided = self.value(condition, frame)
-            assert isinstance(decided, bool), condition
-            if decided:
-                self.run(body, frame)
-                return
-        self.run(node[2], frame)
-
-    def run_case(self, node: Node, frame: Frame) -> None:
-        value = self.value(node[1], frame)
-        for labels, body in node[2]:
-            if any(self.value(label, frame) == value for label in labels):
-                self.run(body, frame)
-                return
-        self.run(node[3], frame)
-
-    def run_for(self, node: Node, frame: Frame) -> None:
-        first, last = (int(self.value(each, frame)) for each in node[2:4])
-        implicit = self.library.get("implicit_for")
-        for k in range(first, last + 1):
-            self.assign(node[1], k, frame, "LOCAL" if implicit else "")
-            self.run(node[4], frame)
-        if implicit:
-            frame.variables.pop(self.key(node[1][1]), None)
-
-    def run_while(self, node: Node, frame: Frame) -> None:
-        while self.value(node[1], frame):
-            self.run(node[2], frame)
-
-    def run_return(self, node: Node, frame: Frame) -> None:
-        raise Returned(None if node[1] is None else self.value(node[1], frame))
-
-    def run_raise(self, node: Node, frame: Frame) -> None:
-        raise RapidError(node[1][1])
-
-    def run_call(self, node: Node, frame: Frame) -> None:
-        self.call(node, frame)
-
     # -- calls
 
-    def call(self, node: Node, frame: Frame) -> Any:
-        target, arguments = node[1], node[2]
-        holder = self.instance(target, frame)
-        if holder is not None:
-            given = {each[1]: self.value(each[2], frame) for each in arguments}
-            holder.call(given)
-            return None
-        name = self.key(target[1])
-        if name in self.routines:
-            return self.call_routine(self.routines[name], arguments, frame)
-        if name in self.library:
-            return self.library[name](self, arguments, frame)
-        raise NameError(f"{target[1]} is neither a routine nor known to the controller")
-
-    def instance(self, target: Node, frame: Frame) -> Any:
-        if target[0] != "name":
-            return self.value(target, frame)
-        name = self.key(target[1])
-        if name in self.routines and self.routines[name].kind != "FUNCTION_BLOCK":
-            return None
-        try:
-            found = self.look_up(target, frame)
-        except NameError:
-            return None
-        return found if hasattr(found, "call") else None
-
-    def call_routine(self, routine: Routine, arguments: list[Node], frame: Frame) -> Any:
-        variables: dict[str, Any] = {}
-        positional = [each for each in arguments if each[0] != "named"]
-        named = {self.key(each[1]): each[2] for each in arguments if each[0] == "named"}
-        if len(arguments) != len(routine.parameters):
-            raise TypeError(f"{routine.name}: {len(arguments)} arguments, {len(routine.parameters)} are wanted")
-        for k, (name, kind, _) in enumerate(routine.parameters):
-            given = named[self.key(name)] if named else positional[k]
-            variables[self.key(name)] = self.store(kind, self.value(given, frame))
-        for name, (kind, initial, _) in routine.variables.items():
-            if self.key(name) not in variables:
-                variables[self.key(name)] = self.fresh(kind, initial)
-        if routine.kind == "FUNCTION":
-            variables[self.key(routine.name)] = self.fresh(routine.result)
-        inner = Frame(self, routine, variables)
+    def call_routine(self, routine: Routine, given: Given, frame: Frame) -> Any:
+        if given.count != len(routine.parameters):
+            raise TypeError(f"{routine.name}: {given.count} arguments, {len(routine.parameters)} are wanted")
+        declared = self.declared_by(routine)
+        variables = dict(declared.plain)
+        for k, (name, keep) in enumerate(declared.parameters):
+            code = given.named[name] if given.named else given.positional[k]
+            variables[name] = self.store(keep, code(self, frame))
+        for name, kind, initial in declared.made:
+            variables[name] = self.fresh(kind, initial)
+        inner = Frame(variables, declared)
         try:
             self.run_body(routine, inner)
         except Returned as result:
@@ -358,13 +233,13 @@ class Machine:
     def run_body(self, routine: Routine, frame: Frame) -> None:
         self.called.add(routine.name)
         try:
-            self.run(routine.body, frame)
+            code_of(routine.body, self.fold)(self, frame)
         except RapidError as error:
             if not routine.handler:
                 raise
             self.global_names["ERRNO"] = str(error)
             try:
-                self.run(routine.handler, frame)
+                code_of(routine.handler, self.fold)(self, frame)
             except RapidError as second:
                 raise TaskStopped(f"{second} in the ERROR handler of {routine.name}") from None
         except Returned:
@@ -375,26 +250,5 @@ class Machine:
     def start(self, name: str, *arguments: Any) -> Any:
         """Call a routine from outside."""
         self.steps = 0
-        nodes = [("value", each) for each in arguments]
-        return self.call(("call", ("name", name, 0), nodes), Frame(self, None, {}))
-
-
-OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "/": lambda a, b: a / b,
-    "DIV": lambda a, b: int(a) // int(b),
-    "MOD": lambda a, b: int(a) % int(b),
-    "AND": lambda a, b: a & b,
-    "OR": lambda a, b: a | b,
-    "XOR": lambda a, b: a ^ b,
-    "=": lambda a, b: a == b,
-    "==": lambda a, b: a == b,
-    "<>": lambda a, b: a != b,
-    "!=": lambda a, b: a != b,
-    "<": lambda a, b: a < b,
-    ">": lambda a, b: a > b,
-    "<=": lambda a, b: a <= b,
-    ">=": lambda a, b: a >= b,
-}
+        given = Given([constant_code(("value", each), self.fold) for each in arguments])
+        return self.call_routine(self.routines[self.key(name)], given, Frame({}))
