@@ -199,6 +199,7 @@ class Simulation:
 
     def _note_pdu(self, host: str, pdu: bytes, is_answered: bool) -> None:
         self.status.note_write(host if is_answered else "", pdu, self.clock.now_s)
+        self.explained.note_write(host, self.clock.now_s)
         if (control := control_of(pdu)) is not None and control & TARE:
             self._note_tare()
         if hangs_payload(pdu):

@@ -23,6 +23,21 @@ def complaints(disturbed_s: float = 0.0, **changes: int) -> int:
     return len(observer.broken)
 
 
+def test_masters_who_take_the_force_from_each_other_between_two_looks_explain_it() -> None:
+    observer = Observer(BOUNDS)
+    judge = ExplainedForce(observer)
+    block = struct.pack(f">{STATUS_WORDS}h", 0, HOLDING, 1700, 2000, 0, 2000, *[0] * (STATUS_WORDS - 6))
+    for number in range(50):
+        judge.note(block, 10.0 + 0.1 * number, 0.0)
+        judge.note_write("one", 10.02 + 0.1 * number)
+        judge.note_write("other", 10.07 + 0.1 * number)
+    assert not observer.broken
+    for number in range(50):
+        judge.note(block, 15.0 + 0.1 * number, 0.0)
+        judge.note_write("other", 15.02 + 0.1 * number)
+    assert len(observer.broken) == 1
+
+
 @pytest.mark.parametrize(
     ("changes", "count"),
     [

@@ -202,6 +202,10 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(5.3856, "worker", "tare"),
         ],
     ),
+    (
+        12546,
+        [Event(0.7313, "worker", "take", (55.03,), way="block"), Event(2.2032, "rival", "take", (19.03,), way="block")],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

@@ -16,11 +16,17 @@ SAYS_WHY = 1 << 1 | 1 << 2 | 1 << 8
 
 
 class ExplainedForce:
-    """Told of each look at the status block."""
+    """Told of each look at the status block, and of each write that was taken: between two looks, two masters who take the
+    force from each other may each have had theirs."""
 
     def __init__(self, observer: Observer) -> None:
         self._observer = observer
-        self._quiet_s, self._requested = 0.0, 0
+        self._quiet_s, self._requested, self._writer = 0.0, 0, ""
+
+    def note_write(self, writer: str, at_s: float) -> None:
+        """Note whose write was taken at at_s."""
+        if writer != self._writer:
+            self._writer, self._quiet_s = writer, max(self._quiet_s, at_s)
 
     def note(self, block: bytes, at_s: float, disturbed_s: float) -> None:
         """Judge the status block as it was at at_s. disturbed_s: when something was disturbed last."""
