@@ -66,9 +66,9 @@ NOTICES: Final = (
     Explanation(
         "W241",
         "certificate of a client outside its days",
-        "A client's certificate has expired or is not yet valid; its connection was closed.",
+        "A client's certificate, or that of the CA, has expired or is not yet valid; its connection was closed.",
         "It is old, or a clock is wrong: this machine's, or that of the machine which made it.",
-        "date shows the clock; make the client a new certificate.",
+        "date shows the clock; make the client a new one. Where force-gateway check says that the CA has expired: all anew.",
     ),
     Explanation(
         "W242",
@@ -101,9 +101,9 @@ NOTICES: Final = (
     Explanation(
         "W246",
         "server certificate is about to expire",
-        "The gateway's own certificate ends within 30 days; after that no client connects by TLS.",
-        "Certificates are made for a limited time.",
-        "Make a new one with the same CA, put it into the rig file and start anew; clients keep theirs.",
+        "The gateway's own certificate, or its CA's, ends within 30 days; after that no client connects by TLS.",
+        "Certificates are made for a limited time, and certs makes a CA for the same as what it signs first.",
+        "Make a new one with the same CA, put it into the rig file and start anew; clients keep theirs. Of a CA: all anew.",
     ),
     Explanation(
         "W247",

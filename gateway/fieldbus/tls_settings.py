@@ -110,7 +110,8 @@ def handshake_failure(error: ssl.SSLError) -> str:
     if isinstance(error, ssl.SSLCertVerificationError):
         if error.verify_code in (_EXPIRED, _NOT_YET):
             state = "has expired" if error.verify_code == _EXPIRED else "is not yet valid"
-            return f"W241 its certificate {state} (or its clock, or ours, is wrong): make a new one"
+            cure = "make a new one; force-gateway check says if it is our CA's that is outside its days"
+            return f"W241 its certificate {state} (or its clock, or ours, is wrong): {cure}"
         if error.verify_code == _PURPOSE:
             return "W240 its certificate is not one for a client (a server's?)"
         return f"W240 its certificate is not of our CA ({error.verify_message}): make one with the same CA"
