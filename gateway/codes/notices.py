@@ -73,7 +73,7 @@ NOTICES: Final = (
     Explanation(
         "W242",
         "certificate without a known role",
-        "A client's certificate carries no role, or one that there is not; its connection was closed.",
+        "A client's certificate has no role, or one that there is not, or no usable name; its connection was closed.",
         "It was made without the extension 1.3.6.1.4.1.50316.802.1 (UTF8String: monitor, setpoint, calibration or admin).",
         "Make it with force-gateway certs --client NAME:ROLE, or add the extension in your own CA.",
     ),
