@@ -26,7 +26,7 @@ _REPEATS: Final = 3
 _PLACES: Final = (
     "rising handle", "rising weight", "falling handle", "falling weight", "slip radius", "slip share", "response",
 )  # fmt: skip
-_RESPONSE: Final = ("dead time", "lag", "second lag")
+_RESPONSE: Final = ("dead time", "lag", "second lag", "damping")
 
 
 class UploadClient(GatewayClient):
@@ -142,4 +142,4 @@ def place(index: int) -> str:
     if not 0 <= index < 16 * len(_PLACES):
         return "the whole set"
     name = f"{_PLACES[index // 16]} {index % 16}"
-    return f"index {index}, {_RESPONSE[index - 96] if 96 <= index < 99 else name}"
+    return f"index {index}, {_RESPONSE[index - 96] if 96 <= index < 96 + len(_RESPONSE) else name}"

@@ -257,6 +257,7 @@ def test_no_request_is_longer_than_modbus_allows(call, file):
         (73, "index 73, slip radius 9"),
         (80, "index 80, slip share 0"),
         (97, "index 97, lag"),
+        (99, "index 99, damping"),
         (-1, "the whole set"),
         (112, "the whole set"),
     ],
