@@ -32,6 +32,8 @@ _RESPONSE: Final = ("dead time", "lag", "second lag", "damping")
 class UploadClient(GatewayClient):
     """CliError for whatever goes wrong: no answer (69), a refusal (1), a set that fails a check (65)."""
 
+    is_commit_sent = False
+
     def send(self, upload: UploadFrames, slot: int) -> None:
         """Send the requests in order. CliError when one is refused."""
         for request in upload.staging:
@@ -42,6 +44,7 @@ class UploadClient(GatewayClient):
         """Send the commit; again only where it has not been heard."""
         before = self._commit_status(upload)
         for is_last in (*[False] * _REPEATS, True):
+            self.is_commit_sent = True
             try:
                 self._send(upload.commit, repeats=0)
             except SilentLineError:
