@@ -17,6 +17,7 @@ from collections.abc import Awaitable, Callable
 from math import isfinite
 from typing import Any, Final
 
+from gateway.live.control_link import ANSWER_S
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.map.register_map import Register
 from gateway.registers.words import ControlBit, Mode
@@ -102,7 +103,7 @@ class Commands:
         self._stops += 1
         self._end_beat()
         self.commander = ""
-        await self._write("control_word", 0)
+        await self._send(P.write_registers_request(self._find("control_word").address, bytes(2)), is_stop=True)
 
     async def take_ownership(self, viewer: str) -> None:
         """Take the setpoint over from whoever owns it."""
@@ -187,9 +188,11 @@ class Commands:
     def _find(self, name: str) -> Register:
         return self._context.profile.register_map.find(name)
 
-    async def _send(self, pdu: bytes) -> bytes:
+    async def _send(self, pdu: bytes, *, is_stop: bool = False) -> bytes:
         unit = self._context.profile.network.units[0]
         request: dict[str, Any] = {"do": "modbus", "via": "web", "unit": unit, "pdu": pdu.hex()}
+        if not is_stop:
+            request["until_s"] = self._clock() + ANSWER_S
         answer = await self._context.control.ask(request)
         pdu = bytes.fromhex(answer["pdu"])
         if P.is_exception(pdu):
