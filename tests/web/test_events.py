@@ -228,7 +228,7 @@ def test_a_gateway_that_does_not_answer_is_said_and_what_it_logged_is_shown(
 def test_a_log_that_cannot_be_read_keeps_nobody_from_force_and_state(
     tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch, is_before: bool
 ) -> None:
-    """The reading for all ended: each page showed the force of then, and its browser held the lease."""
+    """The reading for all ended: each page showed the force of then, and one that held lost its lease."""
     monkeypatch.setattr(events, "_SAMPLES_S", 0.001)
 
     async def scene() -> None:
