@@ -9,6 +9,7 @@
 const listeners = new Map();
 const latest = new Map();
 const COMMAND_MS = 5000;
+const PRESSES = /^\/api\/v1\/(command\/(?!stop)|calibrate\/start)/;
 let csrf = "";
 let source = null;
 
@@ -42,7 +43,7 @@ async function request(path, options) {
 
 /** What a browser has no connection for waits in it; a force that was given up meanwhile must not be asked for then. */
 function givenUp(path) {
-  if (!path.startsWith("/api/v1/command/") || path.endsWith("/stop")) return {};
+  if (!PRESSES.test(path)) return {};
   const giving = new AbortController();
   setTimeout(() => giving.abort(new Error(`no answer within ${COMMAND_MS / 1000} s: are many tabs of this page open?`)), COMMAND_MS);
   return { signal: giving.signal };
