@@ -94,9 +94,14 @@ class Commands:
             self._begin_to_beat(viewer)
 
     async def set_force(self, viewer: str, force_n: float) -> None:
-        """Change the setpoint, N."""
-        await self._write_words("force_setpoint", (await self._words_of_force(force_n))[1:])
-        self._begin_to_beat(viewer)
+        """Change the setpoint, N. A stop told meanwhile is the end of it: the page would own a force that nobody wants."""
+        stops = self._stops
+        words = await self._words_of_force(force_n)
+        if stops != self._stops:
+            raise RefusedCommand("stopped meanwhile: nothing was set")
+        await self._write_words("force_setpoint", words[1:])
+        if stops == self._stops:
+            self._begin_to_beat(viewer)
 
     async def stop(self) -> None:
         """Switch the output off, whoever owns the setpoint; ends a run, too. The safe voltage is out before the answer."""
