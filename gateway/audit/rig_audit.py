@@ -38,6 +38,10 @@ class RigAudit:
             verb: self._watched(verb, handler) if verb in _CHANGING else handler for verb, handler in handlers.items()
         }
 
+    def note_failure(self, what: str, sentence: str) -> None:
+        """Keep that what was accepted came to nothing. sentence: why, with its code."""
+        self.note_gateway(what, result=sentence[:4], text=sentence.partition("\n")[0])
+
     def flush(self) -> None:
         """Send on what waits; cheap where nothing does."""
         self._writes.flush()

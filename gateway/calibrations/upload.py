@@ -53,7 +53,8 @@ class UploadRules:
 
 
 class UploadService:
-    """on_use: called in the loop with what is in use from now on. run_in_background: runs work elsewhere and comes back."""
+    """on_use: called in the loop with what is in use from now on; on_failure: with what was accepted and came to nothing, and
+    why. run_in_background: runs work elsewhere and comes back."""
 
     def __init__(
         self,
@@ -66,6 +67,7 @@ class UploadService:
         if selected.document is None:
             raise ValueError("a gateway has a calibration, at least the rig's own")
         self.on_use: Callable[[ActiveCalibration], None] = lambda in_use: None
+        self.on_failure: Callable[[str, str], None] = lambda what, sentence: None
         self._thread = DiskWorker()
         self.run_in_background: Callable[[Work, Done], None] = self._thread
         self._staging = staging
@@ -203,6 +205,7 @@ class UploadService:
         else:
             trace = "".join(traceback.format_exception(error))
             sentence = f"A499 internal error, please report it; active set {active} unchanged:\n{trace}"
+        self.on_failure(self._doing, sentence)
         self._end(CommitStatus.FAILED, sentence, index, reason)
 
     def _end(self, status: CommitStatus, sentence: str, index: int = 0, reason: int = 0) -> None:

@@ -61,11 +61,20 @@ def make_client(ca: Signed, name: str, role: Role | str, days: int) -> Signed:
 
 
 def load_ca(folder: Path) -> Signed:
-    """Return the CA of a folder. ValueError or OSError where it cannot be read."""
+    """Return the CA of a folder. ValueError or OSError where it cannot be read, or would sign for nothing."""
     certificate = x509.load_pem_x509_certificate(read_plain(folder / "ca.crt"))
-    key = serialization.load_pem_private_key(read_plain(folder / "ca.key"), None)
-    if not isinstance(key, ec.EllipticCurvePrivateKey) or key.public_key() != certificate.public_key():
+    try:
+        key = serialization.load_pem_private_key(read_plain(folder / "ca.key"), None)
+    except TypeError:
+        raise ValueError("ca.key has a password: openssl pkey -in ca.key -out NEW.key takes it off") from None
+    if not isinstance(key, ec.EllipticCurvePrivateKey):
+        raise ValueError("ca.key is none over an elliptic curve, as certs makes them")
+    if key.public_key() != certificate.public_key():
         raise ValueError("ca.key does not fit ca.crt")
+    if certificate.not_valid_after_utc < datetime.now(UTC):
+        raise ValueError(
+            f"it expired on {certificate.not_valid_after_utc:%Y-%m-%d}, and all that it has signed with it"
+        )
     return Signed(certificate, key)
 
 
@@ -86,7 +95,7 @@ def _write(path: Path, data: bytes, mode: int) -> None:
 
 def _sign(ca: Signed, name: str, days: int, extensions: "Sequence[x509.ExtensionType]") -> Signed:
     key = ec.generate_private_key(ec.SECP256R1())
-    builder = _begin(_name(name), ca.certificate.subject, key, days)
+    builder = _begin(_name(name), ca.certificate.subject, key, days, ca.certificate.not_valid_after_utc)
     builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
     builder = builder.add_extension(_usage(signs=False), critical=True)
     authority = x509.AuthorityKeyIdentifier.from_issuer_public_key(ca.key.public_key())
@@ -97,10 +106,12 @@ def _sign(ca: Signed, name: str, days: int, extensions: "Sequence[x509.Extension
 
 
 def _begin(
-    subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, days: int
+    subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, days: int, latest: datetime | None = None
 ) -> x509.CertificateBuilder:
+    """latest: the end of who signs, for behind it nobody takes what it has signed."""
     now = datetime.now(UTC)
     ends = now + timedelta(days=days)
+    ends = min(ends, latest) if latest else ends
     builder = x509.CertificateBuilder(subject_name=subject, issuer_name=issuer, public_key=key.public_key())
     builder = builder.serial_number(x509.random_serial_number())
     builder = builder.not_valid_before(min(now, ends) - _SKEW).not_valid_after(ends)

@@ -117,8 +117,8 @@ FACE_ERRORS: Final = (
     Explanation(
         "E175",
         "server certificate that no client would accept",
-        "The gateway's own certificate is not signed by the CA that the face names, or is made for a client.",
-        "Files of two runs of certs were mixed, or a client's .crt and .key stand where the gateway's belong.",
+        "The gateway's own certificate is not signed by the CA that the face names, or is a client's, or its CA has expired.",
+        "Files of two runs of certs were mixed, a client's .crt and .key stand where the gateway's belong, or the CA is old.",
         "Take gateway.crt and gateway.key that were made with this ca.crt; of two CAs, put both into one file as `ca`.",
     ),
     Explanation(

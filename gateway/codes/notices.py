@@ -66,14 +66,14 @@ NOTICES: Final = (
     Explanation(
         "W241",
         "certificate of a client outside its days",
-        "A client's certificate has expired or is not yet valid; its connection was closed.",
+        "A client's certificate, or that of the CA, has expired or is not yet valid; its connection was closed.",
         "It is old, or a clock is wrong: this machine's, or that of the machine which made it.",
-        "date shows the clock; make the client a new certificate.",
+        "date shows the clock; make the client a new one. Where force-gateway check says that the CA has expired: all anew.",
     ),
     Explanation(
         "W242",
         "certificate without a known role",
-        "A client's certificate carries no role, or one that there is not; its connection was closed.",
+        "A client's certificate has no role, or one that there is not, or no usable name; its connection was closed.",
         "It was made without the extension 1.3.6.1.4.1.50316.802.1 (UTF8String: monitor, setpoint, calibration or admin).",
         "Make it with force-gateway certs --client NAME:ROLE, or add the extension in your own CA.",
     ),
@@ -101,9 +101,9 @@ NOTICES: Final = (
     Explanation(
         "W246",
         "server certificate is about to expire",
-        "The gateway's own certificate ends within 30 days; after that no client connects by TLS.",
-        "Certificates are made for a limited time.",
-        "Make a new one with the same CA, put it into the rig file and start anew; clients keep theirs.",
+        "The gateway's own certificate, or its CA's, ends within 30 days; after that no client connects by TLS.",
+        "Certificates are made for a limited time, and certs makes a CA for the same as what it signs first.",
+        "Make a new one with the same CA, put it into the rig file and start anew; clients keep theirs. Of a CA: all anew.",
     ),
     Explanation(
         "W247",

@@ -34,6 +34,8 @@ MOST_SESSIONS: Final = 200
 keeps 20 480 for two hours, and Python cannot say otherwise. A new context has none."""
 HANDSHAKES_PER_S: Final = 20.0
 """Of one address; each costs the control loop about a millisecond of processor. Loopback is exempt."""
+LONGEST_NAME: Final = 64
+"""Characters of a client's common name (RFC 5280, ub-common-name), which stands in lines of log and audit."""
 CURVE: Final = "prime256v1"
 _EXPIRED, _NOT_YET = 10, 9  # X509_V_ERR_CERT_HAS_EXPIRED, X509_V_ERR_CERT_NOT_YET_VALID
 _PURPOSE: Final = 26
@@ -89,6 +91,9 @@ def _in_memory(data: bytes) -> Iterator[str]:
 
 def certificate_refusal(shown: PeerCertificate, revoked: frozenset[str], now: str) -> str | None:
     """Return why this certificate may not connect, as a sentence with its code; None: it may. now: as its times."""
+    if len(shown.name) > LONGEST_NAME or not shown.name.isprintable():
+        name = f"{shown.name[:LONGEST_NAME]!r}{' ...' * (len(shown.name) > LONGEST_NAME)}"
+        return f"W242 the certificate's common name is {name}: one of at most {LONGEST_NAME} printable characters is needed"
     who = f"the certificate of {shown.name!r}"
     if not shown.begins <= now <= shown.ends:
         return f"W241 {who} is valid from {shown.begins} to {shown.ends}, now is {now}"
@@ -110,7 +115,8 @@ def handshake_failure(error: ssl.SSLError) -> str:
     if isinstance(error, ssl.SSLCertVerificationError):
         if error.verify_code in (_EXPIRED, _NOT_YET):
             state = "has expired" if error.verify_code == _EXPIRED else "is not yet valid"
-            return f"W241 its certificate {state} (or its clock, or ours, is wrong): make a new one"
+            cure = "make a new one; force-gateway check says if it is our CA's that is outside its days"
+            return f"W241 its certificate {state} (or its clock, or ours, is wrong): {cure}"
         if error.verify_code == _PURPOSE:
             return "W240 its certificate is not one for a client (a server's?)"
         return f"W240 its certificate is not of our CA ({error.verify_message}): make one with the same CA"

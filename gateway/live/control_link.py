@@ -11,7 +11,8 @@ from typing import Any, Final
 
 _LONGEST_ANSWER: Final = 1 << 20
 ANSWER_S: Final = 2.0
-"""A control that is being restarted answers nobody; its callers must be able to say so."""
+"""A control that is being restarted answers nobody; its callers must be able to say so. What they ask of the force says until
+when they wait (`until_s`), for it may still be carried out behind that."""
 
 
 class ControlLink:
@@ -28,6 +29,9 @@ class ControlLink:
             try:
                 async with asyncio.timeout(ANSWER_S):
                     answer = await self._exchange(json.dumps(request).encode() + b"\n")
+            except TimeoutError:
+                await self._drop()
+                raise TimeoutError(f"the gateway has not answered within {ANSWER_S:g} s") from None
             except BaseException:
                 await self._drop()  # a late answer must not be taken for that of the next question
                 raise

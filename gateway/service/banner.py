@@ -6,8 +6,8 @@ from math import isfinite
 from typing import Any, Final
 
 from gateway import VERSION, defaults
+from gateway.fieldbus.peers import is_loopback
 from gateway.profiles import Rig
-from gateway.registers.writes.ownership import serial_place
 
 _FORCE_N: Final = 12.0
 _SHORTEST_KEPT_LEASE_S: Final = round(0.75 * defaults.LEASE_S, 3)
@@ -160,8 +160,8 @@ def _reachable_host(host: str, rig: Rig) -> str:
 
 
 def _is_this_machine(owner: str) -> bool:
-    """Decide whether the master that a rig names connects from here over TCP."""
-    return serial_place(owner) is None and ip_address(owner).is_loopback
+    """Decide whether the master that a rig names connects from here over plain TCP: no serial face does, nor a certificate."""
+    return is_loopback(owner)
 
 
 def _in_url(host: str) -> str:

@@ -78,11 +78,14 @@ class LiveAnswers:
 
     def modbus(self, request: Answer) -> Answer:
         """Answer one PDU: {"via": "web", "unit": 1, "pdu": hex} gives {"pdu": hex}, of an exception with the sentence that says
-        why: {"pdu": hex, "refusal": sentence}. ValueError for no hex."""
+        why: {"pdu": hex, "refusal": sentence}. ValueError for no hex, and for what comes too late: others may ask more than
+        their share, and an enable that its page has given up must not press."""
         asked = parse_request(ModbusRequest, request)
         pdu = bytes.fromhex(asked.pdu)
         if not 1 <= len(pdu) <= _LONGEST_PDU:
             raise ValueError(f"a PDU has 1 to {_LONGEST_PDU} bytes")
+        if asked.until_s is not None and self._parts.loop.clock() > asked.until_s:
+            raise ValueError("it waited for longer than whoever asked: nothing was done")
         bank, peer = self._parts.loop.bank, Peer(asked.via, role=self._role)
         units = self._rig.network.units
         given = answer(pdu, bank, peer) if asked.unit in units else refuse_unit((asked.unit, pdu), units, bank, peer)

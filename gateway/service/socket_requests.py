@@ -119,12 +119,14 @@ class SimulationRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModbusRequest:
-    """A Modbus request that came by another way than a face. pdu: in hex."""
+    """A Modbus request that came by another way than a face. pdu: in hex; until_s: monotonic, behind it nobody waits for the
+    answer any more, and nothing must come of it; left out: it is always wanted, as a stop is."""
 
     __pydantic_config__ = _STRICT
     via: Literal["web", "mqtt", "opcua"]
     pdu: Annotated[str, MaxLen(506)]
     unit: Annotated[int, Ge(0), Le(255)] = defaults.UNIT_ID
+    until_s: float | None = None
 
 
 for _shape in (

@@ -7,10 +7,12 @@ without the setpoint is refused before it would be the end of the stop.
 """
 
 import json
+import time
+from collections.abc import Callable
 from math import isfinite
 from typing import Any, Final
 
-from gateway.live.control_link import ControlLink
+from gateway.live.control_link import ANSWER_S, ControlLink
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.map.register_map import Register, RegisterMap
 
@@ -19,27 +21,33 @@ _LONGEST: Final = 16_384
 
 
 class RegisterCommands:
-    """link: to control's socket, whose verb `modbus` checks, owns and audits what is written; unit: an id that is answered."""
+    """link: to control's socket, whose verb `modbus` checks, owns and audits what is written; unit: an id that is answered;
+    clock: monotonic seconds."""
 
-    def __init__(self, register_map: RegisterMap, link: ControlLink, unit: int) -> None:
-        self._map, self._link, self._unit = register_map, link, unit
+    def __init__(
+        self, register_map: RegisterMap, link: ControlLink, unit: int, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._map, self._link, self._unit, self._clock = register_map, link, unit, clock
 
     async def carry_out(self, payload: bytes) -> dict[str, Any]:
         """Write what the payload says; return what was written, and why no more."""
         written: list[str] = []
         try:
-            for name, value in _in_order(_registers(payload)):
-                await self._write(name, value)
+            registers = _registers(payload)
+            stops = _does_stop(registers)
+            for name, value in _in_order(registers):
+                await self._write(name, value, stops=stops)
                 written.append(name)
         except (OSError, ValueError, LookupError, OverflowError) as error:
             return {"ok": False, "written": written, "error": str(error) or type(error).__name__}
         return {"ok": True, "written": written}
 
-    async def _write(self, name: str, value: float) -> None:
+    async def _write(self, name: str, value: float, *, stops: bool) -> None:
         register = self._map.find(name)
         register.check_meant(value)
         request = P.write_registers_request(register.address, _encoded(register, value))
-        answer = await self._link.ask({"do": "modbus", "via": "mqtt", "unit": self._unit, "pdu": request.hex()})
+        asked = {"do": "modbus", "via": "mqtt", "unit": self._unit, "pdu": request.hex()}
+        answer = await self._link.ask(asked if stops else asked | {"until_s": self._clock() + ANSWER_S})
         if P.is_exception(bytes.fromhex(answer["pdu"])):
             raise ValueError(f"{name}: {answer.get('refusal') or 'refused'}")
 

@@ -17,6 +17,7 @@ from collections.abc import Awaitable, Callable
 from math import isfinite
 from typing import Any, Final
 
+from gateway.live.control_link import ANSWER_S
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.map.register_map import Register
 from gateway.registers.words import ControlBit, Mode
@@ -93,16 +94,21 @@ class Commands:
             self._begin_to_beat(viewer)
 
     async def set_force(self, viewer: str, force_n: float) -> None:
-        """Change the setpoint, N."""
-        await self._write_words("force_setpoint", (await self._words_of_force(force_n))[1:])
-        self._begin_to_beat(viewer)
+        """Change the setpoint, N. A stop told meanwhile is the end of it: the page would own a force that nobody wants."""
+        stops = self._stops
+        words = await self._words_of_force(force_n)
+        if stops != self._stops:
+            raise RefusedCommand("stopped meanwhile: nothing was set")
+        await self._write_words("force_setpoint", words[1:])
+        if stops == self._stops:
+            self._begin_to_beat(viewer)
 
     async def stop(self) -> None:
         """Switch the output off, whoever owns the setpoint; ends a run, too. The safe voltage is out before the answer."""
         self._stops += 1
         self._end_beat()
         self.commander = ""
-        await self._write("control_word", 0)
+        await self._send(P.write_registers_request(self._find("control_word").address, bytes(2)), is_stop=True)
 
     async def take_ownership(self, viewer: str) -> None:
         """Take the setpoint over from whoever owns it."""
@@ -187,9 +193,11 @@ class Commands:
     def _find(self, name: str) -> Register:
         return self._context.profile.register_map.find(name)
 
-    async def _send(self, pdu: bytes) -> bytes:
+    async def _send(self, pdu: bytes, *, is_stop: bool = False) -> bytes:
         unit = self._context.profile.network.units[0]
         request: dict[str, Any] = {"do": "modbus", "via": "web", "unit": unit, "pdu": pdu.hex()}
+        if not is_stop:
+            request["until_s"] = self._clock() + ANSWER_S
         answer = await self._context.control.ask(request)
         pdu = bytes.fromhex(answer["pdu"])
         if P.is_exception(pdu):

@@ -7,11 +7,12 @@ dropped; its browser comes back by itself. Nothing is read while nobody looks.
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.live.ring_rows import Columns, RingRows
+from gateway.processes.event import EventRecord
 from gateway.processes.event_file import EventReader
 from gateway.processes.json_socket.messages import encode_answer
 from gateway.web.commands import Commands
@@ -137,8 +138,11 @@ class EventSource:
         self._state = _event("state", state | more)
         self._send(self._state)
 
-    def _read_notes(self, events: Any) -> list[dict[str, Any]]:
-        fresh = [event._asdict() for event in events]
+    def _read_notes(self, events: Iterator[EventRecord]) -> list[dict[str, Any]]:
+        """None where the disk gives none: force and state are shown all the same."""
+        fresh: list[dict[str, Any]] = []
+        with contextlib.suppress(OSError):
+            fresh.extend(event._asdict() for event in events)
         self._notes = (self._notes + fresh)[-_KEPT_NOTES:]
         return fresh[-_KEPT_NOTES:]
 

@@ -1,7 +1,8 @@
-"""HTTP of the page and of the metrics: a connection that does not come to a whole request in time is closed.
+"""HTTP of the page and of the metrics: a connection that does not come to a whole request in time is closed, and one that
+takes nothing of its answer.
 
-uvicorn waits for the rest of a request for ever, and refuses everybody while its bound of connections is full: who opened as
-many and said nothing shut out all others, and the page's Stop with them.
+uvicorn waits for the rest of a request for ever, and for an answer to be taken, and refuses everybody while its bound of
+connections is full: who opened as many and said nothing, or read nothing, shut out all others, and the page's Stop with them.
 """
 
 import asyncio
@@ -12,12 +13,15 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 WHOLE_REQUEST_S: Final = 10.0
 """From its first byte, or from the connection. The largest request that is taken has 64 KB."""
+UNREAD_S: Final = 30.0
+"""For a browser that is asleep, and a page that it has frozen: it comes back by itself."""
 
 
 class ImpatientProtocol(H11Protocol):
     """One connection."""
 
     _patience: asyncio.TimerHandle | None = None
+    _unread: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
         """Begin to wait for a request."""
@@ -28,6 +32,18 @@ class ImpatientProtocol(H11Protocol):
         """Wait for nothing any more."""
         super().connection_lost(exc)
         self._end_patience()
+        self._end_unread()
+
+    def pause_writing(self) -> None:
+        """Begin to wait until some of what was sent is taken."""
+        super().pause_writing()
+        self._end_unread()
+        self._unread = self.loop.call_later(UNREAD_S, self.transport.abort)
+
+    def resume_writing(self) -> None:
+        """It is."""
+        super().resume_writing()
+        self._end_unread()
 
     def data_received(self, data: bytes) -> None:
         """Take the next bytes."""
@@ -45,3 +61,8 @@ class ImpatientProtocol(H11Protocol):
         patience, self._patience = self._patience, None
         if patience:
             patience.cancel()
+
+    def _end_unread(self) -> None:
+        unread, self._unread = self._unread, None
+        if unread:
+            unread.cancel()

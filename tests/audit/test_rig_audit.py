@@ -71,6 +71,22 @@ def test_what_is_refused_and_what_is_uploaded_is_kept_too(tmp_path: Path) -> Non
     assert told[0][0] == "write" and "force_setpoint" in told[0][1]
 
 
+def test_what_was_accepted_and_came_to_nothing_is_kept_as_that(tmp_path: Path) -> None:
+    """A commit whose checks failed stood there as accepted, as one that was put to use did."""
+
+    async def run() -> None:
+        audit = RigAudit(tmp_path, lambda cause, sentence: None)
+        audit.note_failure("upload by robot (10.0.0.5:4711)", "E401 the whole set, crc: wrong; active set 1 unchanged")
+        audit.note_failure("calibration use 3", "A499 internal error, please report it:\nTraceback\n  ...")
+        await audit.close()
+
+    asyncio.run(run())
+    upload, use, _ = read_audit(tmp_path)
+    assert (upload["what"], upload["result"]) == ("upload by robot (10.0.0.5:4711)", "E401")
+    assert upload["text"].endswith("active set 1 unchanged")
+    assert (use["result"], use["text"]) == ("A499", "A499 internal error, please report it:")
+
+
 def test_an_audit_that_was_altered_is_said_once_and_not_only_kept(tmp_path: Path) -> None:
     """It stood in the audit alone, which nobody reads before something has happened."""
     said: list[str] = []

@@ -161,6 +161,7 @@ def test_a_set_that_fails_a_check_changes_nothing_and_says_where_and_why(bench, 
     assert bench.active_words == before
     assert (bench.used, bench.store.list(), bench.store.find_selected().document) == ([], [], OWN)
     (sentence,) = bench.log
+    assert bench.failed == [(f"{'upload' if action == COMMIT else 'dry run'} by {PEER}", sentence)]
     assert sentence.startswith("E401 ")
     assert reason.name.lower() in sentence
     assert sentence.endswith("active set 1 unchanged")
@@ -180,7 +181,7 @@ def test_a_dry_run_checks_all_and_stores_nothing(bench):
     assert bench.commit(staged(GOOD), DRY_RUN) == NOTHING
     assert bench.active_words == before
     assert (bench.used, bench.store.list()) == ([], [])
-    assert bench.log == [f"dry run by {PEER}: the set would be accepted"]
+    assert bench.log == [f"dry run by {PEER}: the set would be accepted"] and not bench.failed
 
 
 # -- while it is under way

@@ -33,6 +33,7 @@ class Bench:
     work: list[tuple[Callable[[], Any], Callable[[Any], None]]] = field(default_factory=list)
     log: list[str] = field(default_factory=list)
     used: list[ActiveCalibration] = field(default_factory=list)
+    failed: list[tuple[str, str]] = field(default_factory=list)  # what was accepted and came to nothing, and why
     shown: list[CommitStatus] = field(default_factory=list)  # what a master reads in the moment of each
 
     def __post_init__(self) -> None:
@@ -51,6 +52,7 @@ class Bench:
         )
         self.upload.run_in_background = lambda work, done: self.work.append((work, done))
         self.upload.on_use = self._on_use
+        self.upload.on_failure = lambda what, sentence: self.failed.append((what, sentence))
         assert self.selected.document
         self.bank.set_active_model(self.selected.document, self.selected.selection.slot_word)
 

@@ -1,16 +1,22 @@
 """What `certs` writes: keys for their owner's eyes, nothing over what is there, and nobody's certificate signs another one."""
 
 import os
+import shlex
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from cryptography import x509
+from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from gateway.cli.certificates import Signed, load_ca, make_ca, make_client, make_server, store
+from gateway.cli.main import command
 from gateway.modbus import Role
+from gateway.processes import exit_codes
 
 
 @pytest.fixture(scope="module")
@@ -69,3 +75,58 @@ def test_a_ca_with_another_s_key_signs_nothing(ca: Signed, tmp_path: Path) -> No
     (tmp_path / "other.key").replace(tmp_path / "ca.key")
     with pytest.raises(ValueError, match=r"ca\.key does not fit ca\.crt"):
         load_ca(tmp_path)
+
+
+def test_nothing_outlives_the_ca_that_has_signed_it(tmp_path: Path) -> None:
+    """It would be refused from the CA's last day on, whatever its own days."""
+    short = make_ca(5)
+    made = [make_server(short, ["127.0.0.1"], 30), make_client(short, "robot", Role.SETPOINT, 30)]
+    assert {each.certificate.not_valid_after_utc for each in made} == {short.certificate.not_valid_after_utc}
+    store(short, tmp_path, "ca")
+    said = CliRunner().invoke(command, ["certs", str(tmp_path), "--client", "robot:setpoint"])
+    assert said.exit_code == 0
+    ends = f"{short.certificate.not_valid_after_utc:%Y-%m-%d}"
+    assert said.output.startswith(f"{tmp_path}/ca.crt ends on {ends}, and all that it signs no later: make a new CA")
+
+
+def with_password(folder: Path) -> None:
+    key = serialization.load_pem_private_key((folder / "ca.key").read_bytes(), None)
+    form = (serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.BestAvailableEncryption(b"x"))
+    (folder / "ca.key").write_bytes(key.private_bytes(*form))
+
+
+def of_another_kind(folder: Path) -> None:
+    key = rsa.generate_private_key(65537, 2048)
+    form = (serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
+    (folder / "ca.key").write_bytes(key.private_bytes(*form))
+
+
+@pytest.mark.parametrize(
+    ("days", "spoil", "sentence"),
+    [
+        (-1, None, "it expired on 20"),
+        (30, with_password, "ca.key has a password: openssl pkey -in ca.key -out NEW.key takes it off"),
+        (30, of_another_kind, "ca.key is none over an elliptic curve, as certs makes them"),
+    ],
+)
+def test_a_ca_that_cannot_sign_is_told_apart(
+    tmp_path: Path, days: int, spoil: Callable[[Path], None] | None, sentence: str
+) -> None:
+    """An expired one signed for nothing and said that it had worked; a key with a password was an internal error."""
+    store(make_ca(days), tmp_path, "ca")
+    if spoil:
+        spoil(tmp_path)
+    said = CliRunner().invoke(command, ["certs", str(tmp_path), "--client", "robot:setpoint"])
+    assert said.exit_code == exit_codes.DATA and not (tmp_path / "robot.crt").exists()
+    assert said.output.startswith(f"E174 the CA in {tmp_path} cannot be used: {sentence}")
+
+
+def test_what_to_do_next_can_be_pasted(tmp_path: Path) -> None:
+    folder = tmp_path / "my keys"
+    said = CliRunner().invoke(command, ["certs", str(folder), "--host", "fd00::5", "--client", "robot:setpoint"])
+    (line,) = (line for line in said.output.splitlines() if line.startswith("  force-gateway read "))
+    words = shlex.split(line)
+    client = f"{folder}/robot"
+    theirs = ["--tls", f"{folder}/ca.crt", "--cert", f"{client}.crt", "--key", f"{client}.key"]
+    assert words[3:] == ["--gateway", "[fd00::5]:8802", *theirs]
+    assert "bind: fd00::5, port: 8802" in said.output

@@ -81,6 +81,9 @@ def test_a_face_with_certificates_is_told_from_what_the_clients_speak() -> None:
     assert "plain Modbus TCP" in shown["not for"]
     (line,) = next(each.commands for each in wiring_page(rig, "demo")[1] if each.title == "Face 1: Modbus/TCP Security")
     assert line.startswith("force-gateway read state --gateway 127.0.0.1:802 --tls ca.crt --cert CLIENT.crt ")
+    far = replace(rig, fieldbus=(replace(face, bind="fd00::5"),))
+    (line,) = next(each.commands for each in wiring_page(far, "demo")[1] if each.title == "Face 1: Modbus/TCP Security")
+    assert " --gateway [fd00::5]:802 " in line
 
 
 def test_a_rig_that_answers_another_unit_only_is_asked_as_that_by_every_line(tmp_path: Path) -> None:

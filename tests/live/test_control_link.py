@@ -59,7 +59,7 @@ def test_an_answer_that_comes_too_late_is_none_to_the_next_question(
             writer.close()
 
         async with await asyncio.start_unix_server(serve, tmp_path / "control.sock"):
-            with pytest.raises(TimeoutError):
+            with pytest.raises(TimeoutError, match="the gateway has not answered within"):
                 await link.ask({"n": 0})
             given_up.set()
             monkeypatch.setattr(control_link, "ANSWER_S", 5.0)

@@ -86,7 +86,10 @@ def test_a_valve_and_what_listens_for_http_are_told_where_they_are() -> None:
     assert (set(bare["ptys"]), bare["web"], bare["metrics"]) == ({"output", "load_cell"}, None, None)
 
 
-@pytest.mark.parametrize(("owner", "may_try"), [("127.0.0.1", True), ("192.168.1.5", False), ("serial:1", False)])
+@pytest.mark.parametrize(
+    ("owner", "may_try"),
+    [("127.0.0.1", True), ("192.168.1.5", False), ("serial:1", False), ("certificate robot", False)],
+)
 def test_a_rig_that_names_its_master_is_tried_from_there_only(owner: str, may_try: bool) -> None:
     rig = replace(demo(), network=replace(demo().network, owner=owner))
     assert (len(try_lines(rig, "127.0.0.1", 5020)) > 1) == may_try

@@ -48,6 +48,17 @@ def test_a_command_by_the_page_is_held_shown_and_owned_by_it(stage: Stage) -> No
     assert state.load_cell.heard > 20 and state.limits.tolerance_n == 1.0
 
 
+def test_what_its_caller_has_given_up_presses_nothing_and_what_is_always_wanted_stops(stage: Stage) -> None:
+    """The socket has a tenth of the loop: an enable behind many questions pressed seconds after its page had called it off."""
+    late = {"do": "modbus", "via": "web", "pdu": ENABLE_12_N, "until_s": stage.wired.now_s - 0.001}
+    assert ask(stage, late) == {"ok": False, "error": "it waited for longer than whoever asked: nothing was done"}
+    assert stage.wired.bank.owner is None
+    assert ask(stage, late | {"until_s": stage.wired.now_s + 0.001})["pdu"] == "1000000002"
+    stage.wired.run(0.5)
+    assert send(stage, DISABLE) == DISABLE
+    assert stage.wired.bank.owner is None
+
+
 def test_who_does_not_own_the_setpoint_may_stop_and_nothing_else(stage: Stage) -> None:
     stage.wired.write(0, 1, 1000)
     assert send(stage, "0600010320") == "8606", "8 N, refused: another master owns the setpoint"

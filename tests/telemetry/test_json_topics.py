@@ -15,7 +15,7 @@ from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.telemetry.broker_session import BrokerMessage
 from gateway.telemetry.json_topics import JsonTopics
 from gateway.telemetry.mqtt_process import Announcer
-from gateway.telemetry.register_commands import RegisterCommands
+from gateway.telemetry.register_commands import RegisterCommands, is_stop
 from tests.telemetry.readings import holding
 
 
@@ -192,6 +192,7 @@ def test_a_command_is_written_in_order_until_the_first_refusal(
     assert answer == result if result else answer["ok"] is False and answer["written"] == [] and answer["error"]
     assert [request["pdu"] for request in asked] == pdus
     assert {request["via"] for request in asked} <= {"mqtt"}
+    assert all(("until_s" in request) is not is_stop(payload) for request in asked), "a stop is wanted however late"
 
 
 def test_what_must_not_be_carried_out_is_told_and_asks_nobody() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.live.control_link import ANSWER_S
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.profiles import Rig
 from gateway.registers.words import ControlBit, State
@@ -112,8 +113,10 @@ def test_stop_ends_the_force_of_another_master_and_nothing_else_does(tmp_path: P
     play(tmp_path, scene)
 
 
-def test_a_stop_ends_an_enable_that_is_still_on_its_way(tmp_path: Path) -> None:
-    """An enable asks control before it writes; a stop in between must not come before that write."""
+@pytest.mark.parametrize("is_held", [False, True])
+def test_a_stop_ends_what_is_still_on_its_way(tmp_path: Path, is_held: bool) -> None:
+    """An enable, and another force, ask control before they write; a stop in between must not come before that write: the page
+    pressed, or owned a setpoint behind its own stop, and kept the robot out."""
 
     async def scene(commands: Commands, stage: Stage) -> None:
         turn, answer_at_once = asyncio.Lock(), commands._context.control.ask
@@ -125,15 +128,16 @@ def test_a_stop_ends_an_enable_that_is_still_on_its_way(tmp_path: Path) -> None:
 
         commands._context.control.ask = ask  # type: ignore[method-assign]
         for turns in range(1, 8):
-            enable = asyncio.create_task(commands.enable("me", 12.0))
+            if is_held:
+                await commands.enable("me", 8.0)
+            asked = asyncio.create_task((commands.set_force if is_held else commands.enable)("me", 12.0))
             for _ in range(turns):
                 await asyncio.sleep(0)
             await commands.stop()
-            await asyncio.gather(enable, return_exceptions=True)
+            await asyncio.gather(asked, return_exceptions=True)
             stage.wired.run(0.1)
-            assert stage.wired.state is State.OFF and commands.commander == "", (
-                f"stopped {turns} turns after the enable"
-            )
+            left = stage.wired.state, stage.wired.word("force_setpoint"), stage.wired.bank.owner, commands.commander
+            assert left == (State.OFF, 0, None, ""), f"stopped {turns} turns after it was asked"
 
     play(tmp_path, scene)
 
@@ -281,3 +285,19 @@ def test_a_reload_within_the_grace_loses_nothing(tmp_path: Path) -> None:
         assert wired.state is State.HOLDING
 
     play(tmp_path, scene, leased())
+
+
+def test_all_but_a_stop_says_until_when_it_is_wanted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[dict[str, Any]] = []
+    ask = Link.ask
+    monkeypatch.setattr(Link, "ask", lambda self, request: (asked.append(request), ask(self, request))[1])
+
+    async def scene(commands: Commands, stage: Stage) -> None:
+        commands.join("me")
+        await commands.enable("me", 12.0)
+        await commands.set_force("me", 8.0)
+        await commands.stop()
+        assert {request.get("until_s", 0.0) - stage.wired.now_s for request in asked[:-1]} == {ANSWER_S}
+        assert "until_s" not in asked[-1]
+
+    play(tmp_path, scene)

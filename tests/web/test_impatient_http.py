@@ -66,3 +66,42 @@ def test_a_whole_request_is_answered_and_half_of_the_next_one_is_not_waited_for(
 ) -> None:
     monkeypatch.setattr(impatient_http, "WHOLE_REQUEST_S", 0.05)
     assert asyncio.run(heard(WHOLE + WHOLE, b"GET ")).count(b"here") == 2
+
+
+@pytest.mark.parametrize("takes", [False, True])
+def test_who_takes_nothing_of_an_answer_is_hung_up_on_and_who_takes_it_is_not(
+    monkeypatch: pytest.MonkeyPatch, takes: bool
+) -> None:
+    """A frozen page kept its place among the connections, and its stream, for as long as its machine was awake."""
+    monkeypatch.setattr(impatient_http, "UNREAD_S", 5.0 if takes else 0.05)
+    size = 4_000_000
+
+    class Noted(impatient_http.ImpatientProtocol):
+        def connection_lost(self, exc: Exception | None) -> None:
+            super().connection_lost(exc)
+            self.lost.set()
+
+    async def large(request: object) -> PlainTextResponse:
+        return PlainTextResponse(size * "x")
+
+    async def scene() -> None:
+        config = Config(Starlette(routes=[Route("/", large)]), ws="none", lifespan="off", log_config=None)
+        config.load()
+        server = Noted(config, ServerState(), {})
+        server.lost = asyncio.Event()
+        ours, far = socket.socketpair()
+        far.setblocking(False)
+        loop = asyncio.get_running_loop()
+        await loop.connect_accepted_socket(lambda: server, ours)
+        await loop.sock_sendall(far, WHOLE)
+        async with asyncio.timeout(10.0):
+            taken = 0
+            while takes and taken < size:
+                taken += len(await loop.sock_recv(far, 100_000))
+            if takes:
+                assert server._unread is None and not server.lost.is_set()
+                far.close()
+            await server.lost.wait()
+        far.close()
+
+    asyncio.run(scene())

@@ -10,6 +10,7 @@ from gateway.cli.errors import CliError
 from gateway.cli.live_monitor.history import Track
 from gateway.cli.live_monitor.register_table import View, Writer
 from gateway.cli.master.client import GatewayClient, RefusedError
+from gateway.registers.writes.ownership import serial_place
 
 POLL_S: Final = 0.25
 """Refresh period of the live page. A frame costs 2 to 4 ms of processor, nearly all of it drawing: four a second are one or two
@@ -86,6 +87,10 @@ def _ask_writers(state: Path) -> dict[str, tuple[str, str, float]]:
 
 
 def _writer(entry: dict[str, Any]) -> tuple[str, str, float]:
-    """From the control socket's answer; its times are of this machine's monotonic clock, as ours are."""
-    host, _, port = str(entry["peer"]).rpartition(":")
-    return host or port, port if host else "", float(entry["time_s"])
+    """From the control socket's answer; its times are of this machine's monotonic clock, as ours are. Of a certificate its
+    name is shown, which is who it is, wherever it connects from."""
+    peer, time_s = str(entry["peer"]), float(entry["time_s"])
+    name, is_certificate, _ = peer.partition(" (")
+    host, colon, port = name.rpartition(":")
+    has_port = colon and not is_certificate and serial_place(name) is None
+    return (host, port, time_s) if has_port else (name, "", time_s)

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from math import isnan
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from gateway.cli.errors import CliError
 from gateway.cli.master.wires import Wire
+from gateway.processes import exit_codes
 from gateway.registers import Register, RegisterMap
 
 if TYPE_CHECKING:
@@ -63,14 +65,16 @@ class Frame:
 
 
 class GatewayClient:
-    """One connection to a gateway. Methods raise CliError (no answer; exit 69) and RefusedError (a Modbus exception)."""
+    """One connection to a gateway. Methods raise CliError (no answer; exit 69) and RefusedError (a Modbus exception).
+
+    is_unanswered: the last request was sent, and its answer never came: what it wanted may have been done."""
 
     def __init__(self, wire: Wire, unit: int, register_map: RegisterMap) -> None:
         self.wire = wire
         self.where = wire.where
         self.register_map = register_map
         self._unit = unit
-        self._has_answered = False
+        self._has_answered = self.is_unanswered = False
         self._client: ModbusTcpClient | ModbusSerialClient | None = None
 
     def __enter__(self) -> "GatewayClient":
@@ -90,7 +94,11 @@ class GatewayClient:
         words: list[int] = []
         while len(words) < count:
             at, most = address + len(words), min(count - len(words), _MOST_READ)
-            words += self._ask("read_holding_registers", f"read {most} at {at}", at, count=most).registers
+            found = self._ask("read_holding_registers", f"read {most} at {at}", at, count=most).registers
+            if len(found) != most:  # none of them would be asked for again without end
+                text = f"E131 {self.where} answered {len(found)} registers to read {most} at {at}: no gateway of ours"
+                raise CliError(text, exit_codes.DEVICE)
+            words += found
         return tuple(words)
 
     def read_block(self, name: str) -> list[RegisterReading]:
@@ -158,11 +166,12 @@ class GatewayClient:
             answer = getattr(client, method)(*arguments, device_id=self._unit, **options)
         except (ModbusException, OSError) as error:
             self.close()
+            self.is_unanswered = True
             raise self.wire.no_answer(self._unit, error, has_answered=self._has_answered) from None
         except KeyboardInterrupt:
             self.close()  # its answer is still to come, and is none to what is asked next
             raise
-        self._has_answered = True
+        self._has_answered, self.is_unanswered = True, False
         if answer.isError():
             raise RefusedError(int(answer.exception_code), request)
         return answer

@@ -26,11 +26,13 @@ _REPEATS: Final = 3
 _PLACES: Final = (
     "rising handle", "rising weight", "falling handle", "falling weight", "slip radius", "slip share", "response",
 )  # fmt: skip
-_RESPONSE: Final = ("dead time", "lag", "second lag")
+_RESPONSE: Final = ("dead time", "lag", "second lag", "damping")
 
 
 class UploadClient(GatewayClient):
     """CliError for whatever goes wrong: no answer (69), a refusal (1), a set that fails a check (65)."""
+
+    is_commit_sent = False
 
     def send(self, upload: UploadFrames, slot: int) -> None:
         """Send the requests in order. CliError when one is refused."""
@@ -42,6 +44,7 @@ class UploadClient(GatewayClient):
         """Send the commit; again only where it has not been heard."""
         before = self._commit_status(upload)
         for is_last in (*[False] * _REPEATS, True):
+            self.is_commit_sent = True
             try:
                 self._send(upload.commit, repeats=0)
             except SilentLineError:
@@ -142,4 +145,4 @@ def place(index: int) -> str:
     if not 0 <= index < 16 * len(_PLACES):
         return "the whole set"
     name = f"{_PLACES[index // 16]} {index % 16}"
-    return f"index {index}, {_RESPONSE[index - 96] if 96 <= index < 99 else name}"
+    return f"index {index}, {_RESPONSE[index - 96] if 96 <= index < 96 + len(_RESPONSE) else name}"

@@ -1,8 +1,10 @@
 """`certs`: a test CA, the gateway's certificate and those of its clients, and what to do with them."""
 
 import re
+from datetime import UTC, datetime, timedelta
 from ipaddress import ip_address
 from pathlib import Path
+from shlex import quote
 from typing import Final
 
 import click
@@ -112,6 +114,7 @@ def _make(folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: 
         except (OSError, ValueError) as error:
             sentence = f"E174 the CA in {folder} cannot be used: {error}; another DIR makes a new one"
             raise CliError(sentence, exit_codes.DATA) from None
+        _say_earlier_end(folder, ca.certificate.not_valid_after_utc, days)
     else:
         ca = certificates.make_ca(days)
         certificates.store(ca, folder, "ca")
@@ -122,11 +125,18 @@ def _make(folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: 
         click.echo(f"{folder / name}.crt, .key   client {name}, role {role.name.lower()}")
 
 
+def _say_earlier_end(folder: Path, ends: datetime, days: int) -> None:
+    if ends < datetime.now(UTC) + timedelta(days=days):
+        cure = "make a new CA in another DIR before, for the gateway and every client"
+        click.echo(f"{folder / 'ca.crt'} ends on {ends:%Y-%m-%d}, and all that it signs no later: {cure}")
+
+
 def _say_next_steps(folder: Path, host: str, clients: dict[str, Role]) -> None:
     name = next(iter(clients), "CLIENT")
-    place, address = folder.resolve(), host if host[0].isdigit() else "127.0.0.1"
+    place, address = folder.resolve(), host if _is_address(host) else "127.0.0.1"
+    there = f"[{host}]" if ":" in host else host
     ours = f"certificate: {place}/gateway.crt, key: {place}/gateway.key, ca: {place}/ca.crt"
-    theirs = f"--cert {folder}/{name}.crt --key {folder}/{name}.key"
+    ca, client = quote(f"{folder}/ca.crt"), quote(f"{folder}/{name}")
     click.echo(
         f"""
 In the rig file (force-gateway check FILE looks at all of it; beyond loopback it wants `allow: [NETWORK]` too):
@@ -136,8 +146,8 @@ fieldbus:
 
 Then try it (port 802 is the standard's, and needs a privilege; 8802 does not):
 
-  force-gateway read force_measured --gateway {host}:8802 --tls {folder}/ca.crt {theirs}
-  openssl s_client -connect {host}:8802 -CAfile {folder}/ca.crt {theirs.replace("--", "-")}
+  force-gateway read force_measured --gateway {there}:8802 --tls {ca} --cert {client}.crt --key {client}.key
+  openssl s_client -connect {there}:8802 -CAfile {ca} -cert {client}.crt -key {client}.key
 
 A robot or PLC gets ca.crt, its own .crt and its own .key, nothing else; ca.key stays here, readable by you alone.
 To shut a client out, put its serial number (openssl x509 -noout -serial -in FILE) under `revoked:` of the face."""

@@ -7,6 +7,8 @@ active block is read back and compared word by word.
 """
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,6 +20,7 @@ from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.bsfm import Calibration
+    from gateway.cli.master.upload import UploadClient
     from gateway.cli.master.upload_frames import UploadFrames
     from gateway.registers import RegisterMap
 
@@ -82,7 +85,7 @@ def _send(upload: "UploadFrames", register_map: "RegisterMap", options: dict[str
     from gateway.cli.master.upload import UploadClient
 
     master = UploadClient(options["wire"], options["unit"], register_map)
-    with master:
+    with _commit_told(master, is_dry=options["dry_run"]), master:
         master.send(upload, options["slot"])
         master.outcome(upload)
         committed, is_known = not options["dry_run"], False
@@ -91,6 +94,18 @@ def _send(upload: "UploadFrames", register_map: "RegisterMap", options: dict[str
             is_known = master.is_known_set()
         active = master.calibration_id()
         return {"committed": committed, "active": active, "slot": options["slot"], "known": is_known}
+
+
+@contextmanager
+def _commit_told(master: "UploadClient", *, is_dry: bool) -> Iterator[None]:
+    """Add to what is told of a gateway that is lost behind the commit that it may have been taken."""
+    try:
+        yield
+    except CliError as error:
+        if is_dry or not master.is_commit_sent or error.exit_code != exit_codes.DEVICE:
+            raise
+        cure = "the commit was sent, and the set may be in use: `force-gateway read calibration_id commit_status` tells"
+        raise CliError(f"{error.format_message()}\n  {cure}", error.exit_code) from None
 
 
 def _sentence(calibration: "Calibration", sentence: dict[str, Any]) -> str:

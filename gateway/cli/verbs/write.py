@@ -11,9 +11,10 @@ import click
 from gateway.cli.command_line.completion_words import complete_assignments
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, json_option
+from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
-    from gateway.cli.master.client import Assignment, Frame
+    from gateway.cli.master.client import Assignment, Frame, GatewayClient
     from gateway.cli.master.wires import Wire
     from gateway.registers import RegisterMap
 
@@ -46,7 +47,7 @@ def command(*, assignments: tuple[str, ...], dry_run: bool, wire: "Wire", as_jso
         with explain_refusals(client):
             frames = client.frames(writes)
         sent: list[Frame] = []
-        with _sent_told(sent), explain_refusals(client, frames, options["state"]):
+        with _sent_told(client, frames, sent), explain_refusals(client, frames, options["state"]):
             for frame in [] if dry_run else frames:
                 client.write(frame)
                 sent.append(frame)
@@ -54,15 +55,18 @@ def command(*, assignments: tuple[str, ...], dry_run: bool, wire: "Wire", as_jso
 
 
 @contextmanager
-def _sent_told(sent: "list[Frame]") -> Iterator[None]:
-    """Add to what is told of a failure which requests had gone out before: who reads of a refusal alone takes it for all."""
+def _sent_told(client: "GatewayClient", frames: "list[Frame]", sent: "list[Frame]") -> Iterator[None]:
+    """Add to what is told of a failure which requests had gone out before: who reads of a refusal alone takes it for all. And
+    which one has no answer: who reads of that alone takes it for not done."""
     try:
         yield
     except CliError as error:
-        if not sent:
+        told = [f"sent before, and in effect: {_request(frame)}" for frame in sent]
+        if client.is_unanswered and error.exit_code == exit_codes.DEVICE:
+            told.append(f"sent without an answer, and perhaps in effect: {_request(frames[len(sent)])}")
+        if not told:
             raise
-        before = "\n  ".join(f"sent before, and in effect: {_request(frame)}" for frame in sent)
-        raise CliError(f"{error.format_message()}\n  {before}", error.exit_code) from None
+        raise CliError("\n  ".join((error.format_message(), *told)), error.exit_code) from None
 
 
 def _request(frame: "Frame") -> str:

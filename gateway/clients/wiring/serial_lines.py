@@ -76,7 +76,7 @@ def _tls_section(place: int, face: TlsFace, unit_option: str) -> Section:
         ("not for", "the generated clients, which speak plain Modbus TCP: for masters with TLS of their own"),
     )
     host = "GATEWAY-ADDRESS" if ip_address(face.bind).is_unspecified else face.bind
-    where = f"{host}:{face.port or 'PORT'}{unit_option}"
+    where = f"{f'[{host}]' if ':' in host else host}:{face.port or 'PORT'}{unit_option}"
     try_it = f"force-gateway read state --gateway {where} --tls {face.ca} --cert CLIENT.crt --key CLIENT.key"
     return Section(
         f"Face {place}: Modbus/TCP Security",

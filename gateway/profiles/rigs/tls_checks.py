@@ -24,6 +24,16 @@ SOON_DAYS: Final = 30
 _PURPOSE: Final = 26  # X509_V_ERR_INVALID_PURPOSE
 _FLIGHTS: Final = 3  # of a handshake: hello, certificate, end
 _MAKE: Final = "`force-gateway certs DIR` makes a CA, a server and clients"
+_NEW_ONES: Final = {
+    "certificate": "make a new one before that day, from then on no client connects",
+    "ca": "from then on no certificate that it has signed counts: make a CA in another folder, and all anew",
+}
+_NOT_YET, _EXPIRED = 9, 10  # X509_V_ERR_CERT_NOT_YET_VALID, X509_V_ERR_CERT_HAS_EXPIRED
+_REFUSALS: Final = {
+    _PURPOSE: "is not one for a server (a client's?)",
+    _EXPIRED: "is of a CA that has expired, as all that it has signed",
+    _NOT_YET: "is of a CA that is not valid yet (this machine's clock?)",
+}
 _CURES: Final[dict[type[OSError], str]] = {
     FileNotFoundError: _MAKE,
     NotADirectoryError: _MAKE,
@@ -73,12 +83,13 @@ def check_tls_files(parts: Parts) -> Found:
 
 
 def check_tls_days(parts: Parts) -> Found:
-    """Yield a warning for a server's certificate that is about to expire."""
+    """Yield a warning for a server's certificate that is about to expire, and for its CA's: with that all go."""
     for path, face in tls_faces(parts):
-        shown, now = _certificate(face.certificate), datetime.now(UTC)
-        if shown and _text(now) <= shown.ends <= _text(now + timedelta(days=SOON_DAYS)):
-            cure = "make a new one before that day, from then on no client connects"
-            yield f"{path}.certificate", f"W246 {face.certificate} expires on {_day(shown.ends)}: {cure}"
+        for name, cure in _NEW_ONES.items():
+            file, now = str(getattr(face, name)), datetime.now(UTC)
+            ends = max((shown.ends for shown in _certificates(file)[: None if name == "ca" else 1]), default="")
+            if _text(now) <= ends <= _text(now + timedelta(days=SOON_DAYS)):
+                yield f"{path}.{name}", f"W246 {file} expires on {_day(ends)}: {cure}"
 
 
 def _unreadable(path: str, face: TlsFace) -> Found:
@@ -121,7 +132,7 @@ def _unfit(path: str, face: TlsFace) -> Found:
     except (ssl.SSLError, OSError) as error:
         yield f"{path}.ca", f"E174 {face.ca} cannot be used: {_reason(error)}; {_MAKE}"
         return
-    shown, now = _certificate(face.certificate), _text(datetime.now(UTC))
+    shown, now = next(iter(_certificates(face.certificate)), None), _text(datetime.now(UTC))
     if shown and now > shown.ends:
         cure = f"no client would connect; {_MAKE}"
         yield f"{path}.certificate", f"E173 {face.certificate} expired on {_day(shown.ends)}: {cure}"
@@ -151,21 +162,20 @@ def _refusal(server: ssl.SSLContext, client: ssl.SSLContext) -> str:
         except ssl.SSLWantReadError:
             continue
         except ssl.SSLCertVerificationError as error:
-            is_purpose = error.verify_code == _PURPOSE
-            return "is not one for a server (a client's?)" if is_purpose else "is not signed by the CA of this face"
+            return _REFUSALS.get(error.verify_code, "is not signed by the CA of this face")
         except ssl.SSLError:  # nothing that the files are to blame for
             break
     return ""
 
 
-def _certificate(file: str) -> PeerCertificate | None:
-    """Return the first certificate of a PEM file; None where there is none that can be read."""
+def _certificates(file: str) -> list[PeerCertificate]:
+    """Return the certificates of a PEM file, in order; none where one cannot be read."""
+    begin, end = "-----BEGIN CERTIFICATE-----", "-----END CERTIFICATE-----"
     try:
-        text = read_plain(file).decode("ascii")
-        begin, end = "-----BEGIN CERTIFICATE-----", "-----END CERTIFICATE-----"
-        return read_certificate(ssl.PEM_cert_to_DER_cert(begin + text.split(begin, 1)[1].split(end, 1)[0] + end))
-    except (OSError, ValueError, IndexError):
-        return None
+        _, *found = read_plain(file).decode("ascii").split(begin)
+        return [read_certificate(ssl.PEM_cert_to_DER_cert(begin + each.split(end, 1)[0] + end)) for each in found]
+    except (OSError, ValueError):
+        return []
 
 
 def _reason(error: Exception) -> str:

@@ -27,13 +27,17 @@ class RigCalibrations:
         self.notes = (*selected.notes, *chosen)
 
     def serve(
-        self, bank: RegisterBank, on_use: Callable[[ActiveCalibration], None], log: Callable[[str, str], None]
+        self,
+        bank: RegisterBank,
+        on_use: Callable[[ActiveCalibration], None],
+        log: Callable[[str, str], None],
+        on_failure: Callable[[str, str], None] = lambda what, sentence: None,
     ) -> UploadService:
         """Show the calibration in use in the bank, and take uploads from now on."""
         bank.set_active_model(self.rig.calibration, self._selected.selection.slot_word)
         rules = UploadRules.of(self.rig.name, self.rig.register_map, _today)
         upload = UploadService(bank.staging, self._activation, self._selected, rules, log)
-        upload.on_use = on_use
+        upload.on_use, upload.on_failure = on_use, on_failure
         return upload
 
 

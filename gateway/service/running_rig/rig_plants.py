@@ -24,12 +24,14 @@ _WAITS: Final = "from the moment the output is disabled: under force the change 
 
 @dataclass(frozen=True, slots=True)
 class PlantEdges:
-    """How a change reaches the control. is_free: whether it may now; on_use: takes the rig as it is from now on."""
+    """How a change reaches the control. is_free: whether it may now; on_use: takes the rig as it is from now on; on_failure:
+    told what was accepted and came to nothing, and why."""
 
     is_free: Callable[[], bool]
     on_use: Callable[[Rig], None]
     clock: Callable[[], float]
     log: Log
+    on_failure: Log = lambda what, sentence: None
 
 
 class RigPlants:
@@ -108,6 +110,8 @@ class RigPlants:
             self.take_waiting()
             when = f"will be in use {_WAITS}" if self._waiting else "is in use"
             self._outcome = "; ".join((f"{_plant(result)} {when}", *compensation_words(result.compensation)))
+        if self._has_failed:
+            self._edges.on_failure(doing, self._outcome)
         self._edges.log("plant", f"{doing}: {self._outcome}")
 
     def _take(self, rig: Rig) -> None:

@@ -113,15 +113,10 @@ class RunningRig:
         self.loop.calibration_runs, self._calibration_runs.decide = self._calibration_runs, self.loop.refresh
         self._faces = Faces(rig, self.bank, self._on_peer_closed, self._log)
         self._faces.on_served = self._show_faces
-        self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log)
-        self._plants.serve(
-            PlantEdges(
-                lambda: self.controller.can_compensate_anew,
-                self._on_plant,
-                time.monotonic,
-                self._log.speaking_for("plant"),
-            )
-        )
+        failed = self._audit.note_failure
+        self._upload = self._calibrations.serve(self.bank, self._on_calibration, self._log, failed)
+        is_free, log = lambda: self.controller.can_compensate_anew, self._log.speaking_for("plant")
+        self._plants.serve(PlantEdges(is_free, self._on_plant, time.monotonic, log, failed))
         self.watch_reports = WatchReports(self.loop, time.monotonic, self._log.speaking_for("watch"))
         self._follow_plant()
         self._control_socket = ControlSocket(

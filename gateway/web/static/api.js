@@ -8,7 +8,10 @@
 
 const listeners = new Map();
 const latest = new Map();
+const COMMAND_MS = 5000;
+const PRESSES = /^\/api\/v1\/(command\/(?!stop)|calibrate\/start)/;
 let csrf = "";
+let source = null;
 
 export const viewer = (() => {
   // of this browser tab: a reload keeps it, and with it the command
@@ -20,8 +23,8 @@ export const viewer = (() => {
   return name;
 })();
 
-async function beginSession() {
-  const answer = await fetch("/api/v1/session");
+async function beginSession(giving) {
+  const answer = await fetch("/api/v1/session", giving);
   if (answer.status === 401) location.assign("/login");
   csrf = (await answer.json()).csrf;
 }
@@ -38,19 +41,29 @@ async function request(path, options) {
   throw error;
 }
 
+/** What a browser has no connection for waits in it; a force that was given up meanwhile must not be asked for then. */
+function givenUp(path) {
+  if (!PRESSES.test(path)) return {};
+  const giving = new AbortController();
+  setTimeout(() => giving.abort(new Error(`no answer within ${COMMAND_MS / 1000} s: are many tabs of this page open?`)), COMMAND_MS);
+  return { signal: giving.signal };
+}
+
 async function post(path, body) {
+  const giving = givenUp(path);
   const send = () =>
     request(path, {
       method: "POST",
       headers: { "content-type": "application/json", "x-csrf-token": csrf, "x-viewer": viewer },
       body: JSON.stringify(body ?? {}),
+      ...giving,
     });
-  if (!csrf) await beginSession();
+  if (!csrf) await beginSession(giving);
   try {
     return await send();
   } catch (error) {
     if (error.reason !== "session") throw error;
-    await beginSession(); // the page's process has been started anew
+    await beginSession(giving); // the page's process has been started anew
     return send();
   }
 }
@@ -61,15 +74,25 @@ export function tell(name, data) {
 }
 
 export function listen() {
-  const source = new EventSource(`/events?viewer=${viewer}`);
+  if (source) return;
+  const stream = (source = new EventSource(`/events?viewer=${viewer}`));
   for (const name of ["history", "samples", "state", "note", "gone"]) {
-    source.addEventListener(name, (event) => tell(name, JSON.parse(event.data)));
+    stream.addEventListener(name, (event) => tell(name, JSON.parse(event.data)));
   }
-  source.onopen = () => tell("open", true);
-  source.onerror = () => {
+  stream.onopen = () => tell("open", true);
+  stream.onerror = () => {
     tell("gone", { sentence: "The page has lost the gateway; it tries again by itself. What you see is old." });
-    if (source.readyState === EventSource.CLOSED) setTimeout(listen, 2000);
+    if (stream.readyState !== EventSource.CLOSED || stream !== source) return;
+    source = null;
+    setTimeout(listen, 2000);
   };
+}
+
+/** Gives up the stream, and with it a connection: a browser has six for all tabs of the page, and each tab keeps one. */
+export function letGo() {
+  source?.close();
+  source = null;
+  tell("gone", { sentence: "The page waits for an answer. What you see is old." });
 }
 
 export const api = {

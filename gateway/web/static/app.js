@@ -1,7 +1,7 @@
 // The page's frame: header, Stop force, tabs. Each tab is a module of static/tabs with `mount(element, api)`, loaded when it is
 // first opened; its element gets the events `shown` and `hidden` after that.
 
-import { api, listen } from "./api.js";
+import { api, letGo, listen } from "./api.js";
 import "./live/samples.js";
 
 const NAMES = ["live", "calibrate", "recordings", "calibrations", "diagnosis", "wiring", "configuration"];
@@ -39,11 +39,18 @@ function showState(state) {
 }
 
 async function stopForce() {
+  const late = setTimeout(() => {
+    letGo(); // six tabs leave no connection for this one
+    api.say("Not stopped from here yet: no answer. Use the emergency stop.", true);
+  }, 500);
   try {
     await api.post("/api/v1/command/stop");
     api.say("Stopped: the safe voltage is out.");
   } catch (error) {
     api.say(`Not stopped from here: ${error.message}. Use the emergency stop.`, true);
+  } finally {
+    clearTimeout(late);
+    listen();
   }
 }
 

@@ -17,8 +17,10 @@ from gateway.cli.master.client import GatewayClient, RegisterReading
 from gateway.cli.master.wires import TcpWire
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
+from gateway.modbus import Peer
 from gateway.registers import RegisterMap
 from gateway.registers.words import State, StatusBit
+from gateway.registers.writes.ownership import serial_host
 
 IN_BAND = StatusBit.ENABLED | StatusBit.CONTACT | StatusBit.IN_BAND
 
@@ -224,6 +226,29 @@ def test_writers_come_from_the_control_socket_and_their_absence_is_no_trouble(
         monkeypatch.undo()
         now_s[0] += 10.0
         assert poller.view(80, 24).writers == {}
+
+
+@pytest.mark.parametrize(
+    ("peer", "narrow", "wide"),
+    [
+        (Peer("10.0.0.7", 50001), "10.0.0.7 3 s", "10.0.0.7:50001 3 s"),
+        (Peer("fd00::7", 50001), "[fd00::7] 3 s", "[fd00::7]:50001 3 s"),
+        (Peer("10.0.0.7", 50001, "robot"), "robot 3 s", "robot 3 s"),
+        (Peer(serial_host(2)), "serial:2 3 s", "serial:2 3 s"),
+        (Peer("web"), "web 3 s", "web 3 s"),
+    ],
+)
+def test_whoever_wrote_is_shown_as_a_whole_however_narrow_the_terminal_is(
+    fake, register_map: RegisterMap, monkeypatch, tmp_path: Path, peer: Peer, narrow: str, wide: str
+) -> None:
+    """A serial face lost its number, a certificate's owner half its bracket."""
+    answer = {"owner": None, "writers": {"force_setpoint": {"peer": str(peer), "time_s": 97.0}}}
+    monkeypatch.setattr("gateway.cli.live_monitor.poll.ask", lambda state, request: answer)
+    with GatewayClient(TcpWire("127.0.0.1", fake.port), 1, register_map) as client:
+        poller = Poller(client, WriterSource(lambda: (tmp_path, "")), lambda: 100.0)
+        poller.poll()
+        for width, expected in ((80, narrow), (200, wide)):
+            assert any(f" {expected}" in line for line in text_of(poller.view(width, 40)))
 
 
 def test_a_run_shows_its_phase_its_force_its_target_and_the_time_left(register_map: RegisterMap) -> None:

@@ -51,6 +51,7 @@ def test_a_write_without_an_answer_is_one_write(deaf: DeafServer, call: Any, mon
     port = deaf.listening.getsockname()[1]
     done = call("write", "force_setpoint=12", "--gateway", f"127.0.0.1:{port}")
     assert done.exit_code == 69 and done.stderr.startswith("E131 ")
+    assert "sent without an answer, and perhaps in effect: FC16 address 1: 04B0" in done.stderr
     deaf.join(10)
     assert len(deaf.heard) == 15
 
@@ -121,3 +122,25 @@ def test_what_was_written_before_a_refusal_is_told_with_it(fake: Any, call: Any)
     assert done.exit_code == 1 and done.stderr.startswith("W204 ")
     assert fake.bank.writes == [(1, (1200,))]
     assert "sent before, and in effect: FC16 address 1: 04B0" in done.stderr
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_who_answers_more_or_fewer_registers_than_were_asked_for_is_asked_once(
+    register_map: RegisterMap, count: int
+) -> None:
+    """Of none at all the question was asked again without end, to whatever device it was."""
+    asked = list[int]()
+
+    def ask(address: int, **options: int) -> Any:
+        asked.append(address)
+        return SimpleNamespace(isError=lambda: False, registers=count * [7])
+
+    StubWire.client = SimpleNamespace(  # type: ignore[attr-defined]
+        connected=True, read_holding_registers=ask, close=lambda: None
+    )
+    with (
+        GatewayClient(StubWire("127.0.0.1", 5020), 1, register_map) as client,
+        pytest.raises(CliError, match=f"E131 127.0.0.1:5020 answered {count} registers to read 2 at 0"),
+    ):
+        client.read_words(0, 2)
+    assert asked == [0]

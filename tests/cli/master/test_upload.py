@@ -11,8 +11,10 @@ from gateway.bsfm import CoefficientLimits
 from gateway.calibrations.activation import Activation, ActiveCalibration
 from gateway.calibrations.store import CalibrationStore, as_text
 from gateway.calibrations.upload import UploadRules, UploadService
-from gateway.cli.master.upload import place
+from gateway.cli.errors import CliError
+from gateway.cli.master.upload import UploadClient, place
 from gateway.modbus import MbapFramer, Peer, Role, answer
+from gateway.processes import exit_codes
 from gateway.profiles import load_calibration
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.command import Status
@@ -257,9 +259,27 @@ def test_no_request_is_longer_than_modbus_allows(call, file):
         (73, "index 73, slip radius 9"),
         (80, "index 80, slip share 0"),
         (97, "index 97, lag"),
+        (99, "index 99, damping"),
         (-1, "the whole set"),
         (112, "the whole set"),
     ],
 )
 def test_an_index_is_told_as_a_place(index, words):
     assert place(index) == words
+
+
+@pytest.mark.parametrize(
+    ("lost", "dry", "told"), [("outcome", [], True), ("outcome", ["--dry-run"], False), ("_send", [], False)]
+)
+def test_a_gateway_that_is_lost_behind_the_commit_may_have_taken_it(
+    gateway, address, call, monkeypatch, lost, dry, told
+):
+    """Who reads of a lost connection alone takes the old set for the one in use."""
+
+    def lose(*arguments, **options):
+        raise CliError("E131 it closed the connection", exit_codes.DEVICE)
+
+    monkeypatch.setattr(UploadClient, lost, lose)
+    done = call("upload", "demo", *dry, "--gateway", address)
+    assert done.exit_code == exit_codes.DEVICE and done.stderr.startswith("E131 it closed the connection")
+    assert ("the commit was sent, and the set may be in use: `force-gateway read calibration_id" in done.stderr) is told

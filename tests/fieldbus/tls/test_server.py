@@ -9,12 +9,12 @@ import pytest
 
 from gateway.fieldbus import ServerSettings
 from gateway.fieldbus.peers import Peers
-from gateway.fieldbus.tls_settings import handshake_failure
+from gateway.fieldbus.tls_settings import certificate_refusal, handshake_failure
 from gateway.modbus import Role, pdu
-from gateway.modbus.certificate import ROLES, read_certificate
+from gateway.modbus.certificate import ROLES, PeerCertificate, read_certificate
 from tests.certificates import Folder, serial_of
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
-from tests.fieldbus.tls.by_hand import REFUSED, VERSIONS, Face, client, face
+from tests.fieldbus.tls.by_hand import NOW, REFUSED, VERSIONS, Face, client, face
 
 __all__ = ["face"]
 
@@ -58,6 +58,17 @@ def test_who_may_not_is_told_apart_and_leaves_nothing(
     assert [told[: len(sentence)] for told in face.log] == [sentence]
     assert line.socket.ended and not face.handshakes.pending and not face.shared.connections
     assert face.closed == []
+
+
+@pytest.mark.parametrize(
+    "name", ["robot\n    18  2026-11-26T10:00:00.000Z  accepted  panel", "\x1b[2J", "tobor\u202e", 65 * "r"]
+)
+def test_who_has_a_name_that_would_forge_a_line_or_fill_the_log_is_turned_away(name: str) -> None:
+    """Log, audit and owner tell of a client by its common name."""
+    shown = PeerCertificate(name, "setpoint", "01", NOW, NOW)
+    refusal = certificate_refusal(shown, frozenset(), NOW)
+    assert refusal and refusal.startswith("W242 the certificate's common name is '") and refusal.isprintable()
+    assert certificate_refusal(shown._replace(name=64 * "é"), frozenset(), NOW) is None
 
 
 def test_a_certificate_that_is_not_yet_valid_and_one_that_ends_are_judged_at_each_connection(folder: Folder) -> None:

@@ -1,10 +1,13 @@
 """What a rig file may say about a TLS face: each of its files that cannot be used is told with its line, before the start."""
 
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from cryptography.hazmat.primitives import serialization
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
 
+from gateway.cli.certificates import Signed, make_ca, make_server, store
 from gateway.profiles import Report, check_report
 from gateway.profiles.rigs.faces import TlsFace
 from tests.certificates import store_all
@@ -179,3 +182,28 @@ def test_an_owner_may_be_named_by_its_certificate(folder: Path) -> None:
     path.write_text(f"{text}\nfieldbus:\n  - {{type: tls, {files()}}}\n", encoding="utf-8")
     rig = check_report(path, simulated=True).rig
     assert rig is not None and rig.network.owner == "certificate robot"
+
+
+def ending(ca: Signed, days: int) -> Signed:
+    """The same CA with another end."""
+    old, now = ca.certificate, datetime.now(UTC)
+    builder = x509.CertificateBuilder(old.issuer, old.subject, ca.key.public_key(), old.serial_number)
+    for extension in old.extensions:
+        builder = builder.add_extension(extension.value, extension.critical)
+    builder = builder.not_valid_before(now - timedelta(days=3)).not_valid_after(now + timedelta(days=days))
+    return Signed(builder.sign(ca.key, hashes.SHA256()), ca.key)
+
+
+@pytest.mark.parametrize("days", [-1, 5, 40])
+def test_the_ca_s_end_is_told_as_its_own(tmp_path: Path, days: int) -> None:
+    """By its own days the gateway's certificate was good; it was called one of another CA, and a new one helped nobody."""
+    ca = make_ca(40)
+    store(make_server(ca, ("127.0.0.1",), 20), tmp_path, "gateway")
+    store(ending(ca, days), tmp_path, "ca")
+    found = report(tmp_path, files())
+    told = [str(each).split(" ", 1)[1] for each in (*found.faults, *found.warnings) if "fieldbus" in str(each)]
+    own = f"fieldbus[0].certificate: W246 {tmp_path}/gateway.crt expires on 20"
+    its_ca = f"fieldbus[0].ca: W246 {tmp_path}/ca.crt expires on 20"
+    too_late = f"fieldbus[0].certificate: E175 {tmp_path}/gateway.crt is of a CA that has expired, as all"
+    expected = {-1: [too_late, own], 5: [own, its_ca], 40: [own]}[days]
+    assert [each[: len(start)] for each, start in zip(told, expected, strict=True)] == expected

@@ -16,10 +16,15 @@ class Edges:
         self.is_free, self.now_s = True, 10.0
         self.taken: list[Rig] = []
         self.said: list[str] = []
+        self.failed: list[tuple[str, str]] = []
         self.plants = RigPlants(demo(), state)
         self.plants.serve(
             PlantEdges(
-                lambda: self.is_free, self.taken.append, lambda: self.now_s, lambda _, text: self.said.append(text)
+                lambda: self.is_free,
+                self.taken.append,
+                lambda: self.now_s,
+                lambda _, text: self.said.append(text),
+                lambda what, sentence: self.failed.append((what, sentence)),
             )
         )
 
@@ -41,6 +46,7 @@ def test_what_waits_for_the_end_of_a_force_is_taken_once_it_is_over_and_once(edg
     assert len(edges.taken) == 1
     status = edges.plants.status()
     assert (status["waiting"], status["since_s"], status["failed"]) == (None, 20.0, False)
+    assert edges.failed == []
 
 
 @pytest.mark.parametrize(
@@ -53,3 +59,4 @@ def test_a_change_that_came_to_nothing_is_told_as_failed_and_the_plant_stays(
     status = edges.plants.status()
     assert status["failed"] and status["said"].startswith(words) and status["said"].endswith("stays in use")
     assert edges.taken == [] and status["since_s"] == 10.0
+    assert edges.failed == [("", status["said"])]

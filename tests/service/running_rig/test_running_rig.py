@@ -208,6 +208,19 @@ def test_the_safe_voltage_is_the_first_thing_that_closing_does(devices: OwnDevic
     assert [record["what"] for record in read_audit(running.parent)][-1] == "end"
 
 
+def test_a_change_that_came_to_nothing_is_in_the_audit(devices: OwnDevices) -> None:
+    """It stood there as accepted; a calibration and a plant that the store does not have, say."""
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        rig._upload.use(77)
+        rig._plants.answer({"do": "plant", "use": 78})
+        await until(lambda: not (rig._upload.status()["busy"] or rig._plants.status()["busy"]))
+
+    with_running_rig(devices, scene)
+    told = {record["what"]: record["result"] for record in read_audit(devices.directory / "state")}
+    assert (told["calibration use 77"][:2], told["plant use 78"][:2]) == ("E4", "E4")
+
+
 def test_a_defect_in_the_step_is_a_fault_and_no_end(devices: OwnDevices, monkeypatch: pytest.MonkeyPatch) -> None:
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         await pressing(rig, devices)

@@ -1,0 +1,77 @@
+"""A browser has six connections for all tabs of the page, and the stream of each keeps one: a Stop goes out all the same.
+
+Six tabs of a real browser take seconds to open.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from tests.web.tabs.scripted_control import ScriptedControl
+
+STOP = "1000000001020000"
+CONNECTIONS = 6  # of Chromium and of Firefox, to one host by HTTP/1.1
+
+
+def modbus(request: dict[str, Any]) -> dict[str, Any]:
+    """A gateway at rest: it reads as zeros, and takes every write."""
+    pdu = bytes.fromhex(request["pdu"])
+    words = 2 * int.from_bytes(pdu[3:5], "big")
+    return {"pdu": (bytes((3, words)) + bytes(words) if pdu[0] == 3 else pdu[:5]).hex()}
+
+
+@pytest.fixture
+def tabs(page: Any, control: ScriptedControl, chromium: Any) -> Iterator[list[Any]]:
+    """As many tabs as there are connections, each with its stream."""
+    answer = control.answer
+
+    def answer_all(request: dict[str, Any]) -> dict[str, Any]:
+        told = answer(request)
+        return modbus(request) if request["do"] == "modbus" else told
+
+    control.answer = answer_all  # type: ignore[method-assign]
+    browser = chromium.new_context()
+    opened = []
+    for _ in range(CONNECTIONS):
+        window = browser.new_page()
+        window.on("pageerror", lambda error: pytest.fail(str(error)))
+        window.goto(f"{page.address}/#configuration", wait_until="commit")
+        if len(opened) < CONNECTIONS - 1:
+            window.get_by_text("demo (simulated)").wait_for()
+        opened.append(window)
+    opened[-1].locator("#stop").wait_for()
+    yield opened
+    browser.close()
+
+
+def written(control: ScriptedControl) -> list[str]:
+    return [one["pdu"] for one in control.asked if one["do"] == "modbus" and not one["pdu"].startswith("03")]
+
+
+def test_esc_stops_from_each_of_them(tabs: list[Any], control: ScriptedControl) -> None:
+    """It waited in the browser without a word, until somebody closed a tab."""
+    from playwright.sync_api import expect
+
+    for window in (tabs[0], tabs[-1], tabs[2]):
+        before = written(control)
+        window.keyboard.press("Escape")
+        expect(window.locator("#said")).to_have_text("Stopped: the safe voltage is out.", timeout=10_000)
+        assert written(control) == [*before, STOP]
+
+
+def test_what_found_no_way_out_is_given_up_and_never_sent(tabs: list[Any], control: ScriptedControl) -> None:
+    """It pressed when somebody closed another tab, minutes later."""
+    begin = """async () => {
+      const { api } = await import("/static/api.js");
+      const asked = [api.post("/api/v1/command/enable", { force_n: 12 }), api.post("/api/v1/calibrate/start")];
+      globalThis.said = Promise.all(asked.map((one) => one.then(() => "begun", (error) => error.message)));
+    }"""
+    tabs[0].evaluate("() => { for (let n = 0; n < 6; n++) new EventSource('/events?viewer=other' + n); }")
+    tabs[1].clock.install()
+    tabs[1].evaluate(begin)
+    tabs[1].clock.fast_forward(5_000)
+    said = tabs[1].evaluate("() => globalThis.said")
+    tabs[0].close()
+    assert said == 2 * ["no answer within 5 s: are many tabs of this page open?"]
+    assert written(control) == [] and not control.count("calibrate")
