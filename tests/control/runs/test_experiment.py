@@ -3,8 +3,9 @@
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.control.runs import experiment_schedule
 from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part, plan_faults
-from gateway.control.runs.experiment_schedule import Schedule, segments_of
+from gateway.control.runs.experiment_schedule import Schedule, schedule_of, segments_of
 from gateway.control.runs.ladder_stairs import highest_voltage_v
 from gateway.registers.words import CalibrationPhase, State
 from tests.control.bench import Bench, bsfm, settings
@@ -162,3 +163,24 @@ def test_a_plan_without_end_is_refused_by_the_number_of_its_turns() -> None:
     start = Move(do=MoveKind.STEP, to_v=3.0, hold_s=0.5)
     with pytest.raises(ValueError, match="20011 stairs and turns, at most 20000"):
         segments_of(plan(start, *many), LIMITS, bsfm())
+
+
+def test_turns_that_are_too_many_are_counted_and_never_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A try of such a plan, which a line may hold, stood in the loop for a second: a held force went with it."""
+    many = Move(do=MoveKind.REVERSALS, size_v=0.1, times=1000, over_s=0.001)
+    asked = plan(Move(do=MoveKind.STEP, to_v=3.0, hold_s=0.5), *[many] * 500)
+    monkeypatch.setattr(experiment_schedule, "Segment", pytest.fail)
+    with pytest.raises(ValueError, match="plan a plan: the parts have 1000501 stairs and turns, at most 20000"):
+        segments_of(asked, LIMITS, bsfm())
+
+
+def test_a_plan_is_counted_as_it_is_made() -> None:
+    assert SHORT.segments == len(segments_of(SHORT, LIMITS, bsfm()))
+
+
+def test_the_voltages_of_a_run_are_made_once_from_the_question_to_its_begin(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, make = [], experiment_schedule.segments_of
+    monkeypatch.setattr(experiment_schedule, "segments_of", lambda *asked: made.append(asked) or make(*asked))
+    schedule_of.cache_clear()
+    bench = begun(Bench(seed=8), SHORT)
+    assert bench.controller.active_run.running and len(made) == 1
