@@ -8,6 +8,7 @@ from typing import Any, Final
 import click
 
 from gateway.cli.duration import parse_duration_s
+from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice, calibration_name, json_option, state_options
 
 _ON = {"on": True, "off": False}
@@ -66,36 +67,51 @@ def command(*, what: str | None, state: StateChoice, as_json: bool, for_s: float
     if for_s:
         answer = _follow(state.directory, answer["recording"], for_s)
     click.echo(json.dumps(answer) if as_json else _sentence(answer))
+    if for_s and answer["fault"]:
+        raise CliError(f"{answer['fault']}: not the {for_s:g} s that were asked for")
 
 
 def _follow(state: Path, recording: str, for_s: float) -> dict[str, Any]:
-    """Wait for the end of a recording, and return what it has become."""
+    """Wait for the end of a recording, and return what it has become; fault: of the disk, that has ended it; later: files in
+    which it went on."""
     from gateway.cli.control_socket import ask
     from gateway.cli.diagnosis.progress_line import show_progress
-    from gateway.recording import read_entry
 
-    is_stopped = False
+    is_stopped, fault, files = False, "", [recording]
     try:
         with show_progress("record"):
-            _wait(state, for_s)
+            fault = _wait(state, for_s, files)
     except KeyboardInterrupt:
         is_stopped = True
-        ask(state, {"do": "record", "on": False})
-    entry = read_entry(Path(recording))
-    answer = {"recording": None, "written": recording, "rows": entry.rows, "duration_s": round(entry.duration_s, 6)}
-    return {**answer, "stopped": is_stopped}
+        fault = ask(state, {"do": "record", "on": False}).get("fault") or ""
+    answer = {"recording": None, "written": recording, **_facts_of(Path(recording)), "stopped": is_stopped}
+    return {**answer, "fault": fault, "later": files[1:]}
 
 
-def _wait(state: Path, for_s: float) -> None:
-    """Look now and then until nothing is recorded any more, and tell how much of the time is over."""
+def _facts_of(path: Path) -> dict[str, Any]:
+    """Return rows and length of a file; one without a row is dropped where the disk has ended it."""
+    from gateway.recording import read_entry
+
+    try:
+        entry = read_entry(path)
+    except FileNotFoundError:
+        return {"rows": 0, "duration_s": 0.0}
+    return {"rows": entry.rows, "duration_s": round(entry.duration_s, 6)}
+
+
+def _wait(state: Path, for_s: float, files: list[str]) -> str:
+    """Look now and then until nothing is recorded any more, and tell how much of the time is over; return why it has ended
+    before, empty where it has not. files: gets those in which it goes on."""
     from gateway.cli.control_socket import ask
     from gateway.progress import report
 
     began_s = time.monotonic()
     while (status := ask(state, {"do": "record"}))["recording"]:
+        files += [status["recording"]] if status["recording"] not in files else []
         spent_s = time.monotonic() - began_s
         report(f"{Path(status['recording']).name}, seconds", min(int(spent_s), round(for_s)), max(round(for_s), 1))
         time.sleep(min(_LOOK_S, max(for_s - spent_s, 0.02)))
+    return str(status.get("waits", ""))
 
 
 def _sentence(answer: dict[str, Any]) -> str:
@@ -104,6 +120,7 @@ def _sentence(answer: dict[str, Any]) -> str:
     if answer.get("written"):
         stopped = "stopped; " if answer.get("stopped") else ""
         length = f" ({answer['duration_s']:.1f} s)" if "duration_s" in answer else ""
-        fault = f"; {answer['fault']}" if answer.get("fault") else ""
-        return f"{stopped}recorded {answer.get('rows', 0)} rows{length} to {answer['written']}{fault}"
+        fault = f"; {answer['fault']}" if answer.get("fault") and "later" not in answer else ""
+        later = f", then to {', '.join(answer['later'])}" if answer.get("later") else ""
+        return f"{stopped}recorded {answer.get('rows', 0)} rows{length} to {answer['written']}{later}{fault}"
     return f"not recording: {answer['waits']}; it begins again by itself" if answer.get("waits") else "not recording"
