@@ -28,7 +28,9 @@ class ExperimentRun:
         limits = settings.limits
         self.schedule = schedule_of(plan, limits, model)
         top_v = self.schedule.top_v
-        stairs = check_stairs(top_v, model) if plan.check and top_v > limits.safe_voltage_v else ()
+        stairs = (
+            check_stairs(top_v, model, limits.safe_voltage_v) if plan.check and top_v > limits.safe_voltage_v else ()
+        )
         self._check = LadderRun(CalibrationPlan(), settings, model, stairs)
         self._rest_v = limits.safe_voltage_v
         self._began_s: float | None = None

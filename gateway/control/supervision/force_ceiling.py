@@ -29,6 +29,7 @@ class ForceCeiling:
         self._given_n = 0.0
         self._last: tuple[float, float] | None = None
         self._before: tuple[float, float] | None = None
+        self._rest_n = 0.0
 
     @property
     def measured_n(self) -> float:
@@ -43,6 +44,7 @@ class ForceCeiling:
 
     def observe_row(self, row: LadderRow) -> None:
         """Take in a stair that has ended."""
+        self._rest_n = row.rest_n
         if row.stair.direction < 0:
             self._last = self._before = None
         else:
@@ -63,7 +65,7 @@ class ForceCeiling:
         """Cell force of a higher stair, by those below it; 0 where there is none to go by."""
         if self._last is None or voltage_v <= self._last[0]:
             return 0.0
-        (last_v, last_n), (before_v, before_n) = self._last, self._before or (self._rest_v, 0.0)
+        (last_v, last_n), (before_v, before_n) = self._last, self._before or (self._rest_v, self._rest_n)
         before_model_n, last_model_n, model_n = (
             self._model.force_n(volts, float(RISING)) for volts in (before_v, last_v, voltage_v)
         )
