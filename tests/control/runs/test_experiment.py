@@ -1,5 +1,7 @@
 """An experiment: its moves become the voltages that it says, within the rig's limits, under the same supervision."""
 
+from dataclasses import replace
+
 import pytest
 
 from gateway.codes.faults import FaultCode
@@ -184,3 +186,21 @@ def test_the_voltages_of_a_run_are_made_once_from_the_question_to_its_begin(monk
     schedule_of.cache_clear()
     bench = begun(Bench(seed=8), SHORT)
     assert bench.controller.active_run.running and len(made) == 1
+
+
+@pytest.mark.parametrize(
+    ("slew_v_per_s", "gain_n_per_v", "most_n"),
+    [(2.0, 15.0, 55.0), (100.0, 9.0, 52.0)],
+    ids=["the output still rises", "the force still rises"],
+)
+def test_behind_a_turn_of_the_plan_the_force_stays_below_the_rigs_largest_too(
+    slew_v_per_s: float, gain_n_per_v: float, most_n: float
+) -> None:
+    """The plan went down already, so nobody looked: 76 N were pressed where the rig allows 50."""
+    up, down = Move(do=MoveKind.STEP, to_v=6.5, hold_s=0.03), Move(do=MoveKind.STEP, to_v=6.0, hold_s=4.0)
+    rig = settings()
+    limits = replace(rig.limits, voltage_slew_v_per_s=slew_v_per_s, over_force_n=80.0)
+    bench = begun(Bench(replace(rig, limits=limits), seed=9, gain_n_per_v=gain_n_per_v), plan(up, down))
+    bench.run(6.0)
+    assert max(record.force_n for record in bench.history) < most_n
+    assert any(event.startswith("A350") for event in bench.events) and bench.last.state is State.OFF

@@ -117,3 +117,11 @@ def test_the_first_rise_counts_from_the_force_at_rest() -> None:
         stair = PlannedStair(1.2, 1, 0, CalibrationPhase.CHECK)
         ceiling.observe_row(LadderRow(stair, force_n, 1.0, True, rest_n))
         assert ceiling.is_beyond(4.0, 0.0) is is_beyond
+
+
+@pytest.mark.parametrize(
+    ("noise_n", "beyond_n", "is_passed"), [(0.0, 0.39, False), (0.0, 0.41, True), (0.4, 1.19, False)]
+)
+def test_beyond_the_largest_force_is_what_no_noise_explains(noise_n: float, beyond_n: float, is_passed: bool) -> None:
+    assert ceiling_at(MOST_N + beyond_n, 0.0).is_passed(noise_n) is is_passed
+    assert not ForceCeiling(MOST_N, bsfm(), 0.0).is_passed(noise_n), "nothing is measured yet"
