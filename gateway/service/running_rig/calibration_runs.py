@@ -35,6 +35,7 @@ from gateway.service.socket_requests import CalibrateRequest, EmptyRequest, pars
 
 FOLLOWED_S: Final = 3.0
 _CLOSING_S: Final = 1.0  # without a sample for so long after the last stair the run is recorded as cut there
+_NOTHING_TAKEN: Final = "the disk took no recording"
 Answer = dict[str, Any]
 
 
@@ -244,9 +245,10 @@ class CalibrationRuns:
         if recording is not self._last:
             return
         self._is_closing = False
-        if recording.failure:
-            self._tell_failure(recording.failure)
-        elif self._calibrating.phase is CalibrationPhase.RECORDED:
+        is_recorded = self._calibrating.phase is CalibrationPhase.RECORDED
+        if recording.failure or (is_recorded and not recording.path):
+            self._tell_failure(recording.failure or _NOTHING_TAKEN)
+        elif is_recorded:
             self._log("calibration", f"experiment recorded in {recording.path}; force-gateway diagnose takes it")
 
     def _tell_failure(self, failure: str) -> None:
@@ -261,7 +263,7 @@ class CalibrationRuns:
 
     def _fit(self, recording: RunRecording) -> None:
         if recording.failure or not recording.path:
-            self._tell_failure(recording.failure or "the disk took no recording")
+            self._tell_failure(recording.failure or _NOTHING_TAKEN)
             return
         try:
             self._child = FitLauncher(recording.path, self._rig.file, self._state, self._on_result)
