@@ -76,6 +76,7 @@ def test_a_run_whose_gateway_has_started_anew_is_told_as_ended(page, control, ch
     control.status = dict(IDLE)
     window.get_by_text("A401 The gateway has started anew").wait_for()
     window.get_by_role("button", name="Continue").wait_for()
+    assert window.get_by_role("button", name="Stop the run").count() == 0
     window.close()
 
 

@@ -257,19 +257,6 @@ def test_a_ladder_behind_which_no_sample_comes_is_closed_all_the_same(
     assert fits == [Path(runs.status()["recording"])]
 
 
-def test_an_experiment_of_which_the_disk_took_nothing_is_not_recorded(tmp_path: Path) -> None:
-    """It was over before the disk refused: it was told as recorded in None."""
-    rig, runs, disk = on_a_hanging_disk(tmp_path)
-    step = {"do": "step", "to_v": 1.0, "hold_s": 0.2}
-    runs.answer({"plan": {"name": "short", "check": False, "parts": [{"name": "one", "moves": [step]}]}})
-    refuse_its_file(runs, disk)
-    climb(rig, runs)
-    rig.until(State.OFF).run(0.1)
-    disk.let_go()
-    told = runs.status()
-    assert (told["phase"], told["ended"], told["recording"]) == ("stopped", "the disk took no recording", None)
-
-
 def delete_its_file(runs: CalibrationRuns, disk: HangingDisk) -> None:
     disk.let_go()
     Path(runs.status()["recording"]).unlink()

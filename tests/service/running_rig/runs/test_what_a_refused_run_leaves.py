@@ -1,4 +1,4 @@
-"""A run that is refused, in its step or by its fit, leaves nothing of itself to the next one."""
+"""A run that is refused, in its step, by its fit or by the disk, leaves nothing of itself to the next one."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.recording import read_recording
 from gateway.registers.words import State
-from tests.service.running_rig.runs.test_calibration_runs import SHORT, on_a_hanging_disk
+from tests.service.running_rig.runs.test_calibration_runs import SHORT, climb, on_a_hanging_disk, refuse_its_file
 from tests.service.running_rig.simulated_rig import CALIBRATE
 
 
@@ -39,3 +39,16 @@ def test_what_a_fit_has_refused_is_not_told_of_the_run_of_a_master_behind_it(tmp
     rig.until(State.OFF).run(0.1)
     disk.let_go()
     assert "stopped by 10.0.0.5" in runs.status()["ended"] and runs.status()["result"] == {}
+
+
+def test_an_experiment_of_which_the_disk_took_nothing_is_not_recorded(tmp_path: Path) -> None:
+    """It was over before the disk refused: it was told as recorded in None."""
+    rig, runs, disk = on_a_hanging_disk(tmp_path)
+    step = {"do": "step", "to_v": 1.0, "hold_s": 0.2}
+    runs.answer({"plan": {"name": "short", "check": False, "parts": [{"name": "one", "moves": [step]}]}})
+    refuse_its_file(runs, disk)
+    climb(rig, runs)
+    rig.until(State.OFF).run(0.1)
+    disk.let_go()
+    told = runs.status()
+    assert (told["phase"], told["ended"], told["recording"]) == ("stopped", "the disk took no recording", None)
