@@ -202,7 +202,7 @@ def _ask(preview: dict[str, Any], yes: bool) -> None:
         return
     from gateway.control.runs.preconditions import preconditions
 
-    force_n, top_v = preview.get("force_max_n", 60.0), preview.get("v_max_v", 8.0)
+    force_n, top_v = preview.get("force_max_n"), preview.get("v_max_v")
     asked = preconditions(force_n, top_v, has_check=preview.get("check", True))
     for words in (*asked, *preview.get("questions", ())):
         if not click.confirm(words, err=True):
