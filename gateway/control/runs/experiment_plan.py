@@ -145,9 +145,20 @@ def move_faults(move: Move) -> Iterator[tuple[str, str]]:
         yield "", "reversals take no time: give hold_s or over_s"
 
 
+def _unprintable_names(plan: ExperimentPlan) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Return (path, sentence) for each text that is shown on a terminal, or in the log, and may not be."""
+    lists = {"columns": plan.columns, "by_hand": plan.by_hand}
+    shown = [(("name",), plan.name), *((("parts", p, "name"), part.name) for p, part in enumerate(plan.parts))]
+    shown += [((key, place), text) for key, texts in lists.items() for place, text in enumerate(texts)]
+    for path, text in shown:
+        if not text.isprintable():
+            yield path, "has signs that cannot be printed on one line"
+
+
 def plan_faults(plan: ExperimentPlan) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """Return (path, sentence) for everything that the types cannot say. Turns are counted, not made: a plan of a few lines may
     mean a million, and who asks is the loop that holds a force."""
+    yield from _unprintable_names(plan)
     for p, part in enumerate(plan.parts):
         if not part.moves:
             yield ("parts", p, "moves"), "is empty: a part has at least one move"

@@ -204,3 +204,13 @@ def test_behind_a_turn_of_the_plan_the_force_stays_below_the_rigs_largest_too(
     bench.run(6.0)
     assert max(record.force_n for record in bench.history) < most_n
     assert any(event.startswith("A350") for event in bench.events) and bench.last.state is State.OFF
+
+
+@pytest.mark.parametrize("path", [("name",), ("parts", 0, "name"), ("columns", 0), ("by_hand", 0)])
+def test_what_a_plan_is_called_writes_on_nobodys_terminal(path: tuple[str | int, ...]) -> None:
+    """A colleague's file is shown before its run, and its name stands in the log."""
+    texts = dict.fromkeys(("name", "part", "columns", "by_hand"), "wheel 3")
+    texts["part" if path[0] == "parts" else str(path[0])] = "\x1b[2J"
+    part = Part(name=texts["part"], moves=(Move(do=MoveKind.DWELL, hold_s=1.0),))
+    asked = ExperimentPlan(name=texts["name"], parts=(part,), columns=(texts["columns"],), by_hand=(texts["by_hand"],))
+    assert [fault[0] for fault in plan_faults(asked)] == [path]
