@@ -230,6 +230,8 @@ def _tell(end: dict[str, Any], as_json: bool, *, resumes: bool) -> None:
         path = Path(end["recording"])
         number = f"{int(path.stem)}" if path.stem.isdecimal() else str(path)
         click.echo(f"recorded in {path}; force-gateway diagnose {number} takes it")
+    if end.get("unreported"):
+        click.echo(end["unreported"], err=True)
     if end["phase"] in ("stored", "recorded"):
         return
     kept = f"\nthe data are kept in {end['recording']}{_GO_ON if resumes else ''}" if end.get("recording") else ""

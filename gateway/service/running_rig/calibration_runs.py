@@ -277,11 +277,14 @@ class CalibrationRuns:
         if "stored" in result:
             self.stored = int(result["stored"])
             self._calibrating.phase = CalibrationPhase.STORED
-            self._log("calibration", f"calibration {self.stored} stored, not active; report {result['report']}")
+            self._log("calibration", f"calibration {self.stored} stored, not active{_describe_report(result)}")
         else:
             self._calibrating.phase = CalibrationPhase.REFUSED
-            report_clause = f"; report {result['report']}" if "report" in result else ""
-            self._log("calibration", f"{result.get('refused')}{report_clause}")
+            self._log("calibration", f"{result.get('refused')}{_describe_report(result)}")
+
+
+def _describe_report(result: Result) -> str:
+    return f"; report {result['report']}" if "report" in result else f"; {result.get('unreported', '')}".rstrip("; ")
 
 
 def _describe_experiment(plan: RecordedPlan) -> Answer:

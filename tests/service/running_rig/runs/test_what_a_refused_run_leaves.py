@@ -41,6 +41,15 @@ def test_what_a_fit_has_refused_is_not_told_of_the_run_of_a_master_behind_it(tmp
     assert "stopped by 10.0.0.5" in runs.status()["ended"] and runs.status()["result"] == {}
 
 
+def test_a_calibration_without_a_report_is_stored_all_the_same(tmp_path: Path) -> None:
+    rig, runs, _ = on_a_hanging_disk(tmp_path)
+    runs._on_result({"stored": 7, "unreported": "E106 0007.html: No space left"})
+    assert (runs.stored, runs.status()["phase"]) == (7, "stored")
+    assert rig.log[-1] == "calibration 7 stored, not active; E106 0007.html: No space left"
+    runs._on_result({"refused": "A331 no"})
+    assert rig.log[-1] == "A331 no"
+
+
 def test_an_experiment_of_which_the_disk_took_nothing_is_not_recorded(tmp_path: Path) -> None:
     """It was over before the disk refused: it was told as recorded in None."""
     rig, runs, disk = on_a_hanging_disk(tmp_path)
