@@ -10,20 +10,18 @@ terminal must not leave a tool climbing stairs.
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 from gateway.bsfm.ladder.plan import LABELS
 from gateway.control import Controller
 from gateway.control.inputs import Output
-from gateway.control.runs.active_run import RecordedPlan, RecordedRun
-from gateway.control.runs.experiment_plan import ExperimentPlan
+from gateway.control.runs.active_run import RecordedPlan
 from gateway.control.runs.experiment_run import ExperimentRun
 from gateway.devices.messages import ForceSample
 from gateway.processes.disk_worker import DiskWorker
 from gateway.profiles import Rig
-from gateway.profiles.kinds.plans import plan_document, plan_of
+from gateway.profiles.kinds.plans import plan_of
 from gateway.recording import Recorder
 from gateway.registers.words import CalibrationPhase
 from gateway.service.run_recording import RunRecording
@@ -31,6 +29,7 @@ from gateway.service.running_rig.fit_launcher import FitLauncher, Result
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recorded_row import COLUMNS
 from gateway.service.running_rig.recordings import END_BOUND_S
+from gateway.service.running_rig.run_descriptions import describe_experiment, describe_progress, header_of_plan
 from gateway.service.socket_requests import CalibrateRequest, EmptyRequest, parse_request
 
 FOLLOWED_S: Final = 3.0
@@ -66,6 +65,7 @@ class CalibrationRuns:
         self._child: FitLauncher | None = None
         self._result: Result = {}
         self._ended = ""
+        self._was_running = self._is_self_test = False
         self._decision: Output | None = None
         self._followed_s = 0.0
         self.decide: Callable[[], None] = lambda: None
@@ -116,7 +116,7 @@ class CalibrationRuns:
             "simulated": self._rig.simulated,
             "rig": self._rig.name,
             "rig_fingerprint": self._rig.fingerprint,
-            **_describe_experiment(plan),
+            **describe_experiment(plan),
         }
 
     def _start(self, query: CalibrateRequest) -> None:
@@ -137,13 +137,13 @@ class CalibrationRuns:
             "phase": (self._phase_before_end if self._is_closing else calibrating.phase).name.lower(),
             "progress": calibrating.progress,
             "eta_s": round(calibrating.eta_s, 1),
-            **_describe_progress(run),
+            **describe_progress(run),
             "noise_n": run.noise_n if run else None,
             "voltage_v": decision.voltage_v if decision else None,
             "force_n": decision.force_measured_n
             if decision and decision.force_measured_n == decision.force_measured_n
             else None,
-            "recording": str(self._last.path) if self._last and self._last.path else None,
+            "recording": str(self._last.path) if self._last and self._last.path and not self._is_self_test else None,
             "ended": self._ended,
             "result": self._result,
         }
@@ -156,6 +156,7 @@ class CalibrationRuns:
         calibrating = self._calibrating
         if calibrating.running:
             self._phase_before_end = calibrating.phase
+        self._follow_ends(decision)
         if calibrating.recorded and self._recording is None:
             self._begin()
         elif self._closing_s is not None:
@@ -167,6 +168,14 @@ class CalibrationRuns:
             calibrating.ask_stop(f"A330 calibration stopped: {failure}")
         elif calibrating.running and calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
             calibrating.ask_stop("A330 calibration stopped: nobody at this machine follows it any more")
+
+    def _follow_ends(self, decision: Output) -> None:
+        """Forget what the run before has left, whoever has begun this one; of a self-test nothing else tells its end."""
+        was_running, self._was_running = self._was_running, self._calibrating.running
+        if self._was_running and not was_running:
+            self._ended, self._result, self._is_self_test = "", {}, self._calibrating.recorded is None
+        elif was_running and not self._was_running and self._is_self_test:
+            self._ended = decision.events[0] if decision.events else ""
 
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
         """Record a sample with the cell's own force, without the payload's weight: the model means that force."""
@@ -214,7 +223,7 @@ class CalibrationRuns:
             "calibration": self._controller.calibration_id,
             "simulated": rig.simulated,
             "seed": rig.seed,
-            **_header_of_plan(run),
+            **header_of_plan(run),
             "continues": list(self._continues),
             "name": self._name,
             "zero_n": self._controller.zero_n,
@@ -225,7 +234,6 @@ class CalibrationRuns:
         self._is_closing = False
         self._recording.begin(self._on_opened)
         self._continues, self._name = (), ""
-        self._ended, self._result = "", {}  # of the run before, whoever has begun it
 
     def _on_opened(self, error: OSError | None) -> None:
         if error and self._calibrating.running:
@@ -285,41 +293,6 @@ class CalibrationRuns:
 
 def _describe_report(result: Result) -> str:
     return f"; report {result['report']}" if "report" in result else f"; {result.get('unreported', '')}".rstrip("; ")
-
-
-def _describe_experiment(plan: RecordedPlan) -> Answer:
-    """Return what a person should know and do before an experiment."""
-    if not isinstance(plan, ExperimentPlan):
-        return {"experiment": "", "check": True, "notes": [], "questions": []}
-    missing = [name for name in plan.columns if name not in COLUMNS]
-    advice = f"this gateway does not record {' and '.join(missing)}: record it beside, and join the tables by time"
-    return {
-        "experiment": f"experiment {plan.name}, {len(plan.parts)} parts ({', '.join(part.name for part in plan.parts)})",
-        "check": plan.check,
-        "notes": [advice] if missing else [],
-        "questions": [f"Ready to do this while it runs: {text}?" for text in plan.by_hand],
-    }
-
-
-def _describe_progress(run: RecordedRun | None) -> Answer:
-    """Return how far a run is, in its own terms."""
-    progress: Answer = {"stair": 0, "stairs": 0, "group": 0, "groups": 0, "part": 0, "parts": 0, "part_name": ""}
-    if isinstance(run, ExperimentRun):
-        part = run.part
-        return progress | {"part": part + 1, "parts": len(run.plan.parts), "part_name": run.plan.parts[part].name}
-    if run is None:
-        return progress
-    stair = run.stairs[min(run.done, len(run.stairs) - 1)]
-    groups = run.plan.groups
-    return progress | {"stair": run.done, "stairs": len(run.stairs), "group": max(0, stair.group + 1), "groups": groups}
-
-
-def _header_of_plan(run: RecordedRun) -> Answer:
-    """For the recording's header: a ladder is what `fit` and --resume look for."""
-    if isinstance(run, ExperimentRun):
-        return {"experiment": plan_document(run.plan)}
-    top_v = max(stair.voltage_v for stair in run.stairs)
-    return {"ladder": asdict(run.plan) | {"stairs": len(run.stairs), "top_v": top_v}}
 
 
 def _parse_plan(fields: Any) -> RecordedPlan:

@@ -1,14 +1,20 @@
 """A run that is refused, in its step, by its fit or by the disk, leaves nothing of itself to the next one."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.control.settings import SelfTestSettings
 from gateway.recording import read_recording
 from gateway.registers.words import State
+from gateway.service.running_rig.calibration_runs import CalibrationRuns
+from tests.control.bench import settings
+from tests.service.rigs import demo
 from tests.service.running_rig.runs.test_calibration_runs import SHORT, climb, on_a_hanging_disk, refuse_its_file
-from tests.service.running_rig.simulated_rig import CALIBRATE
+from tests.service.running_rig.simulated_rig import CALIBRATE, SELF_TEST, SmallRig
+from tests.service.test_run_recording import HangingDisk
 
 
 def test_a_run_that_is_refused_in_its_step_leaves_its_name_to_no_other(tmp_path: Path) -> None:
@@ -61,3 +67,26 @@ def test_an_experiment_of_which_the_disk_took_nothing_is_not_recorded(tmp_path: 
     disk.let_go()
     told = runs.status()
     assert (told["phase"], told["ended"], told["recording"]) == ("stopped", "the disk took no recording", None)
+
+
+def test_of_a_self_test_nothing_is_told_that_the_ladder_before_it_has_left(tmp_path: Path) -> None:
+    """A robot's stop of it was told with that ladder's sentence, recording and calibration."""
+    rig = SmallRig(replace(settings(), self_test=SelfTestSettings(force_n=15.0)))
+    runs = CalibrationRuns(rig.controller, demo(), tmp_path, rig.now, rig.note)
+    disk = runs.disk = HangingDisk()  # type: ignore[assignment]
+    rig.loop.calibration_runs = runs
+    rig.write(0, CALIBRATE)
+    rig.run(0.5)
+    rig.write(0, 0)
+    rig.until(State.OFF).run(0.1)
+    disk.let_go()
+    runs._on_result({"stored": 3, "report": "0003.html"})
+    for is_stopped, words in ((True, "self-test stopped by 10.0.0.5"), (False, "self-test done after")):
+        rig.write(0, SELF_TEST)
+        rig.run(0.5)
+        assert (runs.status()["ended"], runs.status()["recording"]) == ("", None)
+        if is_stopped:
+            rig.write(0, 0)
+        rig.until(State.OFF, 20.0)
+        told = runs.status()
+        assert words in told["ended"] and told["recording"] is None and told["result"] == {}
