@@ -40,7 +40,7 @@ def describe_progress(run: RecordedRun | None) -> Answer:
 
 
 def header_of_plan(run: RecordedRun) -> Answer:
-    """For the recording's header: a ladder is what `fit` and --resume look for."""
+    """Return what stands of it in the header of its recording: a ladder is what `fit` and --resume look for."""
     if isinstance(run, ExperimentRun):
         return {"experiment": plan_document(run.plan)}
     top_v = max(stair.voltage_v for stair in run.stairs)
