@@ -83,7 +83,7 @@ class CalibrationRuns:
         if query.dry_run:
             return self._try_plan(_parse_plan(query.plan))
         if query.stop:
-            self._calibrating.ask_stop("calibration stopped at this machine")
+            self._calibrating.ask_stop(f"{self._calibrating.kind} stopped at this machine")
         elif query.plan is not None:
             self._start(query)
         if refused := self._calibrating.take_refused():

@@ -81,12 +81,13 @@ def test_of_a_self_test_nothing_is_told_that_the_ladder_before_it_has_left(tmp_p
     rig.until(State.OFF).run(0.1)
     disk.let_go()
     runs._on_result({"stored": 3, "report": "0003.html"})
-    for is_stopped, words in ((True, "self-test stopped by 10.0.0.5"), (False, "self-test done after")):
+    stops = (lambda: rig.write(0, 0), lambda: runs.answer({"stop": True}), lambda: None)
+    ends = ("self-test stopped by 10.0.0.5", "self-test stopped at this machine", "self-test done after")
+    for stop, words in zip(stops, ends, strict=True):
         rig.write(0, SELF_TEST)
         rig.run(0.5)
         assert (runs.status()["ended"], runs.status()["recording"]) == ("", None)
-        if is_stopped:
-            rig.write(0, 0)
+        stop()
         rig.until(State.OFF, 20.0)
         told = runs.status()
         assert words in told["ended"] and told["recording"] is None and told["result"] == {}
