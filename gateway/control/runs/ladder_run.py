@@ -276,7 +276,9 @@ class LadderRun:
         if rise_n <= -LOWEST_SHARE * expected_n:
             self.stop_cause = StopCause(FaultCode.SIGN_INVERTED, sign_sentence(rise_n, expected_n))
         elif rise_n < SILENT_SHARE * expected_n:
-            self.stop_cause = StopCause(FaultCode.NONE, ladder_silent_sentence(volts, rise_n, expected_n))
+            is_constant = self.noise_n == 0.0 and rise_n == 0.0
+            sentence = ladder_silent_sentence(volts, rise_n, expected_n, is_constant=is_constant)
+            self.stop_cause = StopCause(FaultCode.NONE, sentence)
         else:
             self.stop_cause = StopCause(FaultCode.GAIN_WRONG, gain_sentence(rise_n, expected_n))
 
