@@ -38,18 +38,25 @@ _NO_ROOM: Final = "E431"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UploadRules:
-    """What rig and map add. today: the date of a new calibration, UTC, as 2026-11-21."""
+    """What rig and map add. today: the date of a new calibration, UTC, as 2026-11-21; doubts_on: why its forces are a guess."""
 
     rig_name: str
     commit_address: int
     select_address: int
     today: Callable[[], str]
+    doubts_on: Callable[[Calibration], str] = lambda calibration: ""
 
     @classmethod
-    def of(cls, rig_name: str, register_map: RegisterMap, today: Callable[[], str]) -> "UploadRules":
+    def of(
+        cls,
+        rig_name: str,
+        register_map: RegisterMap,
+        today: Callable[[], str],
+        doubts_on: Callable[[Calibration], str] = lambda calibration: "",
+    ) -> "UploadRules":
         """Return the rules of a rig whose map has these addresses."""
         commit, select = register_map.find("commit").address, register_map.find("slot_select").address
-        return cls(rig_name=rig_name, commit_address=commit, select_address=select, today=today)
+        return cls(rig_name=rig_name, commit_address=commit, select_address=select, today=today, doubts_on=doubts_on)
 
 
 class UploadService:
@@ -189,7 +196,9 @@ class UploadService:
         self._pointer = active.pointer
         self.on_use(active)
         self._notice |= active.notice
-        self._end(CommitStatus.COMMITTED, self._describe_success(_describe_active(active)))
+        doubts = self._rules.doubts_on(active.calibration)
+        what = "; ".join(filter(None, (_describe_active(active), doubts)))
+        self._end(CommitStatus.COMMITTED, self._describe_success(what))
 
     def _fail(self, error: Exception) -> None:
         """UnusableCalibration, StoreError and OSError are answers; anything else, an internal error, must not stop control."""

@@ -51,11 +51,12 @@ def gain_sentence(rise_n: float, expected_n: float) -> str:
     )
 
 
-def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float) -> str:
-    """Return A301 of a calibration run: no force answers the voltage."""
+def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float, *, is_constant: bool = False) -> str:
+    """Return A301 of a calibration run: no force answers the voltage. is_constant: nor has a reading ever changed."""
+    cell = "all readings are the same: cell or amplifier dead, else " if is_constant else ""
     return (
         f"A301 calibration stopped: {voltage_v:.2f} V out, the force rose by {rise_n:.1f} N where {expected_n:.1f} N were "
-        "expected: no air, valve closed or no contact"
+        f"expected: {cell}no air, valve closed or no contact"
     )
 
 

@@ -37,7 +37,7 @@ def compensation_on(rig: Rig, plant: PlantProfile) -> Compensation:
 def _tell_calibrated(rig: Rig, compensation: Compensation) -> Compensation:
     """Say what is left to a calibration that was made on this very rig and has measured it: the command map, and with its
     response the timing. The parts stay, for another calibration may come into use: control leaves them out by itself."""
-    measured = {By.COMMAND} if rig.calibration.rig == rig.name else set()
+    measured = {By.COMMAND} if rig.has_measured(rig.calibration) else set()
     measured |= {By.TIMING} if rig.response_of(rig.calibration) else set()
     known = {treatment.name for treatment in TREATMENTS if treatment.by in measured}
     left = tuple(

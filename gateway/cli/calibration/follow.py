@@ -34,6 +34,10 @@ class NotBegunError(CliError):
     """Nothing has moved."""
 
 
+class RestartedError(CliError):
+    """The gateway is another one by now, which knows of no run."""
+
+
 def follow(run: Run) -> dict[str, Any]:
     """Begin the run and wait for its end; how it ended."""
     with signals_as_ctrl_c():
@@ -47,7 +51,7 @@ def _watch(run: Run) -> None:
     try:
         with _progress() as progress:
             _wait(run, progress, progress.add_task("starting", total=1.0, force="", eta=""))
-    except NotBegunError:
+    except (NotBegunError, RestartedError):
         raise
     except CliError as error:
         raise CliError(f"{error.format_message()}\n{run.lost_words}", error.exit_code) from None
@@ -66,13 +70,19 @@ def _progress() -> Progress:
 
 
 def _wait(run: Run, progress: Progress, task: TaskID) -> None:
-    began_s = time.monotonic()
+    began_s, has_begun = time.monotonic(), False
     while True:
         look = run.look()
+        has_begun = has_begun or look.phase != "idle"
         name = f"{_NAMES.get(look.phase, look.phase)}{look.detail}"
         progress.update(task, completed=look.progress, description=name, force=_force(look), eta=_eta(look))
         if look.phase in ENDED:
             return
+        if look.phase == "idle" and has_begun:
+            raise RestartedError(
+                "A401 the gateway has started anew, in OFF, and the run has ended with it: its log has the first cause; what "
+                "was recorded is kept there"
+            )
         if look.phase == "idle" and time.monotonic() - began_s > _BEGIN_S:
             raise NotBegunError("W305 the gateway has not begun the calibration; its log says why")
         time.sleep(_POLL_S)

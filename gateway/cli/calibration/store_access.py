@@ -77,12 +77,14 @@ def _change_without_gateway(directory: Path, rig_name: str, request: dict[str, A
     except StoreError as error:
         raise CliError(str(error), exit_codes.FAILED if error.code == "E431" else exit_codes.DATA) from None
     calibration, active = selected.calibration, selected.pointer.active
+    said = f"calibration {calibration.number} ({calibration.name}) will be used from the next start: no gateway runs"
+    doubts = rig.doubts_on(calibration) if rig else ""
     return {
         "active": calibration.number,
         "name": calibration.name,
         "slot": active.slot,
         "built_in": active.number is None,
-        "said": f"calibration {calibration.number} ({calibration.name}) will be used from the next start: no gateway runs",
+        "said": f"{said}; {doubts}" if doubts else said,
     }
 
 

@@ -75,11 +75,13 @@ class _Phase(Enum):
 
 
 class HoldRun:
-    """`next` is asked for each beat; `end` is set once there is nothing more to write."""
+    """`next` is asked for each beat; `end` is set once there is nothing more to write. is_unheard: of the enable nobody knows
+    whether it was heard."""
 
     def __init__(self, force_n: float, *, heartbeat: int, resets: bool) -> None:
         self.force_n = force_n
         self.end: HoldEnd | None = None
+        self.is_unheard = False
         self._resets = resets
         self._heartbeat = heartbeat
         self._phase = _Phase.BEGINNING
@@ -116,6 +118,7 @@ class HoldRun:
     def note_lost(self, write: HoldWrite) -> None:
         """Note that nobody may have heard the last write: nothing has ended by it, and to let go is said again."""
         self.end = None
+        self.is_unheard = self._phase is _Phase.HOLDING and write.control_word == _ENABLE
         if self._phase is _Phase.LOWERING and write.control_word == _ENABLE:
             self._phase = _Phase.HOLDING
 
@@ -133,6 +136,7 @@ class HoldRun:
         if status.state is State.OFF:
             self.end = HoldEnd.STOPPED if stops else HoldEnd.DISABLED
             return None
+        self.is_unheard = False
         if not stops:
             return self._beat()
         self._phase, self._moved_s = _Phase.LOWERING, now_s

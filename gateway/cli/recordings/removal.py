@@ -26,14 +26,19 @@ def delete(state: Path, number: int, *, asks: bool) -> Path:
     if not why and asks and not click.confirm(f"delete recording {number} ({path})?", err=True):
         raise CliError("nothing was deleted")
     if why := why or delete_recording(path, reference):
-        raise CliError(f"E407 recording {number} was not deleted: {why}{_cure(why, number)}", exit_codes.DATA)
+        raise CliError(f"E407 recording {number} was not deleted: {why}{_cure(why, path)}", exit_codes.DATA)
     return path
 
 
-def _cure(why: str, number: int) -> str:
+def _cure(why: str, path: Path) -> str:
+    from gateway.recording import read_entry
+
     if "kept" in why:
-        return f"; force-gateway recordings keep {number} --no lets it go"
-    return "; force-gateway record off ends it" if "being recorded" in why else ""
+        return f"; force-gateway recordings keep {int(path.stem)} --no lets it go"
+    if "being recorded" not in why:
+        return ""
+    is_of_run = not read_entry(path).header.keys().isdisjoint(("ladder", "experiment"))
+    return "; the run that makes it ends it" if is_of_run else "; force-gateway record off ends it"
 
 
 def retention_of(state: StateChoice, days: float | None, most_bytes: int | None) -> "Retention":

@@ -202,7 +202,7 @@ def _ask(preview: dict[str, Any], yes: bool) -> None:
         return
     from gateway.control.runs.preconditions import preconditions
 
-    force_n, top_v = preview.get("force_max_n", 60.0), preview.get("v_max_v", 8.0)
+    force_n, top_v = preview.get("force_max_n"), preview.get("v_max_v")
     asked = preconditions(force_n, top_v, has_check=preview.get("check", True))
     for words in (*asked, *preview.get("questions", ())):
         if not click.confirm(words, err=True):
@@ -230,6 +230,8 @@ def _tell(end: dict[str, Any], as_json: bool, *, resumes: bool) -> None:
         path = Path(end["recording"])
         number = f"{int(path.stem)}" if path.stem.isdecimal() else str(path)
         click.echo(f"recorded in {path}; force-gateway diagnose {number} takes it")
+    if end.get("unreported"):
+        click.echo(end["unreported"], err=True)
     if end["phase"] in ("stored", "recorded"):
         return
     kept = f"\nthe data are kept in {end['recording']}{_GO_ON if resumes else ''}" if end.get("recording") else ""

@@ -190,6 +190,8 @@ def _describe_disabled(beat: "HeartbeatThread") -> str:
         return "A310 the lease ran out: the gateway has ramped to 0 N and let go; a busy machine? --rig tells the lease"
     if beat.warned & WarningBit.RESTARTED:
         return "A401 the gateway has started anew, in OFF: its log has the first cause"
+    if beat.hold.is_unheard:
+        return "E131 the enable got no answer, and the output is off: it was not heard; hold again"
     return "W336 somebody else has cleared enable; the output has been told the safe voltage"
 
 

@@ -8,6 +8,7 @@ from typing import Any, Final
 import click
 
 from gateway.cli.duration import parse_duration_s
+from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice, calibration_name, json_option, state_options
 from gateway.processes import exit_codes
 
@@ -68,45 +69,56 @@ def command(*, what: str | None, state: StateChoice, as_json: bool, for_s: float
     if for_s:
         answer = _follow(state.directory, answer["recording"], for_s)
     click.echo(json.dumps(answer) if as_json else _sentence(answer))
+    if for_s and answer["fault"]:
+        raise CliError(f"{answer['fault']}: not the {for_s:g} s that were asked for")
 
 
 def _follow(state: Path, recording: str, for_s: float) -> dict[str, Any]:
-    """Wait for the end of a recording, and return what it has become. recording: the path that it began in; behind a restart of
-    control, or in use of another plant, it goes on in another file."""
+    """Wait for the end of a recording, and return what it has become. recording: the path that it began in; later: files in
+    which it went on, as behind a restart of control or with another plant; fault: of the disk, that has ended it."""
     from gateway.cli.diagnosis.progress_line import show_progress
-    from gateway.recording import read_entry
 
-    paths, is_stopped = [recording], False
+    is_stopped, fault, files = False, "", [recording]
     try:
         with show_progress("record"):
-            _wait(state, paths, for_s)
+            fault = _wait(state, for_s, files)
     except KeyboardInterrupt:
         is_stopped = True
-        _ask_patiently(state, {"do": "record", "on": False})
-    entries = [read_entry(Path(path)) for path in paths]
-    duration_s = round(sum(entry.duration_s for entry in entries), 6)
-    answer = {"recording": None, "written": recording, "rows": sum(entry.rows for entry in entries)}
-    return {**answer, "duration_s": duration_s, "files": paths, "stopped": is_stopped}
+        fault = _ask_patiently(state, {"do": "record", "on": False}).get("fault") or ""
+    sizes = [_size_of(Path(path)) for path in files]
+    rows, duration_s = sum(size[0] for size in sizes), round(sum(size[1] for size in sizes), 6)
+    answer = {"recording": None, "written": recording, "rows": rows, "duration_s": duration_s, "stopped": is_stopped}
+    return {**answer, "fault": fault, "later": files[1:]}
 
 
-def _wait(state: Path, paths: list[str], for_s: float) -> None:
-    """Look now and then until it is recorded no more, and tell how much of the time is over. paths: its files, the first at
-    first; each further one is added."""
+def _size_of(path: Path) -> tuple[int, float]:
+    """Return rows and length, s, of a file; one without a row is dropped where the disk has ended it."""
+    from gateway.recording import read_entry
+
+    try:
+        entry = read_entry(path)
+    except FileNotFoundError:
+        return 0, 0.0
+    return entry.rows, entry.duration_s
+
+
+def _wait(state: Path, for_s: float, files: list[str]) -> str:
+    """Look now and then until it is recorded no more, and tell how much of the time is over; return why it has ended before,
+    empty where it has not. files: its first one; gets those in which it goes on."""
     from gateway.progress import report
 
     began_s = time.monotonic()
-    while (status := _ask_patiently(state, {"do": "record"})).get("began_in") == paths[0]:
-        if status["recording"] not in paths:
-            paths.append(status["recording"])
+    while (status := _ask_patiently(state, {"do": "record"})).get("began_in") == files[0]:
+        files += [status["recording"]] if status["recording"] not in files else []
         spent_s = time.monotonic() - began_s
         report(f"{Path(status['recording']).name}, seconds", min(int(spent_s), round(for_s)), max(round(for_s), 1))
         time.sleep(min(_LOOK_S, max(for_s - spent_s, 0.02)))
+    return str(status.get("waits", ""))
 
 
 def _ask_patiently(state: Path, request: dict[str, Any]) -> dict[str, Any]:
     """Ask control, which answers nobody for a moment while it is started again."""
     from gateway.cli.control_socket import ask
-    from gateway.cli.errors import CliError
 
     for _ in range(_MOST_LOOKS):
         try:
@@ -124,7 +136,7 @@ def _sentence(answer: dict[str, Any]) -> str:
     if answer.get("written"):
         stopped = "stopped; " if answer.get("stopped") else ""
         length = f" ({answer['duration_s']:.1f} s)" if "duration_s" in answer else ""
-        fault = f"; {answer['fault']}" if answer.get("fault") else ""
-        files = ", ".join(answer.get("files", [answer["written"]]))
-        return f"{stopped}recorded {answer.get('rows', 0)} rows{length} to {files}{fault}"
+        fault = f"; {answer['fault']}" if answer.get("fault") and "later" not in answer else ""
+        later = f", then to {', '.join(answer['later'])}" if answer.get("later") else ""
+        return f"{stopped}recorded {answer.get('rows', 0)} rows{length} to {answer['written']}{later}{fault}"
     return f"not recording: {answer['waits']}; it begins again by itself" if answer.get("waits") else "not recording"

@@ -51,5 +51,7 @@ def _not_running(directory: Path) -> Iterator[None]:
         return
     with state_lock.hold_state_lock(directory) as is_ours:
         if not is_ours:
-            raise CliError(f"E104 a gateway runs on {directory}, or a command is changing it; stop it first", exit_codes.DEVICE)
+            raise CliError(
+                f"E104 a gateway runs on {directory}, or a command is changing it; stop it first", exit_codes.DEVICE
+            )
         yield

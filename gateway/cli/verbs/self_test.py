@@ -107,7 +107,7 @@ class _SelfTest:
         from gateway.registers.words import SelfTestResult
 
         end_s = time.monotonic() + _LONGEST_S
-        while self._read()["result"] == SelfTestResult.RUNNING:
+        while (result := self._read()["result"]) == SelfTestResult.RUNNING:
             if time.monotonic() > end_s:
                 self.stop()
                 raise CliError(f"the self-test did not end within {_LONGEST_S:g} s; it was stopped")
@@ -117,6 +117,9 @@ class _SelfTest:
             self._write(None)
         if shows:
             click.echo("\r\033[K", nl=False, err=True)
+        if result == SelfTestResult.NONE:  # on a serial line no connection breaks with the process behind it
+            ended = "and the self-test has ended with it: its log has the first cause"
+            raise CliError(f"A401 the gateway has started anew, in OFF, {ended}")
 
     def answer(self, wire: "Wire") -> dict[str, Any]:
         """Return result, number and items; each with its numbers where the gateway is on this machine."""

@@ -209,7 +209,8 @@ class ActiveRun:
         ceiling.observe(reading)
         if step.row:
             ceiling.observe_row(step.row)
-        was_reached = run.branch_share > 0.0 and ceiling.is_reached(run.noise_n)
+        rises = run.branch_share > 0.0 or step.voltage_v > present_v
+        was_reached = ceiling.is_reached(run.noise_n) if rises else ceiling.is_passed(run.noise_n)
         if not was_reached and not (step.row and ceiling.is_beyond(step.highest_v, run.noise_n)):
             return step.voltage_v
         if not isinstance(run, LadderRun):

@@ -58,6 +58,13 @@ class Move:
             return 2.0 * (self.times or 0) * (over_s + hold_s)
         return over_s + hold_s
 
+    @property
+    def segments(self) -> int:
+        """Number of stairs, turns and waits that are made of it."""
+        if self.do is MoveKind.LADDER:
+            return self.stairs or 1
+        return 2 * (self.times or 0) + 1 if self.do is MoveKind.REVERSALS else 1
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
@@ -94,6 +101,11 @@ class ExperimentPlan:
     def duration_s(self) -> float:
         """Duration of the parts, s; zero and check come before."""
         return sum(part.duration_s for part in self.parts)
+
+    @property
+    def segments(self) -> int:
+        """Number of stairs, turns and waits of all parts."""
+        return sum(move.segments for part in self.parts for move in part.moves)
 
 
 _LEVEL: Final = ("to_share", "to_n", "to_v")
@@ -133,8 +145,20 @@ def move_faults(move: Move) -> Iterator[tuple[str, str]]:
         yield "", "reversals take no time: give hold_s or over_s"
 
 
+def _unprintable_names(plan: ExperimentPlan) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Return (path, sentence) for each text that is shown on a terminal, or in the log, and may not be."""
+    lists = {"columns": plan.columns, "by_hand": plan.by_hand}
+    shown = [(("name",), plan.name), *((("parts", p, "name"), part.name) for p, part in enumerate(plan.parts))]
+    shown += [((key, place), text) for key, texts in lists.items() for place, text in enumerate(texts)]
+    for path, text in shown:
+        if not text.isprintable():
+            yield path, "has signs that cannot be printed on one line"
+
+
 def plan_faults(plan: ExperimentPlan) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """Return (path, sentence) for everything that the types cannot say."""
+    """Return (path, sentence) for everything that the types cannot say. Turns are counted, not made: a plan of a few lines may
+    mean a million, and who asks is the loop that holds a force."""
+    yield from _unprintable_names(plan)
     for p, part in enumerate(plan.parts):
         if not part.moves:
             yield ("parts", p, "moves"), "is empty: a part has at least one move"
@@ -145,3 +169,5 @@ def plan_faults(plan: ExperimentPlan) -> Iterator[tuple[tuple[str | int, ...], s
         yield ("parts",), "is empty: a plan has at least one part"
     elif not 0.0 < plan.duration_s <= LONGEST_S:
         yield ("parts",), f"the parts take {plan.duration_s:g} s, allowed up to {LONGEST_S:g} s"
+    elif plan.segments > MOST_SEGMENTS:
+        yield ("parts",), f"the parts have {plan.segments} stairs and turns, at most {MOST_SEGMENTS}"

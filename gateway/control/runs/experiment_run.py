@@ -9,7 +9,7 @@ from typing import Final
 
 from gateway.bsfm import Bsfm
 from gateway.control.runs.experiment_plan import ExperimentPlan
-from gateway.control.runs.experiment_schedule import Schedule, segments_of
+from gateway.control.runs.experiment_schedule import schedule_of
 from gateway.control.runs.ladder_run import LadderRun, RunStep
 from gateway.control.runs.ladder_stairs import CalibrationPlan, check_stairs
 from gateway.control.sample_conditioning import Reading
@@ -26,9 +26,11 @@ class ExperimentRun:
     def __init__(self, plan: ExperimentPlan, settings: ControlSettings, model: Bsfm) -> None:
         self.plan, self.model = plan, model
         limits = settings.limits
-        self.schedule = Schedule(segments_of(plan, limits, model), limits.safe_voltage_v)
+        self.schedule = schedule_of(plan, limits, model)
         top_v = self.schedule.top_v
-        stairs = check_stairs(top_v, model) if plan.check and top_v > limits.safe_voltage_v else ()
+        stairs = (
+            check_stairs(top_v, model, limits.safe_voltage_v) if plan.check and top_v > limits.safe_voltage_v else ()
+        )
         self._check = LadderRun(CalibrationPlan(), settings, model, stairs)
         self._rest_v = limits.safe_voltage_v
         self._began_s: float | None = None

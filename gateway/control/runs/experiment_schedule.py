@@ -3,12 +3,13 @@
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import accumulate, pairwise
 from math import isfinite
 from typing import Final
 
 from gateway.bsfm import RISING, Bsfm, InverseStatus
-from gateway.control.runs.experiment_plan import MOST_SEGMENTS, ExperimentPlan, Move, MoveKind, plan_faults
+from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, plan_faults
 from gateway.control.runs.ladder_stairs import highest_voltage_v
 from gateway.control.settings import Limits
 
@@ -83,8 +84,6 @@ def segments_of(plan: ExperimentPlan, limits: Limits, model: Bsfm) -> tuple[Segm
                 raise ValueError(f"plan {plan.name}, part {part.name}, move {m + 1} ({move.do}): {error}") from None
             segments += candidates
             at_v = segments[-1].to_v
-    if len(segments) > MOST_SEGMENTS:
-        raise ValueError(f"plan {plan.name}: {len(segments)} stairs and turns, at most {MOST_SEGMENTS}")
     return tuple(segments)
 
 
@@ -152,3 +151,10 @@ class Schedule:
     def direction(self, elapsed_s: float) -> int:
         """Return +1 when the voltage last rose, -1 when it last fell."""
         return self._ways[self.index(elapsed_s)]
+
+
+@lru_cache(maxsize=4)
+def schedule_of(plan: ExperimentPlan, limits: Limits, model: Bsfm) -> Schedule:
+    """Return the voltage over time of a plan on a rig. ValueError as `segments_of`. Kept: from the request to its begin a run
+    is made four times, and all of them within one turn of the loop."""
+    return Schedule(segments_of(plan, limits, model), limits.safe_voltage_v)

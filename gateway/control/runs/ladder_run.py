@@ -45,12 +45,14 @@ LOWEST_SHARE, HIGHEST_SHARE, SILENT_SHARE = (
 
 
 class LadderRow(NamedTuple):
-    """One settled stair. force_n: mean of the window, zeroed cell force; settled: False if it was left unsettled."""
+    """One settled stair. force_n: mean of the window, zeroed cell force; settled: False if it was left unsettled; rest_n:
+    force before the first stair, N."""
 
     stair: PlannedStair
     force_n: float
     dwell_s: float
     settled: bool
+    rest_n: float = 0.0
 
 
 class RunStep(NamedTuple):
@@ -253,7 +255,7 @@ class LadderRun:
 
     def _row(self, dwell_s: float, *, settled: bool) -> LadderRow:
         forces = [force_n for _, force_n in self._window]
-        row = LadderRow(self._stair, sum(forces) / len(forces), dwell_s, settled)
+        row = LadderRow(self._stair, sum(forces) / len(forces), dwell_s, settled, self.rest_n)
         self.done += 1
         self.unsettled += not settled
         self._dwelt_s += dwell_s
@@ -274,7 +276,9 @@ class LadderRun:
         if rise_n <= -LOWEST_SHARE * expected_n:
             self.stop_cause = StopCause(FaultCode.SIGN_INVERTED, sign_sentence(rise_n, expected_n))
         elif rise_n < SILENT_SHARE * expected_n:
-            self.stop_cause = StopCause(FaultCode.NONE, ladder_silent_sentence(volts, rise_n, expected_n))
+            is_constant = self.noise_n == 0.0 and rise_n == 0.0
+            sentence = ladder_silent_sentence(volts, rise_n, expected_n, is_constant=is_constant)
+            self.stop_cause = StopCause(FaultCode.NONE, sentence)
         else:
             self.stop_cause = StopCause(FaultCode.GAIN_WRONG, gain_sentence(rise_n, expected_n))
 

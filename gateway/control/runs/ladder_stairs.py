@@ -70,7 +70,7 @@ def stairs_of(plan: CalibrationPlan, limits: Limits, model: Bsfm) -> tuple[Plann
     ladder = ladder_plan(top_v, plan.step_v, plan.groups)
     groups = zip(ladder.voltage_v, ladder.direction, ladder.group, strict=True)
     return (
-        *check_stairs(top_v, model),
+        *check_stairs(top_v, model, limits.safe_voltage_v),
         *(
             PlannedStair(volts, way, group, CalibrationPhase.LADDER)
             for volts, way, group in groups
@@ -130,11 +130,12 @@ def _check(plan: CalibrationPlan, top_v: float) -> None:
         raise ValueError(f"{2.0 * top_v / plan.step_v * plan.groups:.0f} stairs: at most {MOST_STAIRS}")
 
 
-def check_stairs(top_v: float, model: Bsfm) -> tuple[PlannedStair, ...]:
-    """Return the coarse cycle at the beginning of a run, up to top_v."""
-    first_v, _ = model.voltage_v(FIRST_STAIR_N + model.branches.rising.value(0.0), float(RISING))
-    voltages = [min(first_v, 0.2 * top_v), *(share * top_v for share in CHECK_SHARES)]
-    ways = [RISING if b > a else FALLING for a, b in zip([0.0, *voltages], voltages, strict=False)]
+def check_stairs(top_v: float, model: Bsfm, rest_v: float = 0.0) -> tuple[PlannedStair, ...]:
+    """Return the coarse cycle at the beginning of a run, from the voltage at rest up to top_v and back."""
+    first_v, _ = model.voltage_v(FIRST_STAIR_N + model.force_n(rest_v, float(RISING)), float(RISING))
+    way_v = top_v - rest_v
+    voltages = [min(first_v, rest_v + 0.2 * way_v), *(rest_v + share * way_v for share in CHECK_SHARES)]
+    ways = [RISING if b > a else FALLING for a, b in zip([rest_v, *voltages], voltages, strict=False)]
     return tuple(
         PlannedStair(volts, way, -1, CalibrationPhase.CHECK) for volts, way in zip(voltages, ways, strict=True)
     )

@@ -3,17 +3,19 @@
 from typing import Final
 
 PRECONDITIONS: Final = (
-    "Does the tool press on the workpiece, or on a stop, that takes {force:.0f} N?",
+    "Does the tool press on the workpiece, or on a stop, that takes {force}?",
     "Are hands and people away, and does nothing else command this tool?",
-    "Is the air on, with supply enough for {top:g} V?",
+    "Is the air on, with supply enough for {top}?",
 )
-"""force: the largest that is planned, N; top: the highest voltage, V."""
+"""force: the largest that is planned; top: the highest voltage."""
 
 WITHOUT_CHECK: Final = 2
 """How many of them count for a plan that leaves out the check of sign and scale."""
 
 
-def preconditions(force_n: float, top_v: float, *, has_check: bool) -> tuple[str, ...]:
-    """Return the questions of a run, with its numbers."""
+def preconditions(force_n: float | None, top_v: float | None, *, has_check: bool) -> tuple[str, ...]:
+    """Return the questions of a run, with its numbers. None: of a gateway elsewhere, which tells none beforehand."""
     asked = PRECONDITIONS if has_check else PRECONDITIONS[:WITHOUT_CHECK]
-    return tuple(text.format(force=force_n, top=top_v) for text in asked)
+    force = "the largest force that its rig file allows (force_max_n)" if force_n is None else f"{force_n:.0f} N"
+    top = "the highest voltage of that rig" if top_v is None else f"{top_v:g} V"
+    return tuple(text.format(force=force, top=top) for text in asked)

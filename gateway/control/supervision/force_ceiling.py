@@ -2,7 +2,8 @@
 
 Two checks. Before a higher stair: were the force to go on as it rose from the stair before to this one, in the shape of the
 calibration in use, it must not pass the ceiling. And at every sample of a rising stair, for what rises otherwise. The
-ceiling is force_max_n less what noise makes of single readings.
+ceiling is force_max_n less what noise makes of single readings. On the way down what the top has reached may still stand, but
+nothing beyond force_max_n: an output that is limited in its slope, or a lag, may rise long after the plan has turned.
 """
 
 from collections import deque
@@ -29,6 +30,7 @@ class ForceCeiling:
         self._given_n = 0.0
         self._last: tuple[float, float] | None = None
         self._before: tuple[float, float] | None = None
+        self._rest_n = 0.0
 
     @property
     def measured_n(self) -> float:
@@ -43,6 +45,7 @@ class ForceCeiling:
 
     def observe_row(self, row: LadderRow) -> None:
         """Take in a stair that has ended."""
+        self._rest_n = row.rest_n
         if row.stair.direction < 0:
             self._last = self._before = None
         else:
@@ -52,18 +55,22 @@ class ForceCeiling:
         """Return whether the force of now is as high as it may be."""
         return len(self._recent_n) == _SAMPLES and self.measured_n >= self._ceiling_n(noise_n)
 
+    def is_passed(self, noise_n: float) -> bool:
+        """Return whether the force of now is beyond the largest one, whatever the noise."""
+        return len(self._recent_n) == _SAMPLES and self.measured_n >= self._force_max_n + _margin_n(noise_n)
+
     def is_beyond(self, voltage_v: float, noise_n: float) -> bool:
         """Return whether a stair of this voltage would pass the ceiling, after the ones that have settled."""
         return self._expected_n(voltage_v) + self._given_n > self._ceiling_n(noise_n)
 
     def _ceiling_n(self, noise_n: float) -> float:
-        return self._force_max_n - max(_LEAST_MARGIN_N, _SIGMAS * noise_n)
+        return self._force_max_n - _margin_n(noise_n)
 
     def _expected_n(self, voltage_v: float) -> float:
         """Cell force of a higher stair, by those below it; 0 where there is none to go by."""
         if self._last is None or voltage_v <= self._last[0]:
             return 0.0
-        (last_v, last_n), (before_v, before_n) = self._last, self._before or (self._rest_v, 0.0)
+        (last_v, last_n), (before_v, before_n) = self._last, self._before or (self._rest_v, self._rest_n)
         before_model_n, last_model_n, model_n = (
             self._model.force_n(volts, float(RISING)) for volts in (before_v, last_v, voltage_v)
         )
@@ -71,3 +78,7 @@ class ForceCeiling:
         if model_rise_n <= 0.0:
             return last_n
         return last_n + max(0.0, last_n - before_n) * (model_n - last_model_n) / model_rise_n
+
+
+def _margin_n(noise_n: float) -> float:
+    return max(_LEAST_MARGIN_N, _SIGMAS * noise_n)

@@ -37,9 +37,16 @@ ALWAYS_SUPPORTED: Final = (
 """Control bits that act on every rig; a self-test and a valve act where the rig file has them, else they are refused."""
 
 
+def rehearsed(rig: str) -> str:
+    """Return the name that a real rig has in a calibration which was measured while its devices were simulated."""
+    return f"{rig} (simulated)"
+
+
 def is_own(calibration: Calibration, rig: str, simulated_plant: PlantProfile | None) -> bool:
     """Decide whether the calibration was measured on this very rig, or on the twin of the plant that it simulates."""
-    return calibration.rig in (rig, simulated_plant and f"twin of plant {simulated_plant.name}")
+    if simulated_plant is None:
+        return calibration.rig == rig
+    return calibration.rig in (rig, rehearsed(rig), f"twin of plant {simulated_plant.name}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,7 +167,20 @@ class Rig:
     def model_of(self, calibration: Calibration, model: Bsfm) -> Bsfm:
         """Return the calibration's model as control uses it here: a bent command map is straightened, but for a
         calibration that was made on this very rig, for that has measured it."""
-        return model if calibration.rig == self.name else apply_command_map(model, self.compensation.command)
+        return model if self.has_measured(calibration) else apply_command_map(model, self.compensation.command)
+
+    def has_measured(self, calibration: Calibration) -> bool:
+        """Decide whether a ladder on this very rig has measured it, bent command map and all."""
+        return calibration.rig in (self.name, rehearsed(self.name) if self.simulated else self.name)
+
+    def doubts_on(self, calibration: Calibration) -> str:
+        """Return why a calibration's forces are a guess on this real rig; empty where they are none."""
+        if self.simulated or calibration.rig == self.name:
+            return ""
+        origin = f'was made on "{calibration.rig}", not on {self.name}'
+        return (
+            f"calibration {calibration.number} {origin}: its forces are a guess until you run `force-gateway calibrate`"
+        )
 
     def response_of(self, calibration: Calibration) -> Response | None:
         """Return how this rig follows, as the calibration measured it; None for one that another rig was measured with."""

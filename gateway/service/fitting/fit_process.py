@@ -22,7 +22,8 @@ def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]
     """Fit a recorded run, store the calibration and return the answer of the process.
 
     {"stored": number, "report": path, "document": path}, the same with "rejected" and a sentence in "refused" for a fit that
-    is kept but not offered, or {"refused": sentence}.
+    is kept but not offered, or {"refused": sentence}. "unreported" in place of both paths: a sentence, where the disk took the
+    calibration and not its report.
     """
     from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.ladder.ladder_error import LadderError
@@ -64,11 +65,14 @@ def _describe_result(
     from gateway.service.fitting.ladder_fit import write_report
 
     report, document = (store.directory / f"{number:04d}.{suffix}" for suffix in ("html", "json"))
+    paths = {"report": str(report), "document": str(document)}
     if is_new or not document.exists():
         fit.document.update(calibration=number, report=str(report))
-        write_report(fit, report)
-        replace_text(document, json.dumps(fit.document, indent=1))
-    paths = {"report": str(report), "document": str(document)}
+        try:
+            write_report(fit, report)
+            replace_text(document, json.dumps(fit.document, indent=1))
+        except OSError as error:  # what is stored is stored; asked again, it is written
+            paths = {"unreported": f"E106 {error.filename or report}: {error.strerror}; only the report is missing"}
     rejected = store.load(number).rejected
     if rejected:
         return {"rejected": number, "refused": rejected_sentence(number, rejected)} | paths

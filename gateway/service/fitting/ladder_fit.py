@@ -16,6 +16,7 @@ from gateway.bsfm.ladder.check import CheckedLadder
 from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.bsfm.response.identification import MeasuredResponse
 from gateway.processes.durable_file import replace_text
+from gateway.profiles.rigs.rig import rehearsed
 from gateway.recording import Recording
 from gateway.reports.fit.document import Document, fit_document
 from gateway.reports.fit.page import fit_page
@@ -23,6 +24,7 @@ from gateway.reports.fit.raw_ladder import raw_ladder
 from gateway.service.fitting.acceptance import Acceptance, judge_fit
 from gateway.service.fitting.ladder_source import RigContext, acceptance_bounds, check_source
 from gateway.service.fitting.measured_response import measure_recorded_response
+from gateway.service.fitting.recorded_rig import is_rehearsal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +80,7 @@ def calibration_of(fit: LadderFit, cell_range_n: float) -> Calibration:
         max_n=fit.verdict.error.max_n,
         date_utc=datetime.now(UTC).strftime("%Y-%m-%d"),
         source=_source(fit),
-        rig=str(fit.document["rig"] or ""),
+        rig=_made_on(fit),
         data_sha256=fit.document["data_sha256"],
         slip_radii_v=_plain(model["slip_radii_v"]),
         slip_shares=_plain(model["slip_shares"]),
@@ -86,6 +88,12 @@ def calibration_of(fit: LadderFit, cell_range_n: float) -> Calibration:
         rejected=fit.verdict.rejected,
         noise_n=fit.document["ladder"]["noise_n"] or 0.0,
     )
+
+
+def _made_on(fit: LadderFit) -> str:
+    """Return the rig by name; of a rehearsal one that a real rig does not take for its own."""
+    rig = str(fit.document["rig"] or "")
+    return rehearsed(rig) if rig and is_rehearsal(fit.recording) else rig
 
 
 def _plain(values: Iterable[float]) -> tuple[float, ...]:

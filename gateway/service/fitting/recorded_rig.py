@@ -64,6 +64,14 @@ def rig_texts(recording: Recording) -> dict[str, str]:
     return {str(file): str(text) for file, text in texts.items()} if isinstance(texts, Mapping) else {}
 
 
+def is_rehearsal(recording: Recording) -> bool:
+    """Decide whether it was made while the devices of a real rig were simulated: what it has measured is no machine."""
+    if str(recording.header.get("simulated")).lower() != "true":
+        return False
+    texts = rig_texts(recording)
+    return bool(texts) and _document(next(iter(texts)), texts).at("simulated") is not True
+
+
 def _read_recorded_plant(texts: Mapping[str, str]) -> PlantProfile | None:
     rig_file, *others = texts
     named = str(_document(rig_file, texts).at("plant") or "")

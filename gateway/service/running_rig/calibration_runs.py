@@ -10,20 +10,18 @@ terminal must not leave a tool climbing stairs.
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 from gateway.bsfm.ladder.plan import LABELS
 from gateway.control import Controller
 from gateway.control.inputs import Output
-from gateway.control.runs.active_run import RecordedPlan, RecordedRun
-from gateway.control.runs.experiment_plan import ExperimentPlan
+from gateway.control.runs.active_run import RecordedPlan
 from gateway.control.runs.experiment_run import ExperimentRun
 from gateway.devices.messages import ForceSample
 from gateway.processes.disk_worker import DiskWorker
 from gateway.profiles import Rig
-from gateway.profiles.kinds.plans import plan_document, plan_of
+from gateway.profiles.kinds.plans import plan_of
 from gateway.recording import Recorder
 from gateway.registers.words import CalibrationPhase
 from gateway.service.running_rig.fit_launcher import FitLauncher, Result
@@ -31,10 +29,12 @@ from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.service.running_rig.recording.recordings import END_BOUND_S
 from gateway.service.running_rig.recording.run_recording import RunRecording
+from gateway.service.running_rig.run_descriptions import describe_experiment, describe_progress, header_of_plan
 from gateway.service.socket_requests import CalibrateRequest, EmptyRequest, parse_request
 
 FOLLOWED_S: Final = 3.0
 _CLOSING_S: Final = 1.0  # without a sample for so long after the last stair the run is recorded as cut there
+_NOTHING_TAKEN: Final = "the disk took no recording"
 Answer = dict[str, Any]
 
 
@@ -65,6 +65,7 @@ class CalibrationRuns:
         self._child: FitLauncher | None = None
         self._result: Result = {}
         self._ended = ""
+        self._was_running = self._is_self_test = False
         self._decision: Output | None = None
         self._followed_s = 0.0
         self.decide: Callable[[], None] = lambda: None
@@ -82,7 +83,7 @@ class CalibrationRuns:
         if query.dry_run:
             return self._try_plan(_parse_plan(query.plan))
         if query.stop:
-            self._calibrating.ask_stop("calibration stopped at this machine")
+            self._calibrating.ask_stop(f"{self._calibrating.kind} stopped at this machine")
         elif query.plan is not None:
             self._start(query)
         if refused := self._calibrating.take_refused():
@@ -115,7 +116,7 @@ class CalibrationRuns:
             "simulated": self._rig.simulated,
             "rig": self._rig.name,
             "rig_fingerprint": self._rig.fingerprint,
-            **_describe_experiment(plan),
+            **describe_experiment(plan),
         }
 
     def _start(self, query: CalibrateRequest) -> None:
@@ -136,13 +137,13 @@ class CalibrationRuns:
             "phase": (self._phase_before_end if self._is_closing else calibrating.phase).name.lower(),
             "progress": calibrating.progress,
             "eta_s": round(calibrating.eta_s, 1),
-            **_describe_progress(run),
+            **describe_progress(run),
             "noise_n": run.noise_n if run else None,
             "voltage_v": decision.voltage_v if decision else None,
             "force_n": decision.force_measured_n
             if decision and decision.force_measured_n == decision.force_measured_n
             else None,
-            "recording": str(self._last.path) if self._last and self._last.path else None,
+            "recording": str(self._last.path) if self._last and self._last.path and not self._is_self_test else None,
             "ended": self._ended,
             "result": self._result,
         }
@@ -155,6 +156,7 @@ class CalibrationRuns:
         calibrating = self._calibrating
         if calibrating.running:
             self._phase_before_end = calibrating.phase
+        self._follow_ends(decision)
         if calibrating.recorded and self._recording is None:
             self._begin()
         elif self._closing_s is not None:
@@ -166,6 +168,14 @@ class CalibrationRuns:
             calibrating.ask_stop(f"A330 calibration stopped: {failure}")
         elif calibrating.running and calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
             calibrating.ask_stop("A330 calibration stopped: nobody at this machine follows it any more")
+
+    def _follow_ends(self, decision: Output) -> None:
+        """Forget what the run before has left, whoever has begun this one; of a self-test nothing else tells its end."""
+        was_running, self._was_running = self._was_running, self._calibrating.running
+        if self._was_running and not was_running:
+            self._ended, self._result, self._is_self_test = "", {}, self._calibrating.recorded is None
+        elif was_running and not self._was_running and self._is_self_test:
+            self._ended = decision.events[0] if decision.events else ""
 
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
         """Record a sample with the cell's own force, without the payload's weight: the model means that force."""
@@ -213,7 +223,7 @@ class CalibrationRuns:
             "calibration": self._controller.calibration_id,
             "simulated": rig.simulated,
             "seed": rig.seed,
-            **_header_of_plan(run),
+            **header_of_plan(run),
             "continues": list(self._continues),
             "name": self._name,
             "zero_n": self._controller.zero_n,
@@ -224,7 +234,6 @@ class CalibrationRuns:
         self._is_closing = False
         self._recording.begin(self._on_opened)
         self._continues, self._name = (), ""
-        self._ended, self._result = "", {}  # of the run before, whoever has begun it
 
     def _on_opened(self, error: OSError | None) -> None:
         if error and self._calibrating.running:
@@ -244,9 +253,10 @@ class CalibrationRuns:
         if recording is not self._last:
             return
         self._is_closing = False
-        if recording.failure:
-            self._tell_failure(recording.failure)
-        elif self._calibrating.phase is CalibrationPhase.RECORDED:
+        is_recorded = self._calibrating.phase is CalibrationPhase.RECORDED
+        if recording.failure or (is_recorded and not recording.path):
+            self._tell_failure(recording.failure or _NOTHING_TAKEN)
+        elif is_recorded:
             self._log("calibration", f"experiment recorded in {recording.path}; force-gateway diagnose takes it")
 
     def _tell_failure(self, failure: str) -> None:
@@ -261,7 +271,7 @@ class CalibrationRuns:
 
     def _fit(self, recording: RunRecording) -> None:
         if recording.failure or not recording.path:
-            self._tell_failure(recording.failure or "the disk took no recording")
+            self._tell_failure(recording.failure or _NOTHING_TAKEN)
             return
         try:
             self._child = FitLauncher(recording.path, self._rig.file, self._state, self._on_result)
@@ -275,46 +285,14 @@ class CalibrationRuns:
         if "stored" in result:
             self.stored = int(result["stored"])
             self._calibrating.phase = CalibrationPhase.STORED
-            self._log("calibration", f"calibration {self.stored} stored, not active; report {result['report']}")
+            self._log("calibration", f"calibration {self.stored} stored, not active{_describe_report(result)}")
         else:
             self._calibrating.phase = CalibrationPhase.REFUSED
-            report_clause = f"; report {result['report']}" if "report" in result else ""
-            self._log("calibration", f"{result.get('refused')}{report_clause}")
+            self._log("calibration", f"{result.get('refused')}{_describe_report(result)}")
 
 
-def _describe_experiment(plan: RecordedPlan) -> Answer:
-    """Return what a person should know and do before an experiment."""
-    if not isinstance(plan, ExperimentPlan):
-        return {"experiment": "", "check": True, "notes": [], "questions": []}
-    missing = [name for name in plan.columns if name not in COLUMNS]
-    advice = f"this gateway does not record {' and '.join(missing)}: record it beside, and join the tables by time"
-    return {
-        "experiment": f"experiment {plan.name}, {len(plan.parts)} parts ({', '.join(part.name for part in plan.parts)})",
-        "check": plan.check,
-        "notes": [advice] if missing else [],
-        "questions": [f"Ready to do this while it runs: {text}?" for text in plan.by_hand],
-    }
-
-
-def _describe_progress(run: RecordedRun | None) -> Answer:
-    """Return how far a run is, in its own terms."""
-    progress: Answer = {"stair": 0, "stairs": 0, "group": 0, "groups": 0, "part": 0, "parts": 0, "part_name": ""}
-    if isinstance(run, ExperimentRun):
-        part = run.part
-        return progress | {"part": part + 1, "parts": len(run.plan.parts), "part_name": run.plan.parts[part].name}
-    if run is None:
-        return progress
-    stair = run.stairs[min(run.done, len(run.stairs) - 1)]
-    groups = run.plan.groups
-    return progress | {"stair": run.done, "stairs": len(run.stairs), "group": max(0, stair.group + 1), "groups": groups}
-
-
-def _header_of_plan(run: RecordedRun) -> Answer:
-    """For the recording's header: a ladder is what `fit` and --resume look for."""
-    if isinstance(run, ExperimentRun):
-        return {"experiment": plan_document(run.plan)}
-    top_v = max(stair.voltage_v for stair in run.stairs)
-    return {"ladder": asdict(run.plan) | {"stairs": len(run.stairs), "top_v": top_v}}
+def _describe_report(result: Result) -> str:
+    return f"; report {result['report']}" if "report" in result else f"; {result.get('unreported', '')}".rstrip("; ")
 
 
 def _parse_plan(fields: Any) -> RecordedPlan:

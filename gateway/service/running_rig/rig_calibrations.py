@@ -24,7 +24,8 @@ class RigCalibrations:
         self.rig = replace(rig, calibration=calibration)
         number = selected.selection.number
         chosen = () if number is None else (f"calibration {number} of {calibration.date_utc} from {store.directory}",)
-        self.notes = (*selected.notes, *chosen)
+        doubts = self.rig.doubts_on(calibration) if chosen else ""  # the rig's own is judged with its file
+        self.notes = (*selected.notes, *chosen, *filter(None, (doubts,)))
 
     def serve(
         self,
@@ -35,7 +36,7 @@ class RigCalibrations:
     ) -> UploadService:
         """Show the calibration in use in the bank, and take uploads from now on."""
         bank.set_active_model(self.rig.calibration, self._selected.selection.slot_word)
-        rules = UploadRules.of(self.rig.name, self.rig.register_map, _today)
+        rules = UploadRules.of(self.rig.name, self.rig.register_map, _today, self.rig.doubts_on)
         upload = UploadService(bank.staging, self._activation, self._selected, rules, log)
         upload.on_use, upload.on_failure = on_use, on_failure
         return upload

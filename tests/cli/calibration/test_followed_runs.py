@@ -13,7 +13,7 @@ from rich.progress import BarColumn
 
 from gateway.cli.calibration import follow as following
 from gateway.cli.calibration import runs
-from gateway.cli.calibration.follow import NotBegunError, follow
+from gateway.cli.calibration.follow import NotBegunError, RestartedError, follow
 from gateway.cli.calibration.runs import ENDED, LocalRun, RunStatus
 from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
@@ -76,6 +76,13 @@ def test_a_run_that_is_lost_keeps_its_exit_code_and_what_becomes_of_it_is_told()
         follow(Lost())
     assert told.value.exit_code == exit_codes.DEVICE
     assert told.value.message == f"E131 no answer\n{Played.lost_words}"
+
+
+def test_a_run_whose_gateway_has_started_anew_is_none_that_was_not_begun(clock: SimpleNamespace) -> None:
+    """A control that is killed is back before the next look: it knows of no run, and its log of no refusal."""
+    with pytest.raises(RestartedError, match="A401 the gateway has started anew") as told:
+        follow(Played("idle", *["ladder"] * 20, "idle"))
+    assert Played.lost_words not in told.value.message and clock.now_s < 5.0
 
 
 def test_a_run_that_was_stopped_is_followed_until_it_has_come_to_rest() -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -147,3 +148,8 @@ def test_a_heartbeat_whose_answer_is_lost_is_followed_by_the_next(monkeypatch: p
     run._beat.join(5.0)
     assert not run._beat.is_alive() and client.beats == 3
     run.close()
+
+
+def test_before_a_run_elsewhere_its_force_is_asked_for_and_no_number_of_ours(call: Any) -> None:
+    answer = call("calibrate", "--gateway", "127.0.0.1:1", input="n\n")
+    assert "takes the largest force that its rig file allows" in answer.stderr and "60 N" not in answer.stderr

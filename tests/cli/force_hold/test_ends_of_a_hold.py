@@ -47,7 +47,7 @@ def test_the_first_signal_ramps_down_and_the_second_drops(number: int) -> None:
 
 def ended(end: HoldEnd, fault: FaultCode = FaultCode.SAMPLE_STALE) -> Any:
     status = StatusReading(State.FAULT, fault)
-    run = SimpleNamespace(end=end, force_n=12.0, is_pressing=True)
+    run = SimpleNamespace(end=end, force_n=12.0, is_pressing=True, is_unheard=False)
     return SimpleNamespace(hold=run, failure=None, status=status, warned=WarningBit(0))
 
 

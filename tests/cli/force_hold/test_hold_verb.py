@@ -86,7 +86,7 @@ def test_a_lost_gateway_is_told_with_what_it_does_now(register_map: RegisterMap)
 
 
 def ended(end: HoldEnd, warned: WarningBit = WarningBit(0), failure: Exception | None = None) -> Any:  # noqa: B008
-    run = SimpleNamespace(end=end, force_n=12.0, is_pressing=True)
+    run = SimpleNamespace(end=end, force_n=12.0, is_pressing=True, is_unheard=False)
     return SimpleNamespace(hold=run, failure=failure, status=PRESSING, warned=warned)
 
 

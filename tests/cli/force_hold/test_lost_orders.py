@@ -78,6 +78,30 @@ def test_a_ramp_down_that_got_lost_is_begun_again_and_nothing_is_enabled_that_is
     assert run.next(StatusReading(State.OFF), 0.3, stops=True) is None and run.end is HoldEnd.STOPPED
 
 
+@pytest.mark.parametrize(("is_heard", "code"), [(False, "E131"), (True, "W336")])
+def test_an_enable_that_nobody_has_heard_was_cleared_by_nobody(
+    is_heard: bool, code: str, register_map: RegisterMap
+) -> None:
+    """Noise on a serial line takes one request: somebody else was blamed. Once it was seen to press, that is so."""
+    bank = PlainBank(register_map)
+    beat = beating(LossyClient(bank, 0), None)
+    send, looks = beat._send, [State.HOLDING, State.OFF] if is_heard else []
+
+    def lose(write: HoldWrite) -> None:
+        if write.control_word == 1:
+            bank.set("state", looks.pop(0) if looks else State.OFF)
+            raise CliError("E131 no answer", exit_codes.DEVICE)
+        bank.set("state", looks.pop(0) if looks else State.OFF)
+        send(write)
+
+    beat._send = lose  # type: ignore[method-assign]
+    beat._looked_s = -10.0
+    beat.run()
+    assert beat.failure is None and beat.hold.end is HoldEnd.DISABLED
+    with pytest.raises(CliError, match=code):
+        _report_end(beat, "127.0.0.1:5020", as_json=False)
+
+
 def test_a_status_that_nobody_here_understands_ends_at_the_safe_voltage_and_is_told(register_map: RegisterMap) -> None:
     """A later gateway may have another fault: the thread died over it, and `hold` told `0 N, disabled` with exit code 0."""
     bank = PlainBank(register_map)

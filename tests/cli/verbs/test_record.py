@@ -74,7 +74,7 @@ def test_a_restart_of_control_in_between_is_waited_for_and_its_other_file_told(
     answer = call("record", "--for", "90s", "--state", tmp_path)
     assert answer.exit_code == 0, answer.output
     first, second = (tmp_path / "recordings" / name for name in ("0001.fgr", "0002.fgr"))
-    assert f"recorded 4 rows (3.0 s) to {first}, {second}" in answer.output
+    assert f"recorded 4 rows (3.0 s) to {first}, then to {second}" in answer.output
 
 
 def test_another_recording_behind_ours_is_not_waited_for(gateway: ScriptedGateway, call, tmp_path: Path) -> None:
@@ -135,3 +135,39 @@ def test_what_makes_no_sense_is_refused_before_anybody_is_asked(
     answer = call("record", *words, "--state", tmp_path)
     assert (answer.exit_code, gateway.asked) == (2, [])
     assert why in " ".join(answer.output.split())
+
+
+FULL = "E402 recording 0001.fgr stopped after 2 rows: No space left on device; control goes on"
+
+
+@pytest.mark.parametrize("is_dropped", [False, True])
+def test_a_disk_that_has_ended_it_before_its_time_is_told_and_no_success(
+    is_dropped: bool, gateway: ScriptedGateway, call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was told as recorded, with exit code 0; where no row was taken its file was missed (E106)."""
+
+    def ask(state: Path, request: dict[str, Any]) -> dict[str, Any]:
+        answer = gateway.ask(state, request)
+        if answer["recording"] is None and is_dropped:
+            gateway.recorder.path.unlink()
+        return answer if answer["recording"] else {"recording": None, "waits": FULL}
+
+    monkeypatch.setattr("gateway.cli.control_socket.ask", ask)
+    answer = call("record", "--for", "90s", "--json", "--state", tmp_path)
+    said = json.loads(answer.stdout)
+    assert (said["rows"], said["fault"]) == (0 if is_dropped else 2, FULL)
+    assert answer.exit_code == 1 and "No space left on device" in answer.stderr and "not the 90 s" in answer.stderr
+
+
+def test_another_file_in_which_it_goes_on_is_told(
+    gateway: ScriptedGateway, call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after a day, or with another plant."""
+
+    def ask(state: Path, request: dict[str, Any]) -> dict[str, Any]:
+        answer = gateway.ask(state, request)
+        return answer | {"recording": "0002.fgr"} if len(gateway.asked) == 3 else answer
+
+    monkeypatch.setattr("gateway.cli.control_socket.ask", ask)
+    answer = call("record", "--for", "90s", "--state", tmp_path)
+    assert answer.exit_code == 0 and "0001.fgr, then to 0002.fgr" in answer.output

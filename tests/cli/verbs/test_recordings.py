@@ -64,12 +64,14 @@ def test_delete_asks_and_a_no_deletes_nothing(state: Path, call) -> None:
 
 def test_neither_the_reference_nor_the_one_under_way_is_deleted(state: Path, call) -> None:
     keep_reference_recording(state, state / "recordings" / "0001.fgr")
-    running = Recorder(state / "recordings", {}, ("time_s",))
-    refusals = [call("recordings", "delete", number, "--yes", "--state", state).stderr for number in ("1", "3")]
-    running.close()
+    running = [Recorder(state / "recordings", header, ("time_s",)) for header in ({}, {"ladder": {"groups": 1}})]
+    refusals = [call("recordings", "delete", number, "--yes", "--state", state).stderr for number in ("1", "3", "4")]
+    for one in running:
+        one.close()
     assert "reference" in refusals[0]
     assert "record off" in refusals[1]
-    assert len(list((state / "recordings").glob("*.fgr"))) == 3
+    assert "the run that makes it ends it" in refusals[2], "record off does not"
+    assert len(list((state / "recordings").glob("*.fgr"))) == 4
 
 
 def test_a_plot_is_a_page_or_one_svg_that_parses(state: Path, call, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -102,6 +102,19 @@ def test_a_test_that_does_not_end_is_stopped_after_half_a_minute(
     assert [frame["heartbeat"] for frame in gateway.words][:4] == [0xFFFF, 0, 1, 2]
 
 
+def test_a_gateway_that_has_started_anew_is_told_and_no_test_without_a_result(
+    gateway: Registers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was told as `self-test 0 none`."""
+    monkeypatch.setattr(
+        self_test, "time", SimpleNamespace(sleep=lambda _s: gateway.values.clear(), monotonic=lambda: 0)
+    )
+    gateway.write = lambda frame: None  # type: ignore[method-assign]
+    gateway.values["self_test_result"] = SelfTestResult.RUNNING
+    with pytest.raises(CliError, match="A401 the gateway has started anew"):
+        self_test._run_to_its_end(run_of(gateway), shows=False)
+
+
 def test_progress_is_told_in_percent(gateway: Registers, capsys: pytest.CaptureFixture[str]) -> None:
     run_of(gateway)._show()
     assert "self-test  25 %" in capsys.readouterr().err

@@ -1,10 +1,13 @@
 """An experiment: its moves become the voltages that it says, within the rig's limits, under the same supervision."""
 
+from dataclasses import replace
+
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.control.runs import experiment_schedule
 from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part, plan_faults
-from gateway.control.runs.experiment_schedule import Schedule, segments_of
+from gateway.control.runs.experiment_schedule import Schedule, schedule_of, segments_of
 from gateway.control.runs.ladder_stairs import highest_voltage_v
 from gateway.registers.words import CalibrationPhase, State
 from tests.control.bench import Bench, bsfm, settings
@@ -162,3 +165,52 @@ def test_a_plan_without_end_is_refused_by_the_number_of_its_turns() -> None:
     start = Move(do=MoveKind.STEP, to_v=3.0, hold_s=0.5)
     with pytest.raises(ValueError, match="20011 stairs and turns, at most 20000"):
         segments_of(plan(start, *many), LIMITS, bsfm())
+
+
+def test_turns_that_are_too_many_are_counted_and_never_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A try of such a plan, which a line may hold, stood in the loop for a second: a held force went with it."""
+    many = Move(do=MoveKind.REVERSALS, size_v=0.1, times=1000, over_s=0.001)
+    asked = plan(Move(do=MoveKind.STEP, to_v=3.0, hold_s=0.5), *[many] * 500)
+    monkeypatch.setattr(experiment_schedule, "Segment", pytest.fail)
+    with pytest.raises(ValueError, match="plan a plan: the parts have 1000501 stairs and turns, at most 20000"):
+        segments_of(asked, LIMITS, bsfm())
+
+
+def test_a_plan_is_counted_as_it_is_made() -> None:
+    assert SHORT.segments == len(segments_of(SHORT, LIMITS, bsfm()))
+
+
+def test_the_voltages_of_a_run_are_made_once_from_the_question_to_its_begin(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, make = [], experiment_schedule.segments_of
+    monkeypatch.setattr(experiment_schedule, "segments_of", lambda *asked: made.append(asked) or make(*asked))
+    schedule_of.cache_clear()
+    bench = begun(Bench(seed=8), SHORT)
+    assert bench.controller.active_run.running and len(made) == 1
+
+
+@pytest.mark.parametrize(
+    ("slew_v_per_s", "gain_n_per_v", "most_n"),
+    [(2.0, 15.0, 55.0), (100.0, 9.0, 52.0)],
+    ids=["the output still rises", "the force still rises"],
+)
+def test_behind_a_turn_of_the_plan_the_force_stays_below_the_rigs_largest_too(
+    slew_v_per_s: float, gain_n_per_v: float, most_n: float
+) -> None:
+    """The plan went down already, so nobody looked: 76 N were pressed where the rig allows 50."""
+    up, down = Move(do=MoveKind.STEP, to_v=6.5, hold_s=0.03), Move(do=MoveKind.STEP, to_v=6.0, hold_s=4.0)
+    rig = settings()
+    limits = replace(rig.limits, voltage_slew_v_per_s=slew_v_per_s, over_force_n=80.0)
+    bench = begun(Bench(replace(rig, limits=limits), seed=9, gain_n_per_v=gain_n_per_v), plan(up, down))
+    bench.run(6.0)
+    assert max(record.force_n for record in bench.history) < most_n
+    assert any(event.startswith("A350") for event in bench.events) and bench.last.state is State.OFF
+
+
+@pytest.mark.parametrize("path", [("name",), ("parts", 0, "name"), ("columns", 0), ("by_hand", 0)])
+def test_what_a_plan_is_called_writes_on_nobodys_terminal(path: tuple[str | int, ...]) -> None:
+    """A colleague's file is shown before its run, and its name stands in the log."""
+    texts = dict.fromkeys(("name", "part", "columns", "by_hand"), "wheel 3")
+    texts["part" if path[0] == "parts" else str(path[0])] = "\x1b[2J"
+    part = Part(name=texts["part"], moves=(Move(do=MoveKind.DWELL, hold_s=1.0),))
+    asked = ExperimentPlan(name=texts["name"], parts=(part,), columns=(texts["columns"],), by_hand=(texts["by_hand"],))
+    assert [fault[0] for fault in plan_faults(asked)] == [path]

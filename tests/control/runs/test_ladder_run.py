@@ -176,6 +176,7 @@ def test_a_latched_fault_refuses_it() -> None:
         ({"unit": 0.2}, FaultCode.GAIN_WRONG, "A303"),
         ({"air": False}, FaultCode.NONE, "A301"),
         ({"contact": False}, FaultCode.NONE, "A301"),
+        ({"unit": 0.0, "noise_n": 0.0}, FaultCode.NONE, "A301"),
     ],
 )
 def test_wrong_sign_wrong_scale_and_no_answer_stop_it_in_the_check(plant, fault, code) -> None:
@@ -183,7 +184,8 @@ def test_wrong_sign_wrong_scale_and_no_answer_stop_it_in_the_check(plant, fault,
     assert bench.last.fault is fault
     assert bench.last.calibration_phase == CalibrationPhase.STOPPED
     assert bench.last.voltage_v == 0.0
-    assert any(event.startswith(code) for event in bench.events)
+    (told,) = [event for event in bench.events if event.startswith(code)]
+    assert ("cell or amplifier dead, else no air" in told) is (plant.get("noise_n") == 0.0), "it blamed the air alone"
     assert max(volts for _, volts in bench.voltages()) < 4.1
 
 

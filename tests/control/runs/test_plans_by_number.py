@@ -90,6 +90,15 @@ def test_a_check_begins_small_and_goes_up_and_down_by_quarters(top_v: float) -> 
     assert {(stair.group, stair.phase, stair.is_step) for stair in stairs} == {(-1, CalibrationPhase.CHECK, False)}
 
 
+def test_a_check_begins_and_ends_where_a_rig_rests_that_presses_there() -> None:
+    stairs = check_stairs(5.0, bsfm(), 2.0)
+    first_v = min(2.0 + 0.2 * 3.0, bsfm().voltage_v(FIRST_STAIR_N + bsfm().force_n(2.0, 1.0), 1.0)[0])
+    assert [stair.voltage_v for stair in stairs] == pytest.approx([first_v, *(2.0 + s * 3.0 for s in CHECK_SHARES)])
+    assert [stair.direction for stair in stairs] == [UP] * 5 + [DOWN] * 4
+    pressing = replace(WIDE, safe_voltage_v=2.0, voltage_min_v=0.5)
+    assert stairs_of(ladder(), pressing, bsfm())[: len(stairs)] == stairs
+
+
 def test_the_walk_of_reversals_ends_with_steps_at_once_for_the_response() -> None:
     stairs = stairs_of(ladder(minor_points=60, response_steps=8), WIDE, bsfm())
     walk = [stair for stair in stairs if stair.phase is CalibrationPhase.MINOR_LOOPS]

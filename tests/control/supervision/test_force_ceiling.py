@@ -106,3 +106,22 @@ def test_the_room_below_the_largest_force_is_three_sigma_and_four_counts_at_leas
     noise_n: float, below_n: float, is_reached: bool
 ) -> None:
     assert ceiling_at(MOST_N - below_n, 0.0).is_reached(noise_n) is is_reached
+
+
+def test_the_first_rise_counts_from_the_force_at_rest() -> None:
+    """A rig that presses at its safe voltage, or whose cell has not been tared, seemed ten times as strong."""
+    rest_n = model_n(1.0)
+    for stronger, is_beyond in ((1.0, False), (3.0, True)):
+        ceiling = ForceCeiling(MOST_N, bsfm(), 1.0)
+        force_n = rest_n + stronger * (model_n(1.2) - rest_n)
+        stair = PlannedStair(1.2, 1, 0, CalibrationPhase.CHECK)
+        ceiling.observe_row(LadderRow(stair, force_n, 1.0, True, rest_n))
+        assert ceiling.is_beyond(4.0, 0.0) is is_beyond
+
+
+@pytest.mark.parametrize(
+    ("noise_n", "beyond_n", "is_passed"), [(0.0, 0.39, False), (0.0, 0.41, True), (0.4, 1.19, False)]
+)
+def test_beyond_the_largest_force_is_what_no_noise_explains(noise_n: float, beyond_n: float, is_passed: bool) -> None:
+    assert ceiling_at(MOST_N + beyond_n, 0.0).is_passed(noise_n) is is_passed
+    assert not ForceCeiling(MOST_N, bsfm(), 0.0).is_passed(noise_n), "nothing is measured yet"

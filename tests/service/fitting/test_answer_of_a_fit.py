@@ -78,6 +78,20 @@ def test_a_fit_that_is_not_offered_is_told_with_its_number_and_why(fits: Fits, t
         assert "stored" not in told and Path(told["document"]).exists()
 
 
+@pytest.mark.parametrize("rejected", ["", "it is out of band"])
+def test_a_report_that_the_disk_does_not_take_makes_no_refusal_of_a_calibration_that_is_stored(
+    rejected: str, fits: Fits, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was told as refused, and nobody knew its number."""
+    fits.made = calibration(8, rejected=rejected)
+    with monkeypatch.context() as full:
+        full.setattr(ladder_fit, "write_report", lambda fit, path: (_ for _ in ()).throw(OSError(28, "No space left")))
+        told = fit_and_store(tmp_path / "1.fgr", "demo", tmp_path)
+    assert told["rejected" if rejected else "stored"] == 2 and ("refused" in told) is bool(rejected)
+    assert "0002.html: No space left; only the report is missing" in told["unreported"] and "report" not in told
+    assert "report" in fit_and_store(tmp_path / "1.fgr", "demo", tmp_path) and len(fits.reports) == 1
+
+
 @pytest.mark.parametrize(
     ("error", "sentence"),
     [

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,11 +23,12 @@ from gateway.service.fitting.ladder_source import RigContext, read_source
 COLUMNS = ("time_s", "command_v", "force_n")
 
 
-def recorded(state: Path, rig: str = "demo", force: float = 1.0) -> Path:
+def recorded(state: Path, rig: str = "demo", force: float = 1.0, facts: dict[str, Any] | None = None) -> Path:
     """Two groups 0 .. 6 V in steps of 0.5 V on a loop 3 N wide, 10 Hz."""
     up = np.arange(0.0, 6.01, 0.5).tolist()
     rng, force_n, time_s = np.random.default_rng(3), 0.0, 0.0
-    recorder = Recorder(state / "recordings", {"rig": rig, "rig_fingerprint": "f" * 64}, COLUMNS)
+    header = {"rig": rig, "rig_fingerprint": "f" * 64} | (facts or {})
+    recorder = Recorder(state / "recordings", header, COLUMNS)
     for volts in [*(up + up[-2::-1]) * 2, 0.0]:
         for _ in range(5):
             recorder.append((time_s, volts, force * force_n + rng.normal(0.0, 0.05)))

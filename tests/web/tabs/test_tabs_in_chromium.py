@@ -68,6 +68,18 @@ def test_a_reload_in_the_middle_of_a_run_loses_nothing(page, control, state, chr
     window.close()
 
 
+def test_a_run_whose_gateway_has_started_anew_is_told_as_ended(page, control, chromium) -> None:
+    """It was shown as starting for as long as the page was open."""
+    window = open_tab(chromium, page.address, "calibrate")
+    lead_to_the_run(window)
+    window.get_by_text("Ladder").wait_for()
+    control.status = dict(IDLE)
+    window.get_by_text("A401 The gateway has started anew").wait_for()
+    window.get_by_role("button", name="Continue").wait_for()
+    assert window.get_by_role("button", name="Stop the run").count() == 0
+    window.close()
+
+
 @pytest.mark.long
 def test_no_tab_is_wider_than_a_telephone_or_grave_for_a_screen_reader(page, control, state, chromium) -> None:
     from axe_playwright_python.sync_playwright import Axe

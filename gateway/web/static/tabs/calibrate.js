@@ -10,6 +10,7 @@ const PHASES = {
 };
 const ENDED = ["stored", "refused", "stopped", "recorded"];
 const STEPS = ["Plan", "Questions", "Run", "Result"];
+const STARTED_ANEW = "A401 The gateway has started anew, in OFF, and the run has ended with it: its log has the first cause. What was recorded is kept.";
 const DISMISSED = "calibrate-dismissed";
 
 /** Builds the tab. api: get(path), post(path, body). */
@@ -34,8 +35,10 @@ class CalibrateTab {
   }
 
   async refresh() {
+    const ran = this.status?.running && this.status.phase !== "idle";
     this.status = await this.api.get("/api/v1/calibrate");
-    if (ENDED.includes(this.status.phase)) this.begunHere = false;
+    if (this.status.phase !== "idle") this.begunHere = false;
+    else if (ran && !this.status.running) this.told.say(STARTED_ANEW);
     if (this.isRunning()) this.showRun();
     else if (ENDED.includes(this.status.phase) && sessionStorage.getItem(DISMISSED) !== this.runKey()) this.showResult();
     else if (!["plan", "questions"].includes(this.place.dataset.shown)) this.showPlan();

@@ -1,0 +1,33 @@
+"""Runs on a rig whose safe voltage presses: it is the integrator's choice, and everything begins and ends there."""
+
+from dataclasses import replace
+
+import pytest
+
+from gateway.control.runs.active_run import RecordedPlan
+from gateway.control.runs.experiment_plan import Move, MoveKind
+from gateway.control.runs.ladder_stairs import CalibrationPlan
+from gateway.registers.words import CalibrationPhase, State
+from tests.control.bench import Bench, settings
+from tests.control.runs.test_experiment import begun, plan
+
+SAFE_V = 0.55
+LOW = plan(Move(do=MoveKind.STEP, to_v=4.0, hold_s=0.3), check=True)
+LADDER = CalibrationPlan(step_v=2.0, groups=1, minor_points=0)
+
+
+@pytest.mark.parametrize(
+    ("asked", "end"), [(LOW, CalibrationPhase.RECORDED), (LADDER, CalibrationPhase.FITTING)], ids=["low", "ladder"]
+)
+def test_a_run_makes_its_whole_check_and_comes_to_its_end(asked: RecordedPlan, end: CalibrationPhase) -> None:
+    """It was told that a volt more would pass the rig's largest force (A350), and stopped, or went on unchecked."""
+    rig = settings()
+    bench = Bench(
+        replace(rig, limits=replace(rig.limits, safe_voltage_v=SAFE_V, voltage_min_v=SAFE_V)), seed=5, gain_n_per_v=6.8
+    )
+    bench.voltage_v = SAFE_V
+    bench.run(1.0)
+    begun(bench, asked)  # type: ignore[arg-type]
+    assert bench.seconds_until(lambda output: output.state is State.OFF, 40.0) < 40.0
+    assert bench.last.calibration_phase == end and not [event for event in bench.events if "A350" in event]
+    assert bench.last.voltage_v == SAFE_V == min(volts for _, volts in bench.voltages())

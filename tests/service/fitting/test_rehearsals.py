@@ -1,0 +1,72 @@
+"""A real rig that is rehearsed with simulated devices, in its own state directory, as everybody begins: what a ladder has
+measured there is no machine, and the real run must not take it for its own."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from gateway.bsfm import CoefficientLimits
+from gateway.bsfm.model import Response
+from gateway.calibrations.activation import Activation
+from gateway.calibrations.store import CalibrationStore
+from gateway.calibrations.upload import UploadRules, UploadService
+from gateway.profiles import Rig, load_rig
+from gateway.service.fitting.fit_process import fit_and_store
+from gateway.service.running_rig.rig_calibrations import RigCalibrations
+from tests.calibrations.coefficients import calibration
+from tests.service.fitting.test_fit_process import recorded
+
+GUESS = 'was made on "irc5-cell (simulated)", not on irc5-cell: its forces are a guess'
+
+
+@pytest.fixture(scope="module")
+def real() -> Rig:
+    return load_rig("irc5-cell")
+
+
+@pytest.mark.parametrize(
+    ("name", "simulated", "made_on"),
+    [
+        ("irc5-cell", True, "irc5-cell (simulated)"),
+        ("irc5-cell", False, "irc5-cell"),
+        ("demo", True, "demo"),  # which is never anything else
+    ],
+)
+def test_a_calibration_says_whether_its_devices_were_simulated(
+    name: str, simulated: bool, made_on: str, tmp_path: Path
+) -> None:
+    facts = {"simulated": simulated, "rig_texts": dict(load_rig(name).texts)}
+    result = fit_and_store(recorded(tmp_path, name, facts=facts), name, tmp_path)
+    assert CalibrationStore(tmp_path).load(result["stored"]).rig == made_on
+
+
+def test_it_counts_as_measured_in_the_simulation_alone(real: Rig) -> None:
+    made = replace(
+        real.calibration, rig="irc5-cell (simulated)", response=Response(dead_time_s=0.1, lag_s=0.2), noise_n=0.1
+    )
+    rehearsal = real.as_simulated()
+    assert rehearsal.calibration_in_use(made).response == made.response and rehearsal.has_measured(made)
+    assert rehearsal.doubts_on(made) == ""
+    in_use = real.calibration_in_use(made)
+    assert (in_use.response, in_use.noise_n, real.has_measured(made)) == (None, 0.0, False)
+    assert GUESS in real.doubts_on(made)
+    assert real.doubts_on(replace(made, rig="irc5-cell")) == ""
+
+
+def test_a_real_run_that_begins_with_it_says_so_and_who_takes_it_into_use_is_told(real: Rig, tmp_path: Path) -> None:
+    store = CalibrationStore(tmp_path, real.calibration)
+    number = store.add(calibration(8, rig="irc5-cell (simulated)"))
+    activation = Activation(store, CoefficientLimits(cell_range_n=100.0))
+    rules = UploadRules.of(real.name, real.register_map, lambda: "", real.doubts_on)
+    said = list[str]()
+    staging = SimpleNamespace()
+    selected = store.find_selected()
+    upload = UploadService(staging, activation, selected, rules, lambda _, sentence: said.append(sentence))  # type: ignore[arg-type]
+    upload.run_in_background = lambda work, done: done(work())
+    upload.use(number)
+    upload.close()
+    assert GUESS in said[-1] and GUESS in upload.status()["said"]
+    assert any(GUESS in note for note in RigCalibrations(real, tmp_path).notes)
+    assert not any(GUESS in note for note in RigCalibrations(real.as_simulated(), tmp_path).notes)
