@@ -206,6 +206,7 @@ KEPT: list[tuple[int, list[Event]]] = [
         12546,
         [Event(0.7313, "worker", "take", (55.03,), way="block"), Event(2.2032, "rival", "take", (19.03,), way="block")],
     ),
+    (42249, [Event(1.2933, "worker", "tare")]),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

@@ -17,6 +17,8 @@ FEWEST = 12
 """Rows of a recording that can be told from what came at another time."""
 NEW_ZERO_S = 1.0
 """After somebody has tared."""
+HEARD_S = 0.01
+"""So much later, at most, a master hears that its tare was taken: a reading may come in between."""
 COUNT_N, COUNT_V = 1e-6, 0.006
 ON_WIRE_S = 0.08
 """From a setting's first byte to its last, behind whatever is on the wire before it."""
@@ -116,7 +118,7 @@ def _judge_laid(
             zeros_n, before_n = _zeros(row["force_n"], force_n, history), zeros_n
             same_n = tuple(one for one in before_n if any(abs(one - other) < COUNT_N for other in zeros_n))
             since_s, known_s = at_s - known_s + NEW_ZERO_S, at_s  # what came between was no plain reading
-            is_new = at_s >= history.weighed_s or _is_near(history.tares, at_s, since_s)
+            is_new = at_s >= history.weighed_s or _is_near(history.tares, at_s + HEARD_S, since_s + HEARD_S)
             if before_n and not same_n and not is_new:
                 yield f"{force_n:.2f} N came at {at_s:.4f}, and it tells {row['force_n']:.2f} N, the zero at {before_n} N"
             zeros_n = same_n or zeros_n
