@@ -27,6 +27,7 @@ _WORDS: Final = (
 )  # fmt: skip
 
 _TRIES: Final = 3
+_RUNNING: Final = ("zero", "check", "ladder", "minor_loops", "experiment", "self_test")
 Said = TypeVar("Said")
 
 
@@ -53,8 +54,14 @@ class RemoteRun:
         return {}
 
     def begin(self) -> None:
-        """Start the run by the control word, and keep its lease from now on."""
-        self._before = self.look().phase
+        """Start the run by the control word, and keep its lease from now on. Where one runs already the bit would not rise: it
+        would be followed, and ended by our Ctrl-C."""
+        self._before = (there := self.look()).phase
+        if self._before in _RUNNING:
+            share = f"{self._before.replace('_', ' ')}, {there.progress:.0%}"
+            raise CliError(
+                f"W310 a run has the output there already ({share}): wait for its end; control_word 0 ends it"
+            )
         try:
             self._command(int(ControlBit.START_CALIBRATION))
         except CliError as error:

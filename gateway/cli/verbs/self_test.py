@@ -84,8 +84,10 @@ class _SelfTest:
 
     def begin(self) -> None:
         """Write the bit, in one request with a new heartbeat."""
-        from gateway.registers.words import ControlBit
+        from gateway.registers.words import ControlBit, SelfTestResult
 
+        if self._read()["result"] == SelfTestResult.RUNNING:  # its bit would not rise, and our Ctrl-C would end it
+            raise CliError("W310 a self-test runs there already: wait for its end; control_word 0 ends it")
         self._write(int(ControlBit.START_SELF_TEST))
         self._has_begun = True
 
