@@ -10,6 +10,7 @@ terminal must not leave a tool climbing stairs.
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import Future
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -180,7 +181,8 @@ class CalibrationRuns:
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
         """Record a sample with the cell's own force, without the payload's weight: the model means that force."""
         if self._recording and self._calibrating.running:
-            self._payload_n = decision.force_measured_n - self._calibrating.cell_n
+            payload_n = decision.force_measured_n - self._calibrating.cell_n
+            self._payload_n = payload_n if isfinite(payload_n) else self._payload_n  # not by what is no reading
             row = decision._replace(force_measured_n=self._calibrating.cell_n)
             self._recording.append(sample, row, line, *self._labels())
         elif self._recording and self._closing_s is not None:
