@@ -58,7 +58,7 @@ class Controller:
         self.calibration_id = calibration.number
         self._commands = CommandTracker(settings)
         self._commands.use(model)
-        self.active_run = ActiveRun(settings, model)
+        self.active_run = ActiveRun(settings, model, lambda: self._given_n)
         self._inform_runs(calibration)
         self._loop = ForceLoop(settings, model, compensation.timing)
         self._faults = FaultDetector(settings)

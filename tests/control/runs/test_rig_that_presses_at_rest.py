@@ -31,3 +31,19 @@ def test_a_run_makes_its_whole_check_and_comes_to_its_end(asked: RecordedPlan, e
     assert bench.seconds_until(lambda output: output.state is State.OFF, 40.0) < 40.0
     assert bench.last.calibration_phase == end and not [event for event in bench.events if "A350" in event]
     assert bench.last.voltage_v == SAFE_V == min(volts for _, volts in bench.voltages())
+
+
+@pytest.mark.parametrize("payload_kg", [0.0, 0.6])
+def test_the_highest_level_of_a_plan_leaves_room_for_the_payload(payload_kg: float) -> None:
+    """Its weight presses, too: each plan that goes near the top was stopped in its check (A350)."""
+    rig = settings()
+    rig = replace(rig, defaults=replace(rig.defaults, payload_kg=payload_kg))
+    bench = begun(
+        Bench(rig, seed=5, gain_n_per_v=6.8), plan(Move(do=MoveKind.STEP, to_share=1.0, hold_s=0.3), check=True)
+    )
+    assert bench.seconds_until(lambda output: output.state is State.OFF, 40.0) < 40.0
+    assert bench.last.calibration_phase == CalibrationPhase.RECORDED
+    assert max(record.force_n for record in bench.history) + 9.81 * payload_kg < rig.limits.force_max_n
+    beyond = plan(Move(do=MoveKind.STEP, to_v=6.9, hold_s=0.3))
+    refused = bench.controller.refusal_of_run(bench.now_s, beyond)
+    assert ("of which the payload presses 5.9 N" in refused) is bool(payload_kg)
