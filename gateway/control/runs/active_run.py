@@ -119,6 +119,11 @@ class ActiveRun:
             return ExperimentRun(plan, self._settings, self.model, self._given_n())
         return LadderRun(plan, self._settings, self.model)
 
+    def most_contact_n(self, voltage_v: float) -> float:
+        """Return what presses at most up to this voltage, by the model and with the payload; the rig's largest is the end."""
+        pressed_n = self.model.force_n(voltage_v, 1.0) + max(0.0, self._given_n())
+        return min(self._settings.limits.force_max_n, pressed_n)
+
     def ask_stop(self, sentence: str) -> None:
         """Ask the next step to end the run: the force goes to 0 along the rig's ramp."""
         self._stop_asked = sentence

@@ -108,7 +108,7 @@ class CalibrationRuns:
         """Return what a plan would do; ValueError where the rig does not allow it."""
         run = self._calibrating.build_recorded(plan)
         top_v = run.schedule.top_v if isinstance(run, ExperimentRun) else max(stair.voltage_v for stair in run.stairs)
-        top_n = self._calibrating.model.force_n(top_v, 1.0)
+        top_n = self._calibrating.most_contact_n(top_v)
         return {
             "stairs": 0 if isinstance(run, ExperimentRun) else len(run.stairs),
             "eta_s": run.eta_s,

@@ -81,6 +81,16 @@ def test_a_reading_that_is_none_right_before_a_ladder_s_end_spoils_no_row_behind
     assert isfinite(read_recording(fits[0]).columns["force_n"][-1])
 
 
+def test_the_largest_force_that_a_person_is_asked_about_has_the_payload_in_it(tmp_path: Path) -> None:
+    """A ladder's end is the rig's own largest force."""
+    rig, runs, _ = on_a_hanging_disk(tmp_path)
+    low = SHORT | {"v_max_v": 4.0, "step_v": 1.0}
+    plain_n = runs.answer({"plan": low, "dry_run": True})["force_max_n"]
+    rig.write(9, 600)
+    assert runs.answer({"plan": low, "dry_run": True})["force_max_n"] == pytest.approx(plain_n + 5.88, abs=0.01)
+    assert runs.answer({"plan": SHORT, "dry_run": True})["force_max_n"] == settings().limits.force_max_n
+
+
 def test_an_experiment_of_which_the_disk_took_nothing_is_not_recorded(tmp_path: Path) -> None:
     """It was over before the disk refused: it was told as recorded in None."""
     rig, runs, disk = on_a_hanging_disk(tmp_path)
