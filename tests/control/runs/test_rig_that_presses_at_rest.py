@@ -7,7 +7,7 @@ import pytest
 from gateway.control.runs.active_run import RecordedPlan
 from gateway.control.runs.experiment_plan import Move, MoveKind
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.registers.words import CalibrationPhase, State
+from gateway.registers.words import CalibrationPhase, ControlBit, State
 from tests.control.bench import Bench, settings
 from tests.control.runs.test_experiment import begun, plan
 
@@ -47,3 +47,15 @@ def test_the_highest_level_of_a_plan_leaves_room_for_the_payload(payload_kg: flo
     beyond = plan(Move(do=MoveKind.STEP, to_v=6.9, hold_s=0.3))
     refused = bench.controller.refusal_of_run(bench.now_s, beyond)
     assert ("of which the payload presses 5.9 N" in refused) is bool(payload_kg)
+
+
+@pytest.mark.parametrize(("safe_v", "is_told"), [(0.0, False), (2.0, True)])
+def test_a_zero_that_may_be_what_presses_at_the_safe_voltage_is_told_as_such(safe_v: float, is_told: bool) -> None:
+    """Each force behind it would be so much more, with a word from nobody."""
+    rig = settings(stuck_n=30.0)
+    bench = Bench(replace(rig, limits=replace(rig.limits, safe_voltage_v=safe_v)), seed=6)
+    bench.voltage_v = safe_v
+    bench.run(1.5)
+    bench.write(control_word=ControlBit.TARE)
+    (told,) = [event for event in bench.events if event.startswith("tare: zero at")]
+    assert ("press at the safe voltage: if the tool touches, lift it" in told) is is_told
