@@ -14,6 +14,7 @@ from gateway import defaults
 from gateway.cli.calibration.runs import ENDED, RunStatus
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.heartbeat import DEFAULT_PERIOD_S
+from gateway.cli.master.byte_order_proof import write_with_proof
 from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
 from gateway.cli.master.refusal_text import explain_refusals
 from gateway.cli.master.wires import Wire
@@ -125,7 +126,7 @@ class RemoteRun:
         with self._turn:
             for frame in self._client.frames([Assignment(register, register.encode(word))]):
                 with explain_refusals(self._client, [frame]):
-                    self._client.write(frame)
+                    write_with_proof(self._client, frame)
 
     def _keep_lease(self) -> None:
         """Change the heartbeat until the end, or until another master commands. Whoever looks tells of a lost connection."""

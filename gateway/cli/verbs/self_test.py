@@ -143,6 +143,7 @@ class _SelfTest:
         return {name: int(reading.value) for name, reading in zip(self._registers, readings, strict=True)}
 
     def _write(self, word: int | None) -> None:
+        from gateway.cli.master.byte_order_proof import write_with_proof
         from gateway.cli.master.client import Assignment
         from gateway.cli.master.refusal_text import explain_refusals
 
@@ -154,7 +155,7 @@ class _SelfTest:
             frames = self._client.frames(assignments)
         with explain_refusals(self._client, frames):
             for frame in frames:
-                self._client.write(frame)
+                write_with_proof(self._client, frame)
 
     def _show(self) -> None:
         from gateway.cli.master.refusal_text import explain_refusals
