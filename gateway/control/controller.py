@@ -17,7 +17,7 @@ from gateway.control.edge_checks import EdgeCheck, Readiness, Situation
 from gateway.control.force_loop.force_loop import ForceLoop, Moved
 from gateway.control.force_loop.response_timing import timing_of
 from gateway.control.inputs import CalibrationInUse, LineStatus, LoopInputs, Output
-from gateway.control.messages import master_lost_sentence
+from gateway.control.messages import master_lost_sentence, tare_sentence
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import NO_READING, SampleConditioner, at_time, turned
@@ -58,7 +58,7 @@ class Controller:
         self.calibration_id = calibration.number
         self._commands = CommandTracker(settings)
         self._commands.use(model)
-        self.active_run = ActiveRun(settings, model)
+        self.active_run = ActiveRun(settings, model, lambda: self._given_n)
         self._inform_runs(calibration)
         self._loop = ForceLoop(settings, model, compensation.timing)
         self._faults = FaultDetector(settings)
@@ -266,7 +266,7 @@ class Controller:
     def _tare(self) -> None:
         self._faults.shift_zero(self._conditioner.take_zero(self._commands.gravity_n))
         self._contact.restart()
-        self._machine.tell(f"tare: zero at {self.zero_n:.2f} N")
+        self._machine.tell(tare_sentence(self.zero_n, self._loop.expected.kept_n))
 
     def _supervise(self, now_s: float, line: LineStatus) -> None:
         name = self._commands.not_finite

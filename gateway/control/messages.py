@@ -1,7 +1,11 @@
 """The sentences of control: a code, what was seen in numbers, what it probably is, one thing to do."""
 
+from typing import Final
+
 from gateway.codes.faults import FaultCode
 from gateway.control.supervision.unreachable_force import Evidence, unreachable_words
+
+_PRESSES_N: Final = 2.0  # less is what friction keeps of a vented tool
 
 
 def fault_sentence(fault: FaultCode, detail: str) -> str:
@@ -66,6 +70,16 @@ def stuck_sentence(measured_n: float, limit_n: float) -> str:
         f"W304 {measured_n:.1f} N measured with the output disabled, allowed +-{limit_n:.1f} N: stuck in contact, valve "
         "open or zero moved; free the tool or tare"
     )
+
+
+def tare_sentence(zero_n: float, rest_n: float) -> str:
+    """Return what a tare has taken as zero. rest_n: what presses at the safe voltage by the model: taken as zero, each force
+    after it is so much more."""
+    is_pressed = rest_n > _PRESSES_N and 0.5 * rest_n < zero_n < 1.5 * rest_n
+    hint = (
+        f"; {rest_n:.1f} N press at the safe voltage: if the tool touches, lift it and tare again" if is_pressed else ""
+    )
+    return f"tare: zero at {zero_n:.2f} N{hint}"
 
 
 def master_lost_sentence(connected: bool, lease_age_s: float) -> str:

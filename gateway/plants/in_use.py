@@ -18,7 +18,7 @@ from gateway.profiles.rigs.compensated_effects import (
     in_simulation,
     without_compensable,
 )
-from gateway.profiles.rigs.rig import PlantInUse
+from gateway.profiles.rigs.rig import PlantInUse, rehearsed
 from gateway.twin.plant import with_value
 
 _HAS_MEASURED: Final = (
@@ -57,10 +57,17 @@ def with_plant_in_use(rig: Rig, plant: NumberedPlant | None) -> Rig:
         return rig
     compensation = compensation_on(rig, plant.profile)
     notes_before = compensation_words(rig.compensation)
-    words = (f"plant {plant.number} ({plant.profile.name}) in use", *compensation_words(compensation))
-    notes = (*(note for note in rig.notes if note not in notes_before), *words)
-    in_use = PlantInUse(plant.number, plant.profile)
+    doubts = _doubts_on(rig, plant)
+    words = (f"plant {plant.number} ({plant.profile.name}) in use", *compensation_words(compensation), doubts)
+    notes = (*(note for note in rig.notes if note not in notes_before), *filter(None, words))
+    in_use = PlantInUse(plant.number, plant.profile, doubts)
     return replace(rig, compensation=compensation, plant_in_use=in_use, notes=notes)
+
+
+def _doubts_on(rig: Rig, plant: NumberedPlant) -> str:
+    if rig.simulated or plant.provenance.rig != rehearsed(rig.name):
+        return ""
+    return f'plant {plant.number} was found on "{plant.provenance.rig}": what it takes back may be in no machine'
 
 
 def with_selected_plant(rig: Rig, state: Path) -> tuple[Rig, tuple[str, ...]]:

@@ -92,6 +92,12 @@ DEFECTS = (
     Defect("a run's ceiling forgets the payload's weight", "control/supervision/force_ceiling.py",
            "self._expected_n(voltage_v) + self._given_n >", "self._expected_n(voltage_v) >",
            ("control/supervision/test_force_ceiling.py",)),
+    Defect("behind a turn of its plan nobody looks at a run's force", "control/runs/active_run.py",
+           "ceiling.is_reached(run.noise_n) if rises else ceiling.is_passed(run.noise_n)",
+           "rises and ceiling.is_reached(run.noise_n)", ("control/runs/test_experiment.py",)),
+    Defect("a rehearsal's calibration is the real rig's own", "service/fitting/ladder_fit.py",
+           "return rehearsed(rig) if rig and is_rehearsal(fit.recording) else rig", "return rig",
+           ("service/fitting/test_rehearsals.py",)),
     Defect("a self-test does not look at its force", "control/self_test/self_test_run.py",
            "        if force_n >= (1.0 - NEAR_SHARE) * self._force_n:", "        if False:", ("control/self_test",)),
     # -- the master

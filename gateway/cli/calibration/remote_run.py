@@ -14,6 +14,7 @@ from gateway import defaults
 from gateway.cli.calibration.runs import ENDED, RunStatus
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.heartbeat import DEFAULT_PERIOD_S
+from gateway.cli.master.byte_order_proof import write_with_proof
 from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
 from gateway.cli.master.refusal_text import explain_refusals
 from gateway.cli.master.wires import Wire
@@ -27,6 +28,7 @@ _WORDS: Final = (
 )  # fmt: skip
 
 _TRIES: Final = 3
+_RUNNING: Final = ("zero", "check", "ladder", "minor_loops", "experiment", "self_test")
 Said = TypeVar("Said")
 
 
@@ -53,8 +55,14 @@ class RemoteRun:
         return {}
 
     def begin(self) -> None:
-        """Start the run by the control word, and keep its lease from now on."""
-        self._before = self.look().phase
+        """Start the run by the control word, and keep its lease from now on. Where one runs already the bit would not rise: it
+        would be followed, and ended by our Ctrl-C."""
+        self._before = (there := self.look()).phase
+        if self._before in _RUNNING:
+            share = f"{self._before.replace('_', ' ')}, {there.progress:.0%}"
+            raise CliError(
+                f"W310 a run has the output there already ({share}): wait for its end; control_word 0 ends it"
+            )
         try:
             self._command(int(ControlBit.START_CALIBRATION))
         except CliError as error:
@@ -118,7 +126,7 @@ class RemoteRun:
         with self._turn:
             for frame in self._client.frames([Assignment(register, register.encode(word))]):
                 with explain_refusals(self._client, [frame]):
-                    self._client.write(frame)
+                    write_with_proof(self._client, frame)
 
     def _keep_lease(self) -> None:
         """Change the heartbeat until the end, or until another master commands. Whoever looks tells of a lost connection."""

@@ -16,7 +16,7 @@ from gateway.profiles.kinds.plants import PlantProfile, load_shipped_plant
 from gateway.recording import Recording, find_recording, read_table
 from gateway.recording.measurement import measurement_of
 from gateway.recording.tables.mapping_file import column_mapping
-from gateway.service.fitting.recorded_rig import plant_of, recorded_noise_n, rig_of, rig_texts
+from gateway.service.fitting.recorded_rig import is_rehearsal, plant_of, recorded_noise_n, rig_of, rig_texts
 from gateway.twin.plant import values
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class Sources:
     decided; late_s: how late the wires may have made the readings; quantum_n: their known step; calibration_noise_n: their
     noise at rest by the calibration that they were made under, N, None where it is not known; is_own: the plant is that of
     the rig that the recordings were made on; straightened: what a plant in use has taken back of the first recording's
-    readings, by the cell's numbers.
+    readings, by the cell's numbers; is_rehearsal: made while the devices of a real rig were simulated.
     """
 
     paths: tuple[Path, ...]
@@ -51,6 +51,7 @@ class Sources:
     calibration_noise_n: float | None = None
     is_own: bool = False
     straightened: dict[str, Any] | None = None
+    is_rehearsal: bool = False
 
     @property
     def name(self) -> str:
@@ -95,6 +96,7 @@ def read_sources(
         quantum_n=_quantum_n(here) if all(map(_of_gateway, recordings)) else 0.0,
         straightened=header_in_use(recordings[0].header).get("cell"),
         is_own=plant is (known.plant_profile if known else plant_of_first),
+        is_rehearsal=any(map(is_rehearsal, recordings)),
     )
 
 

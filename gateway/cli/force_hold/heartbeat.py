@@ -11,9 +11,9 @@ from typing import Final
 from gateway import defaults
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, HoldWrite, StatusReading, status_reading_of
-from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
+from gateway.cli.master.byte_order_proof import write_with_proof
+from gateway.cli.master.client import Assignment, GatewayClient
 from gateway.cli.master.refusal_text import explain_refusals
-from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.processes import exit_codes
 from gateway.registers.words import State
@@ -138,21 +138,7 @@ class HeartbeatThread(threading.Thread):
         )
         with explain_refusals(self._client, frames):
             for frame in frames:
-                try:
-                    self._client.write(frame)
-                except RefusedError:
-                    if not self._proves_byte_order():
-                        raise
-                    self._client.write(frame)
-
-    def _proves_byte_order(self) -> bool:
-        """Some rigs want 1234.5 before an enable. True when that was missing and has been written now."""
-        (reason,) = self._client.read_values([self._client.register_map.find("refusal_reason")])
-        if int(reason.value) != RefusalReason.BYTE_ORDER_UNPROVEN:
-            return False
-        echo = self._client.register_map.find("byte_order_echo")
-        self._client.write_values([Assignment(echo, echo.encode(1234.5))])
-        return True
+                write_with_proof(self._client, frame)
 
     def _look(self) -> None:
         with explain_refusals(self._client):

@@ -78,13 +78,15 @@ def save_diagnosed(directory: Path, diagnosis: "Diagnosis", sources: "Sources", 
     """Add the plant that a diagnosis has extended, with its provenance; return its number. profile: as `--extend` writes it."""
     from hashlib import sha256
 
+    from gateway.profiles.rigs.rig import rehearsed
+
     recordings = tuple(
         SourceRecording(name=path.name, sha256=sha256(path.read_bytes()).hexdigest()) for path in sources.paths
     )
     provenance = Provenance(
         made_utc=now_utc(),
         version=VERSION,
-        rig=sources.rig,
+        rig=rehearsed(sources.rig) if sources.rig and sources.is_rehearsal else sources.rig,
         start=sources.plant.name,
         verdict=diagnosis.verdict.value,
         recordings=recordings,

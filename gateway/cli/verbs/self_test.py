@@ -84,8 +84,10 @@ class _SelfTest:
 
     def begin(self) -> None:
         """Write the bit, in one request with a new heartbeat."""
-        from gateway.registers.words import ControlBit
+        from gateway.registers.words import ControlBit, SelfTestResult
 
+        if self._read()["result"] == SelfTestResult.RUNNING:  # its bit would not rise, and our Ctrl-C would end it
+            raise CliError("W310 a self-test runs there already: wait for its end; control_word 0 ends it")
         self._write(int(ControlBit.START_SELF_TEST))
         self._has_begun = True
 
@@ -141,6 +143,7 @@ class _SelfTest:
         return {name: int(reading.value) for name, reading in zip(self._registers, readings, strict=True)}
 
     def _write(self, word: int | None) -> None:
+        from gateway.cli.master.byte_order_proof import write_with_proof
         from gateway.cli.master.client import Assignment
         from gateway.cli.master.refusal_text import explain_refusals
 
@@ -152,7 +155,7 @@ class _SelfTest:
             frames = self._client.frames(assignments)
         with explain_refusals(self._client, frames):
             for frame in frames:
-                self._client.write(frame)
+                write_with_proof(self._client, frame)
 
     def _show(self) -> None:
         from gateway.cli.master.refusal_text import explain_refusals

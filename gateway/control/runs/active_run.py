@@ -6,6 +6,7 @@ does not depend on the master's lease: nobody on the fieldbus has asked for it; 
 A run never takes the force beyond the rig's force_max_n (`ceiling`): a ladder leaves out what would, any other run ends.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import nan
 from typing import Final, TypeAlias
@@ -42,7 +43,8 @@ class ActiveRun:
     stays until the output is off; said: a sentence for the log; refused: why the last plan asked for was not begun;
     self_test: the last one's report, or that one runs."""
 
-    def __init__(self, settings: ControlSettings, model: Bsfm) -> None:
+    def __init__(self, settings: ControlSettings, model: Bsfm, given_n: Callable[[], float] = lambda: 0.0) -> None:
+        """given_n: contact force of now that the slide need not give."""
         self.phase = CalibrationPhase.IDLE
         self.progress = 0.0
         self.eta_s = 0.0
@@ -53,7 +55,7 @@ class ActiveRun:
         self.run: AnyRun | None = None
         self.last_row: LadderRow | None = None
         self.self_test = SelfTestReport()
-        self._settings = settings
+        self._settings, self._given_n = settings, given_n
         self._cell_noise_n = 0.0
         self._is_report_told = True
         self.model = model
@@ -114,8 +116,13 @@ class ActiveRun:
     def build_recorded(self, plan: RecordedPlan) -> RecordedRun:
         """Return the calibration or experiment that a plan makes; ValueError as `build`."""
         if isinstance(plan, ExperimentPlan):
-            return ExperimentRun(plan, self._settings, self.model)
+            return ExperimentRun(plan, self._settings, self.model, self._given_n())
         return LadderRun(plan, self._settings, self.model)
+
+    def most_contact_n(self, voltage_v: float) -> float:
+        """Return what presses at most up to this voltage, by the model and with the payload; the rig's largest is the end."""
+        pressed_n = self.model.force_n(voltage_v, 1.0) + max(0.0, self._given_n())
+        return min(self._settings.limits.force_max_n, pressed_n)
 
     def ask_stop(self, sentence: str) -> None:
         """Ask the next step to end the run: the force goes to 0 along the rig's ramp."""

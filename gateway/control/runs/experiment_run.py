@@ -19,14 +19,15 @@ from gateway.registers.words import CalibrationPhase
 
 
 class ExperimentRun:
-    """Run of an experiment plan, asked as a LadderRun is. ValueError for a plan that the rig does not allow."""
+    """Run of an experiment plan, asked as a LadderRun is. given_n: contact force that presses besides the slide: the levels
+    stay below the rig's largest with it. ValueError for a plan that the rig does not allow."""
 
     end_phase: Final = CalibrationPhase.RECORDED
 
-    def __init__(self, plan: ExperimentPlan, settings: ControlSettings, model: Bsfm) -> None:
+    def __init__(self, plan: ExperimentPlan, settings: ControlSettings, model: Bsfm, given_n: float = 0.0) -> None:
         self.plan, self.model = plan, model
         limits = settings.limits
-        self.schedule = schedule_of(plan, limits, model)
+        self.schedule = schedule_of(plan, limits, model, given_n)
         top_v = self.schedule.top_v
         stairs = (
             check_stairs(top_v, model, limits.safe_voltage_v) if plan.check and top_v > limits.safe_voltage_v else ()

@@ -33,12 +33,13 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class _Range:
-    """What the rig may use, and why no more."""
+    """What the rig may use, and why no more. given_n: contact force that presses besides the slide."""
 
     limits: Limits
     model: Bsfm
     low_v: float
     top_v: float
+    given_n: float
 
     def level_v(self, move: Move) -> float:
         """ValueError outside the range."""
@@ -61,19 +62,21 @@ class _Range:
         """Return a voltage of the plan; ValueError where it is outside the rig's range. level_text: how the plan names it."""
         if not (isfinite(volts) and self.low_v - _SLACK_V <= volts <= self.top_v + _SLACK_V):
             low_n, high_n = (self.model.force_n(end_v, RISING) for end_v in (self.low_v, self.top_v))
+            payload = f", of which the payload presses {self.given_n:.1f} N" if self.given_n > 0.0 else ""
             raise ValueError(
                 f"{level_text}, allowed {self.low_v:g} .. {self.top_v:g} V (about {max(0.0, low_n):.0f} .. {high_n:.0f} N): "
-                f"beyond lie the rig's limits (force_max_n = {self.limits.force_max_n:g} N), the end of the calibration in "
-                f"use, or the over-force trip at {self.limits.over_force_n:g} N"
+                f"beyond lie the rig's limits (force_max_n = {self.limits.force_max_n:g} N{payload}), the end of the "
+                f"calibration in use, or the over-force trip at {self.limits.over_force_n:g} N"
             )
         return min(max(volts, self.low_v), self.top_v)
 
 
-def segments_of(plan: ExperimentPlan, limits: Limits, model: Bsfm) -> tuple[Segment, ...]:
-    """Return the whole plan in volts. ValueError with a sentence for a plan that the rig does not allow, or that is none."""
+def segments_of(plan: ExperimentPlan, limits: Limits, model: Bsfm, given_n: float = 0.0) -> tuple[Segment, ...]:
+    """Return the whole plan in volts. given_n: what presses besides the slide. ValueError with a sentence for a plan that the
+    rig does not allow, or that is none."""
     for _, sentence in plan_faults(plan):
         raise ValueError(f"plan {plan.name}: {sentence}")
-    usable = _Range(limits, model, limits.voltage_min_v, highest_voltage_v(limits, model))
+    usable = _Range(limits, model, limits.voltage_min_v, highest_voltage_v(limits, model, given_n), given_n)
     segments: list[Segment] = []
     at_v = usable.low_v
     for p, part in enumerate(plan.parts):
@@ -154,7 +157,7 @@ class Schedule:
 
 
 @lru_cache(maxsize=4)
-def schedule_of(plan: ExperimentPlan, limits: Limits, model: Bsfm) -> Schedule:
+def schedule_of(plan: ExperimentPlan, limits: Limits, model: Bsfm, given_n: float = 0.0) -> Schedule:
     """Return the voltage over time of a plan on a rig. ValueError as `segments_of`. Kept: from the request to its begin a run
     is made four times, and all of them within one turn of the loop."""
-    return Schedule(segments_of(plan, limits, model), limits.safe_voltage_v)
+    return Schedule(segments_of(plan, limits, model, given_n), limits.safe_voltage_v)

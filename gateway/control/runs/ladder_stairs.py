@@ -81,11 +81,11 @@ def stairs_of(plan: CalibrationPlan, limits: Limits, model: Bsfm) -> tuple[Plann
     )
 
 
-def highest_voltage_v(limits: Limits, model: Bsfm) -> float:
+def highest_voltage_v(limits: Limits, model: Bsfm, given_n: float = 0.0) -> float:
     """Return how high limits and calibration let a run go, to a hundredth of a volt: not near the over-force trip or
-    force_max_n."""
+    force_max_n. given_n: what presses besides the slide, the payload's weight."""
     allowed_v = min(limits.voltage_max_v, model.voltage_range_v[1])
-    force_v, _ = model.voltage_v(highest_force_n(limits), float(RISING))
+    force_v, _ = model.voltage_v(highest_force_n(limits) - max(0.0, given_n), float(RISING))
     return int(100.0 * min(allowed_v, force_v) + 1.0e-6) / 100.0
 
 

@@ -89,10 +89,12 @@ class ValveLine(_SerialLine):
 
 @dataclass(frozen=True, slots=True)
 class PlantInUse:
-    """A numbered plant that was taken into use on a rig: what control compensates comes from it."""
+    """A numbered plant that was taken into use on a rig: what control compensates comes from it. doubts: why it may be in no
+    machine, empty for nothing."""
 
     number: int
     profile: PlantProfile
+    doubts: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,6 +10,7 @@ terminal must not leave a tool climbing stairs.
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import Future
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -107,7 +108,7 @@ class CalibrationRuns:
         """Return what a plan would do; ValueError where the rig does not allow it."""
         run = self._calibrating.build_recorded(plan)
         top_v = run.schedule.top_v if isinstance(run, ExperimentRun) else max(stair.voltage_v for stair in run.stairs)
-        top_n = self._calibrating.model.force_n(top_v, 1.0)
+        top_n = self._calibrating.most_contact_n(top_v)
         return {
             "stairs": 0 if isinstance(run, ExperimentRun) else len(run.stairs),
             "eta_s": run.eta_s,
@@ -180,7 +181,8 @@ class CalibrationRuns:
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
         """Record a sample with the cell's own force, without the payload's weight: the model means that force."""
         if self._recording and self._calibrating.running:
-            self._payload_n = decision.force_measured_n - self._calibrating.cell_n
+            payload_n = decision.force_measured_n - self._calibrating.cell_n
+            self._payload_n = payload_n if isfinite(payload_n) else self._payload_n  # not by what is no reading
             row = decision._replace(force_measured_n=self._calibrating.cell_n)
             self._recording.append(sample, row, line, *self._labels())
         elif self._recording and self._closing_s is not None:

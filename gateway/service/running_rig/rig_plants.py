@@ -109,7 +109,9 @@ class RigPlants:
             self._waiting = result
             self.take_waiting()
             when = f"will be in use {_WAITS}" if self._waiting else "is in use"
-            self._outcome = "; ".join((f"{_plant(result)} {when}", *compensation_words(result.compensation)))
+            doubts = result.plant_in_use.doubts if result.plant_in_use else ""
+            words = (f"{_plant(result)} {when}", *compensation_words(result.compensation), doubts)
+            self._outcome = "; ".join(filter(None, words))
         if self._has_failed:
             self._edges.on_failure(doing, self._outcome)
         self._edges.log("plant", f"{doing}: {self._outcome}")

@@ -21,8 +21,9 @@ from gateway.registers.words import CalibrationPhase, ControlBit, State
 class ClimbingBank:
     """A bank whose ladder is over after four heartbeats, which its lease needs; with a fault where one is given."""
 
-    def __init__(self, register_map: RegisterMap, fault: FaultCode) -> None:
-        rules = BankRules(rig_name="cell", force_max_n=60.0, supported_bits=BASIC_BITS | ControlBit.START_CALIBRATION)
+    def __init__(self, register_map: RegisterMap, fault: FaultCode, *, wants_proof: bool = False) -> None:
+        bits = BASIC_BITS | ControlBit.START_CALIBRATION
+        rules = BankRules(rig_name="cell", force_max_n=60.0, supported_bits=bits, require_byte_order_echo=wants_proof)
         self.bank = RegisterBank(register_map, rules, now=lambda: 0.0)
         self.bank.on_command = self.hear
         self.fault, self.beats = fault, set[int]()
@@ -43,8 +44,8 @@ class ClimbingBank:
 
 @pytest.fixture
 def climbed(register_map: RegisterMap, serve, call):
-    def run(fault: FaultCode):
-        rig = ClimbingBank(register_map, fault)
+    def run(fault: FaultCode, *, wants_proof: bool = False):
+        rig = ClimbingBank(register_map, fault, wants_proof=wants_proof)
         return rig, call("calibrate", "--yes", "--gateway", serve(rig.bank).address)
 
     return run
@@ -54,6 +55,12 @@ def test_the_heartbeat_is_kept_from_the_start_to_the_end(climbed) -> None:
     rig, answer = climbed(FaultCode.NONE)
     assert answer.exit_code == 0, answer.output
     assert len(rig.beats) > 4 and "calibration 3 is stored, not active" in answer.stdout
+
+
+def test_a_rig_that_wants_proof_of_the_word_order_gets_it_from_us(climbed) -> None:
+    """The user was told to write 1234.5 in the client's own word order."""
+    _, answer = climbed(FaultCode.NONE, wants_proof=True)
+    assert answer.exit_code == 0, answer.output
 
 
 def test_a_fault_that_ends_the_run_is_told(climbed) -> None:

@@ -163,3 +163,11 @@ def test_a_recording_without_labels_has_not_come_to_its_end(monkeypatch: pytest.
         monkeypatch.setattr(resume, "Labels", SimpleNamespace(of=lambda columns, labels=labels: labels))
         recording: Any = SimpleNamespace(columns={})
         assert resume._is_finished(recording) is is_finished
+
+
+@pytest.mark.parametrize(("minor_points", "first_group"), [(0, 1), (32, 2)])
+def test_a_resumed_ladder_whose_groups_are_climbed_begins_where_it_may(minor_points: int, first_group: int) -> None:
+    """With a walk behind it only that is left; without, the last group is climbed again: a run has a group at least."""
+    plan = {"groups": 2, "minor_points": minor_points}
+    rest = RestOfLadder(plan, 2, [1], "", "", Path("0001.fgr"), finished=False)
+    assert rest.plan_with({})["first_group"] == first_group

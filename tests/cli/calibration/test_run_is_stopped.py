@@ -12,7 +12,6 @@ from gateway.cli.calibration import follow as following
 from gateway.cli.calibration import runs
 from gateway.cli.calibration.follow import follow
 from gateway.cli.calibration.remote_run import RemoteRun
-from gateway.cli.calibration.resume import RestOfLadder
 from gateway.cli.calibration.runs import RunStatus
 from gateway.cli.errors import CliError
 from gateway.cli.master.client import Frame, RefusedError
@@ -219,11 +218,13 @@ def test_one_lost_answer_ends_no_run_and_more_of_them_are_not_told_as_its_end(re
     read, lost = remote.read_values, [1]
 
     def lose_some(registers: list[Any]) -> list[Any]:
+        if not remote.words:
+            return read(registers)
         remote.phase = CalibrationPhase.STOPPED if 0 in remote.words else CalibrationPhase.LADDER
-        if remote.words and lost[0]:
-            lost[0] -= 1
-            raise CliError("E131 no answer", exit_codes.DEVICE)
-        return read(registers)
+        if not lost[0]:
+            return read(registers)
+        lost[0] -= 1
+        raise CliError("E131 no answer", exit_codes.DEVICE)
 
     remote.read_values = lose_some  # type: ignore[method-assign]
     run = remote.run
@@ -269,6 +270,16 @@ def test_a_start_that_is_refused_beside_another_s_run_is_no_run_of_ours(remote: 
     run.close()
 
 
+@pytest.mark.parametrize("phase", [CalibrationPhase.LADDER, CalibrationPhase.SELF_TEST])
+def test_a_run_that_is_there_already_is_not_taken_for_ours(phase: CalibrationPhase, remote: Registers) -> None:
+    remote.phase = phase
+    run = remote.run
+    assert run
+    with pytest.raises(CliError, match="W310 a run has the output there already"):
+        run.begin()
+    assert not remote.words and not run._beat.ident
+
+
 def test_what_is_refused_is_not_said_again(remote: Registers) -> None:
     said = list[int]()
 
@@ -285,14 +296,5 @@ def test_what_is_refused_is_not_said_again(remote: Registers) -> None:
 
 def test_a_run_elsewhere_is_told_in_shares_and_volts(remote: Registers) -> None:
     remote.values = {"calibration_progress": 250.0, "output_voltage": 1500.0, "force_measured": 12.0}
-    assert remote.run
-    look = remote.run.look()
-    assert (look.progress, look.voltage_v, look.force_n) == (0.25, 1.5, 12.0)
-
-
-@pytest.mark.parametrize(("minor_points", "first_group"), [(0, 1), (32, 2)])
-def test_a_resumed_ladder_whose_groups_are_climbed_begins_where_it_may(minor_points: int, first_group: int) -> None:
-    """With a walk behind it only that is left; without, the last group is climbed again: a run has a group at least."""
-    plan = {"groups": 2, "minor_points": minor_points}
-    rest = RestOfLadder(plan, 2, [1], "", "", Path("0001.fgr"), finished=False)
-    assert rest.plan_with({})["first_group"] == first_group
+    look = remote.run.look() if remote.run else None
+    assert look and (look.progress, look.voltage_v, look.force_n) == (0.25, 1.5, 12.0)

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from gateway.cli.errors import CliError
-from gateway.cli.force_hold.heartbeat import HeartbeatThread
 from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, StatusReading, status_reading_of
+from gateway.cli.master.byte_order_proof import prove_byte_order
 from gateway.cli.verbs.hold import _handle_signals, _report_end
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
@@ -93,13 +93,12 @@ def test_the_voltage_is_told_in_volts() -> None:
 @pytest.mark.parametrize("reason", [RefusalReason.BYTE_ORDER_UNPROVEN, RefusalReason.FAULT_LATCHED])
 def test_a_byte_order_is_shown_where_that_was_asked_for_and_else_the_refusal_stands(reason: RefusalReason) -> None:
     written = list[Any]()
-    beat = HeartbeatThread.__new__(HeartbeatThread)
     register = SimpleNamespace(encode=lambda value: value)
-    beat._client = SimpleNamespace(  # type: ignore[assignment]
+    client: Any = SimpleNamespace(
         register_map=SimpleNamespace(find=lambda name: register),
         read_values=lambda registers: [SimpleNamespace(value=float(reason))],
         write_values=written.extend,
     )
     is_proof = reason is RefusalReason.BYTE_ORDER_UNPROVEN
-    assert beat._proves_byte_order() is is_proof
+    assert prove_byte_order(client) is is_proof
     assert bool(written) is is_proof

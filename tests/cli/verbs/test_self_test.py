@@ -22,7 +22,8 @@ class DecidingBank:
     """A bank whose self-test ends with these verdicts, or never. words: each control word that was accepted."""
 
     def __init__(self, register_map: RegisterMap, result: SelfTestResult, verdicts: dict[str, SelfTestVerdict]) -> None:
-        rules = BankRules(rig_name="demo", force_max_n=60.0, supported_bits=BASIC_BITS | ControlBit.START_SELF_TEST)
+        bits = BASIC_BITS | ControlBit.START_SELF_TEST  # and this rig wants 1234.5 first, which is ours to write
+        rules = BankRules(rig_name="demo", force_max_n=60.0, supported_bits=bits, require_byte_order_echo=True)
         self.bank = RegisterBank(register_map, rules, now=lambda: 0.0)
         self.bank.on_command = self.hear
         self.result, self.verdicts, self.beats = result, verdicts, set[int]()

@@ -59,7 +59,13 @@ def run_of(gateway: Registers) -> self_test._SelfTest:
 def test_a_start_whose_answer_is_lost_is_stopped_where_it_was_heard(gateway: Registers, is_heard: bool) -> None:
     """Left alone it would press with nobody there; and where it was not heard what presses is another master's."""
     run = run_of(gateway)
-    gateway.lost, gateway.hears = 1, is_heard
+    gateway.hears, frames = is_heard, gateway.frames
+
+    def lose_the_first(assignments: list[Any]) -> list[dict[str, int]]:
+        gateway.lost, gateway.frames = 1, frames  # type: ignore[method-assign]
+        return frames(assignments)
+
+    gateway.frames = lose_the_first  # type: ignore[method-assign]
     with pytest.raises(CliError, match="E131"):
         self_test._run_to_its_end(run, shows=False)
     assert [frame.get("control_word") for frame in gateway.words] == ([START, 0] if is_heard else [])
@@ -106,13 +112,21 @@ def test_a_gateway_that_has_started_anew_is_told_and_no_test_without_a_result(
     gateway: Registers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It was told as `self-test 0 none`."""
-    monkeypatch.setattr(
-        self_test, "time", SimpleNamespace(sleep=lambda _s: gateway.values.clear(), monotonic=lambda: 0)
-    )
-    gateway.write = lambda frame: None  # type: ignore[method-assign]
-    gateway.values["self_test_result"] = SelfTestResult.RUNNING
+
+    def start_anew(_seconds: float) -> None:
+        gateway.values.clear()
+        gateway.write = lambda frame: None  # type: ignore[method-assign]
+
+    monkeypatch.setattr(self_test, "time", SimpleNamespace(sleep=start_anew, monotonic=lambda: 0.0))
     with pytest.raises(CliError, match="A401 the gateway has started anew"):
         self_test._run_to_its_end(run_of(gateway), shows=False)
+
+
+def test_one_that_runs_already_is_another_masters_and_neither_followed_nor_stopped(gateway: Registers) -> None:
+    gateway.values["self_test_result"] = SelfTestResult.RUNNING
+    with pytest.raises(CliError, match="W310 a self-test runs there already"):
+        self_test._run_to_its_end(run_of(gateway), shows=False)
+    assert gateway.words == []
 
 
 def test_progress_is_told_in_percent(gateway: Registers, capsys: pytest.CaptureFixture[str]) -> None:

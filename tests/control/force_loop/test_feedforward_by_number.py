@@ -58,6 +58,16 @@ def test_a_vented_tool_is_approached_with_what_moves_it(least_n: float, asked_n:
     assert at(10.0, model=model).approaching_n(asked_n) == pytest.approx(force_n)
 
 
+def test_what_a_model_presses_that_begins_above_0_v_is_no_friction_to_approach_with() -> None:
+    """Of a rig with a lowest voltage, or of a set from a PLC: a tool without contact was sent out with 21 N instead of 5."""
+    branches = (RationalBezier(1.0, 8.0, [10.0, 66.0], [1.0, 1.0]) for _ in range(2))
+    law = at(20.0, model=Bsfm(Branches(*branches), LinearBlend(6.0)))
+    assert law.approaching_n(3.0) == pytest.approx(2.0 * (10.0 - 8.0) + 1.0)
+    assert law.approaching_n(9.0) == 9.0
+    steep = (RationalBezier(1.0, 8.0, [2.0, 66.0], [1.0, 1.0]) for _ in range(2))
+    assert at(20.0, model=Bsfm(Branches(*steep), LinearBlend(6.0))).approaching_n(0.5) == 1.0
+
+
 @pytest.mark.parametrize(
     ("branch_share", "slope_n_per_v"), [(RISING, 8.0), (FALLING, 4.0), (0.0, 1.0 / (0.5 / 8.0 + 0.5 / 4.0))]
 )

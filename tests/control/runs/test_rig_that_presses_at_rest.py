@@ -7,7 +7,7 @@ import pytest
 from gateway.control.runs.active_run import RecordedPlan
 from gateway.control.runs.experiment_plan import Move, MoveKind
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.registers.words import CalibrationPhase, State
+from gateway.registers.words import CalibrationPhase, ControlBit, State
 from tests.control.bench import Bench, settings
 from tests.control.runs.test_experiment import begun, plan
 
@@ -31,3 +31,31 @@ def test_a_run_makes_its_whole_check_and_comes_to_its_end(asked: RecordedPlan, e
     assert bench.seconds_until(lambda output: output.state is State.OFF, 40.0) < 40.0
     assert bench.last.calibration_phase == end and not [event for event in bench.events if "A350" in event]
     assert bench.last.voltage_v == SAFE_V == min(volts for _, volts in bench.voltages())
+
+
+@pytest.mark.parametrize("payload_kg", [0.0, 0.6])
+def test_the_highest_level_of_a_plan_leaves_room_for_the_payload(payload_kg: float) -> None:
+    """Its weight presses, too: each plan that goes near the top was stopped in its check (A350)."""
+    rig = settings()
+    rig = replace(rig, defaults=replace(rig.defaults, payload_kg=payload_kg))
+    bench = begun(
+        Bench(rig, seed=5, gain_n_per_v=6.8), plan(Move(do=MoveKind.STEP, to_share=1.0, hold_s=0.3), check=True)
+    )
+    assert bench.seconds_until(lambda output: output.state is State.OFF, 40.0) < 40.0
+    assert bench.last.calibration_phase == CalibrationPhase.RECORDED
+    assert max(record.force_n for record in bench.history) + 9.81 * payload_kg < rig.limits.force_max_n
+    beyond = plan(Move(do=MoveKind.STEP, to_v=6.9, hold_s=0.3))
+    refused = bench.controller.refusal_of_run(bench.now_s, beyond)
+    assert ("of which the payload presses 5.9 N" in refused) is bool(payload_kg)
+
+
+@pytest.mark.parametrize(("safe_v", "is_told"), [(0.0, False), (2.0, True)])
+def test_a_zero_that_may_be_what_presses_at_the_safe_voltage_is_told_as_such(safe_v: float, is_told: bool) -> None:
+    """Each force behind it would be so much more, with a word from nobody."""
+    rig = settings(stuck_n=30.0)
+    bench = Bench(replace(rig, limits=replace(rig.limits, safe_voltage_v=safe_v)), seed=6)
+    bench.voltage_v = safe_v
+    bench.run(1.5)
+    bench.write(control_word=ControlBit.TARE)
+    (told,) = [event for event in bench.events if event.startswith("tare: zero at")]
+    assert ("press at the safe voltage: if the tool touches, lift it" in told) is is_told

@@ -4,6 +4,7 @@ measured there is no machine, and the real run must not take it for its own."""
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -12,9 +13,14 @@ from gateway.bsfm.model import Response
 from gateway.calibrations.activation import Activation
 from gateway.calibrations.store import CalibrationStore
 from gateway.calibrations.upload import UploadRules, UploadService
-from gateway.profiles import Rig, load_rig
+from gateway.cli.diagnosis.inputs import read_sources
+from gateway.cli.plants.store_access import save_diagnosed
+from gateway.plants.in_use import with_plant_in_use
+from gateway.plants.store import PlantStore
+from gateway.profiles import Rig, load_plant, load_rig
 from gateway.service.fitting.fit_process import fit_and_store
 from gateway.service.running_rig.rig_calibrations import RigCalibrations
+from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
 from tests.calibrations.coefficients import calibration
 from tests.service.fitting.test_fit_process import recorded
 
@@ -70,3 +76,22 @@ def test_a_real_run_that_begins_with_it_says_so_and_who_takes_it_into_use_is_tol
     assert GUESS in said[-1] and GUESS in upload.status()["said"]
     assert any(GUESS in note for note in RigCalibrations(real, tmp_path).notes)
     assert not any(GUESS in note for note in RigCalibrations(real.as_simulated(), tmp_path).notes)
+
+
+def test_a_plant_that_was_found_in_a_rehearsal_is_told_as_one_by_the_real_rig(real: Rig, tmp_path: Path) -> None:
+    """What control would take back of it may be in no machine."""
+    path = recorded(tmp_path, "irc5-cell", facts={"simulated": True, "rig_texts": dict(real.texts)})
+    sources = read_sources([str(path)], rig=None, columns=None, state=tmp_path)
+    assert sources.is_rehearsal and not replace(sources, is_rehearsal=False).is_rehearsal
+    diagnosis: Any = SimpleNamespace(verdict=SimpleNamespace(value="confirmed"), causes=())
+    number = save_diagnosed(tmp_path, diagnosis, sources, load_plant("paper-slide"))
+    stored = PlantStore(tmp_path).load(number)
+    assert stored.provenance.rig == "irc5-cell (simulated)"
+    doubt = 'plant 1 was found on "irc5-cell (simulated)": what it takes back may be in no machine'
+    assert doubt in with_plant_in_use(real, stored).notes
+    assert doubt not in with_plant_in_use(real.as_simulated(), stored).notes
+    plants = RigPlants(real, tmp_path)
+    plants.serve(PlantEdges(lambda: True, lambda rig: None, lambda: 0.0, lambda cause, sentence: None))
+    plants.run_in_background = lambda work, done: done(work())
+    assert doubt in plants.answer({"use": number})["said"]
+    plants.close()

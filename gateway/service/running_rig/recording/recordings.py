@@ -31,6 +31,7 @@ LONGEST_BYTES: Final = 256 << 20
 LONGEST_S: Final = 86400.0
 _SHARES: Final = 8
 """How many files there are at least in what a rig's limits have room for."""
+_SHORTEST_S: Final = 10.0  # of a file: where the limits have room for less, each tick would make another one
 END_BOUND_S: Final = 1.0
 Answer = dict[str, Any]
 Opened = Callable[[RunRecording, OSError | None], None]
@@ -240,7 +241,8 @@ class Recordings:
     def _is_long(self, size_bytes: int, now_s: float) -> bool:
         if self._began_s is None:
             self._began_s = now_s
-        return size_bytes >= self._longest_bytes or now_s - self._began_s >= self._longest_s
+        lasted_s = now_s - self._began_s
+        return lasted_s >= _SHORTEST_S and (size_bytes >= self._longest_bytes or lasted_s >= self._longest_s)
 
     def _is_over(self, now_s: float) -> bool:
         if (wanted := self._wanted.with_end(now_s)) is not self._wanted:

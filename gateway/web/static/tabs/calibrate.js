@@ -6,7 +6,7 @@ import { resultOf } from "./calibration_result.js";
 const PHASES = {
   idle: "Starting", zero: "Zero and noise", check: "Sign and scale", ladder: "Ladder", minor_loops: "Reversals",
   fitting: "Fitting the models", stored: "Stored", refused: "Not offered", stopped: "Stopped", experiment: "Experiment",
-  recorded: "Recorded",
+  recorded: "Recorded", self_test: "Self-test",
 };
 const ENDED = ["stored", "refused", "stopped", "recorded"];
 const STEPS = ["Plan", "Questions", "Run", "Result"];

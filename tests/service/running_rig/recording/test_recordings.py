@@ -4,12 +4,14 @@ import errno
 import os
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse, Controller
 from gateway.devices.messages import ForceSample, Quality
+from gateway.profiles.recordings_section import Retention
 from gateway.recording import list_recordings
 from gateway.recording.label import RecordingLabel, label_of
 from gateway.recording.recorder import sync_recording
@@ -120,6 +122,21 @@ def test_one_that_goes_on_for_days_goes_on_in_another_file(recordings: Recording
     assert recordings.status()["recording"].endswith("0004.fgr")
     assert {label_of(entry.header).name for entry in list_recordings(tmp_path)} == {"for ever"}
     assert len([line for line in recordings._log if "as long as one may be" in line]) == 3
+    recordings.stop()
+
+
+@pytest.mark.parametrize("limit", [Retention(days=1.0e-6), Retention(bytes=1_000_000)], ids=["days", "bytes"])
+def test_limits_that_have_room_for_no_file_make_one_in_ten_seconds_and_not_one_a_tick(
+    limit: Retention, tmp_path: Path
+) -> None:
+    """A hundred files a second, each with the texts of the rig, were the disk's end."""
+    texts = {"rig.yaml": "#" * 200_000}
+    recordings = Recordings(tmp_path / "recordings", replace(demo(), texts=texts, retention=limit), Log(), AtOnce())
+    recordings._retention = SimpleNamespace(tick=lambda now_s: None, hasten=lambda: None)  # type: ignore[assignment]
+    recordings.start()
+    for tick in range(250):
+        recordings.flush(0.1 * tick)
+    assert recordings.status()["recording"].endswith("0003.fgr")
     recordings.stop()
 
 
