@@ -17,6 +17,7 @@ from math import isfinite
 from typing import Any, Final, NamedTuple
 
 from gateway.audit.write_series import WriteSeries
+from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.registers.refusal import Refusal
 from gateway.registers.words import ControlBit
@@ -30,6 +31,7 @@ _UNITS: Final = {
     "force_setpoint": "N", "force_ramp": "N/s", "voltage_setpoint": "mV", "tilt_angle": "deg", "precontact_force": "N",
     "contact_ramp": "ms", "payload": "g", "in_band_tolerance": "N", "in_band_time": "ms",
 }  # fmt: skip
+_NO_VALUES: Final = (RefusalReason.QUANTITY, RefusalReason.UNIT)  # theirs is a count, or an id
 _AT_ONCE_VALUE, _AT_ONCE_EDGE, _AT_ONCE_REFUSAL = 1, 20, 5
 _FALLS: Final = {ControlBit.ENABLE: "disable", ControlBit.START_CALIBRATION: "stop_calibration"}
 
@@ -71,7 +73,8 @@ class WriteAudit:
         """Keep a refused write: where, what, and the sentence that its master was given."""
         key = peer.identity, refusal.reason.name
         series = self._series.get(key)
-        value = refusal.value if isfinite(refusal.value) else None
+        is_value = isfinite(refusal.value) and refusal.reason not in _NO_VALUES
+        value = refusal.value if is_value else None
         fields = {
             **_who(peer), "what": "write", "address": refusal.address, "new": value,
             "result": refusal.reason.code, "text": refusal.sentence,

@@ -23,7 +23,7 @@ NOTICES: Final = (
     Explanation(
         "W232",
         "not Modbus TCP",
-        "Bytes with another protocol id than 0, or an impossible length; the connection was closed.",
+        "Another protocol id than 0, an impossible length, or TLS with hardly any Modbus in it; the connection was closed.",
         "Another protocol on this port (HTTP, RTU over TCP), or a client that lost count of its bytes.",
         "Choose Modbus TCP in the client, not RTU over TCP.",
     ),

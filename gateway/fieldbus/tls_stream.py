@@ -27,7 +27,12 @@ from gateway.fieldbus.tls_settings import (
 from gateway.modbus.certificate import ROLES, read_certificate
 from gateway.modbus.peer import Peer
 
-_BUFFER_BYTES: Final = 4096
+_BUFFER_BYTES: Final = 1024
+LONGEST_RECORD: Final = (1 << 14) + 2048
+"""Bytes of TLS that may come before a byte of Modbus is in them (RFC 5246, 6.2.3)."""
+_BYTES_FOR_ONE: Final = 100
+"""Of TLS, for a byte of Modbus that is sent by itself. What is beyond are messages of TLS: 150 changes of the keys in 4 KB took
+7 ms of the control loop, and whoever may only read could send them without end."""
 
 
 @dataclass(slots=True)
@@ -78,6 +83,7 @@ class TlsStream(asyncio.BufferedProtocol):
         self._connection: Connection | None = None
         self._is_paused = self._is_closing = False
         self._shaken_bytes = 0
+        self._allowed_bytes = LONGEST_RECORD
 
     # -- towards the socket
 
@@ -115,6 +121,8 @@ class TlsStream(asyncio.BufferedProtocol):
         self._incoming.write(self._view[:size])
         if self._connection is None:
             self._shake_hands()
+        else:
+            self._allowed_bytes -= size
         if self._connection is not None:
             self._deliver()
 
@@ -245,10 +253,14 @@ class TlsStream(asyncio.BufferedProtocol):
             if not size:
                 self.close()
                 return
+            self._allowed_bytes = min(LONGEST_RECORD, self._allowed_bytes + _BYTES_FOR_ONE * size)
             connection.buffer_updated(size)
             if self._incoming.pending and not (self._is_paused or self._is_closing):
                 self.pause_reading()
                 self._shared.clock.call_later(0.0, self.resume_reading)
+        if self._allowed_bytes < 0 and not (self._is_paused or self._is_closing):
+            self._refuse("framing", f"W232 {self.peer}: TLS without end, and hardly a byte of Modbus in it, closed")
+            return
         self._flush()
 
     def _flush(self) -> None:

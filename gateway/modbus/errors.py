@@ -54,7 +54,7 @@ class RequestError(ModbusError):
     """A request refused by the rules of the protocol alone; the bank is told, so that its reason can be read.
 
     value: the function, quantity, byte count, word or unit id that is refused. address: 0-based, None where the request
-    has none.
+    has none. is_write: of a request that wanted to write.
     """
 
     def __init__(self, fault: RequestFault, sentence: str, value: int, address: int | None = None) -> None:
@@ -62,3 +62,4 @@ class RequestError(ModbusError):
         self.fault = fault
         self.value = value
         self.address = address
+        self.is_write = False

@@ -30,6 +30,9 @@ MASK_WRITE: Final = 22
 READ_WRITE: Final = 23
 ENCAPSULATED: Final = 43
 
+WRITES: Final = frozenset((WRITE_COIL, WRITE_REGISTER, WRITE_COILS, WRITE_REGISTERS, MASK_WRITE, READ_WRITE))
+"""Functions of requests that want to write."""
+
 MOST_BITS_READ: Final = 2000
 MOST_BITS_WRITTEN: Final = 1968
 MOST_REGISTERS_READ: Final = 125

@@ -59,6 +59,7 @@ def answer(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
     try:
         return _HANDLERS.get(function, _not_served)(pdu, bank, peer)
     except RequestError as refusal:
+        refusal.is_write = function in P.WRITES
         bank.note_refusal(refusal, peer)
         return P.exception_pdu(function, refusal.code)
     except ModbusError as refusal:
@@ -70,6 +71,7 @@ def refuse_unit(request: tuple[int, bytes], served: Sequence[int], bank: DataBan
     unit, pdu = request
     known = ", ".join(map(str, served))
     refusal = RequestError(RequestFault.UNIT, f"unit id {unit}, served here: {known}", unit, P.address_in(pdu))
+    refusal.is_write = pdu[0] in P.WRITES
     bank.note_refusal(refusal, peer)
     return P.exception_pdu(pdu[0], refusal.code)
 

@@ -3,10 +3,11 @@
 A token must not travel with recordings, which carry the rig's texts, nor be shown: `without_secrets` blanks it there.
 """
 
-import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Protocol
 
+import yaml
 from annotated_types import MaxLen, MinLen
 from pydantic import AfterValidator
 
@@ -16,7 +17,8 @@ from gateway.profiles.rigs.addresses import Address
 from gateway.profiles.strict_yaml.typed import adapter
 from gateway.profiles.telemetry_sections import Mqtt
 
-_SECRET: Final = re.compile(r"""(\b(?:token|password)\s*:\s*)("[^"\n]*"|'[^'\n]*'|[^\s,}#]+)""")
+_SECRETS: Final = ("token", "password")
+_NULL: Final = "tag:yaml.org,2002:null"
 _BLANK: Final = "removed-from-this-copy"
 
 
@@ -104,5 +106,22 @@ def http_sections_of(file: HttpSections) -> dict[str, Any]:
 
 
 def without_secrets(text: str) -> str:
-    """Return the text of a rig file with tokens and passwords blanked; it reads as before otherwise."""
-    return _SECRET.sub(rf"\g<1>{_BLANK}", text)
+    """Return the text of a rig file with tokens and passwords blanked; it reads as before otherwise. Where a value ends YAML
+    says: it may have spaces, commas and number signs in it, and go on in the next line."""
+    if not any(name in text for name in _SECRETS):
+        return text
+    for first, end in sorted(_secret_places(yaml.compose(text, yaml.SafeLoader)), reverse=True):
+        text = text[:first] + _BLANK + text[first + len(text[first:end].rstrip()) :]
+    return text
+
+
+def _secret_places(node: yaml.Node | None) -> Iterator[tuple[int, int]]:
+    """Yield where in the text the values of secrets stand: first character, and the one behind the last."""
+    if isinstance(node, yaml.SequenceNode):
+        for item in node.value:
+            yield from _secret_places(item)
+    for key, value in node.value if isinstance(node, yaml.MappingNode) else ():
+        if key.value in _SECRETS and isinstance(value, yaml.ScalarNode) and value.tag != _NULL:
+            yield value.start_mark.index, value.end_mark.index
+        else:
+            yield from _secret_places(value)

@@ -101,7 +101,8 @@ class RegisterBank:
 
     def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """Note the reason of what the framing has refused, as all others do."""
-        self._note_refusal(request_refusal(refusal), peer)
+        noted = request_refusal(refusal)
+        self._note_refused_write(noted, peer) if refusal.is_write else self._note_refusal(noted, peer)
 
     def read_registers(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Return big-endian words of one block. Refusal (02) for a range that no block holds."""
@@ -112,8 +113,9 @@ class RegisterBank:
         return bytes(self._data[2 * address : 2 * (address + count)])
 
     def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
-        """Check that these registers can be read; RequestError as `read_registers`."""
-        self.read_registers(address, count, peer)
+        """Check that these registers can be read, of a request that writes behind that; Refusal (02) as `read_registers`."""
+        if not 0 < count <= self._room[address]:
+            raise self._note_refused_write(no_such_address(self._blocks, address, count), peer)
 
     def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Return bits of control_word (0-15) or status_word (100-115), packed."""

@@ -98,6 +98,9 @@ class StatusBlock:
         if missing := [name for name in (*_SOURCES, *BANK_REGISTERS) if name not in registers]:
             raise ValueError(f"map {register_map.name}: block status lacks {', '.join(missing)}")
         published = [register for register in registers.values() if register.name in _SOURCES]
+        if foreign := [f"{each.name} in {each.unit}" for each in published if each.unit not in _UNITS_PER_SI]:
+            known = ", ".join(unit for unit in _UNITS_PER_SI if unit)
+            raise ValueError(f"map {register_map.name}: {', '.join(foreign)}; status is published in {known}")
         self._image = image
         self._fields = attrgetter(*(_SOURCES[register.name] for register in published))
         self._scales = tuple(_scale(register) for register in published)

@@ -41,7 +41,7 @@ class ImpatientProtocol(H11Protocol):
         self._unread = self.loop.call_later(UNREAD_S, self.transport.abort)
 
     def resume_writing(self) -> None:
-        """It is."""
+        """End that wait."""
         super().resume_writing()
         self._end_unread()
 

@@ -6,7 +6,9 @@ from typing import Any
 import pytest
 
 from gateway.audit.write_audit import WriteAudit
-from gateway.modbus import ModbusError, Peer, Role
+from gateway.modbus import ModbusError, Peer, Role, answer
+from gateway.modbus.pdu import is_exception
+from gateway.modbus.server import refuse_unit
 from gateway.profiles import load_register_map
 from gateway.registers import BankRules, RegisterBank
 from gateway.registers.command import Status
@@ -59,6 +61,29 @@ def test_who_what_old_new_and_result_are_kept(watched: Watched) -> None:
     assert refused["text"].startswith("W210 certificate robot owns the setpoint")
     watched.write(OTHER, 0, 0)
     assert ("disable", 1.0, 0.0) in watched.told("what", "old", "new")
+
+
+@pytest.mark.parametrize(
+    ("pdu", "where", "code", "new"),
+    [
+        (b"\x05\x00\x00\x12\x34", 0, "W204", 0x1234),
+        (b"\x10\x00\x01\x00\x02\x03\x00\x00\x00", 1, "W220", None),
+        (b"\x06\x00\x01", 1, "W220", None),
+        (b"\x17\x03\xe7\x00\x02\x00\x01\x00\x01\x02\x04\xb0", 999, "W202", None),
+    ],
+    ids=["FC05 with neither 0 nor 1", "FC16 with another count", "FC06 cut off", "FC23 that reads nowhere"],
+)
+def test_a_write_that_the_protocol_s_own_rules_refuse_is_kept_too(
+    watched: Watched, pdu: bytes, where: int, code: str, new: float | None
+) -> None:
+    """Every refused write is; those stood in the log alone, which is not kept for years."""
+    assert is_exception(answer(pdu, watched.bank, OTHER))
+    assert watched.told("what", "address", "result", "new") == [("write", where, code, new)]
+    assert is_exception(answer(b"\x03\x03\xe7\x00\x02", watched.bank, OTHER))
+    assert len(watched.kept) == 1, "a read is none"
+    refuse_unit((9, pdu), (1,), watched.bank, OTHER)
+    refuse_unit((9, b"\x03\x00\x00\x00\x02"), (1,), watched.bank, OTHER)
+    assert watched.told("result")[1:] == [("W222",)]
 
 
 def test_a_stop_of_a_run_that_this_machine_has_begun_is_kept_although_no_bit_falls(watched: Watched) -> None:

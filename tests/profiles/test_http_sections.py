@@ -1,5 +1,6 @@
 """The page's and the metrics' sections of a rig file: addresses, tokens, and that a token stays at home."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -59,3 +60,33 @@ def test_a_token_does_not_travel_with_the_rig_s_texts(tmp_path: Path) -> None:
     copy.write_text(next(text for name, text in rig.texts.items() if name.endswith("rig.yaml")), encoding="utf-8")
     assert load_rig(str(copy)).web is not None, "what is left can be read as before"
     assert without_secrets(f"password: '{TOKEN}' # of the broker") == "password: removed-from-this-copy # of the broker"
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        "web:\n  token: quokka horse battery staple # of the page\n  listen: 0.0.0.0:8080\n",
+        "web:\n  token: quokka,horse,battery,staple\n  listen: 0.0.0.0:8080\n",
+        "web:\n  token: quokka#horse}battery#staple\n  listen: 0.0.0.0:8080\n",
+        'web: {token: "quokka \\"horse\\" battery staple", listen: "0.0.0.0:8080"}\n',
+        "web: {token: quokka horse battery staple, listen: '0.0.0.0:8080'}\n",
+        "web: {\n  token: quokka horse battery staple,\n  listen: '0.0.0.0:8080'\n}\n",
+        "web:\n  token: quokka horse\n    battery staple\n  listen: 0.0.0.0:8080\n",
+        "web:\n  token: >-\n    quokka horse\n    battery staple\n  listen: 0.0.0.0:8080\n",
+    ],
+)
+def test_no_part_of_a_token_travels_however_it_is_written(tmp_path: Path, section: str) -> None:
+    """Of one with a space, a comma or a number sign in it, all but its first word stood in each recording."""
+    rig = load_rig(rig_with(tmp_path, section))
+    assert rig.web and rig.web.token and "horse" in rig.web.token
+    text = next(text for name, text in rig.texts.items() if name.endswith("rig.yaml"))
+    assert not any(word in text for word in ("quokka", "horse", "battery", "staple"))
+    copy = tmp_path / "copy.yaml"
+    copy.write_text(text, encoding="utf-8")
+    again = load_rig(str(copy))
+    assert again.web == replace(rig.web, token="removed-from-this-copy") and again.control == rig.control
+
+
+def test_a_token_that_is_not_there_is_none_in_the_copy(tmp_path: Path) -> None:
+    rig = load_rig(rig_with(tmp_path, "web: {token: null}\n"))
+    assert "token: null" in next(text for name, text in rig.texts.items() if name.endswith("rig.yaml"))

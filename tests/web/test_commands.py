@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from gateway.codes.faults import FaultCode
-from gateway.live.control_link import ANSWER_S
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.profiles import Rig
 from gateway.registers.words import ControlBit, State
@@ -285,19 +284,3 @@ def test_a_reload_within_the_grace_loses_nothing(tmp_path: Path) -> None:
         assert wired.state is State.HOLDING
 
     play(tmp_path, scene, leased())
-
-
-def test_all_but_a_stop_says_until_when_it_is_wanted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[dict[str, Any]] = []
-    ask = Link.ask
-    monkeypatch.setattr(Link, "ask", lambda self, request: (asked.append(request), ask(self, request))[1])
-
-    async def scene(commands: Commands, stage: Stage) -> None:
-        commands.join("me")
-        await commands.enable("me", 12.0)
-        await commands.set_force("me", 8.0)
-        await commands.stop()
-        assert {request.get("until_s", 0.0) - stage.wired.now_s for request in asked[:-1]} == {ANSWER_S}
-        assert "until_s" not in asked[-1]
-
-    play(tmp_path, scene)

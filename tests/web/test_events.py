@@ -224,30 +224,6 @@ def test_a_gateway_that_does_not_answer_is_said_and_what_it_logged_is_shown(
     assert "does not answer" in told[-1][1]["sentence"]
 
 
-@pytest.mark.parametrize("is_before", [True, False])
-def test_a_log_that_cannot_be_read_keeps_nobody_from_force_and_state(
-    tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch, is_before: bool
-) -> None:
-    """The reading for all ended: each page showed the force of then, and one that held lost its lease."""
-    monkeypatch.setattr(events, "_SAMPLES_S", 0.001)
-
-    async def scene() -> None:
-        source = EventSource(Context(tmp_path), RingRows(ring[0]), Commands())  # type: ignore[arg-type]
-        stream = source.stream("me")
-        if not is_before:
-            await anext(stream)
-        (tmp_path / "events.jsonl").mkdir()
-        kinds: list[str] = []
-        async with asyncio.timeout(5.0):
-            while not (kinds.count("state") > 3 and kinds.count("samples") > 3):
-                put(ring[1], len(kinds), 2)
-                kinds.append(read(await anext(stream))[0])
-        await stream.aclose()
-        await source.close()
-
-    asyncio.run(scene())
-
-
 @pytest.mark.parametrize("count", [0, 1, 11, 12, 13, 24, 25, 999])
 def test_a_screen_gets_no_more_rows_than_it_can_show_evenly_spaced_and_the_newest_one(count: int) -> None:
     times = np.arange(count, dtype=float)

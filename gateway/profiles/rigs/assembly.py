@@ -25,7 +25,7 @@ from gateway.profiles.http_sections import Web, without_secrets
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
-from gateway.profiles.kinds.registers import read_registers
+from gateway.profiles.kinds.registers import read_served_registers
 from gateway.profiles.load import load_plant, open_profile, read_named, refer_at, refer_to
 from gateway.profiles.recordings_section import service_sections_of
 from gateway.profiles.rigs import (
@@ -128,9 +128,8 @@ def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
     """Return the rig of a document; None, with the faults noted, when a part is missing."""
     file, faults = build(RigFile, document)
     findings.faults += faults
-    register_map = read_named(
-        "registers", refer_at(document, ("registers",), path.parent, defaults.REGISTER_MAP), read_registers, findings
-    )
+    named = refer_at(document, ("registers",), path.parent, defaults.REGISTER_MAP)
+    register_map = read_named("registers", named, read_served_registers, findings)
     parts = _parts(document, path.parent, findings)
     findings.faults += _first_of_each_path(_run_checks(document, FAULTS, parts))
     findings.hardware += _first_of_each_path(_run_checks(document, HARDWARE, parts))

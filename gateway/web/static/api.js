@@ -8,10 +8,13 @@
 
 const listeners = new Map();
 const latest = new Map();
+const tabs = new BroadcastChannel("force-gateway");
+const AWAY_MS = 2000;
 const COMMAND_MS = 5000;
 const PRESSES = /^\/api\/v1\/(command\/(?!stop)|calibrate\/start)/;
 let csrf = "";
 let source = null;
+let comeBack = 0;
 
 export const viewer = (() => {
   // of this browser tab: a reload keeps it, and with it the command
@@ -88,12 +91,24 @@ export function listen() {
   };
 }
 
-/** Gives up the stream, and with it a connection: a browser has six for all tabs of the page, and each tab keeps one. */
-export function letGo() {
+/** Gives up the streams of all tabs of the page, and with each a connection: a browser has six for all, and each tab keeps one,
+ *  or waits for one before us. The others come back by themselves. */
+export function makeWay() {
+  endStream();
+  tabs.postMessage("make way");
+}
+
+function endStream() {
   source?.close();
   source = null;
   tell("gone", { sentence: "The page waits for an answer. What you see is old." });
 }
+
+tabs.onmessage = () => {
+  endStream();
+  clearTimeout(comeBack);
+  comeBack = setTimeout(listen, AWAY_MS);
+};
 
 export const api = {
   get: (path) => request(path),

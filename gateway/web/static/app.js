@@ -1,7 +1,7 @@
 // The page's frame: header, Stop force, tabs. Each tab is a module of static/tabs with `mount(element, api)`, loaded when it is
 // first opened; its element gets the events `shown` and `hidden` after that.
 
-import { api, letGo, listen } from "./api.js";
+import { api, listen, makeWay } from "./api.js";
 import "./live/samples.js";
 
 const NAMES = ["live", "calibrate", "recordings", "calibrations", "diagnosis", "wiring", "configuration"];
@@ -40,7 +40,7 @@ function showState(state) {
 
 async function stopForce() {
   const late = setTimeout(() => {
-    letGo(); // six tabs leave no connection for this one
+    makeWay(); // six tabs leave no connection for this one
     api.say("Not stopped from here yet: no answer. Use the emergency stop.", true);
   }, 500);
   try {

@@ -3,6 +3,7 @@
 import resource
 import ssl
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -10,10 +11,12 @@ import pytest
 from gateway.fieldbus import tls_stream
 from gateway.fieldbus.connection import _REQUESTS_IN_A_TURN
 from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING, MOST_PENDING_OF_ONE
+from gateway.fieldbus.tls_stream import LONGEST_RECORD
 from gateway.modbus import pdu
 from tests.certificates import Folder
 from tests.fieldbus.by_hand import framed
 from tests.fieldbus.tls.by_hand import REFUSED, VERSIONS, Face, client, face
+from tests.fieldbus.tls.key_updates import ClientKeys, noting_secrets
 
 __all__ = ["face"]
 
@@ -38,7 +41,7 @@ def test_requests_in_records_of_their_own_have_the_turns_of_others(
     """A record each, 120 refused writes came in one wake-up and took 7 ms; 32 peers made a stall, and the force was let go."""
     line = face.accept()
     line.greet(client(folder, "setpoint", version))
-    for number in range(60):
+    for number in range(20):
         line.tls.write(framed(pdu.write_register_request(1, number)))
     data = line.outgoing.read()
     room = line.stream.get_buffer(-1)
@@ -46,7 +49,49 @@ def test_requests_in_records_of_their_own_have_the_turns_of_others(
     line.stream.buffer_updated(len(data))
     assert len(face.bank.writes) <= _REQUESTS_IN_A_TURN and not line.socket.reading
     face.clock.advance(0.0)
-    assert [int.from_bytes(words) for _, words, _ in face.bank.writes] == [*range(60)] and line.socket.reading
+    assert [int.from_bytes(words) for _, words, _ in face.bank.writes] == [*range(20)] and line.socket.reading
+
+
+@pytest.mark.parametrize("answered", [False, True])
+def test_who_changes_the_keys_without_end_is_cut(face: Face, folder: Folder, tmp_path: Path, answered: bool) -> None:
+    """150 of them in 4 KB took 7 ms of the control loop, and each of 32 connections could send them for ever, only to read."""
+    line = face.accept()
+    line.greet(noting_secrets(client(folder, "monitor", ssl.TLSVersion.TLSv1_3), tmp_path / "secrets"))
+    keys = ClientKeys(tmp_path / "secrets", line.tls.cipher()[0])
+    sent = 0
+    for record in islice(keys.updates(answered), 1000):
+        line.send(record)
+        sent += len(record)
+        if line.socket.ended:
+            break
+    assert LONGEST_RECORD < sent < LONGEST_RECORD + 100 and line.socket.ended == "aborted"
+    assert face.log == ["W232 monitor (127.0.0.1:40000): TLS without end, and hardly a byte of Modbus in it, closed"]
+    assert not face.shared.connections
+
+
+def test_who_changes_the_keys_with_each_request_may(face: Face, folder: Folder, tmp_path: Path) -> None:
+    line = face.accept()
+    line.greet(noting_secrets(client(folder, "setpoint", ssl.TLSVersion.TLSv1_3), tmp_path / "secrets"))
+    keys = ClientKeys(tmp_path / "secrets", line.tls.cipher()[0])
+    updates = keys.updates(False)
+    for number in range(1000):
+        line.send(next(updates) + keys.say(framed(pdu.write_register_request(1, number))))
+        face.clock.advance(0.0)
+    assert len(face.bank.writes) == 1000 and not line.socket.ended
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_who_sends_byte_by_byte_in_records_of_their_own_may(
+    face: Face, folder: Folder, version: ssl.TLSVersion
+) -> None:
+    line = face.accept()
+    line.greet(client(folder, "setpoint", version))
+    for number in range(200):
+        for byte in framed(pdu.write_register_request(1, number)):
+            line.tls.write(bytes((byte,)))
+    line.send(line.outgoing.read())
+    face.clock.advance(0.0)
+    assert len(face.bank.writes) == 200 and not line.socket.ended
 
 
 def test_eight_handshakes_at_a_time_each_at_most_five_seconds(face: Face) -> None:

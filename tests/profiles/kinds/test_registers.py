@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.profiles import ProfileError, load_register_map
+from gateway.profiles import ProfileError, check_report, load_register_map
 
 MAP = """\
 name: mine
@@ -35,3 +35,40 @@ def test_the_shipped_map_has_the_registers_that_masters_rely_on() -> None:
     register_map = load_register_map("force-v1")
     assert register_map.find("control_word").address == 0
     assert register_map.find("force_measured").block == "status"
+
+
+SHIPPED = Path(__file__).parents[3] / "profiles"
+
+
+@pytest.mark.parametrize(
+    ("line", "instead", "sentence"),
+    [
+        ("name: plant_id", "name: plant", "block status lacks plant_id"),
+        ("name: byte_order_echo", "name: echo", "byte_order_echo is not a register"),
+        ("name: commit_notice", "name: notice", "commit_notice is not a register"),
+        ("name: command_sequence", "name: number", "block command must hold control_word, force_setpoint"),
+        (
+            "name: force_applied, address: 105, type: int16, scale: 0.01, unit: N",
+            None,
+            "force_applied in lbf; status is",
+        ),
+    ],
+)
+def test_a_map_that_no_gateway_can_serve_is_told_before_it_starts(
+    tmp_path: Path, line: str, instead: str | None, sentence: str
+) -> None:
+    """One copied from an older version, say: `check` was content, and the gateway ended at each of five starts."""
+    text = (SHIPPED / "registers" / "force-v1.yaml").read_text(encoding="utf-8")
+    assert text.count(line) == 1
+    changed = text.replace(line, line.replace("unit: N", "unit: lbf") if instead is None else instead)
+    (tmp_path / "own.yaml").write_text(changed, encoding="utf-8")
+    rig = (
+        (SHIPPED / "rigs" / "demo.yaml")
+        .read_text(encoding="utf-8")
+        .replace("registers: force-v1", "registers: own.yaml")
+    )
+    (tmp_path / "rig.yaml").write_text(rig, encoding="utf-8")
+    assert load_register_map(tmp_path / "own.yaml").name == "force-v1", "a map it is"
+    (fault,) = check_report(tmp_path / "rig.yaml", simulated=True).faults
+    assert "own.yaml:" in str(fault) and "a gateway cannot serve it: " in str(fault) and sentence in str(fault)
+    assert "force-v1 has all that it needs" in str(fault)

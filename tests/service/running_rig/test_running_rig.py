@@ -208,9 +208,7 @@ def test_the_safe_voltage_is_the_first_thing_that_closing_does(devices: OwnDevic
     assert [record["what"] for record in read_audit(running.parent)][-1] == "end"
 
 
-def test_a_change_that_came_to_nothing_is_in_the_audit(devices: OwnDevices) -> None:
-    """It stood there as accepted; a calibration and a plant that the store does not have, say."""
-
+def test_a_change_that_came_to_nothing_is_in_the_audit_as_that(devices: OwnDevices) -> None:
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         rig._upload.use(77)
         rig._plants.answer({"do": "plant", "use": 78})

@@ -23,7 +23,7 @@ def modbus(request: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.fixture
 def tabs(page: Any, control: ScriptedControl, chromium: Any) -> Iterator[list[Any]]:
-    """As many tabs as there are connections, each with its stream."""
+    """More tabs than there are connections: each of those has its stream, and one more waits."""
     answer = control.answer
 
     def answer_all(request: dict[str, Any]) -> dict[str, Any]:
@@ -41,6 +41,7 @@ def tabs(page: Any, control: ScriptedControl, chromium: Any) -> Iterator[list[An
             window.get_by_text("demo (simulated)").wait_for()
         opened.append(window)
     opened[-1].locator("#stop").wait_for()
+    opened[2].evaluate("() => { new EventSource('/events?viewer=other'); }")
     yield opened
     browser.close()
 

@@ -1,0 +1,61 @@
+"""Where control is slow nothing that comes late presses; where the log cannot be read the force is shown all the same."""
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.live.control_link import ANSWER_S
+from gateway.live.ring_rows import RingRows
+from gateway.recording.ring import SampleRing
+from gateway.web import events
+from gateway.web.commands import Commands
+from gateway.web.events import EventSource
+from tests.service.requests.test_hostile_requests import Stage
+from tests.web import test_events
+from tests.web.test_commands import Link, play
+from tests.web.test_events import Context, put, read, ring
+
+__all__ = ["ring"]
+
+
+@pytest.mark.parametrize("is_before", [True, False])
+def test_a_log_that_cannot_be_read_keeps_nobody_from_force_and_state(
+    tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch, is_before: bool
+) -> None:
+    """The reading for all ended: each page showed the force of then, and one that held lost its lease."""
+    monkeypatch.setattr(events, "_SAMPLES_S", 0.001)
+
+    async def scene() -> None:
+        source = EventSource(Context(tmp_path), RingRows(ring[0]), test_events.Commands())  # type: ignore[arg-type]
+        stream = source.stream("me")
+        if not is_before:
+            await anext(stream)
+        (tmp_path / "events.jsonl").mkdir()
+        kinds: list[str] = []
+        async with asyncio.timeout(5.0):
+            while kinds.count("state") < 4 or kinds.count("samples") < 4:
+                put(ring[1], len(kinds), 2)
+                kinds.append(read(await anext(stream))[0])
+        assert "gone" not in kinds and "note" not in kinds
+        await stream.aclose()
+        await source.close()
+
+    asyncio.run(scene())
+
+
+def test_all_but_a_stop_says_until_when_it_is_wanted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[dict[str, Any]] = []
+    ask = Link.ask
+    monkeypatch.setattr(Link, "ask", lambda self, request: (asked.append(request), ask(self, request))[1])
+
+    async def scene(commands: Commands, stage: Stage) -> None:
+        commands.join("me")
+        await commands.enable("me", 12.0)
+        await commands.set_force("me", 8.0)
+        await commands.stop()
+        assert {request.get("until_s", 0.0) - stage.wired.now_s for request in asked[:-1]} == {ANSWER_S}
+        assert "until_s" not in asked[-1]
+
+    play(tmp_path, scene)
