@@ -204,6 +204,7 @@ class Simulation:
             self._note_tare()
         if hangs_payload(pdu):
             self.observer.history.weighed_s = min(self.observer.history.weighed_s, self.clock.now_s)
+            self.reasons.has_payload = True
 
     def _note_tare(self) -> None:
         self.observer.history.tares.append(self.clock.now_s)

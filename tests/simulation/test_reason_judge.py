@@ -33,6 +33,15 @@ def test_a_fault_without_its_reason_is_seen(fault: int, disturbed: str | None) -
     assert len(observer.broken) == (not has_reason), "and told once"
 
 
+@pytest.mark.parametrize("fault", REASONS)
+def test_a_payload_explains_too_much_force_and_nothing_else(fault: int) -> None:
+    observer = Observer(BOUNDS)
+    judge = ReasonJudge(observer)
+    judge.has_payload = True
+    look(judge, fault, 10.0)
+    assert len(observer.broken) == (fault != 4)
+
+
 def test_a_reason_of_long_ago_is_none() -> None:
     observer = Observer(BOUNDS)
     judge = ReasonJudge(observer)

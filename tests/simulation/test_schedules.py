@@ -207,6 +207,13 @@ KEPT: list[tuple[int, list[Event]]] = [
         [Event(0.7313, "worker", "take", (55.03,), way="block"), Event(2.2032, "rival", "take", (19.03,), way="block")],
     ),
     (42249, [Event(1.2933, "worker", "tare")]),
+    (
+        41760,
+        [
+            Event(4.6985, "worker", "hold", (8.31,)),
+            Event(5.8719, "worker", "ask", (1,), b"\x10\x00\x08\x00\x02\x04\x00!l\x08"),
+        ],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (
         15,

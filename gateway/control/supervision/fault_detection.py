@@ -183,7 +183,7 @@ class FaultDetector:
         if self._over and reading.overload:
             return self._over_words(reading, 0.0)
         if self._over:
-            return f"{reading.contact_n:.1f} N on the load cell, over-force is {self._limits.over_force_n:.1f} N: free the tool"
+            return f"{reading.contact_n:.1f} N measured, over-force is {self._limits.over_force_n:.1f} N: free the tool"
         return stuck_sentence(reading.contact_n, self._bounds.stuck_n) if self.is_stuck else ""
 
     def _stall_words(self, now_s: float, line: LineStatus) -> str:
@@ -272,6 +272,9 @@ class FaultDetector:
         if reading.overload:
             return f"cell saturated ({self._bounds.saturation_n:.0f} N is 98 % of its range): over-force, open or shorted wires"
         values = f"{reading.contact_n:.1f} N measured, allowed {self._limits.over_force_n:.1f} N, {expected_n:.1f} N expected"
+        if abs(reading.cell_n) < self._limits.over_force_n:
+            weight_n = reading.contact_n - reading.cell_n
+            return f"{values}: {weight_n:.1f} N of it are the payload's weight, is `payload` the tool's own mass?"
         far_off = abs(reading.contact_n) > _FAR_OFF * abs(expected_n)
         return (
             f"{values}: kgf and N mixed up, or a wrong span?" if far_off else f"{values}: a jam, or the tool was pushed"

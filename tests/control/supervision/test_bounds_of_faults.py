@@ -45,6 +45,20 @@ def test_the_largest_force_itself_is_over_it_and_stays_so_over_a_start() -> None
     assert fault(one) is FaultCode.NONE
 
 
+@pytest.mark.parametrize(
+    ("cell_n", "words"),
+    [(8.0, "92.0 N of it are the payload's weight"), (100.0, "kgf and N mixed up"), (-92.0, "kgf and N mixed up")],
+)
+def test_a_force_that_is_too_large_by_a_payload_alone_is_told_so(cell_n: float, words: str) -> None:
+    """A master has written 9 kg for 0.9: neither a jam, nor the cell's unit."""
+    one, reading = detector(), WELL._replace(contact_n=100.0, cell_n=cell_n)
+    response = ExpectedForce(bsfm(), 0.1, 0.0)
+    for _ in range(3):
+        one.observe(reading, response, 1.0, True)
+    cause = one.first_cause(NOW_S, reading, READY, lambda: 10.0)
+    assert cause and cause.fault is FaultCode.OVER_FORCE and words in cause.sentence
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_nothing_begins_on_one_reading_of_the_largest_force(sign: float) -> None:
     """Three in a row are a fault under force; one is enough not to begin to press."""
@@ -65,7 +79,7 @@ def test_a_force_at_rest_that_keeps_an_enable_back_is_told() -> None:
     assert one.excuse(RefusalReason.NOT_READY, NOW_S, reading, READY) == ""
     observe(one, most_n + 1.0, 1)
     told = one.excuse(RefusalReason.NOT_READY, NOW_S, reading, READY)
-    assert f"{most_n + 1.0:.1f} N on the load cell, over-force is {most_n:.1f} N" in told
+    assert f"{most_n + 1.0:.1f} N measured, over-force is {most_n:.1f} N" in told
     saturated = one.excuse(RefusalReason.NOT_READY, NOW_S, reading._replace(overload=True), READY)
     assert "over-force, open or shorted wires" in saturated
     observe(one, 20.0, 1)

@@ -16,7 +16,7 @@ from gateway.service.running_rig.running_rig import RunningRig
 from tests.disk.at_once import AtOnce
 from tests.service.kept_log import Log
 from tests.service.rigs import demo
-from tests.service.running_rig.test_running_rig import OwnDevices, devices, with_running_rig
+from tests.service.running_rig.begun_rig import OwnDevices, devices, with_running_rig
 
 __all__ = ["devices"]
 

@@ -6,9 +6,7 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Awaitable, Callable, Iterator
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable
 
 import pytest
 
@@ -20,61 +18,17 @@ from gateway.modbus import Peer
 from gateway.ports import PortError
 from gateway.ports.opening import open_descriptor
 from gateway.processes import message_link
-from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.profiles import load_rig
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.running_rig.faces.faces import Faces
-from gateway.service.running_rig.handover import Handover
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.end_to_end.own_devices import OwnDevices
+from tests.service.running_rig.begun_rig import devices, with_running_rig
+
+__all__ = ["devices"]
 
 MASTER = Peer("10.0.0.5", 40001)
-Scene = Callable[[RunningRig, socket.socket], Awaitable[None]]
-
-
-@pytest.fixture
-def devices(tmp_path: Path) -> Iterator[OwnDevices]:
-    with OwnDevices(tmp_path) as devices:
-        yield devices
-
-
-def with_running_rig(
-    devices: OwnDevices, scene: Scene, restarted: Ending | None = None, kept: dict[str, Any] | None = None
-) -> list[str]:
-    """Start a rig, play the scene, close it; return what was logged. kept: what the process before has left for this one."""
-    lines: list[str] = []
-    state = devices.directory / "state"
-    state.mkdir()
-
-    async def play(log: EventLog) -> None:
-        ours, theirs = message_link.create_link()
-        theirs.setblocking(False)
-        profile = load_rig(str(devices.rig))
-        guardian = GuardianLine(theirs)
-        rig = RunningRig(profile, profile.ports(), state, guardian, log)
-        try:
-            await rig.start(["127.0.0.1", 0], Handover(kept or {}, record=False), restarted=restarted)
-            rig.loop.is_watched = True  # as behind READY
-            async with asyncio.timeout(10):
-                await scene(rig, ours)
-        finally:
-            await rig.close()
-            guardian.close()
-            drop(ours)
-
-    with EventLog(lines.append) as log:
-        asyncio.run(play(log))
-    return lines
-
-
-def drop(guardian: socket.socket) -> None:
-    """Close the guardian's end, and every descriptor that was passed to it."""
-    while (message := message_link.receive(guardian)) is not None:
-        for descriptor in message.descriptors:
-            socket.close(descriptor)
-    guardian.close()
 
 
 async def pressing(rig: RunningRig, devices: OwnDevices, volts: float = 4.0) -> None:

@@ -38,7 +38,7 @@ REASONS: dict[int, tuple[str, ...]] = {
     22: (OUTPUT,),
 }
 """Of a number in fault_code: whose disturbance may be its cause. Of those that are not here none ever is."""
-MASTER_LOST = 1
+MASTER_LOST, OVER_FORCE = 1, 4
 REFUSED: dict[int, tuple[float, tuple[str, ...]]] = {
     13: (EVER_S, (OUTPUT, MACHINE)),
     14: (REOPENED_S, (CELL, MACHINE)),
@@ -63,6 +63,8 @@ class ReasonJudge:
         self._observer = observer
         self._last_s: dict[str, float] = {}
         self._fault = self._refusal = self._warned = 0
+        self.has_payload = False
+        """A master has told of one: what it says that weighs counts as force."""
 
     @property
     def disturbed_s(self) -> float:
@@ -88,7 +90,7 @@ class ReasonJudge:
             if new & 1 << bit:
                 self._judge_blame(f"warning {bit}", reasons, at_s, after_s)
         before, self._fault = self._fault, words[10] if words[1] == FAULT else 0
-        if self._fault in (0, before, MASTER_LOST):
+        if self._fault in (0, before, MASTER_LOST) or (self._fault == OVER_FORCE and self.has_payload):
             return
         self._judge_blame(f"fault {self._fault}", REASONS.get(self._fault, ()), at_s)
 
