@@ -1,5 +1,6 @@
 """What a rig file may say about a TLS face: each of its files that cannot be used is told with its line, before the start."""
 
+import ssl
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -8,9 +9,10 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 
 from gateway.cli.certificates import Signed, make_ca, make_server, store
+from gateway.modbus.certificate import read_certificate
 from gateway.profiles import Report, check_report
 from gateway.profiles.rigs.faces import TlsFace
-from tests.certificates import store_all
+from tests.certificates import serial_of, store_all
 from tests.other_kinds import never_waiting, put
 
 DEMO = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
@@ -53,6 +55,16 @@ def test_a_face_is_read_its_paths_from_the_file_and_its_port_from_the_standard(f
     assert isinstance(face, TlsFace)
     assert (face.port, face.bind, face.certificate) == (802, "127.0.0.1", str(folder / "gateway.crt"))
     assert face.revoked == ("0A1B2C",)
+
+
+@pytest.mark.parametrize("written", ["{}", "00:{}", "0000{}"])
+def test_a_revoked_certificate_is_meant_however_many_zeros_stand_before_its_number(folder: Path, written: str) -> None:
+    """As a browser shows it, with the zero octet of its sign, it was nobody's: the certificate still connected."""
+    number = serial_of("thief")
+    rig = report(folder, files(more=f', revoked: ["{written.format(number)}"]')).rig
+    assert rig is not None and isinstance(rig.fieldbus[0], TlsFace)
+    shown = read_certificate(ssl.PEM_cert_to_DER_cert((folder / "thief.crt").read_text()))
+    assert shown.serial in rig.fieldbus[0].revoked
 
 
 FAULTS = [
