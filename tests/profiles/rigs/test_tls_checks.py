@@ -9,6 +9,8 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 
 from gateway.cli.certificates import Signed, make_ca, make_server, store
+from gateway.fieldbus.peers import address_of
+from gateway.modbus import Peer
 from gateway.modbus.certificate import read_certificate
 from gateway.profiles import Report, check_report
 from gateway.profiles.rigs.faces import TlsFace
@@ -164,6 +166,16 @@ def test_an_owner_that_no_face_lets_in_is_told(tmp_path: Path, owner: str, more:
     (tmp_path / "rig.yaml").write_text(text, encoding="utf-8")
     (fault,) = check_report(tmp_path / "rig.yaml", simulated=True).faults
     assert f"network.owner: {sentence}" in str(fault)
+
+
+@pytest.mark.parametrize("host", ["fe80::1%eth0", "::ffff:10.0.0.5", "FD00:0::5", "10.0.0.5"])
+def test_an_owner_is_whoever_connects_from_that_address_however_it_is_written(tmp_path: Path, host: str) -> None:
+    """With a scope, or as the IPv6 form of an IPv4 address, it was nobody, and no master could command."""
+    (tmp_path / "rig.yaml").write_text(
+        DEMO.replace("network:\n", f'network:\n  owner: "{host}"\n', 1), encoding="utf-8"
+    )
+    rig = check_report(tmp_path / "rig.yaml", simulated=True).rig
+    assert rig is not None and rig.network.owner == Peer(str(address_of(host))).identity
 
 
 def test_two_faces_on_one_port_are_told(folder: Path) -> None:
