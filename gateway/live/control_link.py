@@ -29,11 +29,10 @@ class ControlLink:
             try:
                 async with asyncio.timeout(ANSWER_S):
                     answer = await self._exchange(json.dumps(request).encode() + b"\n")
-            except TimeoutError:
-                await self._drop()
-                raise TimeoutError(f"the gateway has not answered within {ANSWER_S:g} s") from None
-            except BaseException:
+            except BaseException as error:
                 await self._drop()  # a late answer must not be taken for that of the next question
+                if isinstance(error, TimeoutError):
+                    raise TimeoutError(f"the gateway has not answered within {ANSWER_S:g} s") from None
                 raise
         if not answer.pop("ok", False):
             raise ValueError(str(answer.get("error", "the gateway refused without a reason")))

@@ -19,9 +19,15 @@ def _owner(text: str) -> str:
     if serial_place(text) is not None or is_certificate(text):
         return text
     try:
-        return _address(text)
+        return _as_peer(_address(text))
     except ValueError as error:
         raise ValueError(f"{error}, nor a serial face such as serial:1, nor certificate NAME") from None
+
+
+def _as_peer(text: str) -> str:
+    """Return an address as a connection from it is known by: without a scope, and by IPv4 where it is one of those."""
+    address = ip_address(text.partition("%")[0])
+    return str(getattr(address, "ipv4_mapped", None) or address)
 
 
 def is_certificate(owner: str) -> bool:

@@ -58,6 +58,7 @@ def _serial_number(text: str) -> str:
     number = text.replace(":", "").upper()
     if not number or number.strip("0123456789ABCDEF"):
         raise ValueError(f'"{text}" is no serial number in hex, as `openssl x509 -noout -serial -in FILE` prints it')
+    number = number.lstrip("0") or "0"  # browsers show the zeros before it
     return number.zfill(len(number) + len(number) % 2)
 
 

@@ -1,5 +1,6 @@
 """What a rig file may say about a TLS face: each of its files that cannot be used is told with its line, before the start."""
 
+import ssl
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -8,9 +9,12 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 
 from gateway.cli.certificates import Signed, make_ca, make_server, store
+from gateway.fieldbus.peers import address_of
+from gateway.modbus import Peer
+from gateway.modbus.certificate import read_certificate
 from gateway.profiles import Report, check_report
 from gateway.profiles.rigs.faces import TlsFace
-from tests.certificates import store_all
+from tests.certificates import serial_of, store_all
 from tests.other_kinds import never_waiting, put
 
 DEMO = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text(encoding="utf-8")
@@ -53,6 +57,16 @@ def test_a_face_is_read_its_paths_from_the_file_and_its_port_from_the_standard(f
     assert isinstance(face, TlsFace)
     assert (face.port, face.bind, face.certificate) == (802, "127.0.0.1", str(folder / "gateway.crt"))
     assert face.revoked == ("0A1B2C",)
+
+
+@pytest.mark.parametrize("written", ["{}", "00:{}", "0000{}"])
+def test_a_revoked_certificate_is_meant_however_many_zeros_stand_before_its_number(folder: Path, written: str) -> None:
+    """As a browser shows it, with the zero octet of its sign, it was nobody's: the certificate still connected."""
+    number = serial_of("thief")
+    rig = report(folder, files(more=f', revoked: ["{written.format(number)}"]')).rig
+    assert rig is not None and isinstance(rig.fieldbus[0], TlsFace)
+    shown = read_certificate(ssl.PEM_cert_to_DER_cert((folder / "thief.crt").read_text()))
+    assert shown.serial in rig.fieldbus[0].revoked
 
 
 FAULTS = [
@@ -152,6 +166,16 @@ def test_an_owner_that_no_face_lets_in_is_told(tmp_path: Path, owner: str, more:
     (tmp_path / "rig.yaml").write_text(text, encoding="utf-8")
     (fault,) = check_report(tmp_path / "rig.yaml", simulated=True).faults
     assert f"network.owner: {sentence}" in str(fault)
+
+
+@pytest.mark.parametrize("host", ["fe80::1%eth0", "::ffff:10.0.0.5", "FD00:0::5", "10.0.0.5"])
+def test_an_owner_is_whoever_connects_from_that_address_however_it_is_written(tmp_path: Path, host: str) -> None:
+    """With a scope, or as the IPv6 form of an IPv4 address, it was nobody, and no master could command."""
+    (tmp_path / "rig.yaml").write_text(
+        DEMO.replace("network:\n", f'network:\n  owner: "{host}"\n', 1), encoding="utf-8"
+    )
+    rig = check_report(tmp_path / "rig.yaml", simulated=True).rig
+    assert rig is not None and rig.network.owner == Peer(str(address_of(host))).identity
 
 
 def test_two_faces_on_one_port_are_told(folder: Path) -> None:
