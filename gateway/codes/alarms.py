@@ -135,7 +135,7 @@ ALARMS: Final = (
         "A331",
         "fit ended without a result",
         "The ladder was run and recorded, but the process that fits it ended without saying anything.",
-        "It was killed, or the machine ran out of memory.",
+        "It was killed, the machine ran out of memory, or it hung, on a disk say, for half an hour.",
         "force-gateway fit RECORDING --store does the same in the foreground.",
     ),
 )

@@ -2,12 +2,15 @@
 
 Control never waits for it: the child is spawned (a millisecond or two, with the output off), its pipe is read when it
 speaks, and it goes on to its end should control die meanwhile. It sets its own priority down
-(gateway.service.fitting.fit_process).
+(gateway.service.fitting.fit_process). One that hangs (its disk does, say) is killed in the end: until it has ended no other
+run may begin.
 """
 
 import asyncio
+import contextlib
 import json
 import os
+import signal
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +21,7 @@ from gateway.processes.module_command import module_command
 Result = dict[str, Any]
 _LONGEST = 1 << 16
 _REAP_S = 0.1
+LONGEST_S = 1800.0  # a ladder is fitted in seconds, on a small machine that is busy in minutes
 
 
 class FitLauncher:
@@ -32,10 +36,17 @@ class FitLauncher:
         assert self._process.stdout
         self._descriptor = self._process.stdout.fileno()
         os.set_blocking(self._descriptor, False)
-        self._output = b""
+        self._output, self._is_given_up = b"", False
         self._on_result = on_result
         self._loop = asyncio.get_running_loop()
         self._loop.add_reader(self._descriptor, self._read)
+        self._patience = self._loop.call_later(LONGEST_S, self._give_up)
+
+    def _give_up(self) -> None:
+        """What it has started goes with it, and the pipe's end tells."""
+        self._is_given_up = True
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
 
     def _read(self) -> None:
         try:
@@ -58,7 +69,8 @@ class FitLauncher:
         try:
             result: Result = json.loads(self._output)
         except ValueError:
-            return {"refused": "A331 the fit process ended without a result; force-gateway fit RECORDING shows why"}
+            how = f"was killed after {LONGEST_S / 60.0:g} minutes" if self._is_given_up else "ended"
+            return {"refused": f"A331 the fit process {how} without a result; force-gateway fit RECORDING shows why"}
         return result
 
     def close(self) -> None:
@@ -68,6 +80,7 @@ class FitLauncher:
             self._process.returncode = 0  # its end is not ours to wait for
 
     def _forget(self) -> None:
+        self._patience.cancel()
         if self._process.stdout and not self._process.stdout.closed:
             self._loop.remove_reader(self._descriptor)
             self._process.stdout.close()

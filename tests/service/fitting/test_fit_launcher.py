@@ -49,6 +49,13 @@ def test_a_fit_that_ends_without_a_result_is_a_refusal_and_no_exception(
     assert result["refused"].startswith(NO_RESULT)
 
 
+def test_a_fit_that_hangs_is_killed_with_all_that_it_has_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Until it has ended no other run may begin."""
+    monkeypatch.setattr(fit_launcher, "LONGEST_S", 0.3)
+    result, _ = heard(monkeypatch, "os.fork(); import signal; signal.pause()")
+    assert result["refused"].startswith("A331 the fit process was killed after 0.005 minutes without a result")
+
+
 def test_a_fit_that_cannot_be_started_is_a_refusal_that_names_the_recording(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
