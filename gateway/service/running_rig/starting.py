@@ -82,7 +82,9 @@ def waiting_s(*, is_restart: bool) -> float:
     return _WORDS_AGAIN_S if is_restart else _FIRST_WORDS_S
 
 
-async def why_silent(port: SerialPort, line: OutputLine | CellLine, blamed: str, *, is_restart: bool) -> str:
+async def why_silent(
+    port: SerialPort, line: OutputLine | CellLine, blamed: str, safe_v: float, *, is_restart: bool
+) -> str:
     """Return why a device says nothing. Its port is closed while the probe listens at other speeds, and opened again.
 
     Not after a restart: seconds of listening would tell what the start has told already. Nor where blamed says that the
@@ -92,7 +94,7 @@ async def why_silent(port: SerialPort, line: OutputLine | CellLine, blamed: str,
         start, waited_s = "restart" if is_restart else "start", waiting_s(is_restart=is_restart)
         return f"E111 {port.path}: nothing heard within {waited_s:g} s of the {start}; {blamed or 'power, wires?'}"
     port.close()
-    sentence = await explain_silent_device(line, port.path)
+    sentence = await explain_silent_device(line, port.path, safe_v)
     await port.open()
     return sentence
 

@@ -195,7 +195,7 @@ class Log:
     note = __call__
 
 
-async def _explain(line: Any, path: str) -> str:
+async def _explain(line: Any, path: str, safe_v: float) -> str:
     return f"E111 {path}: silent"
 
 

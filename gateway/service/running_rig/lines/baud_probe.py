@@ -34,10 +34,11 @@ class ProbeResult:
     says: str = ""
 
 
-async def explain_silent_device(line: OutputLine | CellLine, path: str) -> str:
-    """Return one sentence, E110 or E111 (or E10x when the port cannot be opened)."""
+async def explain_silent_device(line: OutputLine | CellLine, path: str, safe_v: float = 0.0) -> str:
+    """Return one sentence, E110 or E111 (or E10x when the port cannot be opened). safe_v: the rig's safe voltage."""
+    bauds = (line.baud, *(baud for baud in BAUDS if baud != line.baud))
     try:
-        probes = [await listen_at(line, path, baud) for baud in (line.baud, *(b for b in BAUDS if b != line.baud))]
+        probes = [await listen_at(line, path, baud, safe_v) for baud in bauds]
     except PortError as error:
         return str(error)
     return _sentence(path, probes[0], probes[1:])
@@ -59,9 +60,9 @@ def _sentence(path: str, here: ProbeResult, elsewhere: list[ProbeResult]) -> str
     return f"E111 {path}: silence at every speed; power, crossed wires, stream mode? force-gateway explain E111"
 
 
-async def listen_at(line: OutputLine | CellLine, path: str, baud: int) -> ProbeResult:
+async def listen_at(line: OutputLine | CellLine, path: str, baud: int, safe_v: float = 0.0) -> ProbeResult:
     """Open the port, ask or listen at this speed, and return what came. PortError where it does not open."""
-    ask, receive = _question_and_receiver(line)
+    ask, receive = _question_and_receiver(line, safe_v)
     enough = asyncio.Event()
     total = valid = 0
     unread = UnreadLines(line.device)
@@ -88,17 +89,17 @@ async def listen_at(line: OutputLine | CellLine, path: str, baud: int) -> ProbeR
     return ProbeResult(baud, total, valid, unread.words(time.monotonic()))
 
 
-def _question(device: DeviceProfile) -> OutputRequest:
-    """Return what moves nothing: a reading, or, where a device cannot be asked, the least voltage that it can be set to."""
-    return next(iter(output_host(device).idle_questions), SetVoltage(device.voltage_range_v[0]))
+def _question(device: DeviceProfile, safe_v: float) -> OutputRequest:
+    """Return what moves nothing: a reading, or, where a device cannot be asked, the voltage that it was told at the start."""
+    return next(iter(output_host(device).idle_questions), SetVoltage(safe_v))
 
 
 def _question_and_receiver(
-    line: OutputLine | CellLine,
+    line: OutputLine | CellLine, safe_v: float
 ) -> tuple[Callable[[], bytes], Callable[[bytes, float], Sequence[object]]]:
     """Return how to ask this device for a word (a stream is not asked), and what a chunk completes."""
     if isinstance(line, OutputLine):
-        output, question = output_host(line.device), _question(line.device)
+        output, question = output_host(line.device), _question(line.device, safe_v)
         return lambda: output.request(question), output.receive
     cell = cell_host(line.device, line.sign, line.unit)
     return cell.poll, cell.receive

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 from gateway.devices import DeviceProfile, cell_device, output_device
-from gateway.devices.exchange import VoltageRange
 from gateway.devices.messages import Accepted, Garbage, SetVoltage
 from gateway.ports import PacedPty
 from gateway.profiles import CellLine, OutputLine
@@ -179,7 +178,7 @@ def test_each_speed_is_tried_once_the_rig_s_own_first_and_what_it_says_there_is_
 ) -> None:
     tried = list[int]()
 
-    async def hear(line: object, path: str, baud: int) -> ProbeResult:
+    async def hear(line: object, path: str, baud: int, safe_v: float) -> ProbeResult:
         tried.append(baud)
         return ProbeResult(baud, 9, 0, f"it says words of {baud}")
 
@@ -190,14 +189,26 @@ def test_each_speed_is_tried_once_the_rig_s_own_first_and_what_it_says_there_is_
     assert told == "E110 /dev/ttyNONE: 9 bytes, 0 valid lines at 38400; it says words of 38400"
 
 
-def test_what_cannot_be_asked_is_set_to_the_least_that_it_can_be_and_a_cell_to_nothing() -> None:
+def test_what_cannot_be_asked_is_told_the_safe_voltage_of_its_rig_and_a_cell_nothing() -> None:
+    """It was told the least that it can be set to: 0 V where 3 V hold the tool, -10 V of an output of both signs."""
     regulator = replace(load_device("mcu-line"), read_pressure=None, read_voltage=None)
-    assert regulator.set_voltage
-    assert _question(regulator) == SetVoltage(0.0)
-    range_ = VoltageRange(device=(1.0, 9.0), voltage_v=(1.0, 9.0))
-    assert _question(replace(regulator, set_voltage=replace(regulator.set_voltage, range=range_))) == SetVoltage(1.0)
+    assert _question(regulator, 3.0) == SetVoltage(3.0)
+    line = replace(demo().output, device=regulator)
+    assert b"3.0000" in _question_and_receiver(line, 3.0)[0]()
     stream, asked_cell = demo().load_cell, replace(demo().load_cell, device=load_device("mantracourt-dsc"), unit="N")
-    assert _question_and_receiver(stream)[0]() == b"" != _question_and_receiver(asked_cell)[0]()
+    assert _question_and_receiver(stream, 3.0)[0]() == b"" != _question_and_receiver(asked_cell, 3.0)[0]()
+
+
+def test_at_every_speed_the_silent_device_hears_the_safe_voltage_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = list[float]()
+
+    async def hear(line: object, path: str, baud: int, safe_v: float) -> ProbeResult:
+        told.append(safe_v)
+        return ProbeResult(baud, 0, 0)
+
+    monkeypatch.setattr("gateway.service.running_rig.lines.baud_probe.listen_at", hear)
+    asyncio.run(explain_silent_device(demo().output, "/dev/ttyNONE", 3.0))
+    assert told == [3.0] * 5
 
 
 @pytest.mark.parametrize(("here", "elsewhere", "code"), [(0, 0, "E111"), (5, 0, "E110"), (0, 5, "E110")])
