@@ -16,6 +16,7 @@ from gateway.devices.messages import DeviceAnswer, DeviceStep
 _LOOK_PERIOD_S = 1.0  # between two looks at the watchdog: a device that was off for a moment has forgotten its arming
 _WAITS_S = 0.5  # of a look for an idle wire: on a slow one a setpoint that never rests leaves none
 _TRIES = 3  # of arming; then it does not arm
+_MISSES = 5  # of one question in a row, while settings are answered: the device has no words for it
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,7 @@ class DeviceChecks:
     def begin(self) -> None:
         """Begin anew: the port has been opened, or nothing was heard for long, and another device may be behind it."""
         self._waiting = deque(self._known_of(DeviceStep.IDENTITY, DeviceStep.STATUS, *self._arming))
-        self._tries = 0
+        self._tries = self._misses = 0
         self._next_look_s = 0.0
         self.fault = FaultCode.NONE
         self.said = ""
@@ -105,6 +106,7 @@ class DeviceChecks:
     def take(self, answer: DeviceAnswer) -> None:
         """Follow an answer."""
         is_due = bool(self._waiting) and self._waiting[0] is answer.step
+        self._misses = 0
         if is_due:
             self._waiting.popleft()
         if answer.step is DeviceStep.IDENTITY and not answer.is_right:
@@ -123,6 +125,7 @@ class DeviceChecks:
 
     def refuse(self, step: DeviceStep, words: str) -> None:
         """Follow a refusal in the device's own words."""
+        self._misses = 0
         if self._waiting and self._waiting[0] is step:
             self._waiting.popleft()
         if step is DeviceStep.IDENTITY:
@@ -130,9 +133,21 @@ class DeviceChecks:
             self._waiting.clear()
         elif step is DeviceStep.CLEAR:
             self.trip()
-        elif step in (DeviceStep.SET_TIME, DeviceStep.ARM, DeviceStep.VERIFY) and not self.is_tripped:
+        elif (step in _ARMS or (step is DeviceStep.STATUS and self._is_proof)) and not self.is_tripped:
             self._take_proof(is_armed=False, words=words)
         self._settle()
+
+    def miss(self, step: DeviceStep) -> None:
+        """Follow a question that was not answered in its time. A device that has no words for it may not say so: else it would
+        be asked for ever, and nobody told what keeps the output."""
+        self._misses += bool(self._waiting) and self._waiting[0] is step
+        if self._misses >= _MISSES:
+            self.refuse(step, f"nothing that the profile knows, asked for its {step}")
+
+    @property
+    def _is_proof(self) -> bool:
+        """Whether the state that was asked for last is what tells that it watches."""
+        return self._is_proved_by_state and not self._waiting
 
     def _take_state(self, state: WatchdogState, *, is_due: bool) -> None:
         """One spoiled digit makes a trip of an armed one: it is believed when it is said twice."""
@@ -161,4 +176,5 @@ class DeviceChecks:
 
 
 _ASKED_AGAIN = (FaultCode.WATCHDOG_NOT_ARMED, FaultCode.WRONG_DEVICE)  # an answer may have been another question's
+_ARMS = (DeviceStep.SET_TIME, DeviceStep.ARM, DeviceStep.VERIFY)
 _GOES_ON = (FaultCode.NONE, FaultCode.WATCHDOG_TRIPPED)

@@ -83,9 +83,7 @@ class OutputExchange:
         self._write = write
         self._reply_timeout_s = reply_timeout_s
         self._given_up = GivenUpQuestions(reply_timeout_s)
-        self.garbage_bytes = 0
-        self.counts = WireCounts()
-        self.round_trip_s = nan
+        self.garbage_bytes, self.counts, self.round_trip_s = 0, WireCounts(), nan
         self.reset()
 
     def reset(self) -> None:
@@ -167,6 +165,8 @@ class OutputExchange:
         self._host.forget()
         if not isinstance(question, ReadVoltage):  # which tells anew what stands
             self.standing_v = None
+        if isinstance(question, AskDevice):
+            self.checks.miss(question.step)
         self._given_up.note(question, self._sent_s)
         self._in_flight, self._is_overdue = None, True
 

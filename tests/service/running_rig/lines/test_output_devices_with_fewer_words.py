@@ -6,9 +6,9 @@ from math import isnan
 import pytest
 
 from gateway.codes.faults import FaultCode
-from gateway.devices import output_host
+from gateway.devices import output_device, output_host
 from gateway.devices.exchange import VoltageExchange, VoltageRange
-from gateway.devices.messages import DeviceAnswer
+from gateway.devices.messages import Accepted, AskDevice, DeviceAnswer, DeviceStep
 from gateway.service.running_rig.lines.device_checks import DeviceChecks, DeviceLevel
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from tests.profile_files import load_device
@@ -126,3 +126,70 @@ def test_a_trip_stays_until_a_reset_where_a_device_tells_of_its_watchdog_no_more
     checks.clear()
     arm(checks)
     assert checks.is_armed and checks.is_done
+
+
+def line_to_old_firmware(unknown: tuple[bytes, ...], *, is_waived: bool = False, misses: int = 1000) -> OutputExchange:
+    """The line to a DCON module after 4 s: to sentences that begin so it says nothing, as to all that it does not know, so many
+    times; it answers the others."""
+    profile, written = load_device("icpdas-702x"), list[bytes]()
+    host, device = output_host(profile), output_device(profile)
+    line = OutputExchange(host, written.append, REPLY_TIMEOUT_S, DeviceChecks(host, is_waived=is_waived))
+    for step in range(400):
+        now_s = 100.0 + 0.01 * step
+        for said in [written.pop(0) for _ in range(len(written))]:
+            if said.startswith(unknown) and misses > 0:
+                misses -= 1
+                continue
+            for asked in device.receive(said, now_s):
+                done = DeviceAnswer(asked.step, is_right=True) if isinstance(asked, AskDevice) else Accepted(0.0)
+                line.on_bytes(device.reply(done, to=asked), now_s)
+        line.set_voltage(0.0, now_s)
+        line.tick(now_s)
+    return line
+
+
+@pytest.mark.parametrize(
+    ("unknown", "step", "fault"),
+    [
+        (b"$01M", DeviceStep.IDENTITY, FaultCode.WRONG_DEVICE),
+        (b"~013", DeviceStep.ARM, FaultCode.WATCHDOG_NOT_ARMED),
+        (b"~012", DeviceStep.VERIFY, FaultCode.WATCHDOG_NOT_ARMED),
+    ],
+)
+def test_a_device_that_answers_settings_and_not_this_question_is_told_as_such(
+    unknown: bytes, step: DeviceStep, fault: FaultCode
+) -> None:
+    """It was asked for ever, and an enable refused with `not ready: wait`."""
+    line = line_to_old_firmware((unknown,))
+    assert (line.fault, line.confirmed_v) == (fault, None)
+    assert line.said == f"nothing that the profile knows, asked for its {step}"
+
+
+def test_a_rig_that_accepts_to_have_no_watchdog_runs_a_device_that_has_no_words_for_one() -> None:
+    line = line_to_old_firmware((b"~01",), is_waived=True)
+    assert (line.fault, line.confirmed_v) == (FaultCode.NONE, 0.0)
+    assert not line.checks.is_armed
+
+
+@pytest.mark.parametrize("unknown", [b"$01M", b"~013", b"~012"])
+def test_an_answer_that_is_lost_a_few_times_is_asked_for_again(unknown: bytes) -> None:
+    line = line_to_old_firmware((unknown,), misses=4)
+    assert (line.fault, line.confirmed_v, line.checks.is_armed) == (FaultCode.NONE, 0.0, True)
+
+
+@pytest.mark.parametrize("is_waived", [False, True])
+def test_a_watchdog_whose_only_proof_is_refused_is_not_armed(is_waived: bool) -> None:
+    """It counted as well: the output was enabled, and nobody had read the watchdog back."""
+    profile = load_device("icpdas-702x")
+    watchdog = profile.own_watchdog
+    assert watchdog
+    by_state = replace(profile, watchdog=replace(watchdog, verify=None))
+    checks = DeviceChecks(output_host(by_state), is_waived=is_waived)
+    for _ in range(20):
+        if (step := checks.next_step(0.0)) is DeviceStep.STATUS:
+            checks.refuse(step, "?01")
+        elif step:
+            checks.take(DeviceAnswer(step, is_right=True))
+    assert (checks.is_armed, checks.is_done) == (False, is_waived)
+    told = (FaultCode.NONE, "") if is_waived else (FaultCode.WATCHDOG_NOT_ARMED, "?01")
+    assert (checks.fault, checks.said) == told
