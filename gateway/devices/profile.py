@@ -219,8 +219,9 @@ def _check_codec(profile: DeviceProfile) -> None:
         raise ValueError(
             f"reply_timeout_s of a Modbus device is at most {_LONGEST_MODBUS_S} s: the force loop waits for it"
         )
-    if not 1 <= profile.unit_id <= _LARGEST_UNIT:
-        raise ValueError(f"address {profile.unit_id}: a Modbus unit is 1 to {_LARGEST_UNIT}")
+    address = str(profile.constants.get(ADDRESS, 1))
+    if not (address.isdecimal() and 1 <= int(address) <= _LARGEST_UNIT):
+        raise ValueError(f"address {address}: a Modbus unit is 1 to {_LARGEST_UNIT}")
 
 
 _EXCHANGES: Final = ("set_voltage", "read_voltage", "read_pressure", "read_force", "stream")

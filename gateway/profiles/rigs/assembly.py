@@ -19,7 +19,6 @@ from gateway.control.settings import (
     Trim,
 )
 from gateway.devices import DeviceProfile
-from gateway.devices.profile import ADDRESS
 from gateway.profiles.find import display, shipped_profiles_folder
 from gateway.profiles.http_sections import Web, without_secrets
 from gateway.profiles.kinds.calibrations import read_calibration
@@ -44,7 +43,7 @@ from gateway.profiles.rigs.compensated_effects import (
     in_simulation,
     without_compensable,
 )
-from gateway.profiles.rigs.device_settings import find_unfit_settings, set_device
+from gateway.profiles.rigs.device_settings import LineFile, find_unfit_settings, set_device
 from gateway.profiles.rigs.edit_marks import find_edit_marks
 from gateway.profiles.rigs.faces import Face, TlsFace
 from gateway.profiles.rigs.rig import ALWAYS_SUPPORTED, CellLine, OutputLine, Rig, ValveLine
@@ -181,6 +180,7 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
     output, load_cell = _part(document, "output", OutputFile), _part(document, "load_cell", CellFile)
     output_device = read_part("device", ("output", "device"), read_device)
     cell_device = read_part("device", ("load_cell", "device"), read_device)
+    valve = _optional_part(document, "valve", ValveFile)
     plant, extended = (read_part("plant", (key,), read_plant) for key in ("plant", "compensation"))
     return Parts(
         name=str(document.at("name")),
@@ -196,8 +196,8 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
         lead=_part(document, "lead", LeadSettings),
         measures_response=document.at("response") != ResponseSource.RIG,
         supervision=_part(document, "supervision", Supervision),
-        valve=_optional_part(document, "valve", ValveFile),
-        valve_device=read_part("device", ("valve", "device"), read_device),
+        valve=valve,
+        valve_device=_as_set(read_part("device", ("valve", "device"), read_device), valve),
         valve_calibration=read_part("calibration", ("valve", "calibration"), read_calibration),
         self_test=_optional_part(document, "self_test", SelfTestSettings),
         network=_part(document, "network", Network),
@@ -217,7 +217,7 @@ def _loop_hz(document: Document) -> float | None:
     return float(loop_hz) if isinstance(loop_hz, (int, float)) else None
 
 
-def _as_set(device: DeviceProfile | None, line: OutputFile | CellFile | None) -> DeviceProfile | None:
+def _as_set(device: DeviceProfile | None, line: LineFile | None) -> DeviceProfile | None:
     """The device with the rig's settings; as it is where they do not fit, which check_device_settings tells."""
     if device is None or line is None or list(find_unfit_settings(device, line)):
         return device
@@ -282,7 +282,9 @@ def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: 
             self_test=file.self_test,
             valve=file.valve.control if file.valve else None,
         ),
-        valve=_valve_line(file.valve, parts.valve_device) if file.valve and parts.valve_device else None,
+        valve=ValveLine.of(parts.valve_device, file.valve.port, file.valve.baud)
+        if file.valve and parts.valve_device
+        else None,
         pull_calibration=parts.valve_calibration,
         network=file.network,
         fieldbus=tuple(face for face in parts.fieldbus if face),
@@ -309,12 +311,6 @@ def _notes(parts: Parts, compensation: Compensation) -> tuple[str, ...]:
 def _supported_bits(file: RigFile) -> ControlBit:
     self_test = ControlBit.START_SELF_TEST if file.self_test else ControlBit(0)
     return ALWAYS_SUPPORTED | self_test | (ControlBit.VALVE_PULL if file.valve else ControlBit(0))
-
-
-def _valve_line(valve: ValveFile, device: DeviceProfile) -> ValveLine:
-    if valve.address is not None:
-        device = replace(device, constants={**device.constants, ADDRESS: valve.address})
-    return ValveLine.of(device, valve.port, valve.baud)
 
 
 def _cell_line(cell: CellFile, device: DeviceProfile) -> CellLine:

@@ -8,30 +8,31 @@ from gateway.devices import DeviceProfile
 from gateway.devices.force_reading import UNIT
 from gateway.devices.profile import ADDRESS
 from gateway.devices.rehearsal import rehearse
-from gateway.profiles.rigs.rig_file import CellFile, OutputFile
+from gateway.profiles.rigs.rig_file import CellFile, OutputFile, ValveFile
 
 CHANNEL: Final = "channel"
 _CONSTANTS: Final = (ADDRESS, CHANNEL)
 _NAMES: Final = (*_CONSTANTS, "watchdog_s", "watchdog_tick_s", "newton_per_count", "checksum")
 Settings = Iterator[tuple[str, str]]
+LineFile = OutputFile | CellFile | ValveFile
 
 
-def set_device(device: DeviceProfile, line: OutputFile | CellFile) -> DeviceProfile:
+def set_device(device: DeviceProfile, line: LineFile) -> DeviceProfile:
     """Return the device as the rig says that it is set. ValueError where it cannot be set so."""
     changes: dict[str, Any] = {}
     said = {name: getattr(line, name) for name in _CONSTANTS if getattr(line, name, None) is not None}
     if said:
         changes["constants"] = {**device.constants, **said}
-    if line.checksum is not None:
+    if not isinstance(line, ValveFile) and line.checksum is not None:
         changes["checksum"] = line.checksum
     if isinstance(line, OutputFile):
         changes |= _watchdog(device, line)
-    else:
+    elif isinstance(line, CellFile):
         changes |= _counts(device, line)
     return replace(device, **changes) if changes else device
 
 
-def find_unfit_settings(device: DeviceProfile, line: OutputFile | CellFile) -> Settings:
+def find_unfit_settings(device: DeviceProfile, line: LineFile) -> Settings:
     """Yield (key, sentence) for what this device cannot be set to."""
     if not _says_any(line):
         return
@@ -42,7 +43,7 @@ def find_unfit_settings(device: DeviceProfile, line: OutputFile | CellFile) -> S
             and not (name == ADDRESS and device.is_modbus)
         ):
             yield name, f"{device.name} has no {name}: leave this line out"
-    if line.checksum is not None and device.is_modbus:
+    if not isinstance(line, ValveFile) and line.checksum is not None and device.is_modbus:
         yield "checksum", f"{device.name} speaks Modbus RTU, which has its own: leave this line out"
         return
     if isinstance(line, OutputFile) and device.own_watchdog is None:
@@ -64,11 +65,11 @@ def _has_unit(device: DeviceProfile, line: CellFile) -> bool:
     return bool(line.unit or device.reading.unit or device.reading.template.field(UNIT))
 
 
-def _says_any(line: OutputFile | CellFile) -> bool:
+def _says_any(line: LineFile) -> bool:
     return any(getattr(line, name, None) is not None for name in (*_NAMES, "zero_count"))
 
 
-def _blamed(line: OutputFile | CellFile) -> str:
+def _blamed(line: LineFile) -> str:
     """The setting that a device's own checks have refused: the first that is given."""
     return next((name for name in _NAMES if getattr(line, name, None) is not None), "device")
 

@@ -2,10 +2,14 @@
 
 from typing import Final
 
-from gateway.devices import DeviceRole
+from gateway.devices import DeviceRole, ValveDirection, ValveHost
+from gateway.devices.messages import Garbage
+from gateway.devices.valve import ValveDevice
 from gateway.profiles.rigs.checks import Check, Found, Parts
-from gateway.profiles.rigs.line_checks import is_same_port, why_no_path
-from gateway.profiles.strict_yaml.fault_sentences import volt
+from gateway.profiles.rigs.device_settings import find_unfit_settings
+from gateway.profiles.rigs.line_checks import is_same_port, of_role, why_no_path
+from gateway.profiles.rigs.wire_checks import check_reply_time
+from gateway.profiles.strict_yaml.fault_sentences import second, volt
 
 
 def check_valve_device(parts: Parts) -> Found:
@@ -16,6 +20,31 @@ def check_valve_device(parts: Parts) -> Found:
             "valve.device",
             f"{device.name} is of role {device.role}, a valve is needed here (mcu-valve, waveshare-relay)",
         )
+
+
+def check_valve_settings(parts: Parts) -> Found:
+    """Yield a fault for an address that the valve's device does not have, or cannot be set to."""
+    if parts.valve and (device := of_role(parts.valve_device, DeviceRole.VALVE)):
+        for name, sentence in find_unfit_settings(device, parts.valve):
+            yield f"valve.{name}", sentence
+
+
+def check_valve_times(parts: Parts) -> Found:
+    """Yield a fault for an answer that cannot be through the valve's wire before it is given up, or blamed."""
+    valve, device = parts.valve, of_role(parts.valve_device, DeviceRole.VALVE)
+    if valve is None or device is None:
+        return
+    settings = device.serial.at(valve.baud)
+    host, far = ValveHost(device), ValveDevice(device)
+    took_s = {}
+    for name, question in (("set_valve", ValveDirection.PULL), ("read_valve", None)):
+        ask = host.request(question)
+        answers = (far.reply(one, ValveDirection.PULL) for one in far.receive(ask) if not isinstance(one, Garbage))
+        took_s[name] = settings.character_s * (len(ask) + sum(map(len, answers)))
+        yield from check_reply_time("valve.baud", device, settings.baud, (name, took_s[name]))
+    if valve.timeout_s <= sum(took_s.values()):
+        least = f"a setting and its readback take {sum(took_s.values()):.3f} s on the wire"
+        yield "valve.timeout_s", f"{second(valve.timeout_s)} is over before the valve can have answered: {least}"
 
 
 def check_valve_simulated_port(parts: Parts) -> Found:
@@ -53,4 +82,10 @@ def check_valve_pressure(parts: Parts) -> Found:
 HARDWARE: Final[tuple[Check, ...]] = (check_valve_port,)
 """Faults that a run with simulated devices does not mind."""
 
-FAULTS: Final[tuple[Check, ...]] = (check_valve_device, check_valve_simulated_port, check_valve_pressure)
+FAULTS: Final[tuple[Check, ...]] = (
+    check_valve_device,
+    check_valve_settings,
+    check_valve_times,
+    check_valve_simulated_port,
+    check_valve_pressure,
+)

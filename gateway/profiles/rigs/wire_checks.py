@@ -116,13 +116,14 @@ def check_reply_timeout(parts: Parts) -> Found:
     if parts.output_device and parts.output:
         baud = parts.output_device.serial.at(parts.output.baud).baud
         for name, took_s in _talks(parts):
-            yield from _check_reply_time("output.baud", parts.output_device, baud, (name, took_s))
+            yield from check_reply_time("output.baud", parts.output_device, baud, (name, took_s))
     for reading in _readings(parts):
         if reading.is_asked:
-            yield from _check_reply_time("load_cell.baud", reading.device, reading.baud, ("read_force", reading.wire_s))
+            yield from check_reply_time("load_cell.baud", reading.device, reading.baud, ("read_force", reading.wire_s))
 
 
-def _check_reply_time(path: str, device: DeviceProfile, baud: int, talk: tuple[str, float]) -> Found:
+def check_reply_time(path: str, device: DeviceProfile, baud: int, talk: tuple[str, float]) -> Found:
+    """Yield a fault for a talk (its name, its time on the wire in s) that takes longer than the device is waited for."""
     if talk[1] > device.reply_timeout_s:
         reason = f"question and answer of {talk[0]} take {talk[1]:.3f} s on the wire"
         bound = f"{device.name} gives up after reply_timeout_s = {second(device.reply_timeout_s)}"

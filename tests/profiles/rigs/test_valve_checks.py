@@ -7,6 +7,7 @@ import pytest
 
 from gateway.control import CommandMap
 from gateway.control.settings import SafeDirection
+from gateway.devices import ValveHost
 from gateway.profiles import check_report, load_rig
 from gateway.registers.words import ControlBit
 from tests.profiles.rigs.test_checks import CELL, RIGS, messages, report
@@ -33,6 +34,23 @@ def test_the_shipped_rig_pulls_and_tests_itself() -> None:
             "valve.device: smc-itv-rc is of role output, a valve is needed",
         ),
         ("  dwell_s: 0.3", "  port: /dev/serial/by-id/x\n  dwell_s: 0.3", "valve.port: a simulated rig has no ports"),
+        ("  dwell_s: 0.3", "  address: 300\n  dwell_s: 0.3", "valve.address: address 300: a Modbus unit is 1 to 255"),
+        ("  dwell_s: 0.3", "  address: one\n  dwell_s: 0.3", "valve.address: address one: a Modbus unit is 1 to 255"),
+        (
+            "  device: waveshare-relay",
+            "  address: 2\n  device: mcu-valve",
+            "valve.address: mcu-valve has no address: leave this line out",
+        ),
+        (
+            "  baud: 9600\n  dwell_s",
+            "  baud: 1200\n  dwell_s",
+            "valve.baud: 1200: question and answer of set_valve take 0.133 s on the wire, waveshare-relay gives up after",
+        ),
+        (
+            "timeout_s: 0.5",
+            "timeout_s: 0.03",
+            "valve.timeout_s: 0.03 s is over before the valve can have answered: a setting and its readback take 0.031 s",
+        ),
         ("safe_voltage_v: 0", "safe_voltage_v: 1", "limits.safe_voltage_v: 1 V: a rig with a valve needs 0 V"),
         ("safe: push", "safe: hold", "valve.safe:"),
         ("timeout_s: 0.5", "timeout_s: 0", "valve.timeout_s:"),
@@ -44,6 +62,12 @@ def test_the_shipped_rig_pulls_and_tests_itself() -> None:
 def test_what_does_not_fit_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
     found = messages(report(tmp_path, PULL, (old, new)).faults)
     assert any(told in message for message in found), found
+
+
+def test_the_valves_address_is_the_rigs(tmp_path: Path) -> None:
+    found = report(tmp_path, PULL, ("  dwell_s: 0.3", "  address: 17\n  dwell_s: 0.3"))
+    assert found.rig and found.rig.valve, found.faults
+    assert ValveHost(found.rig.valve.device).request(None)[0] == 17
 
 
 @pytest.mark.parametrize(
