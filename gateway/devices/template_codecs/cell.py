@@ -94,15 +94,11 @@ class TemplateCellHost:
         return self._grammar.question_line(self._grammar.encode(self._reading.start)) if self._reading.start else b""
 
     def forget(self) -> None:
-        """Drop half a frame: what comes next belongs to another stream, and may begin in the middle of a number."""
-        self._lines.forget()
-        first = self._reading.template.pieces[0]
-        if (
-            not self._reading.ask
-            and not isinstance(first, str)
-            and first.is_open
-            and isinstance(self._lines, LineSplitter)
-        ):
+        """Drop half a frame: what comes next of a stream may begin in the middle of a number, and so does the rest of a late
+        answer: of `+00032.100` a reading of 2.100."""
+        dropped, first = self._lines.forget(), self._reading.template.pieces[0]
+        is_cut = dropped or not self._reading.ask
+        if is_cut and not isinstance(first, str) and first.is_open and isinstance(self._lines, LineSplitter):
             self._lines.skip()
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:

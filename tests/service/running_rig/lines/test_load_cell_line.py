@@ -35,7 +35,10 @@ class Wire:
 
     def answer(self, force_n: float = 1.0, after_s: float = ROUND_TRIP_S) -> None:
         self.now_s += after_s
-        found = self.exchange.receive(self.device.frame(force_n), self.now_s)
+        self.hear(self.device.frame(force_n))
+
+    def hear(self, chunk: bytes) -> None:
+        found = self.exchange.receive(chunk, self.now_s)
         self.samples += [one for one in found if isinstance(one, ForceSample)]
 
 
@@ -230,6 +233,21 @@ def test_half_an_answer_from_before_a_time_out_is_no_part_of_the_next(wire: Wire
     wire.tick(TIMEOUT_S + 0.01)
     wire.answer(2.0)
     assert [sample.force_n for sample in wire.samples] == [2.0]
+
+
+@pytest.mark.parametrize("rest", [b"2.100\r", b"", b".100\r"])
+def test_the_rest_of_an_answer_whose_time_ran_out_in_its_middle_is_no_reading(rest: bytes) -> None:
+    """The rest of +00032.100 was a reading of 2.1, where nothing marks the beginning of a line."""
+    profile = load_device("mantracourt-dsc")
+    wire = Wire(replace(profile, read_force=replace(profile.reading, unit="N")))
+    wire.tick()
+    wire.exchange.receive(b"+00032.100\r"[: -len(rest) or -1], wire.now_s)
+    wire.tick(TIMEOUT_S + 0.01)
+    wire.hear(rest)
+    for _ in range(3):
+        wire.answer(32.1)
+        wire.tick(TIMEOUT_S + 0.01)
+    assert {sample.force_n for sample in wire.samples} == {32.1}
 
 
 def test_what_a_cell_is_is_an_answer_like_any_other(wire: Wire) -> None:
