@@ -61,6 +61,7 @@ def probe_line(line: "AnyLine") -> "PortReport":
     second = probe_path(line.port, others)
     second.heard = {**second.heard, **report.heard}
     second.strangers = report.strangers + second.strangers
+    second.unasked = report.unasked
     return second
 
 
@@ -90,7 +91,7 @@ def tell_report(report: "PortReport", line: "AnyLine | None" = None, *, is_own_f
             f"{other.said}, the profile knows {known}: another device, or a name to add to `models`"
         )
     if not report.answers and not report.strangers:
-        yield f"E112 {report.path}: no known device answered; {_tell_heard(report)}"
+        yield f"E112 {report.path}: no known device answered; {_tell_silence(report)}"
     yield from _tell_latency(report)
 
 
@@ -117,6 +118,13 @@ def _tell_answer(answer: "ProbeAnswer") -> "Iterator[str]":
         f"  a question takes {answer.took_s * 1e3:.1f} ms ({wire_s * 1e3:.1f} ms on the wire alone): about {possible_hz:.0f} "
         f"{what} a second{slow}; the wire alone would carry {1 / cycle_s:.0f}"
     )
+
+
+def _tell_silence(report: "PortReport") -> str:
+    names, is_heard = ", ".join(report.unasked), any(report.heard.values())
+    cure = "`run` tells it the safe voltage, and what it answers"
+    unasked = f"{names} has no question that changes nothing, so it was not asked: {cure}" if names else ""
+    return "; ".join(filter(None, (_tell_heard(report) if is_heard or not names else "", unasked)))
 
 
 def _tell_heard(report: "PortReport") -> str:

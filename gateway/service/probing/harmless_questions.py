@@ -114,9 +114,11 @@ def _of_cell(profile: DeviceProfile) -> Iterator[HarmlessQuestion]:
 
 
 def _cell_host(profile: DeviceProfile) -> CellHost:
-    """Our end; where only a rig could say the unit, as if it were newtons."""
+    """Our end; where only a rig could say the unit, as if it were newtons. What it hears first of a stream may be cut."""
     is_known = profile.reading.newton_per_unit or profile.reading.template.field(UNIT)
-    return cell_host(profile, unit=None if is_known else "N")
+    host = cell_host(profile, unit=None if is_known else "N")
+    host.forget()
+    return host
 
 
 def _first_words(messages: Sequence[object]) -> str:

@@ -21,7 +21,8 @@ from gateway.service.probing.harmless_questions import (
 )
 
 BAUDS: Final = (9600, 19200, 38400, 57600, 115200)
-_LISTEN_S: Final = 0.25  # several lines of a stream of 20 readings a second
+_LISTEN_S: Final = 0.45  # several lines of a stream of 10 readings a second
+_LONGEST_LISTEN_S: Final = 2.0  # to one that is slower by its profile
 _ENOUGH: Final = 3  # readings of a stream
 _ROUNDS: Final = 5  # of a question, to measure how long it takes
 _SETTLE_S: Final = 0.05  # what was on its way when the port was opened
@@ -54,13 +55,15 @@ class Stranger(NamedTuple):
 @dataclass(slots=True)
 class PortReport:
     """What a port gave: answers in the order of finding; strangers: devices that speak a profile's words and call themselves
-    something that it does not know; bytes heard in all, by settings; warning: of its adapter."""
+    something that it does not know; bytes heard in all, by settings; warning: of its adapter; unasked: profiles that have no
+    question which changes nothing."""
 
     path: str
     answers: list[ProbeAnswer] = field(default_factory=list)
     strangers: list[Stranger] = field(default_factory=list)
     heard: dict[str, bytes] = field(default_factory=dict)
     warning: str = ""
+    unasked: tuple[str, ...] = ()
 
 
 class _Ear:
@@ -99,6 +102,7 @@ async def probe_port(
     """Try these profiles at their own speed and then at others, until a device answers. PortError where the port does not open.
     patience_s: the least time that is waited for an answer, where the profile's own is shorter."""
     report = PortReport(path)
+    report.unasked = tuple(profile.name for profile in profiles if not any(harmless_questions(profile)))
     for settings, fitting in _settings_to_try(profiles, bauds):
         await _probe_at(report, settings, fitting, patience_s)
         if report.answers or report.strangers:
@@ -127,7 +131,7 @@ async def _probe_at(
             ear.port.write(start)
         await ear.listen(_SETTLE_S)
         began_s, ear.received = monotonic_s(), b""
-        await ear.listen(_LISTEN_S)
+        await ear.listen(_listens_s(profiles, patience_s))
         streamed, listened_s = ear.received, monotonic_s() - began_s
         report.heard[str(settings)] = streamed
         for profile in profiles:
@@ -140,6 +144,12 @@ async def _probe_at(
                 report.heard[str(settings)] += ear.received
     finally:
         ear.port.close()
+
+
+def _listens_s(profiles: Sequence[DeviceProfile], patience_s: float) -> float:
+    """How long until these streams have said enough, and one line that was cut at its beginning."""
+    by_rate_s = [(_ENOUGH + 1) / profile.rate_hz for profile in profiles if profile.stream]
+    return max(_LISTEN_S, min(_LONGEST_LISTEN_S, max([patience_s, *by_rate_s]))) if by_rate_s else _LISTEN_S
 
 
 def _streamed(

@@ -2,16 +2,20 @@
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
+from gateway.cli.port_probing import tell_report
 from gateway.devices import ValveDevice, ValveDirection, cell_device, output_device
 from gateway.devices.messages import ReadPressure
 from gateway.devices.profile import DeviceRole
+from gateway.ports import Pty
 from gateway.profiles import list_shipped, load_device
 from gateway.service.probing import port_probe
 from gateway.service.probing.harmless_questions import HarmlessQuestion, count_readings, harmless_questions
 from gateway.service.probing.port_probe import _asked, _settings_to_try, _streamed
+from tests.service.probing.far_ends import FarEnd, behind_ptys
 
 STREAM = load_device("stream-st-gs")
 LINE = cell_device(STREAM, None).frame(5.0)
@@ -45,6 +49,39 @@ def test_where_more_makes_no_sense_than_makes_some_it_is_no_stream(received: byt
 @pytest.mark.parametrize(("lines", "is_told"), [(2, False), (3, True)])
 def test_two_readings_alone_are_no_stream(lines: int, is_told: bool) -> None:
     assert (_streamed(STREAM, STREAM.serial, LINE * lines, 0.25) is not None) is is_told
+
+
+def test_of_a_stream_that_was_cut_at_its_beginning_a_whole_reading_is_told() -> None:
+    profile = load_device("hx711-line")
+    found = _streamed(profile, profile.serial, b"456\r\n" + b"123456\r\n" * 4, 0.25)
+    assert found and (found.said, found.heard) == ("reads 123456", b"123456")
+
+
+@pytest.mark.parametrize(("said_hz", "rate_hz"), [(80.0, 10.0), (3.0, 3.0)])
+def test_a_slow_stream_is_listened_to_until_it_has_said_enough(said_hz: float, rate_hz: float) -> None:
+    """An HX711 gives ten readings a second as it comes, its profile eighty: it was no known device."""
+    profile = load_device("hx711-line")
+    assert profile.stream
+    of_rate = [replace(profile, stream=replace(profile.stream, rate_hz=rate)) for rate in (said_hz, rate_hz)]
+    with behind_ptys(FarEnd(of_rate[1])) as (path,):
+        report = asyncio.run(port_probe.probe_port(path, of_rate[:1], ()))
+    (answer,) = report.answers
+    assert answer.rate_hz == pytest.approx(rate_hz, rel=0.5)
+
+
+@pytest.mark.parametrize(("heard", "told"), [(b"", ""), (b"hello", "5 bytes at 9600 8N1 that no profile understands")])
+def test_what_has_no_harmless_question_is_not_said_to_have_been_silent(heard: bytes, told: str) -> None:
+    """Power and wires were blamed for a device that nobody had asked anything."""
+    profile = replace(load_device("smc-itv-rc"), read_voltage=None, read_pressure=None, name="own")
+    assert profile.set_voltage
+    profile = replace(profile, set_voltage=replace(profile.set_voltage, answer="OK"))
+    pty = Pty()
+    report = asyncio.run(port_probe.probe_port(pty.path, [profile], ()))
+    pty.close()
+    assert report.heard == {"9600 8N1": b""}
+    (said,) = tell_report(replace(report, heard={"9600 8N1": heard}))
+    assert "own has no question that changes nothing, so it was not asked" in said
+    assert told in said and "wires" not in said
 
 
 @pytest.mark.parametrize("baud", [300, 9600])
