@@ -24,6 +24,9 @@ from gateway.devices import (
 from gateway.devices.force_reading import UNIT
 from gateway.devices.messages import (
     Accepted,
+    AskDevice,
+    DeviceAnswer,
+    DeviceStep,
     OutputReply,
     OutputRequest,
     Pressure,
@@ -51,6 +54,8 @@ def _output_talks_s(device: DeviceProfile, character_s: float) -> dict[str, floa
         talks["read_voltage"] = ReadVoltage(), Accepted(high_v)
     if device.read_pressure:
         talks["read_pressure"] = ReadPressure(), Pressure(device.read_pressure.range.pressure_pa[1])
+    steps = (step for step in output_host(device).checks if step is not DeviceStep.DISARM)  # which nobody waits for
+    talks |= {step.value: (AskDevice(step), DeviceAnswer(step, is_right=True)) for step in steps}
     return {name: character_s * _characters(device, *talk) for name, talk in talks.items()}
 
 

@@ -257,7 +257,7 @@ class ControlLoop:
             output_held=self._processor_held(output.unanswered_since_s, now_s),
             output_counts=output.counts,
             cell_counts=self.cell_counts,
-            cell_says=self._cell.unread.words(now_s),
+            cell_says=self._cell.says(now_s),
             answer_late_s=output.answer_late_s,
             valve=self.valve.status if self.valve else None,
         )

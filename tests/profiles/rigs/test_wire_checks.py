@@ -46,6 +46,8 @@ def told(folder: Path, **changes: Any) -> tuple[dict[str, str], dict[str, str]]:
          "supervision.output_timeout_s", "0.1 s is over before an answer can be there: 0.133 s on the wire"),
         ({"rig__output__baud": 300, "dac__reply_timeout_s": 2, "rig__supervision__output_timeout_s": 2}, "output.baud",
          "a setting and a reading take 0.90 s on the wire, longer than supervision.response_lag_s = 0.2 s"),
+        ({"dac__identity": {"ask": "*IDN?", "answer": f"{50 * 'M'},{{model:s}},1.0", "models": ["ITV1050"]}},
+         "output.baud", "9600: question and answer of identity take 0.074 s on the wire, smc-itv-rc gives up after"),
         ({"rig__load_cell__baud": 9600, "cell__stream": None, "cell__read_force": POLLED,
           "rig__supervision__sample_timeout_s": 0.03},
          "supervision.sample_timeout_s", "0.03 s is too short: two readings of stream-st-gs take 0.0333 s (60 readings/s"),

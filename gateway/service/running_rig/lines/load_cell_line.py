@@ -22,6 +22,9 @@ _START_AGAIN_S: Final = (
     1.0  # a stream that has been silent for so long is begun anew: the amplifier had no power, perhaps
 )
 _AWAY_S: Final = 0.5  # of silence of a cell that is asked, beyond its period: what answers then may be another one
+_NO_NAME: Final = (
+    "it does not say what it is: power, wires, address, or a device without words for `identity` of its profile?"
+)
 _FASTEST_HZ: Final = 250.0  # the loop's fastest tick: more readings would only cost processor time
 
 
@@ -44,6 +47,10 @@ class CellExchange:
     def is_stream(self) -> bool:
         """Decide whether the cell talks by itself."""
         return not self._question
+
+    def says(self, now_s: float) -> str:
+        """Return what it says in place of readings, or that it does not say what it is; empty where it has been silent."""
+        return self.unread.words(now_s) or (_NO_NAME if self.identity.is_due and self._sent_s is not None else "")
 
     def reset(self) -> None:
         """Forget all that was received before: the port has been opened (again)."""

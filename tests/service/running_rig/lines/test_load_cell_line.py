@@ -177,6 +177,18 @@ def test_behind_a_silence_may_be_another_cell_too(away_s: float, is_asked: bool)
     assert wire.samples and wire.exchange.identity.fault is FaultCode.NONE
 
 
+def test_a_cell_that_does_not_say_what_it_is_is_told_as_such() -> None:
+    """No reading is taken of it: power and wires alone were blamed, and stream mode, of one that answers readings."""
+    wire = Wire(replace(POLLED, identity=Identity(ask="ID?", answer="ID {model:s}", models=("A1",))))
+    assert wire.exchange.says(wire.now_s) == ""
+    for _ in range(30):
+        wire.tick()
+    assert set(wire.asked) == {b"ID?\r\n"}
+    assert "it does not say what it is" in wire.exchange.says(wire.now_s)
+    wire.hear(b"ID A1\r\n")
+    assert wire.exchange.says(wire.now_s) == ""
+
+
 def test_questions_are_counted_and_a_stream_has_none(wire: Wire) -> None:
     """What the metrics call asked: the answered, the lost and the one that is out."""
     for _ in range(3):
