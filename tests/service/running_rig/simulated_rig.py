@@ -70,7 +70,7 @@ class Samples:
     """Stands for the load cell's line: what is put here comes out at the next bytes."""
 
     identity = SimpleNamespace(fault=FaultCode.NONE, said="")
-    unread = SimpleNamespace(words=lambda now_s: "", explain=lambda line: "")
+    unread = SimpleNamespace(explain=lambda line: "")
 
     def __init__(self) -> None:
         self.next: ForceSample | None = None
@@ -78,6 +78,9 @@ class Samples:
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | None]:
         return [self.next]
+
+    def says(self, now_s: float) -> str:
+        return ""
 
     def tick(self, now_s: float) -> None:
         """A stream is not asked."""
