@@ -110,3 +110,24 @@ def test_a_fault_of_a_secret_does_not_quote_it(tmp_path: Path, section: str, tol
         load_rig(rig_with(tmp_path, section))
     assert told in str(raised.value)
     assert "quokka" not in str(raised.value) and "7700" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "copy"),
+    [
+        ("a: 1\n# token: quokka horse # of before\nb: 2\n", "a: 1\n# token: removed-from-this-copy\nb: 2\n"),
+        (
+            "web:\n  token: new-one # not token = quokka\n",
+            "web:\n  token: removed-from-this-copy # not token = removed-from-this-copy\n",
+        ),
+        (
+            'a: "it is # token: no comment" # a token, password: quokka',
+            'a: "it is # token: no comment" # a token, password: removed-from-this-copy',
+        ),
+        ("a: it#token:x\n#password:quokka", "a: it#token:x\n#password:removed-from-this-copy"),
+        ("a: |\n  # token: of a text\nb: 1 # token\n", "a: |\n  # token: of a text\nb: 1 # token\n"),
+    ],
+)
+def test_a_token_in_a_comment_does_not_travel_either_and_what_is_no_comment_stays(text: str, copy: str) -> None:
+    """The token of before is kept there, in case the new one fails."""
+    assert without_secrets(text) == copy
