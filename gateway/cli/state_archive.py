@@ -83,6 +83,7 @@ def unpack(source: Path, state: Path) -> Path | None:
         fresh = beside / _TOP
         fresh.mkdir(exist_ok=True)
         fresh.chmod(0o700)
+        _give_to_owner(fresh, state if state.exists() else state.parent)
         _sync_all(fresh)
         return _put_in_place(fresh, state)
     finally:
@@ -104,6 +105,15 @@ def _extract(archive: tarfile.TarFile, folder: Path) -> None:
             shutil.copyfileobj(content, file)
         path.chmod(_OWNER_READS | member.mode & _MOST_MODE)
         os.utime(path, (member.mtime, member.mtime))
+
+
+def _give_to_owner(fresh: Path, before: Path) -> None:
+    """Have what root restores belong to whose it was, such as a service's user, who could not open it else. before: what it
+    takes the place of, or the folder that it comes into."""
+    owner = before.stat()
+    if os.geteuid() == 0 and owner.st_uid:
+        for path in (*_files(fresh), fresh):
+            os.chown(path, owner.st_uid, owner.st_gid, follow_symlinks=False)
 
 
 def _sync_all(folder: Path) -> None:

@@ -6,6 +6,7 @@ Not in it: keys, certificates, passwords, tokens, addresses of masters (they bec
 found by the name of its key in a rig file, and by its looks in any text; who packs it is shown the list before it is sent.
 """
 
+import contextlib
 import io
 import json
 import platform
@@ -81,7 +82,7 @@ def collect(state: Path, rig_texts: Callable[[], Iterable[tuple[str, str]]]) -> 
         "health.json": lambda: json.dumps(_ask(state, "health"), indent=2),
         "state.txt": lambda: _listing(state),
     }
-    return {name: redact(_or_sentence(make)) for name, make in parts.items()}
+    return {name: redact(_as_text(_or_sentence(make))) for name, make in parts.items()}
 
 
 def pack_bundle(parts: dict[str, str], target: Path) -> None:
@@ -99,10 +100,17 @@ def pack_bundle(parts: dict[str, str], target: Path) -> None:
         beside.unlink(missing_ok=True)
 
 
+def _as_text(said: str) -> str:
+    """The names of files may be bytes that are no text."""
+    return said.encode(errors="backslashreplace").decode()
+
+
 def _or_sentence(make: Callable[[], str]) -> str:
+    from gateway.profiles import ProfileError  # here, for the verb's help needs no profiles
+
     try:
         return make()
-    except (CliError, OSError, ValueError) as error:
+    except (CliError, ProfileError, OSError, ValueError) as error:
         return f"not in it: {getattr(error, 'message', None) or error}"
 
 
@@ -134,5 +142,8 @@ def _ask(state: Path, what: str) -> dict[str, Any]:
 
 
 def _listing(state: Path) -> str:
-    files = sorted(path for path in state.rglob("*") if path.is_file() and not path.is_symlink())
-    return "\n".join(f"{path.stat().st_size:>12} {path.relative_to(state)}" for path in files)
+    lines = []
+    for path in sorted(path for path in state.rglob("*") if path.is_file() and not path.is_symlink()):
+        with contextlib.suppress(FileNotFoundError):  # a running gateway removes some
+            lines.append(f"{path.stat().st_size:>12} {path.relative_to(state)}")
+    return "\n".join(lines)

@@ -13,6 +13,7 @@ import errno
 import fcntl
 import json
 import os
+import stat
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -71,11 +72,31 @@ def make_directory(directory: Path) -> None:
     except FileExistsError:
         return
     try:
+        _make_owner_s(directory)
         sync_path(directory.parent)
     except OSError:
         with contextlib.suppress(OSError):
             directory.rmdir()
         raise
+
+
+def _make_owner_s(directory: Path) -> None:
+    if os.geteuid():
+        return
+    flags = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
+    with (
+        _closing(os.open(directory, flags | os.O_NOFOLLOW)) as made,
+        _closing(os.open(directory.parent, flags)) as folder,
+    ):
+        _give_to_owner(made, directory.name, folder)
+
+
+@contextlib.contextmanager
+def _closing(descriptor: int) -> Iterator[int]:
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
 
 
 def write_durably(directory: int, name: str, data: bytes) -> None:
@@ -164,9 +185,21 @@ def _write(directory: int, name: str, data: bytes) -> None:
     descriptor = open_plain(name, flags, 0o640, directory=directory)
     try:
         write_whole(descriptor, data)
+        _give_to_owner(descriptor, name, directory)
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def _give_to_owner(made: int, name: str, folder: int) -> None:
+    """Have what root makes in the folder of somebody, such as a service's user, belong to that one, who could not read it else:
+    what an administrator had put in use was passed over. Nothing that a link of theirs has led to."""
+    facts, owner = os.fstat(made), os.fstat(folder)
+    if os.geteuid() or not owner.st_uid or facts.st_uid or (facts.st_nlink > 1 and not stat.S_ISDIR(facts.st_mode)):
+        return
+    if os.path.samestat(facts, os.stat(name, dir_fd=folder, follow_symlinks=False)):
+        with contextlib.suppress(PermissionError):  # of a network's file system, which gives root nothing
+            os.fchown(made, owner.st_uid, owner.st_gid)
 
 
 def sync_path(path: Path) -> None:

@@ -3,6 +3,7 @@
 A token must not travel with recordings, which carry the rig's texts, nor be shown: `without_secrets` blanks it there.
 """
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Protocol
@@ -18,6 +19,8 @@ from gateway.profiles.strict_yaml.typed import adapter
 from gateway.profiles.telemetry_sections import Mqtt
 
 _SECRETS: Final = ("token", "password")
+_COMMENT: Final = re.compile(r"(?:^|(?<=\s))#[^\n]*", re.M)
+_SAID: Final = re.compile(rf"(?:{'|'.join(_SECRETS)})[\"']?\s*[:=]\s*(\S.*)")
 _NULL: Final = "tag:yaml.org,2002:null"
 _BLANK: Final = "removed-from-this-copy"
 
@@ -107,10 +110,12 @@ def http_sections_of(file: HttpSections) -> dict[str, Any]:
 
 def without_secrets(text: str) -> str:
     """Return the text of a rig file with tokens and passwords blanked; it reads as before otherwise. Where a value ends YAML
-    says: it may have spaces, commas and number signs in it, and go on in the next line."""
+    says: it may have spaces, commas and number signs in it, and go on in the next line. One in a comment, as of a former token,
+    goes to the end of its line."""
     if not any(name in text for name in _SECRETS):
         return text
-    for first, end in sorted(_secret_places(yaml.compose(text, yaml.SafeLoader)), reverse=True):
+    document = yaml.compose(text, yaml.SafeLoader)
+    for first, end in sorted([*_secret_places(document), *_places_in_comments(text, document)], reverse=True):
         text = text[:first] + _BLANK + text[first + len(text[first:end].rstrip()) :]
     return text
 
@@ -125,3 +130,22 @@ def _secret_places(node: yaml.Node | None) -> Iterator[tuple[int, int]]:
             yield value.start_mark.index, value.end_mark.index
         else:
             yield from _secret_places(value)
+
+
+def _places_in_comments(text: str, document: yaml.Node | None) -> Iterator[tuple[int, int]]:
+    values, at = list(_value_places(document)), 0
+    while comment := _COMMENT.search(text, at):
+        at = comment.end()
+        if inside := next((end for first, end in values if first <= comment.start() < end), 0):
+            at = inside  # a number sign in a value begins no comment
+        elif said := _SAID.search(comment[0]):
+            yield comment.start() + said.start(1), comment.end()
+
+
+def _value_places(node: yaml.Node | None) -> Iterator[tuple[int, int]]:
+    if isinstance(node, yaml.ScalarNode):
+        yield node.start_mark.index, node.end_mark.index
+    elif node is not None:
+        for each in node.value:
+            for part in each if isinstance(each, tuple) else (each,):
+                yield from _value_places(part)

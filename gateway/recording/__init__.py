@@ -6,7 +6,7 @@ its module: `measurement.measurement_of` (numpy), `mapping_file.column_mapping` 
 """
 
 from gateway.recording.errors import RecordingError
-from gateway.recording.export import export_csv, export_parquet, write_csv
+from gateway.recording.export import export_csv, export_name, export_parquet, write_csv
 from gateway.recording.reader import (
     Recording,
     RecordingEntry,
@@ -28,6 +28,7 @@ __all__ = [
     "RecordingEntry",
     "RecordingError",
     "export_csv",
+    "export_name",
     "export_parquet",
     "find_recording",
     "list_recordings",

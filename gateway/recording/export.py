@@ -6,12 +6,19 @@ values that are not there read `nan`. What is no plain word or number in the hea
 
 import json
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
 from gateway.extras import import_library, is_installed
 from gateway.recording.reader import Recording
+
+
+def export_name(recording: Recording, number: int, form: str) -> str:
+    """Return the usual name of the file. The rig of a foreign recording may have any name, a path elsewhere among them."""
+    rig = re.sub(r"[^\w.-]", "_", str(recording.header.get("rig") or "recording"))
+    return f"{rig}-{number:04d}.{form}"
 
 
 def export_csv(recording: Recording, target: Path) -> None:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 _FLOAT64: Final = struct.Struct("<d")
 _ROW_ITEM: Final = _FLOAT64.size
+_GROUPS: Final = ("ladder", "experiment", "plant_in_use", "rig_texts")
+"""Of a header: what is a group of keys, where it is there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +154,8 @@ def _header(data: memoryview, path: Path) -> tuple[dict[str, Any], int]:
     names = header.get("columns")
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
         raise RecordingError(f"{path} has a header without columns: zeros of a power cut, or another program's file")
+    if wrong := [name for name in _GROUPS if not isinstance(header.get(name) or {}, dict)]:
+        raise RecordingError(f"{path} has a header whose {wrong[0]} is no group of keys: another program's file")
     return header, start + length
 
 

@@ -83,6 +83,11 @@ def _check(recording: Recording) -> None:
     if missing or recording.rows < 2:
         what = f"has no column {', '.join(missing)}" if missing else f"has {recording.rows} rows"
         raise RecordingError(f"{recording.path} {what}: only a recording of a gateway's own work can be replayed")
+    for name in ("time_s", "state"):
+        if len(unknown := np.flatnonzero(~np.isfinite(recording.columns[name]))):
+            raise RecordingError(
+                f"{recording.place(int(unknown[0]))} has no {name}: nobody knows what control was asked for"
+            )
     if np.any(recording.columns["state"] == State.CALIBRATING):
         raise RecordingError(
             f"{recording.path} holds a ladder, a plan or a self-test: its commands came from a run and not from a master, "
@@ -99,7 +104,7 @@ def _decide_all(recording: Recording, controller: Controller) -> Iterator[Output
     rows = zip(lists["time_s"], lists["force_n"], lists["setpoint_n"], lists["state"], qualities, sent, strict=True)
     for at, (time_s, force_n, setpoint_n, state, quality, sent_v) in enumerate(rows):
         now_s = _BEGIN_S + time_s - first_s
-        sample = ForceSample(force_n, force_n, _QUALITY.get(int(quality), Quality.OK), now_s)
+        sample = ForceSample(force_n, force_n, _QUALITY.get(quality, Quality.OK), now_s)
         line = LineStatus(acknowledged_v=sent_v or 0.0, sent_v=sent_v, wire_s=wire_s)
         if at == 0:  # as before an enable: a reading is there
             before_s = now_s - 0.01

@@ -152,3 +152,24 @@ def test_a_name_that_no_backup_has_is_refused(tmp_path: Path, name: str) -> None
     source = archive_of(tmp_path / "b.tar.gz", b'{"format": 1}', name)
     with pytest.raises(ArchiveError, match="which no backup does"):
         names_in(source)
+
+
+@pytest.mark.parametrize("was_there", [True, False])
+def test_what_root_restores_is_whose_it_was(
+    state: Path, tmp_path: Path, was_there: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A service could not open its state behind a restore by its administrator, and did not start."""
+    archive, given, real = tmp_path / "b.tar.gz", list[tuple[str, int, int]](), Path.stat
+    pack(state, archive)
+    theirs = state if was_there else tmp_path / "service"
+
+    def stat(path: Path, **options: bool) -> os.stat_result:
+        found = real(path, **options)
+        return os.stat_result((*found[:4], 501, 502, *found[6:])) if path == theirs else found
+
+    monkeypatch.setattr(Path, "stat", stat)
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    monkeypatch.setattr(os, "chown", lambda path, user, group, **_: given.append((path.name, user, group)))
+    (tmp_path / "service").mkdir()
+    unpack(archive, state if was_there else theirs / "cell")
+    assert given == [(name, 501, 502) for name in ("calibrations", "0001.yaml", "state")]

@@ -1,6 +1,7 @@
 """A bundle tells how it is, and no secret: whatever stands in the rig's files and the events."""
 
 import json
+import os
 import tarfile
 from pathlib import Path
 
@@ -92,3 +93,27 @@ def test_a_link_of_the_state_leads_nowhere_in_it_and_the_newest_events_are_there
     parts = collect(state, list)
     assert "link" not in parts["state.txt"]
     assert len(parts["events.jsonl"].splitlines()) == 30
+
+
+def test_a_rig_with_faults_has_its_faults_in_the_bundle_and_all_else(tmp_path: Path) -> None:
+    """That is when somebody wants help."""
+    state, rig, target = (
+        with_events(tmp_path / "state", "A310 master lost"),
+        tmp_path / "cell.yaml",
+        tmp_path / "b.tar.gz",
+    )
+    rig.write_text("name: cell\nweb: {token: quokka horse}\n")
+    done = gateway("report", target, "--state", state, "--rig", rig)
+    assert done.exit_code == 0, done.stderr
+    with tarfile.open(target) as archive:
+        texts = {Path(name).name: archive.extractfile(name).read().decode() for name in archive.getnames()}  # type: ignore[union-attr]
+    assert texts["rig.txt"].startswith("not in it: ") and "limits: is missing" in texts["rig.txt"]
+    assert "A310" in texts["events.jsonl"] and not any("quokka" in text for text in texts.values())
+
+
+def test_a_file_whose_name_is_no_text_is_listed_all_the_same(tmp_path: Path) -> None:
+    state, target = with_events(tmp_path / "state", "A310 master lost"), tmp_path / "b.tar.gz"
+    (state / os.fsdecode(b"odd-\xff")).write_text("x")
+    done = gateway("report", target, "--state", state, "--rig", "demo")
+    assert done.exit_code == 0, done.stderr
+    assert "odd-\\udcff" in collect(state, list)["state.txt"]

@@ -119,3 +119,44 @@ def test_what_a_killed_writer_has_left_is_no_part_of_the_next_file(tmp_path: Pat
     with lock_directory(tmp_path) as descriptor:
         write_durably(descriptor, "0001.yaml", b"number: 1\n")
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("0001.yaml", b"number: 1\n")]
+
+
+@pytest.fixture
+def given(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
+    """To whom files were given by root, which we play: all of ours are its own, and a folder another user's."""
+    real, given = os.fstat, list[tuple[int, int]]()
+
+    def fstat(descriptor: int) -> os.stat_result:
+        found = real(descriptor)
+        owner = (501, 502) if stat.S_ISDIR(found.st_mode) and not given else (0, 0)
+        return os.stat_result((*found[:4], *owner, *found[6:]))
+
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    monkeypatch.setattr(durable_file.os, "fstat", fstat)
+    monkeypatch.setattr(durable_file.os, "fchown", lambda descriptor, *owner: given.append(owner))
+    return given
+
+
+def test_what_root_writes_for_a_service_is_the_service_s(tmp_path: Path, given: list[tuple[int, int]]) -> None:
+    """A calibration that an administrator had put in use could not be read by the service, which went on with another."""
+    with lock_directory(tmp_path) as descriptor:
+        write_durably(descriptor, "active.000002", b"x")
+    assert given == [(501, 502)]
+
+
+def test_what_a_link_leads_to_is_given_to_nobody(tmp_path: Path, given: list[tuple[int, int]]) -> None:
+    (tmp_path / "elsewhere").write_bytes(b"")
+    (tmp_path / "active.000002.new").symlink_to(tmp_path / "elsewhere")
+    with lock_directory(tmp_path) as descriptor:
+        write_durably(descriptor, "active.000002", b"x")
+    assert given == []
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+def test_a_folder_that_root_makes_is_that_of_whose_state_it_is_in(tmp_path: Path) -> None:
+    os.chown(tmp_path, 501, 502)
+    make_directory(tmp_path / "reference")
+    with lock_directory(tmp_path / "reference") as descriptor:
+        write_durably(descriptor, "reference.json", b"{}")
+    for path in (tmp_path / "reference", tmp_path / "reference" / "reference.json"):
+        assert (path.stat().st_uid, path.stat().st_gid) == (501, 502)

@@ -90,3 +90,44 @@ def test_no_part_of_a_token_travels_however_it_is_written(tmp_path: Path, sectio
 def test_a_token_that_is_not_there_is_none_in_the_copy(tmp_path: Path) -> None:
     rig = load_rig(rig_with(tmp_path, "web: {token: null}\n"))
     assert "token: null" in next(text for name, text in rig.texts.items() if name.endswith("rig.yaml"))
+
+
+@pytest.mark.parametrize(
+    ("section", "told"),
+    [
+        ("web: {token: quokka horse}\n", "web.token: what stands there is shorter than 16 characters"),
+        (f"web: {{token: {'quokka ' * 30}}}\n", "web.token: what stands there is longer than 200 characters"),
+        ("web: {token: 77001133557799001122}\n", "web.token: what stands there is not text: write it in quotes"),
+        (
+            "mqtt: {host: broker, password_file: quokka}\n",
+            "mqtt.password_file: what stands there does not have the form",
+        ),
+    ],
+)
+def test_a_fault_of_a_secret_does_not_quote_it(tmp_path: Path, section: str, told: str) -> None:
+    """Faults stand in the journal, in the events of a start that they end, and so in a bundle for support."""
+    with pytest.raises(ProfileError) as raised:
+        load_rig(rig_with(tmp_path, section))
+    assert told in str(raised.value)
+    assert "quokka" not in str(raised.value) and "7700" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "copy"),
+    [
+        ("a: 1\n# token: quokka horse # of before\nb: 2\n", "a: 1\n# token: removed-from-this-copy\nb: 2\n"),
+        (
+            "web:\n  token: new-one # not token = quokka\n",
+            "web:\n  token: removed-from-this-copy # not token = removed-from-this-copy\n",
+        ),
+        (
+            'a: "it is # token: no comment" # a token, password: quokka',
+            'a: "it is # token: no comment" # a token, password: removed-from-this-copy',
+        ),
+        ("a: it#token:x\n#password:quokka", "a: it#token:x\n#password:removed-from-this-copy"),
+        ("a: |\n  # token: of a text\nb: 1 # token\n", "a: |\n  # token: of a text\nb: 1 # token\n"),
+    ],
+)
+def test_a_token_in_a_comment_does_not_travel_either_and_what_is_no_comment_stays(text: str, copy: str) -> None:
+    """The token of before is kept there, in case the new one fails."""
+    assert without_secrets(text) == copy

@@ -9,13 +9,14 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from ipaddress import ip_network
+from ipaddress import ip_address, ip_network
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from gateway.cli.errors import CliError
 from gateway.cli.system_service import unit_file
 from gateway.processes import exit_codes
+from gateway.profiles.find import list_shipped, locate
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
 
 if TYPE_CHECKING:
@@ -40,9 +41,9 @@ class Installation:
 def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], command: Path | None) -> Installation:
     """Return the plan for a rig that `check` has accepted. CliError E107 where the service could not run it."""
     program = (command or _own_command()).absolute()
-    is_file = Path(rig_name).suffix in (".yaml", ".yml") or "/" in rig_name
-    named = str(Path(rig_name).absolute()) if is_file else rig_name
-    for path in (str(program), *([named] if is_file else [])):
+    is_file = rig_name not in list_shipped("rig")
+    named = _path_of(rig_name) if is_file else rig_name
+    for path in (str(program), *([named] if is_file else []), *_files_of(rig)):
         _refuse_hidden(path)
     if not _NOT_OF_PROGRAMS.isdisjoint(str(program)):
         raise CliError(f"E107 {program}: systemd starts no program with such a path", exit_codes.CONFIGURATION)
@@ -58,8 +59,9 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
         stem=stem,
         ports=_ports_of(rig),
         devices=() if rig.simulated else tuple(dict.fromkeys(port for port in ports if port)),
-        networks=tuple(networks) or _networks_of(rig),
+        networks=_networks_of(rig, networks),
         compiles=rig.is_watched,
+        waits_for_network=any(map(_is_own_address, _addresses_of(rig))),
     )
     return Installation(
         options.name,
@@ -172,6 +174,53 @@ def _ports_of(rig: "Rig") -> tuple[int, ...]:
     return (*([rig.network.port] if rig.network.plain else []), *secure)
 
 
-def _networks_of(rig: "Rig") -> tuple[str, ...]:
-    """Who may connect by the rig itself may by the kernel; a rig that names nobody is reached from this machine alone."""
-    return ("localhost", *map(str, rig.network.allow))
+def _addresses_of(rig: "Rig") -> list[str]:
+    secure = [face.bind for face in rig.fieldbus if isinstance(face, TlsFace)]
+    return [*([rig.network.bind] if rig.network.plain else []), *secure]
+
+
+def _is_own_address(address: str) -> bool:
+    """Decide whether it is there only once the network is up."""
+    found = ip_address(address)
+    return not (found.is_loopback or found.is_unspecified)
+
+
+def _networks_of(rig: "Rig", given: Sequence[str]) -> tuple[str, ...]:
+    """Who may connect by the rig itself may by the kernel, unless others are given; this machine and the broker always may.
+    A rig that names nobody is reached from this machine alone."""
+    secure = [face.allow for face in rig.fieldbus if isinstance(face, TlsFace)]
+    allowed = given or [str(network) for each in (rig.network.allow, *secure) for network in each]
+    return tuple(dict.fromkeys(("localhost", *allowed, *_broker_of(rig, is_given=bool(given)))))
+
+
+def _broker_of(rig: "Rig", *, is_given: bool) -> tuple[str, ...]:
+    """Return the address of the rig's broker. CliError E107 for a name: the kernel goes by addresses, also of a name server."""
+    host = rig.mqtt.host if rig.mqtt else "localhost"
+    try:
+        return (str(ip_address(host.partition("%")[0])),)
+    except ValueError:
+        if host == "localhost" or is_given:
+            return ()
+        raise CliError(
+            f"E107 mqtt.host {host} is a name, and the service reaches only addresses that its unit names: write the broker's "
+            "address in the rig, or give --allow for each network: of masters, broker and name server",
+            exit_codes.CONFIGURATION,
+        ) from None
+
+
+def _path_of(rig_name: str) -> str:
+    """Return the whole path of a rig's file, which `load_rig` has found from here: the service has another directory."""
+    try:
+        return str(locate("rig", rig_name).absolute())
+    except FileNotFoundError:
+        return str(Path(rig_name).absolute())
+
+
+def _files_of(rig: "Rig") -> list[str]:
+    """Return the files that the rig names besides profiles: the service must see them, too."""
+    secure = [
+        path for face in rig.fieldbus if isinstance(face, TlsFace) for path in (face.certificate, face.key, face.ca)
+    ]
+    mqtt, tls = rig.mqtt, rig.mqtt and rig.mqtt.tls
+    broker = (mqtt and mqtt.password_file, *((tls.ca, tls.certificate, tls.key) if tls else ()))
+    return [str(Path(path).absolute()) for path in (*secure, *broker) if path]

@@ -4,6 +4,7 @@ Decisions
 - `Type=notify` and a watchdog that the control loop feeds through the guardian: a loop that stands restarts the service.
 - No restart behind an exit that says that another start would end the same way: command line, data, permission,
   configuration. Any other failure starts again, five times in five minutes at most.
+- An address of its own is there only once the network is up: a start before it would be one of those five.
 - A user of its own that owns nothing but the state directory, and the serial ports by their group. Nothing else of the machine
   can be written, most of it not even seen; only the devices named here are there at all.
 - `systemd-analyze security --offline=true` judges it; a test holds it to at most 1.5.
@@ -65,7 +66,7 @@ DevicePolicy=closed
 class UnitOptions:
     """rig: a shipped name or an absolute path; stem: what its state directory and unit are called; ports: of Modbus, for
     the one privilege that a port below 1024 needs; devices: serial ports, as /dev/serial/by-id/...; networks: who may reach it
-    (CIDR), empty for everybody; compiles: the residual watch runs."""
+    (CIDR), empty for everybody; compiles: the residual watch runs; waits_for_network: it listens on an address of its own."""
 
     command: Path
     rig: str
@@ -74,6 +75,7 @@ class UnitOptions:
     devices: Sequence[str] = ()
     networks: Sequence[str] = ()
     compiles: bool = False
+    waits_for_network: bool = False
 
     @property
     def name(self) -> str:
@@ -92,7 +94,8 @@ def unit_text(options: UnitOptions) -> str:
     lines = [
         "[Unit]",
         f"Description=force-gateway, rig {stem}",
-        "After=network.target",
+        *(["Wants=network-online.target"] if options.waits_for_network else []),
+        f"After={'network-online' if options.waits_for_network else 'network'}.target",
         "StartLimitIntervalSec=300",
         "StartLimitBurst=5",
         "",

@@ -24,6 +24,10 @@ def command(*, file: Path, force: bool, state: StateChoice) -> None:
     directory = state.directory
     if not directory.is_dir():
         raise no_state_directory(directory)
+    if file.absolute().parent.resolve().is_relative_to(directory.resolve()):
+        raise click.UsageError(
+            f"{file} is in {directory} itself: each backup would pack those before it; name a file elsewhere"
+        )
     if file.exists() and not force:
         raise already_exists(file)
     names = pack(directory, file)

@@ -122,6 +122,10 @@ def compare_command(*, a: str, b: str, plot: Path | None, state: StateChoice, as
     from gateway.cli.calibration.store_access import find_calibration, open_store
 
     store = open_store(state.directory, state.rig)
+    if plot:
+        from gateway.cli.diagnosis.outputs import check_targets
+
+        check_targets([plot], [Path(a), Path(b)])
     first, second = find_calibration(store, a), find_calibration(store, b)
     try:
         comparison = compare_calibrations(first, second)

@@ -160,7 +160,8 @@ def _compute_answer(options: dict[str, Any], files: "AnswerFiles") -> "Answer":
             calibration=options["calibration"],
         )
         old = _read_old(options, sources.rig)
-    check_targets(files.on_disk, (*sources.paths, *(old.paths if old else ())))
+    named = (Path(options[name]) for name in ("rig", "columns", "calibration") if options[name])
+    check_targets(files.on_disk, (*sources.paths, *(old.paths if old else ()), *named))
     diagnosis, runtime_s = _run_diagnosis(sources, old, options)
     gain = _measure_gain(diagnosis, sources) if options["closed_loop"] else None
     return add_plan(Answer(diagnosis, sources, runtime_s, gain), files.plan)
@@ -174,8 +175,13 @@ def _show_before_after(options: dict[str, Any]) -> None:
     if not (options["before"] and options["after"]):
         raise click.UsageError("--before A and --after B go together: the run before a change and the one after it")
     from gateway.cli.diagnosis import before_after
-    from gateway.cli.diagnosis.outputs import STDOUT, write_all
+    from gateway.cli.diagnosis.inputs import recording_path
+    from gateway.cli.diagnosis.outputs import STDOUT, check_targets, write_all
 
+    runs = [recording_path(options[name], options["rig"], options["state"]) for name in ("before", "after")]
+    named = [Path(options[name]) for name in ("rig", "columns") if options[name]]
+    targets = [file for file in (options["json_file"], options["report"]) if file and file != STDOUT]
+    check_targets(targets, [*runs, *named])
     found = before_after.run(options["before"], options["after"], options["columns"], options["rig"], options["state"])
     texts = {options["json_file"]: json.dumps(before_after.document(found), indent=2, allow_nan=False) + "\n"}
     if options["report"]:

@@ -75,18 +75,19 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
 
     RECORDING is a number of `recordings list`, a .fgr file, or a CSV or Parquet table with time_s, command_v, force_n.
     """
+    from gateway.cli.diagnosis.outputs import check_targets
     from gateway.cli.diagnosis.progress_line import show_progress
 
+    path = _source(recording, options)
+    target = None if options["no_report"] else options["report"] or _beside(path)
+    named = [Path(options[name]) for name in ("rig", "columns") if options[name]]
+    check_targets([target] if target else [], [path, *named])
     with show_progress("fitting"):
-        fit = _fit(recording, options)
-    target = None if options["no_report"] else options["report"] or _beside(fit.recording.path)
+        fit = _fit(path, options)
     if store:
         fit.document["calibration"] = _store(fit, options)
     if target:
-        from gateway.service.fitting.ladder_fit import write_report
-
-        write_report(fit, target)
-        fit.document["report"] = str(target)
+        _write_report(fit, target)
     if as_json:
         click.echo(json.dumps(fit.document, indent=2))
     else:
@@ -97,7 +98,31 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
         raise CliError(rejected_sentence(fit.document["calibration"], fit.verdict.rejected), exit_codes.DATA)
 
 
-def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
+def _source(name: str, options: dict[str, Any]) -> Path:
+    """Return the file of the recording. RecordingError or CliError (65) where there is none."""
+    from gateway.service.fitting.ladder_source import find_source
+
+    path = find_source(name, state_directory(options["state"], options["rig"]))
+    if not path.exists():
+        raise no_such_recording(path)
+    return path
+
+
+def _write_report(fit: "LadderFit", target: Path) -> None:
+    """Write the report. CliError where the disk refuses; it tells the calibration that is stored all the same."""
+    from gateway.plain_file import tell_refusal
+    from gateway.service.fitting.ladder_fit import write_report
+
+    try:
+        write_report(fit, target)
+    except OSError as error:
+        number = fit.document.get("calibration")
+        stored = f"; calibration {number} is stored, only its report is missing" if number else ""
+        raise CliError(f"E106 {error.filename or target}: {tell_refusal(error)}{stored}") from None
+    fit.document["report"] = str(target)
+
+
+def _fit(path: Path, options: dict[str, Any]) -> "LadderFit":
     """Return the fit; whatever is wrong with the data ends with exit code 65."""
     from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.fit.result import ModelName, Ties
@@ -105,12 +130,9 @@ def _fit(name: str, options: dict[str, Any]) -> "LadderFit":
     from gateway.progress import report
     from gateway.recording.tables.mapping_file import column_mapping
     from gateway.service.fitting.ladder_fit import fit_recording
-    from gateway.service.fitting.ladder_source import RigContext, find_source, read_source
+    from gateway.service.fitting.ladder_source import RigContext, read_source
 
     report("reading the recording")
-    path = find_source(name, state_directory(options["state"], options["rig"]))
-    if not path.exists():
-        raise no_such_recording(path)
     mapping = column_mapping(options["columns"])
     models = tuple(ModelName(model) for model in options["models"])
     question = FitRequest(

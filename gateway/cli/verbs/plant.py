@@ -98,9 +98,13 @@ def compare_command(*, a: str, b: str, state: StateChoice, as_json: bool, **draw
     from gateway.cli.plants.descriptions import describe_difference, differing_numbers
     from gateway.cli.plants.store_access import find_plant
 
+    plot, recording = drawn["plot"], drawn["recording"]
+    if plot:
+        from gateway.cli.diagnosis.outputs import check_targets
+
+        check_targets([plot], [Path(name) for name in (a, b, recording) if name])
     first, second = find_plant(state, a), find_plant(state, b)
     differing = differing_numbers(first, second)
-    plot, recording = drawn["plot"], drawn["recording"]
     if plot:
         from gateway.cli.plants.comparison_page import plant_comparison_page
 

@@ -172,7 +172,7 @@ def export_command(*, number: int, form: str, output: Path | None, force: bool, 
             raise click.UsageError("only CSV goes to stdout; give -o FILE")
         room.write_csv(recording, sys.stdout.buffer)
         return
-    target = output or Path(f"{recording.header.get('rig', 'recording')}-{number:04d}.{form}")
+    target = output or Path(room.export_name(recording, number, form))
     if target.exists() and not force:
         raise already_exists(target)
     (room.export_csv if form == "csv" else room.export_parquet)(recording, target)

@@ -50,7 +50,10 @@ def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str 
     profile = load_plant(plant) if plant else None
     sources = read_sources([recording], **options)
     measurement, profile = sources.measurements[0], profile or sources.plant
-    check_targets([csv_file] if csv_file else [], [*sources.paths, *([Path(plant)] if plant else [])])
+    check_targets(
+        [csv_file] if csv_file else [],
+        [*sources.paths, *(Path(name) for name in (plant, options["rig"], options["columns"]) if name)],
+    )
     with show_progress("simulating"):
         simulated_n, notes = simulate_reading(measurement, profile)
     facts = _facts(measurement, simulated_n) | {

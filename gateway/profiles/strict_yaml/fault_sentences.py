@@ -34,6 +34,11 @@ _TYPES_ELSEWHERE: Final = dict.fromkeys(
 )
 """What is written as a `type` and has a place of its own."""
 _PLAIN: Final = re.compile(r"[\w.:/+ -]+")  # what reads well without quotes
+_SECRETS: Final = ("token", "password", "password_file")  # a password may stand in place of its file
+
+
+class _Secret(str):
+    """A value that no fault may quote: the journal, the events and a support bundle tell faults."""
 
 
 def _unit_start(key: str) -> int | None:
@@ -77,6 +82,8 @@ def quote_value(value: object) -> str:
     """Return a value as the file has it, short."""
     if value is None:
         return "empty"
+    if isinstance(value, _Secret):
+        return "what stands there"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, (int, float)):
@@ -140,6 +147,8 @@ def _hint(value: Any, what: str) -> str:
         return f': write "{str(value).lower()}" in quotes'
     if isinstance(value, (int, float)) and what == "text":
         return f': write "{number(value)}" in quotes'
+    if isinstance(value, _Secret) and what == "text":
+        return ": write it in quotes"
     if not isinstance(value, str):
         return ""
     if what == "true or false" and value.lower() in ("yes", "on", "y", "no", "off", "n", "true", "false"):
@@ -237,5 +246,7 @@ def type_sentence(error: Mapping[str, Any], value: Any, key: object) -> str:
     context: dict[str, Any] = error.get("ctx") or {}
     if value is None and error["type"] != "value_error":
         return "has no value"
+    if key in _SECRETS and isinstance(value, (str, int, float)) and not isinstance(value, bool):
+        value = _Secret(value)
     words = _BY_TYPE.get(error["type"])
     return words(value, context, unit_of(key)) if words else f"{quote_value(value)}: {error['msg']}"

@@ -8,6 +8,7 @@ import contextlib
 import json
 import os
 import tempfile
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -70,7 +71,8 @@ def summary_of(path: Path) -> Summary:
 
 def _duration_s(recording: Recording) -> float:
     time_s = recording.columns.get("time_s")
-    return 0.0 if time_s is None or not len(time_s) else float(time_s[-1] - time_s[0])
+    duration_s = 0.0 if time_s is None or not len(time_s) else float(time_s[-1] - time_s[0])
+    return duration_s if isfinite(duration_s) else 0.0  # of another program: JSON has no NaN
 
 
 _NOTHING_KNOWN: Final[Summary] = {

@@ -86,7 +86,9 @@ def _residual_n(recording: Recording) -> float | None:
 
 def _what_ran(header: dict[str, Any]) -> str:
     if ladder := header.get("ladder"):
-        return f"calibration ladder of {ladder.get('groups', '?')} × {ladder.get('step_v', 0.0):g} V stairs"
+        step_v = ladder.get("step_v", 0.0)
+        stairs = f"{step_v:g} V stairs" if isinstance(step_v, (int, float)) else "stairs"
+        return f"calibration ladder of {ladder.get('groups', '?')} × {stairs}"
     if experiment := header.get("experiment"):
         return f"experiment {experiment.get('name', '')}".strip()
     return "run"

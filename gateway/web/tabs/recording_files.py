@@ -44,13 +44,13 @@ _one_at_a_time: Final = threading.Lock()
 
 def export_recording(state: Path, number: int, form: str) -> ExportedFile:
     """Write a recording as CSV or Parquet into a folder of its own. One at a time: a long one takes memory."""
-    from gateway.recording import export_csv, export_parquet
+    from gateway.recording import export_csv, export_name, export_parquet
 
     source = recording_path(state, number)
     with _one_at_a_time:
         recording = _read(source)
         folder = TemporaryDirectory(prefix="force-gateway-export-")
-        target = Path(folder.name) / f"{recording.header.get('rig', 'recording')}-{number:04d}.{form}"
+        target = Path(folder.name) / export_name(recording, number, form)
         try:
             (export_parquet if form == "parquet" else export_csv)(recording, target)
         except BaseException:

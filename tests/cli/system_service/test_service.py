@@ -3,7 +3,9 @@
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from functools import partial
+from ipaddress import ip_network
 from pathlib import Path
 
 import pytest
@@ -11,10 +13,13 @@ from click.testing import CliRunner, Result
 
 from gateway.cli.errors import CliError
 from gateway.cli.main import command
+from gateway.cli.system_service import installation
 from gateway.cli.system_service.installation import plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, device_classes, unit_text
 from gateway.cli.system_service.unit_status import parse_status
-from gateway.profiles import load_rig
+from gateway.profiles import Rig, load_rig
+from gateway.profiles.rigs.faces import TlsFace
+from gateway.profiles.telemetry_sections import Mqtt
 
 ANALYZE = shutil.which("systemd-analyze")
 needs_systemd = pytest.mark.skipif(ANALYZE is None, reason="systemd-analyze is not here: nobody judges the unit")
@@ -142,3 +147,56 @@ def test_the_status_is_a_sentence() -> None:
     assert runs.is_running and not failed.is_running
     assert runs.sentence == "a.service: runs since Mon 2026-11-23 05:00:00 UTC, started again 1 time; rig demo, x=1"
     assert failed.sentence == "a.service: failed (exit-code, exit code 78); force-gateway service logs shows why"
+
+
+def planned(rig: Rig, *networks: str, name: str = "demo") -> str:
+    plan = plan_installation(name, rig, networks=networks, command=Path("/opt/force-gateway"))
+    return plan.files[f"etc/systemd/system/{plan.unit}"]
+
+
+def allowed(rig: Rig, *networks: str) -> str:
+    return next(line for line in planned(rig, *networks).splitlines() if line.startswith("IPAddressAllow="))
+
+
+def test_whoever_a_tls_face_lets_in_is_let_in_by_the_kernel() -> None:
+    """Its list is its own: a rig without plain Modbus TCP was reached by nobody but this machine."""
+    face = TlsFace(type="tls", certificate="/x", key="/y", ca="/z", allow=(ip_network("10.1.0.0/16"),))
+    assert allowed(replace(load_rig("demo"), fieldbus=(face,))) == "IPAddressAllow=localhost 10.1.0.0/16"
+    both = allowed(replace(load_rig("irc5-cell"), fieldbus=(face,)))
+    assert both == "IPAddressAllow=localhost 192.168.125.0/24 10.1.0.0/16"
+
+
+def test_a_broker_is_reached_and_this_machine_also_where_others_are_given() -> None:
+    rig = replace(load_rig("demo"), mqtt=Mqtt(host="192.0.2.7"))
+    assert allowed(rig) == "IPAddressAllow=localhost 192.0.2.7"
+    assert allowed(rig, "10.0.0.0/8") == "IPAddressAllow=localhost 10.0.0.0/8 192.0.2.7"
+    assert allowed(replace(rig, mqtt=Mqtt(host="localhost"))) == "IPAddressAllow=localhost"
+    named = replace(rig, mqtt=Mqtt(host="broker.example"))
+    with pytest.raises(CliError, match=r"E107 mqtt\.host broker\.example is a name"):
+        allowed(named)
+    assert allowed(named, "10.0.0.0/8") == "IPAddressAllow=localhost 10.0.0.0/8"
+
+
+def test_a_rig_by_the_name_of_its_file_here_is_told_to_the_service_by_its_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The service has another working directory: it would have ended at once, without such a rig."""
+    (tmp_path / "cell.yaml").write_text("name: cell\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(installation, "_HIDDEN", ())
+    assert f" run {tmp_path}/cell.yaml --state %S/force-gateway/cell\n" in planned(load_rig("demo"), name="cell")
+
+
+def test_a_secret_file_that_the_service_cannot_see_is_refused() -> None:
+    rig = replace(load_rig("demo"), mqtt=Mqtt(host="127.0.0.1", password_file="/home/me/password"))
+    with pytest.raises(CliError, match="E107 /home/me/password: the service sees nothing below /home"):
+        planned(rig)
+
+
+def test_an_address_of_its_own_is_waited_for_and_one_that_is_always_there_is_not() -> None:
+    """Five starts before the network is up, and the service stayed off behind a loss of power."""
+    rig = load_rig("demo")
+    own = planned(replace(rig, network=replace(rig.network, bind="192.0.2.1")))
+    assert "Wants=network-online.target\nAfter=network-online.target\n" in own
+    for bind in ("0.0.0.0", "127.0.0.1", "::"):
+        assert "\nAfter=network.target\n" in planned(replace(rig, network=replace(rig.network, bind=bind)))

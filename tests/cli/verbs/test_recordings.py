@@ -117,3 +117,34 @@ def rig_file_with_retention(tmp_path: Path) -> Path:
     path = tmp_path / "own.yaml"
     path.write_text(f"{text}\nrecordings: {{retention: {{days: 7}}}}\n", encoding="utf-8")
     return path
+
+
+@pytest.mark.parametrize("key", ["ladder", "experiment", "plant_in_use", "rig_texts"])
+def test_a_recording_of_another_program_hides_no_other_one(key: str, state: Path, call) -> None:
+    """Its header is JSON of another form: the list ended with an internal error, at the terminal and on the page."""
+    record(state, **{key: "of another form"})
+    listed = call("recordings", "list", "--json", "--state", state)
+    assert listed.exit_code == 0, listed.stderr
+    assert [one["fault"] is None for one in json.loads(listed.stdout)] == [True, True, False]
+    assert f"whose {key} is no group of keys" in call("recordings", "show", "3", "--state", state).output
+
+
+def test_a_time_that_is_no_number_is_no_nan_in_json(tmp_path: Path, call) -> None:
+    recorder = Recorder(tmp_path / "recordings", {"rig": "demo"}, ("time_s", "force_n"))
+    for time_s in (0.0, 0.1, float("nan")):
+        recorder.append((time_s, 1.0))
+    recorder.close()
+    told = json.loads(call("recordings", "show", "1", "--json", "--state", tmp_path).stdout, parse_constant=pytest.fail)
+    assert told["duration_s"] == 0.0 and told["rows"] == 3
+    assert call("recordings", "show", "1", "--state", tmp_path).exit_code == 0
+
+
+def test_an_export_stays_here_whatever_the_rig_of_a_foreign_recording_is_called(
+    tmp_path: Path, call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    record(tmp_path, rig="../elsewhere")
+    assert call("recordings", "export", "1", "--state", tmp_path).exit_code == 0
+    assert [path.name for path in here.iterdir()] == [".._elsewhere-0001.csv"]

@@ -74,3 +74,15 @@ def test_what_is_not_there_is_one_sentence(words: tuple[str, ...], code: int, wh
     assert answer.exit_code == code, answer.output
     assert why in answer.stderr
     assert "Traceback" not in answer.stderr
+
+
+@pytest.mark.parametrize(("name", "code"), [("time_s", 65), ("state", 65), ("quality", 0)])
+def test_a_row_without_its_time_or_state_is_named_and_one_without_quality_is_a_good_one(
+    name: str, code: int, state: Path, tmp_path: Path, call
+) -> None:
+    recording = read_recording(state / "recordings" / "0001.fgr")
+    recording.columns[name][40] = float("nan")
+    export_csv(recording, tmp_path / "edited.csv")
+    answer = call("replay", tmp_path / "edited.csv", "--state", state, "--rig", "demo")
+    assert answer.exit_code == code, answer.output
+    assert "E500" not in answer.output

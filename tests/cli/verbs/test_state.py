@@ -256,3 +256,12 @@ def test_a_backup_of_nothing_says_so(call, tmp_path: Path) -> None:
     answer = call("backup", tmp_path / "b.tar.gz", "--state", tmp_path / "nothing")
     assert answer.exit_code == 65
     assert not (tmp_path / "b.tar.gz").exists()
+
+
+def test_no_backup_goes_into_the_directory_that_it_packs(state: Path, call, tmp_path: Path) -> None:
+    """Each one packed those before it: the disk was full after some weeks of one a night."""
+    (tmp_path / "link").symlink_to(state / "recordings")
+    for target in (state / "today.tar.gz", tmp_path / "link" / "today.tar.gz"):
+        answer = call("backup", target, "--state", state, "--force")
+        assert answer.exit_code == 2 and "name a file elsewhere" in answer.stderr
+    assert not list(state.rglob("*.tar.gz"))

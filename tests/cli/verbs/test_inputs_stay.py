@@ -1,0 +1,58 @@
+"""What a verb reads it does not write over, whatever its options say."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles import shipped_profiles_folder
+from tests.cli.verbs.test_fit import ladder_rows, written
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A ladder, a calibration and a plant, each as a file of its user's."""
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path / "ladder.csv", ladder_rows())
+    for folder, name in (("calibrations", "demo"), ("plants", "paper-slide"), ("rigs", "demo")):
+        text = (shipped_profiles_folder() / folder / f"{name}.yaml").read_text(encoding="utf-8")
+        (tmp_path / f"{folder}.yaml").write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("fit", "ladder.csv", "--report", "ladder.csv"),
+        ("fit", "ladder.csv", "--rig", "rigs.yaml", "--report", "rigs.yaml"),
+        ("diagnose", "--before", "ladder.csv", "--after", "ladder.csv", "--report", "ladder.csv"),
+        ("diagnose", "--before", "ladder.csv", "--after", "ladder.csv", "--json", "./ladder.csv"),
+        ("diagnose", "ladder.csv", "--rig", "rigs.yaml", "--extend", "rigs.yaml"),
+        ("simulate", "ladder.csv", "--rig", "rigs.yaml", "--csv", "rigs.yaml"),
+        ("calibration", "compare", "calibrations.yaml", "demo", "--plot", "calibrations.yaml"),
+        ("plant", "compare", "paper-slide", "plants.yaml", "--plot", "plants.yaml"),
+        ("plant", "compare", "paper-slide", "plants.yaml", "--plot", "ladder.csv", "--recording", "ladder.csv"),
+    ],
+)
+def test_no_output_takes_the_place_of_what_is_read(here: Path, call, words: tuple[str, ...]) -> None:
+    before = {path: path.read_bytes() for path in here.iterdir()}
+    answer = call(*words)
+    assert answer.exit_code == 2 and "would be overwritten" in answer.stderr, answer.output
+    assert {path: path.read_bytes() for path in here.iterdir()} == before
+
+
+def test_a_calibration_whose_report_the_disk_does_not_take_is_told_as_stored(
+    here: Path, call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Who did not hear of it stored it once more."""
+    from gateway.service.fitting import ladder_fit
+
+    def refuse(target: Path, text: str) -> None:
+        raise OSError(28, "No space left on device", str(target))
+
+    monkeypatch.setattr(ladder_fit, "replace_text", refuse)
+    answer = call(
+        "fit", "ladder.csv", "--models", "bsfm", "--orders", "2", "--store", "--state", "state", "--rig", "demo"
+    )
+    assert answer.exit_code == 1 and answer.stderr.startswith("E106 "), answer.output
+    assert "calibration 2 is stored, only its report is missing" in answer.stderr
+    assert (here / "state" / "calibrations" / "0002.yaml").exists()
