@@ -18,6 +18,7 @@ from gateway.cli.system_service.installation import plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, device_classes, unit_text
 from gateway.cli.system_service.unit_status import parse_status
 from gateway.profiles import Rig, load_rig
+from gateway.profiles.http_sections import Metrics
 from gateway.profiles.rigs.faces import TlsFace
 from gateway.profiles.telemetry_sections import Mqtt
 
@@ -198,5 +199,6 @@ def test_an_address_of_its_own_is_waited_for_and_one_that_is_always_there_is_not
     rig = load_rig("demo")
     own = planned(replace(rig, network=replace(rig.network, bind="192.0.2.1")))
     assert "Wants=network-online.target\nAfter=network-online.target\n" in own
+    assert "Wants=network-online.target" in planned(replace(rig, metrics=Metrics(listen="192.0.2.1:9000")))
     for bind in ("0.0.0.0", "127.0.0.1", "::"):
         assert "\nAfter=network.target\n" in planned(replace(rig, network=replace(rig.network, bind=bind)))
