@@ -112,8 +112,9 @@ def _give_to_owner(fresh: Path, before: Path) -> None:
     takes the place of, or the folder that it comes into."""
     owner = before.stat()
     if os.geteuid() == 0 and owner.st_uid:
-        for path in (*_files(fresh), fresh):
-            os.chown(path, owner.st_uid, owner.st_gid, follow_symlinks=False)
+        with contextlib.suppress(PermissionError):  # of a root that may not, as in some containers
+            for path in (*_files(fresh), fresh):
+                os.chown(path, owner.st_uid, owner.st_gid, follow_symlinks=False)
 
 
 def _sync_all(folder: Path) -> None:
