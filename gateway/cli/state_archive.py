@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway import VERSION
-from gateway.plain_file import check_plain
+from gateway.plain_file import check_plain, open_plain_stream
 from gateway.processes.durable_file import sync_path
 
 _MANIFEST: Final = "backup.json"
@@ -46,11 +46,11 @@ def pack(state: Path, target: Path) -> list[str]:
     with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as stream:
         beside = Path(stream.name)
         try:
-            with tarfile.open(fileobj=stream, mode="w:gz") as archive:
+            with tarfile.open(fileobj=stream, mode="w:gz", dereference=True) as archive:  # a second name is a file, too
                 _add_manifest(archive, state)
                 for path in (path for path in _files(state) if _is_kept(path, state)):
                     with contextlib.suppress(FileNotFoundError):  # an event file that has got its next name meanwhile
-                        archive.add(path, f"{_TOP}/{path.relative_to(state)}", recursive=False)
+                        _add(archive, path, f"{_TOP}/{path.relative_to(state)}")
                         files.append(path)
             stream.flush()
             os.fsync(stream.fileno())
@@ -112,8 +112,9 @@ def _give_to_owner(fresh: Path, before: Path) -> None:
     takes the place of, or the folder that it comes into."""
     owner = before.stat()
     if os.geteuid() == 0 and owner.st_uid:
-        for path in (*_files(fresh), fresh):
-            os.chown(path, owner.st_uid, owner.st_gid, follow_symlinks=False)
+        with contextlib.suppress(PermissionError):  # of a root that may not, as in some containers
+            for path in (*_files(fresh), fresh):
+                os.chown(path, owner.st_uid, owner.st_gid, follow_symlinks=False)
 
 
 def _sync_all(folder: Path) -> None:
@@ -168,6 +169,15 @@ def _files(state: Path) -> Iterator[Path]:
 def _is_kept(path: Path, state: Path) -> bool:
     """Decide whether a file is of the state, and not of a gateway that runs on it."""
     return path.parent != state or path.name not in _LEFT_OUT
+
+
+def _add(archive: tarfile.TarFile, path: Path, name: str) -> None:
+    """Add one. A file is opened before it is measured: one that is replaced in between would be cut, or end the backup."""
+    if path.is_dir():
+        archive.add(path, name, recursive=False)
+        return
+    with open_plain_stream(path) as stream:
+        archive.addfile(archive.gettarinfo(arcname=name, fileobj=stream), stream)
 
 
 def _add_manifest(archive: tarfile.TarFile, state: Path) -> None:

@@ -1,7 +1,7 @@
 """What somebody who helps from afar needs to know of a gateway, in one file, and nothing that they must not.
 
 In it: versions, the machine, the rig's files as `check` reads them, the newest events, the loop's figures and the live state
-where a gateway runs, which calibrations, plants and recordings there are (not their content), and the unit of a service.
+where a gateway runs, and which calibrations, plants and recordings there are (not their content).
 Not in it: keys, certificates, passwords, tokens, addresses of masters (they become `master-1` ...), recordings. A secret is
 found by the name of its key in a rig file, and by its looks in any text; who packs it is shown the list before it is sent.
 """

@@ -3,9 +3,10 @@ the loop waits for neither.
 
 A paused terminal blocks its writer, and so may a disk; each has a queue and a thread of its own. At most 10 lines a
 second per cause, and 1 while a flood goes on from second to second: a client that sends garbage makes less than 1 MB of log and
-events a minute, and the number of lines left out is said. Causes carry addresses,
-so that they are without number; only those of the last two seconds are kept. A disk that takes no events is said once, on
-stderr (E150): nothing else depends on it.
+events a minute, and the number of lines left out is said. A cause that has had 600 lines of one code without two seconds of
+rest, such as a robot whose setpoints are refused all night, has one a minute from then on: it would have taken the place of
+every other event within hours. Causes carry addresses, so that they are without number; only those of the last two seconds are
+kept. A disk that takes no events is said once, on stderr (E150): nothing else depends on it.
 """
 
 import contextlib
@@ -25,7 +26,11 @@ from gateway.processes.systemd.journal import journal_writer
 
 LINES_PER_S: Final = 10
 FLOODED_LINES_PER_S: Final = 1
+_WINDOW_S: Final = 1.0
 _FLOOD_ENDS_S: Final = 2.0  # from the beginning of its last full second
+_CODE_LENGTH: Final = 4  # of W204
+_LONG_LINES: Final = 600
+_LONG_WINDOW_S: Final = 60.0
 _LONGEST_QUEUE: Final = 1000
 _MOST_CAUSES: Final = 1000
 _END_BOUND_S: Final = 1.0
@@ -88,13 +93,14 @@ class EventLog:
     def _say(self, source: str, cause: str, sentence: str) -> None:
         now_s = self._clock()
         with self._lock:
-            window = self._windows.get(cause)
-            if window is None or now_s - window.began_s >= 1.0:
+            window, code = self._windows.get(cause), sentence[:_CODE_LENGTH]
+            if window is None or window.is_over(now_s) or window.hides(code):
                 if window is None and len(self._windows) >= _MOST_CAUSES:
                     self._forget_old(now_s)
                 self._put_left_out(cause, window)
-                self._windows[cause] = window = _RateWindow(now_s, source, _lines_after(window, now_s))
+                self._windows[cause] = window = _window_after(window, now_s, source, code)
             window.count += 1
+            window.is_mixed |= code != window.code
             window.sentence = sentence
         if window.count <= window.lines:
             self._put(self._event(cause, sentence, source))
@@ -104,9 +110,9 @@ class EventLog:
         now_s = self._clock()
         with self._lock:
             for cause, window in tuple(self._windows.items()):
-                if at_the_end or now_s - window.began_s >= 1.0:
+                if at_the_end or window.is_over(now_s):
                     self._put_left_out(cause, window)
-                if now_s - window.began_s >= _FLOOD_ENDS_S:
+                if window.is_past(now_s):
                     del self._windows[cause]
 
     def _put_left_out(self, cause: str, window: "_RateWindow | None") -> None:
@@ -119,7 +125,7 @@ class EventLog:
 
     def _forget_old(self, now_s: float) -> None:
         """What was left out of a forgotten cause is told now: nobody comes back to it."""
-        recent = {cause: window for cause, window in self._windows.items() if now_s - window.began_s < 1.0}
+        recent = {cause: window for cause, window in self._windows.items() if not window.is_over(now_s)}
         kept = recent if len(recent) < _MOST_CAUSES else {}
         for cause, window in self._windows.items():
             if cause not in kept:
@@ -136,20 +142,43 @@ class EventLog:
 
 @dataclass(slots=True)
 class _RateWindow:
-    """One second of one cause: how many lines it may have and had, and the last of them."""
+    """One second of one cause, or one minute of a long flood: how many lines it may have and had, the last of them, and how
+    many of its code it has had before without a rest. is_mixed: others came, too."""
 
     began_s: float
     source: str
+    code: str
     lines: int = LINES_PER_S
+    lasts_s: float = _WINDOW_S
+    had: int = 0
     count: int = 0
     sentence: str = ""
     is_told: bool = False
+    is_mixed: bool = False
+
+    def hides(self, code: str) -> bool:
+        """Decide whether what is new would be left out for a long flood of another code."""
+        return self.lasts_s > _WINDOW_S and code != self.code
+
+    def is_over(self, now_s: float) -> bool:
+        """Decide whether another one is next."""
+        return now_s - self.began_s >= self.lasts_s
+
+    def is_past(self, now_s: float) -> bool:
+        """Decide whether the cause has been calm since."""
+        return now_s - self.began_s >= self.lasts_s + _FLOOD_ENDS_S - _WINDOW_S
 
 
-def _lines_after(before: _RateWindow | None, now_s: float) -> int:
-    """Return how many lines the next second of a cause may have: few where the one just before had too many."""
-    is_flooded = before is not None and before.count > before.lines and now_s - before.began_s < _FLOOD_ENDS_S
-    return FLOODED_LINES_PER_S if is_flooded else LINES_PER_S
+def _window_after(before: _RateWindow | None, now_s: float, source: str, code: str) -> _RateWindow:
+    """Return the next one of a cause: with few lines where the one just before had too many."""
+    if before is None or before.is_past(now_s) or before.hides(code):
+        return _RateWindow(now_s, source, code)
+    is_same = code == before.code and not before.is_mixed
+    had = before.had + min(before.count, before.lines) if is_same else 0
+    if had >= _LONG_LINES:
+        return _RateWindow(now_s, source, code, FLOODED_LINES_PER_S, _LONG_WINDOW_S, had)
+    lines = FLOODED_LINES_PER_S if before.count > before.lines else LINES_PER_S
+    return _RateWindow(now_s, source, code, lines, had=had)
 
 
 class QueuedWriter:

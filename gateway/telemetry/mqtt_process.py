@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from gateway.live.control_link import ControlLink
 from gateway.live.live_state import LiveState
-from gateway.plain_file import read_plain
+from gateway.plain_file import read_plain, tell_refusal
 from gateway.processes.beside_control import serve_until_guardian_ends
 from gateway.processes.event_log import EventLog
 from gateway.telemetry.broker_connection import Broker, keep_connected
@@ -72,7 +72,7 @@ async def publish(options: dict[str, Any], log: EventLog) -> None:
 
     rig = unchanged_rig(options["rig"], options["fingerprint"], simulated=options["simulated"])
     assert rig.mqtt is not None
-    password = read_plain(rig.mqtt.password_file).decode().strip() if rig.mqtt.password_file else None
+    password = _password_in(rig.mqtt.password_file) if rig.mqtt.password_file else None
     tls = rig.mqtt.tls
     certificates = (tls.ca, tls.certificate, tls.key) if tls else ()
     broker = Broker(rig.mqtt.host, rig.mqtt.port, rig.mqtt.username, password, *certificates)
@@ -83,6 +83,16 @@ async def publish(options: dict[str, Any], log: EventLog) -> None:
         group.create_task(look_forever(link, sessions))
         for session in sessions:
             group.create_task(keep_connected(broker, session, announcer.say))
+
+
+def _password_in(file: str) -> str:
+    """Return the password. OSError with a sentence where the file does not give one."""
+    try:
+        return read_plain(file).decode().strip()
+    except UnicodeDecodeError:
+        raise OSError(f"E181 mqtt.password_file {file} is no text in UTF-8: save it so") from None
+    except OSError as error:
+        raise OSError(f"E181 mqtt.password_file {file}: {tell_refusal(error)}") from None
 
 
 def main(arguments: list[str]) -> int:

@@ -173,3 +173,31 @@ def test_what_root_restores_is_whose_it_was(
     (tmp_path / "service").mkdir()
     unpack(archive, state if was_there else theirs / "cell")
     assert given == [(name, 501, 502) for name in ("calibrations", "0001.yaml", "state")]
+
+
+def test_a_file_that_is_replaced_while_it_is_packed_is_whole(
+    state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A gateway puts a calibration in use, or a list of recordings is kept, between measuring the file and opening it."""
+    target, real = state / "calibrations" / "0001.yaml", tarfile.TarFile.gettarinfo
+
+    def measure(archive: tarfile.TarFile, *words: object, **named: object) -> tarfile.TarInfo:
+        found = real(archive, *words, **named)  # type: ignore[arg-type]
+        if found.name.endswith("0001.yaml"):
+            (tmp_path / "fresh").write_text("1")
+            (tmp_path / "fresh").replace(target)
+        return found
+
+    monkeypatch.setattr(tarfile.TarFile, "gettarinfo", measure)
+    pack(state, tmp_path / "b.tar.gz")
+    unpack(tmp_path / "b.tar.gz", tmp_path / "again")
+    assert (tmp_path / "again" / "calibrations" / "0001.yaml").read_text() == "name: one\n"
+
+
+def test_a_file_of_two_names_is_restored_as_both(state: Path, tmp_path: Path) -> None:
+    """The archive had the second as a link, and was refused as a whole on the day that it was needed."""
+    os.link(state / "calibrations" / "0001.yaml", state / "calibrations" / "copy.yaml")
+    pack(state, tmp_path / "b.tar.gz")
+    unpack(tmp_path / "b.tar.gz", tmp_path / "again")
+    for name in ("0001.yaml", "copy.yaml"):
+        assert (tmp_path / "again" / "calibrations" / name).read_text() == "name: one\n"

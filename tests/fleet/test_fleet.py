@@ -54,6 +54,19 @@ def test_a_pattern_without_a_file_and_a_scheduler_without_a_scheme_are_refused(t
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv"]
 
 
+def test_files_of_before_are_no_recordings_and_those_of_others_are_not_written_over(tmp_path: Path) -> None:
+    """A pattern with ** found rows, days and cells of the run before: three recordings that could not be read."""
+    shutil.copy(__file__, tmp_path / "x.csv")
+    words = ("fleet", "fit", f"{tmp_path}/**/*.*", "--scheduler", "serial", "-o", tmp_path / "out", "--json")
+    assert [json.loads(gateway(*words).stdout)["recordings"] for _ in range(2)] == [1, 1]
+    mine = tmp_path / "mine" / "report.html"
+    mine.parent.mkdir()
+    mine.write_text("precious")
+    refused = gateway("fleet", "fit", str(tmp_path / "x.csv"), "--scheduler", "serial", "-o", mine.parent)
+    assert refused.exit_code == 1 and refused.stderr.startswith(f"E405 {mine}"), refused.output
+    assert mine.read_text() == "precious"
+
+
 @pytest.mark.long
 def test_the_cell_whose_pad_creeps_more_each_day_is_found_and_its_cause_named(tmp_path: Path) -> None:
     """The real diagnosis, in processes: two minutes."""

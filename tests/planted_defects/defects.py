@@ -162,7 +162,7 @@ DEFECTS = (
            "if answered >= _REQUESTS_IN_A_TURN and len(self._framer):", "if False:",
            ("fieldbus/test_connection_by_hand.py",)),
     Defect("a flood that goes on fills the log", "processes/event_log.py",
-           "return FLOODED_LINES_PER_S if is_flooded else LINES_PER_S", "return LINES_PER_S",
+           "lines = FLOODED_LINES_PER_S if before.count > before.lines else LINES_PER_S", "lines = LINES_PER_S",
            ("processes/test_event_log.py",)),
     Defect("the transaction number is forgotten", "fieldbus/connection.py",
            "encode(Adu(request.transaction, request.unit, pdu))", "encode(Adu(0, request.unit, pdu))",

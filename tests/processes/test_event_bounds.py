@@ -61,7 +61,51 @@ def test_a_flood_is_still_one_in_the_next_second_whoever_looked_between_and_forg
     assert terminal.said().count("x") == 10 + 1
 
 
-def test_ten_lines_a_second_are_no_flood_however_long_they_go_on() -> None:
+def test_ten_lines_a_second_are_no_flood_for_a_minute_and_a_cause_that_never_rests_has_one_a_minute_then() -> None:
+    """A robot whose setpoints are refused ten times a second had replaced all that was kept of other events in three hours."""
+    terminal = Terminal()
+    for tick in range(10 * 3600):
+        terminal.say(0.1 * tick, "x")
+    lines = terminal.said()
+    assert lines[:600] == ["x"] * 600
+    assert 2 * 58 <= len(lines[600:]) <= 2 * 60
+    assert lines[600:604] == ["x", "599 more lines of 'x' left out"] * 2
+
+
+def test_a_cause_that_has_rested_has_all_its_lines_again_and_other_causes_have_theirs_meanwhile() -> None:
+    terminal = Terminal()
+    for tick in range(1000):
+        terminal.say(0.1 * tick, "x")
+    terminal.say(100.0, "A303 other")
+    terminal.look(130.0)
+    terminal.look(200.0)
+    assert not terminal.log._windows
+    terminal.say(200.0, *["x"] * 10)
+    lines = terminal.said()
+    assert lines[-10:] == ["x"] * 10 and "A303 other" in lines
+    assert sum(line == "x" for line in lines) == 600 + 1 + 10
+
+
+def test_another_code_of_the_same_cause_is_told_at_once_in_a_long_flood_and_two_in_turn_have_ten_lines_a_second() -> (
+    None
+):
+    """Of faults that come and are reset all night, the one that is another."""
+    clock, lines = Clock(), list[str]()
+    with EventLog(lines.append, clock) as log:
+        for tick in range(800):
+            clock.now_s = 0.5 * tick
+            log("control", "A310 master lost")
+        log("control", "A303 gain")
+        for tick in range(100):
+            clock.now_s += 0.01
+            log("control", f"A3{10 + tick % 2} in turn")
+    told = texts(lines)
+    assert told.count("A310 master lost") < 605 and told.count("A303 gain") == 1
+    assert told[told.index("A303 gain") - 1].startswith("A310 ") and "left out" in told[told.index("A303 gain") - 1]
+    assert sum(line.endswith("in turn") for line in told) <= 20
+
+
+def test_ten_lines_a_second_are_no_flood() -> None:
     terminal = Terminal()
     for second in range(5):
         terminal.say(float(second), *["x"] * 10)

@@ -272,3 +272,16 @@ def test_a_recording_that_somebody_deletes_meanwhile_keeps_no_other_one(
     monkeypatch.setattr(keeping, "recording_paths", lambda state: paths)
     assert [one.path for one in prune_recordings(tmp_path, Retention(days=30.0), "")] == [old]
     assert numbers(tmp_path) == []
+
+
+def test_a_mark_that_the_disk_does_not_take_is_named_by_its_whole_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(descriptor: int, name: str, data: bytes) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", f"{name}.new")
+
+    path = record(tmp_path)
+    monkeypatch.setattr(keeping, "replace_durably", refuse)
+    with pytest.raises(PermissionError) as raised:
+        keep_recording(path)
+    assert raised.value.filename == str(path.with_suffix(".keep")) and not keeping.is_kept(path)

@@ -118,3 +118,20 @@ def test_the_broker_is_asked_with_the_password_of_its_file_and_the_certificates_
     assert said == [("broker", "E181 away")], "both say the same"
     assert {broker for broker, _ in asked} == {Broker("broker", 8883, "me", "a secret", *files)}
     assert len({session.name for _, session in asked}) == 2
+
+
+@pytest.mark.parametrize(("content", "why"), [(b"gehe\xeemnis", "is no text in UTF-8"), (None, "No such file")])
+def test_a_password_that_cannot_be_read_is_told_by_its_file_and_not_shown(
+    content: bytes | None, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It ended in a traceback, four times, and then in the sentence that MQTT stays off."""
+    secret = tmp_path / "password"
+    if content:
+        secret.write_bytes(content)
+    rig = rig_with(password_file=str(secret))
+    monkeypatch.setattr("gateway.profiles.kept_rig.load_rig", lambda name, simulated: rig)
+    options = {"rig": "demo", "simulated": True, "fingerprint": rig.fingerprint, "state": str(tmp_path)}
+    log: Any = None
+    with pytest.raises(OSError, match=rf"^E181 mqtt\.password_file {secret}.*{why}") as raised:
+        asyncio.run(publish(options, log))
+    assert "gehe" not in str(raised.value)

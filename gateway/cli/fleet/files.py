@@ -15,6 +15,7 @@ DAYS: Final = "days.parquet"
 CELLS: Final = "cells.parquet"
 REPORT: Final = "report.html"
 KEPT: Final = "rows.jsonl"
+WRITTEN: Final = (ROWS, DAYS, CELLS, REPORT)
 
 
 def write_files(folder: Path, rows: Sequence[Row], cells: Sequence[CellDrift], verb: str) -> list[Path]:

@@ -17,6 +17,7 @@ from gateway.cli.errors import CliError
 from gateway.cli.system_service import unit_file
 from gateway.processes import exit_codes
 from gateway.profiles.find import list_shipped, locate
+from gateway.profiles.http_sections import split_listen
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
 
 if TYPE_CHECKING:
@@ -176,7 +177,8 @@ def _ports_of(rig: "Rig") -> tuple[int, ...]:
 
 def _addresses_of(rig: "Rig") -> list[str]:
     secure = [face.bind for face in rig.fieldbus if isinstance(face, TlsFace)]
-    return [*([rig.network.bind] if rig.network.plain else []), *secure]
+    for_people = [split_listen(face.listen)[0] for face in (rig.web, rig.metrics, rig.opcua) if face]
+    return [*([rig.network.bind] if rig.network.plain else []), *secure, *for_people]
 
 
 def _is_own_address(address: str) -> bool:

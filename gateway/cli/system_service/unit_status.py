@@ -5,7 +5,7 @@ from typing import Final
 
 from gateway.cli.system_service.installation import run_command
 
-_ASKED: Final = "ActiveState,SubState,ActiveEnterTimestamp,NRestarts,StatusText,Result,ExecMainStatus"
+_ASKED: Final = "LoadState,ActiveState,SubState,ActiveEnterTimestamp,NRestarts,StatusText,Result,ExecMainStatus"
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +24,8 @@ class UnitStatus:
     def sentence(self) -> str:
         """The line for people."""
         known = self.properties
+        if known.get("LoadState") == "not-found":
+            return f"{self.unit}: there is no such unit; force-gateway service install RIG writes it"
         restarts = int(known.get("NRestarts") or 0)
         again = f", started again {restarts} time{'' if restarts == 1 else 's'}" if restarts else ""
         if self.is_running:

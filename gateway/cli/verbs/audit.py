@@ -79,12 +79,13 @@ def format_record(record: dict[str, Any]) -> str:
     who = f"{record.get('peer', '')} {record.get('role', '')}".strip()
     words = [str(record.get("n", "")).rjust(6), record.get("time", ""), f"{record.get('result', '-'):<8}", who]
     words.append(str(record.get("what", "")))
-    if "old" in record and not isinstance(record["old"], str):
+    old, new = record.get("old"), record.get("new")
+    is_owner = record.get("what") == "owner" and "count" not in record  # the one of which None is a value: nobody
+    if is_owner or not isinstance(old, str | None):
         unit = f" {record['unit']}" if "unit" in record else ""
-        words.append(f"{_value(record['old'])} -> {_value(record.get('new'))}{unit}")
-    elif "new" in record and not record.get("text"):
-        old = f"{record['old']} -> " if "old" in record else ""
-        words.append(f"{old}{_value(record['new'])}")
+        words.append(f"{_value(old)} -> {_value(new)}{unit}")
+    elif new is not None and not record.get("text"):
+        words.append(f"{f'{old} -> ' if old is not None else ''}{_value(new)}")
     if "count" in record and "seconds" in record:
         span = f", {_value(record['min'])} .. {_value(record['max'])}" if record.get("min") is not None else ""
         words.append(f"({record['count']} writes in {record['seconds']:g} s{span})")

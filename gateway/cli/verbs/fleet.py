@@ -11,7 +11,7 @@ import click
 
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
-from gateway.cli.errors import CliError
+from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import count_of, json_option
 from gateway.processes import exit_codes
 
@@ -111,11 +111,12 @@ def _work(verb: str, compute: "Callable[[Task], Row]", columns: Sequence[str], o
     from gateway.fleet.tasks import find_tasks
 
     require("pyarrow")
-    tasks = find_tasks(options["patterns"])
+    folder = options["output"] or Path(f"fleet-{verb}")
+    own = _own_files(folder, is_fresh=options["fresh"])
+    tasks = [task for task in find_tasks(options["patterns"]) if Path(task.path).resolve() not in own]
     if not tasks:
         raise CliError(f"E190 no file matches {' '.join(options['patterns'])}; quote the pattern", exit_codes.DATA)
     engine = partial(_engine_of(options["scheduler"], options["workers"]), compute)
-    folder = options["output"] or Path(f"fleet-{verb}")
     if options["fresh"]:
         (folder / KEPT).unlink(missing_ok=True)
     with show_progress(f"fleet {verb}"):
@@ -137,6 +138,17 @@ def _work(verb: str, compute: "Callable[[Task], Row]", columns: Sequence[str], o
         _tell(rows, failed, taken_over, files)
     if failed:
         raise click.exceptions.Exit(exit_codes.DATA)
+
+
+def _own_files(folder: Path, *, is_fresh: bool) -> set[Path]:
+    """Return the files that are written there; a pattern may find those of an earlier run. CliError E405 for one that none has
+    left."""
+    from gateway.cli.fleet.files import KEPT, WRITTEN
+
+    found = [folder / name for name in WRITTEN if (folder / name).exists()]
+    if found and not is_fresh and not (folder / KEPT).exists():
+        raise already_exists(found[0], "-o names another folder, --fresh takes this one")
+    return {(folder / name).resolve() for name in (*WRITTEN, KEPT)}
 
 
 def _with_all(columns: Sequence[str], row: "Row") -> "Row":

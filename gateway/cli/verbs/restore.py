@@ -45,8 +45,8 @@ def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> No
 
 @contextmanager
 def _not_running(directory: Path) -> Iterator[None]:
-    """Holds the lock that a running gateway holds; E104 when one does."""
-    if not (directory / state_lock.NAME).exists():
+    """Holds the lock that a running gateway holds; E104 when one does. Its file may have been deleted: not the directory's."""
+    if not directory.is_dir() or not any(directory.iterdir()):
         yield
         return
     with state_lock.hold_state_lock(directory) as is_ours:

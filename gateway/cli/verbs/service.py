@@ -34,7 +34,11 @@ def command() -> None:
 @click.argument("rig")
 @click.option("--dry-run", is_flag=True, help="Print the files and commands, change nothing.")
 @click.option(
-    "--allow", "networks", multiple=True, metavar="NETWORK", help="Who may reach it, such as 192.168.125.0/24."
+    "--allow",
+    "networks",
+    multiple=True,
+    metavar="NETWORK",
+    help="Who may reach it besides this machine, such as 192.168.125.0/24; more than once  [default: as the rig says]",
 )
 @click.option("--command", "program", type=click.Path(path_type=Path), help="The program  [default: this one]")
 @_ROOT

@@ -28,8 +28,12 @@ _CLOSED_S: Final = 5.0  # rows come ten times a second: what was written later t
 
 def keep_recording(path: Path) -> None:
     """Have a recording kept, whatever becomes of others. OSError where the disk refuses."""
-    with lock_directory(path.parent) as descriptor:
-        replace_durably(descriptor, path.with_suffix(_MARK).name, b"")
+    mark = path.with_suffix(_MARK)
+    try:
+        with lock_directory(path.parent) as descriptor:
+            replace_durably(descriptor, mark.name, b"")
+    except OSError as error:  # of the descriptor it knows the name alone
+        raise OSError(error.errno, error.strerror, str(mark)) from None
 
 
 def let_recording_go(path: Path) -> None:

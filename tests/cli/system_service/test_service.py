@@ -18,6 +18,7 @@ from gateway.cli.system_service.installation import plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, device_classes, unit_text
 from gateway.cli.system_service.unit_status import parse_status
 from gateway.profiles import Rig, load_rig
+from gateway.profiles.http_sections import Metrics
 from gateway.profiles.rigs.faces import TlsFace
 from gateway.profiles.telemetry_sections import Mqtt
 
@@ -147,6 +148,8 @@ def test_the_status_is_a_sentence() -> None:
     assert runs.is_running and not failed.is_running
     assert runs.sentence == "a.service: runs since Mon 2026-11-23 05:00:00 UTC, started again 1 time; rig demo, x=1"
     assert failed.sentence == "a.service: failed (exit-code, exit code 78); force-gateway service logs shows why"
+    missing = parse_status("a.service", "LoadState=not-found\nActiveState=inactive\nResult=success\n")
+    assert not missing.is_running and missing.sentence.startswith("a.service: there is no such unit;"), "no success"
 
 
 def planned(rig: Rig, *networks: str, name: str = "demo") -> str:
@@ -198,5 +201,6 @@ def test_an_address_of_its_own_is_waited_for_and_one_that_is_always_there_is_not
     rig = load_rig("demo")
     own = planned(replace(rig, network=replace(rig.network, bind="192.0.2.1")))
     assert "Wants=network-online.target\nAfter=network-online.target\n" in own
+    assert "Wants=network-online.target" in planned(replace(rig, metrics=Metrics(listen="192.0.2.1:9000")))
     for bind in ("0.0.0.0", "127.0.0.1", "::"):
         assert "\nAfter=network.target\n" in planned(replace(rig, network=replace(rig.network, bind=bind)))

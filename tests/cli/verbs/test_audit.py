@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 
 from gateway.audit.audit_file import AuditFile
+from gateway.audit.write_series import WriteSeries
+from gateway.cli.verbs.audit import format_record
 
 
 @pytest.fixture
@@ -69,3 +71,24 @@ def test_a_line_that_a_power_cut_has_left_is_told_apart(state: Path, call) -> No
     answer = call("audit", "verify", "--state", state)
     assert answer.exit_code == 0 and answer.stdout.startswith("3 lines hold, up to line 3, ")
     assert "incomplete line (12 bytes)" in answer.stdout
+
+
+@pytest.mark.parametrize(
+    ("what", "value", "told"),
+    [
+        ("enable", None, "  enable  (20 writes in 10 s)"),
+        ("owner", None, "  owner  (20 writes in 10 s)"),
+        ("write", 72.0, "  write  (20 writes in 10 s, 72 .. 72)  72 N is too much"),
+    ],
+)
+def test_a_summary_without_values_before_and_after_names_none(what: str, value: float | None, told: str) -> None:
+    """`enable  nobody -> nobody` was told of a robot that had enabled often, and of its refused writes `nobody -> 72`."""
+    series = WriteSeries(20, {"peer": "10.0.0.5", "what": what} | ({"text": "72 N is too much"} if value else {}))
+    for _ in range(40):
+        series.take(None, value)
+    assert format_record({"time": "T", **(series.summarize(10.0) or {})}).endswith(told)
+
+
+def test_of_an_owner_that_came_or_went_nobody_is_told() -> None:
+    assert format_record({"what": "owner", "old": None, "new": "10.0.0.5"}).endswith("owner  nobody -> 10.0.0.5")
+    assert format_record({"what": "owner", "old": "10.0.0.5", "new": None}).endswith("owner  10.0.0.5 -> nobody")

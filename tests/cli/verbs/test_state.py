@@ -14,6 +14,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+from gateway.processes.state_lock import hold_state_lock
 from gateway.recording import Recorder
 
 
@@ -176,6 +177,17 @@ def test_restore_does_not_pull_the_floor_from_under_a_running_gateway(state: Pat
             answer = call("restore", backup, "--force", "--state", state)
         assert answer.exit_code == 69
         assert answer.stderr.startswith("E104 ")
+
+
+def test_a_restore_finds_a_running_gateway_whose_lock_somebody_has_deleted(state: Path, call, tmp_path: Path) -> None:
+    """It took the state from under it: what that gateway recorded then went to where nobody looks."""
+    backup = tmp_path / "b.tar.gz"
+    call("backup", backup, "--state", state)
+    with hold_state_lock(state):
+        (state / "lock").unlink()
+        answer = call("restore", backup, "--force", "--state", state)
+    assert answer.exit_code == 69 and answer.stderr.startswith("E104 ")
+    assert [path.name for path in tmp_path.glob("state*")] == ["state"]
 
 
 def test_a_dry_run_restores_nothing(state: Path, call, tmp_path: Path) -> None:
