@@ -3,8 +3,9 @@
 Decisions
 - `Type=notify` and a watchdog that the control loop feeds through the guardian: a loop that stands restarts the service.
 - No restart behind an exit that says that another start would end the same way: command line, data, permission,
-  configuration. Any other failure starts again, five times in five minutes at most.
-- An address of its own is there only once the network is up: a start before it would be one of those five.
+  configuration. Any other failure starts again every ten seconds, without end: a device whose cabinet is switched on an hour
+  after this machine, or whose adapter comes late, must not leave the gateway off until somebody logs in.
+- An address of its own is there only once the network is up: a start before it would be in vain.
 - A user of its own that owns nothing but the state directory, and the serial ports by their group. Nothing else of the machine
   can be written, most of it not even seen; only the devices named here are there at all.
 - `systemd-analyze security --offline=true` judges it; a test holds it to at most 1.5.
@@ -96,8 +97,7 @@ def unit_text(options: UnitOptions) -> str:
         f"Description=force-gateway, rig {stem}",
         *(["Wants=network-online.target"] if options.waits_for_network else []),
         f"After={'network-online' if options.waits_for_network else 'network'}.target",
-        "StartLimitIntervalSec=300",
-        "StartLimitBurst=5",
+        "StartLimitIntervalSec=0",
         "",
         "[Service]",
         "Type=notify",
@@ -108,7 +108,7 @@ def unit_text(options: UnitOptions) -> str:
         f"TimeoutStopSec={STOP_S}",
         "KillMode=mixed",
         "Restart=on-failure",
-        "RestartSec=2",
+        "RestartSec=10",
         f"RestartPreventExitStatus={' '.join(map(str, _NO_RESTART))}",
         f"User={USER}",
         f"StateDirectory={NAME}",

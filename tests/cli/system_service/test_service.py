@@ -17,6 +17,7 @@ from gateway.cli.system_service import installation
 from gateway.cli.system_service.installation import plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, device_classes, unit_text
 from gateway.cli.system_service.unit_status import parse_status
+from gateway.processes import exit_codes
 from gateway.profiles import Rig, load_rig
 from gateway.profiles.http_sections import Metrics
 from gateway.profiles.rigs.faces import TlsFace
@@ -95,6 +96,15 @@ def test_a_port_below_1024_has_the_one_privilege_that_it_needs_and_no_other_rig_
 
 def test_no_exit_code_that_says_it_would_fail_again_starts_it_again() -> None:
     assert "RestartPreventExitStatus=2 65 77 78\n" in unit_text(options())
+
+
+def test_a_device_that_comes_an_hour_late_finds_the_gateway_still_trying() -> None:
+    """`run` ends where a port is absent; with a bound on starts the unit stayed off for good."""
+    text = unit_text(options())
+    assert "\nStartLimitIntervalSec=0\n" in text and "StartLimitBurst" not in text
+    pause_s = float(text.partition("\nRestartSec=")[2].partition("\n")[0])
+    assert pause_s >= 10.0, "each start costs a second of processor and two lines of the journal"
+    assert str(exit_codes.DEVICE) not in text.partition("\nRestartPreventExitStatus=")[2].partition("\n")[0].split()
 
 
 def test_a_dry_run_shows_the_unit_of_the_rig_and_writes_nothing(tmp_path: Path) -> None:

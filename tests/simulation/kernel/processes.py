@@ -30,7 +30,7 @@ CLOSING_S = 3.0
 BIRTH_S = 0.15
 """From the guardian's wish until a control process does its first thing."""
 SERVICE_RESTART_S = 2.0
-"""Until a guardian that has ended or died is started again (RestartSec of the unit)."""
+"""Until a guardian that has ended or died is started again: sooner than by the unit, so that more of it happens."""
 MOST_TURNS = 100
 """At one moment: a few things may happen at once."""
 _RIG_PID, _SIGNALS, _FIRST_PID = ((1 << 22) + number for number in range(3))  # above every process number of Linux
