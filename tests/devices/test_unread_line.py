@@ -65,6 +65,15 @@ def test_no_profile_and_no_bytes_are_too_odd(name: str) -> None:
         assert isinstance(explain_unread(profile, bytes(rng.choices(range(32, 127), k=length))), str)
 
 
+@pytest.mark.parametrize(
+    ("line", "told"), [(b"!02\r", "it says '!02', no answer that its profile knows"), (b"\xff!\r", "")]
+)
+def test_an_answer_of_an_output_is_quoted_alone(line: bytes, told: str) -> None:
+    for name in ("icpdas-7024", "smc-itv-rc"):
+        assert explain_unread(load_device(name), line).partition(":")[0] == told
+    assert explain_unread(load_device("waveshare-ao8b"), line) == ""
+
+
 def test_what_is_read_is_never_said_to_be_in_another_unit() -> None:
     host = cell_host(STREAM)
     for unit in ("kg", "lb", "g", "N"):

@@ -15,9 +15,23 @@ from gateway.devices.template import TEXT_CHARACTERS, Template, quote
 _TEXT: Final = re.compile(f"[{TEXT_CHARACTERS}]{{4,80}}".encode("ascii"))
 
 
+_SHORT: Final = re.compile(f"[{TEXT_CHARACTERS}]{{2,40}}".encode("ascii"))
+_FORMS: Final = "no answer that its profile knows: checksum, address, format or another device?"
+
+
+def explain_answer(line: bytes, question: bytes = b"") -> str:
+    """Return what an unread answer of an output says, and what that may be; empty where it is no text, or an adapter has heard
+    our own question."""
+    body = line.rstrip(b"\r\n")
+    is_told = _SHORT.fullmatch(body) and line not in question
+    return f"it says {quote(body.decode('ascii'))}, {_FORMS}" if is_told else ""
+
+
 def explain_unread(profile: DeviceProfile, line: bytes) -> str:
-    """Return what an unread line of a load cell says, how the profile reads it, and what to do; empty where it is no text."""
+    """Return what an unread line says, how the profile of a load cell reads it, and what to do; empty where it is no text."""
     body = line.removesuffix(profile.terminator_bytes)
+    if profile.role is DeviceRole.OUTPUT and not profile.is_modbus:
+        return explain_answer(line)
     if profile.role is not DeviceRole.LOAD_CELL or profile.codec != TEMPLATE or not _TEXT.fullmatch(body):
         return ""
     said, frame = f"it says {quote(body.decode('ascii'))}", profile.reading.template

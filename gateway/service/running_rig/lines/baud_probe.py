@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.devices import DeviceProfile, SerialSettings, cell_host, output_host
-from gateway.devices.messages import Accepted, ForceSample, OutputRequest, Pressure, Refused, SetVoltage
+from gateway.devices.messages import Accepted, ForceSample, Garbage, OutputRequest, Pressure, Refused, SetVoltage
 from gateway.ports import PortError, PortEvents, SerialPort
 from gateway.profiles import CellLine, OutputLine
 from gateway.service.running_rig.lines.unread_lines import UnreadLines
@@ -64,7 +64,7 @@ async def listen_at(line: OutputLine | CellLine, path: str, baud: int, safe_v: f
     """Open the port, ask or listen at this speed, and return what came. PortError where it does not open."""
     ask, receive = _question_and_receiver(line, safe_v)
     enough = asyncio.Event()
-    total = valid = 0
+    total, valid, question = 0, 0, b""
     unread = UnreadLines(line.device)
 
     def on_bytes(chunk: bytes, now_s: float) -> None:
@@ -72,7 +72,7 @@ async def listen_at(line: OutputLine | CellLine, path: str, baud: int, safe_v: f
         total += len(chunk)
         messages = receive(chunk, now_s)
         valid += sum(isinstance(message, _VALID) for message in messages)
-        unread.hear(messages, now_s)
+        unread.hear([one for one in messages if not _is_ours(one, question)], now_s)
         if valid >= _ENOUGH:
             enough.set()
 
@@ -81,12 +81,18 @@ async def listen_at(line: OutputLine | CellLine, path: str, baud: int, safe_v: f
     await port.open()
     try:
         for _ in range(_QUESTIONS):  # the first one may end half a line that somebody left in the device
-            port.write(ask())
+            question = ask()
+            port.write(question)
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(enough.wait(), _LISTEN_S / _QUESTIONS + _LONG_TALK * settings.character_s)
     finally:
         port.close()
     return ProbeResult(baud, total, valid, unread.words(time.monotonic()))
+
+
+def _is_ours(message: object, question: bytes) -> bool:
+    """Decide whether an adapter has heard our own words."""
+    return isinstance(message, Garbage) and message.data in question
 
 
 def _question(device: DeviceProfile, safe_v: float) -> OutputRequest:

@@ -150,6 +150,26 @@ def test_a_refusal_in_the_devices_own_words_is_heard(output: OutputLine) -> None
     assert heard.valid >= 1
 
 
+class TalkingOutput(AnsweringRegulator):
+    """Answers each line by these words, or, where there are none, by its own: so does an adapter that hears itself."""
+
+    def __init__(self, words: bytes) -> None:
+        super().__init__(demo().output.device, 9600)
+        self._words = words
+
+    def _on_bytes(self, chunk: bytes, now_s: float) -> None:
+        if b"\r\n" in chunk:
+            self.pty.send(self._words or chunk)
+
+
+@pytest.mark.parametrize(("words", "told"), [(b"E 07\r\n", "it says 'E 07', no answer that its profile"), (b"", "")])
+def test_an_output_that_answers_in_other_words_is_quoted_and_our_own_are_not(
+    output: OutputLine, words: bytes, told: str
+) -> None:
+    heard = asked(TalkingOutput(words), lambda path: listen_at(output, path, 9600))
+    assert heard.bytes and heard.says.startswith(told) and bool(heard.says) is bool(told)
+
+
 def test_what_is_heard_is_told_in_numbers(cell: CellLine) -> None:
     heard = asked(SpeakingCell(cell.device, 115200), lambda path: listen_at(cell, path, cell.baud))
     assert heard.baud == 115200
