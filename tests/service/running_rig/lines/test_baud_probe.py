@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from gateway.devices import DeviceProfile, cell_device, output_device
-from gateway.devices.messages import Accepted, Garbage, SetVoltage
+from gateway.devices.messages import Accepted, DeviceAnswer, DeviceStep, Garbage, SetVoltage
 from gateway.ports import PacedPty
 from gateway.profiles import CellLine, OutputLine
 from gateway.service.running_rig.lines.baud_probe import (
@@ -217,6 +217,15 @@ def test_what_cannot_be_asked_is_told_the_safe_voltage_of_its_rig_and_a_cell_not
     assert b"3.0000" in _question_and_receiver(line, 3.0)[0]()
     stream, asked_cell = demo().load_cell, replace(demo().load_cell, device=load_device("mantracourt-dsc"), unit="N")
     assert _question_and_receiver(stream, 3.0)[0]() == b"" != _question_and_receiver(asked_cell, 3.0)[0]()
+
+
+def test_of_a_cell_that_can_be_asked_what_it_is_no_reading_is_asked() -> None:
+    """`$014` asks an ADAM-4016 for its sample; an I-7021 on the wrong adapter keeps its output as its power-on value by it."""
+    ask, receive = _question_and_receiver(replace(demo().load_cell, device=load_device("adam-4016"), unit=None), 0.0)
+    for model, is_right in ((b"4016", True), (b"7021", False)):
+        assert ask() == b"$01M\r"
+        assert receive(b"!01", 0.0) == []
+        assert receive(model + b"\r", 0.0) == [DeviceAnswer(DeviceStep.IDENTITY, is_right=is_right)]
 
 
 def test_at_every_speed_the_silent_device_hears_the_safe_voltage_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
