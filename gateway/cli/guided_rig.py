@@ -65,7 +65,7 @@ def ask_rig(name: str) -> str:
 
 
 def _ask_line(rig: GuidedRig, section: str, role: str, what: str) -> None:
-    port = _ask_port(what)
+    port = _ask_port(what, rig.settings.get(("output", "port")))
     device, baud = _ask_device(role, what, port)
     rig.settings[section, "device"] = device.name
     rig.settings[section, "baud"] = baud
@@ -78,13 +78,14 @@ def _ask_line(rig: GuidedRig, section: str, role: str, what: str) -> None:
         _fit_supervision(rig, device, baud)
 
 
-def _ask_port(what: str) -> str:
+def _ask_port(what: str, taken: str | None) -> str:
     from gateway.ports import list_ports
 
     ports = [port.path for port in list_ports()]
     for number, path in enumerate(ports, 1):
         click.echo(f"  {number}  {path}")
-    answer = click.prompt(f"port of {what}: number, path, or {_LATER}", default="1" if ports else _LATER)
+    free = (str(number) for number, path in enumerate(ports, 1) if path != taken)
+    answer = click.prompt(f"port of {what}: number, path, or {_LATER}", default=next(free, _LATER))
     return ports[int(answer) - 1] if answer.isdecimal() and 0 < int(answer) <= len(ports) else str(answer)
 
 

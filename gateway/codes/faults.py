@@ -227,7 +227,7 @@ class FaultCode(IntEnum):
         Explanation(
             "A333",
             "another device than the rig names",
-            "The device was asked what it is, and its profile is not for what it said; nothing but the safe voltage goes out.",
+            "Asked what it is, the device said what its profile does not know, or nothing; only the safe voltage goes out.",
             "Two adapters are exchanged, or the rig file names another profile, or another address, than the device has.",
             "Compare what it says with `models` in its profile; force-gateway check RIG --probe asks every port. Then reset.",
         ),
@@ -237,7 +237,7 @@ class FaultCode(IntEnum):
         Explanation(
             "A334",
             "the output device's watchdog cannot be armed",
-            "Arming was refused, or read back otherwise, three times; the device would hold its voltage without this machine.",
+            "Arming was refused, not answered, or read back otherwise; the device would hold its voltage without this machine.",
             "Firmware that counts another tick, a time that it does not take, or a module without this command.",
             "Set output.watchdog_s or watchdog_tick_s, then reset; or accept_no_device_watchdog: true, with an air dump valve.",
         ),

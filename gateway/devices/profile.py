@@ -287,6 +287,13 @@ def _check_valve(profile: DeviceProfile) -> None:
         raise ValueError("set_voltage, read_voltage, read_pressure, read_force, stream and steps belong to other roles")
     if profile.watchdog != "none":
         raise ValueError("watchdog belongs to an output")
+    _check_unasked(profile, "a valve")
+
+
+def _check_unasked(profile: DeviceProfile, what: str) -> None:
+    """Whoever wrote a question believes that it is asked."""
+    if profile.identity != "none":
+        raise ValueError(f"{what} is never asked what it is: leave identity out, for nobody would see another device")
 
 
 def _check_load_cell(profile: DeviceProfile) -> None:
@@ -298,6 +305,8 @@ def _check_load_cell(profile: DeviceProfile) -> None:
         raise ValueError("watchdog belongs to an output: a load cell drives nothing")
     if profile.stream and (profile.stream.ask or profile.stream.rate_hz <= 0):
         raise ValueError("stream has a rate_hz and no ask")
+    if profile.stream:
+        _check_unasked(profile, "a load cell that streams")
     if profile.read_force and not profile.read_force.ask:
         raise ValueError("read_force needs an ask")
     for text, _ in profile.reading.beyond_range:

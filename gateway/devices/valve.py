@@ -35,7 +35,7 @@ class ValveHost:
         self._grammar = Grammar(profile)
         self._lines = self._grammar.answers()
         self._expected: deque[Question] = deque(maxlen=1)
-        self.said = ""
+        self.said, self._function = "", b""
         self.gap_s = quiet_s(profile.serial.character_s) if profile.is_modbus else 0.0
 
     def request(self, question: Question) -> bytes:
@@ -46,6 +46,7 @@ class ValveHost:
         answer = self._settings.of(question).answer if question else ""
         if not answer:
             asks.append(self._reading.ask)
+        self._function = asks[-1][:2].encode("ascii")
         if isinstance(self._lines, ByteSplitter):
             self._lines.length = byte_count(answer or self._reading.answer)
         return b"".join(self._grammar.question_line(self._grammar.encode(ask)) for ask in asks)
@@ -78,7 +79,8 @@ class ValveHost:
 
     def _text_of(self, line: Line, body: bytes | None) -> str:
         if self._grammar.profile.is_modbus:
-            return exception_text(body) if body else ""
+            is_answer = body is not None and body[:2] == self._function  # else it is late
+            return exception_text(body or b"") or (quote(body.decode("ascii")) if body and is_answer else "")
         return quote(line.body.decode("ascii")) if _TEXT.fullmatch(line.body) else ""
 
 

@@ -63,6 +63,18 @@ def test_no_alarm_and_no_refusal_names_a_wire_for_a_machine_that_stood_still(is_
     assert ("power" in sentence) is (held == Held())
 
 
+def test_no_wire_is_named_for_an_output_that_answers_in_other_words() -> None:
+    bench = Bench()
+    bench.run(0.5)
+    bench.enable(15.0)
+    bench.run(1.0)
+    bench.line = bench.line._replace(said="it says '!02', no answer that its profile knows")
+    bench.output_silent = True
+    assert bench.seconds_until(has_fault(SILENT), 0.2) < 0.15
+    (sentence,) = (event for event in bench.events if event.startswith("A314"))
+    assert "allowed 100 ms: it says '!02', no answer" in sentence and "wires" not in sentence
+
+
 @pytest.mark.parametrize("held", [Held(), Held(rig_waited_s=0.09)])
 def test_a_refused_enable_does_not_either(held: Held) -> None:
     bench = Bench()
@@ -84,6 +96,7 @@ WAITED = Held(rig_waited_s=0.4)
         (LineStatus(acknowledged_v=0.0, unanswered_since_s=0.0, output_held=WAITED), "waited 400 ms of them"),
         (LineStatus(acknowledged_v=0.0, unanswered_since_s=0.0, cell_held=WAITED), OUTPUT_FAULT.explanation.sentence),
         (LineStatus(unanswered_since_s=0.0, output_held=WAITED, fault=FaultCode.OUTPUT_LOST), "port went away"),
+        (LineStatus(acknowledged_v=0.0, unanswered_since_s=0.0, said="it says '!02'"), "heard in time; it says '!02'"),
         (LineStatus(acknowledged_v=0.0, cell_says="it answers 'ERR 3'"), "heard in time; it answers 'ERR 3'"),
     ],
 )

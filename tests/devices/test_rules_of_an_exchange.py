@@ -10,6 +10,7 @@ from gateway.devices import DeviceProfile, cell_device, cell_host
 from gateway.devices.binary.register_access import RegisterAccess, RegisterType
 from gateway.devices.binary.rtu_framing import LONGEST_ADU, answers
 from gateway.devices.binary.weight_registers import RegisterBit, WeightRegisters
+from gateway.devices.device_checks.identity import Identity
 from gateway.devices.exchange import (
     PressureExchange,
     PressureRange,
@@ -44,9 +45,14 @@ def bit(register: int) -> RegisterBit:
     return RegisterBit(register=register, bit=0)
 
 
+WHO = Identity(ask="ID?", answer="ID {model:s}", models=("A1",))
+
+
 @pytest.mark.parametrize(
     ("make", "told"),
     [
+        (lambda: replace(load_device("mcu-valve"), identity=WHO), "a valve is never asked what it is"),
+        (lambda: replace(load_device("hx711-line"), identity=WHO), "that streams is never asked what it is"),
         (lambda: RegisterAccess(function=6, register=0, type="uint32"), "function 6 writes one register"),
         (lambda: voltage(), "`ask` is missing"),
         (lambda: voltage(WRITES, ask="SET {counts:d}"), "leave `ask` and `answer` out"),

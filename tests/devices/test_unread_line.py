@@ -6,6 +6,7 @@ from random import Random
 import pytest
 
 from gateway.devices import cell_host
+from gateway.devices.binary.rtu_framing import rtu_frame
 from gateway.devices.messages import ForceSample
 from gateway.devices.template_codecs.unread_line import explain_unread
 from gateway.devices.wire import resample_at_baud
@@ -63,6 +64,23 @@ def test_no_profile_and_no_bytes_are_too_odd(name: str) -> None:
     for length in range(60):
         assert isinstance(explain_unread(profile, rng.randbytes(length)), str)
         assert isinstance(explain_unread(profile, bytes(rng.choices(range(32, 127), k=length))), str)
+
+
+@pytest.mark.parametrize(
+    ("line", "told"), [(b"!02\r", "it says '!02', no answer that its profile knows"), (b"\xff!\r", "")]
+)
+def test_an_answer_of_an_output_is_quoted_alone(line: bytes, told: str) -> None:
+    for name in ("icpdas-7024", "smc-itv-rc"):
+        assert explain_unread(load_device(name), line).partition(":")[0] == told
+    assert explain_unread(load_device("waveshare-ao8b"), line) == ""
+
+
+def test_a_modbus_cell_that_has_no_such_register_is_not_said_to_have_no_wires() -> None:
+    profile = load_device("laumas-tlb")
+    told = explain_unread(profile, rtu_frame(1, b"8302"))
+    assert told == "it answers exception 2 (illegal data address): are registers and function those of laumas-tlb?"
+    assert explain_unread(profile, rtu_frame(2, b"8302")) == "", "of another unit"
+    assert explain_unread(profile, rtu_frame(1, b"0302000A")) == ""
 
 
 def test_what_is_read_is_never_said_to_be_in_another_unit() -> None:

@@ -3,6 +3,7 @@
 import pytest
 
 from gateway.devices import ValveDevice, ValveDirection, ValveHost
+from gateway.devices.binary.rtu_framing import rtu_frame
 from gateway.devices.messages import Garbage
 from gateway.profiles import list_shipped
 from gateway.profiles.find import shipped_profiles_folder
@@ -44,6 +45,17 @@ def test_what_was_not_asked_or_is_broken_tells_no_direction(name: str) -> None:
     assert all(isinstance(one, Garbage) for one in host.receive(answer[:-2] + b"!" + answer[-1:]))
     host.request(PUSH)
     assert PUSH not in host.receive(device.reply(PULL, PULL)), "the answer to another setting is none to this one"
+
+
+def test_a_modbus_relay_that_answers_otherwise_is_quoted_and_its_late_answers_are_not() -> None:
+    """With another relay on power and wires were blamed, of one that answers each question."""
+    host = ValveHost(load_device("waveshare-relay"))
+    host.request(None)
+    for body, said in ((b"010103", "'010103'"), (b"050000FF00", ""), (b"8102", "exception 2 (illegal data address)")):
+        assert [type(one) for one in host.receive(rtu_frame(1, body))] == [Garbage]
+        assert host.said == said
+    host.receive(rtu_frame(2, b"010103"))
+    assert host.said == "", "another unit's"
 
 
 @pytest.mark.parametrize("name", VALVES)

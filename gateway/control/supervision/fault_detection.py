@@ -175,7 +175,7 @@ class FaultDetector:
             return _unheard(cause_of_silence(FaultCode.SAMPLE_STALE, reading.age_s, line.cell_held, line.cell_says)[1])
         if block is RefusalReason.OUTPUT_FAULT and line.unanswered_since_s is not None and not line.fault:
             silent_s = now_s - line.unanswered_since_s
-            return _unheard(cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, "")[1])
+            return _unheard(cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, line.said)[1])
         return self._stall_words(now_s, line) or self._rest_words(reading) if block is RefusalReason.NOT_READY else ""
 
     def _rest_words(self, reading: Reading) -> str:
@@ -231,7 +231,7 @@ class FaultDetector:
     def _no_answer(self, now_s: float, line: LineStatus) -> StopCause:
         silent_s, bound_s = now_s - (line.unanswered_since_s or 0.0), self._bounds.output_timeout_s
         observation = f"no answer from the output device for {silent_s * 1e3:.0f} ms, allowed {bound_s * 1e3:.0f} ms"
-        suspects = "power or wires"
+        suspects = line.said or "power or wires"
         if line.answer_late_s:
             suspects = (
                 f"the answer before took {format_ms(line.answer_late_s)}, it may be too slow for that; else {suspects}"

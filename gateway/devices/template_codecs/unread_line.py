@@ -7,6 +7,7 @@ What another speed or noise makes of a line is no text, and nothing is said of i
 import re
 from typing import Final
 
+from gateway.devices.binary.rtu_framing import answers, exception_text
 from gateway.devices.fields import Field
 from gateway.devices.force_reading import FORCE, UNIT, units_of
 from gateway.devices.profile import TEMPLATE, DeviceProfile, DeviceRole
@@ -15,9 +16,25 @@ from gateway.devices.template import TEXT_CHARACTERS, Template, quote
 _TEXT: Final = re.compile(f"[{TEXT_CHARACTERS}]{{4,80}}".encode("ascii"))
 
 
+_SHORT: Final = re.compile(f"[{TEXT_CHARACTERS}]{{2,40}}".encode("ascii"))
+_FORMS: Final = "no answer that its profile knows: checksum, address, format or another device?"
+
+
+def explain_answer(line: bytes, question: bytes = b"") -> str:
+    """Return what an unread answer of an output says, and what that may be; empty where it is no text, or an adapter has heard
+    our own question."""
+    body = line.rstrip(b"\r\n")
+    is_told = _SHORT.fullmatch(body) and line not in question
+    return f"it says {quote(body.decode('ascii'))}, {_FORMS}" if is_told else ""
+
+
 def explain_unread(profile: DeviceProfile, line: bytes) -> str:
-    """Return what an unread line of a load cell says, how the profile reads it, and what to do; empty where it is no text."""
+    """Return what an unread line says, how the profile of a load cell reads it, and what to do; empty where it is no text."""
+    if profile.is_modbus:
+        return _explain_exception(profile, line)
     body = line.removesuffix(profile.terminator_bytes)
+    if profile.role is DeviceRole.OUTPUT:
+        return explain_answer(line)
     if profile.role is not DeviceRole.LOAD_CELL or profile.codec != TEMPLATE or not _TEXT.fullmatch(body):
         return ""
     said, frame = f"it says {quote(body.decode('ascii'))}", profile.reading.template
@@ -26,6 +43,13 @@ def explain_unread(profile: DeviceProfile, line: bytes) -> str:
         return f"{said}, in {other}: {profile.name} reads {known}; set the device to that unit, or copy the profile"
     cure = "other decimals, another format, or noise? set the device so, or copy the profile and write what it says"
     return f"{said}, {profile.name} reads {quote(frame.text)}: {cure}"
+
+
+def _explain_exception(profile: DeviceProfile, frame: bytes) -> str:
+    """A Modbus device that has no such register says so, and has power and wires."""
+    answer = next(iter(answers(profile.unit_id).feed(frame)), None)
+    text = exception_text(answer.body) if answer and answer.is_whole else ""
+    return f"it answers {text}: are registers and function those of {profile.name}?" if text else ""
 
 
 def _other_unit(frame: Template, body: bytes) -> tuple[str, str] | None:

@@ -178,9 +178,8 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
         return read_named(kind, refer_at(document, path, folder), read, findings)
 
     output, load_cell = _part(document, "output", OutputFile), _part(document, "load_cell", CellFile)
-    output_device = read_part("device", ("output", "device"), read_device)
-    cell_device = read_part("device", ("load_cell", "device"), read_device)
     valve = _optional_part(document, "valve", ValveFile)
+    output_device, cell_device = (read_part("device", (key, "device"), read_device) for key in ("output", "load_cell"))
     plant, extended = (read_part("plant", (key,), read_plant) for key in ("plant", "compensation"))
     return Parts(
         name=str(document.at("name")),
@@ -282,9 +281,7 @@ def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: 
             self_test=file.self_test,
             valve=file.valve.control if file.valve else None,
         ),
-        valve=ValveLine.of(parts.valve_device, file.valve.port, file.valve.baud)
-        if file.valve and parts.valve_device
-        else None,
+        valve=_valve_line(file.valve, parts.valve_device) if file.valve and parts.valve_device else None,
         pull_calibration=parts.valve_calibration,
         network=file.network,
         fieldbus=tuple(face for face in parts.fieldbus if face),
@@ -311,6 +308,10 @@ def _notes(parts: Parts, compensation: Compensation) -> tuple[str, ...]:
 def _supported_bits(file: RigFile) -> ControlBit:
     self_test = ControlBit.START_SELF_TEST if file.self_test else ControlBit(0)
     return ALWAYS_SUPPORTED | self_test | (ControlBit.VALVE_PULL if file.valve else ControlBit(0))
+
+
+def _valve_line(valve: ValveFile, device: DeviceProfile) -> ValveLine:
+    return ValveLine.of(device, valve.port, valve.baud)
 
 
 def _cell_line(cell: CellFile, device: DeviceProfile) -> CellLine:

@@ -176,6 +176,8 @@ async def _asked(
         if other := question.stranger(ear.received):
             strangers.append(Stranger(profile, settings, other))
             return None
+        if not (words or question.is_enough):  # nor is a reading asked of who knows: `$014` is a setting to an I-7021
+            return None
         if words and not question.is_enough:
             known = f"{words}, "
         elif words:

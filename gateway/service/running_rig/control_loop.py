@@ -243,7 +243,7 @@ class ControlLoop:
             standing_v=output.standing_v,
             unanswered_since_s=output.unanswered_since_s,
             fault=self.output_lost or output.fault or self._cell.identity.fault,
-            said=output.said or self._cell.identity.said,
+            said=output.said if output.fault or not self._cell.identity.fault else self._cell.identity.said,
             cell_lost=self.cell_lost,
             pressure_pa=output.pressure_pa,
             pressure_pa_per_v=self.pressure_pa_per_v,

@@ -234,10 +234,12 @@ class RunningRig:
         else:
             notes += warning_notes(self._rig)
         if self._line.checks.fault:
-            notes.append(device_fault_note(self._line))
+            notes.append(device_fault_note(self._line.checks))
         elif self._line.acknowledged_v is None:
             notes.append(await self._why_silent(self._ports.output, self._rig.output, is_restart=bool(restarted)))
-        if self.loop.sample is None:
+        if self._cell_line.identity.fault:
+            notes.append(device_fault_note(self._cell_line.identity))
+        elif self.loop.sample is None:
             notes.append(await self._why_silent(self._ports.cell, self._rig.load_cell, is_restart=bool(restarted)))
         return tuple(notes)
 

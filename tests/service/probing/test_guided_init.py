@@ -1,6 +1,7 @@
 """`init` at a terminal: from two ports to a rig that `check` accepts, with the devices asked what they are."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner, Result
@@ -60,6 +61,16 @@ def test_forces_that_do_not_fit_are_asked_again() -> None:
     result = answered("later", "", "", "y", "later", "", "", "98.07", "300", "98.07", "40")
     assert "limits.force_max_n: 300 N is above 65.2 N" in result.output
     assert check_report("own.yaml", simulated=True).rig
+
+
+def test_enter_gives_the_load_cell_another_port_than_the_output(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was the output's port again, which is refused by `check` alone, later."""
+    paths = ["/dev/serial/by-id/a", "/dev/serial/by-id/b"]
+    monkeypatch.setattr("gateway.ports.list_ports", lambda: [SimpleNamespace(path=path) for path in paths])
+    answered("", "n", "", "", "y", "", "n", "", "", "98.07", "40")
+    found = check_report("own.yaml")
+    assert found.rig, [str(fault) for fault in found.faults]
+    assert found.rig.ports() == {"output": paths[0], "load_cell": paths[1]}
 
 
 def test_without_a_terminal_nothing_is_asked() -> None:

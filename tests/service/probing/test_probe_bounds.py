@@ -108,7 +108,11 @@ def test_a_cell_that_says_what_it_is_is_asked_for_a_reading_too() -> None:
     answers: dict[bytes, bytes] = {identity.data: b"!014016\r", reading.data: cell_device(profile, "N").frame(12.345)}
     found = asyncio.run(_asked(FakeEar(answers.__getitem__), profile, profile.serial, 0.0, []))  # type: ignore[arg-type]
     assert found and found.said == "it says that it is 4016, reads 12.345"
-    answers[reading.data] = b""
+    answers[identity.data] = b""
+    ear = FakeEar(answers.__getitem__)
+    assert asyncio.run(_asked(ear, profile, profile.serial, 0.0, [])) is None  # type: ignore[arg-type]
+    assert len(ear.waited_s) == 1, "`$014` is a setting to an I-7021: it keeps its output as its power-on value"
+    answers |= {identity.data: b"!014016\r", reading.data: b""}
     assert asyncio.run(_asked(FakeEar(answers.__getitem__), profile, profile.serial, 0.0, [])) is None  # type: ignore[arg-type]
 
 

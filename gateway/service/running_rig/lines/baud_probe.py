@@ -11,9 +11,20 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.devices import DeviceProfile, SerialSettings, cell_host, output_host
-from gateway.devices.messages import Accepted, ForceSample, OutputRequest, Pressure, Refused, SetVoltage
+from gateway.devices.messages import (
+    Accepted,
+    DeviceAnswer,
+    DeviceStep,
+    ForceSample,
+    Garbage,
+    OutputRequest,
+    Pressure,
+    Refused,
+    SetVoltage,
+)
 from gateway.ports import PortError, PortEvents, SerialPort
 from gateway.profiles import CellLine, OutputLine
+from gateway.service.running_rig.lines.cell_identity import CellIdentity
 from gateway.service.running_rig.lines.unread_lines import UnreadLines
 
 BAUDS: Final = (9600, 19200, 38400, 57600, 115200)
@@ -21,7 +32,13 @@ _LISTEN_S: Final = 0.4  # forty frames of a 100 Hz stream, or several questions 
 _LONG_TALK: Final = 40  # characters of a question and its answer: on a slow wire they take longer than that
 _QUESTIONS: Final = 2
 _ENOUGH: Final = 3
-_VALID: Final = (Accepted, Pressure, Refused, ForceSample)  # a device that refuses in its own words is heard
+_VALID: Final = (
+    Accepted,
+    Pressure,
+    Refused,
+    ForceSample,
+    DeviceAnswer,
+)  # a device that refuses in its own words is heard
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +81,7 @@ async def listen_at(line: OutputLine | CellLine, path: str, baud: int, safe_v: f
     """Open the port, ask or listen at this speed, and return what came. PortError where it does not open."""
     ask, receive = _question_and_receiver(line, safe_v)
     enough = asyncio.Event()
-    total = valid = 0
+    total, valid, question = 0, 0, b""
     unread = UnreadLines(line.device)
 
     def on_bytes(chunk: bytes, now_s: float) -> None:
@@ -72,7 +89,7 @@ async def listen_at(line: OutputLine | CellLine, path: str, baud: int, safe_v: f
         total += len(chunk)
         messages = receive(chunk, now_s)
         valid += sum(isinstance(message, _VALID) for message in messages)
-        unread.hear(messages, now_s)
+        unread.hear([one for one in messages if not _is_ours(one, question)], now_s)
         if valid >= _ENOUGH:
             enough.set()
 
@@ -81,12 +98,18 @@ async def listen_at(line: OutputLine | CellLine, path: str, baud: int, safe_v: f
     await port.open()
     try:
         for _ in range(_QUESTIONS):  # the first one may end half a line that somebody left in the device
-            port.write(ask())
+            question = ask()
+            port.write(question)
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(enough.wait(), _LISTEN_S / _QUESTIONS + _LONG_TALK * settings.character_s)
     finally:
         port.close()
     return ProbeResult(baud, total, valid, unread.words(time.monotonic()))
+
+
+def _is_ours(message: object, question: bytes) -> bool:
+    """Decide whether an adapter has heard our own words."""
+    return isinstance(message, Garbage) and message.data in question
 
 
 def _question(device: DeviceProfile, safe_v: float) -> OutputRequest:
@@ -97,9 +120,21 @@ def _question(device: DeviceProfile, safe_v: float) -> OutputRequest:
 def _question_and_receiver(
     line: OutputLine | CellLine, safe_v: float
 ) -> tuple[Callable[[], bytes], Callable[[bytes, float], Sequence[object]]]:
-    """Return how to ask this device for a word (a stream is not asked), and what a chunk completes."""
+    """Return how to ask this device for a word (a stream is not asked), and what a chunk completes. One that can be asked what
+    it is is asked that alone: to another one the question for a reading may be a setting."""
     if isinstance(line, OutputLine):
         output, question = output_host(line.device), _question(line.device, safe_v)
         return lambda: output.request(question), output.receive
-    cell = cell_host(line.device, line.sign, line.unit)
-    return cell.poll, cell.receive
+    identity = CellIdentity(line.device)
+    if not identity.question:
+        cell = cell_host(line.device, line.sign, line.unit)
+        return cell.poll, cell.receive
+
+    def receive(chunk: bytes, now_s: float) -> Sequence[object]:
+        heard: list[object] = [*identity.receive(chunk)]
+        if not identity.is_due:
+            heard.append(DeviceAnswer(DeviceStep.IDENTITY, is_right=not identity.fault))
+            identity.begin()
+        return heard
+
+    return lambda: identity.question, receive

@@ -40,6 +40,7 @@ from gateway.devices.messages import (
     SetVoltage,
     WatchdogTripped,
 )
+from gateway.devices.template_codecs.unread_line import explain_answer
 from gateway.service.running_rig.lines.device_checks import DeviceChecks
 from gateway.service.running_rig.lines.given_up_questions import GivenUpQuestions
 
@@ -80,8 +81,7 @@ class OutputExchange:
         """rest_v: voltage that stands while nothing is wanted."""
         self._host, self._rest_v = host, rest_v
         self.checks = checks or DeviceChecks(host, is_waived=False)
-        self._write = write
-        self._reply_timeout_s = reply_timeout_s
+        self._write, self._reply_timeout_s = write, reply_timeout_s
         self._given_up = GivenUpQuestions(reply_timeout_s)
         self.garbage_bytes, self.counts, self.round_trip_s = 0, WireCounts(), nan
         self.reset()
@@ -102,15 +102,12 @@ class OutputExchange:
         self._is_behind = False  # the answer to one of them came, that to the last question is out
         self._refused_v = nan  # a moment ago: perhaps the watchdog has tripped, which is asked before the next try
         self._is_altered = False  # the last echo was another voltage
-        self._quiet_until_s = 0.0
-        self._sent_s = 0.0
-        self._next_poll_s = self._said_s = 0.0
-        self._polls = 0
+        self._quiet_until_s = self._sent_s = self._next_poll_s = self._said_s = 0.0
+        self._polls, self._frame, self._unread = 0, b"", ""
         self._failures: dict[object, int] = {}
         self.acknowledged_v: float | None = None
         self.unanswered_since_s: float | None = None
-        self._line_fault = FaultCode.NONE
-        self.pressure_pa = nan
+        self._line_fault, self.pressure_pa = FaultCode.NONE, nan
 
     @property
     def fault(self) -> FaultCode:
@@ -119,8 +116,8 @@ class OutputExchange:
 
     @property
     def said(self) -> str:
-        """Words of the device about itself, where that is the fault; else empty."""
-        return self.checks.said
+        """Words of the device about itself, where that is the fault, or in place of an answer; else empty."""
+        return self.checks.said or ("" if self.fault else self._unread)
 
     @property
     def confirmed_v(self) -> float | None:
@@ -231,12 +228,14 @@ class OutputExchange:
         self.counts.asked += 1
         if self.unanswered_since_s is None:
             self.unanswered_since_s = now_s
-        self._write(self._host.request(request))
+        self._frame = self._host.request(request)
+        self._write(self._frame)
 
     def _on_reply(self, reply: OutputReply, now_s: float) -> None:
         if isinstance(reply, Garbage):
             self.garbage_bytes += len(reply.data)
             self.counts.garbled += 1
+            self._unread = explain_answer(reply.data, self._frame)
             if self._in_flight is None:  # unasked: that was it
                 self._is_overdue = False
                 del self._given_up.questions[:1]
@@ -248,7 +247,7 @@ class OutputExchange:
             return
         if self.unanswered_since_s is not None and now_s - self.unanswered_since_s > _AWAY_S:
             self.checks.begin()
-        self.unanswered_since_s = None
+        self.unanswered_since_s, self._unread = None, ""
         if self._is_overdue and not self._is_echo(request, reply):
             self._given_up.note_strange(now_s)
             if request is not None:

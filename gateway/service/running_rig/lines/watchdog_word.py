@@ -7,6 +7,8 @@ from gateway.control.inputs import LineStatus
 from gateway.control.supervision.fault_detection import line_words
 from gateway.profiles import Rig
 from gateway.registers.words import WatchdogBit
+from gateway.service.running_rig.lines.cell_identity import CellIdentity
+from gateway.service.running_rig.lines.device_checks import DeviceChecks
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 
@@ -46,7 +48,6 @@ class WatchdogRegister:
             self._log("device", f"{_FORGOTTEN}; it is being armed again")
 
 
-def device_fault_note(line: OutputExchange) -> str:
+def device_fault_note(checks: DeviceChecks | CellIdentity) -> str:
     """Return what the start says of a device that is not what it should be, or whose watchdog keeps it."""
-    fault = line.checks.fault
-    return f"{fault.code} {line_words(LineStatus(fault=fault, said=line.checks.said))}"
+    return f"{checks.fault.code} {line_words(LineStatus(fault=checks.fault, said=checks.said))}"

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from gateway.devices import DeviceProfile, cell_device, output_device
-from gateway.devices.messages import Accepted, Garbage, SetVoltage
+from gateway.devices.messages import Accepted, DeviceAnswer, DeviceStep, Garbage, SetVoltage
 from gateway.ports import PacedPty
 from gateway.profiles import CellLine, OutputLine
 from gateway.service.running_rig.lines.baud_probe import (
@@ -150,6 +150,26 @@ def test_a_refusal_in_the_devices_own_words_is_heard(output: OutputLine) -> None
     assert heard.valid >= 1
 
 
+class TalkingOutput(AnsweringRegulator):
+    """Answers each line by these words, or, where there are none, by its own: so does an adapter that hears itself."""
+
+    def __init__(self, words: bytes) -> None:
+        super().__init__(demo().output.device, 9600)
+        self._words = words
+
+    def _on_bytes(self, chunk: bytes, now_s: float) -> None:
+        if b"\r\n" in chunk:
+            self.pty.send(self._words or chunk)
+
+
+@pytest.mark.parametrize(("words", "told"), [(b"E 07\r\n", "it says 'E 07', no answer that its profile"), (b"", "")])
+def test_an_output_that_answers_in_other_words_is_quoted_and_our_own_are_not(
+    output: OutputLine, words: bytes, told: str
+) -> None:
+    heard = asked(TalkingOutput(words), lambda path: listen_at(output, path, 9600))
+    assert heard.bytes and heard.says.startswith(told) and bool(heard.says) is bool(told)
+
+
 def test_what_is_heard_is_told_in_numbers(cell: CellLine) -> None:
     heard = asked(SpeakingCell(cell.device, 115200), lambda path: listen_at(cell, path, cell.baud))
     assert heard.baud == 115200
@@ -197,6 +217,15 @@ def test_what_cannot_be_asked_is_told_the_safe_voltage_of_its_rig_and_a_cell_not
     assert b"3.0000" in _question_and_receiver(line, 3.0)[0]()
     stream, asked_cell = demo().load_cell, replace(demo().load_cell, device=load_device("mantracourt-dsc"), unit="N")
     assert _question_and_receiver(stream, 3.0)[0]() == b"" != _question_and_receiver(asked_cell, 3.0)[0]()
+
+
+def test_of_a_cell_that_can_be_asked_what_it_is_no_reading_is_asked() -> None:
+    """`$014` asks an ADAM-4016 for its sample; an I-7021 on the wrong adapter keeps its output as its power-on value by it."""
+    ask, receive = _question_and_receiver(replace(demo().load_cell, device=load_device("adam-4016"), unit=None), 0.0)
+    for model, is_right in ((b"4016", True), (b"7021", False)):
+        assert ask() == b"$01M\r"
+        assert receive(b"!01", 0.0) == []
+        assert receive(model + b"\r", 0.0) == [DeviceAnswer(DeviceStep.IDENTITY, is_right=is_right)]
 
 
 def test_at_every_speed_the_silent_device_hears_the_safe_voltage_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:

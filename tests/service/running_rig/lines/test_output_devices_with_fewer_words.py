@@ -108,6 +108,19 @@ def test_an_answer_that_counts_in_coarser_steps_confirms_and_is_not_asked_for_ev
     assert wire.last == "V 1.240"
 
 
+@pytest.mark.parametrize(("words", "told"), [("E 07", "it says 'E 07', no answer"), ("SET 512", ""), ("\x00\xff", "")])
+def test_a_device_that_answers_in_other_words_is_quoted_until_it_answers(words: str, told: str) -> None:
+    """Power and wires were blamed for a checksum that is switched on, or another format. Our own words an adapter says."""
+    wire = with_words()
+    wire.set_voltage(512)
+    wire.answer(words)
+    assert wire.exchange.said.startswith(told) and bool(wire.exchange.said) is bool(told)
+    wire.tick(REPLY_TIMEOUT_S)
+    assert bool(wire.exchange.said) is bool(told)
+    wire.answer("512")
+    assert wire.exchange.said == ""
+
+
 @pytest.mark.parametrize("is_told", [True, False])
 def test_a_trip_stays_until_a_reset_where_a_device_tells_of_its_watchdog_no_more_than_the_time(is_told: bool) -> None:
     """Which reads back as before, or not at all while it has tripped: neither is a word about the trip."""
