@@ -225,7 +225,8 @@ def test_a_new_directory_is_synced_into_its_parent(store):
     with disk() as there:
         store.add(calibration(2))
     made = there.calls.index(("mkdir", "calibrations"))
-    assert there.calls[made + 1 : made + 3] == [("open", "state"), ("fsync", "state")]
+    kept = [call for call in there.calls[made + 1 :] if call[0] in ("write", "fsync")]  # root looks whose it is before
+    assert kept[0] == ("fsync", "state")
 
 
 def test_what_a_killed_writer_left_is_nothing_to_anybody(used):
