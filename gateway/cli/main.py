@@ -1,6 +1,7 @@
 """The command `force-gateway`. A verb's module is imported when that verb is called, so `--help` and `check` start fast
 and a verb's libraries cost only those who use it."""
 
+import io
 import os
 import sys
 from collections.abc import Iterable
@@ -117,9 +118,18 @@ def _open_standard_streams() -> None:
             setattr(sys, name, open(descriptor, "w" if descriptor else "r", closefd=False))  # noqa: SIM115
 
 
+def _print_what_the_terminal_can() -> None:
+    """Print `?` for a character that the terminal's encoding does not have, or that a file's name has made of a stray byte:
+    a verb that has done its work ended on it."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="replace")
+
+
 def main() -> None:
     """Run `force-gateway` or `python -m gateway`."""
     _open_standard_streams()
+    _print_what_the_terminal_can()
     if "_FORCE_GATEWAY_COMPLETE" in os.environ:
         from gateway.cli.command_line.bash_completion import use_our_bash
 
