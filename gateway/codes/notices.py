@@ -138,6 +138,15 @@ NOTICES: Final = (
         "backup.",
     ),
     Explanation(
+        "W251",
+        "the device's watchdog does not arm",
+        "The output device did not arm its watchdog. The rig says accept_no_device_watchdog, so the output is used: "
+        "the guardian alone watches it.",
+        "A switch or a setting in the device keeps the watchdog off, or the profile's words are another model's.",
+        "See to the device's manual; force-gateway check --probe names what answered. With this machine off, nothing ends the "
+        "force.",
+    ),
+    Explanation(
         "W304",
         "force with the output disabled",
         "The output is disabled, told the safe voltage, and the load cell still measures a force.",

@@ -16,6 +16,7 @@ from gateway.devices.messages import DeviceAnswer, DeviceStep
 _LOOK_PERIOD_S = 1.0  # between two looks at the watchdog: a device that was off for a moment has forgotten its arming
 _WAITS_S = 0.5  # of a look for an idle wire: on a slow one a setpoint that never rests leaves none
 _TRIES = 3  # of arming; then it does not arm
+_READS_OTHERWISE = "it reads back otherwise"
 _MISSES = 5  # of one question in a row, while settings are answered: the device has no words for it
 
 
@@ -30,8 +31,8 @@ class DeviceLevel:
 
 class DeviceChecks:
     """next_step: the question that is due; fault: what keeps the output from being enabled; said: the device's own words for
-    it; is_done: all is asked and well; times_forgotten: how often a look found an armed watchdog off. is_waived: the rig
-    accepts an output without a watchdog."""
+    it; is_done: all is asked and well; times_forgotten: how often a look found an armed watchdog off; unarmed: the
+    device's words where it does not arm and the rig accepts that. is_waived: the rig accepts an output without a watchdog."""
 
     def __init__(self, host: OutputHost, *, is_waived: bool) -> None:
         self._known = host.checks
@@ -51,7 +52,7 @@ class DeviceChecks:
         self._tries = self._misses = 0
         self._next_look_s = 0.0
         self.fault = FaultCode.NONE
-        self.said = ""
+        self.said = self.unarmed = ""
         self.is_armed = self.is_tripped = self._is_said = False
         self._settle()
 
@@ -164,14 +165,16 @@ class DeviceChecks:
         self.times_forgotten += self.is_armed and not (is_armed or words)
         self.is_armed = is_armed
         if is_armed:
-            self._tries = 0
+            self._tries, self.unarmed = 0, ""
             self.fault = FaultCode.NONE
             return
         self._tries += 1
         if self._tries < _TRIES:
             self._waiting = deque(self._arming)
-        elif not self._is_waived:
-            self.fault, self.said = FaultCode.WATCHDOG_NOT_ARMED, words or "it reads back otherwise"
+        elif self._is_waived:
+            self.unarmed = words or _READS_OTHERWISE
+        else:
+            self.fault, self.said = FaultCode.WATCHDOG_NOT_ARMED, words or _READS_OTHERWISE
             self._waiting.clear()
 
 

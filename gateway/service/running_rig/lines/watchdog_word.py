@@ -17,6 +17,7 @@ _GUARDIAN_WATCHES, _DEVICE_ARMED = int(WatchdogBit.GUARDIAN_WATCHES), int(Watchd
 _FORGOTTEN: Final = (
     "W249 the output device said that its watchdog is off: a moment without power, or somebody switched it off"
 )
+_UNARMED: Final = "W251 the output device's watchdog does not arm, and the rig accepts that"
 _DEVICE_HAS_NONE, _DEVICE_TRIPPED = int(WatchdogBit.DEVICE_HAS_NONE), int(WatchdogBit.DEVICE_TRIPPED)
 
 
@@ -32,11 +33,13 @@ def watchdog_word(rig: Rig, ports: RigPorts, line: OutputExchange) -> int:
 
 
 class WatchdogRegister:
-    """Keeps the register `watchdogs`, and tells where the device had forgotten its arming. show: writes the register."""
+    """Keeps the register `watchdogs`, and tells where the device had forgotten its arming, or does not arm where the rig
+    accepts that. show: writes the register."""
 
     def __init__(self, line: OutputExchange, show: Callable[[int], None], log: Callable[[str, str], None]) -> None:
         self._checks, self._show, self._log = line.checks, show, log
         self._shown, self._told = -1, 0
+        self._is_unarmed_told = False
 
     def follow(self, word: int) -> None:
         """Show the word where it has changed; at each tick."""
@@ -46,6 +49,10 @@ class WatchdogRegister:
         if self._checks.times_forgotten != self._told:
             self._told = self._checks.times_forgotten
             self._log("device", f"{_FORGOTTEN}; it is being armed again")
+        if self._checks.unarmed and not self._is_unarmed_told:
+            self._log("device", f"{_UNARMED}: {self._checks.unarmed}")
+        # a port that is opened again asks anew: told again only once it has been armed
+        self._is_unarmed_told = (self._is_unarmed_told or bool(self._checks.unarmed)) and not self._checks.is_armed
 
 
 def device_fault_note(checks: DeviceChecks | CellIdentity) -> str:

@@ -206,3 +206,15 @@ def test_a_watchdog_whose_only_proof_is_refused_is_not_armed(is_waived: bool) ->
     assert (checks.is_armed, checks.is_done) == (False, is_waived)
     told = (FaultCode.NONE, "") if is_waived else (FaultCode.WATCHDOG_NOT_ARMED, "?01")
     assert (checks.fault, checks.said) == told
+
+
+def test_a_watchdog_that_does_not_arm_keeps_nothing_where_the_rig_accepts_it_and_is_told() -> None:
+    checks = DeviceChecks(output_host(load_device("icpdas-702x")), is_waived=True)
+    arm(checks, fails=MOST_TRIES - 1)
+    assert (checks.is_armed, checks.unarmed) == (True, "")
+    checks.begin()
+    arm(checks, fails=MOST_TRIES)
+    assert checks.is_done and checks.fault is FaultCode.NONE
+    assert (checks.is_armed, checks.unarmed) == (False, "it reads back otherwise")
+    checks.begin()
+    assert checks.unarmed == "", "another device may be behind the port"

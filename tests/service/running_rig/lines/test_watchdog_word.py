@@ -28,13 +28,24 @@ def test_the_guardian_watches_only_a_line_that_it_has(guarded: bool) -> None:
 
 
 def test_an_arming_that_the_device_has_forgotten_is_told_once_each_time() -> None:
-    checks, shown, told = SimpleNamespace(times_forgotten=0), list[int](), list[str]()
+    checks, shown, told = SimpleNamespace(times_forgotten=0, unarmed="", is_armed=True), list[int](), list[str]()
     register = WatchdogRegister(SimpleNamespace(checks=checks), shown.append, lambda cause, text: told.append(text))  # type: ignore[arg-type]
     for word, times in ((3, 0), (3, 0), (1, 1), (3, 1), (3, 1), (3, 2)):
         checks.times_forgotten = times
         register.follow(word)
     assert shown == [3, 1, 3]
     assert [text[:4] for text in told] == ["W249", "W249"]
+
+
+def test_a_watchdog_that_does_not_arm_is_told_once_until_it_has_been_armed() -> None:
+    checks, told = SimpleNamespace(times_forgotten=0, unarmed="", is_armed=False), list[str]()
+    line: Any = SimpleNamespace(checks=checks)
+    register = WatchdogRegister(line, lambda word: None, lambda cause, text: told.append(text))
+    steps = [("", False), ("?", False), ("?", False), ("", False), ("?", False), ("", True), ("no", False)]
+    for checks.unarmed, checks.is_armed in steps:
+        register.follow(0)
+    says = "W251 the output device's watchdog does not arm, and the rig accepts that"
+    assert told == [f"{says}: ?", f"{says}: no"]
 
 
 @pytest.mark.parametrize("accepts_none", [False, True])
