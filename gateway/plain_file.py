@@ -10,6 +10,8 @@ Standard library only: the guardian uses this.
 import errno
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, Final, Literal
 
@@ -58,6 +60,15 @@ def open_plain(path: Path | str, flags: int = os.O_RDONLY, mode: int = 0o600, *,
         os.close(descriptor)
         raise
     return descriptor
+
+
+@contextmanager
+def closing_descriptor(descriptor: int) -> Iterator[int]:
+    """Yield an open descriptor, and close it behind the block, whatever happens in it."""
+    try:
+        yield descriptor
+    finally:
+        os.close(descriptor)
 
 
 def open_plain_stream(path: Path | str, mode: Literal["rb", "wb"] = "rb") -> BinaryIO:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Final
 from zlib import crc32
 
-from gateway.plain_file import open_plain, open_plain_stream, write_whole
+from gateway.plain_file import closing_descriptor, open_plain, open_plain_stream, write_whole
 
 _FRESH: Final = ".new"
 _READER_BOUND_S: Final = 2.0
@@ -38,12 +38,9 @@ def lock_directory(directory: Path, *, shared: bool = False) -> Iterator[int]:
     A holder that does not let go (stopped by Ctrl-Z, a hung disk) changes nothing either: who reads goes on without the lock,
     who would change something gets an OSError.
     """
-    descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    try:
+    with closing_descriptor(os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)) as descriptor:
         _lock(descriptor, directory, shared=shared)
         yield descriptor
-    finally:
-        os.close(descriptor)
 
 
 def _lock(descriptor: int, directory: Path, *, shared: bool) -> None:
@@ -85,18 +82,10 @@ def _make_owner_s(directory: Path) -> None:
         return
     flags = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
     with (
-        _closing(os.open(directory, flags | os.O_NOFOLLOW)) as made,
-        _closing(os.open(directory.parent, flags)) as folder,
+        closing_descriptor(os.open(directory, flags | os.O_NOFOLLOW)) as made,
+        closing_descriptor(os.open(directory.parent, flags)) as folder,
     ):
         _give_to_owner(made, directory.name, folder)
-
-
-@contextlib.contextmanager
-def _closing(descriptor: int) -> Iterator[int]:
-    try:
-        yield descriptor
-    finally:
-        os.close(descriptor)
 
 
 def write_durably(directory: int, name: str, data: bytes) -> None:
@@ -182,13 +171,10 @@ def verify_checksum(data: bytes) -> bytes:
 def _write(directory: int, name: str, data: bytes) -> None:
     """A whole new file on the disk, under a name that nobody reads; what a killed writer left there goes."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC
-    descriptor = open_plain(name, flags, 0o640, directory=directory)
-    try:
+    with closing_descriptor(open_plain(name, flags, 0o640, directory=directory)) as descriptor:
         write_whole(descriptor, data)
         _give_to_owner(descriptor, name, directory)
         os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _give_to_owner(made: int, name: str, folder: int) -> None:
@@ -204,8 +190,5 @@ def _give_to_owner(made: int, name: str, folder: int) -> None:
 
 def sync_path(path: Path) -> None:
     """Have a file's data, or a directory's names, put on the disk. OSError where it refuses."""
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    try:
+    with closing_descriptor(os.open(path, os.O_RDONLY | os.O_CLOEXEC)) as descriptor:
         os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from gateway.plain_file import open_plain
+from gateway.plain_file import closing_descriptor, open_plain
 
 NAME: Final = "lock"
 _NO_LOCKS: Final = (errno.ENOLCK, errno.EBADF, errno.EINVAL, errno.ENOTSUP)  # network file systems, of a directory
@@ -21,16 +21,11 @@ _NO_LOCKS: Final = (errno.ENOLCK, errno.EBADF, errno.EINVAL, errno.ENOTSUP)  # n
 @contextmanager
 def hold_state_lock(directory: Path) -> Iterator[bool]:
     """Yield whether the lock is ours; while it is nobody else gets it. OSError where its file cannot be opened, or is none."""
-    with _closing(_open(directory / NAME)) as file, _closing(os.open(directory, os.O_RDONLY | os.O_DIRECTORY)) as whole:
+    with (
+        closing_descriptor(_open(directory / NAME)) as file,
+        closing_descriptor(os.open(directory, os.O_RDONLY | os.O_DIRECTORY)) as whole,
+    ):
         yield _is_taken(file) and _is_taken(whole, _NO_LOCKS)
-
-
-@contextmanager
-def _closing(descriptor: int) -> Iterator[int]:
-    try:
-        yield descriptor
-    finally:
-        os.close(descriptor)
 
 
 def _open(path: Path) -> int:
