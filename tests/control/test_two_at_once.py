@@ -17,6 +17,7 @@ from gateway.control.supervision.one_shot_events import OneShotEvents
 from gateway.registers.words import ControlBit, LimitedBy, Mode, State, StatusBit
 from tests.control.bench import Bench, bsfm, enabled, settings
 from tests.control.runs.test_ladder_run import SHORT, begun
+from tests.control.test_rest_forgets import RESPONSE
 from tests.control.valve.valve_bench import ValveBench
 
 
@@ -115,6 +116,19 @@ def test_a_force_behind_a_voltage_goes_on_from_the_contact_force_with_the_payloa
     pressed_n = bench.last.force_measured_n
     output = bench.write(mode=Mode.FORCE, force_setpoint_n=pressed_n, voltage_setpoint_v=0.0)
     assert output.force_applied_n == pytest.approx(pressed_n, abs=4.0)
+
+
+def test_a_force_by_a_measured_response_goes_on_from_the_voltage_too_with_the_payloads_weight() -> None:
+    """The weight turns no friction round: it pressed before, too."""
+    bench = Bench()
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1, RESPONSE))
+    bench.run(0.3)
+    bench.write(control_word=ControlBit.ENABLE, mode=Mode.VOLTAGE, voltage_setpoint_v=4.0, payload_kg=1.0)
+    expected_n = bench.run(1.5).force_measured_n - bench.last.model_residual_n
+    bench.write(mode=Mode.FORCE, force_setpoint_n=expected_n, voltage_setpoint_v=0.0)
+    bench.history.clear()
+    bench.run(0.1)
+    assert [one.output.voltage_v for one in bench.history] == pytest.approx([4.0] * len(bench.history), abs=0.1)
 
 
 def test_a_question_behind_a_silence_of_which_no_step_knows_is_answered_by_the_time_of_now() -> None:

@@ -183,13 +183,16 @@ class Feedforward:
         turned_v = model.voltage_v(to_n, after)[0]
         return (along_v - from_v) / (turned_v - from_v) if turned_v != from_v else 1.0
 
-    def fall_back(self, goal_n: float) -> None:
-        """Drop to the goal at once when contact is lost, and stay on the rising branch for the next contact."""
-        before_n = self.aimed_n
+    def fall_back(self, goal_n: float, gravity_n: float = 0.0) -> None:
+        """Drop to the goal at once when contact is lost, and stay on the rising branch for the next contact. Nothing corrects
+        it any more; gravity_n as in `advance`."""
         self.applied_n = self.aimed_n = min(self.applied_n, goal_n)
-        self._slid_n += self.aimed_n - before_n  # no movement of the slide, which friction would turn round with
         self._remember(self.model.reversal.at(RISING))
-        self._slide = self._memory
+        self._place_slide(gravity_n)
+
+    def _place_slide(self, gravity_n: float) -> None:
+        """The slide is where the aim is. It has not been moved there, or friction would turn round with it."""
+        self._slide, self._slid_n = self._memory, self.aimed_n - gravity_n
 
     def slope_n_per_v(self, gravity_n: float) -> float:
         """Return how much force a volt makes at the working point, N/V, by the branches as they are shared there."""
@@ -203,15 +206,14 @@ class Feedforward:
         and a trim that took it for an error would pull the new one down with it."""
         self.reference_n = max(0.0, contact_n)
 
-    def take_over(self, force_n: float, branch_share: float = RISING) -> None:
+    def take_over(self, force_n: float, branch_share: float = RISING, gravity_n: float = 0.0) -> None:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump: what a swapped calibration
-        carries over was for a voltage of ours."""
+        carries over was for a voltage of ours. gravity_n as in `advance`."""
         self._carry_over_v = 0.0
         self.applied_n = self.aimed_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
         self._delayed.restart(self.applied_n)
         self._remember(self.model.reversal.at(branch_share))
-        self._slide = self._memory
-        self._slid_n = self.applied_n
+        self._place_slide(gravity_n)
 
     def compute_voltage(self, gravity_n: float) -> tuple[float, LimitedBy]:
         """Return the voltage for the applied contact force by the inverse model and what limited it. ModelError without one."""

@@ -215,7 +215,7 @@ class ForceLoop:
         """Go on from the force of a run that has ended, and no higher than where its voltage would lead (towards_n). given_n:
         as in `use`."""
         reached_n = min(towards_n, self.expected.force_n(branch_share))
-        self.feedforward.take_over(reached_n + given_n, branch_share)
+        self.feedforward.take_over(reached_n + given_n, branch_share, given_n)
 
     def _step_down(self, demand: Demand, dt_s: float, given_n: float) -> StateEvent:
         law = self.feedforward
@@ -298,7 +298,7 @@ class ForceLoop:
 
     def _step_voltage(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
         self._trim.reset()
-        self.feedforward.take_over(inputs.expected_n)
+        self.feedforward.take_over(inputs.expected_n, gravity_n=demand.gravity_n + inputs.outside_n)
         self.feedforward_v = demand.voltage_v
         self.limited_by = self._limiter.drive(demand.voltage_v)
         return self._settling.judge_voltage(demand, inputs, is_slewing=self.limited_by is LimitedBy.VOLTAGE_SLEW)
