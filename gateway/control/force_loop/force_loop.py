@@ -236,9 +236,10 @@ class ForceLoop:
         goal_n, rate_n_per_s = self._approach.goal(inputs.now_s, demand, inputs.touching, law)
         if inputs.held_back:
             goal_n = min(goal_n, law.approaching_n(demand.precontact_n))
-        if self._was_touching and not inputs.touching:
-            law.fall_back(goal_n)
         given_n = demand.gravity_n + inputs.outside_n
+        if self._was_touching and not inputs.touching:
+            law.fall_back(goal_n, given_n)
+            self._trim.forget()
         was_at_rest = law.applied_n <= 0.0
         moved_n = law.advance(goal_n, rate_n_per_s, inputs.dt_s, given_n)
         if was_at_rest:
