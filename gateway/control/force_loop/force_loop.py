@@ -71,6 +71,7 @@ class ForceLoop:
         is_same = model == law.model and settings.timing == self._measured and settings.lead == self._lead_settings
         law.use(model, given_n, self._is_correcting)
         self.expected.retime(settings.supervision.response_lag_s)
+        self._settling.retime(settings.supervision.unreachable_s)
         self.expected.use(model)
         if not is_same or self._is_retimed:
             self._is_retimed = False
