@@ -180,6 +180,16 @@ def test_a_new_setpoint_ends_the_band_of_the_one_before_in_its_own_step() -> Non
     assert not output.status & StatusBit.IN_BAND and output.state is State.RAMPING
 
 
+def test_a_voltage_that_stood_is_no_force_that_was_held_when_the_mode_changes_on_its_way() -> None:
+    bench = enabled()
+    bench.voltage(2.0)
+    bench.run(2.0)
+    bench.voltage(7.0)
+    assert bench.run(0.16).status & StatusBit.IN_BAND, "of a voltage: it stands, while the force still rises"
+    output = bench.write(mode=Mode.FORCE, force_setpoint_n=bench.last.force_measured_n + 0.5, voltage_setpoint_v=0.0)
+    assert not output.status & StatusBit.IN_BAND and output.state is State.RAMPING
+
+
 def test_a_run_begins_with_nothing_of_the_one_before_and_keeps_its_own_ceiling_under_another_calibration() -> None:
     bench = begun(Bench())
     run = bench.controller.active_run

@@ -83,6 +83,8 @@ class SettlingCheck:
     def judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float, applied_n: float) -> StateEvent:
         """Return the event of a step in force mode. goal_n: where the ramp of the applied force leads."""
         self._answer.restart()
+        if self._driven_v is not None:  # what was held was a voltage
+            self._band.restart()
         self._driven_v = None
         if demand.force_n <= 0.0:
             self._band.restart()
