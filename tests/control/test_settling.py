@@ -165,6 +165,13 @@ def test_from_contact_the_force_rises_over_the_contact_ramp():
     assert bench.last.force_applied_n == 12.0
 
 
+def test_a_precontact_force_that_a_master_writes_below_the_smallest_usable_one_moves_the_tool_all_the_same():
+    control = settings()
+    bench = enabled(replace(control, limits=replace(control.limits, smallest_force_n=3.0)))
+    bench.write(force_setpoint_n=20.0, precontact_force_n=1.5)
+    assert bench.run(2.0).state is State.HOLDING
+
+
 def test_lost_contact_takes_the_force_back_at_once():
     bench = enabled()
     bench.force(30.0)

@@ -92,14 +92,14 @@ class Feedforward:
         self._memory, self.branch_share = memory, self.model.reversal.branch_share(memory)
 
     def approaching_n(self, precontact_n: float) -> float:
-        """Return the pre-contact force, but never one that cannot move a vented tool.
+        """Return the pre-contact force, but never one that cannot move a vented tool, as 0 V below the smallest usable one.
         Friction alone keeps pressed what the ladder's lowest stair shows, and where the ladder begins to press it has been
         overcome twice. What a model presses that begins above 0 V is no friction: its falling branch is led on to 0 V."""
         least_n, (least_v, _) = self.model.force_range_n[0], self.model.voltage_range_v
         if least_v > 0.0:
             falling = self.model.branches.falling
             least_n = max(0.0, least_n - falling.slope(falling.x0) * falling.x0)
-        return max(precontact_n, 2.0 * least_n + APPROACH_N)
+        return max(precontact_n, 2.0 * least_n + APPROACH_N, self._limits.smallest_force_n)
 
     def use(self, model: Bsfm, gravity_n: float, is_corrected: bool = False) -> None:
         """Swap the model without a bump: the voltage difference is carried over and fades, with what a correction asks for, if
