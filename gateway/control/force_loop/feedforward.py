@@ -10,7 +10,7 @@ rising branch, because it slides outwards.
 from math import isfinite
 from typing import Final
 
-from gateway.bsfm import RISING, Bsfm, InverseStatus
+from gateway.bsfm import FALLING, RISING, Bsfm, InverseStatus
 from gateway.bsfm.slip.reversal import Memory
 from gateway.control.demand import Demand
 from gateway.control.force_loop.setpoint_trend import SetpointTrend
@@ -195,11 +195,11 @@ class Feedforward:
         self._slide, self._slid_n = self._memory, self.aimed_n - gravity_n
 
     def slope_n_per_v(self, gravity_n: float) -> float:
-        """Return how much force a volt makes at the working point, N/V, by the branches as they are shared there."""
-        rising, falling = self.model.branches.rising, self.model.branches.falling
-        force_n, share = self.aimed_n - gravity_n, 0.5 + 0.5 * self.branch_share
-        slopes = [max(LEAST_SLOPE_N_PER_V, curve.slope(curve.inverse(force_n)[0])) for curve in (rising, falling)]
-        return 1.0 / (share / slopes[0] + (1.0 - share) / slopes[1])
+        """Return how much force a volt as sent makes at the working point, N/V, by the branches as they are shared there."""
+        model, force_n, share = self.model, self.aimed_n - gravity_n, 0.5 + 0.5 * self.branch_share
+        rising, _ = model.branch_slopes_n_per_v(model.voltage_v(force_n, RISING)[0])
+        _, falling = model.branch_slopes_n_per_v(model.voltage_v(force_n, FALLING)[0])
+        return 1.0 / (share / max(LEAST_SLOPE_N_PER_V, rising) + (1.0 - share) / max(LEAST_SLOPE_N_PER_V, falling))
 
     def begin_at(self, contact_n: float) -> None:
         """Begin the expected course at the force that is left of before, N: right behind a disable or a restart it still goes,

@@ -9,6 +9,7 @@ from gateway.bsfm.model import Response
 from gateway.control import CalibrationInUse, Controller
 from gateway.control.compensation.command_map import CommandMap, apply_command_map
 from gateway.control.compensation.compensation import TimingCompensation
+from gateway.control.force_loop.feedforward import Feedforward
 from tests.control.bench import Bench, SmallPlant, bsfm, settings
 
 BOWED = CommandMap(bow=0.05, s=0.02)
@@ -62,6 +63,15 @@ def test_the_thrust_of_a_voltage_is_that_which_arrives(bow: float) -> None:
         assert sent.n_per_v * (sent.linear_v(to_sent_v) - sent.linear_v(from_sent_v)) == pytest.approx(
             arrives_n, rel=0.04
         )
+
+
+@pytest.mark.parametrize("force_n", [4.0, 20.0, 45.0])
+def test_the_limit_of_the_trim_is_one_in_volts_that_are_sent(force_n: float) -> None:
+    model = apply_command_map(bsfm(), CommandMap(bow=-0.1, s=0.0))
+    law = Feedforward(model, settings().limits, 0.1)
+    law.take_over(force_n)
+    volts = [model.voltage_v(force_n + part_n, 1.0)[0] for part_n in (-0.01, 0.01)]
+    assert law.slope_n_per_v(0.0) == pytest.approx(0.02 / (volts[1] - volts[0]), rel=0.01)
 
 
 class _BentPlant(SmallPlant):
