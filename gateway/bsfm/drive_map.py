@@ -58,7 +58,7 @@ def _thrust_slope(model: Bsfm, place: float) -> float:
     low_v, high_v = model.voltage_range_v
     at_v, (first, last) = low_v + place * (high_v - low_v), MIXED
     rising_share = min(1.0, max(0.0, (place - first) / (last - first)))
-    rising, falling = model.branches.rising.slope(at_v), model.branches.falling.slope(at_v)
+    rising, falling = model.branch_slopes_n_per_v(at_v)
     return falling + rising_share * (rising - falling)
 
 

@@ -74,6 +74,10 @@ class Bsfm:
         rising_n, falling_n = self.branches.rising.value(voltage_v), self.branches.falling.value(voltage_v)
         return falling_n + (rising_n - falling_n), falling_n
 
+    def branch_slopes_n_per_v(self, voltage_v: float) -> tuple[float, float]:
+        """Return how steep the rising and the falling branch are at this voltage, N/V."""
+        return self.branches.rising.slope(voltage_v), self.branches.falling.slope(voltage_v)
+
     def settled_n(self, voltage_v: float, branch_share: float) -> float:
         """Return the force whose `voltage_v` at this branch share is this voltage: bracketed Newton between the branches."""
         rising, falling = self.branches.rising, self.branches.falling

@@ -16,6 +16,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.inputs import LineStatus
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
+from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import Reading, SampleConditioner
 from gateway.control.self_test.items import SelfTestPlan
@@ -29,11 +30,6 @@ from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
 _TAKE = int(ControlBit.TAKE_OWNERSHIP)
-_NAMES: Final = {
-    ControlBit.ENABLE: "enable",
-    ControlBit.START_CALIBRATION: "calibration",
-    ControlBit.START_SELF_TEST: "self-test",
-}
 _WHOLE: Final = ControlBit(0)
 _PUSHING: Final = "and a run is made pushing (bit 4 0, enable, wait until status bits 8, 9 are 0)"
 _UNKNOWN: Final = "whether air still presses is not known"
@@ -149,7 +145,7 @@ class EdgeCheck:
             return _no_run(RefusalReason.FITTING, why, plan)
         if why := self._forbids_run(plan, at):
             return _no_run(_reason_of(plan), why, plan)
-        if at.state is State.OFF and (blocked := _refuse_blocked(at, _bit_of(plan))):
+        if at.state is State.OFF and (blocked := _refuse_blocked(at, _bit_of(plan), _name_of(plan))):
             return blocked
         return self._tare(self._commands.command, at.state, at) if plan.tare else None
 
@@ -272,19 +268,23 @@ def _in(state: State, at: Situation) -> Situation:
     return at if state is at.state else replace(at, state=state)
 
 
-def _refuse_blocked(at: Situation, bit: ControlBit) -> EdgeRefusal | None:
+def _refuse_blocked(at: Situation, bit: ControlBit, what: str = "enable") -> EdgeRefusal | None:
     reason = RefusalReason.FAULT_LATCHED if at.state is State.FAULT else at.block
     if not reason:
         return None
-    what = _NAMES[bit]
     late = at.excuse if reason is at.block else ""
     line_fault = at.line_fault if reason is RefusalReason.OUTPUT_FAULT else ""
     return EdgeRefusal(reason, bit, f"{what} refused: {late or line_fault or reason.explanation.sentence}")
 
 
 def _no_run(reason: RefusalReason, why: str, plan: AnyPlan) -> EdgeRefusal:
-    bit = _bit_of(plan)
-    return EdgeRefusal(reason, bit, f"{_NAMES[bit]} refused: {why}")
+    return EdgeRefusal(reason, _bit_of(plan), f"{_name_of(plan)} refused: {why}")
+
+
+def _name_of(plan: AnyPlan) -> str:
+    if isinstance(plan, SelfTestPlan):
+        return "self-test"
+    return "experiment" if isinstance(plan, ExperimentPlan) else "calibration"
 
 
 def _bit_of(plan: AnyPlan) -> ControlBit:

@@ -77,7 +77,7 @@ class SampleConditioner:
             force_n = self._cell.force_n(force_n, *around)
         interval_s = self._interval_s(sample.time_s)
         if interval_s > 0.0 and usable:
-            self._zero.observe(force_n)
+            self._zero.observe(force_n, interval_s)
         age_s = max(0.0, now_s - sample.time_s)
         cell_n = self.direction * (force_n - self._zero.zero_n) if usable else nan
         fresh = age_s <= self._timeout_s

@@ -11,7 +11,8 @@ from typing import Final
 
 from gateway.control.settings import Supervision
 
-_WINDOW: Final = 20  # samples: 0.2 s of a 100 Hz cell
+_WINDOW: Final = 20  # readings: 0.2 s of a 100 Hz cell
+_APART_S: Final = 0.0075  # of a faster one the samples of so long are one reading: it would not see a slow decay
 _FEWEST: Final = 5
 _LARGEST_SHARE: Final = 0.5  # of the saturation: a zero beyond it leaves no range to measure
 
@@ -22,16 +23,22 @@ class Zero:
     def __init__(self, supervision: Supervision) -> None:
         self.zero_n = 0.0
         self._recent_n: deque[float] = deque(maxlen=_WINDOW)
+        self._since_s = self._sum_n = 0.0
+        self._samples = 0
         self.largest_spread_n = max(5.0 * supervision.sample_quantum_n, 0.5)
         self._largest_n = _LARGEST_SHARE * supervision.saturation_n
 
-    def observe(self, force_n: float) -> None:
-        """Keep one more usable sample, N."""
-        self._recent_n.append(force_n)
+    def observe(self, force_n: float, interval_s: float = _APART_S) -> None:
+        """Keep one more usable sample, N. interval_s: since the one before."""
+        self._since_s, self._sum_n, self._samples = self._since_s + interval_s, self._sum_n + force_n, self._samples + 1
+        if self._since_s >= _APART_S:
+            self._recent_n.append(self._sum_n / self._samples)
+            self._since_s, self._sum_n, self._samples = 0.0, 0.0, 0
 
     def forget(self) -> None:
         """Forget all samples after the stream was interrupted: they do not describe now."""
         self._recent_n.clear()
+        self._since_s, self._sum_n, self._samples = 0.0, 0.0, 0
 
     def take(self, gravity_n: float) -> float:
         """Take the zero: by how much it moved, N; gravity_n as in `demand`. Ask `unsteady` first."""

@@ -130,6 +130,21 @@ def test_a_run_of_this_machine_that_cannot_begin_says_why_once_in_the_log():
     assert bench.controller.state is State.HOLDING
 
 
+@pytest.mark.parametrize("begins_with", [None, Response(dead_time_s=0.3, lag_s=1.0)], ids=["a faster", "a slower"])
+def test_the_patience_with_a_force_is_that_of_the_set_in_use(begins_with: Response | None):
+    """Whether it was swapped in, or control began with it."""
+    in_use = CalibrationInUse(bsfm(), 2, Response(dead_time_s=0.1, lag_s=0.5, second_lag_s=0.3))
+    waited_s = []
+    for first in (in_use, CalibrationInUse(bsfm(), 1, begins_with)):
+        bench = Bench(contact=False)
+        bench.controller = Controller(bench.settings, first)
+        bench.controller.use(in_use)
+        bench.run(0.2)
+        bench.enable(20.0)
+        waited_s.append(bench.seconds_until(lambda output: bool(output.status & StatusBit.TARGET_UNREACHABLE), 8.0))
+    assert waited_s[1] == pytest.approx(waited_s[0], abs=0.02)
+
+
 @pytest.mark.parametrize("scale", [0.7, 1.4])
 def test_a_set_that_is_swapped_in_voltage_mode_carries_nothing_over_into_force_mode(scale: float):
     """The voltage was the master's, so none has to fade: it goes on from the force that the new set expects of it."""

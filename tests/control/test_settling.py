@@ -7,12 +7,13 @@ from math import cos, e, pi, radians
 import pytest
 
 from gateway.codes.warning_bits import WarningBit
-from gateway.control import Trim
+from gateway.control import CalibrationInUse, Controller, Trim
 from gateway.control.force_loop.feedforward import Feedforward
 from gateway.control.force_loop.trim import TrimIntegral
 from gateway.registers.words import LimitedBy, Mode, State, StatusBit
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
 from tests.control.bench import Bench, bsfm, enabled, settings
+from tests.control.test_rest_forgets import RESPONSE
 
 UP = [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0]
 STAIRS = [*UP, *UP[-2::-1]]
@@ -164,6 +165,13 @@ def test_from_contact_the_force_rises_over_the_contact_ramp():
     assert bench.last.force_applied_n == 12.0
 
 
+def test_a_precontact_force_that_a_master_writes_below_the_smallest_usable_one_moves_the_tool_all_the_same():
+    control = settings()
+    bench = enabled(replace(control, limits=replace(control.limits, smallest_force_n=3.0)))
+    bench.write(force_setpoint_n=20.0, precontact_force_n=1.5)
+    assert bench.run(2.0).state is State.HOLDING
+
+
 def test_lost_contact_takes_the_force_back_at_once():
     bench = enabled()
     bench.force(30.0)
@@ -173,6 +181,20 @@ def test_lost_contact_takes_the_force_back_at_once():
     assert lost_s < 0.3
     assert bench.last.force_applied_n == 2.0
     assert bench.last.state is State.READY
+
+
+@pytest.mark.parametrize("response", [None, RESPONSE], ids=["by the rig file", "by a measured response"])
+def test_a_tool_that_has_lost_its_contact_waits_at_no_more_than_the_precontact_force(response):
+    """What the trim has learned was of the force before, and what it took for an error until the loss was seen is none."""
+    bench = Bench(gain_n_per_v=6.6)
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1, response))
+    bench.run(0.3)
+    bench.enable(30.0)
+    assert bench.run(1.5).trim_v > 0.2
+    bench.plant.contact = False
+    output = bench.run(0.6)
+    assert output.state is State.READY and output.trim_v == 0.0
+    assert output.voltage_v == pytest.approx(bsfm().voltage_v(2.0, 1.0)[0], abs=0.02)
 
 
 def test_a_setpoint_below_the_smallest_usable_force_is_zero_volts():

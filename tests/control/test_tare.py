@@ -74,6 +74,21 @@ def test_a_tare_of_a_decaying_force_is_refused():
     assert bench.refused and "still on their way to 0" in bench.refused.text
 
 
+@pytest.mark.parametrize("every_ms", [1, 10, 40])
+def test_a_tare_of_a_force_that_decays_more_slowly_than_the_model_is_refused_at_any_rate_of_the_cell(every_ms):
+    bench = enabled(lag_s=0.5)
+    bench.sample_every_ms = every_ms
+    bench.force(40.0)
+    bench.run(2.0)
+    bench.disable()
+    bench.run(0.8)
+    assert bench.last.force_measured_n > 6.0
+    bench.write(control_word=ControlBit.TARE)
+    assert bench.refused and "force not steady" in bench.refused.text
+    bench.run(5.0)
+    assert bench.write(control_word=ControlBit.TARE) and not bench.refused
+
+
 def test_a_tare_of_a_frozen_cell_is_refused():
     """Its reading is no zero: once the cell lives again, every force would be wrong by it."""
     bench = Bench(seed=3, noise_n=0.12)

@@ -17,6 +17,7 @@ from gateway.control.supervision.one_shot_events import OneShotEvents
 from gateway.registers.words import ControlBit, LimitedBy, Mode, State, StatusBit
 from tests.control.bench import Bench, bsfm, enabled, settings
 from tests.control.runs.test_ladder_run import SHORT, begun
+from tests.control.test_rest_forgets import RESPONSE
 from tests.control.valve.valve_bench import ValveBench
 
 
@@ -117,6 +118,19 @@ def test_a_force_behind_a_voltage_goes_on_from_the_contact_force_with_the_payloa
     assert output.force_applied_n == pytest.approx(pressed_n, abs=4.0)
 
 
+def test_a_force_by_a_measured_response_goes_on_from_the_voltage_too_with_the_payloads_weight() -> None:
+    """The weight turns no friction round: it pressed before, too."""
+    bench = Bench()
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1, RESPONSE))
+    bench.run(0.3)
+    bench.write(control_word=ControlBit.ENABLE, mode=Mode.VOLTAGE, voltage_setpoint_v=4.0, payload_kg=1.0)
+    expected_n = bench.run(1.5).force_measured_n - bench.last.model_residual_n
+    bench.write(mode=Mode.FORCE, force_setpoint_n=expected_n, voltage_setpoint_v=0.0)
+    bench.history.clear()
+    bench.run(0.1)
+    assert [one.output.voltage_v for one in bench.history] == pytest.approx([4.0] * len(bench.history), abs=0.1)
+
+
 def test_a_question_behind_a_silence_of_which_no_step_knows_is_answered_by_the_time_of_now() -> None:
     bench = Bench()
     bench.run(0.3)
@@ -163,6 +177,16 @@ def test_a_new_setpoint_ends_the_band_of_the_one_before_in_its_own_step() -> Non
     bench.run(1.0)
     assert bench.last.status & StatusBit.IN_BAND
     output = bench.force(40.0)
+    assert not output.status & StatusBit.IN_BAND and output.state is State.RAMPING
+
+
+def test_a_voltage_that_stood_is_no_force_that_was_held_when_the_mode_changes_on_its_way() -> None:
+    bench = enabled()
+    bench.voltage(2.0)
+    bench.run(2.0)
+    bench.voltage(7.0)
+    assert bench.run(0.16).status & StatusBit.IN_BAND, "of a voltage: it stands, while the force still rises"
+    output = bench.write(mode=Mode.FORCE, force_setpoint_n=bench.last.force_measured_n + 0.5, voltage_setpoint_v=0.0)
     assert not output.status & StatusBit.IN_BAND and output.state is State.RAMPING
 
 

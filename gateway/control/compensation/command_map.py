@@ -39,12 +39,15 @@ class CommandMap:
             if abs(off_v) < _CLOSE_V:
                 break
             low_v, high_v = (low_v, sent_v) if off_v > 0.0 else (sent_v, high_v)
-            stepped_v = sent_v - off_v / max(0.2, self._slope(sent_v))
+            stepped_v = sent_v - off_v / max(0.2, self.slope(sent_v))
             sent_v = stepped_v if low_v < stepped_v < high_v else 0.5 * (low_v + high_v)
         return sent_v
 
-    def _slope(self, sent_v: float) -> float:
+    def slope(self, sent_v: float) -> float:
+        """Return by how much more the regulator makes of one volt more."""
         share = sent_v / self.full_scale_v
+        if not 0.0 < share < 1.0:
+            return 1.0
         bowed = 4.0 * self.bow * (1.0 - 2.0 * share)
         return 1.0 + bowed + 8.0 * self.s * (-1.0 + 6.0 * share - 6.0 * share * share)
 
@@ -70,6 +73,12 @@ class SentBsfm(Bsfm):
     def branch_forces_n(self, voltage_v: float) -> tuple[float, float]:
         """Return `force_n` at the branch shares 1 and -1, N."""
         return Bsfm.branch_forces_n(self, self._straight_v(voltage_v))
+
+    def branch_slopes_n_per_v(self, voltage_v: float) -> tuple[float, float]:
+        """Return how steep the branches are at a voltage that was sent, N/V."""
+        rising, falling = Bsfm.branch_slopes_n_per_v(self, self._straight_v(voltage_v))
+        bend = self.command.slope(voltage_v) if self.command else 1.0
+        return bend * rising, bend * falling
 
     def settled_n(self, voltage_v: float, branch_share: float) -> float:
         """Return the force that comes to rest at a voltage that was sent, N."""

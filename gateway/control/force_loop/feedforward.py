@@ -10,7 +10,7 @@ rising branch, because it slides outwards.
 from math import isfinite
 from typing import Final
 
-from gateway.bsfm import RISING, Bsfm, InverseStatus
+from gateway.bsfm import FALLING, RISING, Bsfm, InverseStatus
 from gateway.bsfm.slip.reversal import Memory
 from gateway.control.demand import Demand
 from gateway.control.force_loop.setpoint_trend import SetpointTrend
@@ -92,14 +92,14 @@ class Feedforward:
         self._memory, self.branch_share = memory, self.model.reversal.branch_share(memory)
 
     def approaching_n(self, precontact_n: float) -> float:
-        """Return the pre-contact force, but never one that cannot move a vented tool.
+        """Return the pre-contact force, but never one that cannot move a vented tool, as 0 V below the smallest usable one.
         Friction alone keeps pressed what the ladder's lowest stair shows, and where the ladder begins to press it has been
         overcome twice. What a model presses that begins above 0 V is no friction: its falling branch is led on to 0 V."""
         least_n, (least_v, _) = self.model.force_range_n[0], self.model.voltage_range_v
         if least_v > 0.0:
             falling = self.model.branches.falling
             least_n = max(0.0, least_n - falling.slope(falling.x0) * falling.x0)
-        return max(precontact_n, 2.0 * least_n + APPROACH_N)
+        return max(precontact_n, 2.0 * least_n + APPROACH_N, self._limits.smallest_force_n)
 
     def use(self, model: Bsfm, gravity_n: float, is_corrected: bool = False) -> None:
         """Swap the model without a bump: the voltage difference is carried over and fades, with what a correction asks for, if
@@ -183,35 +183,37 @@ class Feedforward:
         turned_v = model.voltage_v(to_n, after)[0]
         return (along_v - from_v) / (turned_v - from_v) if turned_v != from_v else 1.0
 
-    def fall_back(self, goal_n: float) -> None:
-        """Drop to the goal at once when contact is lost, and stay on the rising branch for the next contact."""
-        before_n = self.aimed_n
+    def fall_back(self, goal_n: float, gravity_n: float = 0.0) -> None:
+        """Drop to the goal at once when contact is lost, and stay on the rising branch for the next contact. Nothing corrects
+        it any more; gravity_n as in `advance`."""
         self.applied_n = self.aimed_n = min(self.applied_n, goal_n)
-        self._slid_n += self.aimed_n - before_n  # no movement of the slide, which friction would turn round with
         self._remember(self.model.reversal.at(RISING))
-        self._slide = self._memory
+        self._place_slide(gravity_n)
+
+    def _place_slide(self, gravity_n: float) -> None:
+        """The slide is where the aim is. It has not been moved there, or friction would turn round with it."""
+        self._slide, self._slid_n = self._memory, self.aimed_n - gravity_n
 
     def slope_n_per_v(self, gravity_n: float) -> float:
-        """Return how much force a volt makes at the working point, N/V, by the branches as they are shared there."""
-        rising, falling = self.model.branches.rising, self.model.branches.falling
-        force_n, share = self.aimed_n - gravity_n, 0.5 + 0.5 * self.branch_share
-        slopes = [max(LEAST_SLOPE_N_PER_V, curve.slope(curve.inverse(force_n)[0])) for curve in (rising, falling)]
-        return 1.0 / (share / slopes[0] + (1.0 - share) / slopes[1])
+        """Return how much force a volt as sent makes at the working point, N/V, by the branches as they are shared there."""
+        model, force_n, share = self.model, self.aimed_n - gravity_n, 0.5 + 0.5 * self.branch_share
+        rising, _ = model.branch_slopes_n_per_v(model.voltage_v(force_n, RISING)[0])
+        _, falling = model.branch_slopes_n_per_v(model.voltage_v(force_n, FALLING)[0])
+        return 1.0 / (share / max(LEAST_SLOPE_N_PER_V, rising) + (1.0 - share) / max(LEAST_SLOPE_N_PER_V, falling))
 
     def begin_at(self, contact_n: float) -> None:
         """Begin the expected course at the force that is left of before, N: right behind a disable or a restart it still goes,
         and a trim that took it for an error would pull the new one down with it."""
         self.reference_n = max(0.0, contact_n)
 
-    def take_over(self, force_n: float, branch_share: float = RISING) -> None:
+    def take_over(self, force_n: float, branch_share: float = RISING, gravity_n: float = 0.0) -> None:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump: what a swapped calibration
-        carries over was for a voltage of ours."""
+        carries over was for a voltage of ours. gravity_n as in `advance`."""
         self._carry_over_v = 0.0
         self.applied_n = self.aimed_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
         self._delayed.restart(self.applied_n)
         self._remember(self.model.reversal.at(branch_share))
-        self._slide = self._memory
-        self._slid_n = self.applied_n
+        self._place_slide(gravity_n)
 
     def compute_voltage(self, gravity_n: float) -> tuple[float, LimitedBy]:
         """Return the voltage for the applied contact force by the inverse model and what limited it. ModelError without one."""

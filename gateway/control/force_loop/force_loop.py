@@ -71,6 +71,7 @@ class ForceLoop:
         is_same = model == law.model and settings.timing == self._measured and settings.lead == self._lead_settings
         law.use(model, given_n, self._is_correcting)
         self.expected.retime(settings.supervision.response_lag_s)
+        self._settling.retime(settings.supervision.unreachable_s)
         self.expected.use(model)
         if not is_same or self._is_retimed:
             self._is_retimed = False
@@ -215,7 +216,7 @@ class ForceLoop:
         """Go on from the force of a run that has ended, and no higher than where its voltage would lead (towards_n). given_n:
         as in `use`."""
         reached_n = min(towards_n, self.expected.force_n(branch_share))
-        self.feedforward.take_over(reached_n + given_n, branch_share)
+        self.feedforward.take_over(reached_n + given_n, branch_share, given_n)
 
     def _step_down(self, demand: Demand, dt_s: float, given_n: float) -> StateEvent:
         law = self.feedforward
@@ -236,9 +237,10 @@ class ForceLoop:
         goal_n, rate_n_per_s = self._approach.goal(inputs.now_s, demand, inputs.touching, law)
         if inputs.held_back:
             goal_n = min(goal_n, law.approaching_n(demand.precontact_n))
-        if self._was_touching and not inputs.touching:
-            law.fall_back(goal_n)
         given_n = demand.gravity_n + inputs.outside_n
+        if self._was_touching and not inputs.touching:
+            law.fall_back(goal_n, given_n)
+            self._trim.forget()
         was_at_rest = law.applied_n <= 0.0
         moved_n = law.advance(goal_n, rate_n_per_s, inputs.dt_s, given_n)
         if was_at_rest:
@@ -298,7 +300,7 @@ class ForceLoop:
 
     def _step_voltage(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
         self._trim.reset()
-        self.feedforward.take_over(inputs.expected_n)
+        self.feedforward.take_over(inputs.expected_n, gravity_n=demand.gravity_n + inputs.outside_n)
         self.feedforward_v = demand.voltage_v
         self.limited_by = self._limiter.drive(demand.voltage_v)
         return self._settling.judge_voltage(demand, inputs, is_slewing=self.limited_by is LimitedBy.VOLTAGE_SLEW)

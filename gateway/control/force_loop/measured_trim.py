@@ -85,16 +85,20 @@ class MeasuredTrim:
         return sqrt(self._noise_n2)
 
     def reset(self) -> None:
-        """Forget the correction and what was smoothed."""
-        self.value_n = self.value_v = 0.0
-        self.limited_by = LimitedBy.NONE
+        """Forget the correction and what was smoothed, and the turns."""
         self._at_n = self._turned_n = 0.0  # of the target: now, and where it was furthest on its way
         self._going = self._going_then = 1
+        self.forget()
+        self._calm()
+
+    def forget(self) -> None:
+        """Forget the correction, for contact is lost: it was of a force that has gone. The turns are remembered."""
+        self.value_n = self.value_v = 0.0
+        self.limited_by = LimitedBy.NONE
         self._learned_n = self._learned_at_n = self._own_n = 0.0
         self._common_n = self._common_at_n = 0.0
         self._by_way_n = {1: 0.0, -1: 0.0}
         self._rest()
-        self._calm()
 
     def resume(self, value_n: float) -> None:
         """Go on from a correction that another trim has learned."""

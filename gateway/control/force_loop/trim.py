@@ -48,6 +48,10 @@ class TrimIntegral:
         self._pace = 1.0
         self._begin_target()
 
+    def forget(self) -> None:
+        """Forget the correction, for contact is lost: it was of a force that has gone. The swings are remembered."""
+        self.value_v, self.limited_by = 0.0, LimitedBy.NONE
+
     def _begin_target(self) -> None:
         self.swings = self._side = self._beyond_side = self._samples = 0
         self._beyond_s = self._moved_n = self._since_swing_s = 0.0

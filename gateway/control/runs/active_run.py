@@ -34,6 +34,7 @@ AnyPlan: TypeAlias = RecordedPlan | SelfTestPlan
 AnyRun: TypeAlias = RecordedRun | SelfTestRun
 
 _OF_SELF_TEST: Final = (CalibrationPhase.SELF_TEST, CalibrationPhase.TESTED)
+_OF_EXPERIMENT: Final = (CalibrationPhase.EXPERIMENT, CalibrationPhase.RECORDED)
 _PHASES: Final = {phase: phase.name.lower().replace("_", " ") for phase in CalibrationPhase}
 
 
@@ -89,7 +90,9 @@ class ActiveRun:
     @property
     def kind(self) -> str:
         """Word for what runs, or ran last."""
-        return "self-test" if self.phase in _OF_SELF_TEST or isinstance(self.run, SelfTestRun) else "calibration"
+        if self.phase in _OF_SELF_TEST or isinstance(self.run, SelfTestRun):
+            return "self-test"
+        return "experiment" if self.phase in _OF_EXPERIMENT or isinstance(self.run, ExperimentRun) else "calibration"
 
     def use(self, model: Bsfm, timing: LoopTiming | None = None, cell_noise_n: float = 0.0, lag_s: float = 0.0) -> None:
         """Set what later runs compare with: the model, and what its calibration has measured of response and noise; lag_s:

@@ -25,6 +25,10 @@ class InBandTimer:
         self._unreachable_s = unreachable_s
         self.restart()
 
+    def retime(self, unreachable_s: float) -> None:
+        """Replace the time out of band until the target counts as unreachable, s; what has passed of it counts."""
+        self._unreachable_s = unreachable_s
+
     def restart(self) -> None:
         """Restart both timers: nothing is pursued, or something new."""
         self._in_since_s = inf
@@ -65,6 +69,11 @@ class SettlingCheck:
         """Decide whether the target has been missed, or the cell silent in voltage mode, for too long."""
         return self._band.unreachable or self._answer.unreachable
 
+    def retime(self, unreachable_s: float) -> None:
+        """Replace the time until the target counts as unreachable, s, by that of another calibration's response."""
+        self._band.retime(unreachable_s)
+        self._answer.retime(unreachable_s)
+
     def restart(self) -> None:
         """Restart all timers: no setpoint is pursued."""
         self._band.restart()
@@ -74,6 +83,8 @@ class SettlingCheck:
     def judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float, applied_n: float) -> StateEvent:
         """Return the event of a step in force mode. goal_n: where the ramp of the applied force leads."""
         self._answer.restart()
+        if self._driven_v is not None:  # what was held was a voltage
+            self._band.restart()
         self._driven_v = None
         if demand.force_n <= 0.0:
             self._band.restart()

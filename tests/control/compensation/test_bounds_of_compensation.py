@@ -4,9 +4,13 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.bsfm.drive_map import DriveMap
+from gateway.bsfm.model import Response
+from gateway.control import CalibrationInUse, Controller
 from gateway.control.compensation.command_map import CommandMap, apply_command_map
 from gateway.control.compensation.compensation import TimingCompensation
-from tests.control.bench import bsfm, settings
+from gateway.control.force_loop.feedforward import Feedforward
+from tests.control.bench import Bench, SmallPlant, bsfm, settings
 
 BOWED = CommandMap(bow=0.05, s=0.02)
 
@@ -46,3 +50,46 @@ def test_a_bow_is_widest_in_the_middle_and_an_s_turns_round_there(sent_v: float,
 @pytest.mark.parametrize("voltage_v", [-0.5, 0.0, 10.0, 10.5])
 def test_outside_of_its_range_nothing_is_bent(voltage_v: float) -> None:
     assert BOWED.sent_v(voltage_v) == BOWED.straight_v(voltage_v) == voltage_v
+
+
+@pytest.mark.parametrize("bow", [-0.1, 0.05, 0.1])
+def test_the_thrust_of_a_voltage_is_that_which_arrives(bow: float) -> None:
+    """What lags and trim reckon with: a bend that is compensated is in the volts that are sent."""
+    command = CommandMap(bow=bow, s=0.0)
+    straight, sent = DriveMap(bsfm()), DriveMap(apply_command_map(bsfm(), command))
+    for from_v, to_v in ((1.0, 3.0), (3.0, 5.0), (4.0, 7.0)):
+        arrives_n = straight.n_per_v * (straight.linear_v(to_v) - straight.linear_v(from_v))
+        from_sent_v, to_sent_v = command.sent_v(from_v), command.sent_v(to_v)
+        assert sent.n_per_v * (sent.linear_v(to_sent_v) - sent.linear_v(from_sent_v)) == pytest.approx(
+            arrives_n, rel=0.04
+        )
+
+
+@pytest.mark.parametrize("force_n", [4.0, 20.0, 45.0])
+def test_the_limit_of_the_trim_is_one_in_volts_that_are_sent(force_n: float) -> None:
+    model = apply_command_map(bsfm(), CommandMap(bow=-0.1, s=0.0))
+    law = Feedforward(model, settings().limits, 0.1)
+    law.take_over(force_n)
+    volts = [model.voltage_v(force_n + part_n, 1.0)[0] for part_n in (-0.01, 0.01)]
+    assert law.slope_n_per_v(0.0) == pytest.approx(0.02 / (volts[1] - volts[0]), rel=0.01)
+
+
+class _BentPlant(SmallPlant):
+    def advance(self, voltage_v: float, steps: int = 1) -> None:
+        super().advance(CommandMap(bow=-0.1, s=0.0).straight_v(voltage_v), steps)
+
+
+def test_a_step_goes_no_further_beyond_its_end_where_a_bend_is_compensated() -> None:
+    bench = Bench()
+    bench.plant = _BentPlant(bench.rng, lag_s=0.12, delay_s=0.03)
+    model = apply_command_map(bsfm(), CommandMap(bow=-0.1, s=0.0))
+    response = Response(dead_time_s=0.035, lag_s=0.12, second_lag_s=0.015)
+    bench.controller = Controller(bench.settings, CalibrationInUse(model, 1, response))
+    bench.run(0.3)
+    bench.enable(5.0, force_ramp_n_per_s=2000.0)
+    bench.run(1.0)
+    bench.history.clear()
+    bench.force(30.0)
+    bench.run(1.0)
+    assert max(one.force_n for one in bench.history) < 31.0
+    assert all(abs(one.force_n - 30.0) < 1.0 for one in bench.history if one.time_s > bench.history[0].time_s + 0.25)

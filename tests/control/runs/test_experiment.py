@@ -151,6 +151,18 @@ def test_a_stop_ends_it_at_zero_volts() -> None:
     assert bench.last.calibration_phase == CalibrationPhase.STOPPED
 
 
+def test_it_is_told_as_an_experiment_and_not_as_a_calibration() -> None:
+    bench = begun(Bench(seed=6), SHORT)
+    bench.run(0.1)
+    bench.controller.stop()
+    bench.run(0.4)
+    assert "experiment begun by this machine" in bench.events
+    assert "experiment stopped: ramping down" in bench.events
+    bench.controller.active_run.ask(SHORT)
+    bench.run(0.1)
+    assert bench.events[-1].startswith("W305 experiment refused: ")
+
+
 def test_a_silent_cell_is_a_fault_here_too() -> None:
     bench = begun(Bench(seed=7), SHORT)
     bench.run(1.5)
