@@ -70,6 +70,21 @@ SHIPPED = Path(__file__).parents[3] / "profiles"
             None,
             "force_applied in lbf; status is",
         ),
+        (
+            "{name: length, address: 1140",
+            "{name: length, address: 1151",
+            "length@staging is at 1151, an upload has it at 1140",
+        ),
+        (
+            "{name: damping, address: 1658",
+            "{name: damping, address: 1646",
+            "damping@active is at 1646, an upload has it at",
+        ),
+        (
+            "address: 416\n        type: float32",
+            "address: 416\n        type: uint16",
+            "byte_order_echo is uint16, float32 is needed",
+        ),
     ],
 )
 def test_a_map_that_no_gateway_can_serve_is_told_before_it_starts(
