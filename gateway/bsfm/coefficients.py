@@ -143,14 +143,25 @@ class Allowed:
         tiny = 0.0 < abs(number) < _NO_FIT_GIVES
         if self.low <= number <= self.high and not tiny:
             return
-        swapped = _swap_words(number)
-        if self.low <= swapped <= self.high and abs(swapped) > _MEANT:
-            text = f"{self.name} = {number:g}; with its words swapped {swapped:g}: the sender uses the other word order"
-            yield CoefficientFault(index, CoefficientReason.WORDS_SWAPPED, text)
+        if swapped := self._swapped_fault(index, number):
+            yield swapped
         elif not tiny or not self.low <= number <= self.high:
             reason = self.reason if isfinite(number) else CoefficientReason.NOT_FINITE
             allowed = f"{self.low:g} .. {self.high:g} {self.unit}".rstrip()
             yield CoefficientFault(index, reason, f"{self.name} = {number:g}: {allowed} is allowed")
+
+    def swap_fault(self, number: float) -> CoefficientFault | None:
+        """Return the fault of a number of the whole set that makes sense with its words swapped alone, None for none. A range
+        or a limit is no result of a fit: next to nothing is not meant by it, though it is within what is allowed."""
+        is_meant = self.low <= number <= self.high and not 0.0 < abs(number) < _MEANT
+        return None if is_meant else self._swapped_fault(WHOLE, number)
+
+    def _swapped_fault(self, index: int, number: float) -> CoefficientFault | None:
+        swapped = _swap_words(number)
+        if not (self.low <= swapped <= self.high and abs(swapped) > _MEANT):
+            return None
+        text = f"{self.name} = {number:g}; with its words swapped {swapped:g}: the sender uses the other word order"
+        return CoefficientFault(index, CoefficientReason.WORDS_SWAPPED, text)
 
 
 def float32(number: float) -> float:

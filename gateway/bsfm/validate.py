@@ -50,17 +50,27 @@ def _branches(stored: Coefficients) -> Branches:
 
 def _frame_faults(stored: Coefficients, limits: CoefficientLimits) -> Iterator[CoefficientFault]:
     low, high, span = stored.x0_v, stored.x1_v, stored.blend_span_n
-    if not limits.voltage_min_v <= low < high <= limits.voltage_max_v:
+    swapped = _swapped_faults(stored, limits)
+    yield from swapped
+    if not swapped and not limits.voltage_min_v <= low < high <= limits.voltage_max_v:
         allowed = f"{limits.voltage_min_v:g} <= x0 < x1 <= {limits.voltage_max_v:g}"
         text = f"range {low:g} .. {high:g} V: {allowed} V is allowed"
         yield CoefficientFault(WHOLE, CoefficientReason.VOLTAGE_RANGE, text)
-    if not 0.0 <= span <= limits.blend_span_max_n:
+    if not swapped and not 0.0 <= span <= limits.blend_span_max_n:
         text = f"blend span {span:g} N: 0 .. {limits.blend_span_max_n:g} N is allowed"
         yield CoefficientFault(WHOLE, CoefficientReason.BLEND_SPAN, text)
     lengths = {len(array) for _, _, array in _arrays(stored)}
     if len(lengths) != 1 or not 2 <= next(iter(lengths)) <= ORDER_MAX + 1:
         text = f"2 to {ORDER_MAX + 1} handles and as many weights per branch are needed"
         yield CoefficientFault(WHOLE, CoefficientReason.ORDER, text)
+
+
+def _swapped_faults(stored: Coefficients, limits: CoefficientLimits) -> list[CoefficientFault]:
+    """8 V with its words swapped are 2.3e-41 V, which is within the range: all forces would be asked for with no voltage."""
+    volts = limits.voltage_min_v, limits.voltage_max_v, "V", CoefficientReason.VOLTAGE_RANGE
+    span = Allowed("blend span", 0.0, limits.blend_span_max_n, "N", CoefficientReason.BLEND_SPAN)
+    single = [Allowed(name, *volts).swap_fault(end) for name, end in (("x0", stored.x0_v), ("x1", stored.x1_v))]
+    return [fault for fault in (*single, span.swap_fault(stored.blend_span_n)) if fault]
 
 
 def _arrays(stored: Coefficients) -> tuple[tuple[str, int, tuple[float, ...]], ...]:

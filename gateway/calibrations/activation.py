@@ -82,7 +82,7 @@ class Activation:
         """Yield numbers of the store that seem to be this set, the last one first."""
         words = _words(fresh)
         for number, stored in self.store.iterate_unchecked(fresh.data_sha256):
-            with suppress(ValueError, struct.error, OverflowError):
+            with suppress(ArithmeticError, LookupError, TypeError, ValueError, struct.error):  # edited by hand, say
                 if _words(stored) == words:
                     yield number
 

@@ -57,15 +57,18 @@ def resample_at_baud(data: bytes, sent_baud: int, heard_baud: int) -> bytes:
     """Return what a UART at heard_baud makes of characters (8N1) sent at sent_baud.
 
     The levels of the line are sampled as a receiver does: a start edge, then the middle of each bit. Characters without
-    a stop bit (framing errors) are delivered as they were sampled, as Linux does with IGNPAR unset and INPCK off.
+    a stop bit (framing errors) are delivered as they were sampled, as Linux does with IGNPAR unset and INPCK off. No more
+    than a driver would buffer: at 50 baud one character is heard as hundreds. An end that is set to 0 baud (B0) has hung up.
     """
     if sent_baud == heard_baud:
         return data
+    if not sent_baud or not heard_baud:
+        return b""
     levels = _levels(data)
     step = sent_baud / heard_baud  # bits of the sender in one bit of the receiver
     received = bytearray()
     position = 0.0
-    while (start := levels.find(0, floor(position))) >= 0:
+    while len(received) < MOST_QUEUED_BYTES and (start := levels.find(0, floor(position))) >= 0:
         position = max(position, float(start))
         samples = [_level(levels, position + (bit + 0.5) * step) for bit in range(1, 9)]
         received.append(sum(bit << place for place, bit in enumerate(samples)))

@@ -94,7 +94,14 @@ class ModbusRtuServer:
 
     @property
     def _backlog_bytes(self) -> int:
-        return self.port.unsent_bytes if self.port else int(self._open_pty.backlog_s / self._character_s)
+        if self.port is None:
+            return int(self._open_pty.backlog_s / self._character_s)
+        try:
+            return self.port.unsent_bytes
+        except (
+            OSError
+        ):  # unplugged while a request was executed: a driver that has gone says EIO, and the port tells it
+            return 0
 
     @property
     def _character_s(self) -> float:

@@ -299,7 +299,9 @@ class RegisterBank:
         self._settle_owner(admitted, write.host, peer)
         self.command = admitted.command
         self.on_command(self.command)
-        self._writers.note(self._commands.names(write.block, write.address, len(write.data) // 2), peer, now_s)
+        names = self._commands.names(write.block, write.address, len(write.data) // 2)
+        is_guest = owner not in (None, write.host) and not admitted.is_taken_over  # nothing else of its write was taken
+        self._writers.note(names[:1] if is_guest else names, peer, now_s)
         if self.on_write is not None:
             self.on_write(peer, before, admitted, (owner, self._ownership.owner))
         if self.on_accepted is not None:

@@ -57,6 +57,10 @@ def test_a_calibration_that_its_fit_rejected_is_used_for_who_insists_alone(tmp_p
         ("order: 2", "order: 99"),
         ("order: 2", "colour: 2"),
         ("order: 2", "order"),
+        ("slip_radii_v: []", "slip_radii_v: null"),
+        ("force_limits_n: []", "force_limits_n: [null, 3]"),
+        ("rising_handles_n: [0.0, 26.0, 52.0]", "rising_handles_n: []"),
+        ("rising_handles_n: [0.0, 26.0, 52.0]", 'rising_handles_n: {"0": 1}'),
     ],
 )
 def test_what_has_become_of_a_neighbour_keeps_no_upload_from_being_stored(bench: Bench, line: str, spoilt: str) -> None:

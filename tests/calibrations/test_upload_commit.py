@@ -100,6 +100,7 @@ def test_the_last_part_and_the_commit_may_travel_together(bench):
     assert bench.active_slot == 5
 
 
+SCALARS = (("x0_v", 0.5), ("x1_v", 8.0), ("blend_span_n", 3.0), ("force_low_n", 0.7), ("force_high_n", 40.0))
 CHECKS = [
     (staged(GOOD, length=139), -1, UploadReason.LENGTH),
     (staged(GOOD, crc=1), -1, UploadReason.CRC),
@@ -123,6 +124,7 @@ CHECKS = [
     (staged(changed(x0_v=8.0)), -1, CoefficientReason.VOLTAGE_RANGE),
     (staged(changed(x1_v=12.0)), -1, CoefficientReason.VOLTAGE_RANGE),
     (staged(changed(blend_span_n=-1.0)), -1, CoefficientReason.BLEND_SPAN),
+    *((staged(changed(**{name: swapped(meant)})), -1, CoefficientReason.WORDS_SWAPPED) for name, meant in SCALARS),
     (staged(changed(force_high_n=53.0)), -1, UploadReason.FORCE_LIMITS),
     (staged(changed(force_low_n=-1.0)), -1, UploadReason.FORCE_LIMITS),
     (bytes(400), -1, UploadReason.LENGTH),

@@ -230,6 +230,28 @@ def test_a_bank_that_breaks_is_told_to_the_loop() -> None:
     assert isinstance(failures[0], TypeError)
 
 
+def test_a_plug_pulled_while_a_request_is_executed_is_a_lost_port_and_no_defect() -> None:
+    """The driver's queue cannot be asked for any more: the whole gateway ended over it, and with it every force."""
+    failures: list[Any] = []
+
+    class Unplugging(NotingBank):
+        def write_registers(self, address: int, data: bytes, peer: Peer) -> None:
+            super().write_registers(address, data, peer)
+            line.close()
+
+    line, face = Pty(), Face(bank=Unplugging())
+
+    async def scene() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _loop, context: failures.append(context))
+        async with face.serving(line.path):
+            os.write(line.fd, encode_adu(3, P.write_register_request(5, 77)))
+            assert "disconnected" in await face.until_told("E102")
+            assert face.bank.writes == [(5, b"\x00M", FACE)] and face.gone == [FACE]
+
+    play(scene())
+    assert not failures
+
+
 def ask(path: str, bank: NotingBank) -> None:
     """What pymodbus asks of a face, and gets."""
     client = ModbusSerialClient(path, baudrate=LINE.baud, timeout=5, retries=0)

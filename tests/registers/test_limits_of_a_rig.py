@@ -5,6 +5,7 @@ import struct
 import pytest
 
 from gateway.codes.refusals import RefusalReason
+from tests.calibrations.coefficients import calibration
 
 FORCE, FORCE_FLOAT, MODE_FLOAT, PRECONTACT, VOLTAGE = 1, 202, 206, 7, 5
 
@@ -80,3 +81,14 @@ def test_the_largest_voltage_of_a_rig_is_taken_whatever_it_is(make_bank, master_
         assert master.word(VOLTAGE) == millivolts
         if millivolts < 10000:
             master.refusal(master.write, VOLTAGE, millivolts + 1)
+
+
+def test_a_setpoint_that_a_calibration_lowers_may_be_written_as_it_reads(make_bank, master_of):
+    """25.346 N read as 25.35 N: who writes back what it reads was refused for more than the limit."""
+    for high_n, word in ((25.346, 2534), (0.29, 29), (40.2, 4020)):
+        bank = make_bank()
+        master = master_of(bank, "10.0.0.1")
+        master.write(0, 1, 5000)
+        assert f"to {word / 100:.2f} N" in bank.set_active_model(calibration(force_limits_n=(0.0, high_n)))
+        assert master.word(FORCE) == word and bank.command.force_setpoint_n == word / 100
+        master.write(FORCE, word)

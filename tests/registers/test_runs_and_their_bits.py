@@ -260,8 +260,10 @@ def test_only_what_begins_something_wants_the_byte_order_proven(make_bank, maste
     master = master_of(bank, "10.0.0.1")
     for address, word in ((1, 1200), (4, 7), (0, RESET)):
         master.write(address, word)
-    for bit in (1, CALIBRATE, TEST):
-        assert master.refusal(master.write, 0, bit).reason is RefusalReason.BYTE_ORDER_UNPROVEN
+    for bit, name in ((1, "enable"), (CALIBRATE, "start_calibration"), (TEST, "start_self_test")):
+        refusal = master.refusal(master.write, 0, bit)
+        assert refusal.reason is RefusalReason.BYTE_ORDER_UNPROVEN
+        assert refusal.sentence.startswith(f"W218 {name} refused: "), "what was asked for, and not another thing"
 
 
 def test_a_refusal_names_the_register_of_the_bad_float_and_not_the_first_one(master) -> None:

@@ -21,6 +21,15 @@ def test_who_wrote_the_same_registers_again_wrote_them_last():
     assert writers.by_name() == {"mode": (robot, 3.0), "heartbeat": (robot, 3.0)}
 
 
+def test_who_stops_another_s_force_with_a_whole_block_wrote_the_control_word_alone(bank, master, other):
+    """Nothing else of it is taken; the page and the monitor named the stopper for a ramp that was the owner's."""
+    master.write(0, 1, 1200, 300, 0, 7)
+    other.write(0, 0, 1300, 500, 0, 99)
+    writers = {name: peer for name, (peer, _) in bank.last_writer.items()}
+    assert writers["control_word"] == other.peer and bank.command.force_ramp_n_per_s == 30.0
+    assert {writers[name] for name in ("force_ramp", "mode", "heartbeat")} == {master.peer}
+
+
 @pytest.mark.parametrize(
     ("host", "place"),
     [

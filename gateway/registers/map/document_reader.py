@@ -45,6 +45,13 @@ class DocumentReader:
         self.fault(place, "is missing" if content is None else "is not a group of keys", is_of_key=content is None)
         return {}
 
+    def by_name(self, place: Place, content: Any) -> Mapping[str, Any]:
+        """Return a mapping as `group`, of the keys that are words; a fault for each that is a number."""
+        entries = self.group(place, content)
+        for key in (key for key in entries if not isinstance(key, str)):
+            self.fault((*place, key), f"{key} is a number, a name is needed", is_of_key=True)
+        return {key: value for key, value in entries.items() if isinstance(key, str)}
+
     def is_name(self, place: Place, name: str) -> None:
         """Check that this is a name of registers, blocks or values."""
         if not _NAME.fullmatch(name):

@@ -51,7 +51,7 @@ class _MapReader(DocumentReader):
     def map(self, document: Mapping[str, Any]) -> RegisterMap:
         """Return the whole map, checked."""
         self.keys((), document, _MAP_KEYS)
-        given = self.group(("blocks",), document.get("blocks"))
+        given = self.by_name(("blocks",), document.get("blocks"))
         blocks = tuple(self.block(name, self.group(("blocks", name), content)) for name, content in given.items())
         self.blocks_apart(blocks)
         own = [register for block in blocks for register in self.registers(block, self.group((), given[block.name]))]
@@ -79,7 +79,7 @@ class _MapReader(DocumentReader):
             last=self.whole(place, content, "last", first, 0xFFFF),
             text=self.text(place, content, "text", ""),
             word_order=self.order(place, content),
-            repeats=dict(self.group((*place, "repeats"), content.get("repeats", {}))),
+            repeats=dict(self.by_name((*place, "repeats"), content.get("repeats", {}))),
         )
 
     def registers(self, block: Block, content: Mapping[str, Any]) -> Iterator[Register]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from struct import Struct
 from typing import Final, NamedTuple
 
-from gateway.bsfm.coefficients import RADII_FROM, SHARES_FROM, STRIDE, WHOLE
+from gateway.bsfm.coefficients import RADII_FROM, SHARES_FROM, STRIDE, WHOLE, Allowed
 from gateway.bsfm.curve import ORDER_MAX
 from gateway.bsfm.slip.slip_stops import STOPS_CARRIED, STOPS_MAX
 from gateway.bsfm.validate import CoefficientLimits, CoefficientReason, Coefficients, validate_coefficients
@@ -144,8 +144,13 @@ def _cut_to_order(staged: CoefficientSet) -> Coefficients:
 
 
 def _force_fault(staged: CoefficientSet) -> StagedFault | None:
-    """Limits must lie within what both branches reach: their end handles, since the curves do increase."""
+    """Limits must lie within what both branches reach: their end handles, since the curves do increase. 40 N with its words
+    swapped are 2.4e-41 N, which is within it: no force could be asked for any more."""
     low, high = _reach_n(staged)
+    for name, limit_n, reached_n in (("low", staged.force_low_n, low), ("high", staged.force_high_n, high)):
+        swapped = Allowed(f"force_{name}", low, high, "N", CoefficientReason.NONE).swap_fault(limit_n)
+        if swapped and limit_n != reached_n:
+            return StagedFault(swapped.index, swapped.reason, swapped.text)
     if low <= staged.force_low_n < staged.force_high_n <= high:
         return None
     text = f"force limits {staged.force_low_n:g} .. {staged.force_high_n:g} N, the branches reach {low:g} .. {high:g} N"

@@ -28,6 +28,14 @@ from gateway.registers.writes.command_block import check_zeros
 
 NO_SLOT: Final = 0xFFFF
 
+_PLACES: Final = {
+    "range_low": 2, "range_high": 4, "rising_b_0": 6, "rising_w_0": 38, "falling_b_0": 70, "falling_w_0": 102,
+    "force_low": 134, "force_high": 136, "blend_span": 138, "length": 140, "crc32": 142, "target_slot": 144,
+    "slip_stops": 150, "dead_time": 152, "lag": 154, "second_lag": 156, "damping": 158, "slip_radius_0": 160,
+    "slip_share_0": 180,
+}  # fmt: skip
+"""In words behind `order`: a CRC-32 over words in their order leaves no map the choice."""
+
 OnCommit = Callable[[CommitAction, bytes, Peer], None]
 """on_commit(action, words of the staging block, peer); raises Refusal to refuse."""
 OnSelect = Callable[[int, Peer], None]
@@ -36,7 +44,7 @@ OnSelect = Callable[[int, Peer], None]
 class StagingBlock:
     """on_act(name, what, peer): a commit or a choice of slot that was passed on, for the audit.
 
-    ValueError for a map without the staging or the active block."""
+    ValueError for a map without the staging or the active block, or with a part of an upload elsewhere in them."""
 
     def __init__(self, register_map: RegisterMap, image: RegisterImage) -> None:
         self.on_commit: OnCommit | None = None
@@ -53,6 +61,11 @@ class StagingBlock:
         ]
         self._active_first = register_map.find("order@active").address
         self._status = CommitStatus.IDLE
+        for block, first in (("staging", self._first), ("active", self._active_first)):
+            for register in register_map.registers_of(block):
+                at = first + _PLACES.get(register.name, register.address - first)
+                if register.address != at:
+                    raise ValueError(f"{register.name}@{block} is at {register.address}, an upload has it at {at}")
 
     def write(self, address: int, data: bytes, peer: Peer) -> None:
         """Store these words, then act on commit and slot_select if they are among them. Refusal: 03, 06."""

@@ -225,5 +225,6 @@ class Admission:
             text = f"{name} was kept at 1 beyond the end of its run: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
         if self._rules.require_byte_order_echo and not self._echo.is_proven_by(host):
-            text = "enable refused: this rig wants 1234.5 in byte_order_echo first, in your client's word order"
+            name = str(ControlBit(rises & STARTS & -(rises & STARTS)).name).lower()
+            text = f"{name} refused: this rig wants 1234.5 in byte_order_echo first, in your client's word order"
             raise Refusal(RefusalReason.BYTE_ORDER_UNPROVEN, word_at, text, value=float(written))

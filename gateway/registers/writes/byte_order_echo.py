@@ -20,9 +20,11 @@ _MOST_HOSTS: Final = 64  # memory stays bounded whoever writes
 
 
 class ByteOrderEcho:
-    """Remembers which hosts have proven their word order, the latest 64 of them."""
+    """Remembers which hosts have proven their word order, the latest 64 of them. ValueError for a register that is no float."""
 
     def __init__(self, register: Register, image: RegisterImage) -> None:
+        if register.type != "float32":
+            raise ValueError(f"byte_order_echo is {register.type}, float32 is needed")
         self._register = register
         self._image = image
         self._proven: dict[str, None] = {}  # in the order of their proofs

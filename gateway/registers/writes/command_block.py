@@ -7,7 +7,7 @@ int16 face cannot show them. Each edge bit (reset, tare, take ownership) reads b
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import radians
+from math import floor, radians
 from struct import Struct
 from typing import Final
 
@@ -69,15 +69,15 @@ class CommandBlock:
         self._last_words = (0, b"", [])
 
     def lower_force(self) -> tuple[float, float] | None:
-        """Take an accepted setpoint that the limits in use forbid down to the largest allowed; (before, after), None where
-        it is within them."""
+        """Take an accepted setpoint that the limits in use forbid down to the largest allowed that a word can say, which
+        may be written as it reads; (before, after), None where it is within them."""
         field, setpoint_n = self.fields[FORCE_SETPOINT], self.values[FORCE_SETPOINT]
         if field is None or setpoint_n <= field.high:
             return None
         lowered = self.values.copy()
-        lowered[FORCE_SETPOINT] = field.high
+        lowered[FORCE_SETPOINT] = floor(round(field.high * field.counts_per_unit, 6)) / field.counts_per_unit
         self.store(lowered, int(lowered[CONTROL_WORD]))
-        return setpoint_n, field.high
+        return setpoint_n, lowered[FORCE_SETPOINT]
 
     def _fields(self, rules: BankRules) -> tuple[CommandField | None, ...]:
         count, registers = len(self.values), self._registers

@@ -76,3 +76,11 @@ def test_another_speed_hears_garbage_and_always_the_same(line: bytes, sent: int,
     assert garbage == resample_at_baud(line * 20, sent, heard)
     assert line not in garbage
     assert b"\r\n" not in garbage
+
+
+def test_an_end_that_is_set_to_0_baud_has_hung_up_and_a_slow_one_is_heard_within_bounds() -> None:
+    """`stty 0` on the terminal of a serial face ended the gateway at its next answer, and stopped it for good at the next
+    byte; 64 bytes at 50 baud were 140 000, a third of a second of the control loop."""
+    assert resample_at_baud(b"answer", 9600, 0) == b""
+    assert len(resample_at_baud(bytes(64), 50, 115200)) == MOST_QUEUED_BYTES
+    assert resample_at_baud(b"request", 0, 9600) == b""

@@ -31,6 +31,24 @@ def test_every_fault_of_a_map_is_told_at_its_place(tmp_path: Path) -> None:
     assert told[2].startswith("10:9 blocks.command.registers[2]: far at 99 is outside block command, 0 .. 15")
 
 
+@pytest.mark.parametrize(
+    ("line", "spoilt", "told"),
+    [
+        ("  command:", "  400:", "4:3 blocks[400]: 400 is a number, a name is needed"),
+        ("    last: 15\n", "    last: 15\n    repeats: {1: 200}\n", "7:15 blocks.command.repeats[1]: 1 is a number"),
+    ],
+)
+def test_a_number_where_a_block_s_name_belongs_is_a_fault_of_the_file(
+    tmp_path: Path, line: str, spoilt: str, told: str
+) -> None:
+    """It was a traceback, of `check` and of a start."""
+    path = tmp_path / "map.yaml"
+    path.write_text(MAP.replace(line, spoilt), encoding="utf-8")
+    with pytest.raises(ProfileError) as caught:
+        load_register_map(path)
+    assert any(told in str(fault) for fault in caught.value.faults), caught.value.faults
+
+
 def test_the_shipped_map_has_the_registers_that_masters_rely_on() -> None:
     register_map = load_register_map("force-v1")
     assert register_map.find("control_word").address == 0
@@ -51,6 +69,21 @@ SHIPPED = Path(__file__).parents[3] / "profiles"
             "name: force_applied, address: 105, type: int16, scale: 0.01, unit: N",
             None,
             "force_applied in lbf; status is",
+        ),
+        (
+            "{name: length, address: 1140",
+            "{name: length, address: 1151",
+            "length@staging is at 1151, an upload has it at 1140",
+        ),
+        (
+            "{name: damping, address: 1658",
+            "{name: damping, address: 1646",
+            "damping@active is at 1646, an upload has it at",
+        ),
+        (
+            "address: 416\n        type: float32",
+            "address: 416\n        type: uint16",
+            "byte_order_echo is uint16, float32 is needed",
         ),
     ],
 )
