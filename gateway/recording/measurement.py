@@ -17,7 +17,7 @@ from gateway.recording.tables.column_mapping import EXAMPLE, join_names
 from gateway.recording.tables.column_names import SENT
 from gateway.recording.tables.covariates import extract_covariates, interpolate_missing, is_constant, is_own_recording
 from gateway.recording.tables.even_rows import resample_evenly
-from gateway.recording.tables.row_validity import flag_repeated, valid_by_quality
+from gateway.recording.tables.row_validity import flag_dropouts, flag_repeated, valid_by_quality
 from gateway.recording.tables.time_axis import TimeAxis, check_time_axis
 from gateway.units import linear_conversion
 
@@ -42,10 +42,14 @@ def measurement_of(recording: Recording) -> Measurement:
     notes += more_notes
     drive, driven, more_notes = _drive(columns, axis.time_s)
     notes += more_notes
-    usable &= driven
+    position_m, position_notes = _position_m(columns, axis.time_s)
+    drives = [*drive.values(), *([] if position_m is None else [position_m])]
+    dropouts, more_notes = flag_dropouts(columns["force_n"], axis.time_s, drives)
+    notes += more_notes
+    columns = columns | {"force_n": np.where(dropouts, np.nan, columns["force_n"])}
+    usable &= driven & ~dropouts
     _check_enough(recording, axis, usable, notes)
     repeated, more_notes = flag_repeated(columns["force_n"])
-    position_m, position_notes = _position_m(columns, axis.time_s)
     others, suspicions = extract_covariates(columns, axis.time_s, columns["force_n"])
     suspicions += _suspicious(columns["force_n"][usable], {name: values[usable] for name, values in drive.items()})
     measurement = Measurement(
