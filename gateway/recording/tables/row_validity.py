@@ -11,6 +11,8 @@ Flags = NDArray[np.bool_]
 
 OVERLOAD: Final = 1.5
 """Our recorder writes 0 ok, 1 unsteady (normal while the force moves) and 2 overload; only the last is no reading."""
+_OURS: Final = 2.0
+_OPC_GOOD, _OPC_MOST = 192.0, 255.0
 _MOST_VALUES: Final = 8
 _RARE_SHARE: Final = 0.2
 _LEAST_REPEATS: Final = 3
@@ -26,7 +28,8 @@ def valid_by_quality(quality: Floats, is_ours: bool) -> tuple[Flags, list[str]]:
     """Return rows whose reading is valid, and what was made of the column.
 
     A foreign table may mean 0 or 1 (or 192) by good: the most frequent value is taken for it, as long as the others are
-    rare. Where they are not, 0 and 1 are both kept, as our recorder means them.
+    rare. Where they are not, 0 and 1 are both kept, as our recorder means them; of other numbers only those are known
+    that OPC gives to good readings, 192 and more.
     """
     known = np.isfinite(quality)
     values, counts = np.unique(quality[known], return_counts=True)
@@ -37,11 +40,17 @@ def valid_by_quality(quality: Floats, is_ours: bool) -> tuple[Flags, list[str]]:
             f"quality takes {values.size} values: no flag, so no row was left out for it"
         ]
     good = float(values[counts.argmax()])
-    valid = known & (quality == good)
-    if is_ours or (~valid).mean() > _RARE_SHARE:
-        good, valid = 0.0, known & (quality < OVERLOAD)
+    valid, what = known & (quality == good), f"quality is not {good:g}"
+    if is_ours or ((~valid).mean() > _RARE_SHARE and values.max() <= _OURS):
+        good, valid, what = 0.0, known & (quality < OVERLOAD), "quality is not 0"
+    elif (~valid).mean() > _RARE_SHARE:
+        if values.max() < _OPC_GOOD or values.max() > _OPC_MOST:
+            return np.ones(quality.size, dtype=bool), [
+                "what quality means by a good reading is not clear: it was not used"
+            ]
+        valid, what = known & (quality >= _OPC_GOOD), f"quality is below {_OPC_GOOD:g}"
     bad = int((~valid).sum())
-    what = "overload or unknown" if good == 0.0 and (is_ours or values.size > 2) else f"quality is not {good:g}"
+    what = "overload or unknown" if good == 0.0 and (is_ours or values.size > 2) else what
     return valid, [f"{bad} rows are not judged: {what} by the quality column"] if bad else []
 
 
