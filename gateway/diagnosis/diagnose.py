@@ -111,7 +111,19 @@ def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options
     left = find_dependences(found.bench, found.fitted, found.whiten, found.unnamed)
     findings = SearchFindings(start.bench, found, start.evidence, left, start.effects)
     result = compose_diagnosis(findings, options.noise_floor_n, options.calibration_noise_n)
-    return replace(result, notes=(*result.notes, *set_aside_notes(start.bench, start.aside)))
+    return _without_aside(result, start) if start.aside.any() else result
+
+
+def _without_aside(result: Diagnosis, start: SearchStart) -> Diagnosis:
+    """The answer that says which rows are no witness, and in whose pictures and figures they do not count."""
+    forces = (channel for channel in start.bench.channels if channel.is_force)
+    traces = [
+        replace(
+            trace, measurement=replace(trace.measurement, usable=trace.measurement.usable & ~start.aside[each.rows])
+        )
+        for trace, each in zip(result.traces, forces, strict=True)
+    ]
+    return replace(result, traces=tuple(traces), notes=(*result.notes, *set_aside_notes(start.bench, start.aside)))
 
 
 def prepare_search(measurements: Sequence[Measurement], given: Plant, options: Options) -> SearchStart:

@@ -30,6 +30,7 @@ def answer(rows: list[int]) -> Diagnosis:
 def test_a_single_one_is_set_aside_and_told() -> None:
     found = answer([1400])
     assert (found.verdict, found.causes) == (Verdict.NOTHING_FOUND, ())
+    assert not found.traces[0].measurement.usable[1400], "nor in any picture"
     assert any("1 reading stands far apart" in note and "-9999 N at 14.000 s" in note for note in found.notes)
 
 
