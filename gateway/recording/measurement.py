@@ -6,6 +6,7 @@ whether it shows anything is the diagnosis' question. This module imports numpy;
 """
 
 from collections.abc import Mapping
+from math import inf
 from typing import Final
 
 import numpy as np
@@ -27,6 +28,12 @@ _DRIVES: Final = ("command_v", "pressure_kpa")
 _NEEDED: Final = f"at least {FEWEST_ROWS} usable rows over {SHORTEST_S:g} s are needed, 60 s at 200 Hz are good"
 _HIGHEST_COMMAND_V: Final = 50.0
 _LARGEST: Final = 1.0e60  # beyond, squares and products of columns overflow: what a logger writes for "no value"
+_LEAST: Final = {
+    "temperature_c": -273.15,
+    "pressure_kpa": -102.0,
+    "supply_kpa": -102.0,
+}  # nothing is colder, or less air
+_RARE_SHARE: Final = 0.2  # more of them are another unit, or a turned sign
 _TURNED: Final = -0.8  # correlation of force and command at which the sign is asked for
 _PASCAL: Final = linear_conversion("pressure", "kpa", "pa")[0]
 _METRE: Final = linear_conversion("length", "mm", "m")[0]
@@ -90,6 +97,12 @@ def _replace_absurd(columns: dict[str, Floats]) -> tuple[dict[str, Floats], list
         if absurd.any():
             columns = columns | {name: np.where(absurd, np.nan, values)}
             notes.append(f"{int(absurd.sum())} values of {name} are beyond {_LARGEST:.0e}: taken as missing")
+        below = columns[name] < _LEAST.get(name, -inf)
+        if 0.0 < below.mean() < _RARE_SHARE:
+            columns = columns | {name: np.where(below, np.nan, columns[name])}
+            notes.append(
+                f"{int(below.sum())} values of {name} are below {_LEAST[name]:g}, which none is: taken as missing"
+            )
     return columns, notes
 
 

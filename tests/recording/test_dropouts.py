@@ -47,6 +47,19 @@ def test_what_was_pressed_once_in_a_long_rest_is_no_dropout() -> None:
     assert dropped(force_n, np.zeros(TIME_S.size), 5.0e-3 * volts) == [], "driven by the position"
 
 
+@pytest.mark.parametrize("name", ["temperature_c", "supply_kpa", "pressure_kpa"])
+def test_a_temperature_or_a_pressure_that_is_none_is_missing(name: str) -> None:
+    values = 20.0 + np.sin(TIME_S)
+    table = {"time_s": TIME_S, "command_v": VOLTS, "force_n": FORCE_N, name: values.copy()}
+    table[name][::40] = -9999.0
+    found = measurement_of(Recording(Path("run.csv"), {}, table, TIME_S.size, False))
+    kept = found.covariates.get(name) if found.pressure_pa is None else found.pressure_pa / 1000.0
+    np.testing.assert_allclose(kept, values, atol=0.02)
+    assert f"75 values of {name} are below" in found.notes[0]
+    turned = measurement_of(Recording(Path("run.csv"), {}, table | {name: -1000.0 * values}, TIME_S.size, False))
+    assert not any("are below" in note for note in turned.notes), "all of them: that is another thing"
+
+
 def test_what_is_clean_stays_as_it_is() -> None:
     for clean in (FORCE_N, np.zeros(TIME_S.size), np.full(TIME_S.size, np.nan), np.where(VOLTS > 2.0, 10.0, 0.0)):
         assert dropped(clean) == []
