@@ -7,7 +7,7 @@ residual that reaches a noise floor which is known, from replicate cycles or fro
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -20,16 +20,23 @@ from gateway.diagnosis.bench.parameters import ModelParameters
 from gateway.diagnosis.bench.recording_drive import MOTIONS
 from gateway.diagnosis.excerpt import MOST_ROWS, take_excerpt
 from gateway.diagnosis.input_checks import Suspect, find_suspects
-from gateway.diagnosis.measurement import Measurement
+from gateway.diagnosis.measurement import Flags, Measurement
 from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT, base_parameters, fit_base, refit
 from gateway.diagnosis.model_fit.initial_state import drop_unfelt_starts, settle_known_rests
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
 from gateway.diagnosis.model_fit.line_lengths import fit_line_lengths
 from gateway.diagnosis.noise.whitening import Whitener, fast_noise_n, timing_weights, white_whitener
-from gateway.diagnosis.notes import implausible_area, nothing_to_switch_off, uninformative_force
+from gateway.diagnosis.notes import implausible_area, nothing_to_switch_off, set_aside_notes, uninformative_force
 from gateway.diagnosis.residuals.dependence_tests import find_dependences
 from gateway.diagnosis.result import Baseline, Diagnosis, Extended, Trace, Verdict
-from gateway.diagnosis.search.direct_evidence import DirectEvidence, find_outliers, find_quantisation, find_repeats
+from gateway.diagnosis.search.direct_evidence import (
+    FEWEST_SPIKES,
+    DirectEvidence,
+    find_outliers,
+    find_quantisation,
+    find_repeats,
+    flag_spoiling_spikes,
+)
 from gateway.diagnosis.search.search import search_effects
 from gateway.diagnosis.verdict import SearchFindings, compose_diagnosis
 from gateway.one_blas_thread import one_blas_thread
@@ -58,13 +65,15 @@ class Options:
 
 @dataclass(frozen=True, slots=True)
 class SearchStart:
-    """Where a search begins. evidence: what the readings tell by themselves; effects: those to search for."""
+    """Where a search begins. evidence: what the readings tell by themselves; effects: those to search for; aside: rows that
+    are no witness and no finding."""
 
     bench: Bench
     base: FittedModel
     whiten: Whitener
     evidence: tuple[DirectEvidence, ...]
     effects: tuple[Effect, ...]
+    aside: Flags
 
 
 @one_blas_thread()
@@ -101,20 +110,36 @@ def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options
     progress.report("testing what is left")
     left = find_dependences(found.bench, found.fitted, found.whiten, found.unnamed)
     findings = SearchFindings(start.bench, found, start.evidence, left, start.effects)
-    return compose_diagnosis(findings, options.noise_floor_n, options.calibration_noise_n)
+    result = compose_diagnosis(findings, options.noise_floor_n, options.calibration_noise_n)
+    return _without_aside(result, start) if start.aside.any() else result
+
+
+def _without_aside(result: Diagnosis, start: SearchStart) -> Diagnosis:
+    """The answer that says which rows are no witness, and in whose pictures and figures they do not count."""
+    forces = (channel for channel in start.bench.channels if channel.is_force)
+    traces = [
+        replace(
+            trace, measurement=replace(trace.measurement, usable=trace.measurement.usable & ~start.aside[each.rows])
+        )
+        for trace, each in zip(result.traces, forces, strict=True)
+    ]
+    return replace(result, traces=tuple(traces), notes=(*result.notes, *set_aside_notes(start.bench, start.aside)))
 
 
 def prepare_search(measurements: Sequence[Measurement], given: Plant, options: Options) -> SearchStart:
     """Return where a search begins: the base model, and what the readings tell by themselves."""
     progress.report("fitting the base model")
     hidden = frozenset({options.without} if options.without else ())
-    bench, base, whiten = _fit_base_model(measurements, without_hidden(given, hidden), hidden, options.late_s)
+    (bench, base, whiten), aside = _fit_beside_spikes(
+        measurements, without_hidden(given, hidden), hidden, options.late_s
+    )
     quantum_n = max(options.quantum_n, given.cell.quantum_n)
     bench, base, evidence = _take_direct_evidence(bench, base, whiten, quantum_n)
     if options.late_s > 0.0 or any(each.even_s for each in measurements):
         base, whiten = doubt_times(bench, base, whiten, options.late_s)
         bench, base = fit_line_lengths(bench, base, whiten, given.regulator.command_step_v)
-    return SearchStart(bench, base, whiten, evidence, effects_to_search(base.free, hidden, options.late_s))
+    effects = effects_to_search(base.free, hidden, options.late_s)
+    return SearchStart(bench, base, whiten, evidence, effects, aside)
 
 
 def doubt_times(bench: Bench, base: FittedModel, whiten: Whitener, late_s: float) -> tuple[FittedModel, Whitener]:
@@ -203,15 +228,44 @@ def with_readings_of(given: Plant, plant: Plant) -> Plant:
     return with_value(with_value(plant, "cell", "noise_n", given.cell.noise_n), "cell", "quantum_n", quantum_n)
 
 
-def _fit_base_model(
+BaseModel: TypeAlias = tuple[Bench, FittedModel, Whitener]
+
+
+def _fit_beside_spikes(
     measurements: Sequence[Measurement], start: Plant, hidden: frozenset[str], late_s: float
-) -> tuple[Bench, FittedModel, Whitener]:
-    """The bench and base model that fit best, over the ways in which motion may be known."""
+) -> tuple[BaseModel, Flags]:
+    """The base model, fitted without the spikes that would spoil it, and the rows that are set aside: those, where they are
+    too few to be a finding.
+
+    Four readings of -9999 N, which a logger writes for no value, left the gain unknown and the area where it began; two bent
+    lines then explained the difference, surely.
+    """
+    bench, base, whiten = _fit_base_model(measurements, start, hidden, late_s)
+    spikes = flag_spoiling_spikes(bench, base.residual_n)
+    if not spikes.any():
+        return (bench, base, whiten), spikes
+    bench, base, whiten = _fit_base_model(measurements, start, hidden, late_s, spikes)
+    if int(spikes.sum()) < FEWEST_SPIKES:
+        return (bench, base, whiten), spikes
+    bench = replace(bench, usable=bench.usable | spikes)
+    residual_n = bench.residuals(bench.simulate([base.parameters])[0])
+    return (bench, replace(base, residual_n=residual_n), whiten), np.zeros_like(spikes)
+
+
+def _fit_base_model(
+    measurements: Sequence[Measurement],
+    start: Plant,
+    hidden: frozenset[str],
+    late_s: float,
+    left_out: Flags | None = None,
+) -> BaseModel:
+    """The bench and base model that fit best, over the ways in which motion may be known. left_out: rows (rows,)."""
     measured = any(each.position_m is not None for each in measurements)
     motions = MOTIONS if measured else MOTIONS[:1]
     tries = []
     for motion in motions:
         bench = bench_of(measurements, motion)
+        bench = bench if left_out is None else bench.without_rows(left_out)
         whiten = white_whitener(bench, bench.measured_n)
         free = base_parameters(bench, hidden - {"coulomb-friction"}, late_s)  # friction tells which way is which
         tries.append((fit_base(bench, start, free, whiten), motion, bench, whiten))

@@ -23,6 +23,7 @@ SETTLED_S: Final = 0.6
 """From a change of the force that is asked until a rig of this kind has arrived: README, "How well it holds"."""
 LONGEST_BLOCK_S: Final = 5.0
 _SAME_N: Final = 0.005  # half a count of the setpoint register: less is no change
+_LARGEST_N: Final = 1.0e60
 _LEVELS: Final = 8
 _RESAMPLES: Final = 2000
 FEWEST_BLOCKS: Final = 6
@@ -86,16 +87,28 @@ def commanded_force(columns: Mapping[str, Floats]) -> CommandedForce:
     """Return the rows of a recording, or of the sample ring, by its column names. ValueError names a column that is missing.
 
     A row counts where the state says that a force is held or on its way, without a fault; without these columns where the
-    setpoint is above 0.
+    setpoint is above 0. What is asked stands until the next row that says it.
     """
     if missing := [name for name in NEEDED if name not in columns]:
         raise ValueError(f"no column {' and no column '.join(missing)}")
-    counts = np.ones(columns["time_s"].size, dtype=bool)
+    wanted_n, counts = _hold(columns["setpoint_n"])
     if "state" in columns:
         counts &= np.isin(columns["state"], (State.RAMPING, State.HOLDING))
     if "fault_code" in columns:
         counts &= columns["fault_code"] == 0.0
-    return CommandedForce(columns["time_s"], columns["setpoint_n"], columns["force_n"], counts)
+    return CommandedForce(columns["time_s"], wanted_n, _without_absurd(columns["force_n"]), counts)
+
+
+def _hold(setpoint_n: Floats) -> tuple[Floats, Flags]:
+    """Return what is asked at each row, and whether it is known: some tables have it only where it changes."""
+    setpoint_n = _without_absurd(setpoint_n)
+    latest = np.maximum.accumulate(np.where(np.isfinite(setpoint_n), np.arange(setpoint_n.size), -1))
+    return np.where(latest < 0, 0.0, setpoint_n[np.maximum(latest, 0)]), latest >= 0
+
+
+def _without_absurd(values: Floats) -> Floats:
+    """Return the column with NaN for what no force is, and whose square overflows."""
+    return np.where(np.abs(values) < _LARGEST_N, values, nan)
 
 
 def error_blocks(run: CommandedForce) -> tuple[ErrorBlock, ...]:

@@ -104,21 +104,6 @@ def find_suspects(measurements: Sequence[Measurement], plant: Plant, *, is_own: 
     return tuple(replace(each, against=against) for each in found if each is not None)
 
 
-def name_options(found: Sequence[Suspect], given: str = "") -> tuple[Suspect, ...]:
-    """Return the same with the option that corrects each. given: what --columns said."""
-    return tuple(replace(each, option=columns_option(each, given)) for each in found)
-
-
-def columns_option(suspect: Suspect, given: str = "") -> str:
-    """Return `--columns ...` that corrects it. given: what --columns said, NAME=SOURCE[:UNIT] with commas: sources stay."""
-    entries = dict(part.strip().split("=", 1) for part in given.split(",") if "=" in part)
-    sources = {name: entry.rpartition(":")[0] or entry for name, entry in entries.items()}
-    for name, source in suspect.mapping.items():
-        head, colon, unit = source.partition(":")
-        entries[name] = f"{sources.get(head, head)}{colon}{unit}"
-    return f"--columns {','.join(f'{name}={entry}' for name, entry in entries.items())}"
-
-
 def _suspect(measurement: Measurement, plant: Plant, is_own: bool) -> Suspect | None:
     row_s = float(np.median(np.diff(measurement.time_s)))
     if row_s >= _COARSE_S:

@@ -5,7 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from gateway.diagnosis.measurement import Measurement
+from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.measurement import Flags, Measurement
 from gateway.diagnosis.noise.whitening import fast_noise_n
 
 _MOVING_RATIO: Final = 30.0  # times the noise, from which a force moves
@@ -104,3 +105,16 @@ def _dead_drive_notes(measurement: Measurement) -> Iterator[str]:
             f"{measurement.name}: command_v stands at {volts[0]:g} V throughout while the force moves by "
             f"{np.ptp(force_n):.3g} N: is it the right column? Without a command that moves, no cause can be told"
         )
+
+
+def set_aside_notes(bench: Bench, aside: Flags) -> Iterator[str]:
+    """Yield a sentence for each recording that has readings which are no witness. aside: these, (rows,)."""
+    for channel in bench.channels:
+        rows = np.flatnonzero(aside[channel.rows]) if channel.is_force else np.zeros(0, dtype=int)
+        if rows.size:
+            measurement, first = bench.measurements[channel.recording], int(rows[0])
+            yield (
+                f"{measurement.name}: {rows.size} reading{'s stand' if rows.size > 1 else ' stands'} far apart from those "
+                f"around and {'are' if rows.size > 1 else 'is'} not judged: {measurement.force_n[first]:.5g} N at "
+                f"{measurement.time_s[first]:.3f} s"
+            )

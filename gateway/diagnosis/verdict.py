@@ -220,9 +220,10 @@ def _direct_causes(
 
 
 def _direct_estimates(direct: DirectEvidence) -> dict[str, Estimate]:
+    intervals = [_interval(value, error) for _, value, error in direct.values]
     return {
-        parameter.name: Estimate(parameter.section, value, parameter.unit, _interval(value, error))
-        for parameter, value, error in direct.values
+        parameter.name: Estimate(parameter.section, value, parameter.unit, (max(low, parameter.low), high))
+        for (parameter, value, _), (low, high) in zip(direct.values, intervals, strict=True)
     }
 
 

@@ -9,7 +9,8 @@ from gateway.control.compensation.cell_map import CellMap
 from gateway.diagnosis.force_error import CommandedForce, ErrorBlock, commanded_force, error_blocks
 from gateway.diagnosis.measurement import Floats
 from gateway.plants.recorded_number import header_in_use
-from gateway.recording import Recording
+from gateway.recording import Recording, RecordingError
+from gateway.recording.tables.time_axis import check_time_axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +34,16 @@ class RecordedForce:
 
 
 def read_recorded_force(recording: Recording) -> RecordedForce:
-    """Return the run of a recording. ValueError names the column without which nobody knows what was asked."""
-    force = commanded_force(recording.columns)
+    """Return the run of a recording. ValueError names the column without which nobody knows what was asked, RecordingError the
+    row where time runs backwards; no rows are no run."""
+    commanded_force(recording.columns)
+    kept = check_time_axis(recording).kept
+    if not kept.size:
+        raise RecordingError(f"{recording.path}: no rows")
+    columns = {name: values[kept] for name, values in recording.columns.items()}
+    force = commanded_force(columns)
     in_use = header_in_use(recording.header)
     cell = CellMap(**in_use["cell"]) if in_use.get("cell") else None
-    columns = recording.columns
     voltage_v = columns.get("sent_v", columns.get("command_v", np.full(force.time_s.size, nan)))
     return RecordedForce(recording.path.name, int(in_use.get("number", 0)), cell, force, voltage_v)
 

@@ -6,6 +6,7 @@ whether it shows anything is the diagnosis' question. This module imports numpy;
 """
 
 from collections.abc import Mapping
+from math import inf
 from typing import Final
 
 import numpy as np
@@ -17,7 +18,7 @@ from gateway.recording.tables.column_mapping import EXAMPLE, join_names
 from gateway.recording.tables.column_names import SENT
 from gateway.recording.tables.covariates import extract_covariates, interpolate_missing, is_constant, is_own_recording
 from gateway.recording.tables.even_rows import resample_evenly
-from gateway.recording.tables.row_validity import flag_repeated, valid_by_quality
+from gateway.recording.tables.row_validity import flag_dropouts, flag_repeated, valid_by_quality
 from gateway.recording.tables.time_axis import TimeAxis, check_time_axis
 from gateway.units import linear_conversion
 
@@ -27,6 +28,12 @@ _DRIVES: Final = ("command_v", "pressure_kpa")
 _NEEDED: Final = f"at least {FEWEST_ROWS} usable rows over {SHORTEST_S:g} s are needed, 60 s at 200 Hz are good"
 _HIGHEST_COMMAND_V: Final = 50.0
 _LARGEST: Final = 1.0e60  # beyond, squares and products of columns overflow: what a logger writes for "no value"
+_LEAST: Final = {
+    "temperature_c": -273.15,
+    "pressure_kpa": -102.0,
+    "supply_kpa": -102.0,
+}  # nothing is colder, or less air
+_RARE_SHARE: Final = 0.2  # more of them are another unit, or a turned sign
 _TURNED: Final = -0.8  # correlation of force and command at which the sign is asked for
 _PASCAL: Final = linear_conversion("pressure", "kpa", "pa")[0]
 _METRE: Final = linear_conversion("length", "mm", "m")[0]
@@ -42,10 +49,14 @@ def measurement_of(recording: Recording) -> Measurement:
     notes += more_notes
     drive, driven, more_notes = _drive(columns, axis.time_s)
     notes += more_notes
-    usable &= driven
+    position_m, position_notes = _position_m(columns, axis.time_s)
+    drives = [*drive.values(), *([] if position_m is None else [position_m])]
+    dropouts, more_notes = flag_dropouts(columns["force_n"], axis.time_s, drives)
+    notes += more_notes
+    columns = columns | {"force_n": np.where(dropouts, np.nan, columns["force_n"])}
+    usable &= driven & ~dropouts
     _check_enough(recording, axis, usable, notes)
     repeated, more_notes = flag_repeated(columns["force_n"])
-    position_m, position_notes = _position_m(columns, axis.time_s)
     others, suspicions = extract_covariates(columns, axis.time_s, columns["force_n"])
     suspicions += _suspicious(columns["force_n"][usable], {name: values[usable] for name, values in drive.items()})
     measurement = Measurement(
@@ -86,6 +97,12 @@ def _replace_absurd(columns: dict[str, Floats]) -> tuple[dict[str, Floats], list
         if absurd.any():
             columns = columns | {name: np.where(absurd, np.nan, values)}
             notes.append(f"{int(absurd.sum())} values of {name} are beyond {_LARGEST:.0e}: taken as missing")
+        below = columns[name] < _LEAST.get(name, -inf)
+        if 0.0 < below.mean() < _RARE_SHARE:
+            columns = columns | {name: np.where(below, np.nan, columns[name])}
+            notes.append(
+                f"{int(below.sum())} values of {name} are below {_LEAST[name]:g}, which none is: taken as missing"
+            )
     return columns, notes
 
 

@@ -8,7 +8,7 @@ import contextlib
 import json
 import struct
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from zlib import crc32
@@ -31,7 +31,8 @@ class Recording:
     """One recording: header as written, one float64 array per column, all of length rows.
 
     truncated: bytes were dropped, `notes` says which; a gap in the middle shows in time_s. lines: in a text file, the
-    line that each row stood on. suggestion: the `--columns` that is probably meant where the headers are not ours.
+    line that each row stood on. suggestion: the `--columns` that is probably meant where the headers are not ours; factors:
+    what numbers as they stood were multiplied by, of columns that were in another unit.
     """
 
     path: Path
@@ -42,6 +43,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     lines: "Sequence[int] | NDArray[np.int64] | None" = None
     suggestion: str = ""
+    factors: dict[str, float] = field(default_factory=dict)
 
     def place(self, row: int) -> str:
         """Return where a row (from 0) stands, for messages: `file:line`, or the number of the row where there are no lines."""

@@ -148,6 +148,18 @@ def test_a_force_of_a_thousand_times_the_piston_s_asks_for_its_unit(tmp_path: Pa
     assert "E52" not in said(path, "--columns", "time_s=1,command_v=2,force_n=3:mn")
 
 
+def test_what_corrects_a_turned_sign_keeps_the_unit_of_the_header(tmp_path: Path) -> None:
+    """It said -n, which made a tenth of the force; what corrected that said kgf, and the sign was turned again."""
+    turned = columns(force_n=-columns()["force_n"] / 9.80665)
+    path = written(tmp_path / "turned.csv", {"Kraft [kgf]" if n == "force_n" else n: v for n, v in turned.items()})
+    mapping = tmp_path / "columns.yaml"
+    for given in ([], ["--columns", "force_n=3:kgf"], ["--columns", str(mapping)]):
+        mapping.write_text("force_n: 3\n", encoding="utf-8")
+        option = said(str(path), *given).partition("; --columns ")[2].partition(" corrects it")[0]
+        assert option.endswith(":-kgf"), (given, option)
+    assert "E52" not in said(str(path), "--columns", option)
+
+
 def test_a_floor_above_the_residual_confirms_nothing(tmp_path: Path) -> None:
     bent = {**columns(), "force_n": columns()["force_n"] * (1.0 + 0.002 * columns()["force_n"])}
     path = written(tmp_path / "bent.csv", bent)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gateway.diagnosis import Measurement, Options, Verdict, diagnose
-from gateway.diagnosis.input_checks import SWAPPED, TURNED, UNIT, columns_option, find_suspects
+from gateway.diagnosis.input_checks import SWAPPED, TURNED, UNIT, find_suspects
 from gateway.diagnosis.model_fit.base_fit import without_effects
 from gateway.twin.plant import Plant, with_value
 from gateway.twin.replay.replay import Drive, Replay
@@ -83,12 +83,3 @@ def test_no_cause_is_looked_for_where_columns_are_wrong() -> None:
     assert answer.causes == ()
     assert answer.plant == MACHINE, "nothing is refitted to numbers in another unit"
     assert answer.suspects[0].sentence.startswith("E520 machine: the force is 0.102 times what the rig's plant gives")
-
-
-def test_the_option_keeps_the_sources_that_were_given() -> None:
-    (unit,) = find_suspects([replace(COMMANDED, force_n=FORCE_N / 9.80665)], MACHINE, is_own=True)
-    assert columns_option(unit) == "--columns force_n=force_n:kgf"
-    assert columns_option(unit, "time_s=1:ms,force_n=7:n") == "--columns time_s=1:ms,force_n=7:kgf"
-    (swapped,) = find_suspects([replace(COMMANDED, command_v=FORCE_N, force_n=VOLTS)], MACHINE, is_own=True)
-    assert columns_option(swapped) == "--columns command_v=force_n,force_n=command_v"
-    assert columns_option(swapped, "command_v=2,force_n=3:n") == "--columns command_v=3,force_n=2"

@@ -109,7 +109,7 @@ def _select_rows(
     notes = []
     for bad, what in (
         (~finite, "without a number in time, command or force"),
-        (finite & overloaded, "with the load cell overloaded"),
+        (finite & overloaded, "with the load cell overloaded or another bad quality"),
         (finite & ~overloaded & ~forward, "whose time does not advance (repeated or out of order)"),
     ):
         if bad.any():

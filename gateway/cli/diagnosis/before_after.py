@@ -4,7 +4,7 @@ A reading that was straightened by the plant in use is not the reading of before
 the one and as the plant of the other has the cell; where the two answers differ, only another cell could tell.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from pathlib import Path
@@ -48,10 +48,15 @@ def read_run(name: str, *, rig: str | None, columns: str | None, state: Path | N
 def compare_before_after(before: RecordedForce, after: RecordedForce) -> BeforeAfter:
     """Return what the later run gained. `cannot be told` where it depends on which plant is right about the cell."""
     views = [_compare_through(before, after, cell) for cell in dict.fromkeys((after.cell, before.cell))]
-    result = views[0]
-    if len({view.whole.verdict for view in views}) > 1:
-        result = replace(result, whole=replace(result.whole, verdict=GainVerdict.UNKNOWN, why=_ANOTHER_CELL))
-    return result
+    whole, held, moving = (_agreed([getattr(view, part) for view in views]) for part in ("whole", "held", "moving"))
+    return replace(views[0], whole=whole, held=held, moving=moving)
+
+
+def _agreed(views: Sequence[ForceChange]) -> ForceChange:
+    """What one cell makes of a part; `cannot be told` where another cell makes something else of it."""
+    if len({view.verdict for view in views}) == 1:
+        return views[0]
+    return replace(views[0], verdict=GainVerdict.UNKNOWN, why=_ANOTHER_CELL)
 
 
 def _compare_through(before: RecordedForce, after: RecordedForce, cell: CellMap | None) -> BeforeAfter:

@@ -1,7 +1,7 @@
 """What is diagnosed: recordings by path or number, and the plant that they are compared with."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -37,7 +37,8 @@ class Sources:
     decided; late_s: how late the wires may have made the readings; quantum_n: their known step; calibration_noise_n: their
     noise at rest by the calibration that they were made under, N, None where it is not known; is_own: the plant is that of
     the rig that the recordings were made on; straightened: what a plant in use has taken back of the first recording's
-    readings, by the cell's numbers; is_rehearsal: made while the devices of a real rig were simulated.
+    readings, by the cell's numbers; factors: by what each recording's columns were multiplied; is_rehearsal: made while the
+    devices of a real rig were simulated.
     """
 
     paths: tuple[Path, ...]
@@ -51,6 +52,7 @@ class Sources:
     calibration_noise_n: float | None = None
     is_own: bool = False
     straightened: dict[str, Any] | None = None
+    factors: dict[str, dict[str, float]] = field(default_factory=dict)
     is_rehearsal: bool = False
 
     @property
@@ -95,6 +97,7 @@ def read_sources(
         late_s=_WIRE_S if all(map(_of_gateway, recordings)) else 0.0,
         quantum_n=_quantum_n(here) if all(map(_of_gateway, recordings)) else 0.0,
         straightened=header_in_use(recordings[0].header).get("cell"),
+        factors={each.path.name: each.factors for each in recordings},
         is_own=plant is (known.plant_profile if known else plant_of_first),
         is_rehearsal=any(map(is_rehearsal, recordings)),
     )

@@ -222,7 +222,8 @@ def _read_old(options: dict[str, Any], rig: str) -> "Sources | None":
 def _run_diagnosis(sources: "Sources", old: "Sources | None", options: dict[str, Any]) -> "tuple[Diagnosis, float]":
     from gateway.cli.diagnosis.progress_line import show_progress
     from gateway.diagnosis import Options, diagnose, find_changes
-    from gateway.diagnosis.input_checks import name_options
+    from gateway.diagnosis.columns_option import name_options
+    from gateway.recording.tables.mapping_file import spell_mapping
 
     engine_options = Options(
         without=options["without"],
@@ -239,8 +240,9 @@ def _run_diagnosis(sources: "Sources", old: "Sources | None", options: dict[str,
             diagnosis = find_changes(sources.measurements, old.measurements, plant, engine_options)
         else:
             diagnosis = diagnose(sources.measurements, plant, engine_options)
-    diagnosis = replace(diagnosis, suspects=name_options(diagnosis.suspects, options["columns"] or ""))
-    return diagnosis, time.perf_counter() - began_s
+    factors = {**(old.factors if old else {}), **sources.factors}
+    suspects = name_options(diagnosis.suspects, spell_mapping(options["columns"]), factors)
+    return replace(diagnosis, suspects=suspects), time.perf_counter() - began_s
 
 
 def _measure_gain(diagnosis: "Diagnosis", sources: "Sources") -> "ClosedLoopGain | str":

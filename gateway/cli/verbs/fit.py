@@ -29,16 +29,16 @@ def _models(context: click.Context, parameter: click.Parameter, value: str) -> t
 
 def _orders(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
     """Return `1-5`, `2`, `1,3,5` as numbers."""
+    from gateway.bsfm.curve import ORDER_MAX
+
     orders: set[int] = set()
     for part in value.split(","):
         first, dash, last = part.strip().partition("-")
         if not first.isdecimal() or (dash and not last.isdecimal()):
             raise click.BadParameter(f"{value} is not a list of orders such as 1-5 or 2,3")
+        if not 1 <= int(first) <= int(last or first) <= ORDER_MAX:
+            raise click.BadParameter(f"{value}: orders are 1 .. {ORDER_MAX}")
         orders |= set(range(int(first), int(last or first) + 1))
-    from gateway.bsfm.curve import ORDER_MAX
-
-    if not orders or not 1 <= min(orders) <= max(orders) <= ORDER_MAX:
-        raise click.BadParameter(f"{value}: orders are 1 .. {ORDER_MAX}")
     return tuple(sorted(orders))
 
 

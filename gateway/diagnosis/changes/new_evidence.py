@@ -8,7 +8,13 @@ import numpy as np
 from gateway.diagnosis.bench.bench import Bench, bench_of
 from gateway.diagnosis.changes.machine import JointModel, MachineModel
 from gateway.diagnosis.model_fit.base_fit import refit
-from gateway.diagnosis.search.direct_evidence import DirectEvidence, find_outliers, find_quantisation, find_repeats
+from gateway.diagnosis.search.direct_evidence import (
+    DirectEvidence,
+    find_outliers,
+    find_quantisation,
+    find_repeats,
+    flag_spoiling_spikes,
+)
 
 _TIMES_AS_MANY: Final = 2.0  # what the old recordings had, from which more is a change
 
@@ -27,6 +33,7 @@ def take_new_evidence(
         None if lattice else find_repeats(part, residual_n[:fresh]),
     ]
     rows = np.zeros(joint.bench.rows, dtype=bool)
+    rows[:fresh] = flag_spoiling_spikes(part, residual_n[:fresh])
     for each in others:
         if each is not None:
             rows[:fresh] |= each.rows

@@ -17,7 +17,8 @@ from gateway.diagnosis.noise.whitening import fast_noise_n
 from gateway.robust import SIGMA_PER_MAD
 
 _SPIKE: Final = 7.5  # robust standard deviations: one chance in 10^13 rows
-_FEWEST_SPIKES: Final = 3
+FEWEST_SPIKES: Final = 3
+"""Fewer are set aside where they spoil a fit, and are no finding."""
 _LEAST_REPEATED: Final = 0.001  # share of rows ...
 _MORE_THAN_CHANCE: Final = 3.0  # ... and times what counts as coarse as these repeat by chance
 _LEAST_COARSE: Final = 0.05  # share of the noise's power that rounding to the lattice makes
@@ -36,15 +37,9 @@ class DirectEvidence:
 
 def find_outliers(bench: Bench, residual_n: Floats, quantum_n: float) -> DirectEvidence | None:
     """Return rows that stand apart from both neighbours, by the residual of the model as it is, beyond one count."""
-    flagged = np.zeros(bench.rows, dtype=bool)
-    for channel in bench.channels:
-        if channel.is_force:
-            simulated_n = (bench.measured_n - residual_n)[channel.rows]
-            flagged[channel.rows] = _stands_out(
-                residual_n[channel.rows], simulated_n, bench.usable[channel.rows], quantum_n
-            )
+    flagged = flag_spikes(bench, residual_n, quantum_n)
     count = int(flagged.sum())
-    if count < _FEWEST_SPIKES:
+    if count < FEWEST_SPIKES:
         return None
     judged = bench.judged
     share = count / int(judged.sum())
@@ -54,6 +49,26 @@ def find_outliers(bench: Bench, residual_n: Floats, quantum_n: float) -> DirectE
         (OUTLIER, size, size / float(np.sqrt(2.0 * count))),
     )
     return DirectEvidence("outliers", values, flagged, bench.rms_n(residual_n), _rms_of(residual_n[judged & ~flagged]))
+
+
+def flag_spikes(bench: Bench, residual_n: Floats, quantum_n: float = 0.0) -> Flags:
+    """Return the rows (rows,) that stand apart from both neighbours, however few they are."""
+    flagged = np.zeros(bench.rows, dtype=bool)
+    for channel in bench.channels:
+        if channel.is_force:
+            simulated_n = (bench.measured_n - residual_n)[channel.rows]
+            flagged[channel.rows] = _stands_out(
+                residual_n[channel.rows], simulated_n, bench.usable[channel.rows], quantum_n
+            )
+    return flagged
+
+
+def flag_spoiling_spikes(bench: Bench, residual_n: Floats) -> Flags:
+    """Return the spikes, where they hold more of the squared residual than all other rows: what was fitted to them is no model
+    of anything. None else."""
+    flagged = flag_spikes(bench, residual_n) & bench.judged
+    of_spikes, of_others = (float(np.sum(residual_n[rows] ** 2)) for rows in (flagged, bench.judged & ~flagged))
+    return flagged if of_spikes > of_others else np.zeros_like(flagged)
 
 
 def _stands_out(residual_n: Floats, simulated_n: Floats, usable: Flags, quantum_n: float) -> Flags:

@@ -1,5 +1,6 @@
 """Any recording that a user may have, by its first bytes: our own format, Parquet, a workbook, else a table of text."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from gateway.plain_file import other_kind
@@ -7,7 +8,7 @@ from gateway.recording.errors import RecordingError
 from gateway.recording.foreign.table_text import ZIP, refuse_other_kinds
 from gateway.recording.layout import MAGIC
 from gateway.recording.reader import Recording, read_recording
-from gateway.recording.tables.column_mapping import ColumnMapping, select_columns
+from gateway.recording.tables.column_mapping import ColumnMapping, factors_of, select_columns
 from gateway.recording.tables.csv_table import read_csv
 from gateway.recording.tables.parquet_table import MAGIC as PARQUET_MAGIC
 from gateway.recording.tables.parquet_table import read_parquet
@@ -42,8 +43,6 @@ def _apply_mapping(recording: Recording, mapping: ColumnMapping | None) -> Recor
     if mapping is None:
         return recording
     names = list(recording.columns)
-    columns = {
-        pick.name: recording.columns[names[pick.index]] * pick.factor + pick.offset
-        for pick in select_columns(names, mapping, str(recording.path))
-    }
-    return Recording(recording.path, recording.header, columns, recording.rows, recording.truncated, recording.notes)
+    picks = select_columns(names, mapping, str(recording.path))
+    columns = {pick.name: recording.columns[names[pick.index]] * pick.factor + pick.offset for pick in picks}
+    return replace(recording, columns=columns, factors=factors_of(picks))

@@ -167,6 +167,11 @@ def select_columns(
     return (*mapped, *own)
 
 
+def factors_of(picks: Sequence[SelectedColumn]) -> dict[str, float]:
+    """Return what the numbers of a column of the contract are multiplied by, where that is not 1."""
+    return {pick.name: pick.factor for pick in picks if pick.is_contract and pick.factor != 1.0}
+
+
 def describe_understood(
     names: Sequence[str], picks: Sequence[SelectedColumn], mapping: ColumnMapping | None
 ) -> list[str]:

@@ -25,6 +25,7 @@ from gateway.recording.tables.column_mapping import (
     ColumnMapping,
     SelectedColumn,
     describe_understood,
+    factors_of,
     join_names,
     select_columns,
     unit_facts,
@@ -81,7 +82,15 @@ def _read_text(text: TableText, path: Path, mapping: ColumnMapping | None, lenie
     facts = dict(table.facts) | unit_facts(headers, selected, mapping)
     rows = len(table.lines)
     return Recording(
-        path, facts, columns, rows, table.dropped, tuple(notes), lines=table.lines, suggestion=headers.suggest()
+        path,
+        facts,
+        columns,
+        rows,
+        table.dropped,
+        tuple(notes),
+        lines=table.lines,
+        suggestion=headers.suggest(),
+        factors=factors_of(chosen),
     )
 
 

@@ -30,6 +30,22 @@ def column_mapping(text: str | None) -> ColumnMapping | None:
     return read_mapping(Path(text)) if text.lower().endswith(_SUFFIXES) else ColumnMapping.parse(text)
 
 
+def spell_mapping(text: str | None) -> str | None:
+    """Return an option's value as text without a file: `NAME=COLUMN:UNIT,...`. None for a file with a header that such a text
+    cannot hold."""
+    head, comma, rest = (text or "").partition(",")
+    if head.strip().startswith(_SHEET):
+        entries = spell_mapping(rest)
+        return entries if entries is None else f"{head}{comma}{entries}"
+    if text is None or not text.lower().endswith(_SUFFIXES):
+        return text or ""
+    document = parse(read_plain(Path(text)), text)
+    entries_by_name = {str(key): str(_entry(document, key)) for key in document.value}
+    if any(set(",=") & set(entry.partition("..")[0]) for entry in entries_by_name.values()):
+        return None
+    return ",".join(f"{name}={entry}" for name, entry in entries_by_name.items())
+
+
 def read_mapping(path: Path) -> ColumnMapping:
     """Return the mapping in a file. A value is a number, a header, either with `:unit`, or `{column: 7, unit: n}`."""
     try:

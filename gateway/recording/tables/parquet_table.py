@@ -18,6 +18,7 @@ from gateway.recording.tables.column_mapping import (
     ColumnMapping,
     SelectedColumn,
     describe_understood,
+    factors_of,
     join_names,
     select_columns,
     unit_facts,
@@ -57,8 +58,16 @@ def read_parquet(path: Path, mapping: ColumnMapping | None = None) -> Recording:
     notes = [str(note) for note in dropped] if isinstance(dropped, list) else [str(dropped)]
     notes += describe_understood(names, chosen, mapping)
     notes += [f"columns that hold no numbers: {join_names(words)}"] if words else []
-    suggestion = headers.suggest()
-    return Recording(path, facts, columns, table.num_rows, bool(dropped), tuple(notes), suggestion=suggestion)
+    return Recording(
+        path,
+        facts,
+        columns,
+        table.num_rows,
+        bool(dropped),
+        tuple(notes),
+        suggestion=headers.suggest(),
+        factors=factors_of(chosen),
+    )
 
 
 def _stamps(schema: Any) -> list[int]:

@@ -1,5 +1,6 @@
 """Which readings may be judged: valid by the quality column, and not the one before written down again."""
 
+from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
@@ -10,19 +11,25 @@ Flags = NDArray[np.bool_]
 
 OVERLOAD: Final = 1.5
 """Our recorder writes 0 ok, 1 unsteady (normal while the force moves) and 2 overload; only the last is no reading."""
+_OURS: Final = 2.0
+_OPC_GOOD, _OPC_MOST = 192.0, 255.0
 _MOST_VALUES: Final = 8
 _RARE_SHARE: Final = 0.2
 _LEAST_REPEATS: Final = 3
 _LEAST_SHARE: Final = 0.002
 _ENOUGH: Final = 10
 _FINE_STEPS: Final = 5.0
+_ENDS: Final = (0.05, 0.95)
+_BEYOND: Final = 5.0  # times as far away as nine tenths of all readings lie apart, or from 0
+_REMEMBERED_S: Final = 1.0  # that a force still follows what drove it
 
 
 def valid_by_quality(quality: Floats, is_ours: bool) -> tuple[Flags, list[str]]:
     """Return rows whose reading is valid, and what was made of the column.
 
     A foreign table may mean 0 or 1 (or 192) by good: the most frequent value is taken for it, as long as the others are
-    rare. Where they are not, 0 and 1 are both kept, as our recorder means them.
+    rare. Where they are not, 0 and 1 are both kept, as our recorder means them; of other numbers only those are known
+    that OPC gives to good readings, 192 and more.
     """
     known = np.isfinite(quality)
     values, counts = np.unique(quality[known], return_counts=True)
@@ -33,11 +40,17 @@ def valid_by_quality(quality: Floats, is_ours: bool) -> tuple[Flags, list[str]]:
             f"quality takes {values.size} values: no flag, so no row was left out for it"
         ]
     good = float(values[counts.argmax()])
-    valid = known & (quality == good)
-    if is_ours or (~valid).mean() > _RARE_SHARE:
-        good, valid = 0.0, known & (quality < OVERLOAD)
+    valid, what = known & (quality == good), f"quality is not {good:g}"
+    if is_ours or ((~valid).mean() > _RARE_SHARE and values.max() <= _OURS):
+        good, valid, what = 0.0, known & (quality < OVERLOAD), "quality is not 0"
+    elif (~valid).mean() > _RARE_SHARE:
+        if values.max() < _OPC_GOOD or values.max() > _OPC_MOST:
+            return np.ones(quality.size, dtype=bool), [
+                "what quality means by a good reading is not clear: it was not used"
+            ]
+        valid, what = known & (quality >= _OPC_GOOD), f"quality is below {_OPC_GOOD:g}"
     bad = int((~valid).sum())
-    what = "overload or unknown" if good == 0.0 and (is_ours or values.size > 2) else f"quality is not {good:g}"
+    what = "overload or unknown" if good == 0.0 and (is_ours or values.size > 2) else what
     return valid, [f"{bad} rows are not judged: {what} by the quality column"] if bad else []
 
 
@@ -76,3 +89,41 @@ def _repeats_by_resolution(force_n: Floats, resting: Flags) -> float | None:
     if twos < _ENOUGH:
         return None
     return float(0.75 * ones * max(ones / twos, 1.0) ** (1.0 / 3.0))  # half again as many, for a force that creeps
+
+
+def flag_dropouts(force_n: Floats, time_s: Floats, drives: Iterable[Floats]) -> tuple[Flags, list[str]]:
+    """Return stretches of readings far beyond all others that nothing drives there: what a logger writes for no value, such as
+    -9999. A single such reading is left to the diagnosis, which knows spikes.
+
+    drives: columns without holes that move the force; one that leaves its usual range at such a stretch, or within a second
+    before it, explains the force.
+    """
+    none = np.zeros(force_n.size, dtype=bool)
+    known = force_n[np.isfinite(force_n)]
+    if known.size < _ENOUGH:
+        return none, []
+    low_n, high_n = np.quantile(known, _ENDS)
+    far_n = _BEYOND * max(high_n - low_n, abs(low_n), abs(high_n))
+    with np.errstate(invalid="ignore"):
+        far = (force_n < low_n - far_n) | (force_n > high_n + far_n)
+    beside = np.append(False, far[:-1]) | np.append(far[1:], False)
+    far &= beside
+    if not far_n > 0.0 or not far.any():
+        return none, []
+    edges = np.zeros(force_n.size + 1)
+    rows = np.flatnonzero(far)
+    np.add.at(edges, np.searchsorted(time_s, time_s[rows] - _REMEMBERED_S), 1.0)
+    np.add.at(edges, rows + 1, -1.0)
+    about = np.cumsum(edges)[:-1] > 0.0
+    if about.all() or any(_leaves_its_range(drive, about) for drive in drives):
+        return none, []
+    first = f"{force_n[rows[0]]:.5g} N at {time_s[rows[0]]:.3f} s"
+    note = f"{rows.size} readings are far beyond all others while nothing drives them (the first: {first}): taken as missing"
+    return far, [note]
+
+
+def _leaves_its_range(drive: Floats, about: Flags) -> bool:
+    """Decide whether a column goes beyond what it has elsewhere, by more than a hundredth of that."""
+    low, high = float(np.min(drive[~about])), float(np.max(drive[~about]))
+    slack = 0.01 * (high - low)
+    return bool(np.min(drive[about]) < low - slack or np.max(drive[about]) > high + slack)

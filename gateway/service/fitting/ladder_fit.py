@@ -5,7 +5,7 @@ as the store does it. So a refused ladder, a full disk or a kill leaves no half 
 """
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
@@ -22,7 +22,7 @@ from gateway.reports.fit.document import Document, fit_document
 from gateway.reports.fit.page import fit_page
 from gateway.reports.fit.raw_ladder import raw_ladder
 from gateway.service.fitting.acceptance import Acceptance, judge_fit
-from gateway.service.fitting.ladder_source import RigContext, acceptance_bounds, check_source
+from gateway.service.fitting.ladder_source import RigContext, acceptance_bounds, check_source, in_unit
 from gateway.service.fitting.measured_response import measure_recorded_response
 from gateway.service.fitting.recorded_rig import is_rehearsal
 
@@ -41,6 +41,7 @@ class LadderFit:
 def fit_recording(recording: Recording, request: FitRequest, context: RigContext, name: str = "") -> LadderFit:
     """Check, fit, hold out, choose, judge. name: the user's, empty for the one given when it was recorded. LadderError with a
     sentence where the data must not be fitted."""
+    recording, context = in_unit(recording, context.force_unit), replace(context, force_unit=None)
     evaluation = evaluate(check_source(recording, context), request)
     verdict = judge_fit(evaluation, *acceptance_bounds(recording, context))
     document = fit_document(evaluation, recording.path, recording.header)

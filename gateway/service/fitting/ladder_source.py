@@ -1,16 +1,23 @@
 """Where a ladder comes from, and what is known about the rig that it was recorded on."""
 
 from dataclasses import dataclass, replace
+from math import isclose
 from pathlib import Path
 from typing import Final
+
+import numpy as np
 
 from gateway import defaults
 from gateway.bsfm import Calibration
 from gateway.bsfm.ladder.check import CheckedLadder, Expectation, check_ladder, join_ladders
+from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
+from gateway.bsfm.ladder.rows import FORCE_UNITS, OVERLOADED
 from gateway.calibrations.store import calibration_in_use
 from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.recording import ColumnMapping, Recording, find_recording, list_recordings, read_recording, read_table
 from gateway.recording.layout import SUFFIX
+from gateway.recording.tables.covariates import is_own_recording
+from gateway.recording.tables.row_validity import valid_by_quality
 
 _DEFAULT_RIG: Final = defaults.RIG  # whose calibration a table without a known rig is compared with
 _MM2_PER_M2: Final = 1.0e6
@@ -30,11 +37,40 @@ def read_source(path: Path, mapping: ColumnMapping | None = None) -> Recording:
     """Return a recording of ours, Parquet or a CSV, by its first bytes. RecordingError and OSError as the readers.
 
     Cells that are no number are told and left out: a fit takes stairs, not every row. A force whose unit the mapping says
-    is in newtons from here on, and known to be.
+    is in newtons from here on, and known to be. What another program's quality means is told by what is usual in it.
     """
-    recording = read_table(path, mapping, lenient=True)
+    recording = _with_our_quality(read_table(path, mapping, lenient=True))
     says_unit = mapping and any(source.name == "force_n" and source.unit for source in mapping.sources)
     return replace(recording, header=recording.header | {"force_unit": "N"}) if says_unit else recording
+
+
+def _with_our_quality(recording: Recording) -> Recording:
+    """A table of others with a quality as our recorder means it: its 192 is no overload."""
+    columns = recording.columns
+    if "quality" not in columns or is_own_recording(columns):
+        return recording
+    valid, notes = valid_by_quality(columns["quality"], is_ours=False)
+    ours = np.where(valid, 0.0, OVERLOADED)
+    return replace(recording, columns=columns | {"quality": ours}, notes=(*recording.notes, *notes))
+
+
+def in_unit(recording: Recording, force_unit: str | None) -> Recording:
+    """Return the recording that says which unit its force is in, as the user does. LadderError where its header or a mapping
+    has said another one, by which it was read."""
+    factor = recording.factors.get("force_n")
+    if force_unit is None or factor is None:
+        return (
+            recording
+            if force_unit is None
+            else replace(recording, header=recording.header | {"force_unit": force_unit})
+        )
+    if not isclose(FORCE_UNITS.get(force_unit.strip().lower(), 0.0), factor, rel_tol=1.0e-6):
+        sentence = (
+            f"--force-unit {force_unit}, but force_n was read in another unit already (1 of it = {factor:.5g} N), as its "
+            "header or --columns says: leave one of both out"
+        )
+        raise LadderError(LadderFlaw.UNIT, sentence)
+    return replace(recording, header=recording.header | {"force_unit": "N"})
 
 
 def find_source(name: str, state: Path) -> Path:

@@ -66,6 +66,7 @@ def test_a_plant_that_bends_the_readings_cannot_be_judged_by_the_readings(tmp_pa
     document = json.loads(diagnose("--before", before, "--after", after, "--json", "-").stdout)
     assert (document["verdict"], document["after"]["plant"]) == ("cannot be told", 2)
     assert "only a second load cell can tell" in document["force_error"]["why"]
+    assert document["held"]["verdict"] == "cannot be told", "the same readings"
 
 
 @pytest.mark.parametrize(
@@ -86,3 +87,50 @@ def test_a_table_that_does_not_say_what_was_asked_is_no_run(tmp_path):
         "--before", table(tmp_path / "a.csv", 0.8, 1, setpoint="other"), "--after", table(tmp_path / "b.csv", 0.3, 2)
     )
     assert (told.exit_code, "no column setpoint_n" in told.output) == (exit_codes.DATA, True), told.output
+
+
+def spoilt(path: Path, *, keep: slice = slice(None), cell: tuple[int, int, str] | None = None, order: int = 1) -> Path:
+    """The table with a part of its rows only, backwards, or with another cell (row, column, text)."""
+    head, *rows = table(path, 0.3, 2).read_text(encoding="utf-8").splitlines()
+    rows = rows[keep][::order]
+    if cell:
+        words = rows[cell[0]].split(",")
+        rows[cell[0]] = ",".join([*words[: cell[1]], cell[2], *words[cell[1] + 1 :]])
+    path.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"keep": slice(0)}, "other.csv: no rows"),
+        ({"order": -1}, "other.csv:3, column time_s: 20.9 after 20.95: time runs backwards"),
+    ],
+)
+def test_a_table_that_is_no_run_is_refused_by_the_row(tmp_path, changes, sentence):
+    before, after = table(tmp_path / "a.csv", 0.8, 1), spoilt(tmp_path / "other.csv", **changes)
+    told = diagnose("--before", before, "--after", after, "--report", tmp_path / "out.html")
+    assert told.exit_code == exit_codes.DATA, told.output
+    assert sentence in told.output
+    assert not (tmp_path / "out.html").exists()
+
+
+@pytest.mark.parametrize(("column", "value"), [(0, "nan"), (2, "1e308"), (2, "-inf"), (3, "inf"), (3, "nan")])
+def test_a_value_that_is_none_costs_its_row(tmp_path, column, value):
+    before, after = table(tmp_path / "a.csv", 0.8, 1), spoilt(tmp_path / "other.csv", cell=(70, column, value))
+    told = diagnose("--before", before, "--after", after, "--report", tmp_path / "out.html")
+    assert told.exit_code == 0, told.output
+    assert "0.80 N before, 0.31 N after, 0.49 N gained" in told.output
+
+
+def test_what_is_asked_stands_until_the_next_row_that_says_it(tmp_path):
+    """Loggers that write a setpoint only where it changes."""
+    before, after = table(tmp_path / "a.csv", 0.8, 1), table(tmp_path / "b.csv", 0.3, 2)
+    whole = diagnose("--before", before, "--after", after).output
+    for path in (before, after):
+        head, *rows = path.read_text(encoding="utf-8").splitlines()
+        words = [row.split(",") for row in rows]
+        for k in range(len(rows) - 1, 0, -1):
+            words[k][3] = "" if words[k][3] == words[k - 1][3] else words[k][3]
+        path.write_text("\n".join([head, *map(",".join, words)]) + "\n", encoding="utf-8")
+    assert diagnose("--before", before, "--after", after).output == whole

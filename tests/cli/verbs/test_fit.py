@@ -128,7 +128,10 @@ def test_a_missing_recording_is_told_with_the_numbers_there_are(tmp_path: Path, 
     assert call("fit", str(tmp_path / "nowhere.csv")).exit_code == 65
 
 
-@pytest.mark.parametrize("option", [("--orders", "0"), ("--orders", "1-16"), ("--orders", "a"), ("--models", "spline")])
+@pytest.mark.parametrize(
+    "option",
+    [("--orders", "0"), ("--orders", "1-16"), ("--orders", "1-99999999999"), ("--orders", "a"), ("--models", "spline")],
+)
 def test_what_cannot_be_asked_is_a_usage_error(option: tuple[str, str], tmp_path: Path, call) -> None:
     assert call("fit", "x.csv", *option).exit_code == 2
 
@@ -138,3 +141,35 @@ def test_help_of_fit_costs_no_scipy() -> None:
     code += "assert not {'scipy', 'numpy', 'matplotlib'} & set(sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_unit_that_the_header_says_is_not_applied_again(tmp_path: Path, call) -> None:
+    """--force-unit kgf beside a header in kgf made ten times the force."""
+    rows = [(time_s, volts, force_n / 9.80665) for time_s, volts, force_n in ladder_rows()]
+    path = written(tmp_path / "kgf.csv", rows, "time_s,command_v,Kraft [kgf]")
+    plain, asked = (call("fit", str(path), *ORDERS, "--json", *more) for more in ((), ("--force-unit", "kgf")))
+    forces = [json.loads(each.stdout)["ladder"]["force_n"] for each in (plain, asked)]
+    assert forces[0] == forces[1] == pytest.approx([0.0, 46.5], abs=1.0)
+    other = call("fit", str(path), *ORDERS, "--force-unit", "lbf")
+    assert other.exit_code == 65
+    assert "E421" in other.output and "was read in another unit already (1 of it = 9.8066 N)" in other.output
+
+
+def test_the_report_draws_the_readings_in_newtons(tmp_path: Path, call) -> None:
+    """By what --force-unit says, as the table beside the picture has them."""
+    weighed = written(tmp_path / "a.csv", [(t, v, f / 9.80665) for t, v, f in ladder_rows()])
+    pages = []
+    for path, more in ((written(tmp_path / "b.csv", ladder_rows()), ()), (weighed, ("--force-unit", "kgf"))):
+        assert call("fit", str(path), *ORDERS, *more).exit_code == 0
+        pages.append(path.with_suffix(".fit.html").read_text(encoding="utf-8"))
+    ticks = [re.findall(r">(\d+)</text>", page) for page in pages]
+    assert ticks[0] == ticks[1]
+
+
+def test_a_quality_of_others_is_no_overload(tmp_path: Path, call) -> None:
+    rows = [(*row, 192.0) for row in ladder_rows()]
+    rows[7] = (*rows[7][:2], 90.0, 0.0)
+    path = written(tmp_path / "opc.csv", rows, "time_s,command_v,force_n,quality")
+    done = call("fit", str(path), *ORDERS, "--no-report")
+    assert done.exit_code == 0, done.output
+    assert "1 rows are not judged: quality is not 192" in " ".join(done.output.split())

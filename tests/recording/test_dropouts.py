@@ -1,0 +1,65 @@
+"""What a logger writes for no value is no reading, however often it stands there in a row; what was pressed is one."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gateway.diagnosis.measurement import Floats
+from gateway.recording import Recording
+from gateway.recording.measurement import measurement_of
+from gateway.recording.tables.row_validity import flag_dropouts
+
+TIME_S = np.arange(3000) / 100.0
+VOLTS = 2.0 + np.round(1.5 * np.sin(TIME_S), 2)
+FORCE_N = 8.0 * VOLTS + np.random.default_rng(2).normal(0.0, 0.1, TIME_S.size)
+
+
+def dropped(force_n: Floats, *drives: Floats) -> Sequence[int]:
+    rows, notes = flag_dropouts(force_n, TIME_S, drives or (VOLTS,))
+    assert bool(notes) == rows.any()
+    return np.flatnonzero(rows).tolist()
+
+
+@pytest.mark.parametrize("value", [-9999.0, -999.0, 32767.0, 1.0e9])
+def test_a_stretch_of_what_stands_for_no_value_is_missing(value: float) -> None:
+    spoiled = FORCE_N.copy()
+    spoiled[1200:1220] = value
+    assert dropped(spoiled) == list(range(1200, 1220))
+    table = {"time_s": TIME_S, "command_v": VOLTS, "force_n": spoiled}
+    found = measurement_of(Recording(Path("run.csv"), {}, table, TIME_S.size, False))
+    assert int(found.usable.sum()) == TIME_S.size - 20
+    assert found.repeated.sum() == 0
+    assert "20 readings are far beyond all others" in found.notes[0]
+
+
+def test_a_single_one_is_left_to_the_diagnosis() -> None:
+    spoiled = FORCE_N.copy()
+    spoiled[[100, 2000]] = -9999.0
+    assert dropped(spoiled) == []
+
+
+def test_what_was_pressed_once_in_a_long_rest_is_no_dropout() -> None:
+    volts = np.where((TIME_S > 20.0) & (TIME_S < 20.8), 4.0, 0.0)
+    force_n = 8.0 * np.roll(volts, 12) + np.random.default_rng(3).normal(0.0, 0.1, TIME_S.size)
+    assert dropped(force_n, volts) == []
+    assert dropped(force_n, np.zeros(TIME_S.size), 5.0e-3 * volts) == [], "driven by the position"
+
+
+@pytest.mark.parametrize("name", ["temperature_c", "supply_kpa", "pressure_kpa"])
+def test_a_temperature_or_a_pressure_that_is_none_is_missing(name: str) -> None:
+    values = 20.0 + np.sin(TIME_S)
+    table = {"time_s": TIME_S, "command_v": VOLTS, "force_n": FORCE_N, name: values.copy()}
+    table[name][::40] = -9999.0
+    found = measurement_of(Recording(Path("run.csv"), {}, table, TIME_S.size, False))
+    kept = found.covariates.get(name) if found.pressure_pa is None else found.pressure_pa / 1000.0
+    np.testing.assert_allclose(kept, values, atol=0.02)
+    assert f"75 values of {name} are below" in found.notes[0]
+    turned = measurement_of(Recording(Path("run.csv"), {}, table | {name: -1000.0 * values}, TIME_S.size, False))
+    assert not any("are below" in note for note in turned.notes), "all of them: that is another thing"
+
+
+def test_what_is_clean_stays_as_it_is() -> None:
+    for clean in (FORCE_N, np.zeros(TIME_S.size), np.full(TIME_S.size, np.nan), np.where(VOLTS > 2.0, 10.0, 0.0)):
+        assert dropped(clean) == []
