@@ -1,5 +1,6 @@
 """Where a ladder comes from, and what is known about the rig that it was recorded on."""
 
+import contextlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -9,7 +10,16 @@ from gateway.bsfm import Calibration
 from gateway.bsfm.ladder.check import CheckedLadder, Expectation, check_ladder, join_ladders
 from gateway.calibrations.store import calibration_in_use
 from gateway.profiles import ProfileError, Rig, load_rig
-from gateway.recording import ColumnMapping, Recording, find_recording, list_recordings, read_recording, read_table
+from gateway.recording import (
+    ColumnMapping,
+    Recording,
+    RecordingError,
+    find_recording,
+    read_header,
+    read_recording,
+    read_table,
+    recording_paths,
+)
 from gateway.recording.layout import SUFFIX
 
 _DEFAULT_RIG: Final = defaults.RIG  # whose calibration a table without a known rig is compared with
@@ -104,8 +114,11 @@ def acceptance_bounds(recording: Recording, context: RigContext) -> tuple[float 
 
 def rig_of_state(state: Path | None) -> str | None:
     """Return the rig whose recordings a state directory holds; None where it holds none."""
-    entries = list_recordings(state) if state else []
-    return next((str(entry.header["rig"]) for entry in reversed(entries) if entry.header.get("rig")), None)
+    for path in reversed(recording_paths(state) if state else []):
+        with contextlib.suppress(RecordingError, OSError):
+            if rig := read_header(path).get("rig"):
+                return str(rig)
+    return None
 
 
 def find_rig(name: str, file: str) -> tuple[Rig | None, list[str]]:
