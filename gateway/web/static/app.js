@@ -85,6 +85,14 @@ document.addEventListener(
   },
   true,
 );
+/** A report's frame runs no script: while it has the focus, no key comes here. Who has clicked in it means the page still. */
+addEventListener("blur", () =>
+  setTimeout(() => {
+    if (document.activeElement?.tagName !== "IFRAME") return;
+    document.activeElement.blur();
+    focus();
+  }),
+);
 api.on("state", showState);
 api.on("gone", ({ sentence }) => {
   at("gone").textContent = sentence;
