@@ -1,5 +1,6 @@
 """The unit is what systemd accepts and judges safe; nothing is written but what is said."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -160,6 +161,54 @@ def test_the_status_is_a_sentence() -> None:
     assert failed.sentence == "a.service: failed (exit-code, exit code 78); force-gateway service logs shows why"
     missing = parse_status("a.service", "LoadState=not-found\nActiveState=inactive\nResult=success\n")
     assert not missing.is_running and missing.sentence.startswith("a.service: there is no such unit;"), "no success"
+
+
+def test_a_service_that_runs_goes_on_and_it_is_said_what_takes_the_new_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """systemd starts nothing again: the gateway ran with the rig and the networks of before, and was said to run."""
+    asked: list[str] = []
+
+    def answer(words: tuple[str, ...], *, quiet: bool = False) -> str:
+        asked.append(" ".join(words))
+        return state + "\n" if words[1] == "is-active" else ""
+
+    monkeypatch.setattr(installation, "run_command", answer)
+    plan = installation.Installation("force-gateway-x.service", {}, (("systemctl", "enable", "--now", "x"),))
+    state = "inactive"
+    assert installation.install(plan, Path("/")) == ([], False)
+    state = "active"
+    asked.clear()
+    assert installation.install(plan, Path("/")) == ([], True)
+    assert asked == ["systemctl is-active force-gateway-x.service", "systemctl enable --now x"]
+    monkeypatch.setattr(installation, "plan_installation", lambda *_, **__: plan)
+    assert "systemctl restart force-gateway-x.service takes what is new" in gateway("service", "install", "demo").stdout
+
+
+def test_the_logs_are_shown_as_they_are_told_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`service status` names `service logs`, which was no command without a rig; and of `--since -1h` h was taken for help."""
+    shown: list[list[str]] = []
+    monkeypatch.setattr(os, "execvp", lambda program, words: shown.append(words[1:]))
+    monkeypatch.setattr(installation, "UNITS", str(tmp_path))
+    assert gateway("service", "logs").exit_code == exit_codes.DATA, "none is installed"
+    for rig in ("a", "b"):
+        (tmp_path / f"force-gateway-{rig}.service").touch()
+    both = ["--unit", "force-gateway-a.service", "--unit", "force-gateway-b.service"]
+    for words in (
+        (),
+        ("-f",),
+        ("FORCE_GATEWAY_CODE=A310",),
+        ("--since", "-1h"),
+        ("a.yaml", "-f"),
+        ("a", "--since", "-1h"),
+    ):
+        assert gateway("service", "logs", *words).exit_code == 0
+    assert shown == [
+        both,
+        [*both, "-f"],
+        [*both, "FORCE_GATEWAY_CODE=A310"],
+        [*both, "--since", "-1h"],
+        [*both[:2], "-f"],
+        [*both[:2], "--since", "-1h"],
+    ]
 
 
 def planned(rig: Rig, *networks: str, name: str = "demo") -> str:
