@@ -29,7 +29,7 @@ _NO_RESTART: Final = (exit_codes.USAGE, exit_codes.DATA, exit_codes.PERMISSION, 
 _LOWEST_FREE_PORT: Final = 1024
 _USB: Final = ("char-ttyUSB", "char-ttyACM")
 _PLAIN: Final = re.compile(r"[\w./+%-]+")
-_TTY: Final = re.compile(r"/dev/(tty[A-Z]+)\d+")
+_TTY: Final = re.compile(r"/dev/(tty(?:[A-Z]+|mxc))\d+")
 
 _HARDENING: Final = """\
 # What it may not do

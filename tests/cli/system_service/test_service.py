@@ -87,6 +87,9 @@ def test_a_rig_whose_file_cannot_name_a_unit_is_refused(tmp_path: Path) -> None:
 
 def test_a_port_of_a_cabinet_is_allowed_by_its_class_and_one_by_id_as_any_usb_adapter() -> None:
     assert device_classes(("/dev/ttyS0", "/dev/ttyS1", "/dev/ttyAMA0")) == ["char-ttyS", "char-ttyAMA"]
+    assert device_classes(("/dev/ttymxc2",)) == ["char-ttymxc"], (
+        "of an i.MX: as an adapter's it was refused to the service"
+    )
     assert device_classes(("/dev/serial/by-id/usb-FTDI-port0",)) == ["char-ttyUSB", "char-ttyACM"]
 
 
