@@ -61,7 +61,7 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
         ports=_ports_of(rig),
         devices=() if rig.simulated else tuple(dict.fromkeys(port for port in ports if port)),
         networks=_networks_of(rig, networks),
-        compiles=rig.is_watched,
+        compiles=rig.is_watched or rig.web is not None,
         waits_for_network=any(map(_is_own_address, _addresses_of(rig))),
     )
     return Installation(

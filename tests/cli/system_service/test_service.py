@@ -20,7 +20,7 @@ from gateway.cli.system_service.unit_file import UnitOptions, device_classes, un
 from gateway.cli.system_service.unit_status import parse_status
 from gateway.processes import exit_codes
 from gateway.profiles import Rig, load_rig
-from gateway.profiles.http_sections import Metrics
+from gateway.profiles.http_sections import Metrics, Web
 from gateway.profiles.rigs.faces import TlsFace
 from gateway.profiles.telemetry_sections import Mqtt
 
@@ -250,6 +250,14 @@ def test_a_rig_by_the_name_of_its_file_here_is_told_to_the_service_by_its_path(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(installation, "_HIDDEN", ())
     assert f" run {tmp_path}/cell.yaml --state %S/force-gateway/cell\n" in planned(load_rig("demo"), name="cell")
+
+
+def test_a_diagnosis_of_the_page_may_compile_and_without_page_and_watch_nothing_may() -> None:
+    """It ended with `cannot allocate executable memory` on every rig of real devices."""
+    rig = replace(load_rig("irc5-cell"), web=None)
+    assert not rig.is_watched
+    denied = "\nMemoryDenyWriteExecute=yes\n"
+    assert denied in planned(rig) and denied not in planned(replace(rig, web=Web()))
 
 
 def test_a_secret_file_that_the_service_cannot_see_is_refused() -> None:
