@@ -95,6 +95,9 @@ addEventListener("blur", () =>
 );
 api.on("state", showState);
 api.on("gone", ({ sentence }) => {
+  at("state").textContent = "no answer"; // it stays in sight, and would go on saying that a force is held
+  at("state").className = "badge bad";
+  document.title = "no answer · force-gateway";
   at("gone").textContent = sentence;
   at("gone").hidden = false;
 });

@@ -6,6 +6,7 @@ from typing import Any
 from gateway.web.register_table import register_table
 from tests.service.rigs import demo
 from tests.web.tabs.conftest import record
+from tests.web.tabs.scripted_control import ScriptedControl
 from tests.web.tabs.test_tabs_in_chromium import open_tab
 
 REGISTERS = """async (map) => {
@@ -49,6 +50,25 @@ def test_what_could_not_be_read_at_first_is_there_when_the_gateway_is_back(page,
     window.get_by_text("demo.yaml:").first.wait_for()
     assert "force_setpoint" in window.evaluate(REGISTERS, register_table(demo(), 5020))
     browser.close()
+
+
+def test_what_says_how_the_gateway_is_does_not_go_on_saying_it_while_that_is_away(
+    page, served: ScriptedControl, chromium
+) -> None:
+    """The header, which stays in sight, and the browser's tab said that the force was held."""
+    from playwright.sync_api import expect
+
+    window = open_tab(chromium, page.address, "configuration")
+    state = window.locator("#state")
+    expect(state).to_have_text("off", timeout=10_000)
+    answer = served.answer
+    served.answer = lambda request: {"ok": False, "error": "away"}  # type: ignore[method-assign]
+    expect(state).to_have_text("no answer", timeout=10_000)
+    assert window.title().startswith("no answer")
+    served.answer = answer  # type: ignore[method-assign]
+    expect(state).to_have_text("off", timeout=10_000)
+    assert window.title().startswith("off")
+    window.close()
 
 
 def test_times_are_told_in_the_reader_s_zone_and_minutes_have_sixty_seconds(page, chromium) -> None:
