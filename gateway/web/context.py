@@ -30,6 +30,13 @@ class WebContext:
         """The rig as its files say; read once, when it is first needed. ChangedRigError where they say another one by now."""
         return unchanged_rig(self.rig, self.fingerprint, simulated=self.simulated)
 
+    def why_other(self, read_now: str) -> str:
+        """Return the sentence to show with what the rig's files say, where that is not in use; empty where it is.
+        read_now: their fingerprint."""
+        if self.fingerprint in (None, read_now):
+            return ""
+        return "W247 the rig's files have changed since the gateway's start: what stands here is in use from the next start on"
+
     def begin(self, work: Any) -> "asyncio.Task[Any]":
         """Run a coroutine beside the requests, and keep it until it has ended."""
         task: asyncio.Task[Any] = asyncio.create_task(work)

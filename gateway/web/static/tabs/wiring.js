@@ -11,7 +11,8 @@ export function mount(element, api) {
     if (isThere) return;
     const page = await api.get("/api/v1/wiring");
     isThere = true;
-    element.append(h("p", { class: "lead" }, page.title), ...page.sections.flatMap((one) => section(one, told)));
+    const other = page.other && h("div", { class: "notes" }, page.other);
+    element.append(h("p", { class: "lead" }, page.title), other, ...page.sections.flatMap((one) => section(one, told)));
   };
   whileShown(element, () => 3000, load, told);
 }
