@@ -48,6 +48,7 @@ def make_app(context: WebContext, door: Door, rows: RingRows | None) -> Starlett
     """Return the application. rows: the sample ring, None where there is none."""
     commands = Commands(context)
     events = EventSource(context, rows, commands)
+    context.viewers = lambda: events.viewers
     standstill = Standstill(time.monotonic)
 
     @asynccontextmanager
