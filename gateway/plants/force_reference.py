@@ -13,7 +13,7 @@ from gateway.control.compensation.cell_map import CellMap
 from gateway.diagnosis.force_error import FEWEST_BLOCKS, ErrorBlock
 from gateway.plants.recorded_force import read_recorded_force
 from gateway.processes.durable_file import lock_directory, make_directory, read_object, replace_durably
-from gateway.recording import Recording, RecordingError, list_recordings, read_recording
+from gateway.recording import Recording, RecordingError, read_recording, recording_paths
 
 _FILE: Final = "reference.json"
 _NEWEST: Final = 8
@@ -32,9 +32,9 @@ class ForceReference:
 
 def find_reference(state: Path, plant: int, cell: CellMap | None) -> ForceReference | None:
     """Return the reference from the newest recording before; None where no run tells enough. cell: as the plant has it."""
-    for entry in list(reversed(list_recordings(state)))[:_NEWEST]:
+    for path in reversed(recording_paths(state)[-_NEWEST:]):
         try:
-            reference = reference_of(read_recording(entry.path), plant, cell)
+            reference = reference_of(read_recording(path), plant, cell)
         except (OSError, RecordingError, ValueError):
             continue
         if reference.plant_before != plant and len(reference.blocks) >= FEWEST_BLOCKS:

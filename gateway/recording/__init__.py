@@ -13,6 +13,7 @@ from gateway.recording.reader import (
     find_recording,
     list_recordings,
     read_entry,
+    read_header,
     read_recording,
     recording_paths,
 )
@@ -33,6 +34,7 @@ __all__ = [
     "find_recording",
     "list_recordings",
     "read_entry",
+    "read_header",
     "read_recording",
     "read_table",
     "recording_paths",

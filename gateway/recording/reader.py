@@ -78,6 +78,16 @@ def read_recording(path: Path) -> Recording:
     return Recording(path, header, columns, len(table), bool(notes), notes)
 
 
+def read_header(path: Path) -> dict[str, Any]:
+    """Return what a recording says of itself, without its rows, which may be gigabytes; errors as of `read_recording`."""
+    first = len(MAGIC) + HEADER_PREFIX.size
+    with path.open("rb") as stream:
+        data = stream.read(first)
+        length = HEADER_PREFIX.unpack_from(data, len(MAGIC))[0] if len(data) == first else 0
+        data += stream.read(min(length, LONGEST_HEADER))
+    return _header(memoryview(data), path)[0]
+
+
 def list_recordings(state_directory: Path) -> list[RecordingEntry]:
     """Return the recordings of one state directory by number; unreadable ones are listed with their fault, and not those that
     are deleted meanwhile: reading the ones before takes its time."""
@@ -103,7 +113,7 @@ def find_recording(state_directory: Path, number: int) -> Path:
     path = state_directory / "recordings" / f"{number:04d}{SUFFIX}"
     if path.is_file():
         return path
-    present = ", ".join(str(entry.number) for entry in list_recordings(state_directory)) or "none"
+    present = ", ".join(str(int(each.stem)) for each in recording_paths(state_directory)) or "none"
     raise RecordingError(f"no recording {number} in {path.parent}; there: {present}")
 
 

@@ -1,6 +1,7 @@
 """What the page's parts share: where the gateway keeps its state, which rig it runs, and the way to it."""
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +16,8 @@ from gateway.profiles.kept_rig import unchanged_rig
 class WebContext:
     """state: directory; rig: name or file, as `run` was given it; simulated: its devices are; control: the way to control's
     socket, for questions and commands; fingerprint: of the rig that runs, None: whatever it is. jobs: long work that a tab has
-    begun, by a name of its own; it outlives a reload, and `tasks` keeps what must not be collected while it runs."""
+    begun, by a name of its own; it outlives a reload, and `tasks` keeps what must not be collected while it runs. viewers: how
+    many pages are open, whatever tab they show."""
 
     state: Path
     rig: str
@@ -24,11 +26,19 @@ class WebContext:
     fingerprint: str | None = None
     jobs: dict[str, Any] = field(default_factory=dict)
     tasks: set["asyncio.Task[Any]"] = field(default_factory=set)
+    viewers: Callable[[], int] = lambda: 0
 
     @cached_property
     def profile(self) -> Rig:
         """The rig as its files say; read once, when it is first needed. ChangedRigError where they say another one by now."""
         return unchanged_rig(self.rig, self.fingerprint, simulated=self.simulated)
+
+    def why_other(self, read_now: str) -> str:
+        """Return the sentence to show with what the rig's files say, where that is not in use; empty where it is.
+        read_now: their fingerprint."""
+        if self.fingerprint in (None, read_now):
+            return ""
+        return "W247 the rig's files have changed since the gateway's start: what stands here is in use from the next start on"
 
     def begin(self, work: Any) -> "asyncio.Task[Any]":
         """Run a coroutine beside the requests, and keep it until it has ended."""

@@ -7,6 +7,7 @@ Decisions
   CSRF token in a header, which no foreign page can read or set.
 - The session is a cookie that scripts cannot read and other sites cannot send. With a token configured it exists after a
   login only; tools send `Authorization: Bearer TOKEN` instead, which needs no CSRF token because no browser adds it by itself.
+  It holds for as long as the token does: where the page's process was started anew, Esc stops, and leads to no login.
 - A failed login costs a second, one at a time: a token of 16 characters is not guessed.
 - What came while this process stood still is refused, but for what stops: an enable of then pressed seconds after its browser
   had given it up.
@@ -58,6 +59,10 @@ class Door:
     token: str | None = None
     key: bytes = field(default_factory=lambda: secrets.token_bytes(32))
     login_turn: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    def __post_init__(self) -> None:
+        if self.token is not None:
+            self.key = hmac.new(self.token.encode(), b"force-gateway sessions", sha256).digest()
 
     @property
     def cookie(self) -> str:
@@ -188,10 +193,10 @@ def _set_session(response: Response, door: Door, value: str) -> None:
 
 
 def _is_small(headers: Headers) -> bool:
-    """A body in chunks says no length, or another one than it has."""
+    """A body in chunks says no length, or another one than it has; whoever says neither sends none (RFC 9112, 6.3)."""
     if "transfer-encoding" in headers:
         return False
-    length = headers.get("content-length", "")
+    length = headers.get("content-length", "0")
     return length.isdecimal() and int(length) <= LONGEST_BODY
 
 

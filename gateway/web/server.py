@@ -4,6 +4,7 @@ Everything is served from here: no build step, no request to the outside. The ta
 module each, and the style is the reports' own (gateway.reports.style.css) with page.css behind it.
 """
 
+import asyncio
 import json
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -47,6 +48,7 @@ def make_app(context: WebContext, door: Door, rows: RingRows | None) -> Starlett
     """Return the application. rows: the sample ring, None where there is none."""
     commands = Commands(context)
     events = EventSource(context, rows, commands)
+    context.viewers = lambda: events.viewers
     standstill = Standstill(time.monotonic)
 
     @asynccontextmanager
@@ -123,7 +125,8 @@ def _api_routes(context: WebContext, commands: Commands, events: EventSource) ->
         )
 
     async def model(request: Request) -> Response:
-        return JSONResponse(model_curves(context.profile, context.state))
+        # a store that somebody changes on a slow disk is waited for, and a Stop must not wait with it
+        return JSONResponse(await asyncio.to_thread(model_curves, context.profile, context.state))
 
     async def alive(request: Request) -> Response:
         commands.note_alive(_viewer(request))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gateway.cli.fleet.cell_table import print_cells
 from gateway.fleet.drift import ALPHA, find_drifts
 from gateway.fleet.page import fleet_page, headline
 from gateway.fleet.tasks import Row
@@ -120,3 +121,11 @@ def test_the_page_answers_first_and_hides_no_name_of_a_file() -> None:
     assert "<h1>1 of 4 cells drifts: cell 0 (leak," in text
     assert "&lt;b&gt;" in text and "<b>" not in text
     assert text.count("<figure") >= 3
+
+
+def test_a_cell_is_told_by_its_whole_name_whatever_stands_in_it(capsys: pytest.CaptureFixture[str]) -> None:
+    """Two cells were both shown as `press`, and a third ended the command."""
+    cells = find_drifts(row(name, 0, 0.1) for name in ("press[left]", "press[right]", "[/x]"))
+    print_cells(cells)
+    told = capsys.readouterr().out
+    assert all(one.cell in told for one in cells) and len(cells) == 3

@@ -49,6 +49,22 @@ def test_what_is_long_ago_was_another_machine(tmp_path: Path) -> None:
     assert find_reference(tmp_path, 4, None) is None
 
 
+def test_what_is_long_ago_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A year of recordings was, before a plant came into use: longer than the page waits for it."""
+    paths = [record(tmp_path, 0.9, plant=3, seconds=1.0) for _ in range(10)]
+    read: list[str] = []
+    whole = Path.read_bytes
+
+    def note(path: Path) -> bytes:
+        read.append(path.name)
+        return whole(path)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "read_bytes", note)
+        assert find_reference(tmp_path, 3, None) is None
+    assert read == [path.name for path in reversed(paths[2:])]
+
+
 def test_a_reference_is_of_its_plant_alone_until_there_is_none(tmp_path: Path) -> None:
     record(tmp_path, 0.5)
     found = find_reference(tmp_path, 3, None)

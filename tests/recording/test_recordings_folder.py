@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from gateway.recording import Recorder, RecordingError, find_recording, list_recordings
+from gateway.recording.care.summaries import list_summaries
 from gateway.recording.reader import recording_paths
+from gateway.service.fitting.ladder_source import rig_of_state
 from tests.recording.test_recorder import COLUMNS, HEADER, record
 
 
@@ -84,3 +86,46 @@ def test_a_recording_that_is_deleted_while_others_are_read_is_none(
     with monkeypatch.context() as patched:
         patched.setattr(Path, "read_bytes", prune_meanwhile)
         assert [(entry.number, entry.fault) for entry in list_recordings(tmp_path)] == [(1, ""), (3, "")]
+
+
+@pytest.fixture
+def unread(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Whoever reads a whole file fails: a year of them has gigabytes, which took minutes."""
+    monkeypatch.setattr(Path, "read_bytes", lambda path: pytest.fail(f"{path} was read as a whole"))
+    return monkeypatch
+
+
+def test_what_is_asked_of_all_recordings_reads_no_row_of_them(tmp_path: Path, unread: pytest.MonkeyPatch) -> None:
+    paths = [record(tmp_path / "recordings", 1) for _ in range(3)]
+    with pytest.raises(RecordingError, match=r"no recording 7 in .*; there: 1, 2, 3$"):
+        find_recording(tmp_path, 7)
+    for spoilt in (b"no recording", b""):
+        paths[2].write_bytes(spoilt)
+        assert rig_of_state(tmp_path) == HEADER["rig"]
+
+
+def test_who_looks_every_few_seconds_reads_no_recording_that_grows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page read all of it every two seconds: 250 MB by the hour, and three times that in memory."""
+    ended = record(tmp_path / "recordings", 2)
+    recorder = Recorder(tmp_path / "recordings", HEADER | {"name": "all night"}, COLUMNS)
+    recorder.append((0.0, 0.0, 0.0))
+    recorder.write()
+    whole, grows = list_summaries(tmp_path, reads_growing=False)
+    assert (whole["file"], whole["rows"]) == (ended.name, 6)
+    assert (grows["number"], grows["name"], grows["growing"], grows["rows"], grows["fault"]) == (
+        2,
+        "all night",
+        True,
+        0,
+        "",
+    )
+    assert list_summaries(tmp_path)[1]["rows"] == 1, "who asks once is told all"
+    recorder.append((1.0, 0.0, 0.0))
+    recorder.write()
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "read_bytes", lambda path: pytest.fail(f"{path} was read as a whole"))
+        assert list_summaries(tmp_path, reads_growing=False)[1]["growing"]
+    recorder.close()
+    assert list_summaries(tmp_path, reads_growing=False)[1]["rows"] == 2

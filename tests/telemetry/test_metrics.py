@@ -126,6 +126,21 @@ def test_the_dashboard_is_one_that_grafana_can_import() -> None:
     assert all(panel["targets"] for panel in board["panels"])
 
 
+def test_the_dashboard_draws_nothing_in_another_unit_than_it_has() -> None:
+    """The number of a cause stood among newtons: 99 N, and the residual a line at 0 below it."""
+    drawn = {"N": "forceN", "V": "volt", "s": "s", "": "short"}
+    units = {series.name: drawn.get(series.unit) for series in SERIES}
+    board = json.loads((files("gateway.telemetry") / "dashboards" / "grafana.json").read_text(encoding="utf-8"))
+    for panel in board["panels"]:
+        fields = panel["fieldConfig"]
+        own = {one["matcher"]["options"]: one["properties"][0]["value"] for one in fields["overrides"]}
+        for target in panel["targets"]:
+            named = re.fullmatch(r"-?(force_gateway_\w+)\{[^}]*\}( == 1)?", target["expr"])
+            if named:  # no rate, which has a unit of its own
+                shown = own.get(target["refId"], fields["defaults"]["unit"])
+                assert shown.replace("none", "short") == units[named[1]], target["expr"]
+
+
 def test_a_control_that_refuses_to_say_is_one_that_does_not_answer() -> None:
     class Refusing:
         async def ask(self, request: dict[str, Any]) -> dict[str, Any]:

@@ -26,9 +26,13 @@ class Answer:
         return self.headers["set-cookie"].partition(";")[0]
 
 
-async def call(app: Any, method: str, path: str, headers: dict[str, str] | None = None, body: bytes = b"") -> Answer:
-    """Send one request; a Host header of the machine itself is added where there is none."""
-    own = {"host": "127.0.0.1:8080", "content-length": str(len(body))} | (headers or {})
+async def call(
+    app: Any, method: str, path: str, headers: dict[str, str] | None = None, body: bytes | None = b""
+) -> Answer:
+    """Send one request; a Host header of the machine itself is added where there is none. body: None for one without, which
+    says no length."""
+    length = {} if body is None else {"content-length": str(len(body))}
+    own = {"host": "127.0.0.1:8080"} | length | (headers or {})
     scope = {
         "type": "http",
         "asgi": {"version": "3.0"},
@@ -46,7 +50,7 @@ async def call(app: Any, method: str, path: str, headers: dict[str, str] | None 
     sent: list[dict[str, Any]] = []
 
     async def receive() -> dict[str, Any]:
-        return {"type": "http.request", "body": body, "more_body": False}
+        return {"type": "http.request", "body": body or b"", "more_body": False}
 
     async def send(message: dict[str, Any]) -> None:
         sent.append(message)

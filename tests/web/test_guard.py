@@ -16,7 +16,7 @@ TOKEN = "a-token-of-some-length"
 ALIVE = "/api/v1/alive"
 
 
-def answer(app: Any, method: str, path: str, headers: dict[str, str] | None = None, body: bytes = b"") -> Answer:
+def answer(app: Any, method: str, path: str, headers: dict[str, str] | None = None, body: bytes | None = b"") -> Answer:
     return asyncio.run(call(app, method, path, headers, body))
 
 
@@ -170,6 +170,23 @@ def test_a_tool_sends_the_token_itself(tmp_path: Path) -> None:
     assert answer(app, "POST", ALIVE, {"authorization": "Bearer wrong"}).status == 401
     assert answer(app, "GET", "/healthz", {"host": "10.0.0.5:8080"}).status == 200, "reached over the network"
     assert answer(app, "GET", "/healthz", {"host": "evil.example"}).status == 403
+
+
+@pytest.mark.parametrize("path", ["/api/v1/command/stop", "/api/v1/calibrate/stop"])
+def test_a_stop_need_not_say_that_it_has_no_body(tmp_path: Path, path: str) -> None:
+    """`curl -X POST` sends no length where it sends nothing: that was refused as too large."""
+    told = answer(page(tmp_path, TOKEN), "POST", path, {"authorization": f"Bearer {TOKEN}"}, None)
+    assert told.status == 503, "nobody is behind this page, and so far it comes"
+
+
+def test_a_login_outlives_the_page_s_process_and_no_other_token(tmp_path: Path) -> None:
+    """It was asked for again behind each restart of that process, and Esc led to the login until then."""
+    headers = {"origin": "http://127.0.0.1:8080"}
+    logged_in = {"cookie": answer(page(tmp_path, TOKEN), "POST", "/login", headers, TOKEN.encode()).cookie}
+    fresh, changed = page(tmp_path, TOKEN), page(tmp_path, TOKEN[::-1])
+    csrf = answer(fresh, "GET", "/api/v1/session", logged_in).json["csrf"]
+    assert answer(fresh, "POST", ALIVE, logged_in | {"x-csrf-token": csrf}).status == 200
+    assert answer(changed, "GET", "/api/v1/session", logged_in).status == 401
 
 
 def test_a_page_without_its_gateway_says_so(app: Any) -> None:

@@ -24,7 +24,7 @@ def print_cells(cells: Sequence[CellDrift]) -> None:
     table.add_column("cause that changed")
     for one in cells[:_MOST_SHOWN]:
         table.add_row(*_words(one), style="bold" if one.drifts else None)
-    Console().print(table)
+    Console(markup=False).print(table)  # a cell is called as it likes
     if len(cells) > _MOST_SHOWN:
         click.echo(f"and {len(cells) - _MOST_SHOWN} cells more: cells.parquet has all")
 

@@ -51,7 +51,8 @@ def retention_of(state: StateChoice, days: float | None, most_bytes: int | None)
     if retention.is_unlimited:
         raise CliError(
             f"rig {state.rig} retains everything: give --days or --bytes, or have "
-            "`recordings: {retention: {days: 30}}` in its file"
+            "`recordings: {retention: {days: 30}}` in its file",
+            exit_codes.CONFIGURATION,
         )
     return retention
 

@@ -61,7 +61,7 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
         ports=_ports_of(rig),
         devices=() if rig.simulated else tuple(dict.fromkeys(port for port in ports if port)),
         networks=_networks_of(rig, networks),
-        compiles=rig.is_watched,
+        compiles=rig.is_watched or rig.web is not None,
         waits_for_network=any(map(_is_own_address, _addresses_of(rig))),
     )
     return Installation(
@@ -81,9 +81,10 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
     )
 
 
-def install(plan: Installation, root: Path) -> list[Path]:
-    """Write the plan's files below the root and, on a running machine, start the service. CliError where that is refused."""
-    written = []
+def install(plan: Installation, root: Path) -> tuple[list[Path], bool]:
+    """Write the plan's files below the root and, on a running machine, start the service. Return what was written, and whether
+    the service ran before: it goes on as it was then, since a restart would drop the force. CliError where that is refused."""
+    written, ran = [], False
     for name, text in plan.files.items():
         path = root / name
         try:
@@ -98,9 +99,10 @@ def install(plan: Installation, root: Path) -> list[Path]:
             ) from None
         written.append(path)
     if root == Path("/"):
+        ran = run_command(("systemctl", "is-active", plan.unit), quiet=True).strip() == "active"
         for words in plan.commands:
             run_command(words)
-    return written
+    return written, ran
 
 
 def uninstall(stem: str, root: Path) -> Path:

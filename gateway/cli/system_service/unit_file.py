@@ -9,8 +9,8 @@ Decisions
 - A user of its own that owns nothing but the state directory, and the serial ports by their group. Nothing else of the machine
   can be written, most of it not even seen; only the devices named here are there at all.
 - `systemd-analyze security --offline=true` judges it; a test holds it to at most 1.5.
-- MemoryDenyWriteExecute stays: the processes of the service compile nothing. The residual watch does, where the extra
-  `analysis` is installed; with `compiles` the unit leaves that one bolt open.
+- MemoryDenyWriteExecute stays: the processes of the service compile nothing. The residual watch does, and so does a diagnosis
+  that the page begins, where the extra `analysis` is installed; with `compiles` the unit leaves that one bolt open.
 """
 
 import re
@@ -29,7 +29,7 @@ _NO_RESTART: Final = (exit_codes.USAGE, exit_codes.DATA, exit_codes.PERMISSION, 
 _LOWEST_FREE_PORT: Final = 1024
 _USB: Final = ("char-ttyUSB", "char-ttyACM")
 _PLAIN: Final = re.compile(r"[\w./+%-]+")
-_TTY: Final = re.compile(r"/dev/(tty[A-Z]+)\d+")
+_TTY: Final = re.compile(r"/dev/(tty(?:[A-Z]+|mxc))\d+")
 
 _HARDENING: Final = """\
 # What it may not do
@@ -67,7 +67,8 @@ DevicePolicy=closed
 class UnitOptions:
     """rig: a shipped name or an absolute path; stem: what its state directory and unit are called; ports: of Modbus, for
     the one privilege that a port below 1024 needs; devices: serial ports, as /dev/serial/by-id/...; networks: who may reach it
-    (CIDR), empty for everybody; compiles: the residual watch runs; waits_for_network: it listens on an address of its own."""
+    (CIDR), empty for everybody; compiles: the residual watch runs, or there is a page; waits_for_network: it listens on an
+    address of its own."""
 
     command: Path
     rig: str

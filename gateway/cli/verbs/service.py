@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import click
 
@@ -56,9 +56,15 @@ def install_command(*, rig: str, dry_run: bool, networks: tuple[str, ...], progr
         click.echo("\n".join(f"# /{name}\n{text}" for name, text in plan.files.items()))
         click.echo("\n".join(" ".join(words) for words in plan.commands))
         return
-    for path in install(plan, root):
+    written, ran = install(plan, root)
+    for path in written:
         click.echo(f"wrote {path}")
-    if root == Path("/"):
+    if ran:
+        click.echo(
+            f"{plan.unit} ran already and goes on as it was: systemctl restart {plan.unit} takes what is new (the force is "
+            "ramped to 0 first)"
+        )
+    elif root == Path("/"):
         click.echo(f"{plan.unit} runs; force-gateway service status, force-gateway service logs")
 
 
@@ -83,31 +89,42 @@ def status_command(*, rig: str | None, root: Path) -> None:
 
     Exit code 1 when one of them does not run.
     """
-    from gateway.cli.system_service.installation import installed_units
-    from gateway.cli.system_service.unit_file import unit_name
     from gateway.cli.system_service.unit_status import read_status
 
-    units = [unit_name(Path(rig).stem)] if rig else installed_units(root)
-    if not units:
-        raise CliError("E107 no service is installed: force-gateway service install RIG", exit_codes.DATA)
-    found = [read_status(unit) for unit in units]
+    found = [read_status(unit) for unit in _units_of(rig, root)]
     for one in found:
         click.echo(one.sentence)
     if not all(one.is_running for one in found):
         raise click.exceptions.Exit(exit_codes.FAILED)
 
 
-@command.command(name="logs", context_settings={"ignore_unknown_options": True})
-@click.argument("rig")
+def _units_of(rig: str | None, root: Path) -> list[str]:
+    """Return the unit of a rig, or all that are there. CliError E107 for none."""
+    from gateway.cli.system_service.installation import installed_units
+    from gateway.cli.system_service.unit_file import unit_name
+
+    units = [unit_name(Path(rig).stem)] if rig else installed_units(root)
+    if not units:
+        raise CliError("E107 no service is installed: force-gateway service install RIG", exit_codes.DATA)
+    return units
+
+
+_TO_JOURNALCTL: Final = {"ignore_unknown_options": True, "help_option_names": ["--help"]}
+"""-h is an hour in `--since -1h`."""
+
+
+@command.command(name="logs", context_settings=_TO_JOURNALCTL)
+@click.argument("rig", required=False)
 @click.argument("options", nargs=-1, type=click.UNPROCESSED)
-def logs_command(*, rig: str, options: tuple[str, ...]) -> None:
-    """Show the journal of RIG's service. OPTIONS go to journalctl: -f, --since -1h, FORCE_GATEWAY_CODE=A310.
+def logs_command(*, rig: str | None, options: tuple[str, ...]) -> None:
+    """Show the journal of RIG's service, or of all. OPTIONS go to journalctl: -f, --since -1h, FORCE_GATEWAY_CODE=A310.
 
     `force-gateway events` shows the same events from the state directory, without systemd.
     """
-    from gateway.cli.system_service.unit_file import unit_name
-
-    words: list[Any] = ["journalctl", "--unit", unit_name(Path(rig).stem), *options]
+    if rig and (rig.startswith("-") or "=" in rig):  # an option of journalctl's: all services are meant
+        rig, options = None, (rig, *options)
+    units = _units_of(rig, Path("/"))
+    words: list[Any] = ["journalctl", *(word for unit in units for word in ("--unit", unit)), *options]
     try:
         os.execvp(words[0], words)
     except FileNotFoundError:

@@ -1,5 +1,6 @@
 """Where a ladder comes from, and what is known about the rig that it was recorded on."""
 
+import contextlib
 from dataclasses import dataclass, replace
 from math import isclose
 from pathlib import Path
@@ -14,7 +15,16 @@ from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.bsfm.ladder.rows import FORCE_UNITS, OVERLOADED
 from gateway.calibrations.store import calibration_in_use
 from gateway.profiles import ProfileError, Rig, load_rig
-from gateway.recording import ColumnMapping, Recording, find_recording, list_recordings, read_recording, read_table
+from gateway.recording import (
+    ColumnMapping,
+    Recording,
+    RecordingError,
+    find_recording,
+    read_header,
+    read_recording,
+    read_table,
+    recording_paths,
+)
 from gateway.recording.layout import SUFFIX
 from gateway.recording.tables.covariates import is_own_recording
 from gateway.recording.tables.row_validity import valid_by_quality
@@ -140,8 +150,11 @@ def acceptance_bounds(recording: Recording, context: RigContext) -> tuple[float 
 
 def rig_of_state(state: Path | None) -> str | None:
     """Return the rig whose recordings a state directory holds; None where it holds none."""
-    entries = list_recordings(state) if state else []
-    return next((str(entry.header["rig"]) for entry in reversed(entries) if entry.header.get("rig")), None)
+    for path in reversed(recording_paths(state) if state else []):
+        with contextlib.suppress(RecordingError, OSError):
+            if rig := read_header(path).get("rig"):
+                return str(rig)
+    return None
 
 
 def find_rig(name: str, file: str) -> tuple[Rig | None, list[str]]:

@@ -87,6 +87,7 @@ export function listen() {
     tell("gone", { sentence: "The page has lost the gateway; it tries again by itself. What you see is old." });
     if (stream.readyState !== EventSource.CLOSED || stream !== source) return;
     source = null;
+    beginSession({}).catch(() => {}); // a stream does not say why it was refused: a login that is over leads there
     setTimeout(listen, 2000);
   };
 }

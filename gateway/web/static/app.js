@@ -85,8 +85,19 @@ document.addEventListener(
   },
   true,
 );
+/** A report's frame runs no script: while it has the focus, no key comes here. Who has clicked in it means the page still. */
+addEventListener("blur", () =>
+  setTimeout(() => {
+    if (document.activeElement?.tagName !== "IFRAME") return;
+    document.activeElement.blur();
+    focus();
+  }),
+);
 api.on("state", showState);
 api.on("gone", ({ sentence }) => {
+  at("state").textContent = "no answer"; // it stays in sight, and would go on saying that a force is held
+  at("state").className = "badge bad";
+  document.title = "no answer · force-gateway";
   at("gone").textContent = sentence;
   at("gone").hidden = false;
 });

@@ -4,7 +4,9 @@ What a person did wrong, or control refuses, is a TabRefusedError or a ValueErro
 body of an error is always {"error": sentence}.
 """
 
+import errno
 import json
+import os
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from functools import wraps
@@ -104,6 +106,9 @@ def report_page(text: str) -> Response:
 
 
 def _unreachable(error: OSError) -> str:
-    if isinstance(error, (ConnectionError, FileNotFoundError, TimeoutError)):
+    """Of the socket a missing file has no name and the system's words; other files have either."""
+    is_socket = error.filename is None and error.strerror == os.strerror(errno.ENOENT)
+    if isinstance(error, (ConnectionError, TimeoutError)) or (isinstance(error, FileNotFoundError) and is_socket):
         return "the gateway does not answer: it is being started, or has ended"
-    return error.strerror or str(error)
+    place = f"{error.filename}: " if error.filename else ""
+    return f"{place}{error.strerror or error}"

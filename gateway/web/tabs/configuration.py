@@ -24,6 +24,8 @@ def _configuration(context: WebContext) -> dict[str, Any]:
     from gateway.profiles import ProfileError
 
     try:
-        return rig_document(context.rig, simulated=context.simulated)
+        document = rig_document(context.rig, simulated=context.simulated)
     except ProfileError as error:
         raise TabRefusedError(str(error)) from None
+    other = context.why_other(document["fingerprint"])
+    return document | {"warnings": [*([other] if other else []), *document["warnings"]]}

@@ -27,8 +27,9 @@ def recording_path(state: Path, number: int) -> Path:
 
 
 def recording_facts(state: Path) -> list[dict[str, Any]]:
-    """Return every recording, the newest first."""
-    return [{**facts, "kept": is_kept(Path(facts["path"]))} for facts in reversed(list_summaries(state))]
+    """Return every recording, the newest first; of one that is being recorded no rows, for a page asks every two seconds."""
+    known = reversed(list_summaries(state, reads_growing=False))
+    return [{"growing": False, **facts, "kept": is_kept(Path(facts["path"]))} for facts in known]
 
 
 @dataclass(frozen=True, slots=True)

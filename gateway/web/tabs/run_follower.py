@@ -1,9 +1,9 @@
 """Follows a calibration run that was begun on the page, so that it goes on while the page is loaded again.
 
 Control stops a run that nobody has asked about for three seconds: a closed terminal must not leave a tool climbing stairs. The
-page's process asks instead of the browser, for as long as some browser has asked it within ABANDONED_S; after that it falls
-silent, and control stops the run with the data kept (A330). A run that was begun elsewhere is looked at without being kept
-alive.
+page's process asks instead of the browser, for as long as a page is open, whatever tab it shows, or some browser has asked it
+within ABANDONED_S; after that it falls silent, and control stops the run with the data kept (A330). A run that was begun
+elsewhere is looked at without being kept alive.
 """
 
 import asyncio
@@ -67,13 +67,18 @@ class RunFollower:
 
     async def _follow(self) -> None:
         began_s = self._clock()
-        while self._clock() - self._seen_s < ABANDONED_S:
+        while not self._is_abandoned():
             with contextlib.suppress(OSError, ValueError):  # control is restarted: it has ended the run then
                 self._last = await self._ask({})
             is_starting = self._last["phase"] == "idle" and self._clock() - began_s < _BEGUN_WITHIN_S
             if not (self._last["running"] or self._last["phase"] in _BUSY or is_starting):
                 return
             await asyncio.sleep(_ASKED_EVERY_S)
+
+    def _is_abandoned(self) -> bool:
+        if self._context.viewers():
+            self._seen_s = self._clock()
+        return self._clock() - self._seen_s >= ABANDONED_S
 
     async def _ask(self, request: Status) -> Status:
         return await ask_once(self._state, {"do": "calibrate"} | request)

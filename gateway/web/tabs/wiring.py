@@ -21,13 +21,16 @@ def routes(context: WebContext) -> list[Route]:
 
 
 def wiring_document(context: WebContext) -> dict[str, Any]:
-    """Return title and sections as `wiring --json` has them. TabRefusedError where the rig cannot be read any more."""
+    """Return title and sections as `wiring --json` has them, and why they are not of the rig that runs, if they are not.
+    TabRefusedError where the rig cannot be read any more."""
     from gateway.clients import MissingRegisterError
     from gateway.clients.wiring import wiring_page
     from gateway.profiles import ProfileError, load_rig
 
     try:
-        title, sections = wiring_page(load_rig(context.rig, simulated=context.simulated), context.rig)
+        rig = load_rig(context.rig, simulated=context.simulated)
+        title, sections = wiring_page(rig, context.rig)
     except (ProfileError, MissingRegisterError) as error:
         raise TabRefusedError(str(error)) from None
-    return {"title": title, "sections": [asdict(each) for each in sections]}
+    other = context.why_other(rig.fingerprint)
+    return {"title": title, "sections": [asdict(each) for each in sections], "other": other}

@@ -1,5 +1,6 @@
 """The unit is what systemd accepts and judges safe; nothing is written but what is said."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -19,7 +20,7 @@ from gateway.cli.system_service.unit_file import UnitOptions, device_classes, un
 from gateway.cli.system_service.unit_status import parse_status
 from gateway.processes import exit_codes
 from gateway.profiles import Rig, load_rig
-from gateway.profiles.http_sections import Metrics
+from gateway.profiles.http_sections import Metrics, Web
 from gateway.profiles.rigs.faces import TlsFace
 from gateway.profiles.telemetry_sections import Mqtt
 
@@ -86,6 +87,9 @@ def test_a_rig_whose_file_cannot_name_a_unit_is_refused(tmp_path: Path) -> None:
 
 def test_a_port_of_a_cabinet_is_allowed_by_its_class_and_one_by_id_as_any_usb_adapter() -> None:
     assert device_classes(("/dev/ttyS0", "/dev/ttyS1", "/dev/ttyAMA0")) == ["char-ttyS", "char-ttyAMA"]
+    assert device_classes(("/dev/ttymxc2",)) == ["char-ttymxc"], (
+        "of an i.MX: as an adapter's it was refused to the service"
+    )
     assert device_classes(("/dev/serial/by-id/usb-FTDI-port0",)) == ["char-ttyUSB", "char-ttyACM"]
 
 
@@ -162,6 +166,54 @@ def test_the_status_is_a_sentence() -> None:
     assert not missing.is_running and missing.sentence.startswith("a.service: there is no such unit;"), "no success"
 
 
+def test_a_service_that_runs_goes_on_and_it_is_said_what_takes_the_new_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """systemd starts nothing again: the gateway ran with the rig and the networks of before, and was said to run."""
+    asked: list[str] = []
+
+    def answer(words: tuple[str, ...], *, quiet: bool = False) -> str:
+        asked.append(" ".join(words))
+        return state + "\n" if words[1] == "is-active" else ""
+
+    monkeypatch.setattr(installation, "run_command", answer)
+    plan = installation.Installation("force-gateway-x.service", {}, (("systemctl", "enable", "--now", "x"),))
+    state = "inactive"
+    assert installation.install(plan, Path("/")) == ([], False)
+    state = "active"
+    asked.clear()
+    assert installation.install(plan, Path("/")) == ([], True)
+    assert asked == ["systemctl is-active force-gateway-x.service", "systemctl enable --now x"]
+    monkeypatch.setattr(installation, "plan_installation", lambda *_, **__: plan)
+    assert "systemctl restart force-gateway-x.service takes what is new" in gateway("service", "install", "demo").stdout
+
+
+def test_the_logs_are_shown_as_they_are_told_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`service status` names `service logs`, which was no command without a rig; and of `--since -1h` h was taken for help."""
+    shown: list[list[str]] = []
+    monkeypatch.setattr(os, "execvp", lambda program, words: shown.append(words[1:]))
+    monkeypatch.setattr(installation, "UNITS", str(tmp_path))
+    assert gateway("service", "logs").exit_code == exit_codes.DATA, "none is installed"
+    for rig in ("a", "b"):
+        (tmp_path / f"force-gateway-{rig}.service").touch()
+    both = ["--unit", "force-gateway-a.service", "--unit", "force-gateway-b.service"]
+    for words in (
+        (),
+        ("-f",),
+        ("FORCE_GATEWAY_CODE=A310",),
+        ("--since", "-1h"),
+        ("a.yaml", "-f"),
+        ("a", "--since", "-1h"),
+    ):
+        assert gateway("service", "logs", *words).exit_code == 0
+    assert shown == [
+        both,
+        [*both, "-f"],
+        [*both, "FORCE_GATEWAY_CODE=A310"],
+        [*both, "--since", "-1h"],
+        [*both[:2], "-f"],
+        [*both[:2], "--since", "-1h"],
+    ]
+
+
 def planned(rig: Rig, *networks: str, name: str = "demo") -> str:
     plan = plan_installation(name, rig, networks=networks, command=Path("/opt/force-gateway"))
     return plan.files[f"etc/systemd/system/{plan.unit}"]
@@ -198,6 +250,14 @@ def test_a_rig_by_the_name_of_its_file_here_is_told_to_the_service_by_its_path(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(installation, "_HIDDEN", ())
     assert f" run {tmp_path}/cell.yaml --state %S/force-gateway/cell\n" in planned(load_rig("demo"), name="cell")
+
+
+def test_a_diagnosis_of_the_page_may_compile_and_without_page_and_watch_nothing_may() -> None:
+    """It ended with `cannot allocate executable memory` on every rig of real devices."""
+    rig = replace(load_rig("irc5-cell"), web=None)
+    assert not rig.is_watched
+    denied = "\nMemoryDenyWriteExecute=yes\n"
+    assert denied in planned(rig) and denied not in planned(replace(rig, web=Web()))
 
 
 def test_a_secret_file_that_the_service_cannot_see_is_refused() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from gateway.processes import exit_codes
 from gateway.recording import Recorder
 from gateway.watch.reference_recording import keep_reference_recording
 from tests.recording.test_care import record
@@ -104,7 +105,8 @@ def test_prune_takes_the_rigs_own_limits_and_says_where_there_are_none(
     state: Path, call, tmp_path: Path, rig_file_with_retention: Path
 ) -> None:
     os.utime(state / "recordings" / "0001.fgr", (1.6e9, 1.6e9))
-    assert "retains everything" in call("recordings", "prune", "--rig", "demo", "--state", state).stderr
+    unlimited = call("recordings", "prune", "--rig", "demo", "--state", state)
+    assert "retains everything" in unlimited.stderr and unlimited.exit_code == exit_codes.CONFIGURATION
     told = call("recordings", "prune", "--dry-run", "--rig", rig_file_with_retention, "--state", state)
     assert "older than 7 days" in told.output
 

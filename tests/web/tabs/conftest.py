@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gateway.recording import Recorder
-from tests.web.tabs.scripted_control import ScriptedControl, scripted_control
+from tests.web.tabs.scripted_control import ScriptedControl, modbus, scripted_control
 from tests.web.tabs.served_tabs import ServedPage, serve
 
 CHROMIUM = "/usr/bin/chromium"
@@ -38,6 +38,19 @@ def state(tmp_path: Path) -> Path:
 def control(state: Path) -> Iterator[ScriptedControl]:
     with scripted_control(state) as control:
         yield control
+
+
+@pytest.fixture
+def served(control: ScriptedControl) -> ScriptedControl:
+    """The same, which answers Modbus requests of the page, too."""
+    answer = control.answer
+
+    def answer_all(request: dict[str, Any]) -> dict[str, Any]:
+        told = answer(request)
+        return modbus(request) if request["do"] == "modbus" else told
+
+    control.answer = answer_all  # type: ignore[method-assign]
+    return control
 
 
 @pytest.fixture

@@ -67,6 +67,13 @@ class ScriptedControl:
             assert self.heard.wait_for(lambda: self.count(verb) >= count, within_s), f"{verb}: {self.count(verb)} times"
 
 
+def modbus(request: dict[str, Any]) -> dict[str, Any]:
+    """A gateway at rest: it reads as zeros, and takes every write."""
+    pdu = bytes.fromhex(request["pdu"])
+    words = 2 * int.from_bytes(pdu[3:5], "big")
+    return {"pdu": (bytes((3, words)) + bytes(words) if pdu[0] == 3 else pdu[:5]).hex()}
+
+
 @contextmanager
 def scripted_control(state: Path) -> Iterator[ScriptedControl]:
     """Serve control.sock of a state directory until the block ends."""

@@ -14,23 +14,9 @@ STOP = "1000000001020000"
 CONNECTIONS = 6  # of Chromium and of Firefox, to one host by HTTP/1.1
 
 
-def modbus(request: dict[str, Any]) -> dict[str, Any]:
-    """A gateway at rest: it reads as zeros, and takes every write."""
-    pdu = bytes.fromhex(request["pdu"])
-    words = 2 * int.from_bytes(pdu[3:5], "big")
-    return {"pdu": (bytes((3, words)) + bytes(words) if pdu[0] == 3 else pdu[:5]).hex()}
-
-
 @pytest.fixture
-def tabs(page: Any, control: ScriptedControl, chromium: Any) -> Iterator[list[Any]]:
+def tabs(page: Any, served: ScriptedControl, chromium: Any) -> Iterator[list[Any]]:
     """More tabs than there are connections: each of those has its stream, and one more waits."""
-    answer = control.answer
-
-    def answer_all(request: dict[str, Any]) -> dict[str, Any]:
-        told = answer(request)
-        return modbus(request) if request["do"] == "modbus" else told
-
-    control.answer = answer_all  # type: ignore[method-assign]
     browser = chromium.new_context()
     opened = []
     for _ in range(CONNECTIONS):

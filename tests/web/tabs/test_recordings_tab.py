@@ -60,6 +60,18 @@ def test_a_download_is_the_recording_and_leaves_no_file_behind(page, state, tmp_
     assert not list(room.iterdir())
 
 
+def test_a_machine_without_room_for_the_copy_is_not_taken_for_a_gateway_that_is_away(
+    page, state, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a full disk, or in a container that is read-only."""
+    record(state)
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(tempfile, "_candidate_tempdir_list", list)
+    told = page.get("/api/v1/recordings/1/download.csv")
+    assert (told.status, told.json["error"]) == (503, "No usable temporary directory found in []")
+    assert page.post("/api/v1/recordings/start").json["error"].startswith("the gateway does not answer")
+
+
 def test_another_form_is_refused(page, state) -> None:
     record(state)
     assert "csv or parquet" in page.get("/api/v1/recordings/1/download.exe").json["error"]

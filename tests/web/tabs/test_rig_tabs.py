@@ -4,8 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from gateway.profiles import shipped_profiles_folder
+from gateway.live.control_link import ControlLink
+from gateway.profiles import load_rig, shipped_profiles_folder
+from gateway.web.context import WebContext
+from gateway.web.tabs.configuration import _configuration
 from gateway.web.tabs.rig_values import HIDDEN, rig_document
+from gateway.web.tabs.wiring import wiring_document
 from tests.web.tabs.served_tabs import serve
 
 
@@ -51,6 +55,19 @@ def test_a_rig_file_that_has_become_faulty_is_told_in_words(own_rig, state) -> N
             answer = page.get(f"/api/v1/{path}")
             assert answer.status == 409
             assert "own.yaml" in answer.json["error"]
+
+
+def test_files_that_have_changed_since_the_start_are_not_shown_as_what_runs(own_rig, state) -> None:
+    """A limit that was edited stood there as if it were in use."""
+    started = load_rig(str(own_rig), simulated=True).fingerprint
+    context = WebContext(state, str(own_rig), True, ControlLink(state), started)
+    assert not wiring_document(context)["other"]
+    assert not any("W247" in each for each in _configuration(context)["warnings"])
+    own_rig.write_text(
+        own_rig.read_text(encoding="utf-8").replace("force_max_n: 60", "force_max_n: 20"), encoding="utf-8"
+    )
+    assert "in use from the next start on" in wiring_document(context)["other"]
+    assert "W247" in _configuration(context)["warnings"][0]
 
 
 def test_the_wiring_is_that_of_the_verb(page) -> None:

@@ -7,6 +7,9 @@ import pytest
 
 from gateway.live.control_link import ControlLink
 from gateway.web.context import WebContext
+from gateway.web.events import EventSource
+from gateway.web.security import Door
+from gateway.web.server import make_app
 from gateway.web.tabs.run_follower import ABANDONED_S, RunFollower
 from tests.web.tabs.scripted_control import IDLE
 
@@ -43,6 +46,35 @@ def test_a_run_that_nobody_looks_at_is_let_go(state, control) -> None:
     asked = asyncio.run(begin_and_leave())
     assert asked <= 2
     assert not any(request.get("stop") for request in control.asked)  # control ends it by itself, with its own sentence
+
+
+def test_a_run_goes_on_while_a_page_is_open_whatever_tab_it_shows(state, control) -> None:
+    """Whoever looked at the live view for a minute and a half lost the run: its own tab alone counted."""
+    now_s, pages = [0.0], [1]
+
+    async def begin_and_look_elsewhere() -> None:
+        context = WebContext(state, "demo", True, ControlLink(state), viewers=lambda: pages[0])
+        follower = RunFollower(context, lambda: now_s[0])
+        await follower.begin(PLAN["plan"], "")
+        for now_s[0] in (ABANDONED_S, 5.0 * ABANDONED_S):
+            asked = control.count("calibrate")
+            await asyncio.to_thread(control.wait_for, "calibrate", asked + 2)
+            assert follower.is_following
+        pages[0] = 0
+        now_s[0] += ABANDONED_S
+        async with asyncio.timeout(10.0):
+            while follower.is_following:
+                await asyncio.sleep(0.01)
+
+    asyncio.run(begin_and_look_elsewhere())
+
+
+def test_the_page_counts_who_looks(state, monkeypatch: pytest.MonkeyPatch) -> None:
+    context = WebContext(state, "demo", True, ControlLink(state))
+    assert context.viewers() == 0
+    make_app(context, Door("127.0.0.1", 8080), None)
+    monkeypatch.setattr(EventSource, "viewers", property(lambda events: 3))
+    assert context.viewers() == 3
 
 
 def test_a_look_at_anothers_run_does_not_keep_it_alive(page, control) -> None:

@@ -11,6 +11,8 @@ function duration(seconds) {
   return seconds < 5400 ? `${Math.floor(seconds / 60)} min` : `${Math.floor(seconds / 3600)} h`;
 }
 
+/** In the reader's own time zone, as recordings are told; what comes has UTC. */
+const timeOfDay = (utc) => new Date(utc).toLocaleTimeString("en", { hourCycle: "h23" });
 const count = (number) => number.toLocaleString("en").replaceAll(",", " ");
 const milliseconds = (us) => (us === null ? "–" : `${(us / 1000).toFixed(us < 10000 ? 2 : 0)} ms`);
 
@@ -77,7 +79,7 @@ export function makeAlarms(api) {
   }
 
   function tell(note) {
-    const text = `${note.time.slice(11, 19)} ${note.code ? `${note.code} ` : ""}${note.text}`;
+    const text = `${timeOfDay(note.time)} ${note.code ? `${note.code} ` : ""}${note.text}`;
     notes.prepend(make("li", { className: note.severity, textContent: text }));
     while (notes.children.length > 30) notes.lastChild.remove();
   }

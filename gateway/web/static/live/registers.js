@@ -52,6 +52,7 @@ export function makeRegisters(api) {
   let map = null;
   let rows = [];
   let polled = null;
+  let isAsking = false;
 
   function mbpoll(register) {
     const host = map.host === "" ? location.hostname : map.host;
@@ -110,6 +111,16 @@ export function makeRegisters(api) {
   }
 
   async function begin() {
+    if (isAsking) return;
+    isAsking = true;
+    try {
+      await load();
+    } finally {
+      isAsking = false;
+    }
+  }
+
+  async function load() {
     map = await api.get("/api/v1/registers");
     choice.replaceChildren(...map.blocks.map((block) => make("option", { value: block.name, textContent: `${block.name} (${block.first} .. ${block.last})` })));
     choice.prepend(make("option", { value: BOTH, textContent: "command and status" }));
@@ -124,6 +135,7 @@ export function makeRegisters(api) {
   return {
     element,
     async state(state) {
+      if (!map) await begin().catch(() => {}); // it was away when the page was opened
       if (!map) return;
       for (const block of blocks()) {
         const known = state.words[block.name];

@@ -90,9 +90,21 @@ class Shelf {
   }
 
   async use(one) {
-    const { noun } = this.kind;
-    if (one.rejected && !window.confirm(`Calibration ${one.number} was rejected: ${one.rejected}. Use it anyway?`)) return;
-    await this.change({ use: one.number, ...(one.rejected && noun === "calibration" ? { force: true } : {}) });
+    if (one.rejected) this.askAgain(one);
+    else await this.change({ use: one.number });
+  }
+
+  /** Within the page: a dialog of the browser's takes Esc for itself, and stands still all else, a lease's heartbeat too. */
+  askAgain(one) {
+    const name = `${this.kind.noun} ${one.number}`;
+    const use = button(`Use ${name} nevertheless`, async () => {
+      await this.change({ use: one.number, force: true });
+      this.close();
+    }, this.told);
+    const leave = h("button", { type: "button", class: "primary", onclick: this.close }, "Leave it");
+    this.shown.replaceChildren(h("div", { class: "notes" }, `The fit of ${name} was rejected: ${one.rejected}. Use it all the same?`), h("div", { class: "row" }, leave, use));
+    this.shown.scrollIntoView({ block: "nearest" });
+    leave.focus();
   }
 
   async change(body) {

@@ -1,17 +1,19 @@
 // Tab Configuration: every value of the rig, read-only, with the line that says so or the default that stands for it.
 
-import { Told, h, prepare, table } from "./dom.js";
+import { Told, h, prepare, table, whileShown } from "./dom.js";
 
 /** Builds the tab. api: get(path), post(path, body). */
-export async function mount(element, api) {
+export function mount(element, api) {
   const told = new Told();
+  let isThere = false;
   prepare(element, h("h2", {}, "Configuration"), told.element);
-  try {
+  const load = async () => {
+    if (isThere) return;
     const rig = await api.get("/api/v1/configuration");
-    element.append(...overview(rig), ...filter(rig, element));
-  } catch (error) {
-    told.say(error);
-  }
+    isThere = true;
+    element.append(...overview(rig), ...filter(rig));
+  };
+  whileShown(element, () => 3000, load, told);
 }
 
 function overview(rig) {

@@ -85,11 +85,17 @@ class DiagnosisTab {
   }
 
   showEnd(job) {
-    if (!job) return;
+    if (!job) return this.showLost();
     const words = { done: `Recording ${job.recording} is diagnosed, in ${duration(job.spent_s)}.`, cancelled: "Cancelled; nothing of it is kept.", failed: job.said };
     showOnce(this.job, `ended:${job.recording}:${job.ended}:${job.spent_s}`, () =>
       h("p", { role: "status", class: `told ${job.ended === "failed" ? "bad" : "good"}` }, [words[job.ended], job.ended === "done" ? job.said : ""].filter(Boolean).join(" ")),
     );
+  }
+
+  /** A process of the page that has started anew knows of none; whoever looked at one must not wait for it. */
+  showLost() {
+    if (!this.job.dataset.shown?.startsWith("running:")) return;
+    showOnce(this.job, "lost", () => h("p", { role: "status", class: "told bad" }, "The page's process has started anew, and the diagnosis has ended with it: begin it again."));
   }
 
   open(recording) {

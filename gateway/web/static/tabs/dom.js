@@ -114,12 +114,13 @@ export function table(caption, heads, rows, style = "") {
   );
 }
 
-/** A report within the page: a whole page of its own, which runs nothing. close: what closes it, if anything does. */
+/** A report within the page: a whole page of its own, which runs nothing, and takes no focus, since Esc would stop nothing there
+ *  (app.js): who reads by keys opens it in a tab. close: what closes it, if anything does. */
 export function report(title, address, close = null) {
   const open = h("a", { href: address, target: "_blank", rel: "noopener" }, "Open in a tab of its own");
   const shut = close && h("button", { type: "button", onclick: close, "aria-label": `Close: ${title}` }, "Close");
   const bar = h("div", { class: "report-bar" }, h("strong", {}, title), h("span", { class: "row" }, open, shut));
-  return h("section", { class: "report", "aria-label": title }, bar, h("iframe", { src: address, title }));
+  return h("section", { class: "report", "aria-label": title }, bar, h("iframe", { src: address, title, tabindex: "-1" }));
 }
 
 /** Shows one of several things in a place, and leaves it alone while nothing has changed. */
@@ -135,8 +136,9 @@ export const number = (value, digits = 2) =>
 export function duration(seconds) {
   if (seconds === null || seconds === undefined || !(seconds >= 0)) return "–";
   if (seconds < 90) return `${seconds < 10 ? seconds.toFixed(1) : Math.round(seconds)} s`;
-  const minutes = Math.floor(seconds / 60);
-  return minutes < 90 ? `${minutes} min ${Math.round(seconds % 60)} s` : `${(seconds / 3600).toFixed(1)} h`;
+  const whole = Math.round(seconds); // first, or 119.7 s would be 1 min 60 s
+  const minutes = Math.floor(whole / 60);
+  return minutes < 90 ? `${minutes} min ${whole % 60} s` : `${(seconds / 3600).toFixed(1)} h`;
 }
 
 export function bytes(count) {

@@ -26,8 +26,10 @@ class RecordingsTab {
     const rows = this.now.querySelector(".rows");
     if (rows) rows.textContent = `${answer.recording.rows} rows so far`;
     const open = file ? Number(file.split("/").pop().split(".")[0]) : 0;
-    const shown = answer.recordings.map((one) => (one.number === open ? { ...one, rows: 0, size_bytes: 0, duration_s: 0 } : one));
-    showOnce(this.list, JSON.stringify([shown, answer.no_parquet]), () => this.table(shown, open, answer.no_parquet));
+    const shown = answer.recordings.map((one) =>
+      one.number === open || one.growing ? { ...one, growing: true, happened: "being recorded", rows: 0, size_bytes: 0, duration_s: 0, truncated: false } : one,
+    );
+    showOnce(this.list, JSON.stringify([shown, answer.no_parquet]), () => this.table(shown, answer.no_parquet));
   }
 
   control(file) {
@@ -43,15 +45,15 @@ class RecordingsTab {
     await this.refresh();
   }
 
-  table(recordings, open, noParquet) {
+  table(recordings, noParquet) {
     if (!recordings.length) {
       return h("p", { class: "empty" }, "Nothing is recorded yet. Start a recording, command some force, stop it: it can then be drawn, downloaded and diagnosed here.");
     }
     const heads = ["number", "started", "what happened", "duration", "size", ""];
     const rows = recordings.map((one) => [
       String(one.number), moment(one.started_utc), h("span", { class: "long" }, one.fault || words(one)),
-      one.number === open ? "running" : duration(one.duration_s), one.number === open ? "–" : bytes(one.size_bytes),
-      one.number === open || one.fault ? "" : this.actions(one, noParquet),
+      one.growing ? "running" : duration(one.duration_s), one.growing ? "–" : bytes(one.size_bytes),
+      one.growing || one.fault ? "" : this.actions(one, noParquet),
     ]);
     return table("Recordings, the newest first", heads, rows, "list");
   }
