@@ -98,10 +98,8 @@ class ModbusRtuServer:
             return int(self._open_pty.backlog_s / self._character_s)
         try:
             return self.port.unsent_bytes
-        except (
-            OSError
-        ):  # unplugged while a request was executed: a driver that has gone says EIO, and the port tells it
-            return 0
+        except OSError:
+            return 0  # unplugged while a request was executed: a driver that has gone says EIO, and the port tells it
 
     @property
     def _character_s(self) -> float:

@@ -26,7 +26,9 @@ def test_ctrl_c_while_the_first_modules_are_read_shows_no_traceback(monkeypatch:
 
 
 @pytest.mark.parametrize(("encoding", "printed"), [("ascii", "rig ? S?d"), ("latin-1", "rig · Süd")])
-def test_what_a_terminal_cannot_print_ends_no_verb(monkeypatch: pytest.MonkeyPatch, encoding: str, printed: str) -> None:
+def test_what_a_terminal_cannot_print_ends_no_verb(
+    monkeypatch: pytest.MonkeyPatch, encoding: str, printed: str
+) -> None:
     terminal = io.BytesIO()
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(terminal, encoding, write_through=True))
     monkeypatch.setattr(gateway.cli.main, "command", lambda **_: Console().print("rig · Süd"))
