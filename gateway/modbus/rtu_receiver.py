@@ -41,8 +41,9 @@ from gateway.modbus.rtu_echo import RtuEcho
 SPLIT_S: Final = 0.02
 """Longest pause inside of a frame: 16 ms is the slowest adapter's (FTDI as it comes), and a little for the machine."""
 MOST_BYTES: Final = 512
-"""Held without a silence: twice the longest frame. What comes before is dropped, unless frames can be made out in it."""
+"""Held without a silence: twice the longest frame. What comes before is dropped, but for the latest requests in it."""
 
+_MOST_PASSED: Final = 8
 _STRAY_BYTES: Final = 2  # before or behind a request that is answered: a line that floats makes one or two
 _DIAGNOSTICS_BYTES: Final = 8  # the usual FC08: a sub-function with one word
 _FRAMED: Final = frozenset(
@@ -71,7 +72,8 @@ class RtuReceiver:
     """
 
     __slots__ = (
-        "_burst", "_echo", "_last_s", "_marks", "_silence_s", "_unit", "_units", "_wait_s", "frames", "noise_bytes",
+        "_burst", "_echo", "_last_s", "_marks", "_passed", "_silence_s", "_unit", "_units", "_wait_s", "frames",
+        "noise_bytes",
     )  # fmt: skip
 
     def __init__(self, unit: int, baud: int, character_s: float, *, may_echo: bool = True) -> None:
@@ -79,6 +81,7 @@ class RtuReceiver:
         self._units: set[int] = set()  # others that were heard on this line
         self._silence_s = silence_s(baud, character_s)
         self._burst = bytearray()
+        self._passed: list[RtuRequest] = []  # made out in what had to make room, and not taken yet
         self._marks: list[int] = []  # places in the burst that a visible silence lies before
         self._last_s = 0.0
         self._wait_s = self._silence_s
@@ -89,7 +92,7 @@ class RtuReceiver:
     @property
     def deadline_s(self) -> float | None:
         """Time at which `take` has something to decide, if nothing arrives before; None: the line is silent."""
-        return self._last_s + self._wait_s if self._burst else None
+        return self._last_s + self._wait_s if self._burst or self._passed else None
 
     def receive(self, data: bytes, now_s: float) -> None:
         """Append what has arrived by now."""
@@ -102,19 +105,20 @@ class RtuReceiver:
 
     def take(self, now_s: float) -> list[RtuRequest]:
         """Return the requests that the silence has ended, in order; none while more may belong to the last one."""
-        if not self._burst or now_s < self._last_s + self._wait_s:
+        if now_s < self._last_s + self._wait_s:
             return []
+        passed, self._passed = self._passed, []
         is_final = self._wait_s >= SPLIT_S  # not by the time alone: a program that was late first reads what has come
         found, noise, pending = self._scan(is_final=is_final)
         is_waiting = pending > (_STRAY_BYTES if found and self._burst[found[-1][0]] == self._unit else 0)
         if is_waiting and not is_final:
             self._wait_s = SPLIT_S
-            return []
+            return passed
         requests = self._requests(found)
         self.frames += len(found)
         self.noise_bytes += noise
         self._drop(len(self._burst))
-        return requests
+        return passed + requests
 
     def note_sent(self, request: RtuRequest, answer: bytes, now_s: float) -> None:
         """Expect an answer (the whole frame) back on a line that hears itself."""
@@ -123,6 +127,7 @@ class RtuReceiver:
     def forget(self) -> None:
         """Forget what has arrived: the port was lost."""
         self._drop(len(self._burst))
+        self._passed.clear()
         self._echo.forget()
         self._units.clear()
 
@@ -131,12 +136,18 @@ class RtuReceiver:
         self._marks = [mark - count for mark in self._marks if mark > count]
 
     def _shorten(self) -> None:
-        """Drop the frames that can be made out, then what is older than the longest frame."""
-        at = 0
+        """Drop the frames that can be made out, then what is older than the longest frame. Requests among them are kept, the
+        latest: where an adapter hands over a busy bus every 16 ms, each time in the middle of a frame, no silence is seen
+        for long, and a broadcast that stops all units is not said again."""
+        at, found = 0, list[tuple[int, int]]()
         while at < len(self._burst) and (size := self._frame_size(at, is_start=True)):
             self._note_unit(at)
+            found.append((at, size))
             at += size
-            self.frames += 1
+        self.frames += len(found)
+        self._passed += [request._replace(is_answered=False) for request in self._requests(found)]
+        while len(self._passed) > _MOST_PASSED or sum(len(request.pdu) for request in self._passed) > LONGEST_ADU:
+            del self._passed[0]
         self._drop(at)
         if (surplus := len(self._burst) - LONGEST_ADU) > 0 and len(self._burst) > MOST_BYTES:
             self.noise_bytes += surplus

@@ -182,3 +182,25 @@ def test_behind_a_stray_byte_a_frame_counts_where_frames_reach_to_the_next_silen
     both = [RtuRequest(1, WRITE, False), *answered()]
     assert Bus().send(b"\x0a" + COMMAND, OURS + b"\x00", pause_s=0.0021).requests() == both
     assert Bus().send(b"\x77" + encode_adu(0, WRITE) + b"\x03", b"\xf0", pause_s=0.016).requests() == []
+
+
+def test_a_broadcast_is_obeyed_on_a_busy_bus_that_comes_in_pieces_without_a_silence() -> None:
+    """An adapter that hands over every 16 ms, each time in the middle of another unit's answer: a stop to everybody made room
+    for what came behind it, and nobody says a broadcast again."""
+    stop = P.write_register_request(0, 0)
+    polls = (encode_adu(7, READ) + encode_adu(7, bytes((3, 240)) + bytes(240))) * 8
+    line = encode_adu(0, stop) + polls
+    bus = Bus(baud=115200)
+    bus.send(*(line[at : at + 156] for at in range(0, len(line), 156)), pause_s=0.016)
+    assert bus.requests() == [RtuRequest(0, stop, False)]
+    assert bus.receiver.noise_bytes == 0
+
+
+def test_of_a_flood_of_broadcasts_the_latest_are_obeyed_in_their_order_and_none_behind_a_plug() -> None:
+    writes = [P.write_register_request(1, count) for count in range(200)]
+    flood = b"".join(encode_adu(0, write) for write in writes)
+    bus = Bus().send(*(flood[at : at + 100] for at in range(0, len(flood), 100)))
+    taken = [request.pdu for request in bus.requests()]
+    assert taken == writes[-len(taken) :] and len(taken) > 8
+    bus.send(flood).receiver.forget()
+    assert bus.requests() == []
