@@ -101,6 +101,7 @@ def test_a_page_whose_login_is_over_leads_to_the_login(page, chromium) -> None:
         browser.route(address, lambda route: route.fulfill(**over))
     window = open_tab(browser, page.address, "configuration")
     window.wait_for_url("**/login")
+    assert window.get_by_role("button", name="Log in").count() == 1
     browser.close()
 
 
@@ -114,4 +115,5 @@ def test_a_recording_that_waits_for_room_is_told_as_one(page, chromium) -> None:
     )
     window = open_tab(browser, page.address, "recordings")
     window.get_by_text("not recording: the disk is full; it begins again by itself").wait_for()
+    assert window.get_by_role("button", name="Start recording").is_enabled()
     browser.close()
