@@ -122,7 +122,7 @@ def logs_command(*, rig: str | None, options: tuple[str, ...]) -> None:
     `force-gateway events` shows the same events from the state directory, without systemd.
     """
     if rig and (rig.startswith("-") or "=" in rig):  # an option of journalctl's: all services are meant
-        rig, options = None, (rig, *options)
+        options, rig = (rig, *options), None
     units = _units_of(rig, Path("/"))
     words: list[Any] = ["journalctl", *(word for unit in units for word in ("--unit", unit)), *options]
     try:

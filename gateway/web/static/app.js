@@ -78,6 +78,10 @@ async function openTab() {
 }
 
 at("stop").addEventListener("click", stopForce);
+document.querySelector(".skip").addEventListener("click", (event) => {
+  event.preventDefault(); // its address is no tab's, and would lead to the first one
+  at("main").focus();
+});
 document.addEventListener(
   "keydown",
   (event) => {

@@ -1,7 +1,7 @@
 """How a tab answers: JSON, or a sentence that says why not, with the status that fits; and how it reads a request's body.
 
-What a person did wrong, or control refuses, is a TabRefusedError or a ValueError (409); no gateway is an OSError (503). The
-body of an error is always {"error": sentence}.
+What a person did wrong, or control refuses, is a TabRefusedError or a ValueError (409), and so is what an extra is missing for;
+no gateway is an OSError (503). The body of an error is always {"error": sentence}.
 """
 
 import errno
@@ -15,6 +15,7 @@ from typing import Any, Final, TypeVar
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, Response
 
+from gateway.extras import MissingExtraError
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
 
@@ -59,7 +60,7 @@ def answers(handler: Callable[[Request], Awaitable[Any]]) -> Endpoint:
             return JSONResponse({"error": str(refusal)}, refusal.status)
         except OSError as error:
             return JSONResponse({"error": _unreachable(error)}, UNAVAILABLE)
-        except ValueError as error:
+        except (ValueError, MissingExtraError) as error:
             return JSONResponse({"error": str(error)}, CONFLICT)
         return answer if isinstance(answer, Response) else JSONResponse(answer)
 

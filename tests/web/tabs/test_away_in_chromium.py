@@ -101,4 +101,19 @@ def test_a_page_whose_login_is_over_leads_to_the_login(page, chromium) -> None:
         browser.route(address, lambda route: route.fulfill(**over))
     window = open_tab(browser, page.address, "configuration")
     window.wait_for_url("**/login")
+    assert window.get_by_role("button", name="Log in").count() == 1
+    browser.close()
+
+
+def test_a_recording_that_waits_for_room_is_told_as_one(page, chromium) -> None:
+    """As `record status` does. It looked as if nobody had asked for one."""
+    waits = {"recording": None, "waits": "the disk is full"}
+    browser = chromium.new_context()
+    browser.route(
+        "**/api/v1/recordings",
+        lambda route: route.fulfill(json={"recordings": [], "recording": waits, "no_parquet": ""}),
+    )
+    window = open_tab(browser, page.address, "recordings")
+    window.get_by_text("not recording: the disk is full; it begins again by itself").wait_for()
+    assert window.get_by_role("button", name="Start recording").is_enabled()
     browser.close()

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gateway import extras
 from gateway.recording import read_recording, read_table
 from gateway.reports.recording_plot import _thinned
 from tests.web.tabs.conftest import ROWS, record
@@ -70,6 +71,14 @@ def test_a_machine_without_room_for_the_copy_is_not_taken_for_a_gateway_that_is_
     told = page.get("/api/v1/recordings/1/download.csv")
     assert (told.status, told.json["error"]) == (503, "No usable temporary directory found in []")
     assert page.post("/api/v1/recordings/start").json["error"].startswith("the gateway does not answer")
+
+
+def test_parquet_without_its_library_is_refused_with_what_brings_it(page, state, monkeypatch) -> None:
+    """It ended in an internal error of the page's."""
+    record(state)
+    monkeypatch.setattr(extras, "is_installed", lambda library: library != "pyarrow")
+    told = page.get("/api/v1/recordings/1/download.parquet")
+    assert (told.status, told.json["error"][:4]) == (409, "E160")
 
 
 def test_another_form_is_refused(page, state) -> None:

@@ -80,6 +80,16 @@ def test_a_run_whose_gateway_has_started_anew_is_told_as_ended(page, control, ch
     window.close()
 
 
+def test_who_skips_to_the_content_stays_in_the_tab(page, chromium) -> None:
+    """It led to the live view."""
+    window = open_tab(chromium, page.address, "configuration")
+    window.locator(".skip").focus()
+    window.keyboard.press("Enter")
+    assert window.evaluate("[location.hash, document.activeElement.id]") == ["#configuration", "main"]
+    assert window.locator("#tab-configuration").is_visible()
+    window.close()
+
+
 @pytest.mark.long
 def test_no_tab_is_wider_than_a_telephone_or_grave_for_a_screen_reader(page, control, state, chromium) -> None:
     from axe_playwright_python.sync_playwright import Axe

@@ -22,7 +22,8 @@ class RecordingsTab {
   async refresh() {
     const answer = await this.api.get("/api/v1/recordings");
     const file = answer.recording.recording;
-    showOnce(this.now, file ?? "none", () => this.control(file));
+    const waits = answer.recording.waits ?? "";
+    showOnce(this.now, file ?? `none ${waits}`, () => this.control(file, waits));
     const rows = this.now.querySelector(".rows");
     if (rows) rows.textContent = `${answer.recording.rows} rows so far`;
     const open = file ? Number(file.split("/").pop().split(".")[0]) : 0;
@@ -32,9 +33,10 @@ class RecordingsTab {
     showOnce(this.list, JSON.stringify([shown, answer.no_parquet]), () => this.table(shown, answer.no_parquet));
   }
 
-  control(file) {
+  control(file, waits) {
     if (!file) {
-      return [button("Start recording", async () => this.after(await this.api.post("/api/v1/recordings/start", {})), this.told, { class: "primary" })];
+      const start = button("Start recording", async () => this.after(await this.api.post("/api/v1/recordings/start", {})), this.told, { class: "primary" });
+      return [start, waits && h("span", { class: "badge bad" }, `not recording: ${waits}; it begins again by itself`)];
     }
     const stop = button("Stop recording", async () => this.after(await this.api.post("/api/v1/recordings/stop", {})), this.told);
     return [stop, h("span", { class: "badge warn" }, `recording ${Number(file.split("/").pop().split(".")[0])}`), h("span", { class: "small rows" })];
