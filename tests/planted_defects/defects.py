@@ -487,7 +487,7 @@ DEFECTS = (
            "return self.active_run.is_local or (self._machine.state is _RUNNING and not self.active_run.running)",
            "return self.active_run.is_local", ("control/test_two_at_once.py",)),
     Defect("a lost contact turns the slide round", "control/force_loop/feedforward.py",
-           "        self._slid_n += self.aimed_n - before_n", "        self._slid_n += 0.0 * before_n",
+           "at(RISING))\n        self._place_slide(gravity_n)", "at(RISING))\n        self._slide = self._memory",
            ("control/force_loop/test_feedforward.py",)),
     Defect("a second calibration drops what the first has carried over", "control/force_loop/feedforward.py",
            "self._carry_over_v += before_v", "self._carry_over_v = before_v", ("control/force_loop/test_feedforward.py",)),
