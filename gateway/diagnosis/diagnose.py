@@ -228,12 +228,12 @@ def with_readings_of(given: Plant, plant: Plant) -> Plant:
     return with_value(with_value(plant, "cell", "noise_n", given.cell.noise_n), "cell", "quantum_n", quantum_n)
 
 
-BaseModel: TypeAlias = tuple[Bench, FittedModel, Whitener]
+_BaseModel: TypeAlias = tuple[Bench, FittedModel, Whitener]
 
 
 def _fit_beside_spikes(
     measurements: Sequence[Measurement], start: Plant, hidden: frozenset[str], late_s: float
-) -> tuple[BaseModel, Flags]:
+) -> tuple[_BaseModel, Flags]:
     """The base model, fitted without the spikes that would spoil it, and the rows that are set aside: those, where they are
     too few to be a finding.
 
@@ -258,7 +258,7 @@ def _fit_base_model(
     hidden: frozenset[str],
     late_s: float,
     left_out: Flags | None = None,
-) -> BaseModel:
+) -> _BaseModel:
     """The bench and base model that fit best, over the ways in which motion may be known. left_out: rows (rows,)."""
     measured = any(each.position_m is not None for each in measurements)
     motions = MOTIONS if measured else MOTIONS[:1]

@@ -136,10 +136,11 @@ def _answer(options: dict[str, Any]) -> None:
     saved = save_plant(answer, options["state"], options["rig"]) if options["save"] else None
     if printed is None:
         print_answer(answer, texts)
-        if saved:
-            click.echo(f"plant {saved}; force-gateway plant use {saved} compensates what can be of it")
     else:
         click.echo(printed, nl=False)
+    if saved:
+        told = f"plant {saved}; force-gateway plant use {saved} compensates what can be of it"
+        click.echo(told, err=printed is not None)
     if options["fail_on"] and answer.diagnosis.verdict in _FAILS[options["fail_on"]]:
         raise click.exceptions.Exit(exit_codes.FAILED)
 

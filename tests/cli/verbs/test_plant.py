@@ -122,3 +122,7 @@ def test_a_diagnosis_is_kept_as_the_next_plant_with_its_provenance(tmp_path, sta
     assert [cause.name for cause in provenance.causes] == [cause.name for cause in diagnosis().causes]
     assert provenance.causes[0].parameters["load_dependent_n_per_n"]["ci95"] == [0.0482, 0.0511]
     assert "load-dependent-friction" in call(state, "list").stdout
+    words = ["diagnose", str(recording), "--save", "--state", str(state), "--json", "-"]
+    told = CliRunner().invoke(command, words)
+    assert json.loads(told.stdout)["verdict"] == diagnosis().verdict
+    assert "plant 2; force-gateway plant use 2" in told.stderr, "whoever reads JSON wants its number, too"
