@@ -3,7 +3,8 @@
 import errno
 import os
 import resource
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -12,25 +13,27 @@ from gateway.recording import Recorder, read_recording
 from tests.recording.test_recorder import COLUMNS, HEADER
 
 
-@pytest.fixture
-def limited() -> Iterator[Callable[[int], None]]:
-    """limited(bytes): no file of this process gets longer, as under `ulimit -f` or on a FAT file system."""
+@contextmanager
+def files_of_at_most(size_bytes: int) -> Iterator[None]:
+    """No file of this process gets longer meanwhile, as under `ulimit -f` or on a FAT file system: nor does the report of the
+    tests, so the limit ends with what it is for."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda size_bytes: resource.setrlimit(resource.RLIMIT_FSIZE, (size_bytes, hard))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size_bytes, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.mark.parametrize("more_bytes", [0, 10])
-def test_a_limit_on_the_length_of_files_is_told_as_one(
-    tmp_path: Path, limited: Callable[[int], None], more_bytes: int
-) -> None:
+def test_a_limit_on_the_length_of_files_is_told_as_one(tmp_path: Path, more_bytes: int) -> None:
     """It said that the disk is full: of the batch that reaches the limit a part still fits."""
     recorder = Recorder(tmp_path, HEADER, COLUMNS)
     recorder.append((0.0, 1.0, 2.0))
     recorder.write()
-    limited(recorder.size_bytes + more_bytes)
-    recorder.append((0.1, 1.0, 2.0))
-    recorder.write()
+    with files_of_at_most(recorder.size_bytes + more_bytes):
+        recorder.append((0.1, 1.0, 2.0))
+        recorder.write()
     assert recorder.failure is not None
     assert "after 1 rows: File too large: longer than a process may write here (ulimit -f" in recorder.failure
     assert "full" not in recorder.failure
