@@ -54,6 +54,14 @@ def parse_sources(folder: str) -> dict[str, ast.Module]:
         gc.enable()
 
 
+@pytest.fixture(scope="module", autouse=True)
+def forget_the_sources() -> Iterator[None]:
+    """The worker goes on with other tests: of a million nodes more, each of their collections of garbage takes a second."""
+    yield
+    nodes_of.cache_clear()
+    parse_sources.cache_clear()
+
+
 @cache
 def nodes_of(path: str) -> tuple[ast.FunctionDef | ast.AsyncFunctionDef | ast.ImportFrom, ...]:
     """Return a module's functions and imports, inner ones too."""
