@@ -16,7 +16,6 @@ from rich.console import Console
 
 from gateway import defaults
 from gateway.cli.diagnosis.inputs import Sources
-from gateway.cli.diagnosis.outputs import STDOUT
 from gateway.cli.diagnosis.terminal import render_diagnosis
 from gateway.diagnosis import EFFECTS, Diagnosis
 from gateway.reports.diagnosis.document import diagnosis_document
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AnswerFiles:
-    """The files that were asked for; None: not asked for. `json` may be STDOUT."""
+    """The files that were asked for; None: not asked for. One of them may be `outputs.STDOUT`."""
 
     json: Path | None
     report: Path | None
@@ -38,9 +37,9 @@ class AnswerFiles:
     plan: Path | None
 
     @property
-    def on_disk(self) -> list[Path]:
-        """Those that are files."""
-        return [file for file in (self.json, self.report, self.extend, self.plan) if file and file != STDOUT]
+    def given(self) -> list[Path]:
+        """Those that were asked for."""
+        return [file for file in (self.json, self.report, self.extend, self.plan) if file]
 
 
 @dataclass(frozen=True, slots=True)

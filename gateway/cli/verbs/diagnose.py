@@ -162,7 +162,7 @@ def _compute_answer(options: dict[str, Any], files: "AnswerFiles") -> "Answer":
         )
         old = _read_old(options, sources.rig)
     named = (Path(options[name]) for name in ("rig", "columns", "calibration") if options[name])
-    check_targets(files.on_disk, (*sources.paths, *(old.paths if old else ()), *named))
+    check_targets(files.given, (*sources.paths, *(old.paths if old else ()), *named))
     diagnosis, runtime_s = _run_diagnosis(sources, old, options)
     gain = _measure_gain(diagnosis, sources) if options["closed_loop"] else None
     return add_plan(Answer(diagnosis, sources, runtime_s, gain), files.plan)
@@ -181,7 +181,7 @@ def _show_before_after(options: dict[str, Any]) -> None:
 
     runs = [recording_path(options[name], options["rig"], options["state"]) for name in ("before", "after")]
     named = [Path(options[name]) for name in ("rig", "columns") if options[name]]
-    targets = [file for file in (options["json_file"], options["report"]) if file and file != STDOUT]
+    targets = [file for file in (options["json_file"], options["report"]) if file]
     check_targets(targets, [*runs, *named])
     found = before_after.run(options["before"], options["after"], options["columns"], options["rig"], options["state"])
     texts = {options["json_file"]: json.dumps(before_after.document(found), indent=2, allow_nan=False) + "\n"}

@@ -40,6 +40,20 @@ def test_no_output_takes_the_place_of_what_is_read(here: Path, call, words: tupl
     assert {path: path.read_bytes() for path in here.iterdir()} == before
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--before", "ladder.csv", "--after", "ladder.csv", "--json", "-", "--report", "-"),
+        ("ladder.csv", "--rig", "rigs.yaml", "--json", "-", "--extend", "-"),
+    ],
+)
+def test_two_answers_do_not_share_one_stream(here: Path, call, words: tuple[str, ...]) -> None:
+    """One of them was lost without a word."""
+    answer = call("diagnose", *words)
+    assert answer.exit_code == 2 and "- is written by another option" in answer.stderr, answer.output
+    assert not answer.stdout
+
+
 def test_a_calibration_whose_report_the_disk_does_not_take_is_told_as_stored(
     here: Path, call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
