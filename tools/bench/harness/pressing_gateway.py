@@ -11,6 +11,7 @@ import signal
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import psutil
 
@@ -109,6 +110,15 @@ class Scene:
         said = {round(heard.voltage_v or 0.0, 1) for heard in self.devices.settings_since(since_s)}
         assert said <= {PRESSED_V}, f"it was disturbed: {said}"
 
+    def recording(self, answer: dict[str, Any]) -> Path:
+        """Return the file that is recorded to, once the disk has taken it. answer: to `record`."""
+        deadline_s = time.monotonic() + 2.0
+        while not answer["recording"]:
+            assert time.monotonic() < deadline_s, f"it does not record: {answer}"
+            time.sleep(0.002)
+            answer = ask(self.gateway.state, {"do": "record"})
+        return Path(answer["recording"])
+
     def disable(self) -> None:
         """Let go, and wait for OFF."""
         assert not self.gateway.write(0, 0).isError()
@@ -134,10 +144,10 @@ def fault_control(scene: Scene, number: int) -> Times:
 
 
 def fault_recording(scene: Scene, number: int) -> Times:
-    """Send it to one that records: the recording, too, ends where control did."""
+    """Send it to one that records: the recording, too, ends where control did, and goes on in another file behind it."""
     state = scene.gateway.state
     scene.press()
-    path = Path(ask(state, {"do": "record", "on": True})["recording"])
+    path = scene.recording(ask(state, {"do": "record", "on": True}))
     recorded_s = time.monotonic()
     time.sleep(UNDISTURBED_S)
     lasted_s = time.monotonic() - recorded_s
@@ -145,6 +155,8 @@ def fault_recording(scene: Scene, number: int) -> Times:
     (entry,) = (entry for entry in list_recordings(state) if entry.path == path)
     assert not entry.fault, entry.fault
     assert entry.duration_s >= lasted_s - BATCH_S, f"{entry.duration_s:.2f} s of {lasted_s:.2f} s are kept"
+    assert scene.recording(ask(state, {"do": "record"})) > path
+    ask(state, {"do": "record", "on": False})
     return times
 
 
