@@ -6,6 +6,7 @@ from gateway.profiles.strict_yaml.text import Document
 from gateway.registers import BankRules, RegisterBank
 from gateway.registers.map.map_reader import MapError, read_map
 from gateway.registers.map.register_map import RegisterMap
+from gateway.registers.map.value_names import check_numbers
 
 
 def read_registers(document: Document) -> tuple[RegisterMap | None, list[ProfileFault]]:
@@ -24,6 +25,7 @@ def read_served_registers(document: Document) -> tuple[RegisterMap | None, list[
         return None, faults
     try:
         RegisterBank(register_map, BankRules(rig_name="", force_max_n=1.0), now=lambda: 0.0)
+        check_numbers(register_map)
     except (ValueError, LookupError) as error:
         sentence = f"a gateway cannot serve it: {error}; {defaults.REGISTER_MAP} has all that it needs, to copy it from"
         return None, [document.fault((), sentence)]
