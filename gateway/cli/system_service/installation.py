@@ -19,6 +19,7 @@ from gateway.processes import exit_codes
 from gateway.profiles.find import list_shipped, locate
 from gateway.profiles.http_sections import split_listen
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
+from gateway.service.supervisor.run_options import stem_of
 
 if TYPE_CHECKING:
     from gateway.profiles import Rig
@@ -48,7 +49,7 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
         _refuse_hidden(path)
     if not _NOT_OF_PROGRAMS.isdisjoint(str(program)):
         raise CliError(f"E107 {program}: systemd starts no program with such a path", exit_codes.CONFIGURATION)
-    if not _STEM.fullmatch(stem := Path(named).stem):
+    if not _STEM.fullmatch(stem := stem_of(named)):
         raise CliError(f"E107 {named}: its name names the unit: letters, digits, _ . - only", exit_codes.CONFIGURATION)
     _refuse_no_networks(networks)
     lines = (rig.output, rig.load_cell, *([rig.valve] if rig.valve else []))
