@@ -294,6 +294,11 @@ class ExchangeTable:
         return masks
 
 
+def s7_address(address: int) -> str:
+    """Return MB_DATA_ADDR of a holding register: five digits up to 49999, six from 410000 on."""
+    return f"4{address + 1:04d}"
+
+
 def _span(registers: tuple[Register, ...]) -> tuple[int, int]:
     first, last = registers[0], registers[-1]
     return first.address, last.address + last.words - first.address

@@ -5,6 +5,7 @@ for anything.
 """
 
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -95,7 +96,7 @@ def install(plan: Installation, root: Path) -> tuple[list[Path], bool]:
             beside.replace(path)
         except PermissionError:
             raise CliError(
-                f"E107 {path}: only root may write there; sudo {' '.join(sys.argv)}, or --root DIR for an image",
+                f"E107 {path}: only root may write there; sudo {shlex.join(sys.argv)}, or --root DIR for an image",
                 exit_codes.PERMISSION,
             ) from None
         written.append(path)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from gateway.clients.exchange import CONTROL_BITS, STATUS_BITS, ExchangeTable, ModelField
+from gateway.clients.exchange import CONTROL_BITS, STATUS_BITS, ExchangeTable, ModelField, s7_address
 from gateway.registers.map.register_map import Register
 
 _SET_BY_THE_BLOCK = ("control_word", "force_setpoint", "heartbeat")
@@ -49,7 +49,7 @@ _ST = _Dialect(
 
 
 def spell_scl(table: ExchangeTable) -> dict[str, str]:
-    """Return the lists of the SCL source. MB_DATA_ADDR has five digits up to 49999, and six, 410000 and so on, from there."""
+    """Return the lists of the SCL source."""
     host = table.where.host
     part_a, part_b, part_c = table.parts
     stage = {name: table.at(name, "staging").address for name in ("order", "length", "commit", "commit_status")}
@@ -66,7 +66,7 @@ def spell_scl(table: ExchangeTable) -> dict[str, str]:
         "commit_status": stage["commit_status"],
     }
     octets = {f"ip_{k}": octet for k, octet in enumerate(_octets(host), 1)}
-    places = {f"s7_{name}": f"4{address + 1:04d}" for name, address in numbers.items()}
+    places = {f"s7_{name}": s7_address(address) for name, address in numbers.items()}
     hexadecimal = {"set_words_hex": f"{part_a + part_b + part_c:04X}", "unit_hex": f"{table.where.unit:02X}"}
     return {**_lists(table, _SCL), **octets, **places, **hexadecimal}
 

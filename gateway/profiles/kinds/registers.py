@@ -1,5 +1,7 @@
 """Register maps: read by the registers room itself, its faults told with their lines."""
 
+from dataclasses import replace
+
 from gateway import defaults
 from gateway.profiles.strict_yaml.faults import ProfileFault
 from gateway.profiles.strict_yaml.text import Document
@@ -12,7 +14,7 @@ from gateway.registers.map.value_names import check_numbers
 def read_registers(document: Document) -> tuple[RegisterMap | None, list[ProfileFault]]:
     """Return the register map of a file, or None and every fault."""
     try:
-        return read_map(document.value), []
+        return replace(read_map(document.value), file=document.file), []
     except MapError as error:
         faults = (document.fault(flaw.place, flaw.sentence, at_key=flaw.is_of_key) for flaw in error.faults)
         return None, sorted(dict.fromkeys(faults))
