@@ -146,6 +146,15 @@ ERRORS: Final = (
         "Take the missing ones over from profiles/registers/force-v1.yaml, or make the client from force-v1.",
     ),
     Explanation(
+        "E186",
+        "the gateway serves another register map",
+        "Register map_hash is not that of the map by which this program would have written: its counts, or its places, mean "
+        "something else there. Nothing was written.",
+        "A rig with a register map of its own, or a gateway of another version.",
+        "Name the rig's map: --map FILE (the banner of `run` has the whole line). A write of zeros alone, such as "
+        "control_word=0, goes out all the same.",
+    ),
+    Explanation(
         "E190",
         "no recording matches",
         "The pattern of fleet fit or fleet diagnose finds no file.",
