@@ -117,8 +117,9 @@ def test_what_cannot_be_probed_is_told() -> None:
     assert "E114 rig demo is simulated" in simulated.output
     device = runner.invoke(command, ["check", "smc-itv-rc.yaml", "--probe"])
     assert device.exit_code != 0
-    missing = runner.invoke(command, ["ports", "--listen", "/dev/none"])
-    assert "E102" in missing.output
+    for words in (["/dev/none"], ["/dev/none", "--json"]):
+        missing = runner.invoke(command, ["ports", "--listen", *words])
+        assert "E102" in missing.output and missing.exit_code == exit_codes.DEVICE
 
 
 @pytest.mark.parametrize(("latency_ms", "is_told"), [(16, True), (1, False), (None, False)])
