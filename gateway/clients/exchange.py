@@ -125,6 +125,7 @@ class ExchangeTable:
         for block in _WITH_NUMBERS:
             if any(each.words > 1 and each.word_order is not WordOrder.ABCD for each in self.map.registers_of(block)):
                 yield f"word order abcd in block {block}"
+        yield from (f"type int16 of {each.name}" for each in self.command if each.unit and each.type != "int16")
         yield from self._find_missing_bits("control_word", CONTROL_BITS)
         yield from self._find_missing_bits("status_word", STATUS_BITS)
         yield from self._find_missing_names()

@@ -39,6 +39,11 @@ TENTHS = (
             "values: {0: frei, 3: fertig, 4: failed},",
             "value committed of commit_status",
         ),
+        (  # of which the clients' 16#8000, no value, would be 327.68 N
+            "name: force_setpoint, address: 1, type: int16, scale: 0.01, unit: N, access: RW, min: 0, max: 327.67",
+            "name: force_setpoint, address: 1, type: uint16, scale: 0.01, unit: N, access: RW, min: 0, max: 655.35",
+            "type int16 of force_setpoint",
+        ),
     ],
 )
 @pytest.mark.parametrize("language", LANGUAGES)
