@@ -40,8 +40,8 @@ ERRORS: Final = (
     Explanation(
         "E114",
         "nothing to probe",
-        "check --probe asks the devices of a rig, or those behind a port; this file has neither.",
-        "A simulated rig, or a file of another kind.",
+        "check --probe asks the devices of a rig at its own ports, or with --port PORT the one of a device's own file.",
+        "A simulated rig, a file of another kind, a device's file without --port, or a rig's with it.",
         "Name a real rig's file; force-gateway ports --listen PORT listens at any port.",
     ),
     Explanation(
