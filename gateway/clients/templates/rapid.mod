@@ -678,6 +678,10 @@ ${status_decoding}
 
   ! A request per cycle, so that the heartbeat goes on meanwhile
   LOCAL PROC FgUploadPart()
+    IF nUploadStep<4 AND NOT FgSetFits() THEN
+      FgUploadEnd FALSE;
+      RETURN;
+    ENDIF
     TEST nUploadStep
     CASE 0:
       fgUploaded:=FALSE;
@@ -702,6 +706,23 @@ ${status_decoding}
       FgExplain;
     ENDIF
   ENDPROC
+
+  ! What PackRawBytes does not take would cost the connection, and the
+  ! force with it
+  LOCAL FUNC bool FgSetFits()
+    FOR i FROM 1 TO ${set_words} DO
+      IF NOT FgIsWord(fgSet{i}) THEN
+        fgText:="fgSet, place "+NumToStr(i,0)+": allowed 0 .. 65535, whole";
+        RETURN FALSE;
+      ENDIF
+    ENDFOR
+    IF NOT FgIsWord(fgSlot) fgText:="fgSlot: allowed 0 .. 7, whole";
+    RETURN FgIsWord(fgSlot);
+  ENDFUNC
+
+  LOCAL FUNC bool FgIsWord(num nValue)
+    RETURN nValue>=0 AND nValue<=65535 AND nValue=Round(nValue);
+  ENDFUNC
 
   LOCAL PROC FgAskCommit()
     FgFrameRead ${stg_commit_status},3;
