@@ -120,6 +120,26 @@ def test_every_line_to_type_can_be_typed(tmp_path: Path) -> None:
     assert rows_of(page, "Siemens S7-1200/1500: requests")["status"][1] == "410101"
 
 
+@pytest.mark.parametrize(
+    ("owner", "lease_s", "commands"),
+    [
+        ("192.168.125.7", 0.2, "force-gateway hold 12 "),
+        ("192.168.125.7", None, "mbpoll -1 -p 5020 -r 1 192.168.125.20 1 1200 "),
+        ("serial:1", 0.2, ""),
+    ],
+)
+def test_a_rig_that_names_its_owner_says_who_may_type_what(owner: str, lease_s: float | None, commands: str) -> None:
+    """It said that mbpoll keeps no heartbeat where there was no lease, and had anybody hold a force."""
+    rig = load_rig("irc5-cell")
+    supervision = replace(rig.control.supervision, lease_s=lease_s)
+    rig = replace(rig, network=replace(rig.network, owner=owner), control=replace(rig.control, supervision=supervision))
+    section = wiring_page(rig, "irc5-cell")[1][-1]
+    assert section.title.startswith("mbpoll") and f"Only {owner} may command here" in " ".join(section.sentences)
+    assert ("keeps no heartbeat" in " ".join(section.sentences)) is commands.startswith("force-gateway")
+    able = [line for line in section.commands if "enable" in line]
+    assert len(able) == bool(commands) and all(line.startswith(commands) for line in able)
+
+
 def test_a_rig_without_a_lease_is_told_that_its_force_outlives_the_master() -> None:
     told = "This rig has no lease: the force lasts when the master's program stops"
     assert told in " ".join(call("wiring", "demo").split())

@@ -266,7 +266,11 @@ def _mbpoll(rig: Rig, table: ExchangeTable) -> Section:
     force_n = rig.force_to_try_n
     counts = round(force_n * table.at("force_setpoint", "command").counts_per_unit)
     endpoint = f"{f'[{where.host}]' if ':' in where.host else where.host}:{where.shown_port}{where.unit_option}"
-    if rig.control.supervision.lease_s is not None or network.owner or network.require_byte_order_echo:
+    if network.owner:
+        sentences.append(f"Only {network.owner} may command here (network.owner): others read, and disable.")
+    if is_no_address(network.owner):
+        pass  # nobody on plain Modbus TCP
+    elif rig.control.supervision.lease_s is not None or network.require_byte_order_echo:
         sentences.append("mbpoll keeps no heartbeat, so it cannot hold a force here: `hold` does.")
         lines.append(
             f"force-gateway hold {force_n:g} --gateway {endpoint}{rig.map_option}    # enable, heartbeat; Ctrl-C ramps to 0"
