@@ -85,8 +85,17 @@ def _ask_port(what: str, taken: str | None) -> str:
     for number, path in enumerate(ports, 1):
         click.echo(f"  {number}  {path}")
     free = (str(number) for number, path in enumerate(ports, 1) if path != taken)
-    answer = click.prompt(f"port of {what}: number, path, or {_LATER}", default=next(free, _LATER))
-    return ports[int(answer) - 1] if answer.isdecimal() and 0 < int(answer) <= len(ports) else str(answer)
+
+    def read(answer: str) -> str:
+        path = ports[int(answer) - 1] if answer.isdecimal() and 0 < int(answer) <= len(ports) else answer
+        if path != _LATER and not path.startswith("/"):
+            raise click.UsageError(f"{answer} is no number of this list, and no path such as /dev/ttyUSB0")
+        if path == taken:
+            raise click.UsageError(f"{path} is the output's port already: each device has its own")
+        return path
+
+    text = f"port of {what}: number, path, or {_LATER}"
+    return str(click.prompt(text, default=next(free, _LATER), value_proc=read))
 
 
 def _ask_device(role: str, what: str, port: str) -> "tuple[DeviceProfile, int]":

@@ -146,14 +146,14 @@ def _tell_latency(report: "PortReport") -> "Iterator[str]":
         yield f"W332 {report.path} waits up to {latency} ms before it hands over what it received; 1 ms is usual"
 
 
-def probe_rig(rig: "Rig") -> "Iterator[tuple[str, AnyLine, PortReport]]":
-    """Yield each line of a real rig with what its port answered. CliError for a simulated one."""
+def lines_to_probe(rig: "Rig") -> "Iterator[tuple[str, AnyLine]]":
+    """Yield each line of a real rig. CliError for a simulated one."""
     if rig.simulated or rig.output.port is None or rig.load_cell.port is None:
         raise CliError(f"E114 rig {rig.name} is simulated: it has no ports to probe", exit_codes.CONFIGURATION)
-    yield "output", rig.output, probe_line(rig.output)
-    yield "load_cell", rig.load_cell, probe_line(rig.load_cell)
+    yield "output", rig.output
+    yield "load_cell", rig.load_cell
     if rig.valve and rig.valve.port is not None:
-        yield "valve", rig.valve, probe_line(rig.valve)
+        yield "valve", rig.valve
 
 
 def report_fields(report: "PortReport") -> dict[str, Any]:

@@ -35,6 +35,12 @@ PROOF_BLOCK: Final = ("byte_order_echo",)
 NEEDED: Final = {"command": COMMAND, "status": STATUS, "staging": STAGING, "active": ACTIVE, "proof": PROOF_BLOCK}
 """Block -> registers that the clients name."""
 
+NAMED: Final = ("fault_code", "refusal_reason", "warning_word", "state", "failing_reason", "commit_status")
+"""Registers whose numbers or bits the clients say in words."""
+COMMIT_ENDS: Final = ("committed", "failed")
+_MOST_READ: Final = 125
+"""Words of one read, by the Modbus specification."""
+
 _WITH_NUMBERS: Final = ("status", "staging", "active")
 """Blocks with numbers of two words that the clients read or write, all high word first."""
 CONTROL_BITS: Final = ("enable", "reset_fault", "tare", "take_ownership", "valve_pull")
@@ -119,8 +125,12 @@ class ExchangeTable:
         for block in _WITH_NUMBERS:
             if any(each.words > 1 and each.word_order is not WordOrder.ABCD for each in self.map.registers_of(block)):
                 yield f"word order abcd in block {block}"
+        yield from (f"type int16 of {each.name}" for each in self.command if each.unit and each.type != "int16")
         yield from self._find_missing_bits("control_word", CONTROL_BITS)
         yield from self._find_missing_bits("status_word", STATUS_BITS)
+        yield from self._find_missing_names()
+        if self.status and self.status_span[1] > _MOST_READ:
+            yield f"a status block of at most {_MOST_READ} words"
 
     def _find_missing_bits(self, word: str, names: Mapping[str, str] | tuple[str, ...]) -> Iterator[str]:
         try:
@@ -128,6 +138,20 @@ class ExchangeTable:
         except UnknownRegister:
             return
         yield from (f"bit {name} of {word}" for name in names if name not in known)
+
+    def _find_missing_names(self) -> Iterator[str]:
+        for name in NAMED:
+            try:
+                register = self._named(name)
+            except UnknownRegister:
+                continue
+            if not (register.bits or register.values):
+                yield f"names of {name}"
+            elif name == "commit_status":
+                yield from (f"value {end} of {name}" for end in COMMIT_ENDS if end not in register.values.values())
+
+    def _named(self, name: str) -> Register:
+        return self.at(name, "staging" if name in ("failing_reason", "commit_status") else "status")
 
     def at(self, name: str, block: str) -> Register:
         """Return a register of a block. Raises UnknownRegister."""
@@ -185,9 +209,8 @@ class ExchangeTable:
         return tuple(found.values())
 
     def texts(self, name: str) -> dict[int, str]:
-        """Return {number or bit: text} of fault_code, refusal_reason, warning_word, state, failing_reason or commit_status."""
-        block = "staging" if name in ("failing_reason", "commit_status") else "status"
-        register = self.at(name, block)
+        """Return {number or bit: text} of a register of NAMED."""
+        register = self._named(name)
         names = register.bits if register.bits else register.values
         return {number: _text(name, number, word)[:TEXT_LENGTH] for number, word in names.items()}
 
@@ -209,8 +232,8 @@ class ExchangeTable:
             "status_first": status_first,
             "status_words": status_words,
             "status_last": status_words - 1,
-            "force_min": f"{force.minimum or 0.0:.2f}",
-            "force_max": f"{force.maximum:.2f}",
+            "force_min": _limit(force.minimum or 0.0),
+            "force_max": _limit(force.maximum or 0.0),
             "force_counts": force.counts_per_unit,
             **self._echo_values(),
             **self._upload_values(),
@@ -272,9 +295,19 @@ class ExchangeTable:
         return masks
 
 
+def s7_address(address: int) -> str:
+    """Return MB_DATA_ADDR of a holding register: five digits up to 49999, six from 410000 on."""
+    return f"4{address + 1:04d}"
+
+
 def _span(registers: tuple[Register, ...]) -> tuple[int, int]:
     first, last = registers[0], registers[-1]
     return first.address, last.address + last.words - first.address
+
+
+def _limit(newton: float) -> str:
+    """Return a limit with two decimals, or as many as it has: a rounded one would let through what the map does not."""
+    return f"{newton:.2f}" if round(newton, 2) == newton else f"{newton:.10g}"
 
 
 def _text(name: str, number: int, word: str) -> str:

@@ -40,8 +40,8 @@ ERRORS: Final = (
     Explanation(
         "E114",
         "nothing to probe",
-        "check --probe asks the devices of a rig, or those behind a port; this file has neither.",
-        "A simulated rig, or a file of another kind.",
+        "check --probe asks the devices of a rig at its own ports, or with --port PORT the one of a device's own file.",
+        "A simulated rig, a file of another kind, a device's file without --port, or a rig's with it.",
         "Name a real rig's file; force-gateway ports --listen PORT listens at any port.",
     ),
     Explanation(
@@ -144,6 +144,15 @@ ERRORS: Final = (
         "A client for a robot or PLC is made from the register map, and names registers that this map does not have.",
         "A map of your own in which registers were renamed or left out.",
         "Take the missing ones over from profiles/registers/force-v1.yaml, or make the client from force-v1.",
+    ),
+    Explanation(
+        "E186",
+        "the gateway serves another register map",
+        "Register map_hash is not that of the map by which this program would have written: its counts, or its places, mean "
+        "something else there. Nothing was written.",
+        "A rig with a register map of its own, or a gateway of another version.",
+        "Name the rig's map: --map FILE (the banner of `run` has the whole line). A write of zeros alone, such as "
+        "control_word=0, goes out all the same.",
     ),
     Explanation(
         "E190",

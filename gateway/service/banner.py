@@ -3,13 +3,13 @@
 from dataclasses import dataclass, field
 from ipaddress import ip_address
 from math import isfinite
+from shlex import quote
 from typing import Any, Final
 
 from gateway import VERSION, defaults
 from gateway.fieldbus.peers import is_loopback
 from gateway.profiles import Rig
 
-_FORCE_N: Final = 12.0
 _SHORTEST_KEPT_LEASE_S: Final = round(0.75 * defaults.LEASE_S, 3)
 """`hold` keeps it without knowing the lease: it beats four times in the usual one, so three times in this."""
 
@@ -116,16 +116,21 @@ def _all_lines_to_try(ready: Ready) -> tuple[str, ...]:
 
 def _try_rtu(rig: Rig, face: ServedFace) -> tuple[str, ...]:
     """Return a command line for a serial face's terminal. A terminal has no parity: mbpoll is told so."""
-    force_n, unit = _force_to_try_n(rig), face.facts["unit"]
+    force_n, unit = rig.force_to_try_n, face.facts["unit"]
     if rig.network.owner not in (None, face.facts["host"]):
         return ()
     if rig.control.supervision.lease_s is not None or rig.network.require_byte_order_echo:
-        options = "" if unit == defaults.UNIT_ID else f" --unit {unit}"
-        return (
-            f"force-gateway hold {force_n:g} --rtu {face.where}{options} --rig {rig.file}        (over Modbus RTU)",
-        )
+        options = ("" if unit == defaults.UNIT_ID else f" --unit {unit}") + rig.map_option
+        line = f"force-gateway hold {force_n:g} --rtu {face.where}{options} --rig {quote(str(rig.file))}"
+        return (f"{line}        (over Modbus RTU)",)
     line = f"-b {face.facts['baud']} -P none -a {unit}"
-    return (f"mbpoll -m rtu {line} -1 -r 1 {face.where} 1 {round(100 * force_n)}        (over Modbus RTU)",)
+    return (f"mbpoll -m rtu {line} -1 {_polled(rig, face.where)}        (over Modbus RTU)",)
+
+
+def _polled(rig: Rig, where: str) -> str:
+    """Return mbpoll's words that enable with the force to try."""
+    word, force = (rig.register_map.find(name) for name in ("control_word", "force_setpoint"))
+    return f"-r {word.address + 1} {where} 1 {round(force.counts_per_unit * rig.force_to_try_n)}"
 
 
 def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
@@ -137,13 +142,14 @@ def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
     unit = defaults.UNIT_ID if defaults.UNIT_ID in rig.network.units else rig.network.units[0]
     where = "" if (host, port) == (defaults.HOST, defaults.MODBUS_PORT) else f" --gateway {_in_url(host)}:{port}"
     where += "" if unit == defaults.UNIT_ID else f" --unit {unit}"
+    where += rig.map_option
     if rig.network.owner and not _is_this_machine(rig.network.owner):
         return (f"force-gateway monitor{where}        ({rig.network.owner} alone may command)",)
-    force_n, lease_s = _force_to_try_n(rig), rig.control.supervision.lease_s
+    force_n, lease_s = rig.force_to_try_n, rig.control.supervision.lease_s
     if lease_s is not None or rig.network.require_byte_order_echo:
-        pace = "" if lease_s is None or lease_s >= _SHORTEST_KEPT_LEASE_S else f" --rig {rig.file}"
+        pace = "" if lease_s is None or lease_s >= _SHORTEST_KEPT_LEASE_S else f" --rig {quote(str(rig.file))}"
         return (f"force-gateway hold {force_n:g}{where}{pace}        (enable, heartbeat; Ctrl-C ramps to 0)",)
-    polled = f"{'' if unit == defaults.UNIT_ID else f' -a {unit}'} -p {port} -r 1 {host} 1 {round(100 * force_n)}"
+    polled = f"{'' if unit == defaults.UNIT_ID else f' -a {unit}'} -p {port} {_polled(rig, host)}"
     return (
         f"mbpoll -1{polled}        (enable, {force_n:.2f} N)",
         f"force-gateway write force_setpoint={force_n:g} control_word=1{where}",
@@ -166,17 +172,6 @@ def _is_this_machine(owner: str) -> bool:
 
 def _in_url(host: str) -> str:
     return f"[{host}]" if ":" in host else host
-
-
-def _force_to_try_n(rig: Rig) -> float:
-    """12 N, or a force in the middle of what the rig may press with, to whole newtons where that can be."""
-    limits, calibration = rig.control.limits, rig.calibration.model()
-    low_n = max(limits.smallest_force_n, calibration.force_range_n[0])
-    high_n = min(limits.force_max_n, calibration.force_range_n[1])
-    if low_n <= _FORCE_N <= high_n:
-        return _FORCE_N
-    middle_n = 0.5 * (low_n + high_n)
-    return round(middle_n) if low_n <= round(middle_n) <= high_n else round(middle_n, 2)
 
 
 def _reading(value: float | None, unit: str, digits: int) -> str:

@@ -32,6 +32,9 @@ class PlainBank:
     refuse: dict[int, tuple[int, RefusalReason]] = field(default_factory=dict)
     identity: Mapping[int, bytes] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        self.set("map_hash", self.register_map.map_hash)
+
     def set(self, name: str, value: float) -> None:
         register = self.register_map.find(name)
         data = register.encode(value)

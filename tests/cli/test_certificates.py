@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 from click.testing import CliRunner
 from cryptography import x509
 from cryptography.hazmat.primitives import serialization
@@ -130,3 +131,14 @@ def test_what_to_do_next_can_be_pasted(tmp_path: Path) -> None:
     theirs = ["--tls", f"{folder}/ca.crt", "--cert", f"{client}.crt", "--key", f"{client}.key"]
     assert words[3:] == ["--gateway", "[fd00::5]:8802", *theirs]
     assert "bind: fd00::5, port: 8802" in said.output
+
+
+@pytest.mark.parametrize("host", ["::1", "fd00::5", "192.168.125.20", "cell3.local"])
+def test_the_lines_for_the_rig_file_are_yaml_whatever_the_folder_is_called(host: str, tmp_path: Path) -> None:
+    folder = tmp_path / "keys, left: 1"
+    result = CliRunner().invoke(command, ["certs", str(folder), "--host", host])
+    assert result.exit_code == exit_codes.OK, result.output
+    text = result.output.partition("fieldbus:")[2].partition("Then try")[0]
+    (face,) = yaml.safe_load(f"fieldbus:{text}")["fieldbus"]
+    assert face["bind"] == ("127.0.0.1" if host == "cell3.local" else host)
+    assert [Path(face[key]).is_file() for key in ("certificate", "key", "ca")] == [True] * 3

@@ -160,6 +160,25 @@ def test_a_word_of_the_command_that_pack_raw_bytes_would_not_take_loses_no_conne
     assert ("allowed -32768 .. 65535" in client.text) is (abs(given) in (70000, 32769))
 
 
+@pytest.mark.parametrize(
+    ("name", "value"), [("fgSlot", 2.5), ("fgSlot", -1), ("fgSet", -1), ("fgSet", 0.5), ("fgSet", 70000)]
+)
+def test_a_word_of_an_upload_that_pack_raw_bytes_would_not_take_costs_no_force(name: str, value: float) -> None:
+    gateway = GatewayAtHand(MAP)
+    client = Irc5(TEXTS["rapid"], gateway)
+    client.enable(12.0)
+    cycles(client)
+    client.begin_upload(MODEL, 3)
+    if name == "fgSlot":
+        client.set(fgSlot=value)
+    else:
+        client.get("fgSet")[client.get("FG_M_ORDER") - 1] = value
+    cycles(client, 10)
+    assert client.enabled and not client.ended and gateway.uploads == []
+    assert client.text.startswith(name) and "whole" in client.text
+    assert not client.get("fgUpload") and not client.uploaded
+
+
 def test_a_word_of_the_command_of_a_universal_robot_is_whole_and_has_16_bits() -> None:
     gateway = GatewayAtHand(MAP)
     client = UniversalRobot(TEXTS["urscript"], gateway)

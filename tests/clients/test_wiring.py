@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -92,6 +94,50 @@ def test_a_rig_that_answers_another_unit_only_is_asked_as_that_by_every_line(tmp
     (section,) = [each for each in page_of(tmp_path / "own.yaml")["sections"] if each["title"].startswith("mbpoll")]
     assert all("-a 7 " in line or "--unit 7 " in line for line in section["commands"])
     assert load_rig(str(tmp_path / "own.yaml")).network.units == (7,)
+
+
+def test_every_line_to_type_can_be_typed(tmp_path: Path) -> None:
+    """A name with a blank in it, an IPv6 address, a least force of 20 N, a map with other addresses."""
+    shipped = (PROFILES / "registers" / "force-v1.yaml").read_text()
+    moved = re.sub(r"(address|first|last): 1(\d\d)\b", r"\g<1>: 101\2", shipped)
+    (tmp_path / "far.yaml").write_text(re.sub(r"(address|first|last): 1(\d{3})\b", r"\g<1>: 11\2", moved))
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    text = text.replace("bind: 192.168.125.20", 'bind: "fd00::5"').replace("- 192.168.125.0/24", '- "fd00::/64"')
+    text = text.replace("registers: force-v1", "registers: far.yaml").replace(
+        "contact_force_n: 3", "contact_force_n: 20"
+    )
+    text = text.replace("smallest_force_n: 2", "smallest_force_n: 20")
+    text += "\nfieldbus:\n  - {type: rtu, port: /dev/ttyS7, baud: 38400, parity: even, stop_bits: 1, unit: 17}\n"
+    (tmp_path / "left cell.yaml").write_text(text)
+    page = page_of(tmp_path / "left cell.yaml")
+    lines = [line for section in page["sections"] for line in section["commands"]]
+    made = [shlex.split(line) for line in lines if line.startswith("force-gateway registers")]
+    assert {words[words.index("--rig") + 1] for words in made} == {str(tmp_path / "left cell.yaml")}
+    (hold,) = (shlex.split(line) for line in lines if line.startswith("force-gateway hold"))
+    assert hold[2:7] == ["35", "--gateway", "[fd00::5]:5020", "--map", str(tmp_path / "far.yaml")]
+    (serial,) = (line for line in lines if "-m rtu" in line)
+    assert " -r 10101 -c 32 " in serial
+    assert rows_of(page, "Siemens S7-1200/1500: requests")["status"][1] == "410101"
+
+
+@pytest.mark.parametrize(
+    ("owner", "lease_s", "commands"),
+    [
+        ("192.168.125.7", 0.2, "force-gateway hold 12 "),
+        ("192.168.125.7", None, "mbpoll -1 -p 5020 -r 1 192.168.125.20 1 1200 "),
+        ("serial:1", 0.2, ""),
+    ],
+)
+def test_a_rig_that_names_its_owner_says_who_may_type_what(owner: str, lease_s: float | None, commands: str) -> None:
+    """It said that mbpoll keeps no heartbeat where there was no lease, and had anybody hold a force."""
+    rig = load_rig("irc5-cell")
+    supervision = replace(rig.control.supervision, lease_s=lease_s)
+    rig = replace(rig, network=replace(rig.network, owner=owner), control=replace(rig.control, supervision=supervision))
+    section = wiring_page(rig, "irc5-cell")[1][-1]
+    assert section.title.startswith("mbpoll") and f"Only {owner} may command here" in " ".join(section.sentences)
+    assert ("keeps no heartbeat" in " ".join(section.sentences)) is commands.startswith("force-gateway")
+    able = [line for line in section.commands if "enable" in line]
+    assert len(able) == bool(commands) and all(line.startswith(commands) for line in able)
 
 
 def test_a_rig_without_a_lease_is_told_that_its_force_outlives_the_master() -> None:

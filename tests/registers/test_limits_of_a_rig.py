@@ -1,10 +1,13 @@
 """A value at the very end of what a rig allows is taken, in a word as in a float; one beyond is told with the range."""
 
 import struct
+from copy import deepcopy
 
 import pytest
 
 from gateway.codes.refusals import RefusalReason
+from gateway.registers import BankRules, RegisterBank
+from gateway.registers.map.map_reader import read_map
 from tests.calibrations.coefficients import calibration
 
 FORCE, FORCE_FLOAT, MODE_FLOAT, PRECONTACT, VOLTAGE = 1, 202, 206, 7, 5
@@ -24,6 +27,20 @@ def test_the_least_force_of_a_rig_and_0_are_taken_in_words_and_floats(make_bank,
     for act, value in ((master.write, 209), (master.write_float, 2.09)):
         refused = master.refusal(act, FORCE if act == master.write else FORCE_FLOAT, value)
         assert "allowed 0 and 2.1 .. 60 N" in refused.sentence
+
+
+def test_a_force_in_words_without_a_sign_has_its_hundredths_as_a_float_too(document, master_of):
+    """A map of one's own for forces up to 655.35 N: 12.5 N as a float was "not a whole number"."""
+    document = deepcopy(document)
+    force = next(one for one in document["blocks"]["command"]["registers"] if one["name"] == "force_setpoint")
+    force |= {"type": "uint16", "max": 655.35}
+    bank = RegisterBank(read_map(document), BankRules(rig_name="demo", force_max_n=600.0), now=lambda: 7.0)
+    master = master_of(bank, "10.0.0.1")
+    master.write_float(FORCE_FLOAT, 12.5)
+    assert master.word(FORCE) == 1250
+    master.write(FORCE, 50000)
+    assert master.float(FORCE_FLOAT) == 500.0
+    assert "not a whole number" in master.refusal(master.write_float, MODE_FLOAT + 2, 1.5).sentence
 
 
 def test_a_rig_with_all_of_the_maps_force_has_its_own_least(make_bank, master_of):

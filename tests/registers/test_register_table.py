@@ -4,12 +4,14 @@ import csv
 import io
 import json
 import re
+from copy import deepcopy
 
 import pytest
 
 from gateway.modbus import Role
-from gateway.registers import render_block, render_registers
+from gateway.registers import BankRules, RegisterBank, Status, render_block, render_registers
 from gateway.registers.image import RegisterImage
+from gateway.registers.map.map_reader import read_map
 from gateway.registers.words import State
 
 FIELDS = [
@@ -136,3 +138,21 @@ def test_one_block_can_be_shown_alone(register_map):
 def test_an_unknown_form_is_refused(register_map):
     with pytest.raises(ValueError, match="markdown, csv, json"):
         render_registers(register_map, "yaml")
+
+
+def test_the_coils_are_where_the_words_are(document, register_map):
+    assert "Coils 0-15 (FC01, FC05, FC15) are the bits of control_word, coils 100-115" in render_registers(
+        register_map, "markdown"
+    )
+    moved = deepcopy(document)
+    moved["blocks"]["status"] |= {"first": 140, "last": 171}
+    for register in moved["blocks"]["status"]["registers"]:
+        register["address"] += 40
+    bank = RegisterBank(read_map(moved), BankRules(rig_name="own", force_max_n=60.0), now=lambda: 0.0)
+    bank.publish(Status(status_word=0b110))
+    assert bank.read_bits(140, 16) == b"\x06\0"
+    assert "coils 140-155 those of status_word" in render_registers(read_map(moved), "markdown")
+    del moved["blocks"]["command"]["registers"][0]
+    assert "(FC01, FC05, FC15)" not in render_registers(read_map(moved), "markdown"), (
+        "nor are there any without the word"
+    )

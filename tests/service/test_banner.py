@@ -1,16 +1,20 @@
 """What a start says to people and to programs: where everything is, how it is, and lines to try that work there."""
 
 import json
+import shlex
 from dataclasses import replace
 from ipaddress import ip_network
 from math import inf, nan
+from pathlib import Path
 
 import pytest
 
 from gateway.control.settings import LeaseAction
-from gateway.profiles import load_rig
+from gateway.profiles import load_register_map, load_rig
 from gateway.service.banner import Ready, ServedFace, format_banner, ready_fields, tcp_face, try_lines
 from tests.service.rigs import demo, with_supervision
+
+PROFILES = Path(__file__).parents[2] / "profiles"
 
 
 def ready(**changes: object) -> Ready:
@@ -71,6 +75,24 @@ def test_the_command_to_try_names_another_gateway() -> None:
 def test_with_a_lease_the_line_to_try_keeps_a_heartbeat(changes: dict[str, float], expected: str) -> None:
     (line,) = try_lines(with_supervision(demo(), **({"lease_s": 0.2} | changes)), "127.0.0.1", 5020)
     assert line.startswith(expected)
+
+
+def test_a_map_of_one_s_own_is_tried_by_its_own_numbers(tmp_path: Path) -> None:
+    """By those of force-v1, 12 N were 1200 counts of 0.1 N: 120 N."""
+    force = "force_setpoint, address: 1, type: int16, scale: 0.01, unit: N, access: RW, min: 0, max: 327.67"
+    shipped = (PROFILES / "registers" / "force-v1.yaml").read_text()
+    coarse = shipped.replace(force, force.replace("0.01", "0.1"))
+    (tmp_path / "own map.yaml").write_text(coarse)
+    rig = (PROFILES / "rigs" / "demo.yaml").read_text().replace("registers: force-v1", "registers: own map.yaml")
+    (tmp_path / "own rig.yaml").write_text(rig)
+    polled, written, held = try_lines(load_rig(tmp_path / "own rig.yaml"), "127.0.0.1", 5020)
+    assert polled.startswith("mbpoll -1 -p 5020 -r 1 127.0.0.1 1 120 ")
+    for line in (written, held):
+        words = shlex.split(line)
+        assert load_register_map(words[words.index("--map") + 1]).find("force_setpoint").scale == 0.1
+    (kept,) = try_lines(with_supervision(load_rig(tmp_path / "own rig.yaml"), lease_s=0.05), "127.0.0.1", 5020)
+    words = shlex.split(kept)
+    assert Path(words[words.index("--rig") + 1]) == tmp_path / "own rig.yaml"
 
 
 def test_a_valve_and_what_listens_for_http_are_told_where_they_are() -> None:

@@ -28,7 +28,9 @@ def tell_rig(rig: str, directory: Path) -> None:
     """Say on a terminal which rig was taken where none was given, and that there are others."""
     if not is_terminal():
         return
-    others = [name for name in rigs_with_state() if name != Path(rig).stem]
+    from gateway.service.supervisor.run_options import stem_of
+
+    others = [name for name in rigs_with_state() if name != stem_of(rig)]
     more = f"; --rig takes another: {', '.join(others)}" if others else ""
     said = f"rig {rig}, state {directory}{more}"
     click.echo(said if os.environ.get("NO_COLOR") else click.style(said, dim=True), err=True)

@@ -9,6 +9,7 @@ Decisions
 
 import logging
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import isnan
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -115,6 +116,18 @@ class GatewayClient:
             words = self.read_words(first, last - first)
             readings |= {register.address: _reading(register, words, first) for register in group}
         return [readings[register.address] for register in registers]
+
+    def check_map(self) -> None:
+        """Check that the gateway serves the map by which this client would command: in the counts of another one 12 N may be
+        120. CliError E186. A map without a hash is not checked."""
+        found = [register for register in self.register_map.registers if register.name == "map_hash"]
+        with suppress(RefusedError):  # the gateway has it elsewhere
+            if not found or int(self.read_values(found)[0].value) == self.register_map.map_hash:
+                return
+        name = f"{self.register_map.name} (map_hash 0x{self.register_map.map_hash:08X})"
+        raise CliError(
+            f"E186 {self.where} serves another register map than {name}: --map FILE names the one of its rig"
+        )
 
     def frames(self, assignments: Sequence[Assignment]) -> list[Frame]:
         """Return what `write_values` sends: one FC16 per block, more where it is too long or a read-only register lies

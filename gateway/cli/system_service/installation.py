@@ -5,6 +5,7 @@ for anything.
 """
 
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from gateway.processes import exit_codes
 from gateway.profiles.find import list_shipped, locate
 from gateway.profiles.http_sections import split_listen
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
+from gateway.service.supervisor.run_options import stem_of
 
 if TYPE_CHECKING:
     from gateway.profiles import Rig
@@ -48,7 +50,7 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
         _refuse_hidden(path)
     if not _NOT_OF_PROGRAMS.isdisjoint(str(program)):
         raise CliError(f"E107 {program}: systemd starts no program with such a path", exit_codes.CONFIGURATION)
-    if not _STEM.fullmatch(stem := Path(named).stem):
+    if not _STEM.fullmatch(stem := stem_of(named)):
         raise CliError(f"E107 {named}: its name names the unit: letters, digits, _ . - only", exit_codes.CONFIGURATION)
     _refuse_no_networks(networks)
     lines = (rig.output, rig.load_cell, *([rig.valve] if rig.valve else []))
@@ -94,7 +96,7 @@ def install(plan: Installation, root: Path) -> tuple[list[Path], bool]:
             beside.replace(path)
         except PermissionError:
             raise CliError(
-                f"E107 {path}: only root may write there; sudo {' '.join(sys.argv)}, or --root DIR for an image",
+                f"E107 {path}: only root may write there; sudo {shlex.join(sys.argv)}, or --root DIR for an image",
                 exit_codes.PERMISSION,
             ) from None
         written.append(path)

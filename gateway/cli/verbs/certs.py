@@ -1,5 +1,6 @@
 """`certs`: a test CA, the gateway's certificate and those of its clients, and what to do with them."""
 
+import json
 import re
 from datetime import UTC, datetime, timedelta
 from ipaddress import ip_address
@@ -20,6 +21,7 @@ _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,62}")
 _HOST: Final = re.compile(
     r"(?=.{1,253}$)([A-Za-z0-9]([\w-]{0,61}[A-Za-z0-9])?\.)*(?!\d+$)[A-Za-z0-9]([\w-]{0,61}[A-Za-z0-9])?", re.ASCII
 )
+_PLAIN: Final = re.compile(r"[\w/](?:[\w/. -]|:(?! |$))*")
 _TAKEN: Final = ("ca", "gateway")
 
 
@@ -131,18 +133,24 @@ def _say_earlier_end(folder: Path, ends: datetime, days: int) -> None:
         click.echo(f"{folder / 'ca.crt'} ends on {ends:%Y-%m-%d}, and all that it signs no later: {cure}")
 
 
+def _in_yaml(text: str) -> str:
+    """Return a text as it may stand between braces: quoted where a comma or a colon in it would end it."""
+    return text if _PLAIN.fullmatch(text) else json.dumps(text)
+
+
 def _say_next_steps(folder: Path, host: str, clients: dict[str, Role]) -> None:
     name = next(iter(clients), "CLIENT")
     place, address = folder.resolve(), host if _is_address(host) else "127.0.0.1"
     there = f"[{host}]" if ":" in host else host
-    ours = f"certificate: {place}/gateway.crt, key: {place}/gateway.key, ca: {place}/ca.crt"
+    files = {"certificate": "gateway.crt", "key": "gateway.key", "ca": "ca.crt"}
+    ours = ", ".join(f"{key}: {_in_yaml(f'{place}/{file}')}" for key, file in files.items())
     ca, client = quote(f"{folder}/ca.crt"), quote(f"{folder}/{name}")
     click.echo(
         f"""
 In the rig file (force-gateway check FILE looks at all of it; beyond loopback it wants `allow: [NETWORK]` too):
 
 fieldbus:
-  - {{type: tls, bind: {address}, port: 8802, {ours}}}
+  - {{type: tls, bind: {_in_yaml(address)}, port: 8802, {ours}}}
 
 Then try it (port 802 is the standard's, and needs a privilege; 8802 does not):
 

@@ -38,39 +38,48 @@ def command(context: click.Context, *, file: str, probe: bool, port: str | None,
     """
     from gateway.profiles import check_file
 
+    if port and not probe:
+        raise click.UsageError("--port goes with --probe: nothing is asked without it")
     checked = check_file(file)
     document = _document(checked)
     if not as_json:
         _print(file, checked)
-    is_answered = True
+    failed = exit_codes.OK
     if probe and not checked.faults:
-        is_answered, document["probe"] = _probe(checked, port, is_quiet=as_json)
+        failed, document["probe"] = _probe(checked, port, is_quiet=as_json)
     if as_json:
         click.echo(json.dumps(document, indent=2))
-    failed = exit_codes.OK if is_answered else exit_codes.DEVICE
     context.exit(exit_codes.CONFIGURATION if checked.faults else failed)
 
 
-def _probe(checked: "Checked", port: str | None, *, is_quiet: bool) -> tuple[bool, dict[str, Any]]:
-    """Ask what is behind the ports; whether each device is the one that was named, and the probes as JSON."""
+def _probe(checked: "Checked", port: str | None, *, is_quiet: bool) -> tuple[int, dict[str, Any]]:
+    """Ask what is behind the ports; the exit code, OK where each device is the one that was named, and the probes as JSON."""
     from gateway.cli import port_probing as probing
 
+    if checked.kind != ("device" if port else "rig"):
+        raise CliError(
+            "E114 --probe asks the devices of a rig, at the ports that it names; of a device's own file the one at --port PORT",
+            exit_codes.USAGE,
+        )
     if not is_quiet:
         click.echo(f"{'probe':<12} {probing.HARMLESS}")
-    if checked.kind == "device" and port:
-        report = probing.probe_path(port, [checked.value], probing.PATIENCE_S)
-        _tell("device", probing.tell_report(report, is_own_file=True), is_quiet=is_quiet)
-        return bool(report.answers), {"device": probing.report_fields(report)}
-    if checked.kind != "rig":
-        raise CliError(
-            "E114 --probe asks the devices of a rig; for a device's own file say --port PORT", exit_codes.USAGE
-        )
-    is_right, found = True, {}
-    for name, line, report in probing.probe_rig(checked.value):
-        _tell(name, probing.tell_report(report, line), is_quiet=is_quiet)
+    code, found = exit_codes.OK, {}
+    lines = [("device", None)] if port else probing.lines_to_probe(checked.value)
+    for name, line in lines:
+        try:
+            report = (
+                probing.probe_line(line) if line else probing.probe_path(str(port), [checked.value], probing.PATIENCE_S)
+            )
+        except CliError as error:  # the other ports are asked all the same
+            _tell(name, iter([error.message]), is_quiet=is_quiet)
+            found[name] = {"port": line.port if line else port, "error": error.message}
+            code = code or error.exit_code
+            continue
+        _tell(name, probing.tell_report(report, line, is_own_file=line is None), is_quiet=is_quiet)
         found[name] = probing.report_fields(report)
-        is_right = is_right and probing.is_as_named(line, report)
-    return is_right, found
+        if not (probing.is_as_named(line, report) if line else report.answers):
+            code = code or exit_codes.DEVICE
+    return code, found
 
 
 def _tell(name: str, lines: "Iterator[str]", *, is_quiet: bool) -> None:

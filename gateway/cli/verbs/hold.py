@@ -79,6 +79,7 @@ def command(
     force_n = _check_force(register_map, newton)
     with GatewayClient(wire, options["unit"], register_map) as client:
         with explain_refusals(client):
+            client.check_map()
             (heartbeat,) = client.read_values([register_map.find("heartbeat")])
         run = HoldRun(force_n, heartbeat=int(heartbeat.value), resets=options["resets"])
         beat = HeartbeatThread(client, run, lease, time.monotonic)

@@ -1,6 +1,8 @@
 """`init`: a commented rig file to start from. At a terminal it asks for the devices, and the devices; else it asks nothing.
 Overwrites nothing."""
 
+import errno
+import os
 import re
 import sys
 from pathlib import Path
@@ -37,6 +39,8 @@ def command(*, name: str, guided: bool | None) -> None:
         raise click.UsageError(f"{target.stem} is the name of a shipped rig; choose another")
     if target.exists():
         raise already_exists(target, "choose another name")
+    if not os.access(".", os.W_OK):  # before anything is asked
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))
     is_guided = sys.stdin.isatty() and sys.stdout.isatty() if guided is None else guided
     text = _ask(target.stem) if is_guided else starter_rig(target.stem)
     try:
@@ -44,13 +48,15 @@ def command(*, name: str, guided: bool | None) -> None:
             file.write(text)
     except FileExistsError:
         raise already_exists(target, "choose another name") from None
+    most = re.search(r"^  force_max_n: ([\d.]+)", text, re.MULTILINE)
+    force = f"{min(12.0, float(most[1]) if most else 12.0):g}"
     click.echo(f"wrote {target}; next:")
     for line, why in (
         (f"run {target} --sim", "tries it without hardware"),
         ("ports", "lists what to put into the lines marked EDIT"),
         (f"check {target}", "tells every fault with its line"),
         (f"run {target}", "runs it"),
-        ("hold 12", "in another terminal: holds 12 N, with the heartbeat that the rig's lease wants"),
+        (f"hold {force}", f"in another terminal: holds {force} N, with the heartbeat that the rig's lease wants"),
     ):
         click.echo(f"  force-gateway {line:<28} {why}")
 

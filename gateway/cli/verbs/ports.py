@@ -2,12 +2,13 @@
 
 import json
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from gateway.cli.errors import CliError
 from gateway.cli.options import json_option
+from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.ports import PortInfo
@@ -25,7 +26,8 @@ EXAMPLES = ("ports", "ports --json")
     "--seconds", type=click.FloatRange(0.1, 60.0), default=0.5, show_default=True, help="Listen so long at each speed."
 )
 @json_option
-def command(*, paths: tuple[str, ...], listen: bool, seconds: float, as_json: bool) -> None:
+@click.pass_context
+def command(context: click.Context, *, paths: tuple[str, ...], listen: bool, seconds: float, as_json: bool) -> None:
     """List serial ports, by id as rig files want them.
 
     With --listen: what each device says by itself (or only those at the PORTs named), at 9600 to 115200 baud, and which
@@ -34,8 +36,8 @@ def command(*, paths: tuple[str, ...], listen: bool, seconds: float, as_json: bo
     from gateway.ports import list_ports
 
     if listen or paths:
-        _listen(paths or tuple(port.path for port in list_ports()), seconds, as_json=as_json)
-        return
+        failed = _listen(paths or tuple(port.path for port in list_ports()), seconds, as_json=as_json)
+        context.exit(failed if paths else exit_codes.OK)  # of all that there are, some may be in use
     ports = list_ports()
     if as_json:
         click.echo(json.dumps([{"path": port.path} | asdict(port) for port in ports], indent=2))
@@ -47,16 +49,18 @@ def command(*, paths: tuple[str, ...], listen: bool, seconds: float, as_json: bo
         click.echo(f"  {_line(port)}")
 
 
-def _listen(paths: tuple[str, ...], seconds: float, *, as_json: bool) -> None:
+def _listen(paths: tuple[str, ...], seconds: float, *, as_json: bool) -> int:
+    """Return the exit code: of the first port that did not open."""
     from gateway.cli import port_probing as probing
 
-    found = []
+    found, failed = list[dict[str, Any]](), exit_codes.OK
     for path in paths:
         if not as_json:
             click.echo(path)
         try:
             heard = probing.listen_at(path, seconds)
         except CliError as error:
+            failed = failed or error.exit_code
             if as_json:
                 found.append({"port": path, "error": error.message})
                 continue
@@ -69,6 +73,7 @@ def _listen(paths: tuple[str, ...], seconds: float, *, as_json: bool) -> None:
         click.echo(json.dumps(found, indent=2))
     elif not paths:
         click.echo("no serial port of a device found; name one: force-gateway ports --listen /dev/ttyUSB0")
+    return failed
 
 
 def _line(port: "PortInfo") -> str:

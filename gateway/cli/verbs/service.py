@@ -74,9 +74,10 @@ def install_command(*, rig: str, dry_run: bool, networks: tuple[str, ...], progr
 def uninstall_command(*, rig: str, root: Path) -> None:
     """Stop the service of RIG and remove its unit; what it has recorded stays."""
     from gateway.cli.system_service.installation import uninstall
+    from gateway.service.supervisor.run_options import stem_of
 
     try:
-        click.echo(f"removed {uninstall(Path(rig).stem, root)}; /var/lib/force-gateway/{Path(rig).stem} stays")
+        click.echo(f"removed {uninstall(stem_of(rig), root)}; /var/lib/force-gateway/{stem_of(rig)} stays")
     except PermissionError as error:
         raise CliError(f"E107 {error.filename}: only root may remove it", exit_codes.PERMISSION) from None
 
@@ -102,8 +103,9 @@ def _units_of(rig: str | None, root: Path) -> list[str]:
     """Return the unit of a rig, or all that are there. CliError E107 for none."""
     from gateway.cli.system_service.installation import installed_units
     from gateway.cli.system_service.unit_file import unit_name
+    from gateway.service.supervisor.run_options import stem_of
 
-    units = [unit_name(Path(rig).stem)] if rig else installed_units(root)
+    units = [unit_name(stem_of(rig))] if rig else installed_units(root)
     if not units:
         raise CliError("E107 no service is installed: force-gateway service install RIG", exit_codes.DATA)
     return units

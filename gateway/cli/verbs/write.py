@@ -45,6 +45,8 @@ def command(*, assignments: tuple[str, ...], dry_run: bool, wire: "Wire", as_jso
     _refuse_doubles(writes)
     with GatewayClient(wire, options["unit"], register_map) as client:
         with explain_refusals(client):
+            if any(any(each.data) for each in writes):  # what takes something off is never kept back
+                client.check_map()
             frames = client.frames(writes)
         sent: list[Frame] = []
         with _sent_told(client, frames, sent), explain_refusals(client, frames, options["state"]):

@@ -3,7 +3,7 @@
 from gateway.clients.exchange import STATUS_BITS, ExchangeTable, ModelField
 from gateway.registers.map.register_map import Register
 
-_TYPES = {"int16": "float", "float32": "float", "uint16": "uint16_t", "uint32": "uint32_t"}
+_TYPES = {"int16": "float", "float32": "float", "uint16": "uint16_t", "uint32": "uint32_t", "int32": "int32_t"}
 
 
 def spell_c(table: ExchangeTable) -> dict[str, str]:
@@ -43,15 +43,18 @@ def _cases(texts: dict[int, str]) -> str:
 
 def _declare(register: Register) -> str:
     unit = f"   /* {register.unit} */" if register.unit else ""
-    return f"    {_TYPES[register.type]} {register.name};{unit}"
+    kind = "float" if register.type == "uint16" and register.counts_per_unit != 1 else _TYPES[register.type]
+    return f"    {kind} {register.name};{unit}"
 
 
 def _decode(register: Register, first: int) -> str:
-    k, name = register.address - first, register.name
+    k, name, counts = register.address - first, register.name, register.counts_per_unit
     if register.type == "int16":
-        return f"    s->{name} = fg_scaled(w[{k}], {register.counts_per_unit}.0f);"
-    if register.type == "uint32":
-        return f"    s->{name} = ((uint32_t)w[{k}] << 16) | w[{k + 1}];"
+        return f"    s->{name} = fg_scaled(w[{k}], {counts}.0f);"
+    if register.type in ("uint32", "int32"):
+        return f"    s->{name} = ({_TYPES[register.type]})(((uint32_t)w[{k}] << 16) | w[{k + 1}]);"
+    if register.type == "uint16" and counts != 1:
+        return f"    s->{name} = w[{k}] / {counts}.0f;"
     return f"    s->{name} = fg_get_float(w + {k});" if register.type == "float32" else f"    s->{name} = w[{k}];"
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from gateway.clients.exchange import CONTROL_BITS, STATUS_BITS, ExchangeTable, ModelField
+from gateway.clients.exchange import CONTROL_BITS, STATUS_BITS, ExchangeTable, ModelField, s7_address
 from gateway.registers.map.register_map import Register
 
 _SET_BY_THE_BLOCK = ("control_word", "force_setpoint", "heartbeat")
@@ -66,7 +66,7 @@ def spell_scl(table: ExchangeTable) -> dict[str, str]:
         "commit_status": stage["commit_status"],
     }
     octets = {f"ip_{k}": octet for k, octet in enumerate(_octets(host), 1)}
-    places = {f"s7_{name}": str(40001 + address) for name, address in numbers.items()}
+    places = {f"s7_{name}": s7_address(address) for name, address in numbers.items()}
     hexadecimal = {"set_words_hex": f"{part_a + part_b + part_c:04X}", "unit_hex": f"{table.where.unit:02X}"}
     return {**_lists(table, _SCL), **octets, **places, **hexadecimal}
 
@@ -123,11 +123,15 @@ def _constants(table: ExchangeTable, dialect: _Dialect) -> Iterator[str]:
 
 def _kind(register: Register, *, registers: bool) -> str:
     """Return the member's type: whole words that carry bits are words, what has a unit is real."""
-    if register.type in ("int16", "float32"):
+    if register.type in ("int16", "float32") or (_is_scaled_word(register) and not registers):
         return "real"
     if register.words == 2:
         return "dword"
     return "word" if register.bits and not registers else "uint"
+
+
+def _is_scaled_word(register: Register) -> bool:
+    return register.type == "uint16" and register.counts_per_unit != 1
 
 
 def _declare(register: Register, dialect: _Dialect, *, registers: bool) -> str:
@@ -170,6 +174,8 @@ def _decode(register: Register, table: ExchangeTable, dialect: _Dialect) -> str:
     if register.words == 2:
         shifted = f"SHL(IN := WORD_TO_DWORD({first}), N := 16)" if dialect.local else f"SHL(WORD_TO_DWORD({first}), 16)"
         return f"{place}{shifted} OR WORD_TO_DWORD({second});"
+    if _is_scaled_word(register):
+        return f"{place}UINT_TO_REAL(WORD_TO_UINT({first})) / {register.counts_per_unit}.0;"
     return f"{place}{first};" if register.bits else f"{place}WORD_TO_UINT({first});"
 
 

@@ -59,4 +59,5 @@ def _decode(register: Register, first: int) -> str:
         return f"{place}FgScaled(nWords{{{k}}},{register.counts_per_unit});"
     if register.words == 2:
         return f"{place}nWords{{{k}}};\n    fgStatus{{{k + 1}}}:=nWords{{{k + 1}}};"
-    return f"{place}nWords{{{k}}};"
+    counts = register.counts_per_unit
+    return f"{place}nWords{{{k}}};" if counts == 1 else f"{place}nWords{{{k}}}/{counts};"

@@ -105,7 +105,7 @@ typedef struct fg_client {
     uint16_t heartbeat;
     int off_pending, pulls;
     uint16_t asked;             /* control_word on its way: without an answer nobody knows whether it is on */
-    int proven;                 /* byte_order_echo was written over this connection */
+    int proven, seen;           /* byte_order_echo was written, the status was read over this connection */
     uint8_t ended, exception;   /* exception: of the last refused request, 0 none */
     fg_status status;
     uint16_t words[FG_STATUS_WORDS];
@@ -304,7 +304,7 @@ static int fg_connect(fg_client *client) {
     /* A name may have several addresses: "localhost" is ::1 first where there is IPv6, and the gateway listens on 127.0.0.1. */
     for (each = found; each && client->socket < 0; each = each->ai_next) client->socket = fg_connect_address(each, until_ms);
     freeaddrinfo(found);
-    client->proven = 0;
+    client->proven = client->seen = 0;
     if (client->socket >= 0) return FG_OK;
     fg_drop(client, "not accepted in time");
     return FG_LOST;
@@ -400,6 +400,7 @@ static void fg_end(fg_client *client) {
 
 /* The gateway has switched off (a fault, another master, a restart): enable is not repeated, which would be a new rise. */
 static void fg_follow(fg_client *client) {
+    client->seen = 1;
     fg_decode(client->words, &client->status);
     if (client->good[FG_CONTROL_WORD] & FG_ENABLE && !client->status.enabled) fg_end(client);
 }
@@ -441,7 +442,10 @@ void fg_init(fg_client *client, const char *host, uint16_t port, uint8_t unit) {
 }
 
 static int fg_has_changed(const fg_client *client) {
-    return client->off_pending || client->once || memcmp(client->want, client->good, sizeof client->want) != 0;
+    if (client->off_pending || client->once) return 1;
+    /* Another master presses: this write, enable 0 in it, would be its stop. The other words wait. */
+    if (!(client->want[FG_CONTROL_WORD] | client->good[FG_CONTROL_WORD]) && (client->status.enabled || !client->seen)) return 0;
+    return memcmp(client->want, client->good, sizeof client->want) != 0;
 }
 
 /* Writes ${echo_number} to byte_order_echo, once a connection: a rig may want it before the first enable. Where it is refused and that

@@ -167,6 +167,8 @@ ${crc_table}];
   LOCAL VAR num nQuiet:=0;
   ! byte_order_echo was written over this connection
   LOCAL VAR bool bProven:=FALSE;
+  ! The status was read over this connection
+  LOCAL VAR bool bSeen:=FALSE;
   LOCAL VAR num nWant{${command_words}};
   LOCAL VAR num nGood{${command_words}};
   LOCAL VAR num nWords{${status_words}};
@@ -336,6 +338,11 @@ ${crc_table}];
 
   LOCAL FUNC bool FgHasChanged()
     IF bOffPending OR nOnce<>0 RETURN TRUE;
+    IF nWant{FG_C_CONTROL_WORD}=0 AND NOT FgIsOn() THEN
+      ! Another master presses: this write, enable 0 in it, would be its
+      ! stop. The other words wait
+      IF fgEnabled OR NOT bSeen RETURN FALSE;
+    ENDIF
     FOR i FROM 1 TO COMMAND_WORDS DO
       IF nWant{i}<>nGood{i} RETURN TRUE;
     ENDFOR
@@ -427,6 +434,7 @@ ${crc_table}];
   ! The gateway has switched off: do not repeat enable, a new rise
   LOCAL PROC FgFollow()
     FgDecode;
+    bSeen:=TRUE;
     IF FgIsOn() AND NOT fgEnabled THEN
       IF fgFault fgText:=FgFaultText(fgStatus{FG_S_FAULT_CODE});
       IF NOT fgFault fgText:="disabled by the gateway or another master";
@@ -484,6 +492,7 @@ ${status_decoding}
   LOCAL PROC FgConnect()
     SocketClose sdGateway;
     bProven:=FALSE;
+    bSeen:=FALSE;
     SocketCreate sdGateway;
     SocketConnect sdGateway,FG_HOST,FG_PORT\Time:=FG_TIMEOUT;
     fgConnected:=TRUE;
@@ -669,6 +678,10 @@ ${status_decoding}
 
   ! A request per cycle, so that the heartbeat goes on meanwhile
   LOCAL PROC FgUploadPart()
+    IF nUploadStep<4 AND NOT FgSetFits() THEN
+      FgUploadEnd FALSE;
+      RETURN;
+    ENDIF
     TEST nUploadStep
     CASE 0:
       fgUploaded:=FALSE;
@@ -693,6 +706,23 @@ ${status_decoding}
       FgExplain;
     ENDIF
   ENDPROC
+
+  ! What PackRawBytes does not take would cost the connection, and the
+  ! force with it
+  LOCAL FUNC bool FgSetFits()
+    FOR i FROM 1 TO ${set_words} DO
+      IF NOT FgIsWord(fgSet{i}) THEN
+        fgText:="fgSet, place "+NumToStr(i,0)+": allowed 0 .. 65535, whole";
+        RETURN FALSE;
+      ENDIF
+    ENDFOR
+    IF NOT FgIsWord(fgSlot) fgText:="fgSlot: allowed 0 .. 7, whole";
+    RETURN FgIsWord(fgSlot);
+  ENDFUNC
+
+  LOCAL FUNC bool FgIsWord(num nValue)
+    RETURN nValue>=0 AND nValue<=65535 AND nValue=Round(nValue);
+  ENDFUNC
 
   LOCAL PROC FgAskCommit()
     FgFrameRead ${stg_commit_status},3;

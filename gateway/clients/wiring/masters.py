@@ -4,17 +4,16 @@ and a Universal Robot. Addresses come from the exchange table that the generated
 from collections.abc import Iterator
 from dataclasses import replace
 from ipaddress import ip_address
+from shlex import quote
 from typing import Final
 
 from gateway import defaults
-from gateway.clients.exchange import Endpoint, ExchangeTable
+from gateway.clients.exchange import Endpoint, ExchangeTable, s7_address
 from gateway.clients.rendering import endpoint_of, is_no_address
 from gateway.clients.wiring.section import Row, Section
 from gateway.control.settings import LeaseAction
 from gateway.profiles import Rig
 
-_HOLDING: Final = 40001
-"""Name of holding register 0 in S7's MB_MODE 0 and 1."""
 _LOST: Final = {
     LeaseAction.FAULT: "the safe voltage, and fault A310",
     LeaseAction.HOLD: "a warning, and the force is kept (hold)",
@@ -40,7 +39,7 @@ def network_sections(rig: Rig, called: str) -> Iterator[Section]:
         (_codesys, "st", "ForceGateway.st"),
         (_universal_robot, "urscript", "force_gateway.script"),
     ):
-        make = f"force-gateway registers --format {language} --rig {called} > {file}"
+        make = f"force-gateway registers --format {language} --rig {quote(called)} > {file}"
         yield replace(describe(rig, table), commands=(make,))
         if describe is _s7:
             yield _s7_requests(table)
@@ -193,7 +192,7 @@ def _s7_requests(table: ExchangeTable) -> Section:
     ]
     for what, writes, address, words in _requests(table):
         function = 6 if writes and words == 1 else 16 if writes else 3
-        numbers = (int(writes), _HOLDING + address, words, 100 + function, address)
+        numbers = (int(writes), s7_address(address), words, 100 + function, address)
         rows.append((what, *map(str, numbers), f"FC{function:02d}"))
     once = "One MB_CLIENT instance, one request at a time: REQ stays TRUE until DONE or ERROR, then FALSE for a call."
     other = "The second pair of MB_MODE and MB_DATA_ADDR counts from 0, and needs an MB_CLIENT that has it (S7-1200: FW 4.2)."
@@ -264,12 +263,18 @@ def _mbpoll(rig: Rig, table: ExchangeTable) -> Section:
             first = block.repeats["status"] + 2 * (table.at("force_measured", "status").address - status)
             lines.append(f"{base} -t 4:float{order} -r {first + 1} {where.host}    # force_measured in N, {block.name}")
     sentences = ["-r counts from 1: register 1 is address 0."]
-    force_n = min(12.0, rig.control.limits.force_max_n)
+    force_n = rig.force_to_try_n
     counts = round(force_n * table.at("force_setpoint", "command").counts_per_unit)
-    endpoint = f"{where.host}:{where.shown_port}{where.unit_option}"
-    if rig.control.supervision.lease_s is not None or network.owner or network.require_byte_order_echo:
+    endpoint = f"{f'[{where.host}]' if ':' in where.host else where.host}:{where.shown_port}{where.unit_option}"
+    if network.owner:
+        sentences.append(f"Only {network.owner} may command here (network.owner): others read, and disable.")
+    if is_no_address(network.owner):
+        pass  # nobody on plain Modbus TCP
+    elif rig.control.supervision.lease_s is not None or network.require_byte_order_echo:
         sentences.append("mbpoll keeps no heartbeat, so it cannot hold a force here: `hold` does.")
-        lines.append(f"force-gateway hold {force_n:g} --gateway {endpoint}    # enable, heartbeat; Ctrl-C ramps to 0")
+        lines.append(
+            f"force-gateway hold {force_n:g} --gateway {endpoint}{rig.map_option}    # enable, heartbeat; Ctrl-C ramps to 0"
+        )
     else:
         lines.append(f"{base} -r {command + 1} {where.host} 1 {counts}    # enable, {force_n:.2f} N, and it lasts")
     lines.append(f"{base} -r {command + 1} {where.host} 0    # disable: safe voltage")

@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import fields
 from ipaddress import ip_address
+from shlex import quote
 
+from gateway.clients.exchange import ExchangeTable
 from gateway.clients.rendering import endpoint_of
 from gateway.clients.wiring.device_wires import GENERAL, RS485, wires_of
 from gateway.clients.wiring.section import Section
@@ -17,7 +19,7 @@ def serial_sections(rig: Rig) -> Iterator[Section]:
         yield _device_section(name, line)
     for place, face in enumerate(rig.fieldbus, start=1):
         if isinstance(face, RtuFace):
-            yield _face_section(place, face)
+            yield _face_section(place, face, ExchangeTable(rig.register_map, endpoint_of(rig)).status_span)
         else:
             yield _tls_section(place, face, endpoint_of(rig).unit_option)
 
@@ -48,7 +50,7 @@ def _device_section(name: str, line: object) -> Section:
     return Section(f"Serial line: {name}", rows=tuple(rows))
 
 
-def _face_section(place: int, face: RtuFace) -> Section:
+def _face_section(place: int, face: RtuFace, status: tuple[int, int]) -> Section:
     parity = face.parity if face.port else "none"  # a pseudo-terminal has none
     port = face.port or "a pseudo-terminal, which `run` names when it is ready"
     rows = (
@@ -59,8 +61,9 @@ def _face_section(place: int, face: RtuFace) -> Section:
         ("master", "Modbus RTU master of the PLC or robot, 8 data bits, the same settings; one owner per serial face"),
     )
     options = f"-m rtu -b {face.baud} -P {parity} -s {face.stop_bits} -a {face.unit}"
+    first, words = status
     commands = (
-        f"mbpoll -1 {options} -r 101 -c 32 MASTER-PORT    # on the machine at the other end, with its own port",
+        f"mbpoll -1 {options} -r {first + 1} -c {words} MASTER-PORT    # on the machine at the other end, with its own port",
     )
     return Section(f"Serial face {place}: Modbus RTU, masters ask here", rows=rows, commands=commands)
 
@@ -77,7 +80,9 @@ def _tls_section(place: int, face: TlsFace, unit_option: str) -> Section:
     )
     host = "GATEWAY-ADDRESS" if ip_address(face.bind).is_unspecified else face.bind
     where = f"{f'[{host}]' if ':' in host else host}:{face.port or 'PORT'}{unit_option}"
-    try_it = f"force-gateway read state --gateway {where} --tls {face.ca} --cert CLIENT.crt --key CLIENT.key"
+    try_it = (
+        f"force-gateway read state --gateway {where} --tls {quote(str(face.ca))} --cert CLIENT.crt --key CLIENT.key"
+    )
     return Section(
         f"Face {place}: Modbus/TCP Security",
         rows=rows,

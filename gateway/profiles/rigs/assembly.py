@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from shlex import quote
 from typing import Final, TypeVar
 
 from gateway import defaults
@@ -143,7 +144,8 @@ def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
     lines = ", ".join(str(fault.line) for fault in marks)
     what = f"lines {lines} are" if len(marks) > 1 else f"line {lines} is"
     return replace(
-        rig, notes=(*rig.notes, f"{what} still marked EDIT: force-gateway check {display(path)} says what each is")
+        rig,
+        notes=(*rig.notes, f"{what} still marked EDIT: force-gateway check {quote(display(path))} says what each is"),
     )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from ipaddress import ip_address
 from pathlib import Path
+from shlex import quote
 from typing import Any, Final, Self
 
 from gateway import defaults
@@ -15,6 +16,7 @@ from gateway.control.inputs import CalibrationInUse
 from gateway.control.settings import ControlSettings
 from gateway.devices import DeviceProfile, SerialSettings
 from gateway.extras import is_installed, missing_note
+from gateway.profiles.find import display, locate
 from gateway.profiles.http_sections import Metrics, OpcUa, Web
 from gateway.profiles.kinds.plants import PlantProfile
 from gateway.profiles.recordings_section import Retention
@@ -35,6 +37,8 @@ ALWAYS_SUPPORTED: Final = (
     | ControlBit.START_CALIBRATION
 )
 """Control bits that act on every rig; a self-test and a valve act where the rig file has them, else they are refused."""
+
+_FORCE_TO_TRY_N: Final = 12.0
 
 
 def rehearsed(rig: str) -> str:
@@ -165,6 +169,25 @@ class Rig:
     def lacks_device_watchdog(self) -> bool:
         """Decide whether a real output device would hold its last voltage when nobody talks to it any more."""
         return not self.simulated and self.output.device.watchdog == "none"
+
+    @property
+    def map_option(self) -> str:
+        """Return what `hold`, `write` and `read` need beside the address where the rig has a map of its own: by the numbers of
+        another one 12 N may be 120."""
+        file = self.register_map.file
+        shipped = display(locate("registers", defaults.REGISTER_MAP))
+        return "" if file in ("", shipped) else f" --map {quote(file)}"
+
+    @property
+    def force_to_try_n(self) -> float:
+        """12 N, or a force in the middle of what the rig may press with, to whole newtons where that can be."""
+        limits, calibration = self.control.limits, self.calibration.model()
+        low_n = max(limits.smallest_force_n, calibration.force_range_n[0])
+        high_n = min(limits.force_max_n, calibration.force_range_n[1])
+        if low_n <= _FORCE_TO_TRY_N <= high_n:
+            return _FORCE_TO_TRY_N
+        middle_n = 0.5 * (low_n + high_n)
+        return round(middle_n) if low_n <= round(middle_n) <= high_n else round(middle_n, 2)
 
     def model_of(self, calibration: Calibration, model: Bsfm) -> Bsfm:
         """Return the calibration's model as control uses it here: a bent command map is straightened, but for a

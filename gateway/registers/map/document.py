@@ -12,7 +12,7 @@ from itertools import groupby
 from typing import Any, Final
 
 from gateway import defaults
-from gateway.registers.map.register_map import Block, Register, RegisterMap
+from gateway.registers.map.register_map import PLAIN_BLOCKS, Block, Register, RegisterMap
 from gateway.registers.values import WordOrder
 
 MOST_READ, MOST_WRITTEN = 125, 123
@@ -77,10 +77,19 @@ def _markdown(register_map: RegisterMap) -> str:
     about = f"# Register map {register_map.name}, version {register_map.version}\n\n{register_map.text}\n\n"
     about += (
         f"map_hash 0x{register_map.map_hash:08X}. FC03 and FC04 read the same registers; FC06, FC16, FC22 and FC23 write those "
-        "marked RW. Words without a name are reserved: they read 0 and accept only 0. Coils 0-15 (FC01, FC05, FC15) are the "
-        "bits of control_word, coils 100-115 those of status_word; FC02 reads both too.\n"
+        f"marked RW. Words without a name are reserved: they read 0 and accept only 0.{_coils(register_map)}\n"
     )
     return about + "".join(_section(register_map, block) for block in register_map.blocks)
+
+
+def _coils(register_map: RegisterMap) -> str:
+    """Return where the bits of both words are, of a map that has them: at the words' own addresses."""
+    words = {one.name: one.address for one in register_map.registers if one.block in PLAIN_BLOCKS}
+    if not {"control_word", "status_word"} <= words.keys():
+        return ""
+    control, status = (f"{words[name]}-{words[name] + MOST_BITS - 1}" for name in ("control_word", "status_word"))
+    bits = f"are the bits of control_word, coils {status} those of status_word; FC02 reads both too."
+    return f" Coils {control} (FC01, FC05, FC15) {bits}"
 
 
 def _section(register_map: RegisterMap, block: Block) -> str:

@@ -162,13 +162,14 @@ def _add_block(tables: AddressTables, block: Block) -> None:
 
 @dataclass(frozen=True)
 class RegisterMap:
-    """One version of the map. Numbers are frozen within a version."""
+    """One version of the map. Numbers are frozen within a version. file: where it was read from."""
 
     name: str
     version: int
     blocks: tuple[Block, ...]
     registers: tuple[Register, ...]
     text: str = ""
+    file: str = ""
 
     def block(self, name: str) -> Block:
         """Return the block of this name. Raises LookupError where there is none."""

@@ -3,7 +3,7 @@
 So a number has its name in one place. A map may list numbers and names of its own all the same.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from enum import IntEnum, IntFlag
 from typing import Final
 
@@ -12,6 +12,7 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers import words
+from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.residual_cause import ResidualCause
 
 
@@ -47,3 +48,18 @@ BIT_NAMES: Final = {
     "watchdogs": _bits(words.WatchdogBit),
 }
 """Name in a map file -> {bit: name}."""
+
+
+def check_numbers(register_map: RegisterMap) -> None:
+    """Check that no name of the program's own enumerations has another number here: clients and people would take the map's,
+    the gateway its own. ValueError. Names that the program does not know are the map's own words."""
+    for register in register_map.registers:
+        for kind, known, given in (("value", VALUE_NAMES, register.values), ("bit", BIT_NAMES, register.bits)):
+            _check_numbers_of(f"{register.name} has {kind}", known.get(register.name, {}), given)
+
+
+def _check_numbers_of(register: str, known: Mapping[int, str], given: Mapping[int, str]) -> None:
+    numbers = {name: number for number, name in known.items()}
+    for number, name in given.items():
+        if numbers.get(name, number) != number:
+            raise ValueError(f"{register} {number} as {name}, which is {numbers[name]} of a gateway")

@@ -26,6 +26,8 @@ NAMES: Final = (
     "precontact_force", "contact_ramp", "payload", "command_sequence", "in_band_tolerance", "in_band_time",
 )  # fmt: skip
 """Registers of the command block in the order of their offsets: what this code relies on, whatever else a map has."""
+UNITS: Final = ("", "N", "N/s", "", "", "mV", "deg", "N", "ms", "g", "", "N", "ms")
+"""Unit of each: `command` takes their values in these."""
 
 CONTROL_WORD, FORCE_SETPOINT, MODE, HEARTBEAT, VOLTAGE_SETPOINT, SEQUENCE = 0, 1, 3, 4, 5, 10
 _KNOWN_BITS: Final = 1 << 7
@@ -46,6 +48,11 @@ class CommandBlock:
         registers = register_map.registers_of("command")
         if tuple((r.name, r.address - block.first) for r in registers) != tuple((n, k) for k, n in enumerate(NAMES)):
             raise ValueError(f"map {register_map.name}: block command must hold {', '.join(NAMES)} in this order")
+        if foreign := [
+            f"{r.name} in {r.unit or 'counts'}" for r, unit in zip(registers, UNITS, strict=True) if r.unit != unit
+        ]:
+            known = ", ".join(f"{name} in {unit}" for name, unit in zip(NAMES, UNITS, strict=True) if unit)
+            raise ValueError(f"map {register_map.name}: {', '.join(foreign)}; a command is taken with {known}")
         self.values: Values = [0.0] * block.words
         self._shown = self.values
         self._last_words: tuple[int, bytes, Values] = (0, b"", [])  # offset, words, what they mean

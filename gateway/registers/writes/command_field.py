@@ -116,7 +116,7 @@ def command_field(register: Register, rules: BankRules, map_name: str) -> Comman
         name=register.name,
         counts_per_unit=register.counts_per_unit,
         is_signed=register.type == "int16",
-        is_whole=register.type == "uint16",
+        is_whole=register.type == "uint16" and register.scale == 1.0,
         low=low,
         high=high,
         float_low=min(low, float32(low)),

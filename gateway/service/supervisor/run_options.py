@@ -3,8 +3,11 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from gateway import defaults
+
+_ENDS: Final = (".yaml", ".yml", ".json")
 
 
 @dataclass(frozen=True)
@@ -27,10 +30,17 @@ class RunOptions:
         """Directory that holds what the rig keeps between runs."""
         if self.state is not None:
             return self.state
-        return default_state_root() / Path(self.rig).stem
+        return default_state_root() / stem_of(self.rig)
 
 
 def default_state_root() -> Path:
     """Return where the state directories of rigs are that were given none."""
     home = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
     return Path(home) / "force-gateway"
+
+
+def stem_of(rig: str) -> str:
+    """Return what a rig's state directory and service are called: its name, or its file's without the end. Another dot is its
+    own: cell-1.2 is neither cell-1 nor does it take the calibrations of that."""
+    name = Path(rig).name
+    return next((name.removesuffix(end) for end in _ENDS if name.endswith(end) and name != end), name)

@@ -8,11 +8,13 @@ import pytest
 
 from gateway.bsfm import Response
 from gateway.codes.refusals import RefusalReason
-from gateway.profiles import load_calibration
+from gateway.profiles import load_calibration, load_register_map
 from gateway.registers import BankRules, RegisterBank, RegisterMap
 from gateway.registers.command import Status
 from gateway.registers.words import ControlBit, State
 from gateway.registers.writes.proposed_write import EdgeRefusal
+
+PROFILES = Path(__file__).parents[3] / "profiles"
 
 
 @pytest.fixture
@@ -37,6 +39,35 @@ def test_a_force_is_commanded_and_read_back(bank: RegisterBank, gateway: str, ca
     assert facts["state"]["text"] == "holding"
     assert facts["force_measured"]["value"] == 11.97
     assert facts["force_measured@float_cdab"]["value"] == pytest.approx(11.97)
+
+
+FORCE = "force_setpoint, address: 1, type: int16, scale: 0.01, unit: N, access: RW, min: 0, max: 327.67"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "counts"),
+    [
+        (FORCE, FORCE.replace("0.01", "0.1"), 120),
+        ("{name: map_hash, address: 412", "{name: map_hash, address: 430", 1200),
+    ],
+)
+def test_a_gateway_with_a_map_of_its_own_is_not_commanded_by_another(
+    old: str, new: str, counts: int, serve, call, tmp_path: Path
+) -> None:
+    """12 N by force-v1 are 1200 counts, and by a map of tenths 120 N."""
+    (tmp_path / "own.yaml").write_text((PROFILES / "registers" / "force-v1.yaml").read_text().replace(old, new))
+    own = load_register_map(tmp_path / "own.yaml")
+    bank = RegisterBank(own, BankRules(rig_name="own", force_max_n=200.0), now=lambda: 0.0)
+    address = serve(bank).address
+    for words in (("write", "force_setpoint=12", "control_word=1"), ("hold", "12", "--for", "10ms")):
+        refused = call(*words, "--gateway", address)
+        assert refused.exit_code == 1 and "E186 " in refused.stderr and "--map FILE" in refused.stderr
+    assert bank.command.number == 0, "nothing was written"
+    taken = call("write", "force_setpoint=12", "control_word=1", "--gateway", address, "--map", tmp_path / "own.yaml")
+    assert taken.exit_code == 0 and bank.command.force_setpoint_n == 12.0
+    assert bank.read_registers(1, 1) == counts.to_bytes(2, "big")
+    assert call("write", "control_word=0", "--gateway", address).exit_code == 0
+    assert not bank.command.control_word, "a stop is never kept back"
 
 
 def test_a_negative_force_is_not_beyond_a_limit_that_nobody_can_tell(

@@ -131,6 +131,18 @@ def test_an_image_gets_the_files_and_one_unit_a_rig(tmp_path: Path) -> None:
     assert again.exit_code == 65 and "E107" in again.stderr and "force-gateway-irc5-cell.service" in again.stderr
 
 
+def test_a_service_with_a_dot_in_its_name_is_not_another_one(tmp_path: Path) -> None:
+    """`uninstall cell-1.2` stopped and removed cell-1, whose force went with it."""
+    units = tmp_path / "etc/systemd/system"
+    units.mkdir(parents=True)
+    for stem in ("cell-1", "cell-1.2"):
+        (units / f"force-gateway-{stem}.service").write_text("")
+    result = gateway("service", "uninstall", "cell-1.2", "--root", tmp_path)
+    assert result.exit_code == exit_codes.OK, result.output
+    assert [path.name for path in units.iterdir()] == ["force-gateway-cell-1.service"]
+    assert "/var/lib/force-gateway/cell-1.2 stays" in result.output
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [

@@ -375,7 +375,7 @@ class Plc:
             "DWORD_TO_WORD": values(lambda number: number & 0xFFFF),
             "WORD_TO_INT": values(lambda word: word - 65536 if word > 32767 else word),
             "INT_TO_WORD": values(lambda number: number & 0xFFFF),
-            "INT_TO_REAL": values(float),
+            **dict.fromkeys(["INT_TO_REAL", "UINT_TO_REAL"], values(float)),
             "REAL_TO_INT": values(real_to_int),
             "REAL_TO_DWORD": values(lambda number: struct.unpack(">I", struct.pack(">f", number))[0]),
             "DWORD_TO_REAL": values(lambda bits: struct.unpack(">f", struct.pack(">I", bits))[0]),

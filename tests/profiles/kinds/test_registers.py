@@ -85,6 +85,17 @@ SHIPPED = Path(__file__).parents[3] / "profiles"
             "address: 416\n        type: uint16",
             "byte_order_echo is uint16, float32 is needed",
         ),
+        (
+            "contact_ramp, address: 8, type: int16, scale: 1, unit: ms, access: RW, min: 0, max: 10000",
+            "contact_ramp, address: 8, type: int16, scale: 0.001, unit: s, access: RW, min: 0, max: 10",
+            "contact_ramp in s; a command is taken with force_setpoint in N",
+        ),
+        (
+            "bits: control_word",
+            "bits: {0: reset_fault, 1: enable, 2: tare, 3: take_ownership, 4: valve_pull}",
+            "control_word has bit 0 as reset_fault, which is 1 of a gateway",
+        ),
+        ("values: state,", "values: {0: aus, 1: holding},", "state has value 1 as holding, which is 3 of a gateway"),
     ],
 )
 def test_a_map_that_no_gateway_can_serve_is_told_before_it_starts(

@@ -73,6 +73,29 @@ def test_enter_gives_the_load_cell_another_port_than_the_output(monkeypatch: pyt
     assert found.rig.ports() == {"output": paths[0], "load_cell": paths[1]}
 
 
+def test_a_port_that_is_none_or_the_other_device_s_is_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`port: 9` stood in the file, and twice the same port, without a word."""
+    paths = ["/dev/serial/by-id/a", "/dev/serial/by-id/b"]
+    monkeypatch.setattr("gateway.ports.list_ports", lambda: [SimpleNamespace(path=path) for path in paths])
+    result = answered("9", "1", "n", "", "", "y", "1", paths[0], "2", "n", "", "", "98.07", "8")
+    assert "9 is no number of this list" in result.output
+    assert result.output.count(f"{paths[0]} is the output's port already") == 2
+    found = check_report("own.yaml")
+    assert found.rig, [str(fault) for fault in found.faults]
+    assert found.rig.ports() == {"output": paths[0], "load_cell": paths[1]}
+    assert "force-gateway hold 8 " in result.output, "no more than tool and workpiece take"
+
+
+@pytest.mark.parametrize("guided", ["--guided", "--no-guided"])
+def test_a_folder_that_takes_no_file_is_told_before_anything_is_asked(
+    guided: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.cli.verbs.init.os.access", lambda path, mode: False)
+    result = CliRunner().invoke(command, ["init", "own", guided], input="later\n")
+    assert result.exit_code == 77 and result.output == "E105 own.yaml: Permission denied: this user may not\n"
+    assert not any(folder.iterdir())
+
+
 def test_without_a_terminal_nothing_is_asked() -> None:
     result = CliRunner().invoke(command, ["init", "own"])
     assert result.exit_code == 0

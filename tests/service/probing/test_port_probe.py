@@ -117,8 +117,35 @@ def test_what_cannot_be_probed_is_told() -> None:
     assert "E114 rig demo is simulated" in simulated.output
     device = runner.invoke(command, ["check", "smc-itv-rc.yaml", "--probe"])
     assert device.exit_code != 0
-    missing = runner.invoke(command, ["ports", "--listen", "/dev/none"])
-    assert "E102" in missing.output
+    for words in (["/dev/none"], ["/dev/none", "--json"]):
+        missing = runner.invoke(command, ["ports", "--listen", *words])
+        assert "E102" in missing.output and missing.exit_code == exit_codes.DEVICE
+
+
+def test_a_port_that_is_missing_keeps_no_other_one_from_being_asked(tmp_path: Path) -> None:
+    """And `--json` says so in JSON: it said nothing at all."""
+    indicator = FarEnd(load_device("stream-st-gs"))
+    with behind_ptys(indicator) as (cell,):
+        code, said = probe(tmp_path, ["/dev/none", cell])
+        found = CliRunner().invoke(command, ["check", str(tmp_path / "own.yaml"), "--probe", "--json"])
+    assert code == found.exit_code == exit_codes.DEVICE
+    assert "E102 /dev/none is not there" in said and "stream-st-gs answers at 115200 8N1" in said
+    probes = json.loads(found.stdout)["probe"]
+    assert probes["output"]["error"].startswith("E102 /dev/none") and probes["load_cell"]["answers"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["stream-st-gs", "--port", "/dev/none"], "--port goes with --probe"),
+        (["stream-st-gs", "--probe"], "E114 --probe asks the devices of a rig"),
+        (["irc5-cell", "--probe", "--port", "/dev/none"], "E114 --probe asks the devices of a rig"),
+    ],
+)
+def test_a_port_is_of_a_device_s_own_file_and_of_a_probe(words: list[str], told: str) -> None:
+    """It was passed over without a word: a rig's own ports were asked instead."""
+    result = CliRunner().invoke(command, ["check", *words])
+    assert result.exit_code == exit_codes.USAGE and told in result.output
 
 
 @pytest.mark.parametrize(("latency_ms", "is_told"), [(16, True), (1, False), (None, False)])

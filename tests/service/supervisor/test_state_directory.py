@@ -41,6 +41,8 @@ def test_a_rig_without_a_given_directory_has_one_of_its_own_name(
     """Whatever folder its file is in: a rig that is moved keeps its calibrations."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     assert RunOptions(rig="cells/left.yaml").state_directory == tmp_path / "force-gateway" / "left"
+    for rig in ("cells/cell-1.2.yaml", "cell-1.2", "cell-1.2.yml"):  # by its name, as it is told where it has run here
+        assert RunOptions(rig=rig).state_directory == tmp_path / "force-gateway" / "cell-1.2", "not that of cell-1"
     assert RunOptions(rig="left", state=tmp_path / "own").state_directory == tmp_path / "own"
     monkeypatch.delenv("XDG_STATE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path))

@@ -1,0 +1,69 @@
+"""Two masters at one gateway: who commands nothing takes no other master's force, whatever words it has set beside enable."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.c_program import CProgram
+from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
+from tests.clients.scenes import cycles
+
+
+def set_ramp(client: Any) -> None:
+    """50 N/s, in the words of each language."""
+    if isinstance(client, Irc5):
+        client.get("fgCommand")[client.get("FG_C_FORCE_RAMP") - 1] = 500
+    elif isinstance(client, UniversalRobot):
+        client.machine.start("fg_set_command", client.get("FG_C_FORCE_RAMP"), 500)
+    elif isinstance(client, Plc):
+        client.structures[client.NAMES["command"]]["FORCE_RAMP"] = 50.0
+    elif isinstance(client, CProgram):
+        assert client._library.fg_set(client._client, 2, ctypes.c_float(50.0), ctypes.c_float(10.0)) == 0
+    else:
+        client.client.set("force_ramp", 50.0)
+
+
+def held_elsewhere(gateway: GatewayAtHand) -> bool:
+    command = gateway.bank.command
+    return bool(command.control_word & 1) and command.force_setpoint_n == 7.0
+
+
+def test_a_word_that_is_set_while_another_master_presses_is_not_its_stop(client: Any, gateway: GatewayAtHand) -> None:
+    """The whole command goes out with enable 0, which anybody may: a second robot that only set its ramp took the force."""
+    gateway.take_over_from_elsewhere()
+    set_ramp(client)
+    cycles(client)
+    assert held_elsewhere(gateway) and gateway.writes == [] and gateway.requests
+    gateway.stop_from_elsewhere()
+    cycles(client)
+    assert gateway.bank.command.force_ramp_n_per_s == 50.0, "it waited for the other one's end"
+
+
+def test_a_guest_that_connects_again_stops_nobody(client: Any, gateway: GatewayAtHand) -> None:
+    """Each loss of a panel with a ramp in its data was the end of the force that a robot held."""
+    set_ramp(client)
+    cycles(client)
+    gateway.take_over_from_elsewhere()
+    count = len(gateway.writes)
+    gateway.is_cut = True
+    cycles(client, 3)
+    gateway.is_cut = False
+    for _ in range(6):
+        client.cycle(1.0)
+    assert held_elsewhere(gateway) and len(gateway.writes) == count
+
+
+def test_a_word_that_is_set_while_nobody_presses_goes_out_and_with_the_next_enable(
+    client: Any, gateway: GatewayAtHand
+) -> None:
+    set_ramp(client)
+    cycles(client)
+    assert gateway.bank.command.force_ramp_n_per_s == 50.0 and not gateway.bank.command.control_word
+    client.enable(12.0)
+    cycles(client)
+    assert gateway.words[-1][:3] == (1, 1200, 500) and client.enabled
+    client.disable()
+    cycles(client)
+    assert not gateway.bank.command.control_word and not client.enabled

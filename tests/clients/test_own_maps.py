@@ -1,0 +1,134 @@
+"""A map of one's own: what it moves or scales is followed in each language, what it lacks is told instead of left out."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.clients import MissingRegisterError, render_client
+from gateway.profiles import load_register_map
+from gateway.registers import Status
+from tests.clients.conftest import CONTROLLERS
+from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.controllers import S7, Codesys, Irc5
+from tests.clients.programs.python_program import PythonProgram
+from tests.clients.scenes import WHERE, cycles
+from tests.clients.test_controller_rules import LANGUAGES, PROFILES, own_map
+
+TENTHS = (
+    "name: calibration_time_left, address: 130, type: uint16, scale: 1,",
+    "name: calibration_time_left, address: 130, type: uint16, scale: 0.1,",
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("min: 0, max: 5, values: state,", "min: 0, max: 5,", "names of state"),
+        ("values: fault_code\n", "min: 0\n", "names of fault_code"),
+        ("bits: warning_word\n", "min: 0\n", "names of warning_word"),
+        (
+            "values: commit_status,",
+            "values: {0: frei, 3: fertig, 4: failed},",
+            "value committed of commit_status",
+        ),
+        (  # of which the clients' 16#8000, no value, would be 327.68 N
+            "name: force_setpoint, address: 1, type: int16, scale: 0.01, unit: N, access: RW, min: 0, max: 327.67",
+            "name: force_setpoint, address: 1, type: uint16, scale: 0.01, unit: N, access: RW, min: 0, max: 655.35",
+            "type int16 of force_setpoint",
+        ),
+    ],
+)
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_map_without_the_names_that_a_client_says_is_told_so(
+    language: str, old: str, new: str, told: str, tmp_path: Path
+) -> None:
+    """A CASE or an enumeration with nothing in it is no text that a compiler takes, and no commit would ever end."""
+    with pytest.raises(MissingRegisterError, match=f"^map own lacks {told}$"):
+        render_client(own_map(tmp_path, old, new), language, WHERE)
+
+
+def test_a_status_block_that_one_request_cannot_read_is_told(tmp_path: Path) -> None:
+    """The gateway would refuse each read of it, and the client take that for a loss."""
+    text = (PROFILES / "registers" / "force-v1.yaml").read_text()
+    for old, new in (
+        ("first: 200\n    last: 295", "first: 2000\n    last: 2431"),
+        ("first: 300\n    last: 395", "first: 3000\n    last: 3431"),
+        ("{command: 200, status: 232}", "{command: 2000, status: 2032}"),
+        ("{command: 300, status: 332}", "{command: 3000, status: 3032}"),
+        ("last: 131\n", "last: 299\n"),
+        ("name: plant_id, address: 131", "name: plant_id, address: 250"),
+    ):
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    (tmp_path / "wide.yaml").write_text(text)
+    with pytest.raises(MissingRegisterError, match=r"^map force-v1 lacks a status block of at most 125 words$"):
+        render_client(load_register_map(str(tmp_path / "wide.yaml")), "rapid", WHERE)
+
+
+def test_a_word_without_a_sign_is_shown_in_its_unit_too(tmp_path: Path) -> None:
+    changed = own_map(tmp_path, *TENTHS)
+    shown: list[float] = []
+    for language, kind in (("rapid", Irc5), ("scl", S7), ("st", Codesys), ("python", PythonProgram)):
+        gateway = GatewayAtHand(changed)
+        client: Any = kind(render_client(changed, language, WHERE), gateway)
+        gateway.bank.publish(Status(calibration_time_left_s=12.3))
+        cycles(client, 2)
+        if language == "rapid":
+            shown.append(client.get("fgStatus")[client.get("FG_S_CALIBRATION_TIME_LEFT") - 1])
+        elif language == "python":
+            shown.append(client.client.status["calibration_time_left"])
+        else:
+            shown.append(client.output("status")["CALIBRATION_TIME_LEFT"])
+    assert shown == pytest.approx([12.3] * 4)
+
+
+@pytest.mark.skipif(not shutil.which("gcc"), reason="no gcc")
+def test_c_shows_scaled_words_and_numbers_of_two_words_with_their_sign(tmp_path: Path) -> None:
+    wide = own_map(tmp_path, "name: owner_ip, address: 116, type: uint32", "name: owner_ip, address: 116, type: int32")
+    assert "int32_t owner_ip;" in render_client(wide, "c", WHERE)
+    (tmp_path / "force_gateway.h").write_text(render_client(own_map(tmp_path, *TENTHS), "c", WHERE))
+    (tmp_path / "main.c").write_text(
+        '#define FORCE_GATEWAY_IMPLEMENTATION\n#include "force_gateway.h"\n'
+        "int main(void) { uint16_t w[FG_STATUS_WORDS] = {0}; fg_status s; w[30] = 123; fg_decode(w, &s);\n"
+        'printf("%.2f", (double)s.calibration_time_left); return 0; }\n'
+    )
+    subprocess.run(
+        ["gcc", "-std=c99", "-Wall", "-Werror", "-Wno-unused", "main.c", "-o", "it", "-lm"], cwd=tmp_path, check=True
+    )
+    assert subprocess.run([tmp_path / "it"], capture_output=True, text=True, check=True).stdout == "12.30"
+
+
+def test_an_s7_names_registers_from_40001_to_49999_and_from_410000_on(tmp_path: Path) -> None:
+    """50001 is no MB_DATA_ADDR: five digits end at 49999, the six that go further begin at 400001."""
+    shipped = (PROFILES / "registers" / "force-v1.yaml").read_text()
+    moved = re.sub(r"(address|first|last): 1(\d{3})\b", r"\g<1>: 10\2", shipped)
+    (tmp_path / "far.yaml").write_text(moved)
+    scl = render_client(load_register_map(str(tmp_path / "far.yaml")), "scl", WHERE)
+    numbers = dict(re.findall(r"(\w+_ADDR) : UDInt := (\d+);", scl))
+    assert (numbers["STAGE_A_ADDR"], numbers["TAIL_ADDR"], numbers["COMMAND_ADDR"]) == ("410001", "410141", "40001")
+
+
+def test_the_limits_of_a_finer_scale_are_said_whole(tmp_path: Path) -> None:
+    """32.77 is 3 counts more than 32.767: let through, it would be refused, or wrapped."""
+    force = "name: force_setpoint, address: 1, type: int16, scale: 0.01, unit: N, access: RW, min: 0, max: 327.67"
+    finer = force.replace("0.01", "0.001").replace("327.67", "32.767")
+    changed = own_map(tmp_path, force, finer)
+    for language in CONTROLLERS:
+        text = render_client(changed, {"twincat": "st", "codesys": "st"}.get(language, language), WHERE)
+        assert "32.767" in text and "32.77" not in text
+    gateway = GatewayAtHand(changed)
+    client = Irc5(render_client(changed, "rapid", WHERE), gateway)
+    client.enable(32.768)
+    cycles(client)
+    assert not gateway.writes and "0.00 .. 32.767" in client.text
+    client.enable(math.floor(32.767 * 8) / 8)
+    cycles(client)
+    assert struct.pack(">H", 32750) in gateway.requests[-6] + gateway.requests[-5]
