@@ -18,6 +18,7 @@ from gateway.control.force_loop.coming_thrust import ComingThrust
 from gateway.control.force_loop.feedforward import Approach, Feedforward, ModelError
 from gateway.control.force_loop.lag_inverse import LinearizedLagInverse
 from gateway.control.force_loop.lead_compensator import LeadCompensator
+from gateway.control.force_loop.leaping_readings import LeapLimit
 from gateway.control.force_loop.measured_trim import MeasuredTrim
 from gateway.control.force_loop.transient_estimate import TransientEstimate
 from gateway.control.force_loop.trim import TrimIntegral
@@ -44,7 +45,7 @@ class ForceLoop:
 
     def __init__(self, settings: ControlSettings, model: Bsfm, timing: TimingCompensation | None = None) -> None:
         self._timing, self._is_retimed = timing, False
-        self._coming, self._transient = ComingThrust(), TransientEstimate()
+        self._coming, self._transient, self._leaps = ComingThrust(), TransientEstimate(), LeapLimit()
         self._lead: LeadCompensator | LinearizedLagInverse
         self._trim: TrimIntegral | MeasuredTrim = TrimIntegral(settings.trim)
         self._tune(settings, model)
@@ -187,6 +188,7 @@ class ForceLoop:
         self._limiter.make_safe()
         self.feedforward.reset()
         self._trim.reset()
+        self._leaps.forget()
         self._settling.restart()
         self._approach, self.feedforward_v, self.limited_by = Approach(), 0.0, LimitedBy.NONE
         self._was_touching = False  # or the next contact, which is still to come, would count as lost
@@ -269,6 +271,9 @@ class ForceLoop:
     def _learn(self, inputs: LoopInputs, moved_n: float, given_n: float) -> None:
         law, trim = self.feedforward, self._trim
         trim.travel(moved_n)
+        if inputs.reading.is_new and inputs.reading.is_usable:
+            believed_n = self._leaps.take(inputs.reading.contact_n)
+            inputs = inputs._replace(reading=inputs.reading._replace(contact_n=believed_n))
         if law.applied_n <= 0.0:
             trim.reset()
         elif isinstance(trim, MeasuredTrim):
