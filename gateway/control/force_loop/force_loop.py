@@ -18,7 +18,6 @@ from gateway.control.force_loop.coming_thrust import ComingThrust
 from gateway.control.force_loop.feedforward import Approach, Feedforward, ModelError
 from gateway.control.force_loop.lag_inverse import LinearizedLagInverse
 from gateway.control.force_loop.lead_compensator import LeadCompensator
-from gateway.control.force_loop.leaping_readings import LeapLimit
 from gateway.control.force_loop.measured_trim import MeasuredTrim
 from gateway.control.force_loop.transient_estimate import TransientEstimate
 from gateway.control.force_loop.trim import TrimIntegral
@@ -28,6 +27,7 @@ from gateway.control.settings import ControlSettings, LoopTiming, Trim
 from gateway.control.state_table import StateEvent
 from gateway.control.supervision.fault_detection import StopCause, stop_cause
 from gateway.control.supervision.in_band import SettlingCheck
+from gateway.control.supervision.leaping_readings import LeapLimit
 from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.registers.words import LimitedBy, Mode
 

@@ -2,8 +2,9 @@
 
 A digit that was disturbed on a wire without a checksum, or a spike of an amplifier, is one reading; a force that has really
 moved so far shows in the next one as well. So the trim learns from a leap a reading later, and nothing from one that is alone:
-at 100 Hz one reading that was 50 N off moved a held force by 2 N, for a second. Over-force, contact and plausibility count
-readings themselves.
+at 100 Hz one reading that was 50 N off moved a held force by 2 N, for a second. The same holds for the force at rest that the
+first rise is judged from: one false reading of a slow cell right before an enable was a wrong gain. Over-force and contact
+count readings themselves.
 """
 
 from math import inf

@@ -1,11 +1,13 @@
-"""One reading that is false, by a digit that was disturbed on its wire or a spike, moves no force that is held."""
+"""One reading that is false, by a disturbed digit or a spike, moves no force that is held, and blames nobody."""
 
 from dataclasses import replace
 
 import pytest
 
-from gateway.control.force_loop.leaping_readings import LEAP_N, LeapLimit
+from gateway.codes.faults import FaultCode
+from gateway.control.supervision.leaping_readings import LEAP_N, LeapLimit
 from gateway.devices.messages import ForceSample
+from gateway.registers.words import State
 from tests.control.bench import Bench, enabled, settings
 
 HELD_N = 30.0
@@ -35,6 +37,20 @@ def test_one_false_reading_does_not_move_a_held_force(said_n: float, every_ms: i
     assert any(record.sample and record.sample.force_n == said_n for record in bench.history[seen:])
     moved_n = max(abs(record.force_n - held_n) for record in bench.history[seen:])
     assert moved_n < MOST_MOVED_N
+
+
+@pytest.mark.parametrize("said_n", [-40.0, -20.0, 40.0])
+def test_one_false_reading_right_before_an_enable_is_no_wrong_gain(said_n: float) -> None:
+    """It was the force at rest that the first rise was judged from: a fault A303, at the machine that had none."""
+    bench = Bench(settings(sample_timeout_s=0.25), seed=2)
+    bench.sample_every_ms = 100
+    bench.run(2.05)
+    spoil_one(bench, said_n)
+    bench.run(0.1)
+    bench.enable(HELD_N)
+    bench.run(0.1)  # with the reading behind it
+    bench.enable(HELD_N)
+    assert bench.run(3.0).state is State.HOLDING and bench.last.fault is FaultCode.NONE
 
 
 def test_a_leap_is_believed_as_soon_as_a_second_reading_says_so() -> None:
