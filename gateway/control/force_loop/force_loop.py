@@ -56,7 +56,7 @@ class ForceLoop:
         self.limited_by = LimitedBy.NONE
         self._approach = Approach()
         self._settling = SettlingCheck(settings.supervision.unreachable_s)
-        self._was_touching = False
+        self._was_touching = self._has_leapt = False
         self._wanted_v = 0.0
 
     def take_timing(self, timing: TimingCompensation | None) -> None:
@@ -272,8 +272,7 @@ class ForceLoop:
         law, trim = self.feedforward, self._trim
         trim.travel(moved_n)
         if inputs.reading.is_new and inputs.reading.is_usable:
-            believed_n = self._leaps.take(inputs.reading.contact_n)
-            inputs = inputs._replace(reading=inputs.reading._replace(contact_n=believed_n))
+            self._has_leapt = self._leaps.take(inputs.reading.contact_n) != inputs.reading.contact_n
         if law.applied_n <= 0.0:
             trim.reset()
         elif isinstance(trim, MeasuredTrim):
@@ -301,7 +300,7 @@ class ForceLoop:
 
     def _may_learn(self, inputs: LoopInputs) -> bool:
         free = self.limited_by is _NONE or self.limited_by is _TRIM_RANGE  # of the step before
-        return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and free
+        return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and free and not self._has_leapt
 
     def _step_voltage(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
         self._trim.reset()

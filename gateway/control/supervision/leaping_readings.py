@@ -2,17 +2,15 @@
 
 A digit that was disturbed on a wire without a checksum, or a spike of an amplifier, is one reading; a force that has really
 moved so far shows in the next one as well. So the trim learns from a leap a reading later, and nothing from one that is alone:
-at 100 Hz one reading that was 50 N off moved a held force by 2 N, for a second. The same holds for the force at rest that the
-first rise is judged from: one false reading of a slow cell right before an enable was a wrong gain. Over-force and contact
-count readings themselves.
+at 100 Hz one that was 50 N off moved a held force by 2 N, for a second. It passes such a reading over: a part of a true leap
+is a wrong force, too: of a cell of 10 Hz each step is one. The self-test, and the force at rest that the first rise is judged
+from, take the part: there one false reading was a wrong sign, span or gain. Over-force and contact count readings themselves.
 """
 
 from math import inf
 from typing import Final
 
-LEAP_N: Final = (
-    3.0  # more than a force moves from one reading to the next where the trim may learn, and than usual noise
-)
+LEAP_N: Final = 3.0  # more than usual noise, and than a force that is held moves from one reading to the next
 
 
 class LeapLimit:
