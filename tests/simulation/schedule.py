@@ -265,7 +265,7 @@ class Simulation:
                 self.observer.note_status(pdu, at_s)
                 self.status.note(pdu[2:], at_s - DELAY_S)
                 self.reasons.judge(pdu[2:], at_s - DELAY_S)
-                self.held_force.note(pdu[2:], at_s - DELAY_S)
+                self.held_force.note(pdu[2:], at_s - DELAY_S, CABLES["load_cell"].spoiled_s)
                 self.explained.note(pdu[2:], at_s - DELAY_S, self.reasons.disturbed_s)
         self.reader.heard.clear()
         self.reader.ask(read_pdu(STATUS_FIRST, STATUS_WORDS))

@@ -126,6 +126,17 @@ def test_a_held_force_in_its_band_is_left_alone_and_so_is_one_that_has_begun_lat
     assert observer.broken == []
 
 
+@pytest.mark.parametrize(("late_s", "state", "is_seen"), [(0.1, 3, False), (0.5, 3, True), (0.1, 4, True)])
+def test_a_look_at_a_false_reading_tells_nothing_of_the_force_but_a_fault_is_seen(
+    observer: Observer, late_s: float, state: int, is_seen: bool
+) -> None:
+    held = HeldForce(observer, 2.0)
+    held.expect(HELD_N, 1.0)
+    words = [0, state, 6000] + [0] * (STATUS_WORDS - 3)
+    held.note(struct.pack(f">{STATUS_WORDS}h", *words), 5.0 + late_s, 5.0)
+    assert bool(observer.broken) is is_seen
+
+
 def test_true_registers_are_left_alone(observer: Observer) -> None:
     witness = StatusWitness(observer, lambda: 1.0)
     witness.note_write(OWNER, write_pdu(0, 1, 1200), 1.85)

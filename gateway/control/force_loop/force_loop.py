@@ -27,6 +27,7 @@ from gateway.control.settings import ControlSettings, LoopTiming, Trim
 from gateway.control.state_table import StateEvent
 from gateway.control.supervision.fault_detection import StopCause, stop_cause
 from gateway.control.supervision.in_band import SettlingCheck
+from gateway.control.supervision.leaping_readings import LeapLimit
 from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.registers.words import LimitedBy, Mode
 
@@ -44,7 +45,7 @@ class ForceLoop:
 
     def __init__(self, settings: ControlSettings, model: Bsfm, timing: TimingCompensation | None = None) -> None:
         self._timing, self._is_retimed = timing, False
-        self._coming, self._transient = ComingThrust(), TransientEstimate()
+        self._coming, self._transient, self._leaps = ComingThrust(), TransientEstimate(), LeapLimit()
         self._lead: LeadCompensator | LinearizedLagInverse
         self._trim: TrimIntegral | MeasuredTrim = TrimIntegral(settings.trim)
         self._tune(settings, model)
@@ -55,7 +56,7 @@ class ForceLoop:
         self.limited_by = LimitedBy.NONE
         self._approach = Approach()
         self._settling = SettlingCheck(settings.supervision.unreachable_s)
-        self._was_touching = False
+        self._was_touching = self._has_leapt = False
         self._wanted_v = 0.0
 
     def take_timing(self, timing: TimingCompensation | None) -> None:
@@ -187,6 +188,7 @@ class ForceLoop:
         self._limiter.make_safe()
         self.feedforward.reset()
         self._trim.reset()
+        self._leaps.forget()
         self._settling.restart()
         self._approach, self.feedforward_v, self.limited_by = Approach(), 0.0, LimitedBy.NONE
         self._was_touching = False  # or the next contact, which is still to come, would count as lost
@@ -269,6 +271,8 @@ class ForceLoop:
     def _learn(self, inputs: LoopInputs, moved_n: float, given_n: float) -> None:
         law, trim = self.feedforward, self._trim
         trim.travel(moved_n)
+        if inputs.reading.is_new and inputs.reading.is_usable:
+            self._has_leapt = self._leaps.take(inputs.reading.contact_n) != inputs.reading.contact_n
         if law.applied_n <= 0.0:
             trim.reset()
         elif isinstance(trim, MeasuredTrim):
@@ -296,7 +300,7 @@ class ForceLoop:
 
     def _may_learn(self, inputs: LoopInputs) -> bool:
         free = self.limited_by is _NONE or self.limited_by is _TRIM_RANGE  # of the step before
-        return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and free
+        return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and free and not self._has_leapt
 
     def _step_voltage(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
         self._trim.reset()

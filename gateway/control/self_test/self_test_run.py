@@ -3,7 +3,8 @@
 Nothing passes the stated force, whatever the calibration in use expects: the first level is below half of it, reached slowly;
 the second is set by what the first one has shown; and at every reading a force near the stated one ends the test. A run of
 its own, asked as a ladder is: the controller's supervision goes on, and a fault of it is the verdict on what it is about
-(items.report_of).
+(items.report_of). A reading that leaps counts whole only when the next one says so, too: a digit that was disturbed on the wire
+is no wrong sign or span.
 """
 
 from enum import Enum
@@ -43,6 +44,7 @@ from gateway.control.self_test.measurements import (
     still_rises,
 )
 from gateway.control.supervision.fault_detection import StopCause
+from gateway.control.supervision.leaping_readings import LeapLimit
 from gateway.registers.words import CalibrationPhase
 
 REST_S: Final = 3.0  # the first of which lets a force from before leave
@@ -83,7 +85,7 @@ class SelfTestRun:
         self._rest_n = self._first_n = self._second_n = 0.0
         self._first_count = 0
         self.noise_n = 0.0
-        self._lines = LineWatch()
+        self._lines, self._leaps = LineWatch(), LeapLimit()
         self._levels: Levels | None = None
         self._pressures: list[tuple[float, float]] = []
 
@@ -133,8 +135,9 @@ class SelfTestRun:
             self._began_s = self._stage_s = now_s
         if reading.is_new and reading.is_usable:
             at_s = now_s - reading.age_s
-            self._trace.append((at_s - self._stage_s, reading.cell_n))
-            self._all.append((at_s, reading.cell_n))
+            believed_n = self._leaps.take(reading.cell_n)
+            self._trace.append((at_s - self._stage_s, believed_n))
+            self._all.append((at_s, believed_n))
             self._lines.note_reading(at_s)
             if self._stage is _Stage.HOLD and self._lines.pressure_pa > 0.0:
                 self._pressures.append((at_s, self._lines.pressure_pa))

@@ -18,6 +18,7 @@ from typing import Final
 from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
 from gateway.control.sample_conditioning import Reading
+from gateway.control.supervision.leaping_readings import LeapLimit
 
 _SMOOTHING_S: Final = 0.05  # of the measured rise: five readings of a 100 Hz cell
 _LASTING_S: Final = 0.3  # a violation must last this long: impacts and lag do not
@@ -89,16 +90,16 @@ class RiseCheck:
 
     def __init__(self, contact_threshold_n: float) -> None:
         """smooth_n: the cell force behind a low-pass, for judgement and sentences."""
-        self._threshold_n = contact_threshold_n
-        self.smooth_n = self._behind_n = 0.0
+        self._threshold_n, self._leaps = contact_threshold_n, LeapLimit()
+        self.smooth_n = self._calm_n = self._behind_n = 0.0
         self._readings = 0
         self.start()
 
     def start(self) -> None:
-        """Take the force at rest, at an enable. A positive rest counts as residual force in contact, not as zero error."""
-        self._at_rest_n = self.smooth_n
-        self._base_n = min(self.smooth_n, self._threshold_n)
-        self._lowest_n = self.smooth_n
+        """Take the force at rest, at an enable. A positive rest counts as residual force in contact, not as zero error; one
+        reading alone that leapt counts as none: it would make the whole rise too high, or too low."""
+        self._at_rest_n = self._lowest_n = self._calm_n
+        self._base_n = min(self._calm_n, self._threshold_n)
         self._wrong_sign_s = self._wrong_gain_s = self._right_gain_s = 0.0
         self._proven = False
         self.is_too_high = False
@@ -124,12 +125,15 @@ class RiseCheck:
             self._readings += 1
             weight = max(1.0 / self._readings, reading.interval_s / (_SMOOTHING_S + reading.interval_s))
             self.smooth_n += (reading.cell_n - self.smooth_n) * weight
+            self._calm_n += (self._leaps.take(reading.cell_n) - self._calm_n) * weight
             self._lowest_n = min(self._lowest_n, self.smooth_n)
             self._behind_n += (self.smooth_n - self._behind_n) * reading.interval_s / (_TREND_S + reading.interval_s)
 
     def shift(self, moved_n: float) -> None:
         """Take over a zero that has moved: what was measured before reads that much less now."""
+        self._leaps.forget()
         self.smooth_n -= moved_n
+        self._calm_n -= moved_n
         self._behind_n -= moved_n
         self._at_rest_n -= moved_n
         self._lowest_n -= moved_n

@@ -159,3 +159,21 @@ def test_a_fault_of_the_supervision_is_the_verdict_on_what_it_is_about() -> None
 def test_a_second_self_test_has_the_next_number() -> None:
     rig = SelfTestRig(1, 0.0)
     assert [rig.tested().number, rig.tested().number] == [1, 2]
+
+
+@pytest.mark.parametrize("said_n", [-20.0, 60.0])
+@pytest.mark.parametrize("at_s", [3.5, 3.9, 5.0, 7.0])
+def test_one_reading_that_was_disturbed_on_its_wire_fails_no_machine(at_s: float, said_n: float) -> None:
+    """It was a sign to be turned, or a span that is wrong, by a force that nobody had pressed."""
+    rig = SelfTestRig(5, FORCE_N)
+    begun_s, said = rig.now_s, list[float]()
+
+    def read(force_n: float) -> float:
+        if said or rig.now_s < begun_s + at_s:
+            return force_n
+        said.append(said_n)
+        return said_n
+
+    rig.reading = read
+    report = rig.tested()
+    assert said and report.result is SelfTestResult.PASSED, report.sentences

@@ -32,3 +32,13 @@ def test_a_reading_that_is_old_or_none_neither_counts_nor_breaks_a_count(nothing
     assert not detector.update(pressed)
     assert not detector.update(between)
     assert detector.update(pressed)
+
+
+@pytest.mark.parametrize("interval_s", [0.1, 0.4])
+def test_one_sample_of_a_slow_cell_alone_ends_no_contact(interval_s: float) -> None:
+    """Of a cell of 10 Hz one that was false stood for a tenth of a second: the force fell to the pre-contact one."""
+    detector = ContactDetector(0.5)
+    felt(detector, 20.0, 20.0)
+    nothing, pressed = (Reading(n, n, interval_s=interval_s, is_new=True, is_usable=True) for n in (0.0, 20.0))
+    assert detector.update(nothing) and detector.update(pressed) and detector.update(nothing)
+    assert not detector.update(nothing)

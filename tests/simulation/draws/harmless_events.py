@@ -32,7 +32,9 @@ COMMANDS_END = 400
 APART_S = 1.0
 """Between two moments in which a sample or an answer is lost: more than one in a row may cost the force."""
 TRUTHFUL = ("late", "lost", "doubled")
-"""What may happen to a reading of the cell or the valve: it is gone, or late. A cut one is another number in some protocols."""
+"""What may happen to an answer of the cell or the valve: it is gone, or late. A cut one is another number in some protocols."""
+FALSE = "digit"
+"""And to one reading of the cell: a number that it has not said."""
 QUIET = ("calibrate", "self_test", "reset", "let_go", "tare", "burst")
 """What another master may do to stop the force, by right."""
 ENABLE, TAKE = 1, 8
@@ -99,7 +101,7 @@ def _is_harmless(event: Event) -> bool:
         case "machine":
             return event.what in (*DISKS, "disk_free", "clock_jump", "stop")
         case "load_cell" | "valve":
-            return event.what == "push" or event.what in TRUTHFUL
+            return event.what in ("push", *TRUTHFUL) or (event.what == FALSE and event.whom == "load_cell")
         case "output":
             return event.what not in ("pull", "power", "torn", "say")
         case "bus":

@@ -1,0 +1,30 @@
+"""Believe a reading that leaps only as far as the one before lets it be believed.
+
+A digit that was disturbed on a wire without a checksum, or a spike of an amplifier, is one reading; a force that has really
+moved so far shows in the next one as well. So the trim learns from a leap a reading later, and nothing from one that is alone:
+at 100 Hz one that was 50 N off moved a held force by 2 N, for a second. It passes such a reading over: a part of a true leap
+is a wrong force, too: of a cell of 10 Hz each step is one. The self-test, and the force at rest that the first rise is judged
+from, take the part: there one false reading was a wrong sign, span or gain. Over-force and contact count readings themselves.
+"""
+
+from math import inf
+from typing import Final
+
+LEAP_N: Final = 3.0  # more than usual noise, and than a force that is held moves from one reading to the next
+
+
+class LeapLimit:
+    """Told of each usable reading in its order."""
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget what was read before: the next one is believed whole."""
+        self._low_n, self._high_n = -inf, inf
+
+    def take(self, force_n: float) -> float:
+        """Return as much of this reading as is believed, N."""
+        believed_n = max(self._low_n, min(self._high_n, force_n))
+        self._low_n, self._high_n = min(force_n, believed_n) - LEAP_N, max(force_n, believed_n) + LEAP_N
+        return believed_n
