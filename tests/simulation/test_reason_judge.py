@@ -42,14 +42,15 @@ def test_a_payload_explains_too_much_force_and_nothing_else(fault: int) -> None:
     assert len(observer.broken) == (fault != 4)
 
 
-def test_a_reason_of_long_ago_is_none() -> None:
+@pytest.mark.parametrize(("fault", "whom", "after_s"), [(7, "output", 1.5), (6, "load_cell", 3.0)])
+def test_a_reason_of_long_ago_is_none(fault: int, whom: str, after_s: float) -> None:
     observer = Observer(BOUNDS)
     judge = ReasonJudge(observer)
-    judge.note("output", 9.0)
-    look(judge, 7, 10.0)
-    look(judge, 0, 10.1)
+    judge.note(whom, 9.0)
+    look(judge, fault, 8.9 + after_s)
+    look(judge, 0, 9.0 + after_s)
     assert not observer.broken
-    look(judge, 7, 10.6)
+    look(judge, fault, 9.1 + after_s)
     assert [line.partition(" at ")[0] for line in observer.broken] == ["reason"]
 
 

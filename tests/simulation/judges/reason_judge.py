@@ -12,6 +12,8 @@ from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Observer
 
 AFTER_S = 1.5
 """So long after its cause has ended a fault may still begin: the longest bound on silence, and two looks."""
+RISE_S = 3.0
+"""The same of a wrong gain: it is judged over the whole first rise, which may have begun with a disturbed cell."""
 REOPENED_S = 3.0
 """So long one may be refused: a port that is back is opened within two seconds."""
 EVER_S = 1e6
@@ -38,7 +40,7 @@ REASONS: dict[int, tuple[str, ...]] = {
     22: (OUTPUT,),
 }
 """Of a number in fault_code: whose disturbance may be its cause. Of those that are not here none ever is."""
-MASTER_LOST, OVER_FORCE = 1, 4
+MASTER_LOST, OVER_FORCE, GAIN_WRONG = 1, 4, 6
 REFUSED: dict[int, tuple[float, tuple[str, ...]]] = {
     13: (EVER_S, (OUTPUT, MACHINE)),
     14: (REOPENED_S, (CELL, MACHINE)),
@@ -92,7 +94,8 @@ class ReasonJudge:
         before, self._fault = self._fault, words[10] if words[1] == FAULT else 0
         if self._fault in (0, before, MASTER_LOST) or (self._fault == OVER_FORCE and self.has_payload):
             return
-        self._judge_blame(f"fault {self._fault}", REASONS.get(self._fault, ()), at_s)
+        after_s = RISE_S if self._fault == GAIN_WRONG else AFTER_S
+        self._judge_blame(f"fault {self._fault}", REASONS.get(self._fault, ()), at_s, after_s)
 
     def _judge_refusal(self, refusal: int, at_s: float) -> None:
         before, self._refusal = self._refusal, refusal
