@@ -18,7 +18,7 @@ UNSTABLE: Final = "may be another adapter after a replug: `force-gateway ports` 
 
 _POLLED_S: Final = 0.3  # three questions of an idle line: what a watchdog that any sentence feeds must outlast
 _ROLES: Final = {"output": DeviceRole.OUTPUT, "load_cell": DeviceRole.LOAD_CELL}
-_ARTICLE: Final = {DeviceRole.OUTPUT: "an output", DeviceRole.LOAD_CELL: "a load cell"}
+_ARTICLE: Final = {DeviceRole.OUTPUT: "an output", DeviceRole.LOAD_CELL: "a load cell", DeviceRole.VALVE: "a valve"}
 
 
 def lines_of(parts: Parts) -> Iterator[tuple[str, OutputFile | CellFile, DeviceProfile | None]]:
@@ -35,7 +35,7 @@ def of_role(device: DeviceProfile | None, role: DeviceRole) -> DeviceProfile | N
 
 
 def check_device_roles(parts: Parts) -> Found:
-    """Yield a fault for a device at the wrong end: an output named as load cell, or the reverse."""
+    """Yield a fault for a device at the wrong end: an output named as load cell, say."""
     for key, _, device in lines_of(parts):
         if device and device.role is not _ROLES[key]:
             yield f"{key}.device", f"{device.name} is {_ARTICLE[device.role]}, {_ARTICLE[_ROLES[key]]} is needed here"

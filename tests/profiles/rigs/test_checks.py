@@ -61,6 +61,8 @@ def messages(faults: tuple[object, ...]) -> list[str]:
          "accept_no_device_watchdog: must be true: smc-itv-rc has no watchdog and keeps its last output"),
         ("device: stream-st-gs", "device: smc-itv-rc", "load_cell.device: smc-itv-rc is an output, a load cell is needed here"),
         ("device: smc-itv-rc", "device: stream-st-gs", "output.device: stream-st-gs is a load cell, an output is needed here"),
+        ("device: smc-itv-rc", "device: mcu-valve", "output.device: mcu-valve is a valve, an output is needed here"),
+        ("device: stream-st-gs", "device: mcu-valve", "load_cell.device: mcu-valve is a valve, a load cell is needed here"),
         ("device: smc-itv-rc", "port: /dev/ttyS0\n  device: smc-itv-rc",
          "output.port: a simulated rig has no ports: delete this line, or write `simulated: false`"),
         ("sign: 1", "unit: kg", "load_cell.unit: stream-st-gs says its unit in each frame"),
