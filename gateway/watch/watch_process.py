@@ -22,7 +22,6 @@ from gateway import progress
 from gateway.extras import MissingExtraError
 from gateway.processes import exit_codes
 from gateway.processes.beside_control import exit_with_guardian, yield_to_others
-from gateway.recording.ring import RingReader
 from gateway.side_by_side import one_after_another
 from gateway.watch.memory import give_large_arrays_back_at_once, resident_mb, return_memory
 from gateway.watch.processor_budget import ProcessorBudget
@@ -30,6 +29,7 @@ from gateway.watch.processor_budget import ProcessorBudget
 if TYPE_CHECKING:
     from gateway.diagnosis import Diagnosis, Measurement
     from gateway.profiles import Rig
+    from gateway.recording.ring import RingReader
     from gateway.twin.plant import Plant
     from gateway.watch.force_watch import ForceWatch, PlantSince
     from gateway.watch.residual_watch import Watch, WindowComparison
@@ -52,7 +52,7 @@ def report_to_control(state: Path, message: dict[str, Any]) -> dict[str, Any]:
     return {}
 
 
-def make_watch(ring: RingReader, options: dict[str, Any]) -> tuple["Watch", "ForceWatch"]:
+def make_watch(ring: "RingReader", options: dict[str, Any]) -> tuple["Watch", "ForceWatch"]:
     """Return the watch over the rig, and that over the force. Everything heavy is imported here."""
     from gateway.plants.in_use import with_selected_plant
     from gateway.profiles.kept_rig import unchanged_rig
@@ -117,10 +117,11 @@ def work_gently() -> Iterator[None]:
 def watch_forever(options: dict[str, Any]) -> None:
     """Look, tell, sleep; for ever. Begin anew where another plant has come into use. The look at the force is cheap, so it is
     told before the other begins, which may take long."""
+    time.sleep(options["window_s"])
+    from gateway.recording.ring import RingReader
     from gateway.watch.reference_recording import FirstGoodRecording, read_reference_recording
 
     ring, state, budget = RingReader(options["ring"]), Path(options["state"]), ProcessorBudget()
-    time.sleep(options["window_s"])
     with work_gently():
         watch, force = make_watch(ring, options)
     last_plant: PlantSince | None = None
@@ -184,13 +185,18 @@ def main(arguments: list[str]) -> int:
     """Watch until the guardian ends. arguments: descriptor of the link, options as JSON."""
     yield_to_others()
     exit_with_guardian(socket.socket(fileno=int(arguments[0])))
-    from gateway.profiles.kept_rig import ChangedRigError
-
     try:
         watch_forever(json.loads(arguments[1]))
-    except (MissingExtraError, ChangedRigError) as why:  # numba is there, or nobody had started us, and does not load
+    except _told_in_words() as why:
         sys.stderr.write(f"{why}\n")
     return exit_codes.DEVICE
+
+
+def _told_in_words() -> tuple[type[Exception], ...]:
+    """Return the errors that a sentence says all of. Asked once something is raised: the rig's modules are heavy."""
+    from gateway.profiles.kept_rig import ChangedRigError
+
+    return MissingExtraError, ChangedRigError  # numba is there, or nobody had started us, and does not load
 
 
 if __name__ == "__main__":

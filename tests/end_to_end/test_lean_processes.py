@@ -67,6 +67,24 @@ def test_each_process_imports_only_what_it_needs(statement, absent):
     assert loaded_by(statement).isdisjoint(absent)
 
 
+def test_the_watch_loads_nothing_of_the_rig_before_there_is_a_window():
+    """It waits for that beside a gateway that starts, and takes no processor from it meanwhile."""
+    code = """
+import socket, sys, time
+from gateway.watch import watch_process
+
+guardian, link = socket.socketpair()
+time.sleep = lambda window_s: print(window_s, *sys.modules) or sys.exit()
+watch_process.main([str(link.detach()), '{"ring": 0, "state": "", "window_s": 60, "every_s": 20}'])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    waited_s, *modules = done.stdout.split()
+    assert waited_s == "60"
+    rooms = {name.split(".")[1] for name in modules if name.startswith("gateway.")}
+    assert rooms.isdisjoint({"profiles", "recording", "control", "devices", "registers", "twin", "diagnosis"})
+    assert {"numpy", "yaml", "pydantic"}.isdisjoint(modules)
+
+
 def test_a_gateway_without_the_extra_holds_a_force_and_records(tmp_path):
     """Only the residual watch is off, and one line says so."""
     gateway = start(tmp_path / "state", "--sim", "--record", environment=lean_environment(tmp_path))

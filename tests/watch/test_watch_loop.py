@@ -78,13 +78,13 @@ def scene(monkeypatch: pytest.MonkeyPatch) -> Scene:
     ring = SimpleNamespace(newest=lambda count: b"", columns=())
     for name, stand_in in {
         "time": clock,
-        "RingReader": lambda descriptor: ring,
         "make_watch": scene.make,
         "report_to_control": scene.hear,
         "work_gently": nullcontext,
         "resident_mb": lambda: 1.0,
     }.items():
         monkeypatch.setattr(watch_process, name, stand_in)
+    monkeypatch.setattr("gateway.recording.ring.RingReader", lambda descriptor: ring)
     room = "gateway.watch.reference_recording"
     monkeypatch.setattr(f"{room}.read_reference_recording", lambda state: scene.reference(scene.now_s))
     monkeypatch.setattr(f"{room}.FirstGoodRecording", lambda state: SimpleNamespace(keep=lambda now_s: None))
