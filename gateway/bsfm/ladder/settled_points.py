@@ -2,8 +2,9 @@
 
 By the recording contract `command_v` holds until the next row and `force_n` is read before it acts, so a row's force
 belongs to the command of the row before. A dwell is a stretch of one command; its point is the mean of the last quarter,
-which is as settled as the dwell let it become. A table with one row per stair has no dwell to look into; whether its
-forces belong to their own row or to the row before is decided at the turning points, where the two differ.
+which is as settled as the dwell let it become, without a reading that alone is far off. A table with one row per stair has
+no dwell to look into; whether its forces belong to their own row or to the row before is decided at the turning points,
+where the two differ.
 """
 
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.bsfm.fit.projected_problem import Floats
+from gateway.bsfm.ladder.lone_reading import without_lone_reading
 
 Integers = NDArray[np.int64]
 
@@ -112,7 +114,7 @@ def _squares_about_line(values: Floats) -> float:
 
 def _tail(force_n: Floats) -> Floats:
     count = max(FEWEST_TAIL_ROWS, round(TAIL_SHARE * len(force_n)))
-    return force_n[-min(count, max(1, len(force_n) // 2)) :]
+    return np.array(without_lone_reading(force_n[-min(count, max(1, len(force_n) // 2)) :].tolist()))
 
 
 def _one_row_each(time_s: Floats, command_v: Floats, force_n: Floats) -> Points:

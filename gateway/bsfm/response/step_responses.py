@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from gateway.bsfm.drive_map import DriveMap
+from gateway.bsfm.ladder.lone_reading import without_lone_reading
 from gateway.bsfm.ladder.settled_points import SAME_V, TAIL_SHARE
 from gateway.bsfm.model import Bsfm
 from gateway.bsfm.response.response_model import PATH_POINTS, Floats, Lags, StepResponse, missing_share
@@ -101,7 +102,11 @@ def _plateaus(time_s: Floats, command_v: Floats) -> list[_Plateau]:
 
 def _mean_settled_n(force_n: Floats, plateau: _Plateau) -> float:
     rows = force_n[plateau.first + 1 : plateau.end + 1]
-    return float(np.mean(rows[-tail_rows(len(rows)) :])) if len(rows) else float(force_n[plateau.last])
+    return (
+        float(np.mean(without_lone_reading(rows[-tail_rows(len(rows)) :].tolist())))
+        if len(rows)
+        else float(force_n[plateau.last])
+    )
 
 
 def _correct_ends(settled_n: list[float], plateaus: list[_Plateau], time_s: Floats, lags: Lags) -> list[float]:

@@ -79,7 +79,7 @@ class Feedforward:
 
     def reset(self) -> None:
         """Forget everything: vented, nothing applied."""
-        self.applied_n = self.aimed_n = self.reference_n = 0.0
+        self.applied_n = self.aimed_n = self.reference_n = self._given_n = 0.0
         self._delayed.restart(0.0)
         self._trend.restart()
         self._remember(self.model.reversal.start())
@@ -118,8 +118,9 @@ class Feedforward:
 
     def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float, gravity_n: float = 0.0) -> float:
         """Move the applied target towards the goal; returns by how much, N. gravity_n: of it, what does not come from
-        the slide: the payload's weight, forces from outside. The aim is where the target will be ahead_s later: on its ramp,
-        and where the goal itself moves steadily, on the goal's way; on a fast ramp it stays nearer, so that it remains one."""
+        the slide: the payload's weight, forces from outside; it is there at once, and the slide makes room for it no sooner
+        than it follows. The aim is where the target will be ahead_s later: on its ramp, and where the goal itself moves
+        steadily, on the goal's way; on a fast ramp it stays nearer, so that it remains one."""
         self._trend.advance(goal_n, dt_s)
         self._pace.earn(dt_s)
         last_n = self.applied_n
@@ -130,6 +131,7 @@ class Feedforward:
         aimed_n, self.aimed_n = self.aimed_n, self._aim_n(goal_n, rate_n_per_s)
         self._turn(aimed_n - gravity_n, self.aimed_n - gravity_n)
         delayed_n = self._delayed.advance(self.applied_n, dt_s)
+        self.reference_n, self._given_n = self.reference_n + gravity_n - self._given_n, gravity_n
         self.reference_n += (delayed_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
         self._carry_over_v -= self._carry_over_v * dt_s / (_CARRY_OVER_S + dt_s)
         return moved_n
@@ -209,7 +211,7 @@ class Feedforward:
     def take_over(self, force_n: float, branch_share: float = RISING, gravity_n: float = 0.0) -> None:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump: what a swapped calibration
         carries over was for a voltage of ours. gravity_n as in `advance`."""
-        self._carry_over_v = 0.0
+        self._carry_over_v, self._given_n = 0.0, gravity_n
         self.applied_n = self.aimed_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
         self._delayed.restart(self.applied_n)
         self._remember(self.model.reversal.at(branch_share))

@@ -27,7 +27,7 @@ from gateway.control.settings import ControlSettings, LoopTiming, Trim
 from gateway.control.state_table import StateEvent
 from gateway.control.supervision.fault_detection import StopCause, stop_cause
 from gateway.control.supervision.in_band import SettlingCheck
-from gateway.control.supervision.leaping_readings import LeapLimit
+from gateway.control.supervision.leaping_readings import LeapCheck
 from gateway.control.supervision.plausibility import ExpectedForce
 from gateway.registers.words import LimitedBy, Mode
 
@@ -45,7 +45,7 @@ class ForceLoop:
 
     def __init__(self, settings: ControlSettings, model: Bsfm, timing: TimingCompensation | None = None) -> None:
         self._timing, self._is_retimed = timing, False
-        self._coming, self._transient, self._leaps = ComingThrust(), TransientEstimate(), LeapLimit()
+        self._coming, self._transient, self._leaps = ComingThrust(), TransientEstimate(), LeapCheck()
         self._lead: LeadCompensator | LinearizedLagInverse
         self._trim: TrimIntegral | MeasuredTrim = TrimIntegral(settings.trim)
         self._tune(settings, model)
@@ -272,7 +272,7 @@ class ForceLoop:
         law, trim = self.feedforward, self._trim
         trim.travel(moved_n)
         if inputs.reading.is_new and inputs.reading.is_usable:
-            self._has_leapt = self._leaps.take(inputs.reading.contact_n) != inputs.reading.contact_n
+            self._has_leapt = self._leaps.passes_over(inputs.reading.contact_n)
         if law.applied_n <= 0.0:
             trim.reset()
         elif isinstance(trim, MeasuredTrim):

@@ -17,6 +17,7 @@ from math import sqrt
 from typing import Final, NamedTuple
 
 from gateway.bsfm import Bsfm
+from gateway.bsfm.ladder.lone_reading import without_lone_reading
 from gateway.bsfm.ladder.plan import RESPONSE_GROUP
 from gateway.codes.faults import FaultCode
 from gateway.control.messages import gain_sentence, ladder_silent_sentence, sign_sentence
@@ -206,14 +207,14 @@ class LadderRun:
         while len(window) > FEWEST_READINGS and window[0][0] < now_s - ZERO_S:
             window.popleft()
         if waited_s >= ZERO_S and len(window) >= FEWEST_READINGS and (self._is_still() or waited_s >= MOST_DWELL_S):
-            forces = [force_n for _, force_n in window]
+            forces = self._forces_n()
             self.rest_n = sum(forces) / len(forces)
             self.noise_n = sqrt(sum((force - self.rest_n) ** 2 for force in forces) / (len(forces) - 1))
             self._begin_next(now_s, self.rest_n)
 
     def _is_still(self) -> bool:
         """No drift beyond the noise, which neighbouring readings tell: a drift counts little between them."""
-        forces = [force_n for _, force_n in self._window]
+        forces = self._forces_n()
         noise_n = sqrt(sum((b - a) ** 2 for a, b in pairwise(forces)) / (2.0 * (len(forces) - 1)))
         return self._drift_n() <= max(SMALLEST_DRIFT_N, SETTLED_SIGMA * noise_n * sqrt(4.0 / len(forces)))
 
@@ -244,8 +245,11 @@ class LadderRun:
     def _is_spare(self, now_s: float) -> bool:
         return self._window[0][0] < now_s - WINDOW_S and len(self._window) > FEWEST_READINGS
 
+    def _forces_n(self) -> list[float]:
+        return without_lone_reading([force_n for _, force_n in self._window])
+
     def _drift_n(self) -> float:
-        forces = [force_n for _, force_n in self._window]
+        forces = self._forces_n()
         half = len(forces) // 2
         return abs(sum(forces[-half:]) - sum(forces[:half])) / half
 
@@ -254,7 +258,7 @@ class LadderRun:
         return max(SMALLEST_DRIFT_N, SETTLED_SIGMA * self.noise_n * sqrt(4.0 / len(self._window)))
 
     def _row(self, dwell_s: float, *, settled: bool) -> LadderRow:
-        forces = [force_n for _, force_n in self._window]
+        forces = self._forces_n()
         row = LadderRow(self._stair, sum(forces) / len(forces), dwell_s, settled, self.rest_n)
         self.done += 1
         self.unsettled += not settled

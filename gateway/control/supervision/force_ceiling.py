@@ -14,7 +14,7 @@ from gateway.bsfm.ladder.plan import RISING
 from gateway.control.runs.ladder_run import LadderRow
 from gateway.control.sample_conditioning import Reading
 
-_SAMPLES: Final = 3  # whose mean is compared, as over-force takes three
+_SAMPLES: Final = 3  # in a row, as over-force takes; a mean of them would be reached by one false reading alone
 _LEAST_MARGIN_N: Final = 0.4  # below force_max_n: a few counts of a usual amplifier (0.1 N)
 _SIGMAS: Final = 3.0  # of the noise of single readings, where that is more
 
@@ -34,8 +34,8 @@ class ForceCeiling:
 
     @property
     def measured_n(self) -> float:
-        """Contact force of the last samples, 0 before the first."""
-        return sum(self._recent_n) / len(self._recent_n) if self._recent_n else 0.0
+        """Contact force that none of the last samples is below, 0 before the first."""
+        return min(self._recent_n, default=0.0)
 
     def observe(self, reading: Reading) -> None:
         """Take in every reading."""

@@ -5,12 +5,16 @@ moved so far shows in the next one as well. So the trim learns from a leap a rea
 at 100 Hz one that was 50 N off moved a held force by 2 N, for a second. It passes such a reading over: a part of a true leap
 is a wrong force, too: of a cell of 10 Hz each step is one. The self-test, and the force at rest that the first rise is judged
 from, take the part: there one false reading was a wrong sign, span or gain. Over-force and contact count readings themselves.
+
+Two false readings in a row seldom say the same. So behind one that was passed over the trim passes one more that agrees neither
+with it nor with those before; not where readings leapt shortly before, for of a force that shakes none agree.
 """
 
 from math import inf
 from typing import Final
 
 LEAP_N: Final = 3.0  # more than usual noise, and than a force that is held moves from one reading to the next
+CALM_READINGS: Final = 5  # that did not leap, behind which two leaps in a row are doubted
 
 
 class LeapLimit:
@@ -28,3 +32,28 @@ class LeapLimit:
         believed_n = max(self._low_n, min(self._high_n, force_n))
         self._low_n, self._high_n = min(force_n, believed_n) - LEAP_N, max(force_n, believed_n) + LEAP_N
         return believed_n
+
+
+class LeapCheck:
+    """Told of each usable reading in its order."""
+
+    def __init__(self) -> None:
+        self._limit, self._believed_n = LeapLimit(), 0.0
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget what was read before: the next one is believed whole."""
+        self._limit.forget()
+        self._calm = CALM_READINGS
+        self._leapt_n: float | None = None  # by the reading before, behind calm ones
+
+    def passes_over(self, force_n: float) -> bool:
+        """Decide whether nothing may be learned from this reading, N."""
+        leapt_n, self._leapt_n = self._leapt_n, None
+        if self._limit.take(force_n) != force_n:
+            self._leapt_n, self._calm = (force_n if self._calm >= CALM_READINGS else None), 0
+            return True
+        if leapt_n is not None and min(abs(force_n - leapt_n), abs(force_n - self._believed_n)) > LEAP_N:
+            return True
+        self._calm, self._believed_n = self._calm + 1, force_n
+        return False

@@ -39,8 +39,9 @@ def reading(contact_n: float, *, is_usable: bool = True) -> Reading:
     return Reading(cell_n=contact_n, contact_n=contact_n, is_new=True, is_usable=is_usable)
 
 
-def test_one_spike_is_not_the_force_of_now() -> None:
-    ceiling = ceiling_at(35.0, 0.0)
+@pytest.mark.parametrize("before_n", [35.0, 48.0])
+def test_one_spike_is_not_the_force_of_now(before_n: float) -> None:
+    ceiling = ceiling_at(before_n, 0.0)
     ceiling.observe(reading(MOST_N + 10.0))
     assert not ceiling.is_reached(0.0)
     ceiling.observe(reading(MOST_N + 10.0))
