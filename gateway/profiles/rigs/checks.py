@@ -159,12 +159,13 @@ def check_calibration_range(parts: Parts) -> Found:
 
 
 def check_calibration_against_cell(parts: Parts) -> Found:
-    """Yield a fault for a calibration that the load cell cannot have measured, or whose force at the safe voltage counts
-    as stuck."""
+    """Yield a fault for a calibration of this rig that its load cell cannot have measured, or one whose force at the safe
+    voltage counts as stuck. Another rig's may go beyond this cell: force_max_n bounds what is used of it."""
     if (calibration := parts.calibration) is None:
         return
     largest = max(map(abs, (*calibration.rising_handles_n, *calibration.falling_handles_n)))
-    if parts.load_cell and largest > parts.load_cell.range_n:
+    measured_here = is_own(calibration, parts.name, parts.plant if parts.simulated else None)
+    if parts.load_cell and measured_here and largest > parts.load_cell.range_n:
         cell = f"load_cell.range_n = {newton(parts.load_cell.range_n)}"
         yield "calibration", f"{calibration.name} has a handle of {largest:.1f} N, beyond {cell}"
     if parts.limits and parts.supervision:

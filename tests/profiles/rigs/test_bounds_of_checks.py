@@ -134,14 +134,14 @@ BOUNDS: tuple[tuple[Check, str, Parts, Parts], ...] = (
     (
         checks.check_calibration_against_cell,
         "calibration",
-        calibration(),
-        calibration(falling_handles_n=(*HANDLES[:-1], 98.1)),
+        calibration(rig="own"),
+        calibration(rig="own", falling_handles_n=(*HANDLES[:-1], 98.1)),
     ),
     (
         checks.check_calibration_against_cell,
         "calibration",
-        calibration(),
-        calibration(rising_handles_n=(-98.1, *HANDLES[1:])),
+        calibration(rig="another", falling_handles_n=(*HANDLES[:-1], 98.1)),
+        calibration(rig="own", rising_handles_n=(-98.1, *HANDLES[1:])),
     ),
     (
         checks.check_calibration_against_cell,
