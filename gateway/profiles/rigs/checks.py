@@ -212,6 +212,14 @@ def check_real_rig(parts: Parts) -> Found:
         yield "calibration", f"{origin}: its forces are a guess until you run `force-gateway calibrate`"
 
 
+def check_rest_voltage(parts: Parts) -> Found:
+    """Yield a warning for a safe voltage above what a force of 0 is given: who enables goes below it."""
+    if (limits := parts.limits) and limits.safe_voltage_v > limits.voltage_min_v:
+        below = f"0 N while enabled is voltage_min_v = {volt(limits.voltage_min_v)}, less than the safe voltage"
+        cure = f"if that may drop the tool, write voltage_min_v: {number(limits.safe_voltage_v)}"
+        yield "limits.safe_voltage_v", f"{volt(limits.safe_voltage_v)}: {below}; {cure}"
+
+
 def check_contact_threshold(parts: Parts) -> Found:
     """Yield a warning for a precontact force that is too small to feel contact with."""
     if (defaults := parts.defaults) is None:
@@ -286,4 +294,10 @@ FAULTS: Final[tuple[Check, ...]] = (
     check_simulated_plant,
     check_compensation,
 )
-WARNINGS: Final[tuple[Check, ...]] = (check_real_rig, check_contact_threshold, check_plant_supply, check_pace)
+WARNINGS: Final[tuple[Check, ...]] = (
+    check_real_rig,
+    check_rest_voltage,
+    check_contact_threshold,
+    check_plant_supply,
+    check_pace,
+)

@@ -126,6 +126,12 @@ BOUNDS: tuple[tuple[Check, str, Parts, Parts], ...] = (
         for key in ("lease_s", "stall_s", "sample_timeout_s", "output_timeout_s")
     ),
     (
+        checks.check_rest_voltage,
+        "limits.safe_voltage_v",
+        limits(safe_voltage_v=2.0, voltage_min_v=2.0),
+        limits(safe_voltage_v=2.0, voltage_min_v=1.99),
+    ),
+    (
         checks.check_contact_threshold,
         "defaults.precontact_force_n",
         defaults(precontact_force_n=0.51),
