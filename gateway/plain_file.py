@@ -11,7 +11,7 @@ import errno
 import os
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, Final, Literal
 
@@ -80,6 +80,15 @@ def read_plain(path: Path | str) -> bytes:
     """Return all that a plain file holds. OSError for what else has its name."""
     with open_plain_stream(path) as stream:
         return stream.read()
+
+
+def replaced_by(path: Path) -> Path:
+    """Return the place of a file that is written beside it and renamed: where a link leads to. OSError where something else
+    than a plain file stands: root would make a device such as /dev/null a file, for everybody."""
+    place = Path(os.path.realpath(path))
+    with suppress(FileNotFoundError):
+        check_plain(place)
+    return place
 
 
 def write_whole(descriptor: int, data: bytes | memoryview) -> None:

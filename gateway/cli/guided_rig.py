@@ -24,8 +24,12 @@ _LATER: Final = "later"
 _OVER: Final = 1.3  # of force_max_n: where the over-force fault trips, unless the cell ends before
 _SATURATION: Final = 0.98  # of the cell's range
 _LEAST_TIMEOUT_S: Final = 0.05  # and of the starter rig
-_TOLERANCE_N: Final = 1.0  # of the starter rig
-_ATTEMPTS: Final = 3  # of answers that check refuses; then the file is written with its faults told
+_TOLERANCE_N: Final = 1.0  # of the starter rig, as the three below it
+_SMALLEST_N: Final = 2.0
+_PRECONTACT_N: Final = 3.0
+_CONTACT_N: Final = 0.5
+_MOST_N: Final = 40.0
+_ATTEMPTS: Final = 3  # to mend answers that check refuses; then the file is written with its faults told
 Settings = dict[tuple[str, str], Any]
 
 
@@ -51,16 +55,13 @@ def ask_rig(name: str) -> str:
     _ask_line(rig, "output", "output", "the DAC or pressure regulator")
     _ask_line(rig, "load_cell", "load cell", "the load-cell amplifier")
     _ask_forces(rig)
-    for _ in range(_ATTEMPTS):
+    for left in range(_ATTEMPTS, -1, -1):
         faults = list(faults_of(rig))
-        if not faults:
-            break
         for path, sentence in faults:
             click.echo(f"  {path}: {sentence}")
-        if any(path.startswith("limits.") for path, _ in faults):
-            _ask_forces(rig)
-        else:
+        if not left or not any(path.startswith("limits.") for path, _ in faults):
             break
+        _ask_forces(rig)
     return rig.text()
 
 
@@ -174,21 +175,27 @@ def _fit_supervision(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None
     if per_unit:
         count_n = reading.step * per_unit
         said["supervision", "sample_quantum_n"] = f"{count_n:.3g}"
-        if count_n > _TOLERANCE_N:
-            said["defaults", "in_band_tolerance_n"] = f"{2.0 * count_n:.2g}"
 
 
 def _ask_forces(rig: GuidedRig) -> None:
     positive = click.FloatRange(0, min_open=True)
     range_n = click.prompt("rated force of the load cell, N", default=98.07, type=positive)
     most_n = click.prompt(
-        "largest force that tool and workpiece take, N", default=round(0.4 * range_n, 1), type=positive
+        "largest force that tool and workpiece take, N", default=round(min(0.4 * range_n, _MOST_N), 1), type=positive
+    )
+    band_n, count_n = (
+        min(_TOLERANCE_N, most_n / 10.0),
+        float(rig.settings.get(("supervision", "sample_quantum_n"), 0.0)),
     )
     rig.settings |= {
         ("load_cell", "range_n"): f"{range_n:g}",
         ("limits", "force_max_n"): f"{most_n:g}",
         ("limits", "over_force_n"): f"{min(_OVER * most_n, 0.95 * range_n):.4g}",
         ("supervision", "saturation_n"): f"{_SATURATION * range_n:.4g}",
+        ("limits", "smallest_force_n"): f"{min(_SMALLEST_N, most_n / 10.0):.2g}",
+        ("defaults", "precontact_force_n"): f"{min(_PRECONTACT_N, most_n / 5.0):.2g}",
+        ("defaults", "contact_threshold_n"): f"{min(_CONTACT_N, most_n / 10.0):.2g}",
+        ("defaults", "in_band_tolerance_n"): f"{2.0 * count_n if count_n > band_n else band_n:.2g}",
     }
 
 

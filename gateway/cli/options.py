@@ -112,6 +112,11 @@ def _gateway_option(default: str | None, gateway_help: str) -> Callable[[Any], A
 
 def gateway_options(function: Function) -> Function:
     """Add --gateway, --rtu and what belongs to it, --unit and --map: which server to speak to, how, and by which names."""
+    return map_option(wire_options(DEFAULT_ENDPOINT, "Where the gateway's Modbus TCP is.")(function))
+
+
+def map_option(function: Function) -> Function:
+    """Add --map; the function receives `map_name`."""
     from gateway.cli.command_line.completion_words import complete_maps
 
     option = click.option(
@@ -122,7 +127,7 @@ def gateway_options(function: Function) -> Function:
         shell_complete=complete_maps,
         help="Register map (name or file).",
     )
-    return option(wire_options(DEFAULT_ENDPOINT, "Where the gateway's Modbus TCP is.")(function))
+    return option(function)
 
 
 def wire_options(default: str | None, gateway_help: str) -> Callable[[Function], Function]:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway import VERSION
-from gateway.plain_file import check_plain, open_plain_stream
+from gateway.plain_file import check_plain, open_plain_stream, replaced_by
 from gateway.processes.durable_file import sync_path
 
 _MANIFEST: Final = "backup.json"
@@ -43,6 +43,7 @@ _DAMAGE: Final = (tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError, Valu
 def pack(state: Path, target: Path) -> list[str]:
     """Write everything of `state` to `target`; the names packed. OSError when either cannot be used."""
     files: list[Path] = []
+    target = replaced_by(target)
     with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as stream:
         beside = Path(stream.name)
         try:

@@ -23,6 +23,7 @@ from typing import Any, Final
 from gateway import VERSION
 from gateway.cli.errors import CliError
 from gateway.defaults import HOST
+from gateway.plain_file import replaced_by
 
 EVENT_LINES: Final = 2000
 _LIBRARIES: Final = ("numpy", "scipy", "pymodbus", "pyserial", "pydantic", "uvloop", "numba", "pyarrow", "starlette")
@@ -87,6 +88,7 @@ def collect(state: Path, rig_texts: Callable[[], Iterable[tuple[str, str]]]) -> 
 
 def pack_bundle(parts: dict[str, str], target: Path) -> None:
     """Write the parts as a tar.gz; OSError when the disk does not take it. Nothing half stays behind."""
+    target = replaced_by(target)
     beside = target.with_name(f".{target.name}.part")
     try:
         with tarfile.open(beside, "w:gz") as archive:

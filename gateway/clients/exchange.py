@@ -31,7 +31,7 @@ STAGING: Final = (
     "order falling_b_0 blend_span length crc32 target_slot commit commit_status failing_index failing_reason slip_stops"
 ).split()
 ACTIVE: Final = ("order", "falling_b_0", "blend_span", "crc32", "slip_stops")
-PROOF_BLOCK: Final = ("byte_order_echo",)
+PROOF_BLOCK: Final = ("byte_order_echo", "map_hash")
 NEEDED: Final = {"command": COMMAND, "status": STATUS, "staging": STAGING, "active": ACTIVE, "proof": PROOF_BLOCK}
 """Block -> registers that the clients name."""
 
@@ -235,23 +235,26 @@ class ExchangeTable:
             "force_min": _limit(force.minimum or 0.0),
             "force_max": _limit(force.maximum or 0.0),
             "force_counts": force.counts_per_unit,
-            **self._echo_values(),
+            **self._proof_values(),
             **self._upload_values(),
             **self._offsets(),
             **self._masks(),
         }
 
-    def _echo_values(self) -> dict[str, object]:
-        """Return the place of byte_order_echo and the two words of its number, high word first, as all floats of a client."""
-        high, low = unpack(">HH", pack_number("float32", WordOrder.ABCD, PROOF))
-        return {
-            "echo_first": self.at("byte_order_echo", "proof").address,
+    def _proof_values(self) -> dict[str, object]:
+        """Return the places of byte_order_echo and map_hash, and the two words of each: what is written there (high word
+        first, as all floats of a client), and what must be read there."""
+        echo, found = self.at("byte_order_echo", "proof"), self.at("map_hash", "proof")
+        values: dict[str, object] = {
             "echo_number": f"{PROOF:g}",
-            "echo_high": high,
-            "echo_low": low,
-            "echo_high_hex": f"{high:04X}",
-            "echo_low_hex": f"{low:04X}",
+            "echo_first": echo.address,
+            "hash_first": found.address,
         }
+        data = {"echo": pack_number("float32", WordOrder.ABCD, PROOF), "hash": found.encode(self.map.map_hash)}
+        for name, pair in data.items():
+            for part, word in zip(("high", "low"), unpack(">HH", pair), strict=True):
+                values |= {f"{name}_{part}": word, f"{name}_{part}_hex": f"{word:04X}"}
+        return values
 
     def _upload_values(self) -> dict[str, object]:
         """Return the places of the staging and the active block."""

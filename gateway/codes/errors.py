@@ -148,8 +148,8 @@ ERRORS: Final = (
     Explanation(
         "E186",
         "the gateway serves another register map",
-        "Register map_hash is not that of the map by which this program would have written: its counts, or its places, mean "
-        "something else there. Nothing was written.",
+        "Register map_hash is not that of the map of this program: its counts, or its places, mean something else there. "
+        "Nothing was written.",
         "A rig with a register map of its own, or a gateway of another version.",
         "Name the rig's map: --map FILE (the banner of `run` has the whole line). A write of zeros alone, such as "
         "control_word=0, goes out all the same.",

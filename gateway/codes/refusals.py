@@ -94,7 +94,7 @@ class RefusalReason(IntEnum):
             "the two words of a number are swapped",
             "A float that makes no sense as sent (12.0 N reads 2.34e-41 swapped) and does with its words exchanged.",
             "Your client sends the low word first (CDAB), as mbpoll does without -B, and many PLCs.",
-            "Use block 300 (float_cdab) instead of 200, or let your client send the high word first.",
+            "Use the block float_cdab (300) instead of float_abcd (200), or let your client send the high word first.",
         ),
     )
     TOO_SMALL = (

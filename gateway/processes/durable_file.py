@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Final
 from zlib import crc32
 
-from gateway.plain_file import closing_descriptor, open_plain, open_plain_stream, write_whole
+from gateway.plain_file import closing_descriptor, open_plain, open_plain_stream, replaced_by, write_whole
 
 _FRESH: Final = ".new"
 _READER_BOUND_S: Final = 2.0
@@ -112,6 +112,7 @@ def replace_durably(directory: int, name: str, data: bytes) -> None:
 
 def replace_text(target: Path, text: str) -> None:
     """Write a file of people's durably in place of the one that may be there. OSError, and what was there stays."""
+    target = replaced_by(target)
     beside = target.with_name(f".{target.name}.{os.getpid()}")
     try:
         beside.write_text(text, encoding="utf-8")

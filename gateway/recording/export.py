@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from gateway.extras import import_library, is_installed
+from gateway.plain_file import replaced_by
 from gateway.recording.reader import Recording
 
 
@@ -78,6 +79,7 @@ def _one_line(value: Any) -> str:
 
 
 def _replace(target: Path, write: Callable[[IO[bytes]], None]) -> None:
+    target = replaced_by(target)
     beside = target.with_name(f".{target.name}.{os.getpid()}")
     try:
         with beside.open("wb") as stream:

@@ -66,7 +66,7 @@ class RegisterBank:
         self._writers, self._now, self.refusals = LastWriters(), now, 0  # refused since the start
         self.last_refusal: Refusal | None = None
         self.identity: Mapping[int, bytes] = build_identity(register_map.name, rules.rig_name)
-        self._blocks = register_map.blocks
+        self._map = register_map
         self._image = RegisterImage(register_map)
         self._roles = write_roles(register_map.blocks)
         self._data, self._room = self._image.data, self._image.room
@@ -107,7 +107,7 @@ class RegisterBank:
     def read_registers(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Return big-endian words of one block. Refusal (02) for a range that no block holds."""
         if not 0 < count <= self._room[address]:
-            raise self._note_refusal(no_such_address(self._blocks, address, count), peer)
+            raise self._note_refusal(no_such_address(self._map.blocks, address, count), peer)
         if self._image.is_behind:
             self._catch_up()
         return bytes(self._data[2 * address : 2 * (address + count)])
@@ -115,7 +115,7 @@ class RegisterBank:
     def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
         """Check that these registers can be read, of a request that writes behind that; Refusal (02) as `read_registers`."""
         if not 0 < count <= self._room[address]:
-            raise self._note_refused_write(no_such_address(self._blocks, address, count), peer)
+            raise self._note_refused_write(no_such_address(self._map.blocks, address, count), peer)
 
     def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Return bits of control_word (0-15) or status_word (100-115), packed."""
@@ -253,7 +253,7 @@ class RegisterBank:
     def _write(self, address: int, data: bytes, peer: Peer, touched: int = ALL_BITS) -> None:
         count = len(data) // 2
         if not 0 < count <= self._room[address]:
-            raise no_such_address(self._blocks, address, count)
+            raise no_such_address(self._map.blocks, address, count)
         if count > self._image.writable[address]:
             raise self._read_only(address + self._image.writable[address])
         block = self._image.block_at[address]
@@ -286,7 +286,7 @@ class RegisterBank:
     def _write_echo(self, address: int, data: bytes, peer: Peer) -> None:
         if (order := self._echo.write(address, data, peer.identity)) is not None:
             self._writers.note(("byte_order_echo",), peer, self._now())
-            self._tell(f"byte_order_echo {order.upper()}: use block {'200' if order == 'abcd' else '300'}", peer)
+            self._tell(f"byte_order_echo {order.upper()}: use {self._map.name_float_block(order)}", peer)
 
     def _write_command(self, write: Write, peer: Peer) -> None:
         now_s = self._now()

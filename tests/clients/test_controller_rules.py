@@ -231,7 +231,7 @@ def own_map(folder: Path, old: str, new: str) -> RegisterMap:
 def test_the_longest_text_of_a_map_of_one_s_own_fits_the_strings_of_rapid(tmp_path: Path) -> None:
     names = ", ".join(f"{k}: {'n' * 90}_{k}" for k in range(20))
     changed = own_map(tmp_path, "values: failing_reason", f"values: {{{names}}}")
-    client = Irc5(render_client(changed, "rapid", WHERE), GatewayAtHand(MAP))
+    client = Irc5(render_client(changed, "rapid", WHERE), GatewayAtHand(changed))
     client.begin_upload(MODEL | {"rising_b": [0.0, 70.0, 60.0]}, 0)
     cycles(client, 8)
     assert "nnnn" in client.text and not client.get("fgUploaded")

@@ -40,8 +40,8 @@ class RemoteRun:
         "control_word 0"
     )
 
-    def __init__(self, wire: Wire, unit: int) -> None:
-        self._map = load_register_map(defaults.REGISTER_MAP)
+    def __init__(self, wire: Wire, unit: int, map_name: str = defaults.REGISTER_MAP) -> None:
+        self._map = load_register_map(map_name)
         self._client = GatewayClient(wire, unit, self._map)
         self._registers = [self._map.find(name) for name in _WORDS]
         self._values: list[float] = []
@@ -57,6 +57,7 @@ class RemoteRun:
     def begin(self) -> None:
         """Start the run by the control word, and keep its lease from now on. Where one runs already the bit would not rise: it
         would be followed, and ended by our Ctrl-C."""
+        self._said_again(self._check_map)
         self._before = (there := self.look()).phase
         if self._before in _RUNNING:
             share = f"{self._before.replace('_', ' ')}, {there.progress:.0%}"
@@ -90,6 +91,10 @@ class RemoteRun:
     def stop(self) -> None:
         """Stop the run; the force goes to 0. Said again where nobody has answered: it may not have been heard."""
         self._said_again(lambda: self._command(0))
+
+    def _check_map(self) -> None:
+        with self._turn, explain_refusals(self._client):
+            self._client.check_map()
 
     def _read(self) -> list[float]:
         with self._turn, explain_refusals(self._client):

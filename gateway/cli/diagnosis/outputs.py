@@ -39,14 +39,15 @@ def write_all(texts: Mapping[Path, str]) -> None:
 
 def _write_all(texts: Mapping[Path, str], pressed: threading.Event) -> None:
     devices = [path for path in texts if path.exists() and not path.is_file()]
-    beside = {path: path.with_name(f".{path.name}.{os.getpid()}") for path in texts if path not in devices}
+    places = {path: Path(os.path.realpath(path)) for path in texts if path not in devices}  # a link stays one
+    beside = {path: place.with_name(f".{place.name}.{os.getpid()}") for path, place in places.items()}
     try:
         for path, fresh in beside.items():
             fresh.write_text(texts[path], encoding="utf-8")
         if pressed.is_set():
             raise KeyboardInterrupt
         for path, fresh in beside.items():
-            fresh.replace(path)
+            fresh.replace(places[path])
     finally:
         for fresh in beside.values():
             fresh.unlink(missing_ok=True)

@@ -28,9 +28,13 @@ class Poller:
         self._client = client
         self._source = writers
         self._clock = clock
+        self._is_map_checked = False
 
     def poll(self) -> None:
-        """Read both blocks; CliError or RefusedError when that fails."""
+        """Read both blocks; CliError or RefusedError when that fails, or when they are another map's."""
+        if not self._is_map_checked:  # at first, and after each trouble: another gateway may be there
+            self._client.check_map()
+            self._is_map_checked = True
         readings = [*self._client.read_block("command"), *self._client.read_block("status")]
         self.track.add(self._clock(), readings)
         self.trouble = ""
@@ -40,7 +44,7 @@ class Poller:
         try:
             self.poll()
         except (CliError, RefusedError) as error:
-            self.trouble = str(error)
+            self.trouble, self._is_map_checked = str(error), False
 
     def view(self, width: int, height: int, hint: str = "") -> View:
         """Return what a frame of this size is drawn from. hint: what a key does."""

@@ -9,13 +9,13 @@ Decisions
 
 import logging
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from math import isnan
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from gateway.cli.errors import CliError
 from gateway.cli.master.wires import Wire
+from gateway.modbus.errors import ILLEGAL_ADDRESS
 from gateway.processes import exit_codes
 from gateway.registers import Register, RegisterMap
 
@@ -118,12 +118,15 @@ class GatewayClient:
         return [readings[register.address] for register in registers]
 
     def check_map(self) -> None:
-        """Check that the gateway serves the map by which this client would command: in the counts of another one 12 N may be
-        120. CliError E186. A map without a hash is not checked."""
+        """Check that the gateway serves the map by which this client would command or read: in the counts of another one 12 N
+        may be 120. CliError E186. A map without a hash is not checked."""
         found = [register for register in self.register_map.registers if register.name == "map_hash"]
-        with suppress(RefusedError):  # the gateway has it elsewhere
+        try:
             if not found or int(self.read_values(found)[0].value) == self.register_map.map_hash:
                 return
+        except RefusedError as refused:
+            if refused.code != ILLEGAL_ADDRESS:  # which means that the gateway has it elsewhere
+                raise
         name = f"{self.register_map.name} (map_hash 0x{self.register_map.map_hash:08X})"
         raise CliError(
             f"E186 {self.where} serves another register map than {name}: --map FILE names the one of its rig"

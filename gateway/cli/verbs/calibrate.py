@@ -14,7 +14,7 @@ import click
 from gateway import defaults
 from gateway.cli.command_line.numbers import Quantity, Whole
 from gateway.cli.errors import CliError
-from gateway.cli.options import StateChoice, json_option, name_option, state_options, wire_options
+from gateway.cli.options import StateChoice, json_option, map_option, name_option, state_options, wire_options
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -67,12 +67,11 @@ EXAMPLES = ("calibrate --quick --yes", 'calibrate --groups 3 --step 0.25 --name 
 @click.option("--resume", is_flag=True, help="Go on with the groups that the last stopped run did not climb.")
 @name_option
 @click.option("--yes", is_flag=True, help="Do not ask.")
+@map_option
 @wire_options(None, "By Modbus TCP (the rig's own plan), not on this machine.")
 @state_options
 @json_option
-def command(
-    *, state: StateChoice, wire: "Wire | None", unit: int, yes: bool, as_json: bool, **plan_options: Any
-) -> None:
+def command(*, state: StateChoice, wire: "Wire | None", yes: bool, as_json: bool, **plan_options: Any) -> None:
     """Calibrate by a measured ladder, or record an experiment.
 
     The calibration gets a number. An experiment is a --plan that `diagnose` wrote. Runs on the gateway of this
@@ -83,13 +82,13 @@ def command(
     from gateway.cli.calibration.remote_run import RemoteRun
     from gateway.cli.calibration.runs import LocalRun
 
-    resumes = True
+    resumes, there = True, [plan_options.pop(name) for name in ("unit", "map_name")]
     if wire:
         if any(plan_options.values()):
             raise click.UsageError(
                 "by Modbus (--gateway, --rtu, --tls) the gateway runs its own plan: leave the plan's options out"
             )
-        run: LocalRun | RemoteRun = RemoteRun(wire, unit)
+        run: LocalRun | RemoteRun = RemoteRun(wire, *there)
     else:
         directory = state.directory
         run_request = _plan_wanted(directory, plan_options)

@@ -34,6 +34,7 @@ def command(*, names: tuple[str, ...], wire: "Wire", unit: int, map_name: str, a
     register_map = load_register_map(map_name)
     registers = _find_registers(register_map, names)
     with GatewayClient(wire, unit, register_map) as client, explain_refusals(client):
+        client.check_map()
         readings = client.read_values(registers)
     if as_json:
         click.echo(json.dumps({label(reading.register): _facts(reading) for reading in readings}, indent=2))

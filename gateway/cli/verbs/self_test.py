@@ -41,6 +41,7 @@ def command(*, wire: "Wire", unit: int, map_name: str, as_json: bool) -> None:
     register_map = load_register_map(map_name)
     with GatewayClient(wire, unit, register_map) as client:
         with explain_refusals(client):
+            client.check_map()
             run = _SelfTest(client)
         _run_to_its_end(run, shows=sys.stderr.isatty() and not as_json)
         with explain_refusals(client):

@@ -82,10 +82,13 @@ def _upload(calibration: "Calibration", register_map: "RegisterMap", options: di
 
 def _send(upload: "UploadFrames", register_map: "RegisterMap", options: dict[str, Any]) -> dict[str, Any]:
     """Stage, commit, wait, read back; what to tell. CliError when it did not come to that."""
+    from gateway.cli.master.refusal_text import explain_refusals
     from gateway.cli.master.upload import UploadClient
 
     master = UploadClient(options["wire"], options["unit"], register_map)
     with _commit_told(master, is_dry=options["dry_run"]), master:
+        with explain_refusals(master):
+            master.check_map()
         master.send(upload, options["slot"])
         master.outcome(upload)
         committed, is_known = not options["dry_run"], False

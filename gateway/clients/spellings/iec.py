@@ -57,6 +57,7 @@ def spell_scl(table: ExchangeTable) -> dict[str, str]:
         "command": table.command_span[0],
         "heartbeat": table.at("heartbeat", "command").address,
         "echo": table.at("byte_order_echo", "proof").address,
+        "hash": table.at("map_hash", "proof").address,
         "status": table.status_span[0],
         "stage_a": stage["order"],
         "stage_b": stage["order"] + part_a,

@@ -105,7 +105,7 @@ typedef struct fg_client {
     uint16_t heartbeat;
     int off_pending, pulls;
     uint16_t asked;             /* control_word on its way: without an answer nobody knows whether it is on */
-    int proven, seen;           /* byte_order_echo was written, the status was read over this connection */
+    int known, proven, seen;    /* over this connection: map_hash is ours, byte_order_echo was written, the status was read */
     uint8_t ended, exception;   /* exception: of the last refused request, 0 none */
     fg_status status;
     uint16_t words[FG_STATUS_WORDS];
@@ -287,6 +287,8 @@ static int fg_connect_address(const struct addrinfo *to, long long until_ms) {
     return -1;
 }
 
+static int fg_check_map(fg_client *client);
+
 static int fg_connect(fg_client *client) {
     struct addrinfo hints, *found = NULL, *each;
     long long until_ms;
@@ -304,8 +306,8 @@ static int fg_connect(fg_client *client) {
     /* A name may have several addresses: "localhost" is ::1 first where there is IPv6, and the gateway listens on 127.0.0.1. */
     for (each = found; each && client->socket < 0; each = each->ai_next) client->socket = fg_connect_address(each, until_ms);
     freeaddrinfo(found);
-    client->proven = client->seen = 0;
-    if (client->socket >= 0) return FG_OK;
+    client->known = client->proven = client->seen = 0;
+    if (client->socket >= 0) return fg_check_map(client);
     fg_drop(client, "not accepted in time");
     return FG_LOST;
 }
@@ -355,7 +357,7 @@ static int fg_ask(fg_client *client, uint8_t *frame, size_t length) {
         return FG_REFUSED;
     }
     if (frame[7] == function) {
-        client->backoff_ms = 0;
+        if (client->known) client->backoff_ms = 0;
         return FG_OK;
     }
     fg_drop(client, "an answer of another function");
@@ -369,6 +371,19 @@ static int fg_take_words(fg_client *client, const uint8_t *frame, uint16_t count
     }
     for (uint16_t k = 0; k < count; k++) words[k] = fg_get(frame + 9 + 2 * k);
     return FG_OK;
+}
+
+/* Does the gateway serve the map that this client was made from? */
+static int fg_check_map(fg_client *client) {
+    uint8_t frame[FG_FRAME];
+    uint16_t words[2];
+    int result = fg_ask(client, frame, fg_frame_read(frame, ++client->transaction, client->unit, ${hash_first}, 2));
+    if (result == FG_OK) result = fg_take_words(client, frame, 2, words);
+    client->known = result == FG_OK && words[0] == ${hash_high} && words[1] == ${hash_low};
+    if (client->known) return FG_OK;
+    if (result == FG_OK) fg_drop(client, "the map has changed: generate this client again");
+    if (result == FG_REFUSED) fg_drop(client, "map_hash is refused: another map or unit");
+    return FG_LOST;
 }
 
 int fg_read(fg_client *client, uint16_t first, uint16_t count, uint16_t *words) {

@@ -238,6 +238,7 @@ ${crc_table}];
     IF NOT fgConnected THEN
       IF ClkRead(clRetry)<nBackoff RETURN;
       FgConnect;
+      IF NOT fgConnected RETURN;
     ENDIF
     FgCollect;
     IF FgHasChanged() THEN
@@ -495,6 +496,22 @@ ${status_decoding}
     bSeen:=FALSE;
     SocketCreate sdGateway;
     SocketConnect sdGateway,FG_HOST,FG_PORT\Time:=FG_TIMEOUT;
+    FgCheckMap;
+  ENDPROC
+
+  ! Connected only to the map that this client was made from
+  LOCAL PROC FgCheckMap()
+    FgFrameRead ${hash_first},2;
+    FgAsk 3;
+    IF nException<>0 THEN
+      FgDrop "map_hash is refused: another map or unit";
+      RETURN;
+    ENDIF
+    FgTakeWords 2;
+    IF nWords{1}<>${hash_high} OR nWords{2}<>${hash_low} THEN
+      FgDrop "the map has changed: generate this client again";
+      RETURN;
+    ENDIF
     fgConnected:=TRUE;
     ! A clock that runs for 49 days overflows, and ClkStop raises it
     ClkStop clRetry;
@@ -545,7 +562,7 @@ ${status_decoding}
     ELSEIF nGot<>nFunction THEN
       RAISE ERR_FG_FRAME;
     ENDIF
-    nBackoff:=0;
+    IF fgConnected nBackoff:=0;
   ENDPROC
 
   LOCAL PROC FgTakeWords(num nCount)

@@ -148,6 +148,7 @@ def _requests(table: ExchangeTable) -> Iterator[tuple[str, bool, int, int]]:
     part_a, part_b, part_c = table.parts
     first, length = table.at("order", "staging").address, table.at("length", "staging").address
     tail = table.at("target_slot", "staging").address - length + 1
+    yield f"map_hash, 0x{table.map.map_hash:08X}, once a connection", False, table.at("map_hash", "proof").address, 2
     yield "status", False, status, status_words
     yield "byte_order_echo, 1234.5 once a connection", True, table.at("byte_order_echo", "proof").address, 2
     yield "command, when something has changed", True, command, words

@@ -159,12 +159,13 @@ def check_calibration_range(parts: Parts) -> Found:
 
 
 def check_calibration_against_cell(parts: Parts) -> Found:
-    """Yield a fault for a calibration that the load cell cannot have measured, or whose force at the safe voltage counts
-    as stuck."""
+    """Yield a fault for a calibration of this rig that its load cell cannot have measured, or one whose force at the safe
+    voltage counts as stuck. Another rig's may go beyond this cell: force_max_n bounds what is used of it."""
     if (calibration := parts.calibration) is None:
         return
     largest = max(map(abs, (*calibration.rising_handles_n, *calibration.falling_handles_n)))
-    if parts.load_cell and largest > parts.load_cell.range_n:
+    measured_here = is_own(calibration, parts.name, parts.plant if parts.simulated else None)
+    if parts.load_cell and measured_here and largest > parts.load_cell.range_n:
         cell = f"load_cell.range_n = {newton(parts.load_cell.range_n)}"
         yield "calibration", f"{calibration.name} has a handle of {largest:.1f} N, beyond {cell}"
     if parts.limits and parts.supervision:
@@ -209,6 +210,14 @@ def check_real_rig(parts: Parts) -> Found:
     if parts.calibration and parts.calibration.rig != parts.name:
         origin = f'was made on "{parts.calibration.rig}", not on {parts.name}'
         yield "calibration", f"{origin}: its forces are a guess until you run `force-gateway calibrate`"
+
+
+def check_rest_voltage(parts: Parts) -> Found:
+    """Yield a warning for a safe voltage above what a force of 0 is given: who enables goes below it."""
+    if (limits := parts.limits) and limits.safe_voltage_v > limits.voltage_min_v:
+        below = f"0 N while enabled is voltage_min_v = {volt(limits.voltage_min_v)}, less than the safe voltage"
+        cure = f"if that may drop the tool, write voltage_min_v: {number(limits.safe_voltage_v)}"
+        yield "limits.safe_voltage_v", f"{volt(limits.safe_voltage_v)}: {below}; {cure}"
 
 
 def check_contact_threshold(parts: Parts) -> Found:
@@ -285,4 +294,10 @@ FAULTS: Final[tuple[Check, ...]] = (
     check_simulated_plant,
     check_compensation,
 )
-WARNINGS: Final[tuple[Check, ...]] = (check_real_rig, check_contact_threshold, check_plant_supply, check_pace)
+WARNINGS: Final[tuple[Check, ...]] = (
+    check_real_rig,
+    check_rest_voltage,
+    check_contact_threshold,
+    check_plant_supply,
+    check_pace,
+)

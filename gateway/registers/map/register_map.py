@@ -178,6 +178,11 @@ class RegisterMap:
                 return block
         raise LookupError(f"map {self.name} has no block {name}")
 
+    def name_float_block(self, order: str) -> str:
+        """Return `block 300`: of commands as float32 in this word order; `no float block` where there is none."""
+        first = next((b.first for b in self.blocks if "command" in b.repeats and b.word_order == order), None)
+        return "no float block" if first is None else f"block {first}"
+
     def registers_of(self, block: str) -> tuple[Register, ...]:
         """Return the registers of one block, by address."""
         return tuple(register for register in self.registers if register.block == block)

@@ -13,7 +13,7 @@ from gateway.bsfm.model import Calibration
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.registers.image import RegisterImage
-from gateway.registers.map.register_map import RegisterMap
+from gateway.registers.map.register_map import Register, RegisterMap
 from gateway.registers.refusal import Refusal
 from gateway.registers.upload.coefficients import (
     BLOCK_BYTES,
@@ -23,6 +23,7 @@ from gateway.registers.upload.coefficients import (
     CoefficientSet,
     model_hash,
 )
+from gateway.registers.values import WordOrder
 from gateway.registers.words import NO_NOTICE, CommitAction, CommitNotice, CommitStatus
 from gateway.registers.writes.command_block import check_zeros
 
@@ -35,6 +36,8 @@ _PLACES: Final = {
     "slip_share_0": 180,
 }  # fmt: skip
 """In words behind `order`: a CRC-32 over words in their order leaves no map the choice."""
+
+_OF_ONE_WORD: Final = ("length", "target_slot", "slip_stops")
 
 OnCommit = Callable[[CommitAction, bytes, Peer], None]
 """on_commit(action, words of the staging block, peer); raises Refusal to refuse."""
@@ -66,6 +69,7 @@ class StagingBlock:
                 at = first + _PLACES.get(register.name, register.address - first)
                 if register.address != at:
                     raise ValueError(f"{register.name}@{block} is at {register.address}, an upload has it at {at}")
+                _check_number(register)
 
     def write(self, address: int, data: bytes, peer: Peer) -> None:
         """Store these words, then act on commit and slot_select if they are among them. Refusal: 03, 06."""
@@ -138,3 +142,14 @@ class StagingBlock:
             raise Refusal(RefusalReason.COEFFICIENTS, self._select, text, value=slot)
         self.on_select(slot, peer)
         self.on_act("slot_select", f"slot {slot}", peer)
+
+
+def _check_number(register: Register) -> None:
+    """Check that a number of the set is what it is taken for. ValueError: the CRC-32 is over words in one order."""
+    stem, _, index = register.name.rpartition("_")
+    name = f"{stem}_0" if index.isdigit() else register.name
+    kind = "uint32" if name == "crc32" else "float32"
+    if name not in _PLACES or name in _OF_ONE_WORD or (register.type, register.word_order) == (kind, WordOrder.ABCD):
+        return
+    there = f"{register.type}, {'high' if register.word_order is WordOrder.ABCD else 'low'} word first"
+    raise ValueError(f"{register.name}@{register.block} is {there}, an upload has {kind}, high word first")

@@ -56,7 +56,7 @@ class CommandBlock:
         self.values: Values = [0.0] * block.words
         self._shown = self.values
         self._last_words: tuple[int, bytes, Values] = (0, b"", [])  # offset, words, what they mean
-        self._registers, self._map_name = registers, register_map.name
+        self._registers, self._map = registers, register_map
         self.fields: tuple[CommandField | None, ...] = self._fields(rules)
         self._counts = [field.counts_per_unit if field else 1 for field in self.fields]
         self._image = image
@@ -88,7 +88,7 @@ class CommandBlock:
 
     def _fields(self, rules: BankRules) -> tuple[CommandField | None, ...]:
         count, registers = len(self.values), self._registers
-        named = (command_field(register, rules, self._map_name) for register in registers)
+        named = (command_field(register, rules, self._map) for register in registers)
         return (*named, *(None,) * (count - len(registers)))
 
     def holds(self, block: Block, address: int) -> bool:

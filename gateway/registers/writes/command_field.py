@@ -13,7 +13,7 @@ from math import isfinite
 from typing import Final
 
 from gateway.codes.refusals import RefusalReason
-from gateway.registers.map.register_map import Register
+from gateway.registers.map.register_map import Register, RegisterMap
 from gateway.registers.refusal import Refusal, allowed_range, quantity
 from gateway.registers.rig_rules import BankRules
 from gateway.registers.values import WordOrder, decimal, float32, pack_number, unpack_number
@@ -38,6 +38,7 @@ class CommandField:
     decimals: int
     limit_source: str
     values: Mapping[int, str]
+    cures: Mapping[WordOrder, str]
 
     def of_word(self, word: int, address: int) -> float:
         """Return the value of one int16 or uint16 register."""
@@ -69,9 +70,8 @@ class CommandField:
 
     def _not_a_value(self, value: float, address: int, order: WordOrder) -> Refusal:
         if self._is_plausible(swapped := _swap_words_of_float(value)):
-            sends, cure = _CURES[order]
             value_text = f"{self.format(value)}; with the words swapped {self.format(swapped)}"
-            text = f"{value_text}: your client sends {sends}, {cure} ({self.name} at {address})"
+            text = f"{value_text}: your client sends {self.cures[order]} ({self.name} at {address})"
             return Refusal(RefusalReason.WORDS_SWAPPED, address, text, value=value)
         if not isfinite(value):
             return Refusal(
@@ -91,10 +91,10 @@ class CommandField:
         return Refusal(RefusalReason.OUT_OF_RANGE, address, text, value=value)
 
 
-_CURES: Final = {
-    WordOrder.ABCD: ("CDAB", "use block 300 or mbpoll -B"),
-    WordOrder.CDAB: ("ABCD", "use block 200 or mbpoll without -B"),
-}
+def _cures(register_map: RegisterMap) -> dict[WordOrder, str]:
+    """Return {word order of a block: what a client that writes the other one there sends, and what helps}."""
+    high, low = register_map.name_float_block(WordOrder.ABCD), register_map.name_float_block(WordOrder.CDAB)
+    return {WordOrder.ABCD: f"CDAB, use {low} or mbpoll -B", WordOrder.CDAB: f"ABCD, use {high} or mbpoll without -B"}
 
 
 def _swap_words_of_float(value: float) -> float:
@@ -102,11 +102,11 @@ def _swap_words_of_float(value: float) -> float:
     return float(unpack_number("float32", WordOrder.CDAB, pack_number("float32", WordOrder.ABCD, value)))
 
 
-def command_field(register: Register, rules: BankRules, map_name: str) -> CommandField:
+def command_field(register: Register, rules: BankRules, register_map: RegisterMap) -> CommandField:
     """Return the register's limits narrowed by the rig's. Enumerations keep the type's range: what they lack is refused
     by name."""
     low, high = register.minimum or 0.0, register.maximum if register.maximum is not None else 65535.0
-    source = f"map {map_name}"
+    source = f"map {register_map.name}"
     rig_low, rig_high = _rig_limits(register.name, rules) or (low, high)
     if rig_low > low or rig_high < high:
         low, high, source = max(low, rig_low), min(high, rig_high), _source(register.name, rules)
@@ -125,6 +125,7 @@ def command_field(register: Register, rules: BankRules, map_name: str) -> Comman
         decimals=register.decimals,
         limit_source=source,
         values=register.values,
+        cures=_cures(register_map),
     )
 
 

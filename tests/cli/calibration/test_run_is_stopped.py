@@ -128,8 +128,8 @@ class Registers:
 
     def __init__(self) -> None:
         self.run: RemoteRun | None = None
-        self.words: list[int] = []
-        self.beats = 0
+        self.words, self.beats = list[int](), 0
+        self.check_map = self._in_turn
         self.phase = CalibrationPhase.STORED
         self.values: dict[str, float] = {}
 

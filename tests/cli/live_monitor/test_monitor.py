@@ -207,9 +207,15 @@ def test_a_gateway_that_comes_back_is_found_again(serve, fake, register_map: Reg
         poller.poll_or_note()
         assert poller.trouble.startswith(("E130", "E131"))
         assert "NO ANSWER" in text_of(poller.view(80, 24))[0]
-        serve(fake.bank, fake.port)
+        again = serve(fake.bank, fake.port)
         poller.poll_or_note()
         assert poller.trouble == ""
+        again.stop()
+        poller.poll_or_note()
+        fake.bank.set("map_hash", register_map.map_hash ^ 1)
+        serve(fake.bank, fake.port)
+        poller.poll_or_note()
+        assert poller.trouble.startswith("E186 "), "what comes back may be another rig's gateway, in other counts"
 
 
 def test_writers_come_from_the_control_socket_and_their_absence_is_no_trouble(

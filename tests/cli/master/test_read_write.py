@@ -51,7 +51,7 @@ def test_read_knows_both_word_orders(block: str, fake, call) -> None:
 def test_a_block_is_read_whole_and_in_one_request(fake, call) -> None:
     answer = call("read", "status", "--gateway", fake.address)
     assert len(answer.output.splitlines()) == len(fake.bank.register_map.registers_of("status"))
-    assert len(fake.bank.reads) == 1
+    assert [count for _, count in fake.bank.reads] == [2, 32], "the map's hash, and the block"
 
 
 def test_an_unknown_name_gets_a_proposal(fake, call) -> None:
@@ -213,8 +213,9 @@ def test_a_server_that_hangs_up_is_no_gateway(call) -> None:
     assert "allow-list" in answer.stderr
 
 
-def test_a_foreign_unit_is_an_exception_and_not_a_timeout(fake, call) -> None:
-    answer = call("read", "state", "--unit", "7", "--gateway", fake.address)
+@pytest.mark.parametrize("words", [("read", "state"), ("write", "control_word=1"), ("hold", "12"), ("upload", "demo")])
+def test_a_foreign_unit_is_an_exception_and_not_a_timeout_or_another_map(words: tuple[str, ...], fake, call) -> None:
+    answer = call(*words, "--unit", "7", "--gateway", fake.address)
     assert answer.exit_code == 1
     assert "exception 0B" in answer.stderr
 

@@ -70,6 +70,32 @@ def test_a_gateway_with_a_map_of_its_own_is_not_commanded_by_another(
     assert not bank.command.control_word, "a stop is never kept back"
 
 
+WHAT_READS_OR_BEGINS = (
+    ("read", "force_measured"), ("monitor", "--once"), ("self-test",), ("calibrate", "--yes"),
+    ("upload", PROFILES / "calibrations" / "demo.yaml"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("words", WHAT_READS_OR_BEGINS, ids=lambda words: words[0])
+def test_nothing_is_read_and_nothing_begun_by_another_map_than_the_gateway_s(
+    words: tuple[str, ...], serve, call, tmp_path: Path
+) -> None:
+    """By a map of tenths 12 N stood there as 1.20 N, without a word."""
+    measured = "{name: force_measured, address: 102, type: int16, scale: 0.01"
+    text = (PROFILES / "registers" / "force-v1.yaml").read_text()
+    (tmp_path / "own.yaml").write_text(text.replace(measured, measured.replace("0.01", "0.1")))
+    own = load_register_map(tmp_path / "own.yaml")
+    bank = RegisterBank(own, BankRules(rig_name="own", force_max_n=200.0), now=lambda: 0.0)
+    bank.publish(Status(force_measured_n=12.0))
+    address = serve(bank).address
+    refused = call(*words, "--gateway", address)
+    assert refused.exit_code == 1 and "E186 " in refused.stderr and "--map FILE" in refused.stderr
+    assert "1.20" not in refused.stdout and bank.command.number == 0
+    named = call(*words, "--gateway", address, "--map", tmp_path / "own.yaml")
+    assert "E186" not in named.stderr
+    assert "12.0" in named.stdout or words[0] not in ("read", "monitor")
+
+
 def test_a_negative_force_is_not_beyond_a_limit_that_nobody_can_tell(
     bank: RegisterBank, gateway: str, call, monkeypatch, tmp_path: Path
 ) -> None:

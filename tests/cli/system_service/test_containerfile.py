@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from gateway.cli.main import command
+from gateway.cli.system_service.unit_file import UnitOptions, unit_text
 
 ROOT = Path(__file__).parents[3]
 TEXT = (ROOT / "tools/container/Containerfile").read_text(encoding="utf-8")
@@ -21,6 +22,16 @@ def test_what_the_image_runs_is_a_verb_with_its_options() -> None:
     verb = command.get_command(None, words[0])  # type: ignore[arg-type]
     assert verb is not None
     assert verb.make_context(words[0], words[1:]).params["simulate"] is True
+
+
+def test_a_container_is_tried_again_as_the_unit_without_one_is() -> None:
+    """`on-failure:5` left a cell off for good whose device was there after the fifth try."""
+    unit = unit_text(
+        UnitOptions(stem="cell", rig="/etc/force-gateway/cell.yaml", command=Path("/usr/bin/force-gateway"))
+    )
+    told = re.findall(r"^#   (\w+=.*)$", TEXT, re.M)
+    assert set(re.findall(r"^(?:Restart|StartLimit|TimeoutStop|WantedBy)\w*=.*$", unit, re.M)) <= set(told)
+    assert " --restart" not in "".join(re.findall(r"^#   podman run.*$", TEXT, re.M))
 
 
 def test_the_image_has_no_shell_for_its_command_and_no_root() -> None:

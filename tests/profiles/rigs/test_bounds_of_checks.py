@@ -126,6 +126,12 @@ BOUNDS: tuple[tuple[Check, str, Parts, Parts], ...] = (
         for key in ("lease_s", "stall_s", "sample_timeout_s", "output_timeout_s")
     ),
     (
+        checks.check_rest_voltage,
+        "limits.safe_voltage_v",
+        limits(safe_voltage_v=2.0, voltage_min_v=2.0),
+        limits(safe_voltage_v=2.0, voltage_min_v=1.99),
+    ),
+    (
         checks.check_contact_threshold,
         "defaults.precontact_force_n",
         defaults(precontact_force_n=0.51),
@@ -134,14 +140,14 @@ BOUNDS: tuple[tuple[Check, str, Parts, Parts], ...] = (
     (
         checks.check_calibration_against_cell,
         "calibration",
-        calibration(),
-        calibration(falling_handles_n=(*HANDLES[:-1], 98.1)),
+        calibration(rig="own"),
+        calibration(rig="own", falling_handles_n=(*HANDLES[:-1], 98.1)),
     ),
     (
         checks.check_calibration_against_cell,
         "calibration",
-        calibration(),
-        calibration(rising_handles_n=(-98.1, *HANDLES[1:])),
+        calibration(rig="another", falling_handles_n=(*HANDLES[:-1], 98.1)),
+        calibration(rig="own", rising_handles_n=(-98.1, *HANDLES[1:])),
     ),
     (
         checks.check_calibration_against_cell,

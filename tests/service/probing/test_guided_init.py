@@ -1,5 +1,6 @@
 """`init` at a terminal: from two ports to a rig that `check` accepts, with the devices asked what they are."""
 
+from itertools import cycle, product
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,7 +9,9 @@ from click.testing import CliRunner, Result
 
 from gateway.cli.guided_rig import set_in
 from gateway.cli.main import command
+from gateway.cli.port_probing import known_profiles
 from gateway.cli.starter_rig import starter_rig
+from gateway.devices import DeviceProfile
 from gateway.devices.messages import SetVoltage
 from gateway.profiles import check_report, load_device
 from tests.service.probing.far_ends import FarEnd, behind_ptys
@@ -63,6 +66,13 @@ def test_forces_that_do_not_fit_are_asked_again() -> None:
     assert check_report("own.yaml", simulated=True).rig
 
 
+def test_a_file_that_is_written_with_a_fault_has_it_told() -> None:
+    """What was answered at the last time went into the file without a look at it."""
+    result = answered("later", "", "", "y", "later", "", "", *["98.07", "300"] * 3, "98.07", "299")
+    assert "limits.force_max_n: 299 N is above 65.2 N" in result.output
+    assert not check_report("own.yaml", simulated=True).rig
+
+
 def test_enter_gives_the_load_cell_another_port_than_the_output(monkeypatch: pytest.MonkeyPatch) -> None:
     """It was the output's port again, which is refused by `check` alone, later."""
     paths = ["/dev/serial/by-id/a", "/dev/serial/by-id/b"]
@@ -94,6 +104,24 @@ def test_a_folder_that_takes_no_file_is_told_before_anything_is_asked(
     result = CliRunner().invoke(command, ["init", "own", guided], input="later\n")
     assert result.exit_code == 77 and result.output == "E105 own.yaml: Permission denied: this user may not\n"
     assert not any(folder.iterdir())
+
+
+def answers_for(output: DeviceProfile, cell: DeviceProfile) -> tuple[str, ...]:
+    """What a person says up to the forces, to whom these two profiles are known by name."""
+    accepted = () if output.own_watchdog else ("y",)
+    unit = () if cell.reading.newton_per_unit or cell.reading.template.field("unit") else ("counts", "0", "0.0001")
+    return ("later", output.name, "", *accepted, "later", cell.name, "", *unit)
+
+
+def test_enter_at_the_largest_force_is_accepted_for_every_pair_of_devices_and_every_cell() -> None:
+    """A cell of 20 N and less, and one of 200 N and more, gave files that `check` refused. Each device meets each cell."""
+    pairs = list(product(known_profiles("output"), known_profiles("load cell")))
+    for (output, cell), range_n in zip(pairs, cycle(("1", "5", "20", "98.07", "5000")), strict=False):
+        result = answered(*answers_for(output, cell), range_n, "")
+        found = check_report("own.yaml", simulated=True)
+        assert found.rig, (output.name, cell.name, range_n, result.output, *map(str, found.faults))
+        Path("own.yaml").unlink()
+    assert len(pairs) > 40
 
 
 def test_without_a_terminal_nothing_is_asked() -> None:

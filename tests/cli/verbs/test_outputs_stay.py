@@ -1,0 +1,63 @@
+"""What a verb writes replaces a plain file only: never the pipe, socket or device of that name, and never a link to it.
+
+Not tried with a device: where the program is at fault root would lose it."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import Result
+
+from gateway.cli.diagnosis.outputs import write_all
+from gateway.processes.durable_file import replace_text
+from tests.other_kinds import never_waiting, put
+from tests.recording.test_care import record
+
+Call = Callable[..., Result]
+VERBS = ("backup out", "report out", "recordings export 1 -o out", "recordings export 1 --parquet -o out")
+
+
+@pytest.fixture
+def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    record(tmp_path / "state", rig="demo")
+    return tmp_path / "state"
+
+
+@pytest.mark.parametrize("kind", ["a pipe", "a socket"])
+@pytest.mark.parametrize("verb", VERBS)
+def test_no_verb_puts_a_file_in_place_of_what_is_none(verb: str, kind: str, state: Path, call: Call) -> None:
+    """As root `report /dev/null --force` made /dev/null a file, for the whole machine."""
+    place = put(kind, state.parent / "out")
+    before = os.lstat(place)
+    with never_waiting():
+        answer = call(*verb.split(), "--force", "--state", "state")
+    assert os.path.samestat(os.lstat(place), before)
+    assert answer.exit_code == 1 and answer.output.startswith("E106 ") and f"it is {kind}, and no file" in answer.output
+    assert sorted(path.name for path in state.parent.iterdir()) == ["out", "state"]
+
+
+@pytest.mark.parametrize("kind", ["a pipe", "a socket", "a directory"])
+def test_a_report_of_a_fit_replaces_nothing_but_a_file(kind: str, tmp_path: Path) -> None:
+    place = put(kind, tmp_path / "out")
+    with pytest.raises(OSError, match=f"it is {kind}"):
+        replace_text(place, "a report")
+    assert [path.name for path in tmp_path.iterdir()] == ["out"] and not place.is_file()
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_what_a_link_leads_to_is_written_and_the_link_stays(verb: str, state: Path, call: Call) -> None:
+    """Such as /dev/stdout, which leads to the file that the shell has opened."""
+    (state.parent / "there").write_text("before")
+    (state.parent / "out").symlink_to("there")
+    answer = call(*verb.split(), "--force", "--state", "state")
+    assert answer.exit_code == 0, answer.output
+    assert (state.parent / "out").is_symlink() and (state.parent / "there").read_bytes() != b"before"
+
+
+def test_pages_are_written_where_a_link_leads_to(tmp_path: Path) -> None:
+    (tmp_path / "there").write_text("before")
+    (tmp_path / "out").symlink_to("there")
+    write_all({tmp_path / "out": "a page"})
+    assert (tmp_path / "out").is_symlink() and (tmp_path / "there").read_text() == "a page"

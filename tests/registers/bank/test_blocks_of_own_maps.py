@@ -1,0 +1,60 @@
+"""Sentences name the blocks of the map in use: they said 200 and 300 whatever the map had."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.modbus import Peer
+from gateway.profiles import load_register_map
+from gateway.registers import BankRules, RegisterBank
+from gateway.registers.refusal import Refusal
+from gateway.registers.values import WordOrder, pack_number
+
+SHIPPED = (Path(__file__).parents[3] / "profiles" / "registers" / "force-v1.yaml").read_text()
+FLOATS = SHIPPED[SHIPPED.index("  float_cdab:") : SHIPPED.index("  proof:")]
+MOVED = FLOATS.replace(" 300", " 3000").replace("395", "3095").replace("332", "3032")
+PEER = Peer("10.0.0.9", 40000)
+
+
+@pytest.mark.parametrize(
+    ("floats", "block"),
+    [(MOVED, "use block 3000"), (FLOATS.replace("command: 300, ", ""), "use no float block")],
+)
+def test_the_block_for_swapped_words_is_that_of_the_map_in_use(floats: str, block: str, tmp_path: Path) -> None:
+    (tmp_path / "own.yaml").write_text(SHIPPED.replace(FLOATS, floats))
+    own = load_register_map(tmp_path / "own.yaml")
+    bank = RegisterBank(own, BankRules(rig_name="own", force_max_n=60.0), now=lambda: 0.0)
+    told: list[str] = []
+    bank.on_accepted = lambda sentence, peer: told.append(sentence)
+    with pytest.raises(Refusal) as refused:
+        bank.write_registers(202, pack_number("float32", WordOrder.CDAB, 12.0), PEER)
+    assert f"your client sends CDAB, {block} or mbpoll -B" in refused.value.sentence
+    bank.write_registers(416, pack_number("float32", WordOrder.CDAB, 1234.5), PEER)
+    assert told == [f"byte_order_echo CDAB: {block}"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("name: lag, address: 1154, type: float32", "word_order: cdab, ", "lag@staging is float32, low word first"),
+        ("name: lag, address: 1654, type: float32", "word_order: cdab, ", "lag@active is float32, low word first"),
+        ("name: crc32, address: 1142, type: uint32", "word_order: cdab, ", "crc32@staging is uint32, low word first"),
+        (
+            "name: rising_b, address: 1506, count: 16, type: float32",
+            "word_order: cdab, ",
+            "rising_b_0@active is float32, low",
+        ),
+        ("name: range_low, address: 1002, type: float32", "float32>int32", "range_low@staging is int32"),
+    ],
+)
+def test_a_number_of_an_upload_is_no_other_than_the_gateway_takes_it_for(
+    old: str, new: str, told: str, tmp_path: Path
+) -> None:
+    """It was served: `read lag@active` said -6.98e21 s, and what was staged by its name was another number."""
+    before, _, after = new.partition(">")
+    changed = old.replace(before, after) if after else f"{new}{old}"
+    assert SHIPPED.count(old) == 1
+    (tmp_path / "own.yaml").write_text(SHIPPED.replace(old, changed))
+    own = load_register_map(tmp_path / "own.yaml")
+    with pytest.raises(ValueError, match=f"{told}.*, an upload has (float32|uint32), high word first"):
+        RegisterBank(own, BankRules(rig_name="own", force_max_n=60.0), now=lambda: 0.0)
