@@ -5,6 +5,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.calibrations.kept_ladders import kept_ladders
 from gateway.processes.disk_worker import DiskWorker
 from gateway.processes.event_log import EventLog
 from gateway.profiles.recordings_section import Retention
@@ -41,7 +42,8 @@ class RecordingRetention:
 
     def _prune(self) -> list[Prunable]:
         reference = read_reference_recording(self._state)
-        return prune_recordings(self._state, self._retention, reference.name if reference else "")
+        name = reference.name if reference else ""
+        return prune_recordings(self._state, self._retention, name, kept_ladders(self._state))
 
     def _tell(self, gone: Any) -> None:
         if isinstance(gone, BaseException):
