@@ -1,5 +1,6 @@
 """Ladders of calibrations that are in use, would come back or stand in a slot are measured data: no retention takes them."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -21,16 +22,17 @@ def test_the_ladders_of_what_is_in_use_of_the_one_before_and_of_slots_stay(tmp_p
     store = CalibrationStore(tmp_path)
     for _ in range(5):
         record(tmp_path, days_ago=1_000.0)
+    os.utime(record(tmp_path))
     unused, slotted, before, used = made_from(store, 5, *(f"recording {k:04d}.fgr: 60 stairs" for k in (1, 2, 3, 4)))
     store.use(slotted, slot=2)
     store.use(before)
     store.use(used)
     assert unused and kept_ladders(tmp_path) == {"0002.fgr", "0003.fgr", "0004.fgr"}
     retention = RecordingRetention(tmp_path, Retention(days=30.0), lambda cause, sentence: None)  # type: ignore[arg-type]
-    gone = retention._prune()
+    gone = retention._prune(0.0)
     retention.close()
     assert [one.path.name for one in gone] == ["0001.fgr", "0005.fgr"]
-    assert [path.name for path in recording_paths(tmp_path)] == ["0002.fgr", "0003.fgr", "0004.fgr"]
+    assert [path.stem for path in recording_paths(tmp_path)] == ["0002", "0003", "0004", "0006"]
 
 
 def test_the_parts_that_a_resumed_run_went_on_from_stay_with_it(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from gateway.recording.reader import recording_paths
 
 _MARK: Final = ".keep"
 _GONE: Final = ".gone"  # of the highest number that was deleted: it is not used again
-_CLOCK_SET_S: Final = 1_577_836_800.0  # 2020: an earlier time is of a clock that nobody had set, as after a power cut
+CLOCK_SET_S: Final = 1_577_836_800.0  # 2020: an earlier time is of a clock that nobody had set, as after a power cut
 _CLOSED_S: Final = 5.0  # rows come ten times a second: what was written later than this is being recorded, lock or not
 
 
@@ -85,7 +85,7 @@ def choose_prunable(
     ended = sorted(_with_ends(paths, now_s), key=lambda one: (one[0], one[2].name))
     total, chosen = sum(status.st_size for _, status, _ in ended), []
     for _, status, path in ended:
-        age_s = now_s - status.st_mtime if status.st_mtime >= _CLOCK_SET_S else None
+        age_s = now_s - status.st_mtime if status.st_mtime >= CLOCK_SET_S else None
         why = _why_it_goes(age_s, total, retention)
         is_needed = path.name in needed or abs(now_s - status.st_mtime) <= _CLOSED_S
         if why and not is_needed and _may_go(path, reference):
