@@ -147,6 +147,14 @@ NOTICES: Final = (
         "force.",
     ),
     Explanation(
+        "W252",
+        "the clock cannot tell how old recordings are",
+        "The clock was not set, or does not go with the ends of the recordings: `days` takes none, for a day where it seems "
+        "to be ahead.",
+        "The machine has no battery for its clock and no time server, or stood still for longer than recordings are retained.",
+        "date shows the clock; sudo timedatectl set-ntp true has it set by a time server. recordings keep N keeps one.",
+    ),
+    Explanation(
         "W304",
         "force with the output disabled",
         "The output is disabled, told the safe voltage, and the load cell still measures a force.",

@@ -65,9 +65,16 @@ def with_plant_in_use(rig: Rig, plant: NumberedPlant | None) -> Rig:
 
 
 def _doubts_on(rig: Rig, plant: NumberedPlant) -> str:
-    if rig.simulated or plant.provenance.rig != rehearsed(rig.name):
+    """Return why what a plant takes back may not be in this real machine; empty where nothing says so. Of one that somebody has
+    added from a file nobody knows where it was found."""
+    found_on = plant.provenance.rig
+    if rig.simulated or found_on == rig.name or not plant.provenance.recordings:
         return ""
-    return f'plant {plant.number} was found on "{plant.provenance.rig}": what it takes back may be in no machine'
+    if found_on == rehearsed(rig.name):
+        return f'plant {plant.number} was found on "{found_on}": what it takes back may be in no machine'
+    origin = f'on "{found_on}"' if found_on else "in recordings that name no rig"
+    cure = "`force-gateway diagnose` of a recording of this rig makes another one"
+    return f"plant {plant.number} was found {origin}, not on {rig.name}: what it takes back may not be in this machine; {cure}"
 
 
 def with_selected_plant(rig: Rig, state: Path) -> tuple[Rig, tuple[str, ...]]:

@@ -85,7 +85,7 @@ def _make_owner_s(directory: Path) -> None:
         closing_descriptor(os.open(directory, flags | os.O_NOFOLLOW)) as made,
         closing_descriptor(os.open(directory.parent, flags)) as folder,
     ):
-        _give_to_owner(made, directory.name, folder)
+        give_to_owner(made, directory.name, folder)
 
 
 def write_durably(directory: int, name: str, data: bytes) -> None:
@@ -151,6 +151,17 @@ def remove_if_possible(directory: int, name: str) -> None:
         os.unlink(name, dir_fd=directory)
 
 
+def give_to_owner(made: int, name: str, folder: int) -> None:
+    """Have what root makes in the folder of somebody, such as a service's user, belong to that one, who could not read it else:
+    what an administrator had put in use was passed over. Nothing that a link of theirs led to. made, folder: descriptors."""
+    facts, owner = os.fstat(made), os.fstat(folder)
+    if os.geteuid() or not owner.st_uid or facts.st_uid or (facts.st_nlink > 1 and not stat.S_ISDIR(facts.st_mode)):
+        return
+    if os.path.samestat(facts, os.stat(name, dir_fd=folder, follow_symlinks=False)):
+        with contextlib.suppress(PermissionError):  # of a network's file system, which gives root nothing
+            os.fchown(made, owner.st_uid, owner.st_gid)
+
+
 def add_checksum(text: str) -> bytes:
     """Return the text with the CRC-32 of its bytes in a line before it."""
     data = text.encode()
@@ -174,19 +185,8 @@ def _write(directory: int, name: str, data: bytes) -> None:
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC
     with closing_descriptor(open_plain(name, flags, 0o640, directory=directory)) as descriptor:
         write_whole(descriptor, data)
-        _give_to_owner(descriptor, name, directory)
+        give_to_owner(descriptor, name, directory)
         os.fsync(descriptor)
-
-
-def _give_to_owner(made: int, name: str, folder: int) -> None:
-    """Have what root makes in the folder of somebody, such as a service's user, belong to that one, who could not read it else:
-    what an administrator had put in use was passed over. Nothing that a link of theirs has led to."""
-    facts, owner = os.fstat(made), os.fstat(folder)
-    if os.geteuid() or not owner.st_uid or facts.st_uid or (facts.st_nlink > 1 and not stat.S_ISDIR(facts.st_mode)):
-        return
-    if os.path.samestat(facts, os.stat(name, dir_fd=folder, follow_symlinks=False)):
-        with contextlib.suppress(PermissionError):  # of a network's file system, which gives root nothing
-            os.fchown(made, owner.st_uid, owner.st_gid)
 
 
 def sync_path(path: Path) -> None:

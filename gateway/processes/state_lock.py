@@ -8,11 +8,12 @@ import errno
 import fcntl
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
 from gateway.plain_file import closing_descriptor, open_plain
+from gateway.processes.durable_file import give_to_owner
 
 NAME: Final = "lock"
 _NO_LOCKS: Final = (errno.ENOLCK, errno.EBADF, errno.EINVAL, errno.ENOTSUP)  # network file systems, of a directory
@@ -25,6 +26,8 @@ def hold_state_lock(directory: Path) -> Iterator[bool]:
         closing_descriptor(_open(directory / NAME)) as file,
         closing_descriptor(os.open(directory, os.O_RDONLY | os.O_DIRECTORY)) as whole,
     ):
+        with suppress(OSError):  # a disk that has become read-only, say
+            give_to_owner(file, NAME, whole)
         yield _is_taken(file) and _is_taken(whole, _NO_LOCKS)
 
 

@@ -28,11 +28,13 @@ _DRIVES: Final = ("command_v", "pressure_kpa")
 _NEEDED: Final = f"at least {FEWEST_ROWS} usable rows over {SHORTEST_S:g} s are needed, 60 s at 200 Hz are good"
 _HIGHEST_COMMAND_V: Final = 50.0
 _LARGEST: Final = 1.0e60  # beyond, squares and products of columns overflow: what a logger writes for "no value"
-_LEAST: Final = {
-    "temperature_c": -273.15,
-    "pressure_kpa": -102.0,
-    "supply_kpa": -102.0,
-}  # nothing is colder, or less air
+_RANGES: Final = {
+    "command_v": (-_HIGHEST_COMMAND_V, _HIGHEST_COMMAND_V),
+    "temperature_c": (-273.15, 5000.0),  # nothing is colder
+    "pressure_kpa": (-102.0, 9000.0),  # or less air
+    "supply_kpa": (-102.0, 9000.0),
+}
+"""Beyond these stands what a logger writes for no value: -9999, 32767."""
 _RARE_SHARE: Final = 0.2  # more of them are another unit, or a turned sign
 _TURNED: Final = -0.8  # correlation of force and command at which the sign is asked for
 _PASCAL: Final = linear_conversion("pressure", "kpa", "pa")[0]
@@ -43,7 +45,7 @@ def measurement_of(recording: Recording) -> Measurement:
     """Return the checked measurement. RecordingError in the user's words, with row and column where there is one."""
     _check_columns(recording)
     axis = check_time_axis(recording)
-    columns, more_notes = _replace_absurd({name: values[axis.kept] for name, values in recording.columns.items()})
+    columns, more_notes = _replace_absurd(recording, axis)
     notes = [*recording.notes, *axis.notes, *more_notes]
     usable, more_notes = _usable_rows(columns, axis)
     notes += more_notes
@@ -89,20 +91,21 @@ def _check_columns(recording: Recording) -> None:
         raise RecordingError(f"{recording.path}: {recording.rows} rows: {_NEEDED}")
 
 
-def _replace_absurd(columns: dict[str, Floats]) -> tuple[dict[str, Floats], list[str]]:
+def _replace_absurd(recording: Recording, axis: TimeAxis) -> tuple[dict[str, Floats], list[str]]:
     """Return the columns with NaN where a number is none of a measurement, and a sentence for each such column."""
-    notes = []
-    for name, values in columns.items():
-        absurd = np.isfinite(values) & (np.abs(values) > _LARGEST)
-        if absurd.any():
-            columns = columns | {name: np.where(absurd, np.nan, values)}
-            notes.append(f"{int(absurd.sum())} values of {name} are beyond {_LARGEST:.0e}: taken as missing")
-        below = columns[name] < _LEAST.get(name, -inf)
-        if 0.0 < below.mean() < _RARE_SHARE:
-            columns = columns | {name: np.where(below, np.nan, columns[name])}
-            notes.append(
-                f"{int(below.sum())} values of {name} are below {_LEAST[name]:g}, which none is: taken as missing"
-            )
+    columns, notes = {}, []
+    for name, values in recording.columns.items():
+        column, (low, high) = values[axis.kept], _RANGES.get(name, (-inf, inf))
+        for least, most, what, share in (
+            (-_LARGEST, _LARGEST, f"beyond {_LARGEST:.0e}", 1.0),
+            (low, high, f"below {low:g} or above {high:g}, which none is", _RARE_SHARE),
+        ):
+            strange = np.isfinite(column) & ((column < least) | (column > most))
+            if strange.any() and strange.mean() <= share:
+                first = recording.place(int(axis.kept[int(np.argmax(strange))]))
+                column = np.where(strange, np.nan, column)
+                notes.append(f"{int(strange.sum())} values of {name} are {what} (the first: {first}): taken as missing")
+        columns[name] = column
     return columns, notes
 
 

@@ -19,6 +19,7 @@ from gateway.devices.messages import ForceSample, Quality
 from gateway.profiles import Rig
 from gateway.progress import report
 from gateway.recording import Recording, RecordingError
+from gateway.recording.tables.time_axis import check_time_axis
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
 
@@ -88,6 +89,7 @@ def _check(recording: Recording) -> None:
             raise RecordingError(
                 f"{recording.place(int(unknown[0]))} has no {name}: nobody knows what control was asked for"
             )
+    check_time_axis(recording)
     if np.any(recording.columns["state"] == State.CALIBRATING):
         raise RecordingError(
             f"{recording.path} holds a ladder, a plan or a self-test: its commands came from a run and not from a master, "

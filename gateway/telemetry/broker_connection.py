@@ -1,6 +1,7 @@
 """A connection to an MQTT broker that is opened again for ever, and carries what a session has to say."""
 
 import asyncio
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -13,6 +14,8 @@ from gateway.telemetry.command_queue import CommandQueue
 
 AGAIN_S: Final = 2.0
 _KEEPALIVE_S: Final = 10
+_LASTS_S: Final = 10.0  # a connection that was not taken away at once by another client of our name
+_SHORT_ONES: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,24 +40,50 @@ async def keep_connected(
     """
     aiomqtt = import_library("aiomqtt")
     _tell_no_loss_twice(asyncio.get_running_loop(), aiomqtt.MqttError)
-    is_away = False
+    losses = _Losses(f"the MQTT broker {broker.host}:{broker.port}", session.name, say)
     while True:
         will = session.begin()
         try:
             async with _client(aiomqtt, broker, session.name, will) as client:
-                if is_away:
-                    say(f"the MQTT broker {broker.host}:{broker.port} is back")
-                is_away = False
+                losses.note_open()
                 await _carry(client, session)
         except* (aiomqtt.MqttError, OSError) as lost:
-            if not is_away:
-                say(
-                    f"E181 the MQTT broker {broker.host}:{broker.port} is away ({_reason(lost)}); data is kept meanwhile"
-                )
-            is_away = True
+            losses.note_loss(_reason(lost))
         finally:
             session.lose()
         await asyncio.sleep(again_s)
+
+
+class _Losses:
+    """Says when the broker is away and back; and once, instead of that each two seconds for ever, that it ends connections as
+    soon as they are open, as it does where two clients have one name: each takes the other's place."""
+
+    def __init__(self, broker: str, name: str, say: Callable[[str], None]) -> None:
+        self._broker, self._name, self._say = broker, name, say
+        self._is_away = False
+        self._opened_s: float | None = None
+        self._short = 0  # connections without one that lasted between them
+
+    def note_open(self) -> None:
+        """Note that a connection is open."""
+        self._opened_s = time.monotonic()
+        if self._is_away and self._short < _SHORT_ONES:
+            self._say(f"{self._broker} is back")
+        self._is_away = False
+
+    def note_loss(self, reason: str) -> None:
+        """Note that it is lost, or that none was opened."""
+        opened_s, self._opened_s = self._opened_s, None
+        is_short = opened_s is not None and time.monotonic() - opened_s < _LASTS_S
+        self._short = self._short + 1 if is_short else 0
+        if self._short == _SHORT_ONES:
+            ended = f"{self._broker} has ended {_SHORT_ONES} connections, each as soon as it was open ({reason})"
+            cure = "Give each gateway a rig name, mqtt.base_topic and sparkplug.node of its own"
+            who = f"does another gateway use the name {self._name!r} there, or does it forbid us a topic (see its log)?"
+            self._say(f"E181 {ended}: {who} {cure}; what they send may be mixed up until then")
+        elif self._short < _SHORT_ONES and not self._is_away:
+            self._say(f"E181 {self._broker} is away ({reason}); data is kept meanwhile")
+        self._is_away = True
 
 
 def _tell_no_loss_twice(loop: asyncio.AbstractEventLoop, loss: type[Exception]) -> None:

@@ -15,6 +15,7 @@ from typing import Final
 
 from gateway.numbered_documents.selection import read_selection
 from gateway.processes.durable_file import (
+    give_to_owner,
     lock_directory,
     make_directory,
     read_object,
@@ -78,6 +79,8 @@ def keep_reference_recording(state: Path, recording: Path, calibration: int | No
         beside = folder / f".{kept.file}"
         try:
             shutil.copyfile(recording, beside)
+            with beside.open("rb") as made:
+                give_to_owner(made.fileno(), beside.name, descriptor)
             sync_path(beside)
             beside.replace(folder / kept.file)
             sync_path(folder)

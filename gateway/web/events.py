@@ -3,16 +3,21 @@
 Events: `history` (once: the last minute), `samples` (the new rows, 15 times a second), `state` (twice a second: LiveState,
 register words, viewers), `note` (a line of the gateway's log), `gone` (control does not answer). A viewer that does not read is
 dropped; its browser comes back by itself. Nothing is read while nobody looks.
+
+The log's file is read in a thread: a disk that hangs would keep all requests waiting, a Stop among them. The page goes on with
+the lines that it has, and says so.
 """
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Iterator
+import time
+from collections import deque
+from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.live.ring_rows import Columns, RingRows
-from gateway.processes.event import EventRecord
+from gateway.processes.event import make_event
 from gateway.processes.event_file import EventReader
 from gateway.processes.json_socket.messages import encode_answer
 from gateway.web.commands import Commands
@@ -37,6 +42,10 @@ _HISTORY_ROWS: Final = 1200
 _MOST_ROWS: Final = 12  # of one event: what a screen can show
 _WAITING: Final = 100  # events of a viewer: six seconds that its line may be busy
 _KEPT_NOTES: Final = 60
+_PATIENCE_S: Final = 1.0
+"""How long who comes waits for the lines of before."""
+_HANGS_S: Final = 10.0
+_HANGS: Final = f"the disk has not given the log for {_HANGS_S:g} s: lines of since are missing here until it does"
 MOST_VIEWERS: Final = 128
 """Half of the connections that the page's process serves at a time: whoever opens more must not shut out a Stop."""
 LIVE_BLOCKS: Final = ("command", "status")
@@ -60,6 +69,8 @@ class EventSource:
         self._task: asyncio.Task[None] | None = None
         self._notes: list[dict[str, Any]] = []
         self._log = EventReader(context.state)
+        self._read = self._log.read_stored
+        self._reading: asyncio.Task[None] | None = None
         self._state = b""
 
     @property
@@ -79,12 +90,8 @@ class EventSource:
         try:
             if self._task is None:
                 self._begin()
-            yield b"retry: 1000\n\n"
-            yield _event("history", self._history())
-            for note in self._notes[-_KEPT_NOTES:]:
-                yield _event("note", note)
-            if self._state:
-                yield self._state
+            for event in await self._first_events(viewer):
+                yield event
             while not viewer.ended.is_set():
                 yield await viewer.waiting.get()
         finally:
@@ -95,21 +102,31 @@ class EventSource:
                 self._task.cancel()
                 self._task = None
 
+    async def _first_events(self, viewer: Viewer) -> list[bytes]:
+        """Return what there is until now; only what comes behind it waits for the viewer."""
+        if self._reading:
+            await asyncio.wait([self._reading], timeout=_PATIENCE_S)
+        viewer.waiting = asyncio.Queue(_WAITING)
+        history = [b"retry: 1000\n\n", _event("history", self._history())]
+        return [*history, *(_event("note", note) for note in self._notes), *([self._state] if self._state else [])]
+
     async def close(self) -> None:
         """End the reading; viewers end with their connections."""
-        if self._task:
-            self._task.cancel()
+        is_hung = self._reading is not None and not self._reading.done()
+        for task in filter(None, (self._task, self._reading)):
+            task.cancel()
             with contextlib.suppress(asyncio.CancelledError):
-                await self._task
-            self._task = None
-        self._log.close()
+                await task
+        self._task = None
+        if not is_hung:
+            self._log.close()
         if self._rows:
             self._rows.close()
 
     # -- reading
 
     def _begin(self) -> None:
-        self._read_notes(self._log.read_new() if self._notes else self._log.read_stored())
+        self._look_for_notes()
         if self._rows:
             self._rows.fresh(1)  # what is there is history
         self._task = asyncio.create_task(self._run())
@@ -119,8 +136,7 @@ class EventSource:
         while True:
             if turn % _STATE_EVERY == 0:
                 await self._tell_state()
-                for note in self._read_notes(self._log.read_new()):
-                    self._send(_event("note", note))
+                self._look_for_notes()
             if self._rows and (columns := self._rows.fresh(10 * _MOST_ROWS)):
                 self._send(_event("samples", _shown(columns, _MOST_ROWS)))
             turn += 1
@@ -131,20 +147,37 @@ class EventSource:
             state = await self._context.control.ask({"do": "state"})
             words = {name: await self._commands.words(name) for name in LIVE_BLOCKS}
         except (OSError, ValueError, TimeoutError) as error:
-            self._state = b""
-            self._send(_event("gone", {"sentence": f"the gateway does not answer: {error}"}))
+            self._state = _event("gone", {"sentence": f"the gateway does not answer: {error}"})
+            self._send(self._state)
             return
         more = {"words": words, "viewers": self.viewers, "commander": self._commands.commander}
         self._state = _event("state", state | more)
         self._send(self._state)
 
-    def _read_notes(self, events: Iterator[EventRecord]) -> list[dict[str, Any]]:
-        """None where the disk gives none: force and state are shown all the same."""
-        fresh: list[dict[str, Any]] = []
-        with contextlib.suppress(OSError):
-            fresh.extend(event._asdict() for event in events)
+    def _look_for_notes(self) -> None:
+        """Begin to read what has been logged since, where the reading of before has come to its end."""
+        if self._reading is None or self._reading.done():
+            self._reading = asyncio.create_task(self._tell_notes())
+
+    async def _tell_notes(self) -> None:
+        reading = asyncio.ensure_future(asyncio.to_thread(self._read_notes))
+        await asyncio.wait([reading], timeout=_HANGS_S)
+        if not reading.done():
+            self._add_notes([make_event(time.time(), "page", "events", _HANGS)._asdict()])
+        self._add_notes(await reading)
+
+    def _add_notes(self, fresh: list[dict[str, Any]]) -> None:
         self._notes = (self._notes + fresh)[-_KEPT_NOTES:]
-        return fresh[-_KEPT_NOTES:]
+        for note in fresh:
+            self._send(_event("note", note))
+
+    def _read_notes(self) -> list[dict[str, Any]]:
+        """None where the disk gives none: force and state are shown all the same."""
+        read, self._read = self._read, self._log.read_new
+        fresh: deque[dict[str, Any]] = deque(maxlen=_KEPT_NOTES)
+        with contextlib.suppress(OSError):
+            fresh.extend(event._asdict() for event in read())
+        return list(fresh)
 
     def _history(self) -> dict[str, Any]:
         if self._rows is None:

@@ -1,8 +1,9 @@
 """The run before a plant: which recording is it, how is its force read, and what is left of it that is kept."""
 
 import json
-from math import isnan, nan
+from math import inf, isnan, nan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from gateway.diagnosis.force_error import rms_n
 from gateway.plants.force_reference import find_reference, keep_reference, read_reference
 from gateway.plants.recorded_force import read_recorded_force
 from gateway.plants.recorded_number import header_in_use
-from gateway.recording import Recorder, read_recording
+from gateway.recording import Recorder, RecordingError, read_recording
 
 COLUMNS = ("time_s", "setpoint_n", "force_n", "command_v")
 STRAIGHTENED = {"quadratic_per_n": 2.0e-3, "zero_n": 0.4}
@@ -117,3 +118,23 @@ def test_the_voltage_is_what_went_out_else_what_was_asked_else_unknown(tmp_path:
 def test_a_header_says_which_plant_was_in_use_or_nothing(said: object, read: dict[str, int]) -> None:
     assert header_in_use({"plant_in_use": said}) == read
     assert header_in_use({}) == {}
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"number": "x"},
+        {"number": [1]},
+        {"number": 1.5},
+        {"number": 1, "cell": {"foo": 1.0}},
+        {"number": 1, "cell": [1, 2]},
+        {"number": 1, "cell": {"quadratic_per_n": "a"}},
+        {"number": 1, "cell": {"quadratic_per_n": None}},
+        {"number": 1, "cell": {"zero_n": inf}},
+        {"number": 1, "cell": {"zero_n": 10**400}},
+    ],
+)
+def test_a_plant_in_use_that_no_gateway_writes_is_a_sentence_and_no_internal_error(said: dict[str, Any]) -> None:
+    for written in (said, json.dumps(said)):
+        with pytest.raises(RecordingError, match="of plant_in_use what no gateway writes"):
+            header_in_use({"plant_in_use": written})

@@ -2,6 +2,7 @@
 
 import errno
 import fcntl
+import os
 from pathlib import Path
 
 import pytest
@@ -50,3 +51,16 @@ def test_a_file_system_that_locks_no_directories_locks_the_file(
 
 def refuse_file() -> None:
     raise OSError(errno.ENOLCK, "No locks available")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+def test_the_lock_that_an_administrator_leaves_behind_is_the_service_s(tmp_path: Path) -> None:
+    """Where root's files are nobody else's (umask 077) a gateway did not start behind a change that root had made."""
+    os.chown(tmp_path, 501, 502)
+    before = os.umask(0o077)
+    try:
+        with hold_state_lock(tmp_path) as is_ours:
+            assert is_ours
+    finally:
+        os.umask(before)
+    assert (tmp_path / NAME).stat().st_uid == 501

@@ -63,3 +63,20 @@ def test_a_temperature_or_a_pressure_that_is_none_is_missing(name: str) -> None:
 def test_what_is_clean_stays_as_it_is() -> None:
     for clean in (FORCE_N, np.zeros(TIME_S.size), np.full(TIME_S.size, np.nan), np.where(VOLTS > 2.0, 10.0, 0.0)):
         assert dropped(clean) == []
+
+
+@pytest.mark.parametrize("value", [-9999.0, 9999.0, 32767.0, 1.0e30])
+@pytest.mark.parametrize("name", ["command_v", "pressure_kpa"])
+def test_what_drives_is_missing_where_a_logger_wrote_no_value(name: str, value: float) -> None:
+    """It was simulated as a command: causes were found for it, and the note asked whether it is in mV."""
+    drive = VOLTS if name == "command_v" else 100.0 * VOLTS
+    spoiled = drive.copy()
+    spoiled[1200:1220] = value
+    table = {"time_s": TIME_S, "force_n": FORCE_N, name: spoiled}
+    found = measurement_of(Recording(Path("run.csv"), {}, table, TIME_S.size, False))
+    kept = found.command_v if found.pressure_pa is None else found.pressure_pa / 1000.0
+    assert kept is not None and float(np.abs(kept - drive).max()) < 0.5 * float(np.ptp(drive))
+    assert f"20 values of {name} are below" in found.notes[0] and "(the first: run.csv, row 1201)" in found.notes[0]
+    assert not any("in mV" in note for note in found.notes)
+    millivolts = measurement_of(Recording(Path("run.csv"), {}, table | {name: 1.0e3 * drive}, TIME_S.size, False))
+    assert not any("are below" in note for note in millivolts.notes), "all of them: that is another unit"

@@ -112,7 +112,7 @@ def test_what_overflows_in_a_square_is_a_missing_value(name: str) -> None:
     table = columns(temperature_c=20.0 + TIME_S**2)
     table[name][500] = 1.0e300
     found = measured(**table)
-    assert noted(found, f"1 values of {name} are beyond 1e+60: taken as missing")
+    assert noted(found, f"1 values of {name} are beyond 1e+60 (the first: run.csv, row 501): taken as missing")
     assert bool(found.usable[500]) == (name != "force_n")
     assert found.command_v is not None and float(found.command_v.max()) < 4.0
     assert float(found.covariates["temperature_c"].max()) < 100.0

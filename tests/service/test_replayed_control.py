@@ -158,6 +158,14 @@ def test_a_recording_of_a_run_is_refused(recording: Recording, own: ReplaySetup,
         replay_control(replace(recording, columns=columns), own)
 
 
+def test_a_time_that_runs_backwards_is_refused_with_its_row(recording: Recording, own: ReplaySetup) -> None:
+    """As by every other verb: control was played over it, and the differences told were of no machine."""
+    time_s = recording.columns["time_s"].copy()
+    time_s[50] = time_s[40]
+    with pytest.raises(RecordingError, match=r"row 51, column time_s: .* time runs backwards"):
+        replay_control(replace(recording, columns=recording.columns | {"time_s": time_s}), own)
+
+
 def test_a_table_without_the_gateways_columns_is_refused(recording: Recording, own: ReplaySetup) -> None:
     columns = {name: recording.columns[name] for name in ("time_s", "force_n", "command_v")}
     with pytest.raises(RecordingError, match="has no column setpoint_n, state"):

@@ -193,3 +193,15 @@ def test_each_recording_is_read_once_for_each_calibration(tmp_path: Path, monkey
         use_calibration(tmp_path, number)
         assert search.keep(1.0e12) is None
         assert len(read) == reads
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+def test_a_reference_that_an_administrator_chooses_is_the_service_s(tmp_path: Path) -> None:
+    """Where root's files are nobody else's (umask 077) the watch could not read it, and left it out."""
+    os.chown(tmp_path, 501, 502)
+    before = os.umask(0o077)
+    try:
+        reference = keep_reference_recording(tmp_path, record(tmp_path))
+    finally:
+        os.umask(before)
+    assert reference_path(tmp_path, reference).stat().st_uid == 501

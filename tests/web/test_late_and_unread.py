@@ -1,6 +1,8 @@
 """Where control is slow nothing that comes late presses; where the log cannot be read the force is shown all the same."""
 
 import asyncio
+import threading
+from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +10,9 @@ import pytest
 
 from gateway.live.control_link import ANSWER_S
 from gateway.live.ring_rows import RingRows
+from gateway.processes.event import EventRecord
+from gateway.processes.event_file import EventFile
+from gateway.processes.event_log import EventLog
 from gateway.recording.ring import SampleRing
 from gateway.web import events
 from gateway.web.commands import Commands
@@ -43,6 +48,45 @@ def test_a_log_that_cannot_be_read_keeps_nobody_from_force_and_state(
         await source.close()
 
     asyncio.run(scene())
+
+
+def test_a_disk_that_hangs_under_the_log_keeps_nobody_waiting_and_is_said(
+    tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was read by the loop that serves the page: no request was answered, and no Stop came through, while it hung."""
+    for name, value in (("_SAMPLES_S", 0.001), ("_PATIENCE_S", 0.01), ("_HANGS_S", 0.02)):
+        monkeypatch.setattr(events, name, value)
+    goes_on, read_stored = threading.Event(), events.EventReader.read_stored
+
+    def hang(reader: events.EventReader) -> Iterator[EventRecord]:
+        goes_on.wait(10.0)
+        return read_stored(reader)
+
+    monkeypatch.setattr(events.EventReader, "read_stored", hang)
+    with EventLog(lambda line: None, source="control", file=EventFile(tmp_path)) as log:
+        log("control", "A310 master lost")
+
+    async def until(stream: AsyncGenerator[bytes], wanted: str) -> dict[str, Any]:
+        while (event := read(await anext(stream)))[0] != wanted:
+            pass
+        return dict(event[1])
+
+    async def scene() -> list[str]:
+        source = EventSource(Context(tmp_path), RingRows(ring[0]), test_events.Commands())  # type: ignore[arg-type]
+        stream = source.stream("me")
+        async with asyncio.timeout(8.0):
+            await until(stream, "history")
+            await until(stream, "state")
+            said = [(await until(stream, "note"))["text"]]
+            await until(stream, "state")
+            goes_on.set()
+            said.append((await until(stream, "note"))["text"])
+        await stream.aclose()
+        await source.close()
+        return said
+
+    first, second = asyncio.run(scene())
+    assert "the disk has not given the log" in first and second == "master lost"
 
 
 def test_all_but_a_stop_says_until_when_it_is_wanted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -26,6 +26,9 @@ LARGEST_BAD_SHARE: Final = 0.2
 OVERLOADED: Final = 1.5  # quality 2 is an overload, 1 an unsteady reading
 LARGEST_COMMAND_V: Final = 10.5
 REGULAR_SHARE: Final = 0.5  # values seen before, as those of a staircase are
+NO_COMMAND_V: Final = 50.0  # here and there, that stands for no value (-9999, 32767); in many rows it is another unit
+FAR: Final = 5.0  # times the largest force that a command usually makes
+FAR_SHARE: Final = 0.2  # of the rows of one command: more of them are the force of that command
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,16 +109,21 @@ def _select_rows(
     latest = np.maximum.accumulate(np.where(finite, time_s, -np.inf))
     forward = np.append(True, time_s[1:] > latest[:-1])
     overloaded = columns["quality"] >= OVERLOADED if "quality" in columns else np.zeros(len(finite), dtype=bool)
+    no_command = finite & (np.abs(command_v) > NO_COMMAND_V)
+    no_command &= bool(no_command.mean() <= LARGEST_BAD_SHARE)
+    no_force = _far_forces(command_v, force, finite & ~no_command)
     notes = []
     for bad, what in (
         (~finite, "without a number in time, command or force"),
+        (no_command, f"with a command beyond {NO_COMMAND_V:g} V, as a logger writes for no value"),
+        (no_force, "with a force far beyond all others at the same command, as a logger writes for no value"),
         (finite & overloaded, "with the load cell overloaded or another bad quality"),
         (finite & ~overloaded & ~forward, "whose time does not advance (repeated or out of order)"),
     ):
         if bad.any():
             first = int(np.flatnonzero(bad)[0]) + 1
             notes.append(f"{int(bad.sum())} of {len(bad)} rows {what}, the first is data row {first}: left out")
-    keep = finite & forward & ~overloaded
+    keep = finite & forward & ~overloaded & ~no_command & ~no_force
     if (~finite).mean() > LARGEST_BAD_SHARE:
         raise LadderError(
             LadderFlaw.NOT_FINITE, f"{notes[0].removesuffix(': left out')}: too many to guess around; record again"
@@ -123,6 +131,20 @@ def _select_rows(
     if int(keep.sum()) < FEWEST_ROWS:
         raise LadderError(LadderFlaw.TOO_SHORT, f"{int(keep.sum())} usable rows are left: {'; '.join(notes)}")
     return keep, notes
+
+
+def _far_forces(command_v: Floats, force: Floats, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which forces are none: one such reading in a stair's mean was told as a cell in kgf, or with its sign inverted."""
+    far = np.zeros(len(force), dtype=bool)
+    if not known.any():
+        return far
+    commands, of, count = np.unique(np.round(command_v[known], 3), return_inverse=True, return_counts=True)
+    order = np.lexsort((force[known], of))
+    usual = force[known][order[np.cumsum(count) - count + count // 2]]  # the median at each command
+    far[known] = np.abs(force[known]) > FAR * np.abs(usual).max()
+    share = np.bincount(of, weights=far[known], minlength=len(commands)) / count
+    far[known] &= share[of] < FAR_SHARE
+    return far
 
 
 def _check_roles(rows: Rows) -> None:

@@ -1,9 +1,11 @@
 """Going on with a run that was stopped: what its plan was, and which groups it has not climbed.
 
 A group counts once all of its stairs were left by the run itself; a cut one is climbed again, from rest and after the check's
-cycle, as every recording begins. A recording that may not be fitted counts for nothing.
+cycle, as every recording begins. A recording that may not be fitted counts for nothing. Of other recordings, which may have
+gigabytes, only the headers are read.
 """
 
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -13,7 +15,7 @@ from gateway.bsfm.ladder.labels import Labels
 from gateway.bsfm.ladder.ladder_error import LadderError
 from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
-from gateway.recording import Recording, RecordingError, list_recordings, read_recording
+from gateway.recording import Recording, RecordingError, read_header, read_recording, recording_paths
 
 _NO_PLAN: Final = ("stairs", "top_v")  # what the header says beside the plan's own fields
 
@@ -48,29 +50,33 @@ class RestOfLadder:
 
 def find_rest_of_ladder(state: Path) -> RestOfLadder:
     """Return what is left of the last recorded ladder. CliError where none is recorded."""
-    ladders = [entry for entry in list_recordings(state) if entry.header.get("ladder")]
-    if not ladders:
-        raise CliError(
-            f"E422 no calibration run is recorded in {state / 'recordings'}: nothing to go on with", exit_codes.DATA
-        )
-    entry = ladders[-1]
-    facts, last = entry.header["ladder"], read_recording(entry.path)
+    path, header = _last_ladder(state)
+    facts, last = header["ladder"], read_recording(path)
     plan = {name: value for name, value in facts.items() if name not in _NO_PLAN}
     plan["tare"] = (
         False  # the zero is that of the first part (ladder_source); a slide that has pressed does not rest at it
     )
     plan["v_max_v"] = facts.get("top_v", plan["v_max_v"])  # the same stairs again, whatever model is in use by now
-    earlier = {number: _whole_groups(_beside(entry.path, number)) for number in entry.header.get("continues", ())}
-    climbed = earlier | {entry.number: _whole_groups(last)}
+    earlier = {number: _whole_groups(_beside(path, number)) for number in header.get("continues", ())}
+    climbed = earlier | {int(path.stem): _whole_groups(last)}
     used = [number for number, groups in climbed.items() if groups]
-    header, finished = entry.header, _is_finished(last) and all(earlier.values())
+    finished = _is_finished(last) and all(earlier.values())
     groups, fingerprint = sum(climbed.values()), header.get("rig_fingerprint", "")
-    return RestOfLadder(plan, groups, used, header.get("name", ""), fingerprint, entry.path, finished)
+    return RestOfLadder(plan, groups, used, header.get("name", ""), fingerprint, path, finished)
+
+
+def _last_ladder(state: Path) -> tuple[Path, dict[str, Any]]:
+    for path in reversed(recording_paths(state)):
+        with contextlib.suppress(RecordingError, OSError):
+            if (header := read_header(path)).get("ladder"):
+                return path, header
+    sentence = f"no calibration run is recorded in {state / 'recordings'}: nothing to go on with"
+    raise CliError(f"E422 {sentence}", exit_codes.DATA)
 
 
 def rig_of(recording: Path, named: str) -> str:
     """Return the rig file that a recording names, if that can (still) be read, else the one that was named."""
-    file = str(read_recording(recording).header.get("rig_file", ""))
+    file = str(read_header(recording).get("rig_file", ""))
     return file if file and Path(file).exists() else named
 
 

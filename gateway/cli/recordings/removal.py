@@ -59,13 +59,14 @@ def retention_of(state: StateChoice, days: float | None, most_bytes: int | None)
 
 def prune(state: Path, retention: "Retention", *, dry_run: bool, asks: bool) -> list["Prunable"]:
     """Delete what there is no room for, or only say what it would be; return it."""
+    from gateway.calibrations.kept_ladders import kept_ladders
     from gateway.recording import recording_paths
     from gateway.recording.care.keeping import choose_prunable, prune_recordings
 
-    reference = reference_name(state)
-    chosen = choose_prunable(recording_paths(state), retention, reference, time.time())
+    reference, needed = reference_name(state), kept_ladders(state)
+    chosen = choose_prunable(recording_paths(state), retention, reference, time.time(), needed)
     if dry_run or not chosen:
         return chosen
     if asks and not click.confirm(f"delete {count_of(chosen, 'recording')}?", err=True):
         raise CliError("nothing was deleted")
-    return prune_recordings(state, retention, reference)
+    return prune_recordings(state, retention, reference, needed)

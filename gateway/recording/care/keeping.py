@@ -22,7 +22,7 @@ from gateway.recording.reader import recording_paths
 
 _MARK: Final = ".keep"
 _GONE: Final = ".gone"  # of the highest number that was deleted: it is not used again
-_CLOCK_SET_S: Final = 1_577_836_800.0  # 2020: an earlier time is of a clock that nobody had set, as after a power cut
+CLOCK_SET_S: Final = 1_577_836_800.0  # 2020: an earlier time is of a clock that nobody had set, as after a power cut
 _CLOSED_S: Final = 5.0  # rows come ten times a second: what was written later than this is being recorded, lock or not
 
 
@@ -77,14 +77,18 @@ class Prunable:
     why: str
 
 
-def choose_prunable(paths: list[Path], retention: Retention, reference: str, now_s: float) -> list[Prunable]:
-    """Return the recordings that the limits have no room for, the oldest first. now_s: of the epoch."""
+def choose_prunable(
+    paths: list[Path], retention: Retention, reference: str, now_s: float, needed: frozenset[str] = frozenset()
+) -> list[Prunable]:
+    """Return the recordings that the limits have no room for, the oldest first. now_s: of the epoch; needed: names of those
+    that somebody will read again, such as a calibration's ladder."""
     ended = sorted(_with_ends(paths, now_s), key=lambda one: (one[0], one[2].name))
     total, chosen = sum(status.st_size for _, status, _ in ended), []
     for _, status, path in ended:
-        age_s = now_s - status.st_mtime if status.st_mtime >= _CLOCK_SET_S else None
+        age_s = now_s - status.st_mtime if status.st_mtime >= CLOCK_SET_S else None
         why = _why_it_goes(age_s, total, retention)
-        if why and abs(now_s - status.st_mtime) > _CLOSED_S and _may_go(path, reference):
+        is_needed = path.name in needed or abs(now_s - status.st_mtime) <= _CLOSED_S
+        if why and not is_needed and _may_go(path, reference):
             chosen.append(Prunable(path, status.st_size, why))
             total -= status.st_size
     return chosen
@@ -153,11 +157,13 @@ def _keep_highest_mark(folder: Path, descriptor: int) -> None:
         remove_if_possible(descriptor, mark.name)
 
 
-def prune_recordings(state: Path, retention: Retention, reference: str) -> list[Prunable]:
+def prune_recordings(
+    state: Path, retention: Retention, reference: str, needed: frozenset[str] = frozenset()
+) -> list[Prunable]:
     """Remove what the limits have no room for; return what has gone. One that the disk does not let go keeps no other one;
     OSError where it lets none go."""
     gone, refusals = [], []
-    for one in choose_prunable(recording_paths(state), retention, reference, time.time()):
+    for one in choose_prunable(recording_paths(state), retention, reference, time.time(), needed):
         try:
             if not delete_recording(one.path, reference):
                 gone.append(one)

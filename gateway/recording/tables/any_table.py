@@ -10,6 +10,7 @@ from gateway.recording.layout import MAGIC
 from gateway.recording.reader import Recording, read_recording
 from gateway.recording.tables.column_mapping import ColumnMapping, factors_of, select_columns
 from gateway.recording.tables.csv_table import read_csv
+from gateway.recording.tables.force_unit import force_in_newtons
 from gateway.recording.tables.parquet_table import MAGIC as PARQUET_MAGIC
 from gateway.recording.tables.parquet_table import read_parquet
 
@@ -20,6 +21,10 @@ def read_table(path: Path, mapping: ColumnMapping | None = None, *, lenient: boo
     lenient: rows and cells of a CSV that cannot be read are told in `notes` and left out; else they are a
     RecordingError that names row and column. OSError as usual.
     """
+    return force_in_newtons(_read_any(path, mapping, lenient))
+
+
+def _read_any(path: Path, mapping: ColumnMapping | None, lenient: bool) -> Recording:
     if path.is_dir():
         raise RecordingError(f"{path} is a directory: name the recording in it")
     if other := other_kind(path):

@@ -77,7 +77,7 @@ def in_unit(recording: Recording, force_unit: str | None) -> Recording:
     if not isclose(FORCE_UNITS.get(force_unit.strip().lower(), 0.0), factor, rel_tol=1.0e-6):
         sentence = (
             f"--force-unit {force_unit}, but force_n was read in another unit already (1 of it = {factor:.5g} N), as its "
-            "header or --columns says: leave one of both out"
+            "header, a comment or --columns says: leave one of both out"
         )
         raise LadderError(LadderFlaw.UNIT, sentence)
     return replace(recording, header=recording.header | {"force_unit": "N"})

@@ -202,6 +202,25 @@ def test_rows_without_numbers_are_left_out_with_the_first_one_named() -> None:
     )
 
 
+@pytest.mark.parametrize("value", [-9999.0, 9999.0, -999.25, 1.0e30])
+@pytest.mark.parametrize("name", ["force_n", "command_v"])
+def test_what_a_logger_writes_for_no_value_is_no_reading(name: str, value: float) -> None:
+    """One in the mean of a stair was told as a cell in kgf, as one with its sign inverted, or was a top of 1056 N."""
+    clean = recorded(stairs())
+    for rows in ([795], [795, 1195, 415], list(range(19, 2400, 160))):
+        table = {**clean, name: clean[name].copy()}
+        table[name][rows] = value
+        checked = check_table(table)
+        assert checked.ladder.force_n == pytest.approx(check_table(clean).ladder.force_n, abs=0.1)
+        assert f"{len(rows)} of 2480 rows with a " in checked.notes[0]
+        assert f"the first is data row {min(rows) + 1}: left out" in checked.notes[0]
+
+
+def test_what_was_really_pressed_in_a_long_rest_is_no_sentinel() -> None:
+    resting = recorded([0.0] * 4000 + stairs())
+    assert check_table(resting).notes == ()
+
+
 def test_a_table_of_mostly_nothing_is_refused() -> None:
     table = recorded(stairs())
     table["force_n"][::3] = np.nan

@@ -65,11 +65,10 @@ class Recorded:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, groups: dict[int, int | None], finished: bool = True) -> None:
         header = {"ladder": PLAN | {"stairs": 99, "top_v": 7.5}, "continues": (1, 2), "name": "mine"}
         header["rig_fingerprint"] = "f" * 64
-        none = SimpleNamespace(header={"rig": "demo"}, path=Path("0004.fgr"), number=4)
-        last = SimpleNamespace(header=header, path=Path("0003.fgr"), number=3)
-        older = SimpleNamespace(header={"ladder": PLAN}, path=Path("0000.fgr"), number=0)
-        self.entries: list[Any] = [older, last, none]
-        monkeypatch.setattr(resume, "list_recordings", lambda state: self.entries)
+        none, older = {"rig": "demo"}, {"ladder": PLAN}
+        self.headers: dict[Path, Any] = {Path(f"000{k}.fgr"): one for k, one in ((0, older), (3, header), (4, none))}
+        monkeypatch.setattr(resume, "recording_paths", lambda state: list(self.headers))
+        monkeypatch.setattr(resume, "read_header", lambda path: self.headers[path])
         monkeypatch.setattr(resume, "read_recording", self._read)
         monkeypatch.setattr(resume, "check_ladder", self._check)
         monkeypatch.setattr(resume, "_is_finished", lambda recording: finished)
@@ -117,7 +116,7 @@ def test_a_run_whose_last_stair_stood_when_it_ended_is_not_finished(monkeypatch:
 
 def test_without_a_ladder_there_is_nothing_to_go_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
     recorded = Recorded(monkeypatch, {})
-    del recorded.entries[:2]
+    recorded.headers = {Path("0004.fgr"): {"rig": "demo"}}
     with pytest.raises(CliError, match="E422") as ended:
         find_rest_of_ladder(Path())
     assert ended.value.exit_code == exit_codes.DATA
@@ -150,7 +149,7 @@ def test_the_rig_file_of_a_recording_is_taken_while_it_is_there(
     ):
         if there:
             file.touch()
-        monkeypatch.setattr(resume, "read_recording", lambda path, header=header: SimpleNamespace(header=header))
+        monkeypatch.setattr(resume, "read_header", lambda path, header=header: header)
         assert resume.rig_of(Path("0001.fgr"), "demo") == rig
 
 

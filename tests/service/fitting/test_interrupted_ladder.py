@@ -173,6 +173,19 @@ def test_a_finished_run_repeats_nothing_and_its_fit_is_made_once(whole_fit) -> N
     assert (more["first_group"], rest.is_whole(more)) == (2, False)
 
 
+def test_of_other_recordings_only_the_headers_are_read(runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Recordings of days have gigabytes each, and all of them were read into memory."""
+    ladder = written(tmp_path, runs.whole)
+    for header in ({}, {"rig": "demo"}):
+        Recorder(tmp_path / "recordings", header, ("time_s",)).close()
+    (tmp_path / "recordings" / "0004.fgr").write_bytes(b"damaged")
+    whole: list[Path] = []
+    read = Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda path: (whole.append(path), read(path))[1])
+    assert find_rest_of_ladder(tmp_path).last == ladder
+    assert whole == [ladder]
+
+
 def test_an_earlier_part_that_is_gone_is_climbed_again(runs, tmp_path: Path) -> None:
     gone = written(tmp_path, runs.whole, int(np.searchsorted(runs.whole.columns["stair"], 30)))
     written(tmp_path, runs.rest[1], int(np.searchsorted(runs.rest[1].columns["stair"], 12)), continues=[1])

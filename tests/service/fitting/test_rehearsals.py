@@ -95,3 +95,18 @@ def test_a_plant_that_was_found_in_a_rehearsal_is_told_as_one_by_the_real_rig(re
     plants.run_in_background = lambda work, done: done(work())
     assert doubt in plants.answer({"use": number})["said"]
     plants.close()
+
+
+@pytest.mark.parametrize(("rig_name", "origin"), [("cell-9", 'on "cell-9"'), ("", "in recordings that name no rig")])
+def test_a_plant_of_another_machine_is_told_as_one(rig_name: str, origin: str, real: Rig, tmp_path: Path) -> None:
+    """A store that was copied by hand, or a selection, was believed: control took back what is in another machine."""
+    path = recorded(tmp_path, "irc5-cell", facts={"rig_texts": dict(real.texts)})
+    sources = replace(read_sources([str(path)], rig=None, columns=None, state=tmp_path), rig=rig_name)
+    diagnosis: Any = SimpleNamespace(verdict=SimpleNamespace(value="confirmed"), causes=())
+    stored = PlantStore(tmp_path).load(save_diagnosed(tmp_path, diagnosis, sources, load_plant("paper-slide")))
+    doubt = f"plant 1 was found {origin}, not on irc5-cell: what it takes back may not be in this machine"
+    assert [note for note in with_plant_in_use(real, stored).notes if note.startswith(doubt)]
+    own = replace(stored, provenance=replace(stored.provenance, rig="irc5-cell"))
+    from_file = replace(stored, provenance=replace(stored.provenance, recordings=(), file="plant.yaml"))
+    for rig, plant in ((real, own), (real, from_file), (real.as_simulated(), stored)):
+        assert not [note for note in with_plant_in_use(rig, plant).notes if "was found" in note]

@@ -1,18 +1,28 @@
 """Removes the recordings that the rig has no room for, at the start, every hour, and whenever
-one has become as long as one may be, in a thread beside the control loop."""
+one has become as long as one may be, in a thread beside the control loop.
 
+A clock by which all recordings are too old is not believed for a day: a machine whose clock was years ahead at its start would
+have lost everything before anybody, or a time server, could set it.
+"""
+
+import time
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.calibrations.kept_ladders import kept_ladders
 from gateway.processes.disk_worker import DiskWorker
 from gateway.processes.event_log import EventLog
 from gateway.profiles.recordings_section import Retention
 from gateway.progress import few
+from gateway.recording import recording_paths
+from gateway.recording.care.clock_doubt import ClockDoubt, doubt_clock
 from gateway.recording.care.keeping import Prunable, prune_recordings
 from gateway.watch.reference_recording import read_reference_recording
 
 _EVERY_S: Final = 3600.0
+_DOUBT_S: Final = 86400.0
 
 
 class RecordingRetention:
@@ -22,12 +32,14 @@ class RecordingRetention:
         self._state, self._retention, self._log = state, retention, log
         self._worker = DiskWorker()
         self._due_s = inf if retention.is_unlimited else -inf
+        self._told = ClockDoubt.NONE
+        self._doubted_s: float | None = None  # since when the clock seemed to be ahead
 
     def tick(self, now_s: float) -> None:
         """Begin to prune where it is time; nothing waits for it. In a running loop, if there is a limit."""
         if now_s >= self._due_s:
             self._due_s = now_s + _EVERY_S
-            self._worker(self._prune, self._tell)
+            self._worker(lambda: self._prune(now_s), self._tell)
 
     def hasten(self) -> None:
         """Have it begin with the next tick, if there is a limit: a recording has ended by its length."""
@@ -39,9 +51,23 @@ class RecordingRetention:
         self._due_s = inf
         self._worker.close()
 
-    def _prune(self) -> list[Prunable]:
+    def _prune(self, now_s: float) -> list[Prunable]:
         reference = read_reference_recording(self._state)
-        return prune_recordings(self._state, self._retention, reference.name if reference else "")
+        name = reference.name if reference else ""
+        return prune_recordings(self._state, self._believed_limits(now_s), name, kept_ladders(self._state))
+
+    def _believed_limits(self, now_s: float) -> Retention:
+        """Return the limits, without that of the age for a day once the clock seems to be ahead."""
+        if self._retention.days is None:
+            return self._retention
+        doubt = doubt_clock(recording_paths(self._state), self._retention.days, time.time())
+        if doubt.sentence and doubt.kind is not self._told:
+            self._log("recording", doubt.sentence)
+        self._told = doubt.kind
+        if doubt.kind is ClockDoubt.AHEAD and self._doubted_s is None:
+            self._doubted_s = now_s
+        is_doubted = self._doubted_s is not None and now_s < self._doubted_s + _DOUBT_S
+        return replace(self._retention, days=None) if is_doubted else self._retention
 
     def _tell(self, gone: Any) -> None:
         if isinstance(gone, BaseException):

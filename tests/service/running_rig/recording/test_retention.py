@@ -1,6 +1,7 @@
 """The gateway prunes at its start and every hour, in a thread of its own, and says what has gone."""
 
 import asyncio
+import os
 import threading
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,8 +27,16 @@ class Said:
         self.heard.set()
 
 
+def record_now(state: Path) -> Path:
+    """Record one by which the clock is believed."""
+    path = record(state)
+    os.utime(path)
+    return path
+
+
 async def prune_at(state: Path, *times_s: float) -> list[str]:
     said = Said()
+    record_now(state)
     retention = RecordingRetention(state, Retention(days=30.0), said)
     for now_s in times_s:
         record(state, days_ago=1_000)
@@ -42,7 +51,7 @@ def test_it_prunes_at_the_start_and_again_an_hour_later(tmp_path: Path) -> None:
     lines = asyncio.run(prune_at(tmp_path, 50.0, 3650.0))
     assert [line.split(" (")[0] for line in lines] == ["pruned 1 recordings"] * 2
     assert "older than 30 days" in lines[0]
-    assert recording_paths(tmp_path) == []
+    assert [path.name for path in recording_paths(tmp_path)] == ["0001.fgr"]
 
 
 def test_within_the_hour_and_without_a_limit_nothing_is_looked_at(tmp_path: Path) -> None:
@@ -78,12 +87,13 @@ def test_the_rigs_reference_stays_however_old_it_is(
     tmp_path: Path, is_reference: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = record(tmp_path, days_ago=1_000)
+    record_now(tmp_path)
     reference = SimpleNamespace(name=path.name) if is_reference else None
     monkeypatch.setattr(
         "gateway.service.running_rig.recording.retention.read_reference_recording", lambda state: reference
     )
     retention = RecordingRetention(tmp_path, Retention(days=30.0), Said())
-    gone = retention._prune()
+    gone = retention._prune(0.0)
     retention.close()
     assert [one.path for one in gone] == ([] if is_reference else [path])
 

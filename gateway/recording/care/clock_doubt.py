@@ -1,0 +1,66 @@
+"""Whether the clock can tell how old recordings are.
+
+One that is years ahead would have them all deleted at once, one that nobody has set would keep them for ever; neither can be
+told from a long rest with certainty, and so it is said.
+"""
+
+import contextlib
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from gateway.recording.care.keeping import CLOCK_SET_S, is_being_recorded
+
+_DAY_S: Final = 86400.0
+_CURE: Final = "`date` shows the clock, `sudo timedatectl set-ntp true` has it set"
+
+
+class ClockDoubt(StrEnum):
+    """What the clock cannot be believed for."""
+
+    NONE = "none"
+    UNSET = "unset"
+    BEHIND = "behind"
+    AHEAD = "ahead"
+
+
+class Doubt(NamedTuple):
+    """kind, and the sentence with its code, empty for none."""
+
+    kind: ClockDoubt
+    sentence: str = ""
+
+
+def doubt_clock(paths: Sequence[Path], days: float, now_s: float) -> Doubt:
+    """Return what is odd about the clock beside the ends of these recordings. days: how long they are retained; now_s: of the
+    epoch."""
+    if now_s < CLOCK_SET_S:
+        sentence = f"nobody has set this machine's clock ({_date(now_s)}): no recording goes for its age until it is"
+        return Doubt(ClockDoubt.UNSET, f"W252 {sentence}; {_CURE}")
+    ended_s, name = max(_ended(paths), default=(now_s, ""))
+    if ended_s > now_s + _DAY_S:
+        clocks = f"recording {name} ended on {_date(ended_s)}, and now this machine's clock says {_date(now_s)}"
+        cure = f"{_CURE}, recordings delete N removes one"
+        sentence = f"{clocks}: it is behind, or was ahead then. Such recordings do not go for their age; {cure}"
+        return Doubt(ClockDoubt.BEHIND, f"W252 {sentence}")
+    if CLOCK_SET_S <= ended_s < now_s - days * _DAY_S:
+        oldest = f"all recordings are older than {days:g} days, the newest, {name}, is of {_date(ended_s)}"
+        cure = f"If the clock is ahead, set it within a day: so long none goes for its age; {_CURE}"
+        return Doubt(ClockDoubt.AHEAD, f"W252 by this machine's clock ({_date(now_s)}) {oldest}. {cure}")
+    return Doubt(ClockDoubt.NONE)
+
+
+def _ended(paths: Sequence[Path]) -> list[tuple[float, str]]:
+    """When those ended that are not being recorded; what cannot be asked tells nothing."""
+    ends = []
+    for path in paths:
+        with contextlib.suppress(OSError):
+            if not is_being_recorded(path):
+                ends.append((path.stat().st_mtime, path.name))
+    return ends
+
+
+def _date(time_s: float) -> str:
+    return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d}"

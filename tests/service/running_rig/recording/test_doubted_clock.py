@@ -1,0 +1,93 @@
+"""A clock that is years ahead at the start deletes nothing at once; one that is behind is said, for it keeps everything."""
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles.recordings_section import Retention
+from gateway.recording import recording_paths
+from gateway.recording.care.clock_doubt import ClockDoubt, doubt_clock
+from gateway.service.running_rig.recording import retention as module
+from gateway.service.running_rig.recording.retention import RecordingRetention
+from tests.recording.test_care import NOW_S, record
+
+DAY_S = 86400.0
+
+
+class Machine:
+    """A gateway that prunes, on a machine whose clock can be set."""
+
+    def __init__(self, state: Path, limit: Retention, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.state, self.said, self.wall_s = state, [], NOW_S
+        for place in (module.time, time):
+            monkeypatch.setattr(place, "time", lambda: self.wall_s)
+        self.retention = RecordingRetention(state, limit, lambda cause, text: self.said.append(text))  # type: ignore[arg-type]
+        self.retention.close()
+
+    def prune(self, now_s: float) -> list[str]:
+        return [one.path.stem for one in self.retention._prune(now_s)]
+
+
+def test_a_clock_that_is_years_ahead_takes_nothing_for_a_day_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for days_ago in (400.0, 3.0, 2.0):
+        record(tmp_path, days_ago=days_ago)
+    machine = Machine(tmp_path, Retention(days=90.0), monkeypatch)
+    machine.wall_s = NOW_S + 3650 * DAY_S
+    assert machine.prune(100.0) == machine.prune(3700.0) == []
+    assert len(machine.said) == 1
+    assert machine.said[0].startswith("W252 by this machine's clock (2033-11-11) all recordings are older than 90 days")
+    assert "0003.fgr, is of 2023-11-12" in machine.said[0]
+    machine.wall_s = NOW_S + 0.5 * DAY_S  # somebody, or a time server, has set it
+    assert machine.prune(7300.0) == []
+    assert machine.prune(100.0 + 1.01 * DAY_S) == ["0001"], "which is really so old"
+    assert len(recording_paths(tmp_path)) == 2
+
+
+def test_what_was_recorded_by_the_wrong_clock_is_no_witness_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record(tmp_path, days_ago=2.0)
+    machine = Machine(tmp_path, Retention(days=90.0), monkeypatch)
+    machine.wall_s = NOW_S + 3650 * DAY_S
+    assert machine.prune(0.0) == []
+    record(tmp_path, days_ago=-3649.9)
+    assert machine.prune(3600.0) == []
+
+
+def test_behind_a_rest_that_was_really_so_long_they_go_a_day_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record(tmp_path, days_ago=100.0)
+    machine = Machine(tmp_path, Retention(days=90.0), monkeypatch)
+    assert [machine.prune(hours * 3600.0) for hours in (0, 1, 23, 24)] == [[], [], [], ["0001"]]
+    assert len(machine.said) == 1
+
+
+def test_what_takes_too_much_room_goes_whatever_the_clock_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    paths = [record(tmp_path, days_ago=100.0) for _ in range(3)]
+    limit = Retention(days=90.0, bytes=1_000_000)
+    object.__setattr__(limit, "bytes", 2 * paths[0].stat().st_size)
+    assert Machine(tmp_path, limit, monkeypatch).prune(0.0) == ["0001"]
+
+
+@pytest.mark.parametrize("wall_s", [3600.0, NOW_S - 700 * DAY_S])
+def test_a_clock_that_is_behind_is_said_once(wall_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record(tmp_path, days_ago=3.0)
+    machine = Machine(tmp_path, Retention(days=90.0), monkeypatch)
+    machine.wall_s = wall_s
+    assert machine.prune(0.0) == machine.prune(3600.0) == []
+    (sentence,) = machine.said
+    assert sentence.startswith("W252 ") and "timedatectl" in sentence
+    assert ("nobody has set" in sentence) is (wall_s < DAY_S)
+
+
+def test_a_clock_that_goes_along_is_not_doubted(tmp_path: Path) -> None:
+    path = record(tmp_path, days_ago=3.0)
+    assert doubt_clock([path, tmp_path / "gone.fgr"], 90.0, NOW_S).kind is ClockDoubt.NONE
+    assert doubt_clock([], 90.0, NOW_S).kind is ClockDoubt.NONE
+    os.utime(path, (3600.0, 3600.0))
+    assert doubt_clock([path], 90.0, NOW_S).kind is ClockDoubt.NONE, "its age is not known, and it does not go"
