@@ -150,10 +150,15 @@ def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bo
 
 @contextmanager
 def _handle_signals(beat: "HeartbeatThread") -> Iterator[None]:
-    """The first of Ctrl-C, SIGTERM and a closed terminal (not with nohup) ramps down, the second drops the force at once."""
+    """The first of Ctrl-C, SIGTERM and a closed terminal (not with nohup) ramps down, a second Ctrl-C or SIGTERM drops the
+    force at once. A terminal that closes says SIGHUP twice, the end of a session SIGTERM beside it: nobody asks twice then."""
+    is_hung_up = False
 
     def on_signal(number: int, frame: object) -> None:
-        (beat.dropping if beat.stopping.is_set() else beat.stopping).set()
+        nonlocal is_hung_up
+        drops = beat.stopping.is_set() and not is_hung_up and number != signal.SIGHUP
+        is_hung_up = number == signal.SIGHUP
+        (beat.dropping if drops else beat.stopping).set()
 
     heard = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:

@@ -45,10 +45,14 @@ class SignalPipe:
     Who starts us may have signals blocked (a thread of a Qt or Java program), and that is inherited: nothing but SIGKILL would
     stop us and our children then. Or he ignores the ends of children (`trap '' CHLD`), which is inherited too: the kernel
     keeps no exit code then, and a gateway whose rig file is at fault would be started again and again.
+
+    A terminal that closes says SIGHUP twice, by its shell and, when that has ended, by the kernel; the end of a session says
+    SIGTERM beside it. Nobody has asked twice then, so SIGHUP counts as the first of the others does, and never beside it.
     """
 
     def __init__(self) -> None:
         self._reader, self._writer = socket.socketpair()
+        self._asked = self._told = 0
         for end in (self._reader, self._writer):
             end.setblocking(False)
 
@@ -58,10 +62,13 @@ class SignalPipe:
         return self._reader.fileno()
 
     def take(self) -> int:
-        """Return how many have come since the last call."""
+        """Return how many stops have been asked for since the last call."""
+        numbers, before = b"", self._told
         with contextlib.suppress(OSError):
-            return len(self._reader.recv(_MOST_SIGNALS))
-        return 0
+            numbers = self._reader.recv(_MOST_SIGNALS)
+        self._asked += len(numbers) - numbers.count(signal.SIGHUP)
+        self._told = max(self._asked, before, int(signal.SIGHUP in numbers))
+        return self._told - before
 
     def __enter__(self) -> Self:
         signal.set_wakeup_fd(self._writer.fileno(), warn_on_full_buffer=False)  # first: a handler does nothing

@@ -35,13 +35,33 @@ def test_under_nohup_the_end_of_the_terminal_ends_no_hold() -> None:
         assert not beat.stopping.is_set()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_first_signal_ramps_down_and_the_second_drops(number: int) -> None:
     beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
     with _handle_signals(beat):
         os.kill(os.getpid(), number)
         assert beat.stopping.is_set() and not beat.dropping.is_set()
         os.kill(os.getpid(), number)
+        assert beat.dropping.is_set()
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        (signal.SIGHUP, signal.SIGHUP),
+        (signal.SIGHUP, signal.SIGTERM, signal.SIGHUP),
+        (signal.SIGTERM, signal.SIGHUP, signal.SIGHUP),
+    ],
+)
+def test_a_terminal_or_a_session_that_ends_asks_once(numbers: tuple[int, ...]) -> None:
+    """Its shell and the kernel say SIGHUP each: the second one dropped the force."""
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    with _handle_signals(beat):
+        for number in numbers:
+            os.kill(os.getpid(), number)
+        assert beat.stopping.is_set() and not beat.dropping.is_set()
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGINT)
         assert beat.dropping.is_set()
 
 

@@ -112,6 +112,28 @@ def test_two_signals_at_once_are_two():
     assert signal.set_wakeup_fd(-1) == -1, "its end of the pipe is closed: nothing is written there any more"
 
 
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        (signal.SIGHUP, signal.SIGHUP),
+        (signal.SIGHUP, signal.SIGTERM, signal.SIGHUP),
+        (signal.SIGTERM, signal.SIGHUP, signal.SIGHUP),
+    ],
+)
+def test_a_terminal_or_a_session_that_ends_asks_once(numbers):
+    """Its shell and the kernel say SIGHUP each: the second one skipped the ramp, and the force fell at once."""
+    with SignalPipe() as signals:
+        heard = 0
+        for number in numbers:
+            os.kill(os.getpid(), number)
+            heard += signals.take()
+        assert heard == 1
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGINT)
+            heard += signals.take()
+        assert heard >= 2, "whoever asks again waits for nothing"
+
+
 def test_who_is_started_in_the_background_hears_what_stops_it():
     """A shell ignores SIGINT for a job that it starts with &; only nohup's word counts."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
