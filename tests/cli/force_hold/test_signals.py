@@ -20,8 +20,8 @@ def test_a_closed_terminal_ends_a_hold_unless_nohup_says_otherwise(is_ignored: b
         with _handle_signals(beat):
             os.kill(os.getpid(), signal.SIGHUP)
             assert beat.stopping.is_set() == stops
-            for _ in range(2):
-                os.kill(os.getpid(), signal.SIGTERM)
+            os.kill(os.getpid(), signal.SIGTERM)
+            os.kill(os.getpid(), signal.SIGINT)
             assert beat.stopping.is_set() and beat.dropping.is_set()
         assert signal.getsignal(signal.SIGHUP) is handler
     finally:
