@@ -13,6 +13,8 @@ from gateway.telemetry.command_queue import CommandQueue
 
 AGAIN_S: Final = 2.0
 _KEEPALIVE_S: Final = 10
+_SHORT_S: Final = 10.0
+_MOST_SHORT: Final = 3  # connections in a row; then it is no broker that comes and goes
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,25 +38,53 @@ async def keep_connected(
     MissingExtraError without aiomqtt.
     """
     aiomqtt = import_library("aiomqtt")
-    _tell_no_loss_twice(asyncio.get_running_loop(), aiomqtt.MqttError)
-    is_away = False
+    loop = asyncio.get_running_loop()
+    _tell_no_loss_twice(loop, aiomqtt.MqttError)
+    news = BrokerNews(f"the MQTT broker {broker.host}:{broker.port}", _name_at_broker(session.name), say, loop.time)
     while True:
         will = session.begin()
         try:
             async with _client(aiomqtt, broker, session.name, will) as client:
-                if is_away:
-                    say(f"the MQTT broker {broker.host}:{broker.port} is back")
-                is_away = False
+                news.note_connected()
                 await _carry(client, session)
         except* (aiomqtt.MqttError, OSError) as lost:
-            if not is_away:
-                say(
-                    f"E181 the MQTT broker {broker.host}:{broker.port} is away ({_reason(lost)}); data is kept meanwhile"
-                )
-            is_away = True
+            news.note_lost(_reason(lost))
         finally:
             session.lose()
         await asyncio.sleep(again_s)
+
+
+class BrokerNews:
+    """Says that the broker is away and back. Where it ends each connection at once, that is said instead, and once: two
+    gateways of one name, by a copied rig file say, take each other's place every few seconds, and it was never away.
+    clock: seconds."""
+
+    def __init__(self, broker: str, name: str, say: Callable[[str], None], clock: Callable[[], float]) -> None:
+        self._broker, self._name, self._say, self._clock = broker, name, say, clock
+        self._is_away = False
+        self._connected_s: float | None = None
+        self._short = 0
+
+    def note_connected(self) -> None:
+        """Note that there is a connection."""
+        self._connected_s = self._clock()
+        if self._is_away:
+            self._say(f"{self._broker} is back")
+        self._is_away = False
+
+    def note_lost(self, reason: str) -> None:
+        """Note that it is lost, or that there was none to be had."""
+        connected_s, self._connected_s = self._connected_s, None
+        is_short = connected_s is not None and self._clock() - connected_s < _SHORT_S
+        self._short = self._short + 1 if is_short else 0
+        if self._short == _MOST_SHORT:
+            self._say(
+                f"E181 {self._broker} ends each connection within seconds ({reason}): has another gateway the name "
+                f'"{self._name}" there, or may this one not publish? Data is kept meanwhile; not told again until one lasts'
+            )
+        elif self._short < _MOST_SHORT and not self._is_away:
+            self._is_away = True
+            self._say(f"E181 {self._broker} is away ({reason}); data is kept meanwhile")
 
 
 def _tell_no_loss_twice(loop: asyncio.AbstractEventLoop, loss: type[Exception]) -> None:
@@ -69,13 +99,18 @@ def _tell_no_loss_twice(loop: asyncio.AbstractEventLoop, loss: type[Exception]) 
     loop.set_exception_handler(handle)
 
 
+def _name_at_broker(name: str) -> str:
+    """Return a name under which a second gateway takes our place, and is not mixed with us."""
+    return f"force-gateway {name}"
+
+
 def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage) -> Any:
     for file in filter(None, (broker.ca, broker.certificate, broker.key)):
         check_plain(file)
     return aiomqtt.Client(
         broker.host,
         broker.port,
-        identifier=f"force-gateway {name}",  # a second gateway of this name takes its place, and is not mixed with it
+        identifier=_name_at_broker(name),
         tls_params=aiomqtt.TLSParameters(broker.ca, broker.certificate, broker.key) if broker.ca else None,
         username=broker.username,
         password=broker.password,
