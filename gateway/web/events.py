@@ -7,6 +7,7 @@ dropped; its browser comes back by itself. Nothing is read while nobody looks.
 
 import asyncio
 import contextlib
+from collections import deque
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -139,12 +140,13 @@ class EventSource:
         self._send(self._state)
 
     def _read_notes(self, events: Iterator[EventRecord]) -> list[dict[str, Any]]:
-        """None where the disk gives none: force and state are shown all the same."""
-        fresh: list[dict[str, Any]] = []
+        """None where the disk gives none: force and state are shown all the same. Of a full log, 100 000 lines that would take
+        80 MB, only the last are kept."""
+        fresh: deque[dict[str, Any]] = deque(maxlen=_KEPT_NOTES)
         with contextlib.suppress(OSError):
             fresh.extend(event._asdict() for event in events)
-        self._notes = (self._notes + fresh)[-_KEPT_NOTES:]
-        return fresh[-_KEPT_NOTES:]
+        self._notes = [*self._notes, *fresh][-_KEPT_NOTES:]
+        return list(fresh)
 
     def _history(self) -> dict[str, Any]:
         if self._rows is None:

@@ -1,6 +1,8 @@
 """Where control is slow nothing that comes late presses; where the log cannot be read the force is shown all the same."""
 
 import asyncio
+import weakref
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +45,36 @@ def test_a_log_that_cannot_be_read_keeps_nobody_from_force_and_state(
         await source.close()
 
     asyncio.run(scene())
+
+
+class Fields(dict[str, Any]):
+    """An event as it is shown, of which is known whether it is still there."""
+
+
+class Line:
+    """An event of the log."""
+
+    def __init__(self, number: int, held: list["weakref.ref[Fields]"]) -> None:
+        self.number, self.held = number, held
+
+    def _asdict(self) -> Fields:
+        fields = Fields(text=f"line {self.number}")
+        self.held.append(weakref.ref(fields))
+        return fields
+
+
+def test_of_a_long_log_no_more_is_held_than_is_shown(tmp_path: Path) -> None:
+    """All of it was, 80 MB of a full one, to show the last sixty lines."""
+    held: list[weakref.ref[Fields]] = []
+
+    def log() -> Iterator[Any]:
+        for number in range(500):
+            yield Line(number, held)
+            assert sum(one() is not None for one in held) <= events._KEPT_NOTES + 1
+
+    source = EventSource(Context(tmp_path), None, test_events.Commands())  # type: ignore[arg-type]
+    shown = source._read_notes(log())
+    assert [note["text"] for note in shown] == [f"line {number}" for number in range(440, 500)]
 
 
 def test_all_but_a_stop_says_until_when_it_is_wanted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
