@@ -1,7 +1,6 @@
 """A connection to an MQTT broker that is opened again for ever, and carries what a session has to say."""
 
 import asyncio
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -14,8 +13,8 @@ from gateway.telemetry.command_queue import CommandQueue
 
 AGAIN_S: Final = 2.0
 _KEEPALIVE_S: Final = 10
-_LASTS_S: Final = 10.0  # a connection that was not taken away at once by another client of our name
-_SHORT_ONES: Final = 3
+_SHORT_S: Final = 10.0
+_MOST_SHORT: Final = 3  # connections in a row; then it is no broker that comes and goes
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,51 +38,53 @@ async def keep_connected(
     MissingExtraError without aiomqtt.
     """
     aiomqtt = import_library("aiomqtt")
-    _tell_no_loss_twice(asyncio.get_running_loop(), aiomqtt.MqttError)
-    losses = _Losses(f"the MQTT broker {broker.host}:{broker.port}", session.name, say)
+    loop = asyncio.get_running_loop()
+    _tell_no_loss_twice(loop, aiomqtt.MqttError)
+    news = BrokerNews(f"the MQTT broker {broker.host}:{broker.port}", _name_at_broker(session.name), say, loop.time)
     while True:
         will = session.begin()
         try:
             async with _client(aiomqtt, broker, session.name, will) as client:
-                losses.note_open()
+                news.note_connected()
                 await _carry(client, session)
         except* (aiomqtt.MqttError, OSError) as lost:
-            losses.note_loss(_reason(lost))
+            news.note_lost(_reason(lost))
         finally:
             session.lose()
         await asyncio.sleep(again_s)
 
 
-class _Losses:
-    """Says when the broker is away and back; and once, instead of that each two seconds for ever, that it ends connections as
-    soon as they are open, as it does where two clients have one name: each takes the other's place."""
+class BrokerNews:
+    """Says that the broker is away and back. Where it ends each connection at once, that is said instead, and once: two
+    gateways of one name, by a copied rig file say, take each other's place every few seconds, and it was never away.
+    clock: seconds."""
 
-    def __init__(self, broker: str, name: str, say: Callable[[str], None]) -> None:
-        self._broker, self._name, self._say = broker, name, say
+    def __init__(self, broker: str, name: str, say: Callable[[str], None], clock: Callable[[], float]) -> None:
+        self._broker, self._name, self._say, self._clock = broker, name, say, clock
         self._is_away = False
-        self._opened_s: float | None = None
-        self._short = 0  # connections without one that lasted between them
+        self._connected_s: float | None = None
+        self._short = 0
 
-    def note_open(self) -> None:
-        """Note that a connection is open."""
-        self._opened_s = time.monotonic()
-        if self._is_away and self._short < _SHORT_ONES:
+    def note_connected(self) -> None:
+        """Note that there is a connection."""
+        self._connected_s = self._clock()
+        if self._is_away:
             self._say(f"{self._broker} is back")
         self._is_away = False
 
-    def note_loss(self, reason: str) -> None:
-        """Note that it is lost, or that none was opened."""
-        opened_s, self._opened_s = self._opened_s, None
-        is_short = opened_s is not None and time.monotonic() - opened_s < _LASTS_S
+    def note_lost(self, reason: str) -> None:
+        """Note that it is lost, or that there was none to be had."""
+        connected_s, self._connected_s = self._connected_s, None
+        is_short = connected_s is not None and self._clock() - connected_s < _SHORT_S
         self._short = self._short + 1 if is_short else 0
-        if self._short == _SHORT_ONES:
-            ended = f"{self._broker} has ended {_SHORT_ONES} connections, each as soon as it was open ({reason})"
-            cure = "Give each gateway a rig name, mqtt.base_topic and sparkplug.node of its own"
-            who = f"does another gateway use the name {self._name!r} there, or does it forbid us a topic (see its log)?"
-            self._say(f"E181 {ended}: {who} {cure}; what they send may be mixed up until then")
-        elif self._short < _SHORT_ONES and not self._is_away:
+        if self._short == _MOST_SHORT:
+            self._say(
+                f"E181 {self._broker} ends each connection within seconds ({reason}): has another gateway the name "
+                f'"{self._name}" there, or may this one not publish? Data is kept meanwhile; not told again until one lasts'
+            )
+        elif self._short < _MOST_SHORT and not self._is_away:
+            self._is_away = True
             self._say(f"E181 {self._broker} is away ({reason}); data is kept meanwhile")
-        self._is_away = True
 
 
 def _tell_no_loss_twice(loop: asyncio.AbstractEventLoop, loss: type[Exception]) -> None:
@@ -98,13 +99,18 @@ def _tell_no_loss_twice(loop: asyncio.AbstractEventLoop, loss: type[Exception]) 
     loop.set_exception_handler(handle)
 
 
+def _name_at_broker(name: str) -> str:
+    """Return a name under which a second gateway takes our place, and is not mixed with us."""
+    return f"force-gateway {name}"
+
+
 def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage) -> Any:
     for file in filter(None, (broker.ca, broker.certificate, broker.key)):
         check_plain(file)
     return aiomqtt.Client(
         broker.host,
         broker.port,
-        identifier=f"force-gateway {name}",  # a second gateway of this name takes its place, and is not mixed with it
+        identifier=_name_at_broker(name),
         tls_params=aiomqtt.TLSParameters(broker.ca, broker.certificate, broker.key) if broker.ca else None,
         username=broker.username,
         password=broker.password,

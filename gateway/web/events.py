@@ -172,7 +172,8 @@ class EventSource:
             self._send(_event("note", note))
 
     def _read_notes(self) -> list[dict[str, Any]]:
-        """None where the disk gives none: force and state are shown all the same."""
+        """None where the disk gives none: force and state are shown all the same. Of a full log, 100 000 lines that would take
+        80 MB, only the last are kept."""
         read, self._read = self._read, self._log.read_new
         fresh: deque[dict[str, Any]] = deque(maxlen=_KEPT_NOTES)
         with contextlib.suppress(OSError):

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from gateway.telemetry import broker_connection
-from gateway.telemetry.broker_connection import Broker, keep_connected
+from gateway.telemetry.broker_connection import Broker, BrokerNews, keep_connected
 from tests.telemetry.test_broker_connection import Session
 
 aiomqtt = pytest.importorskip("aiomqtt")
@@ -105,3 +105,30 @@ def test_a_certificate_that_is_no_file_is_told_and_not_waited_for(kind: str, tmp
 
     sentence = asyncio.run(meet())
     assert sentence.startswith("E181") and f"it is {kind}" in sentence
+
+
+def test_a_broker_that_ends_each_connection_at_once_is_not_away_and_is_told_once() -> None:
+    """Two gateways of one name, a copied rig file, took each other's place: away and back were told every four seconds."""
+    now_s, said = 100.0, list[str]()
+    news = BrokerNews("the MQTT broker b:1883", "force-gateway cell", said.append, lambda: now_s)
+
+    def connection(lasts_s: float) -> None:
+        nonlocal now_s
+        news.note_connected()
+        now_s += lasts_s
+        news.note_lost("Disconnected")
+
+    for _ in range(100):
+        connection(2.0)
+    assert len(said) == 5
+    assert said[-1].startswith("E181") and 'the name "force-gateway cell"' in said[-1]
+    connection(60.0)
+    assert said[-1].startswith("E181 the MQTT broker b:1883 is away (Disconnected)")
+    connection(60.0)
+    assert [sentence.partition(" (")[0] for sentence in said[5:]] == [
+        "E181 the MQTT broker b:1883 is away",
+        "the MQTT broker b:1883 is back",
+        "E181 the MQTT broker b:1883 is away",
+    ]
+    news.note_lost("nobody listens")
+    assert len(said) == 8, "it is away still"

@@ -2,6 +2,7 @@
 
 import asyncio
 import threading
+import weakref
 from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
 from typing import Any
@@ -87,6 +88,37 @@ def test_a_disk_that_hangs_under_the_log_keeps_nobody_waiting_and_is_said(
 
     first, second = asyncio.run(scene())
     assert "the disk has not given the log" in first and second == "master lost"
+
+
+class Fields(dict[str, Any]):
+    """An event as it is shown, of which is known whether it is still there."""
+
+
+class Line:
+    """An event of the log."""
+
+    def __init__(self, number: int, held: list["weakref.ref[Fields]"]) -> None:
+        self.number, self.held = number, held
+
+    def _asdict(self) -> Fields:
+        fields = Fields(text=f"line {self.number}")
+        self.held.append(weakref.ref(fields))
+        return fields
+
+
+def test_of_a_long_log_no_more_is_held_than_is_shown(tmp_path: Path) -> None:
+    """All of it was, 80 MB of a full one, to show the last sixty lines."""
+    held: list[weakref.ref[Fields]] = []
+
+    def log() -> Iterator[Any]:
+        for number in range(500):
+            yield Line(number, held)
+            assert sum(one() is not None for one in held) <= events._KEPT_NOTES + 1
+
+    source = EventSource(Context(tmp_path), None, test_events.Commands())  # type: ignore[arg-type]
+    source._read = log
+    shown = source._read_notes()
+    assert [note["text"] for note in shown] == [f"line {number}" for number in range(440, 500)]
 
 
 def test_all_but_a_stop_says_until_when_it_is_wanted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

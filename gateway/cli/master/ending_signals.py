@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
+from gateway.service.supervisor.event_wait import StopSignals
+
 _ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -19,28 +21,43 @@ def signals_as_ctrl_c() -> Iterator[None]:
         yield
 
 
-@contextmanager
-def signals_held_back() -> Iterator[None]:
-    """Let nothing from outside end the block, but KeyboardInterrupt right behind it."""
-    heard: list[int] = []
-    with _handled_by(lambda number, frame: heard.append(number)):
-        yield
-    if heard:
-        raise KeyboardInterrupt
-
-
 def watch_to_the_end(begin: Callable[[], None], watch: Callable[[], None], stop: Callable[[], None]) -> bool:
-    """Begin what presses and watch it; False where something from outside has ended that before: it is stopped then."""
-    with signals_as_ctrl_c():
+    """Begin what presses and watch it; False where something from outside has ended that before: it is stopped then. One end
+    may say its signal twice, and the second one, close behind the first, must not take the place of the stop."""
+    ending = _FirstOfAll()
+    with _handled_by(ending):
         try:
-            with signals_held_back():
-                begin()
+            begin()
+            ending.raise_from_now_on()
             watch()
         except (KeyboardInterrupt, OSError):  # OSError: the terminal is gone, and nobody sees it any more
-            with signals_held_back():
-                stop()
+            ending.is_raised = False
+            stop()
+            if ending.count > 1:
+                raise KeyboardInterrupt from None
             return False
     return True
+
+
+class _FirstOfAll:
+    """A handler that raises KeyboardInterrupt at the first signal and counts the others; at none while `is_raised` is false."""
+
+    def __init__(self) -> None:
+        self.is_raised, self.count = False, 0
+        self._stops = StopSignals()
+
+    def __call__(self, number: int, frame: object) -> None:
+        if not self._stops.asks_anew(number):
+            return
+        self.count += 1
+        if self.is_raised and self.count == 1:
+            raise KeyboardInterrupt
+
+    def raise_from_now_on(self) -> None:
+        """Raise for the one that has come already, too."""
+        self.is_raised = True
+        if self.count:
+            raise KeyboardInterrupt
 
 
 @contextmanager

@@ -58,6 +58,9 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
         mark = "*" if selected.selection.number is None else " "
         description = describe_calibration(store.built_in, _slots(selected, OWN), is_own=True)
         lines += fold_entry(store.built_in.number, description, mark)
+    else:
+        is_used = ", in use," if selected.selection.number is None else ""
+        click.echo(f"the rig's own{is_used} is not shown: give the rig's file by --rig", err=True)
     for entry in entries:
         is_rejected = entry.document is not None and bool(entry.document.rejected)
         mark = "*" if selected.selection.number == entry.number else "x" if is_rejected else " "
@@ -65,7 +68,7 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
         lines += fold_entry(
             entry.number, describe_calibration(entry.document, slots) if entry.document else unusable, mark
         )
-    click.echo("\n".join(lines))
+    click.echo("\n".join(lines), nl=bool(lines))
 
 
 @command.command(name="show")

@@ -5,7 +5,7 @@ import re
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
@@ -149,11 +149,16 @@ def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bo
 
 
 @contextmanager
-def _handle_signals(beat: "HeartbeatThread") -> Iterator[None]:
-    """The first of Ctrl-C, SIGTERM and a closed terminal (not with nohup) ramps down, the second drops the force at once."""
+def _handle_signals(beat: "HeartbeatThread", clock: Callable[[], float] = time.monotonic) -> Iterator[None]:
+    """The first of Ctrl-C, SIGTERM and a closed terminal (not with nohup) ramps down, a second Ctrl-C or SIGTERM drops the
+    force at once."""
+    from gateway.service.supervisor.event_wait import StopSignals
+
+    stops = StopSignals(clock)
 
     def on_signal(number: int, frame: object) -> None:
-        (beat.dropping if beat.stopping.is_set() else beat.stopping).set()
+        if stops.asks_anew(number):
+            (beat.dropping if beat.stopping.is_set() and number != signal.SIGHUP else beat.stopping).set()
 
     heard = [signal.SIGINT, signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:

@@ -4,6 +4,8 @@ import contextlib
 import select
 import signal
 import socket
+import time
+from collections.abc import Callable
 from math import isinf
 from types import TracebackType
 from typing import Final, Self
@@ -24,6 +26,8 @@ _STRAY: Final = (
 """Mean nothing to us, come from tools that rotate logs or ask other programs to reload, and would end who does not ignore them,
 without the safe voltage; or stop him (Ctrl-Z, a word from the background): then the force goes on and nobody watches it.
 Children inherit it."""
+_AT_ONCE_S: Final = 0.05
+"""A hand that presses Ctrl-C twice takes longer."""
 _LONGEST_S: Final = 3600.0
 _MOST_SIGNALS: Final = 64
 
@@ -38,6 +42,24 @@ def wait_readable(descriptors: list[int], timeout_s: float) -> set[int]:
     return {descriptor for descriptor, _ in poll.poll(max(0.0, longest_s) * 1e3)}
 
 
+class StopSignals:
+    """Tells which of the signals that ask for a stop ask anew. Nobody has asked twice where a terminal closes, whose shell says
+    SIGHUP and, when that has ended, the kernel, where a session ends, which says SIGTERM beside it, or where `timeout` tells
+    its child and then its group, the child once more. clock: in seconds."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._last, self._last_s = 0, 0.0
+
+    def asks_anew(self, number: int) -> bool:
+        """Take the next signal; return whether it is more than what was asked before it."""
+        last, last_s = self._last, self._last_s
+        self._last, self._last_s = number, self._clock()
+        if number == signal.SIGHUP:
+            return not last
+        return last != signal.SIGHUP and (number != last or self._last_s - last_s > _AT_ONCE_S)
+
+
 class SignalPipe:
     """SIGINT, SIGTERM and SIGHUP as readable bytes: nothing of ours runs inside a signal handler. Stray signals are ignored,
     and SIGHUP where who starts us ignores it: nohup says that the end of its terminal is not ours.
@@ -47,8 +69,9 @@ class SignalPipe:
     keeps no exit code then, and a gateway whose rig file is at fault would be started again and again.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._reader, self._writer = socket.socketpair()
+        self._stops = StopSignals(clock)
         for end in (self._reader, self._writer):
             end.setblocking(False)
 
@@ -58,9 +81,9 @@ class SignalPipe:
         return self._reader.fileno()
 
     def take(self) -> int:
-        """Return how many have come since the last call."""
+        """Return how many stops have been asked for since the last call."""
         with contextlib.suppress(OSError):
-            return len(self._reader.recv(_MOST_SIGNALS))
+            return sum(map(self._stops.asks_anew, self._reader.recv(_MOST_SIGNALS)))
         return 0
 
     def __enter__(self) -> Self:

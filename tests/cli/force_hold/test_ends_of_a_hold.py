@@ -3,7 +3,8 @@
 import os
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from itertools import count
 from types import SimpleNamespace
 from typing import Any
 
@@ -27,6 +28,11 @@ def terminal_may_end_it() -> Iterator[None]:
     signal.signal(signal.SIGHUP, before)
 
 
+def slow_hand(apart_s: float = 1.0) -> Callable[[], float]:
+    """A clock on which signals are so far apart."""
+    return count(1.0, apart_s).__next__
+
+
 def test_under_nohup_the_end_of_the_terminal_ends_no_hold() -> None:
     beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
@@ -35,14 +41,39 @@ def test_under_nohup_the_end_of_the_terminal_ends_no_hold() -> None:
         assert not beat.stopping.is_set()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_first_signal_ramps_down_and_the_second_drops(number: int) -> None:
     beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
-    with _handle_signals(beat):
+    with _handle_signals(beat, slow_hand()):
         os.kill(os.getpid(), number)
         assert beat.stopping.is_set() and not beat.dropping.is_set()
         os.kill(os.getpid(), number)
         assert beat.dropping.is_set()
+
+
+@pytest.mark.parametrize(
+    ("numbers", "apart_s"),
+    [
+        ((signal.SIGHUP, signal.SIGHUP), 1.0),
+        ((signal.SIGTERM, signal.SIGHUP, signal.SIGHUP), 1.0),
+        ((signal.SIGTERM, signal.SIGTERM), 0.02),
+    ],
+)
+def test_what_is_said_more_than_once_by_one_end_drops_nothing(numbers: tuple[int, ...], apart_s: float) -> None:
+    """A terminal that closes, a session that ends, `timeout`."""
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    with _handle_signals(beat, slow_hand(apart_s)):
+        for number in numbers:
+            os.kill(os.getpid(), number)
+        assert beat.stopping.is_set() and not beat.dropping.is_set()
+
+
+def test_a_terminal_that_closes_while_the_force_goes_down_by_itself_drops_nothing() -> None:
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    beat.stopping.set()
+    with _handle_signals(beat, slow_hand()):
+        os.kill(os.getpid(), signal.SIGHUP)
+        assert not beat.dropping.is_set()
 
 
 def ended(end: HoldEnd, fault: FaultCode = FaultCode.SAMPLE_STALE) -> Any:

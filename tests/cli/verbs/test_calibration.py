@@ -197,6 +197,19 @@ def test_a_state_of_a_rig_that_cannot_be_read_works_without_its_own_calibration(
     assert [head[:4].split() for head, *_ in entries(done.output)] == [["2"], ["*", "3"]]
 
 
+def test_where_the_rigs_own_is_not_known_the_list_says_so_and_whether_it_is_in_use(state, call, tmp_path):
+    """A gateway of a file elsewhere was asked, and the answer was an empty line."""
+    rig = ("--rig", "nowhere")
+    nothing = call("calibration", "list", "--state", tmp_path / "fresh", *rig)
+    assert (nothing.stdout, nothing.stderr) == (
+        "",
+        "the rig's own, in use, is not shown: give the rig's file by --rig\n",
+    )
+    stored = call("calibration", "list", "--state", state, *rig)
+    assert [entry[0][:4] for entry in entries(stored.stdout)] == ["   2", "*  3"]
+    assert "the rig's own is not shown" in stored.stderr
+
+
 def test_a_rejected_one_is_listed_as_such_and_used_only_by_force(state, call):
     store = CalibrationStore(state, load_calibration("demo"))
     number = store.add(calibration(32, rejected="0.600 N RMS on all 59 measured points"))

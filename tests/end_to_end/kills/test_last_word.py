@@ -153,7 +153,7 @@ def stopping(gateway: RunningGateway, devices: OwnDevices, signal_number: int, *
     began_s = time.monotonic()
     for pid in pids or [gateway.process.pid]:
         os.kill(pid, signal_number)
-    while len({heard.voltage_v for heard in devices.settings_since(began_s)}) < 5:
+    while len({heard.voltage_v for heard in devices.settings_since(began_s)}) < 12:
         assert time.monotonic() - began_s < 2.0, "no ramp"
         time.sleep(0.005)
     return began_s

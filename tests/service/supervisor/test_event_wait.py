@@ -112,6 +112,30 @@ def test_two_signals_at_once_are_two():
     assert signal.set_wakeup_fd(-1) == -1, "its end of the pipe is closed: nothing is written there any more"
 
 
+HUP, INT, TERM = signal.SIGHUP, signal.SIGINT, signal.SIGTERM
+
+
+@pytest.mark.parametrize(
+    ("numbers", "apart_s"),
+    [((HUP, HUP), 1.0), ((HUP, TERM, HUP), 1.0), ((TERM, HUP, HUP), 1.0), ((TERM, TERM), 0.02), ((INT, INT), 0.02)],
+)
+def test_what_is_said_more_than_once_by_one_end_asks_once(numbers, apart_s):
+    """A terminal that closes, a session that ends, `timeout`: what came second skipped the ramp, and the force fell at once."""
+    now_s = 100.0
+    with SignalPipe(lambda: now_s) as signals:
+        heard = 0
+        for number in numbers:
+            now_s += apart_s
+            os.kill(os.getpid(), number)
+            heard += signals.take()
+        assert heard == 1
+        for _ in range(2):
+            now_s += 0.1
+            os.kill(os.getpid(), INT)
+            heard += signals.take()
+        assert heard >= 2, "whoever asks again waits for nothing"
+
+
 def test_who_is_started_in_the_background_hears_what_stops_it():
     """A shell ignores SIGINT for a job that it starts with &; only nohup's word counts."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
