@@ -2,9 +2,9 @@
 
 Approach: without contact the tool waits at the pre-contact force; from contact the target rises over contact_ramp_s, or
 by the force ramp where that is slower. Lost contact takes the target back at once: a free tool must not shoot out with
-the full force. The reversal's memory follows changes of the target (gateway.bsfm.slip.reversal), never the measured force,
-whose noise would chatter; a vented tool starts where the calibration ladder starts, and a tool that has lost contact on the
-rising branch, because it slides outwards.
+the full force. The reversal's memory follows changes of what the slide has to give, by target and weight
+(gateway.bsfm.slip.reversal), never the measured force, whose noise would chatter; a vented tool starts where the calibration
+ladder starts, and a tool that has lost contact on the rising branch, because it slides outwards.
 """
 
 from math import isfinite
@@ -117,24 +117,24 @@ class Feedforward:
         return self.compute_voltage(gravity_n)[0] + (self.correction_v(gravity_n) if is_corrected else 0.0)
 
     def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float, gravity_n: float = 0.0) -> float:
-        """Move the applied target towards the goal; returns by how much, N. gravity_n: of it, what does not come from
-        the slide: the payload's weight, forces from outside; it is there at once, and the slide makes room for it no sooner
-        than it follows. The aim is where the target will be ahead_s later: on its ramp, and where the goal itself moves
-        steadily, on the goal's way; on a fast ramp it stays nearer, so that it remains one."""
+        """Move the applied target towards the goal; returns by how much that moves the slide, N. gravity_n: of the target, what
+        does not come from the slide: the payload's weight, forces from outside; it is there at once, and the slide makes room
+        for it no sooner than it follows. The aim is where the target will be ahead_s later: on its ramp, and where the goal
+        itself moves steadily, on the goal's way; on a fast ramp it stays nearer, so that it remains one."""
         self._trend.advance(goal_n, dt_s)
         self._pace.earn(dt_s)
-        last_n = self.applied_n
+        last_n, given_n = self.applied_n, self._given_n if self.applied_n > 0.0 else gravity_n
         self.applied_n = ramp_limited(goal_n, last_n, rate_n_per_s, self._pace.available_s)
-        moved_n = self.applied_n - last_n
+        moved_n, self._given_n = self.applied_n - last_n, gravity_n
         if moved_n:
             self._pace.spend(moved_n, rate_n_per_s)
         aimed_n, self.aimed_n = self.aimed_n, self._aim_n(goal_n, rate_n_per_s)
-        self._turn(aimed_n - gravity_n, self.aimed_n - gravity_n)
+        self._turn(aimed_n - given_n, self.aimed_n - gravity_n)
         delayed_n = self._delayed.advance(self.applied_n, dt_s)
-        self.reference_n, self._given_n = self.reference_n + gravity_n - self._given_n, gravity_n
+        self.reference_n += gravity_n - given_n
         self.reference_n += (delayed_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
         self._carry_over_v -= self._carry_over_v * dt_s / (_CARRY_OVER_S + dt_s)
-        return moved_n
+        return moved_n - (gravity_n - given_n)
 
     def _aim_n(self, goal_n: float, rate_n_per_s: float) -> float:
         """Where the target will be ahead_s later."""
@@ -184,6 +184,10 @@ class Feedforward:
         from_v, along_v = model.voltage_v(self._slid_n, before)[0], model.voltage_v(to_n, before)[0]
         turned_v = model.voltage_v(to_n, after)[0]
         return (along_v - from_v) / (turned_v - from_v) if turned_v != from_v else 1.0
+
+    def carry_freely(self, gravity_n: float) -> None:
+        """Take over a weight that changes without contact, as in `advance`: nothing presses that friction could turn with."""
+        self._given_n = gravity_n
 
     def fall_back(self, goal_n: float, gravity_n: float = 0.0) -> None:
         """Drop to the goal at once when contact is lost, and stay on the rising branch for the next contact. Nothing corrects

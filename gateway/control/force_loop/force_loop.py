@@ -224,13 +224,13 @@ class ForceLoop:
         law = self.feedforward
         law.advance(0.0, demand.ramp_n_per_s, dt_s, given_n)
         voltage_v, _ = law.compute_voltage(given_n)
-        self._drive_by_model(min(voltage_v, self.voltage_v), law.applied_n, law.branch_share)
+        self._drive_by_model(min(voltage_v, self.voltage_v), law.applied_n, law.branch_share, given_n)
         return StateEvent.MOVE
 
-    def _drive_by_model(self, voltage_v: float, expected_n: float, branch_share: float) -> None:
+    def _drive_by_model(self, voltage_v: float, expected_n: float, branch_share: float, given_n: float = 0.0) -> None:
         self._trim.reset()
         self._settling.restart()
-        self.feedforward.take_over(expected_n, branch_share)
+        self.feedforward.take_over(expected_n, branch_share, given_n)
         self.feedforward_v = voltage_v
         self.limited_by = self._limiter.drive(voltage_v)
 
@@ -243,6 +243,8 @@ class ForceLoop:
         if self._was_touching and not inputs.touching:
             law.fall_back(goal_n, given_n)
             self._trim.forget()
+        if not inputs.touching:
+            law.carry_freely(given_n)
         was_at_rest = law.applied_n <= 0.0
         moved_n = law.advance(goal_n, rate_n_per_s, inputs.dt_s, given_n)
         if was_at_rest:
