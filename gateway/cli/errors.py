@@ -58,6 +58,8 @@ def translate_error(error: Exception, command_line: str, *, debug: bool) -> CliE
         return CliError(str(error), exit_codes.DEVICE)
     if _is_a(error, "gateway.ports", "PortError"):
         return CliError(str(error), getattr(error, "exit_code", exit_codes.DEVICE))
+    if _is_a(error, "gateway.registers.map.register_map", "UnknownRegister"):  # verbs name only what force-v1 has
+        return CliError(f"E185 --map lacks a register that is needed: {error}")
     if isinstance(error, OSError) and error.strerror:
         return _from_system(error)
     if debug:

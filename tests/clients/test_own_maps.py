@@ -90,6 +90,27 @@ def test_a_word_without_a_sign_is_shown_in_its_unit_too(tmp_path: Path) -> None:
     assert shown == pytest.approx([12.3] * 4)
 
 
+def test_what_a_robot_s_own_modbus_client_is_told_to_write_is_of_the_map_in_use(tmp_path: Path) -> None:
+    """By force-v1's numbers 12 N were 120 N of a map in tenths, and control_word somebody else's register."""
+    text = (PROFILES / "registers" / "force-v1.yaml").read_text()
+    commands = text[text.index("  command:") : text.index("  status:")]
+    moved = re.sub(r"(first|last|address): (\d+)", lambda found: f"{found[1]}: {int(found[2]) + 600}", commands)
+    tenths = moved.replace("type: int16, scale: 0.01, unit: N, access: RW, min: 0, max: 327.67", "type: int16, scale: 0.1, "
+                           "unit: N, access: RW, min: 0, max: 327.67", 1)  # fmt: skip
+    (tmp_path / "own.yaml").write_text(text.replace(commands, tenths))
+    own = load_register_map(str(tmp_path / "own.yaml"))
+    assert (own.find("force_setpoint").address, own.find("force_setpoint").scale) == (601, 0.1)
+    script = render_client(own, "urscript", WHERE)
+    for line in (
+        'modbus_add_signal("192.168.125.20", 1, 600, 3, "fg_control", False)',
+        'modbus_add_signal("192.168.125.20", 1, 601, 3, "fg_force", False)',
+        'modbus_add_signal("192.168.125.20", 1, 604, 3, "fg_heartbeat", False)',
+        'modbus_set_output_register("fg_force", 120, False)             # 12.00 N',
+        'modbus_set_output_register("fg_all", [1, 120, 0, 0, beat])',
+    ):
+        assert line in script, line
+
+
 @pytest.mark.skipif(not shutil.which("gcc"), reason="no gcc")
 def test_c_shows_scaled_words_and_numbers_of_two_words_with_their_sign(tmp_path: Path) -> None:
     wide = own_map(tmp_path, "name: owner_ip, address: 116, type: uint32", "name: owner_ip, address: 116, type: int32")

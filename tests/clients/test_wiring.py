@@ -83,6 +83,9 @@ def test_a_face_with_certificates_is_told_from_what_the_clients_speak() -> None:
     assert "plain Modbus TCP" in shown["not for"]
     (line,) = next(each.commands for each in wiring_page(rig, "demo")[1] if each.title == "Face 1: Modbus/TCP Security")
     assert line.startswith("force-gateway read state --gateway 127.0.0.1:802 --tls ca.crt --cert CLIENT.crt ")
+    own = replace(rig, register_map=replace(rig.register_map, file="own.yaml"))
+    (line,) = next(each.commands for each in wiring_page(own, "demo")[1] if each.title == "Face 1: Modbus/TCP Security")
+    assert " --gateway 127.0.0.1:802 --map own.yaml --tls " in line, "else it is refused: E186"
     far = replace(rig, fieldbus=(replace(face, bind="fd00::5"),))
     (line,) = next(each.commands for each in wiring_page(far, "demo")[1] if each.title == "Face 1: Modbus/TCP Security")
     assert " --gateway [fd00::5]:802 " in line

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from gateway import defaults
 from gateway.cli.cards.card import Fact
 from gateway.cli.master.value_text import limits_of
+from gateway.profiles.rigs.rig import map_option
 from gateway.registers import Register, RegisterMap
 from gateway.registers.values import WordOrder
 
@@ -36,10 +37,10 @@ def register_facts(register_map: RegisterMap, register: Register) -> Iterator[Fa
     yield "bits", ", ".join(f"{number} {name}" for number, name in sorted(register.bits.items()))
     yield "also", ", ".join(f"{other.name}@{other.block} at {other.address}" for other in _same(register_map, register))
     yield "mbpoll", read_line(register)
-    label = _label(register_map, register)
-    yield "read", f"force-gateway read {label}"
+    label, option = _label(register_map, register), map_option(register_map)
+    yield "read", f"force-gateway read {label}{option}"
     if register.is_writable:
-        yield "write", f"force-gateway write {label}={_example(register)}"
+        yield "write", f"force-gateway write {label}={_example(register)}{option}"
 
 
 def read_line(register: Register) -> str:

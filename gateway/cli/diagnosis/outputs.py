@@ -15,7 +15,8 @@ STDOUT: Final = Path("-")  # as the name of a file
 
 
 def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Raise UsageError where two outputs, or an output and an input, are one file, FileNotFoundError where no directory is."""
+    """Raise UsageError where two outputs, or an output and an input, are one file, FileNotFoundError where no directory is,
+    IsADirectoryError where one is in the place of a file."""
     occupied = {path.resolve(): f"{path} is read" for path in inputs if path.exists()}
     for target in targets:
         if target.resolve() in occupied:
@@ -23,6 +24,7 @@ def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
         occupied[target.resolve()] = f"{target} is written by another option"
         if not target.parent.is_dir():
             raise FileNotFoundError(errno.ENOENT, "no such directory", str(target.parent))
+        _refuse_directory(target)
 
 
 def write_all(texts: Mapping[Path, str]) -> None:
@@ -38,6 +40,8 @@ def write_all(texts: Mapping[Path, str]) -> None:
 
 
 def _write_all(texts: Mapping[Path, str], pressed: threading.Event) -> None:
+    for path in texts:
+        _refuse_directory(path)
     devices = [path for path in texts if path.exists() and not path.is_file()]
     places = {path: Path(os.path.realpath(path)) for path in texts if path not in devices}  # a link stays one
     beside = {path: place.with_name(f".{place.name}.{os.getpid()}") for path, place in places.items()}
@@ -53,3 +57,8 @@ def _write_all(texts: Mapping[Path, str], pressed: threading.Event) -> None:
             fresh.unlink(missing_ok=True)
     for path in devices:
         path.write_text(texts[path], encoding="utf-8")
+
+
+def _refuse_directory(target: Path) -> None:
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "it is a directory, and no file", str(target))

@@ -29,13 +29,14 @@ class Poller:
         self._source = writers
         self._clock = clock
         self._is_map_checked = False
+        self._blocks = [block.name for block in client.register_map.blocks if block.name in ("command", "status")]
 
     def poll(self) -> None:
         """Read both blocks; CliError or RefusedError when that fails, or when they are another map's."""
         if not self._is_map_checked:  # at first, and after each trouble: another gateway may be there
             self._client.check_map()
             self._is_map_checked = True
-        readings = [*self._client.read_block("command"), *self._client.read_block("status")]
+        readings = [reading for name in self._blocks for reading in self._client.read_block(name)]
         self.track.add(self._clock(), readings)
         self.trouble = ""
 

@@ -215,5 +215,5 @@ def _describe_fault(beat: "HeartbeatThread") -> str:
     return (
         f"{entry.code} {entry.title}, {when}: {entry.seen} {obeys}\n"
         f"  {entry.do} (force-gateway explain {entry.code})\n"
-        f"  then: force-gateway hold {beat.hold.force_n:g} --reset"
+        "  then: the same command with --reset"
     )

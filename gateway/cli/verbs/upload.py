@@ -107,7 +107,7 @@ def _commit_told(master: "UploadClient", *, is_dry: bool) -> Iterator[None]:
     except CliError as error:
         if is_dry or not master.is_commit_sent or error.exit_code != exit_codes.DEVICE:
             raise
-        cure = "the commit was sent, and the set may be in use: `force-gateway read calibration_id commit_status` tells"
+        cure = "the commit was sent, and the set may be in use: `force-gateway read calibration_id commit_status` of it tells"
         raise CliError(f"{error.format_message()}\n  {cure}", error.exit_code) from None
 
 

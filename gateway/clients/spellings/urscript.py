@@ -11,6 +11,7 @@ def spell_urscript(table: ExchangeTable) -> dict[str, str]:
     shown = {STATUS_BITS.get(name, name): 1 << bit for bit, name in table.map.find("status_word").bits.items()}
     commit = {f"commit_{name}": number for number, name in table.at("commit_status", "staging").values.items()}
     named = {name: table.at(name, "status").address for name in ("status_word", "force_measured", "fault_code")}
+    named |= {name: table.at(name, "command").address for name in ("control_word", "force_setpoint", "heartbeat")}
     part_a, part_b, part_c = table.parts
     words, tail = table.command_span[1], table.at("target_slot", "staging").address
     tail_words = tail - table.at("length", "staging").address + 1
@@ -30,6 +31,7 @@ def spell_urscript(table: ExchangeTable) -> dict[str, str]:
         "status_bytes": str(2 * table.status_span[1]),
         "tail_pdu": str(6 + 2 * tail_words),
         "tail_bytes": str(2 * tail_words),
+        "counts_of_12_n": str(12 * table.at("force_setpoint", "command").counts_per_unit),
         **{f"at_{name}": str(address) for name, address in named.items()},
         "fault_cases": _cases(table.texts("fault_code"), "code"),
         "refusal_cases": _cases(table.texts("refusal_reason"), "reason"),

@@ -21,7 +21,7 @@ def serial_sections(rig: Rig) -> Iterator[Section]:
         if isinstance(face, RtuFace):
             yield _face_section(place, face, ExchangeTable(rig.register_map, endpoint_of(rig)).status_span)
         else:
-            yield _tls_section(place, face, endpoint_of(rig).unit_option)
+            yield _tls_section(place, face, endpoint_of(rig).unit_option + rig.map_option)
 
 
 def _lines(rig: Rig) -> Iterator[tuple[str, object]]:
@@ -68,7 +68,7 @@ def _face_section(place: int, face: RtuFace, status: tuple[int, int]) -> Section
     return Section(f"Serial face {place}: Modbus RTU, masters ask here", rows=rows, commands=commands)
 
 
-def _tls_section(place: int, face: TlsFace, unit_option: str) -> Section:
+def _tls_section(place: int, face: TlsFace, options: str) -> Section:
     port = face.port or "a free port, which `run` names when it is ready"
     rows = (
         ("what", "value"),
@@ -79,7 +79,7 @@ def _tls_section(place: int, face: TlsFace, unit_option: str) -> Section:
         ("not for", "the generated clients, which speak plain Modbus TCP: for masters with TLS of their own"),
     )
     host = "GATEWAY-ADDRESS" if ip_address(face.bind).is_unspecified else face.bind
-    where = f"{f'[{host}]' if ':' in host else host}:{face.port or 'PORT'}{unit_option}"
+    where = f"{f'[{host}]' if ':' in host else host}:{face.port or 'PORT'}{options}"
     try_it = (
         f"force-gateway read state --gateway {where} --tls {quote(str(face.ca))} --cert CLIENT.crt --key CLIENT.key"
     )

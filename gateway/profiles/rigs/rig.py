@@ -53,6 +53,12 @@ def is_own(calibration: Calibration, rig: str, simulated_plant: PlantProfile | N
     return calibration.rig in (rig, rehearsed(rig), f"twin of plant {simulated_plant.name}")
 
 
+def map_option(register_map: RegisterMap) -> str:
+    """Return the option that names this map to our own verbs; empty for the one that they take without it."""
+    file, shipped = register_map.file, display(locate("registers", defaults.REGISTER_MAP))
+    return "" if file in ("", shipped) else f" --map {quote(file)}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _SerialLine:
     """The wire to one device; port None in a simulated rig."""
@@ -174,9 +180,7 @@ class Rig:
     def map_option(self) -> str:
         """Return what `hold`, `write` and `read` need beside the address where the rig has a map of its own: by the numbers of
         another one 12 N may be 120."""
-        file = self.register_map.file
-        shipped = display(locate("registers", defaults.REGISTER_MAP))
-        return "" if file in ("", shipped) else f" --map {quote(file)}"
+        return map_option(self.register_map)
 
     @property
     def force_to_try_n(self) -> float:

@@ -90,6 +90,13 @@ def test_only_an_end_as_asked_is_none_to_tell_a_script_of() -> None:
         _report_end(ended(HoldEnd.DISABLED), "127.0.0.1:5020", as_json=True)
 
 
+def test_how_to_go_on_is_told_of_the_gateway_that_was_meant() -> None:
+    """`force-gateway hold 12 --reset` stood there whatever --gateway had said: another cell's tool would have pressed."""
+    with pytest.raises(CliError) as told:
+        _report_end(ended(HoldEnd.FAULT), "10.0.0.5:5020", as_json=False)
+    assert "then: the same command with --reset" in told.value.message and "hold 1" not in told.value.message
+
+
 OUTPUT_FAULTS = [fault for fault in FaultCode if fault.name.startswith("OUTPUT_")]
 
 

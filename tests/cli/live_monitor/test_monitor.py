@@ -181,6 +181,23 @@ def test_once_prints_one_frame(fake, call) -> None:
     assert len(answer.output.splitlines()) <= 24
 
 
+def test_a_smaller_map_is_shown_as_far_as_it_goes(fake, call, tmp_path: Path) -> None:
+    """As profiles/README.md promises; it was an internal error."""
+    (tmp_path / "small.yaml").write_text(
+        "name: small\nversion: 1\ntext: of a display\nblocks:\n  status:\n    first: 100\n    last: 110\n    registers:\n"
+        "      - {name: state, address: 101, type: uint16, values: state, text: State}\n"
+        "      - {name: force_measured, address: 102, type: int16, scale: 0.01, unit: N, text: Force}\n"
+    )
+    fake.bank.set("state", State.HOLDING)
+    fake.bank.set("force_measured", 12.34)
+    answer = call("monitor", "--once", "--gateway", fake.address, "--map", tmp_path / "small.yaml")
+    assert answer.exit_code == 0, answer.output
+    assert "HOLDING" in answer.output and "12.34 N" in answer.output
+    for words in (("hold", "12"), ("upload", "demo"), ("calibrate", "--yes")):
+        refused = call(*words, "--gateway", fake.address, "--map", tmp_path / "small.yaml")
+        assert refused.exit_code == 1 and refused.stderr.startswith("E185 "), refused.stderr
+
+
 def test_the_picture_needs_nothing_from_the_web(fake, call, tmp_path: Path) -> None:
     fake.bank.set("force_measured", 12.0)
     answer = call("monitor", "--svg", tmp_path / "monitor.svg", "--gateway", fake.address)

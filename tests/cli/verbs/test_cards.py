@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -66,6 +67,12 @@ def test_every_register_has_a_card_whose_lines_name_it(register_map: RegisterMap
         if "write" in facts:
             label, _, value = facts["write"].removeprefix("force-gateway write ").partition("=")
             assert (label, bool(value)) == (named, True)
+
+
+def test_the_lines_of_a_card_name_a_map_of_one_s_own(register_map: RegisterMap) -> None:
+    """Without it they are refused: E186."""
+    facts = dict(register_facts(replace(register_map, file="own.yaml"), register_map.find("heartbeat")))
+    assert facts["read"] == "force-gateway read heartbeat --map own.yaml" and facts["write"].endswith(" --map own.yaml")
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import Result
 
-from gateway.cli.diagnosis.outputs import write_all
+from gateway.cli.diagnosis.outputs import check_targets, write_all
 from gateway.processes.durable_file import replace_text
 from tests.other_kinds import never_waiting, put
 from tests.recording.test_care import record
@@ -54,6 +54,16 @@ def test_what_a_link_leads_to_is_written_and_the_link_stays(verb: str, state: Pa
     answer = call(*verb.split(), "--force", "--state", "state")
     assert answer.exit_code == 0, answer.output
     assert (state.parent / "out").is_symlink() and (state.parent / "there").read_bytes() != b"before"
+
+
+def test_a_directory_among_the_names_is_told_before_anything_is_computed_or_written(tmp_path: Path) -> None:
+    """`diagnose --json DIR --report why.html` wrote the report, minutes later, and only then told."""
+    targets = [tmp_path / "why.html", tmp_path]
+    with pytest.raises(IsADirectoryError):
+        check_targets(targets, [])
+    with pytest.raises(IsADirectoryError):
+        write_all(dict.fromkeys(targets, "a page"))
+    assert not (tmp_path / "why.html").exists()
 
 
 def test_pages_are_written_where_a_link_leads_to(tmp_path: Path) -> None:
