@@ -125,7 +125,7 @@ class FirstGoodRecording:
         for path in recording_paths(self._state):
             if (path, since[0]) in self._passed:
                 continue
-            if now_s - path.stat().st_mtime < _CLOSED_S:
+            if abs(now_s - path.stat().st_mtime) < _CLOSED_S:  # one of years to come: the clock was ahead, and is set
                 return None  # it may become the first good one
             if _is_first_good(path, *since):
                 return keep_reference_recording(self._state, path, since[0])

@@ -121,6 +121,16 @@ def test_a_recording_that_is_being_written_is_waited_for(tmp_path):
     assert FirstGoodRecording(tmp_path).keep(10.0) is not None
 
 
+def test_a_recording_from_while_the_clock_was_ahead_is_not_waited_for(tmp_path):
+    """None was found for as long as the clock had been ahead, years, and nobody said so."""
+    use_calibration(tmp_path, 2)
+    ahead = record(tmp_path, 10.0)
+    os.utime(ahead, (2.0e12, 2.0e12))
+    record(tmp_path)
+    kept = FirstGoodRecording(tmp_path).keep(1.0e12)
+    assert kept is not None and kept.name == "0002.fgr"
+
+
 def test_a_recording_from_before_the_calibration_came_into_use_is_none(tmp_path):
     record(tmp_path)
     use_calibration(tmp_path, 2)
