@@ -36,6 +36,8 @@ _SECRET_WORD: Final = re.compile(
     r"(?!\(left out)[^\s\"',;}\]]+",
     re.I,
 )
+_IN_SECTION: Final = re.compile(r'(\b(?:web|mqtt)[\w.]*: \\?")[^"\\\n]+(?=\\?")')
+"""What a fault quotes of the sections that hold secrets: `web: "TOKEN" is not a group of keys`."""
 _LOGIN: Final = re.compile(r"(?<=://)[^/\s@\"]+(?=@)|(?<=\bbearer )[\w.~+/=-]+|(?<=\bbasic )[\w+/=]{8,}", re.I)
 _PEM: Final = re.compile(r"-----BEGIN [^-]+-----.*?(?:-----END [^-]+-----|\Z)", re.S)
 _IPV4: Final = re.compile(r"(?<![\d.])(?:\d{1,3}\.){3}\d{1,3}(?![\d.])")
@@ -51,7 +53,7 @@ class Redaction:
 
     def __call__(self, text: str) -> str:
         text = _PEM.sub("(a key or certificate, left out)", text)
-        text = _SECRET_KEY.sub(r"\1(left out)", text)
+        text = _IN_SECTION.sub(r"\1(left out)", _SECRET_KEY.sub(r"\1(left out)", text))
         text = _SECRET_WORD.sub(r"\1(left out)", _LOGIN.sub("(left out)", text))
         text = _IPV4.sub(lambda found: self._name_of(found[0]), text)
         return _MAYBE_IPV6.sub(lambda found: self._name_of(found[0]) if _is_ipv6(found[0]) else found[0], text)

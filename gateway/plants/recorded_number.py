@@ -4,10 +4,8 @@ import json
 from dataclasses import fields
 from typing import Any, Final
 
-from gateway.control.compensation.cell_map import CellMap
 from gateway.recording import RecordingError
 
-_CELL_NUMBERS: Final = frozenset(each.name for each in fields(CellMap))
 _LARGEST: Final = 1.0e30
 
 
@@ -30,8 +28,12 @@ def header_in_use(header: dict[str, Any]) -> dict[str, Any]:
 
 
 def _is_cell(cell: Any) -> bool:
+    from gateway.control.compensation.cell_map import (
+        CellMap,
+    )  # here, for a diagnosis of any other table loads no control
+
     return (
         isinstance(cell, dict)
-        and cell.keys() <= _CELL_NUMBERS
+        and cell.keys() <= {each.name for each in fields(CellMap)}
         and all(type(value) in (int, float) and abs(value) < _LARGEST for value in cell.values())
     )

@@ -55,6 +55,17 @@ def test_a_secret_in_a_comment_or_in_the_middle_of_a_sentence_does_not_go_in_eit
     assert "@broker failed" in text
 
 
+def test_what_a_fault_quotes_of_a_section_with_secrets_does_not_go_in(tmp_path: Path) -> None:
+    """A token that stands where its section should be was in the sentence that says so."""
+    rig = tmp_path / "cell.yaml"
+    rig.write_text("name: cell\nweb: s3cr3t-abcdefghijklmnop\n")
+    state = with_events(tmp_path / "state", 'E151 cell.yaml:2:6 web: "s3cr3t-abcdefghijklmnop" is not a group of keys')
+    told = gateway("report", "--show", "--rig", rig, "--state", state).output
+    assert "s3cr3t" not in told and told.count("is not a group of keys") == 2
+    event = next(line for line in told.splitlines() if line.startswith('{"time"'))
+    assert 'web: "(left out)" is not' in json.loads(event)["text"]
+
+
 def test_an_address_of_ipv6_is_one_too() -> None:
     text = Redaction()(
         "W204 [2001:db8::5]:40112 at 10:31:47.123Z, fe80::1ff:fe23:4567:890a%eth0, 2001:db8::5; bind ::1"

@@ -254,3 +254,27 @@ def test_a_quote_that_nobody_closes_is_no_table_and_no_defect(tmp_path: Path) ->
     path.write_text('time_s,command_v,force_n\n"' + "1," * 100_000 + "\n")
     with pytest.raises(RecordingError, match="line 2 has quotes and 200002 characters"):
         read_table(path)
+
+
+@pytest.mark.parametrize("first", [0, 300])
+@pytest.mark.parametrize("separator", ["\t", ";"])
+def test_a_comma_of_thousands_beside_decimal_points_is_no_number(separator: str, first: int, tmp_path: Path) -> None:
+    """As Excel copies cells with a format: 1,234 N were read as 1.234 N."""
+    rows = [f"{k / 100:.2f};2.5;{'1,234' if k >= first and k % 7 == 0 else 900 + k}" for k in range(400)]
+    path = tmp_path / "table.txt"
+    path.write_text(
+        "time_s;command_v;force_n\n".replace(";", separator) + "\n".join(rows).replace(";", separator) + "\n"
+    )
+    with pytest.raises(
+        RecordingError, match=rf"table.txt:{first + 2 + -first % 7}, column force_n .*: '1,234' is no number"
+    ):
+        read_table(path)
+    assert "'1,234' is no number" in read_table(path, lenient=True).notes[0]
+
+
+def test_a_decimal_comma_stays_one_beside_a_version_and_behind_whole_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text("time_s;force_n;version\n0,01;1,234;1.2\n0,02;2,345;1.2\n")
+    np.testing.assert_allclose(read_table(path).columns["force_n"], [1.234, 2.345])
+    path.write_text("time_s;force_n\n" + "".join(f"{k};{k}\n" for k in range(300)) + "300;1,5\n")
+    assert read_table(path).columns["force_n"][-1] == 1.5

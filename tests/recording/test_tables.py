@@ -260,6 +260,16 @@ def test_a_parquet_file_whose_names_are_no_text_is_a_sentence(tmp_path: Path) ->
         read_table(path)
 
 
+def test_of_two_parquet_columns_of_one_name_the_one_is_read_that_was_picked(tmp_path: Path) -> None:
+    """The advice to pick one led to an internal error."""
+    path = tmp_path / "table.parquet"
+    pq.write_table(pa.table([[0.0, 0.1], [1.0, 2.0], [3.0, 4.0]], names=["time_s", "force_n", "force_n"]), path)
+    with pytest.raises(RecordingError, match="stands twice in the header: force_n; pick one with --columns"):
+        read_table(path)
+    for place, first in ((2, 1.0), (3, 3.0)):
+        assert read_table(path, ColumnMapping.parse(f"force_n={place}:n")).columns["force_n"][0] == first
+
+
 def test_parquet_of_others_is_read_by_what_its_columns_are(tmp_path: Path) -> None:
     path = tmp_path / "table.parquet"
     stamps = np.array([1_700_000_000_000_000, 1_700_000_000_005_000], dtype="datetime64[us]")

@@ -106,6 +106,17 @@ def test_the_first_good_recording_after_a_calibration_came_into_use_is_kept(tmp_
     assert kept is not None and kept.name == "0001.fgr"
 
 
+def test_recordings_of_another_calibration_are_not_read_through(tmp_path, monkeypatch):
+    """Each was, once: days of recordings went through the memory of the watch."""
+    record(tmp_path, calibration=1), record(tmp_path, calibration=3), record(tmp_path)
+    use_calibration(tmp_path, 2)
+    read: list[str] = []
+    whole = reference_recording.read_table
+    monkeypatch.setattr(reference_recording, "read_table", lambda path: (read.append(path.name), whole(path))[1])
+    kept = FirstGoodRecording(tmp_path).keep(1.0e12)
+    assert kept is not None and read == ["0003.fgr"]
+
+
 def test_what_a_user_has_chosen_stays(tmp_path):
     keep_reference_recording(tmp_path, record(tmp_path, calibration=1))
     record(tmp_path)
@@ -119,6 +130,16 @@ def test_a_recording_that_is_being_written_is_waited_for(tmp_path):
     record(tmp_path)
     assert FirstGoodRecording(tmp_path).keep(1.0) is None
     assert FirstGoodRecording(tmp_path).keep(10.0) is not None
+
+
+def test_a_recording_from_while_the_clock_was_ahead_is_not_waited_for(tmp_path):
+    """None was found for as long as the clock had been ahead, years, and nobody said so."""
+    use_calibration(tmp_path, 2)
+    ahead = record(tmp_path, 10.0)
+    os.utime(ahead, (2.0e9, 2.0e9))
+    record(tmp_path)
+    kept = FirstGoodRecording(tmp_path).keep(1.9e9)
+    assert kept is not None and kept.name == "0002.fgr"
 
 
 def test_a_recording_from_before_the_calibration_came_into_use_is_none(tmp_path):

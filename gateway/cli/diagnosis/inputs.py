@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+import click
+
 from gateway import defaults
 from gateway.cli.errors import CliError, no_such_recording
 from gateway.cli.options import state_directory
@@ -75,6 +77,7 @@ def read_sources(
     calibration: number, name or file of the one that the recordings were made under, None for what they say themselves.
     """
     paths = tuple(recording_path(name, rig, state) for name in names)
+    refuse_twice(paths)
     known = _load_rig(rig) if rig else None
     mapping = column_mapping(columns)
     recordings = [read_table(path, mapping) for path in paths]
@@ -101,6 +104,14 @@ def read_sources(
         is_own=plant is (known.plant_profile if known else plant_of_first),
         is_rehearsal=any(map(is_rehearsal, recordings)),
     )
+
+
+def refuse_twice(paths: Sequence[Path]) -> None:
+    """Refuse a recording that is named twice: UsageError. Its noise would be what two have in common, and count as evidence."""
+    files = [path.resolve() for path in paths]
+    for at, file in enumerate(files):
+        if file in files[:at]:
+            raise click.UsageError(f"{paths[at]} is named twice: a recording is no evidence for itself; leave one out")
 
 
 def _calibration_noise(

@@ -148,7 +148,7 @@ def _answer(options: dict[str, Any]) -> None:
 def _compute_answer(options: dict[str, Any], files: "AnswerFiles") -> "Answer":
     """Read the recordings, check that the files can be written, and diagnose."""
     from gateway.cli.diagnosis.answer import Answer, add_plan
-    from gateway.cli.diagnosis.inputs import read_sources
+    from gateway.cli.diagnosis.inputs import read_sources, refuse_twice
     from gateway.cli.diagnosis.outputs import check_targets
     from gateway.cli.diagnosis.progress_line import show_progress
 
@@ -161,6 +161,7 @@ def _compute_answer(options: dict[str, Any], files: "AnswerFiles") -> "Answer":
             calibration=options["calibration"],
         )
         old = _read_old(options, sources.rig)
+        refuse_twice((*sources.paths, *(old.paths if old else ())))
     named = (Path(options[name]) for name in ("rig", "columns", "calibration") if options[name])
     check_targets(files.given, (*sources.paths, *(old.paths if old else ()), *named))
     diagnosis, runtime_s = _run_diagnosis(sources, old, options)

@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 from gateway.recording.care.keeping import CLOCK_SET_S, is_being_recorded
 
 _DAY_S: Final = 86400.0
+_LAST_S: Final = 253_402_214_400.0  # 9999-12-31
 _CURE: Final = "`date` shows the clock, `sudo timedatectl set-ntp true` has it set"
 
 
@@ -63,4 +64,5 @@ def _ended(paths: Sequence[Path]) -> list[tuple[float, str]]:
 
 
 def _date(time_s: float) -> str:
-    return f"{datetime.fromtimestamp(time_s, UTC):%Y-%m-%d}"
+    """Of what a calendar has: a file may be of the year 60000."""
+    return f"{datetime.fromtimestamp(min(max(time_s, 0.0), _LAST_S), UTC):%Y-%m-%d}"

@@ -28,6 +28,8 @@ _LONGEST_CELL: Final = csv.field_size_limit()  # whoever does not close a quote 
 _DECIMAL_COMMA: Final = re.compile(r"\d,\d")
 _QUOTED_DECIMAL_COMMA: Final = re.compile(r'"\s*[-+]?\d+,\d+(?:[eE][-+]?\d+)?\s*"')
 _DECIMAL_POINT: Final = re.compile(r"(?<![\d.:])\d+\.\d+(?![\d.])")
+_POINT_CELL: Final = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
+_THOUSANDS_CELL: Final = re.compile(r"[-+]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?")
 _QUOTED: Final = re.compile(r'"[^"]*"')
 _NAMED_SEPARATOR: Final = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 _UNPRINTABLE: Final = re.compile(r"[\x00-\x08\x0e-\x1f]")
@@ -36,7 +38,8 @@ _UNPRINTABLE: Final = re.compile(r"[\x00-\x08\x0e-\x1f]")
 @dataclass(frozen=True, slots=True)
 class CsvDialect:
     """names: one per column, "" where the header has none; skip: lines before the first row; sample: the first rows;
-    file: where the text lies, path itself or what was made of it; units: of the row below the header."""
+    file: where the text lies, path itself or what was made of it; units: of the row below the header; is_sure: the decimal
+    sign was seen, so that a comma beside points is one of thousands, and no number."""
 
     path: Path
     file: Path
@@ -49,6 +52,7 @@ class CsvDialect:
     sample: tuple[tuple[str, ...], ...]
     units: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
+    is_sure: bool = False
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line as they stand; empty ones beyond the last column are a trailing separator, and dropped."""
@@ -59,7 +63,8 @@ class CsvDialect:
 
     def parse_number(self, cell: str) -> float | None:
         """Return the value of a cell, NaN where nothing was taken; None when it is no number."""
-        return parse_number(cell, "," if self.decimal == "," or self.separator != "," else ".")
+        may_be_comma = self.separator != "," and not self.is_sure
+        return parse_number(cell, "," if self.decimal == "," or may_be_comma else ".")
 
     def is_words(self, index: int) -> bool:
         """Return whether no filled cell of the first rows is a number."""
@@ -151,7 +156,7 @@ def _make_dialect(path: Path, file: Path, facts: dict[str, str], lines: list[tup
     separator = named[1] if named else _separator([line for _, line in lines])
     lines, notes = _without_title(lines, separator)
     (at, first), rest = lines[0], [line for _, line in lines[1:]]
-    decimal = _decimal(separator, rest or [first])
+    decimal, is_sure = _decimal(separator, rest or [first])
     names = tuple(cell.strip() for cell in split_cells(first, separator))
     _refuse_wide(path, len(names))
     has_header = any(parse_number(name, decimal) is None and parse_stamp(name) is None for name in names)
@@ -160,7 +165,7 @@ def _make_dialect(path: Path, file: Path, facts: dict[str, str], lines: list[tup
     rows = rest[1:] if units else rest if has_header else [first, *rest]
     sample = tuple(tuple(split_cells(row, separator)) for row in rows)
     shown = names if has_header else ("",) * _width(names)
-    return CsvDialect(path, file, facts, shown, separator, decimal, has_header, skip, sample, units, notes)
+    return CsvDialect(path, file, facts, shown, separator, decimal, has_header, skip, sample, units, notes, is_sure)
 
 
 def _refuse_wide(path: Path, columns: int) -> None:
@@ -168,13 +173,18 @@ def _refuse_wide(path: Path, columns: int) -> None:
         raise RecordingError(f"{path}: {columns} columns: at most {MOST_COLUMNS} are read; write the ones that matter")
 
 
-def _decimal(separator: str, rows: Sequence[str]) -> str:
-    """Return the decimal sign. In a table with commas between cells, one inside a cell is quoted; beside decimal points it
-    would be one of thousands, and is no number."""
-    if separator != ",":
-        return "," if any(_DECIMAL_COMMA.search(line) for line in rows) else "."
-    quoted = any(_QUOTED_DECIMAL_COMMA.search(line) for line in rows)
-    return "," if quoted and not any(_DECIMAL_POINT.search(line) for line in rows) else "."
+def _decimal(separator: str, rows: Sequence[str]) -> tuple[str, bool]:
+    """Return the decimal sign, and whether it was seen. In a table with commas between cells, one inside a cell is quoted;
+    beside decimal points it would be one of thousands, and is no number. So is 1,234 beside points in any other table."""
+    if separator == ",":
+        quoted = any(_QUOTED_DECIMAL_COMMA.search(line) for line in rows)
+        return ("," if quoted and not any(_DECIMAL_POINT.search(line) for line in rows) else "."), True
+    cells = [cell.strip() for line in rows for cell in split_cells(line, separator)]
+    commas = [cell for cell in cells if _DECIMAL_COMMA.search(cell)]
+    has_points = any(map(_POINT_CELL.fullmatch, cells))
+    if commas and not (has_points and all(map(_THOUSANDS_CELL.fullmatch, commas))):
+        return ",", True
+    return ".", has_points
 
 
 def _without_title(lines: list[tuple[int, str]], separator: str) -> tuple[list[tuple[int, str]], list[str]]:

@@ -86,10 +86,10 @@ def _columns(
     columns: dict[str, NDArray[np.float64]] = {}
     words: list[str] = []
     for pick in chosen:
-        values = _numbers(table[headers[pick.index]])
+        column = _column_at(table, headers, pick.index)
+        values = _numbers(column)
         if values is None and pick.is_contract:
-            kind = table.schema.field(headers[pick.index]).type
-            raise RecordingError(f"{path}: column {pick.name} holds {kind}, not numbers")
+            raise RecordingError(f"{path}: column {pick.name} holds {column.type}, not numbers")
         if values is None:
             words.append(pick.name)
         else:
@@ -97,6 +97,13 @@ def _columns(
                 values if (pick.factor, pick.offset) == (1.0, 0.0) else values * pick.factor + pick.offset
             )
     return columns, words
+
+
+def _column_at(table: Any, headers: Sequence[str], index: int) -> Any:
+    """Return the column at this place of the file; another one may have its name, and is read with it."""
+    name = headers[index]
+    places = [place for place, read in enumerate(table.column_names) if read == name]
+    return table.column(places[list(headers[:index]).count(name)])
 
 
 def _numbers(column: Any) -> "NDArray[np.float64] | None":

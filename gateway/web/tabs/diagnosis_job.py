@@ -118,14 +118,14 @@ class DiagnosisJobs:
             _kill(job.process)
             await job.process.wait()
             raise
-        self._end(job, code, said.decode(errors="replace")[-_LONGEST_SAID:], folder)
+        await self._end(job, code, said.decode(errors="replace")[-_LONGEST_SAID:], folder)
         await asyncio.to_thread(shutil.rmtree, folder, True)
 
-    def _end(self, job: RunningDiagnosis, code: int, said: str, folder: Path) -> None:
+    async def _end(self, job: RunningDiagnosis, code: int, said: str, folder: Path) -> None:
         job.took_s = self._clock() - job.began_s
         if job.ended:
             return
-        whole = code == 0 and _keep(folder, self._state / FOLDER, job.recording)
+        whole = code == 0 and await asyncio.to_thread(_keep, folder, self._state / FOLDER, job.recording)
         job.ended = "done" if whole else "failed"
         job.said = _saved_plant(said) if whole else last_sentence(said) or f"the diagnosis ended with {code}"
 

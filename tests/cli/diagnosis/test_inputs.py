@@ -1,10 +1,14 @@
-"""What a diagnosis loads before it begins: of seconds, imports are the largest part that nobody sees."""
+"""What a diagnosis loads before it begins: of seconds, imports are the largest part that nobody sees. And what it refuses."""
 
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from gateway.cli.main import command
 
 _ONLY_FOR_RIGS = ("gateway.control.controller", "gateway.profiles.rigs.rig_file", "gateway.devices.codecs")
 _ONLY_FOR_SOME = ("scipy", "asyncio", "gateway.reports.diagnosis.page", "gateway.service.closed_loop.study")
@@ -20,3 +24,17 @@ def test_a_table_that_names_no_rig_is_diagnosed_without_what_reads_rigs_and_writ
     )
     told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
     assert told.split()[1:] == ["[]"]
+
+
+@pytest.mark.parametrize(
+    "words", [("{0}", "{1}"), ("{0}", "--against", "{1}"), ("{0}", "--against", "{2}", "--against", "{2}")]
+)
+def test_a_recording_is_no_evidence_for_itself(words: tuple[str, ...], tmp_path: Path) -> None:
+    """Named twice, its noise was what two recordings had in common; against itself, whatever was found was no change."""
+    rows = "".join(f"{k / 100},{k % 5},{k % 7}\n" for k in range(400))
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text("time_s,command_v,force_n\n" + rows)
+    (tmp_path / "same.csv").symlink_to(tmp_path / "a.csv")
+    given = [word.format(*(tmp_path / name for name in ("a.csv", "same.csv", "b.csv"))) for word in words]
+    refused = CliRunner().invoke(command, ["diagnose", *given, "--rig", "demo"])
+    assert refused.exit_code == 2 and "is named twice: a recording is no evidence for itself" in refused.stderr

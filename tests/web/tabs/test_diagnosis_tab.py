@@ -1,19 +1,23 @@
 """A diagnosis of the page: one at a time, cancelled without a trace, and ended with the page's process."""
 
+import asyncio
 import json
 import re
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from gateway import progress
 from gateway.diagnosis.result import Verdict
+from gateway.web.tabs import diagnosis_job
 from gateway.web.tabs.diagnosis_process import ProgressTeller
 from tests.web.tabs.conftest import record
 from tests.web.tabs.served_tabs import serve
@@ -128,3 +132,14 @@ def test_the_page_has_words_for_each_verdict() -> None:
     script = files("gateway.web").joinpath("static/tabs/diagnosis.js").read_text("utf-8")
     (words,) = re.findall(r"const VERDICTS = \{(.*?)\};", script)
     assert set(re.findall(r'"?([\w-]+)"?: "', words)) == {verdict.value for verdict in Verdict}
+
+
+def test_the_disk_that_takes_the_report_keeps_no_request_waiting(tmp_path, monkeypatch) -> None:
+    """It was renamed by the loop that serves the page: on a disk that hung nobody could stop the force there."""
+    names: list[str] = []
+    monkeypatch.setattr(diagnosis_job, "_keep", lambda *words: names.append(threading.current_thread().name) or True)
+    job = diagnosis_job.RunningDiagnosis(1, False, 0.0)
+    jobs = diagnosis_job.DiagnosisJobs(SimpleNamespace(state=tmp_path), lambda: 2.0)
+    asyncio.run(jobs._end(job, 0, "", tmp_path))
+    assert (job.ended, job.took_s) == ("done", 2.0)
+    assert names and names != [threading.main_thread().name]

@@ -8,6 +8,7 @@ import pytest
 
 from gateway.profiles.recordings_section import Retention
 from gateway.recording import recording_paths
+from gateway.recording.care import clock_doubt
 from gateway.recording.care.clock_doubt import ClockDoubt, doubt_clock
 from gateway.service.running_rig.recording import retention as module
 from gateway.service.running_rig.recording.retention import RecordingRetention
@@ -91,3 +92,10 @@ def test_a_clock_that_goes_along_is_not_doubted(tmp_path: Path) -> None:
     assert doubt_clock([], 90.0, NOW_S).kind is ClockDoubt.NONE
     os.utime(path, (3600.0, 3600.0))
     assert doubt_clock([path], 90.0, NOW_S).kind is ClockDoubt.NONE, "its age is not known, and it does not go"
+
+
+def test_a_year_that_no_calendar_has_is_said_as_its_last_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = record(tmp_path, days_ago=3.0)
+    monkeypatch.setattr(clock_doubt, "_ended", lambda paths: [(2.0e12, path.name)])
+    doubt = doubt_clock([path], 90.0, NOW_S)
+    assert doubt.kind is ClockDoubt.BEHIND and "ended on 9999-12-31" in doubt.sentence
