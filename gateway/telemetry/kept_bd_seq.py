@@ -6,10 +6,12 @@ process before, which the broker tells late, for that of the new one (Sparkplug 
 
 import contextlib
 import json
+import os
 from pathlib import Path
 from typing import Final
 
-from gateway.processes.durable_file import lock_directory, read_object, replace_durably
+from gateway.plain_file import closing_descriptor
+from gateway.processes.durable_file import read_object, replace_durably
 
 _FILE: Final = "sparkplug.json"
 _ROUND: Final = 256
@@ -23,9 +25,14 @@ class KeptBdSeq:
         self._last = self._read()
 
     def next(self) -> int:
-        """Return the number of a new connection, 0 .. 255 and round; it counts also where the disk does not take it."""
+        """Return the number of a new connection, 0 .. 255 and round; it counts also where the disk does not take it.
+
+        Without a lock: the state directory's is the guardian's for as long as it runs, and nobody else writes this file."""
         self._last = (self._last + 1) % _ROUND
-        with contextlib.suppress(OSError), lock_directory(self._path.parent) as descriptor:
+        with (
+            contextlib.suppress(OSError),
+            closing_descriptor(os.open(self._path.parent, os.O_RDONLY | os.O_DIRECTORY)) as descriptor,
+        ):
             replace_durably(descriptor, _FILE, json.dumps({"bdSeq": self._last}).encode())
         return self._last
 

@@ -1,8 +1,9 @@
 """HTTP of the page and of the metrics: a connection that does not come to a whole request in time is closed, and one that
-takes nothing of its answer.
+takes nothing of its answer; where as many are open as are served, the one that has asked for nothing for longest makes room.
 
 uvicorn waits for the rest of a request for ever, and for an answer to be taken, and refuses everybody while its bound of
-connections is full: who opened as many and said nothing, or read nothing, shut out all others, and the page's Stop with them.
+connections is full: who opened as many and said nothing, or read nothing, shut out all others, and the page's Stop with them;
+by opening them again and again for ever, and without the page's token.
 """
 
 import asyncio
@@ -22,10 +23,13 @@ class ImpatientProtocol(H11Protocol):
 
     _patience: asyncio.TimerHandle | None = None
     _unread: asyncio.TimerHandle | None = None
+    _asked_s = 0.0  # when it connected, or its last whole request had come
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
         """Begin to wait for a request."""
         super().connection_made(transport)
+        self._asked_s = self.loop.time()
+        self._make_room()
         self._watch_request()
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -52,10 +56,27 @@ class ImpatientProtocol(H11Protocol):
 
     def _watch_request(self) -> None:
         """More of the same request does not begin the time anew."""
-        if self.conn.their_state not in (h11.IDLE, h11.SEND_BODY):
+        if not self._is_waited_for:
+            self._asked_s = self.loop.time()
             self._end_patience()
         elif self._patience is None:
             self._patience = self.loop.call_later(WHOLE_REQUEST_S, self.transport.close)
+
+    @property
+    def _is_waited_for(self) -> bool:
+        """Decide whether its next request, or the rest of one, is still to come."""
+        return self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
+
+    def _make_room(self) -> None:
+        if self.limit_concurrency is None or len(self.connections) < self.limit_concurrency:
+            return
+        silent = [
+            one for one in self.connections if isinstance(one, ImpatientProtocol) and one._is_waited_for and one != self
+        ]
+        if silent:
+            longest = min(silent, key=lambda one: one._asked_s)
+            self.connections.discard(longest)  # now: several may come before it is told of its end
+            longest.transport.abort()
 
     def _end_patience(self) -> None:
         patience, self._patience = self._patience, None

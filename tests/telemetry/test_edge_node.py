@@ -3,6 +3,7 @@
 import asyncio
 import itertools
 import struct
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.live.live_state import LiveState
+from gateway.processes.state_lock import hold_state_lock
 from gateway.telemetry.broker_session import BrokerMessage
 from gateway.telemetry.edge_node import REBIRTH, EdgeNode
 from gateway.telemetry.kept_bd_seq import KeptBdSeq
@@ -178,6 +180,21 @@ def test_bd_seq_goes_on_where_the_process_before_has_ended(tmp_path: Path) -> No
         (tmp_path / "sparkplug.json").write_text(damage)
         assert KeptBdSeq(tmp_path).next() == 0
     assert [KeptBdSeq(tmp_path / "nowhere").next() for _ in range(2)] == [0, 0], "no disk: counts in memory only"
+
+
+def test_bd_seq_is_kept_while_a_gateway_has_the_state_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its lock was waited for, in the loop: of each connection nothing was said, heard or looked at for ten seconds, a stop
+    neither, and behind them the number was not kept."""
+
+    def wait(seconds: float) -> None:
+        raise AssertionError("it waits for the guardian's lock")
+
+    monkeypatch.setattr(time, "sleep", wait)
+    with hold_state_lock(tmp_path) as is_ours:
+        assert is_ours
+        assert [KeptBdSeq(tmp_path).next() for _ in range(3)] == [0, 1, 2]
 
 
 def field(number: int, wire_type: int, content: bytes) -> bytes:

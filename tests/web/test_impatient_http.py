@@ -105,3 +105,39 @@ def test_who_takes_nothing_of_an_answer_is_hung_up_on_and_who_takes_it_is_not(
         far.close()
 
     asyncio.run(scene())
+
+
+def test_who_opens_connections_and_asks_for_nothing_shuts_nobody_out() -> None:
+    """Two hundred and fifty-six, opened again every ten seconds, and each Stop of the page was refused as one too many."""
+    most = 4
+
+    async def index(request: object) -> PlainTextResponse:
+        return PlainTextResponse("here")
+
+    async def scene() -> None:
+        app = Starlette(routes=[Route("/", index)])
+        config = Config(app, ws="none", lifespan="off", log_config=None, limit_concurrency=most)
+        config.load()
+        state, loop = ServerState(), asyncio.get_running_loop()
+
+        async def connect() -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+            ours, far = socket.socketpair()
+            await loop.connect_accepted_socket(lambda: impatient_http.ImpatientProtocol(config, state, {}), ours)
+            return await asyncio.open_connection(sock=far)
+
+        first = await connect()
+        silent = [await connect() for _ in range(3 * most)]
+        assert len(state.connections) < most
+        assert await first[0].read() == b"", "the one that was silent for longest has gone"
+        reader, writer = await connect()
+        writer.write(WHOLE)
+        assert b"here" in await reader.readuntil(b"here")
+        writer.write(WHOLE)  # who asks stays, whoever comes behind
+        more = [await connect() for _ in range(most - 2)]
+        assert b"here" in await reader.readuntil(b"here")
+        for _, each in (first, *silent, (reader, writer), *more):
+            each.close()
+        while state.connections:
+            await asyncio.sleep(0)
+
+    asyncio.run(asyncio.wait_for(scene(), 10.0))

@@ -13,9 +13,10 @@ from functools import wraps
 from typing import Any, Final, TypeVar
 
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, JSONResponse, Response
+from starlette.responses import HTMLResponse, Response
 
 from gateway.extras import MissingExtraError
+from gateway.processes.json_socket.messages import encode_answer
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
 
@@ -57,14 +58,19 @@ def answers(handler: Callable[[Request], Awaitable[Any]]) -> Endpoint:
         try:
             answer = await handler(request)
         except TabRefusedError as refusal:
-            return JSONResponse({"error": str(refusal)}, refusal.status)
+            return _as_json({"error": str(refusal)}, refusal.status)
         except OSError as error:
-            return JSONResponse({"error": _unreachable(error)}, UNAVAILABLE)
+            return _as_json({"error": _unreachable(error)}, UNAVAILABLE)
         except (ValueError, MissingExtraError) as error:
-            return JSONResponse({"error": str(error)}, CONFLICT)
-        return answer if isinstance(answer, Response) else JSONResponse(answer)
+            return _as_json({"error": str(error)}, CONFLICT)
+        return answer if isinstance(answer, Response) else _as_json(answer)
 
     return endpoint
+
+
+def _as_json(answer: dict[str, Any], status: int = 200) -> Response:
+    """In ASCII: a file's name need not be UTF-8."""
+    return Response(encode_answer(answer), status, media_type="application/json")
 
 
 async def read_body(request: Request, shape: type[Shape]) -> Shape:

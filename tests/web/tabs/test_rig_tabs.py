@@ -1,5 +1,6 @@
 """Wiring and configuration: every value stands where the tab says, and secrets stay where they are."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,16 @@ def test_a_rig_file_that_has_become_faulty_is_told_in_words(own_rig, state) -> N
             answer = page.get(f"/api/v1/{path}")
             assert answer.status == 409
             assert "own.yaml" in answer.json["error"]
+
+
+def test_a_rig_file_whose_name_is_no_utf_8_is_shown_and_its_faults_told(own_rig, state) -> None:
+    """As an older system wrote it. Both tabs were an internal error."""
+    file = own_rig.rename(own_rig.with_name(os.fsdecode(b"caf\xe9.yaml")))
+    with serve(state, str(file)) as page:
+        for path in ("configuration", "wiring"):
+            assert page.get(f"/api/v1/{path}").status == 200
+        file.write_text("name: [", encoding="utf-8")
+        assert "caf" in page.get("/api/v1/configuration").json["error"]
 
 
 def test_files_that_have_changed_since_the_start_are_not_shown_as_what_runs(own_rig, state) -> None:
