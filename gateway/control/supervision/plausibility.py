@@ -89,7 +89,8 @@ class RiseCheck:
     """Smoothed rise of the cell force since enable, judged on every new sample."""
 
     def __init__(self, contact_threshold_n: float) -> None:
-        """smooth_n: the cell force behind a low-pass, for judgement and sentences."""
+        """smooth_n: the cell force behind a low-pass, for sentences, and to hold the target back at once. A fault is judged
+        from the same with only a part of a reading that leaps alone: of a cell of 10 Hz one was a wrong sign or gain."""
         self._threshold_n, self._leaps = contact_threshold_n, LeapLimit()
         self.smooth_n = self._calm_n = self._behind_n = 0.0
         self._readings = 0
@@ -107,12 +108,12 @@ class RiseCheck:
     @property
     def measured_rise_n(self) -> float:
         """Rise of the measured force since the check began, N."""
-        return self.smooth_n - self._base_n
+        return self._calm_n - self._base_n
 
     @property
     def rise_since_lowest_n(self) -> float:
         """The same without what pressed at the beginning and has left since, N."""
-        return self.smooth_n - max(self._base_n, self._lowest_n)
+        return self._calm_n - max(self._base_n, self._lowest_n)
 
     @property
     def wrong_rise_n(self) -> float:
@@ -126,8 +127,8 @@ class RiseCheck:
             weight = max(1.0 / self._readings, reading.interval_s / (_SMOOTHING_S + reading.interval_s))
             self.smooth_n += (reading.cell_n - self.smooth_n) * weight
             self._calm_n += (self._leaps.take(reading.cell_n) - self._calm_n) * weight
-            self._lowest_n = min(self._lowest_n, self.smooth_n)
-            self._behind_n += (self.smooth_n - self._behind_n) * reading.interval_s / (_TREND_S + reading.interval_s)
+            self._lowest_n = min(self._lowest_n, self._calm_n)
+            self._behind_n += (self._calm_n - self._behind_n) * reading.interval_s / (_TREND_S + reading.interval_s)
 
     def shift(self, moved_n: float) -> None:
         """Take over a zero that has moved: what was measured before reads that much less now."""
@@ -154,12 +155,12 @@ class RiseCheck:
 
     def _judge_gain(self, expected_n: float, slack_n: float, kept_n: float, interval_s: float) -> FaultCode:
         off_n = self.measured_rise_n - expected_n
-        risen_n = self.rise_since_lowest_n
-        self.is_too_high = risen_n - expected_n > slack_n + kept_n and risen_n > _HIGHEST_SHARE * expected_n
-        coming_n = max(0.0, self.smooth_n - self._behind_n) * _UNKNOWN_LAG_S / _TREND_S
+        most_n = max(expected_n + slack_n + kept_n, _HIGHEST_SHARE * expected_n)
+        self.is_too_high = self.smooth_n - max(self._base_n, self._lowest_n) > most_n
+        coming_n = max(0.0, self._calm_n - self._behind_n) * _UNKNOWN_LAG_S / _TREND_S
         too_low = -off_n > slack_n and self.measured_rise_n + coming_n < _LOWEST_SHARE * (expected_n - slack_n)
-        has_moved = self.smooth_n - self._at_rest_n > _MOVED_SHARE * expected_n
-        wrong = self.is_too_high or (too_low and has_moved)
+        has_moved = self._calm_n - self._at_rest_n > _MOVED_SHARE * expected_n
+        wrong = (self.is_too_high and self.rise_since_lowest_n > most_n) or (too_low and has_moved)
         self._wrong_gain_s = self._wrong_gain_s + interval_s if wrong else 0.0
         self._right_gain_s = self._right_gain_s + interval_s if expected_n >= _PROVING_RISE_N and not wrong else 0.0
         self._proven = self._right_gain_s >= _LASTING_S
