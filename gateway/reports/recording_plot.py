@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-LEAST_ROWS: Final = 2
+_LEAST_ROWS: Final = 2
 _DRAWN: Final = 700
 """Places along a curve; each shows the lowest and the highest value there."""
 _PANELS: Final = (
@@ -27,8 +27,15 @@ _PANELS: Final = (
 _WIDTH, _LEFT, _ABOVE, _BELOW = 1200, 70, 90, 60  # of the SVG file, px
 
 
+def why_no_picture(recording: Recording) -> str:
+    """Return why a recording cannot be drawn, as what is said of it; empty where it can."""
+    if "time_s" not in recording.columns:
+        return "has no column time_s: nothing to draw"
+    return f"has {recording.rows} rows: nothing to draw" if recording.rows < _LEAST_ROWS else ""
+
+
 def recording_page(recording: Recording) -> str:
-    """Return a page with the drawings. The recording has LEAST_ROWS rows."""
+    """Return a page with the drawings of a recording that has a picture."""
     figures = "".join(figure(title, drawing(chart), "", "full") for title, chart in _charts(recording))
     header, label = recording.header, label_of(recording.header)
     head = frame.Head(
@@ -41,7 +48,7 @@ def recording_page(recording: Recording) -> str:
 
 
 def recording_svg(recording: Recording) -> str:
-    """Return one SVG file with the drawings. The recording has LEAST_ROWS rows."""
+    """Return one SVG file with the drawings of a recording that has a picture."""
     charts, parts, down = _charts(recording), [], _ABOVE
     for _, chart in charts:
         parts.append(chart.svg_at(_LEFT, down, _WIDTH))

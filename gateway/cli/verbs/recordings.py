@@ -91,7 +91,7 @@ def plot_command(*, number: int, output: Path | None, force: bool, state: StateC
     """Draw recording N: forces and the command against time."""
     from gateway.cli.diagnosis.outputs import write_all
     from gateway.recording import find_recording, read_recording
-    from gateway.reports.recording_plot import LEAST_ROWS, recording_page, recording_svg
+    from gateway.reports.recording_plot import recording_page, recording_svg, why_no_picture
 
     path = find_recording(state.directory, number)
     target = output or Path(f"recording-{number:04d}.html")
@@ -101,8 +101,8 @@ def plot_command(*, number: int, output: Path | None, force: bool, state: StateC
     if target.exists() and not force:
         raise already_exists(target)
     recording = read_recording(path)
-    if recording.rows < LEAST_ROWS:
-        raise CliError(f"E403 recording {number} has {recording.rows} rows: nothing to draw", exit_codes.DATA)
+    if why := why_no_picture(recording):
+        raise CliError(f"E403 recording {number} {why}", exit_codes.DATA)
     write_all({target: draw(recording)})
     click.echo(f"wrote {target}", err=True)
 

@@ -100,11 +100,17 @@ def _said_by(header: Mapping[str, Any]) -> Summary:
     return {
         "name": label.name,
         "note": label.note,
-        "started_utc": header.get("started_utc"),
-        "rig": header.get("rig"),
+        "started_utc": _text_of(header, "started_utc"),
+        "rig": _text_of(header, "rig"),
         "calibration": header.get("calibration"),
         "plant": (header.get("plant_in_use") or {}).get("number"),
     }
+
+
+def _text_of(header: Mapping[str, Any], key: str) -> str | None:
+    """Another program may have written anything there."""
+    value = header.get(key)
+    return None if value is None else str(value)
 
 
 def _duration_s(recording: Recording) -> float:

@@ -62,12 +62,12 @@ def export_recording(state: Path, number: int, form: str) -> ExportedFile:
 
 def draw_recording(state: Path, number: int) -> str:
     """Return a page with two drawings: forces and the voltage against time."""
-    from gateway.reports.recording_plot import LEAST_ROWS, recording_page
+    from gateway.reports.recording_plot import recording_page, why_no_picture
 
     with _one_at_a_time:
         recording = _read(recording_path(state, number))
-    if recording.rows < LEAST_ROWS:
-        raise TabRefusedError(f"recording {number} has {recording.rows} rows: nothing to draw")
+    if why := why_no_picture(recording):
+        raise TabRefusedError(f"recording {number} {why}")
     return recording_page(recording)
 
 

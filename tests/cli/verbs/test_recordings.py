@@ -131,6 +131,27 @@ def test_a_recording_of_another_program_hides_no_other_one(key: str, state: Path
     assert f"whose {key} is no group of keys" in call("recordings", "show", "3", "--state", state).output
 
 
+@pytest.mark.parametrize("key", ["rig", "started_utc"])
+def test_a_header_of_another_program_with_a_number_for_a_name_is_listed(key: str, state: Path, call) -> None:
+    """The list of all recordings ended with an internal error."""
+    record(state, **{key: 5})
+    listed = call("recordings", "list", "--state", state)
+    assert listed.exit_code == 0, listed.stderr
+    assert "new seals tomorrow" in words_of(listed.output)
+    assert call("recordings", "show", "3", "--state", state).exit_code == 0
+
+
+def test_a_recording_without_a_time_is_no_picture(state: Path, call) -> None:
+    recorder = Recorder(state / "recordings", {"rig": "demo"}, ("force_n", "x"))
+    for row in range(9):
+        recorder.append((float(row), 1.0))
+    recorder.close()
+    refused = call("recordings", "plot", "3", "-o", state / "o.svg", "--state", state)
+    assert (
+        refused.exit_code == exit_codes.DATA and "recording 3 has no column time_s: nothing to draw" in refused.stderr
+    )
+
+
 def test_a_time_that_is_no_number_is_no_nan_in_json(tmp_path: Path, call) -> None:
     recorder = Recorder(tmp_path / "recordings", {"rig": "demo"}, ("time_s", "force_n"))
     for time_s in (0.0, 0.1, float("nan")):
