@@ -75,14 +75,16 @@ def test_an_equal_model_swapped_in_leaves_the_memory_of_every_stop():
     ]
 
 
-def test_tilting_the_payload_moves_no_stop():
-    force_law = law(slip())
-    go(force_law, 30.0, 18.0)
-    before = force_law.branch_share
+def test_tilting_the_payload_turns_the_stops_as_the_same_way_of_the_slide_does():
+    """At one target the slide gives the less the more the weight gives, and friction holds against its turns."""
+    tilted, straight = law(slip()), law(slip())
+    for each in (tilted, straight):
+        go(each, 30.0, 18.0)
     for gravity_n in (0.0, 2.0, 5.0, 0.0):
-        force_law.advance(18.0, 100.0, 0.01, gravity_n)
-        force_law.compute_voltage(gravity_n)
-    assert force_law.branch_share == before
+        tilted.advance(18.0, 1000.0, 0.01, gravity_n)
+        straight.advance(18.0 - gravity_n, 1000.0, 0.01)
+    assert tilted.branch_share == pytest.approx(straight.branch_share, abs=1e-9)
+    assert tilted.compute_voltage(0.0)[0] == pytest.approx(straight.compute_voltage(0.0)[0], abs=1e-9)
 
 
 def test_chatter_of_the_setpoint_does_not_leave_the_band():

@@ -227,15 +227,16 @@ class RegisterMap:
 
     @cached_property
     def map_hash(self) -> int:
-        """Return the CRC-32 of everything that a master relies on; texts may be improved without a change of it."""
+        """Return the CRC-32 of the places and numbers that a master relies on. Texts may be improved without a change of it,
+        and names of values and bits be added, such as a new fault's: a client that knows fewer of them commands as ever, and
+        one that refuses another map would stand still behind each update."""
         content = [self.name, self.version, *([b.name, b.first, b.last] for b in self.blocks)]
         content += [_hashed_fields(register) for register in self.registers]
         return crc32(dumps(content, sort_keys=True, separators=(",", ":")).encode())
 
 
 def _hashed_fields(register: Register) -> list[Any]:
-    """Return what a master relies on of one register: everything but its text."""
+    """Return what a master relies on of one register: everything but its text and the names of what it holds."""
     limits = [register.minimum, register.maximum, register.constant]
-    names = [{str(number): name for number, name in group.items()} for group in (register.values, register.bits)]
     place = [register.name, register.block, register.address, register.words, register.type, str(register.word_order)]
-    return [*place, register.scale, register.unit, register.access, *limits, *names]
+    return [*place, register.scale, register.unit, register.access, *limits]
