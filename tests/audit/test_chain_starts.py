@@ -1,6 +1,7 @@
 """What a start finds of an audit: what was altered is told and stays to be seen, what the disk withholds is asked for again."""
 
 import errno
+import json
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from gateway.audit.audit_file import AuditFile, audit_files
 from gateway.audit.audit_reader import read_audit, verify_audit
+from gateway.audit.chain import NO_HASH
 from tests.audit.test_chain import FILE_BYTES, LINES, find_line, records, replace_last_line
 from tests.other_kinds import MAKERS, never_waiting, put
 
@@ -30,6 +32,17 @@ def test_a_start_covers_up_no_head_that_is_gone_or_names_another_line(state: Pat
     told = [fields["text"] for fields in read_audit(state) if fields["what"] == "chain broken"]
     assert [text[:4] for text in told] == ["A352"]
     assert verify_audit(state).broken
+
+
+def test_behind_a_last_line_that_was_altered_the_numbers_go_on_and_no_hash_vouches_for_it(state: Path) -> None:
+    newest = audit_files(state / "audit")[-1]
+    newest.write_bytes(newest.read_bytes()[:-20] + b"0" * 19 + b"\n")
+    file = AuditFile(state, 1 << 20)
+    file.append([{"what": "start"}])
+    file.close()
+    behind = [json.loads(line) for line in newest.read_bytes().splitlines()[-2:]]
+    assert [(each["n"], each["what"]) for each in behind] == [(LINES + 1, "chain broken"), (LINES + 2, "start")]
+    assert behind[0]["prev"] == NO_HASH
 
 
 def test_a_head_that_is_damaged_alone_is_no_line_that_was_replaced(state: Path) -> None:
