@@ -88,6 +88,17 @@ def test_a_flipped_bit_costs_its_own_batch_only(tmp_path: Path) -> None:
         assert "damaged" in recording.notes[0]
 
 
+@pytest.mark.parametrize("strange", [1, 2, 15])
+def test_strange_bytes_between_two_batches_cost_themselves_only(tmp_path: Path, strange: int) -> None:
+    path = record(tmp_path, batches=3)
+    data = path.read_bytes()
+    at = batch_ends(data, len(COLUMNS))[1]
+    path.write_bytes(data[:at] + b"?" * strange + data[at:])
+    recording = read_recording(path)
+    assert recording.columns["force_n"].tolist() == list(range(9))
+    assert recording.notes[0].startswith(f"{strange} bytes at {at} are damaged")
+
+
 def test_batches_that_are_missing_repeated_or_moved_are_said(tmp_path: Path) -> None:
     """Whole batches each, with a right CRC: their numbers tell, or a recording would jump in time and say nothing."""
     path = record(tmp_path, batches=4)
