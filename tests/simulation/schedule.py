@@ -26,6 +26,7 @@ from tests.simulation.judges.status_witness import StatusWitness
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_edges
 from tests.simulation.kernel.fits import SimulatedFit
+from tests.simulation.kernel.garbage import garbage_left_alone
 from tests.simulation.kernel.network import DELAY_S
 from tests.simulation.kernel.processes import SimulatedService
 from tests.simulation.kernel.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
@@ -43,8 +44,7 @@ RECORDED_EVERY, RECORDED = 8, 1
 """Of so many gateways one records from its start."""
 POLL_S = 0.1
 """Until an output device is asked something where nothing changes."""
-LOOK_S = 0.02
-READ_S = 0.1
+LOOK_S, READ_S = 0.02, 0.1
 
 
 @dataclass(frozen=True)
@@ -287,6 +287,7 @@ class Simulation:
         return float(struct.unpack(">h", answers[-1][2:4])[0]) * 0.01 if answers else nan
 
 
+@garbage_left_alone()
 def run_schedule(seed: int, events: Sequence[Event], duration_s: float) -> Outcome:
     """Run one schedule by itself, in a directory of its own."""
     base: Any = "/dev/shm" if Path("/dev/shm").is_dir() else None

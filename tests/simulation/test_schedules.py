@@ -4,7 +4,9 @@ Another range: SIMULATION_SEEDS=1000:1200 (and SIMULATION_SECONDS=10). What a se
 found so and mended stays in KEPT.
 """
 
+import gc
 import os
+from collections.abc import Iterator
 
 import pytest
 
@@ -273,6 +275,19 @@ def test_a_seed_gives_the_same_run_bit_for_bit_and_another_one_another() -> None
     assert first == again
     assert first.fingerprint != other.fingerprint
     assert first.settings > 20 and first.largest_v > 1.0, "something has happened"
+
+
+def test_no_garbage_is_collected_in_the_depth_of_a_schedule() -> None:
+    """What closes the coroutines of a killed process must not run where a nested JSON has used up the recursion."""
+    collects = set[bool]()
+
+    def events() -> Iterator[Event]:
+        for event in draw_events(3, 4.0):
+            collects.add(gc.isenabled())
+            yield event
+
+    run_schedule(3, events(), 4.0)  # type: ignore[arg-type]
+    assert collects == {False} and gc.isenabled()
 
 
 @pytest.mark.parametrize(("seed", "events"), KEPT)

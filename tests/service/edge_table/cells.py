@@ -59,7 +59,7 @@ class Cell:
     def outcome(self, rig: SmallRig) -> object:
         """What the bank would store and hand on, without doing it: equal ones have one future. Raises Refusal."""
         name = "command" if self.block == "coils" else self.block
-        block = next(one for one in rig.bank._blocks if one.name == name)
+        block = next(one for one in rig.bank._map.blocks if one.name == name)
         data = pack(">H", int(self.values[0])) if self.block == "coils" else self.data
         touched = 0x7F if self.block == "coils" else 0xFFFF
         admitted = rig.bank._admission.admit(
