@@ -39,6 +39,18 @@ def test_a_client_of_another_map_says_so_and_commands_nothing(language: str, ten
     assert set(gateway.requests) == {HASH}, "no force, no upload, no proof of the byte order"
 
 
+def test_of_another_map_it_asks_less_and_less_often(language: str, tenths: RegisterMap) -> None:
+    """Each answer of that gateway was a success, behind which the pause began anew."""
+    gateway = GatewayAtHand(tenths)
+    client = CONTROLLERS[language](TEXTS[language], gateway)
+    for _ in range(200):
+        client.cycle(0.1)
+    if language == "urscript":  # its thread sleeps for the pause itself
+        assert client.get("fg_backoff") == 4.0
+    else:
+        assert 4 <= gateway.requests.count(HASH) <= 10, "in 20 s, at pauses of 0.25 to 4 s"
+
+
 def test_a_gateway_that_comes_back_with_another_map_is_not_commanded(language: str, tenths: RegisterMap) -> None:
     """Not even the OFF behind a loss: what has another map by now has started anew, in OFF."""
     gateway = GatewayAtHand(MAP)

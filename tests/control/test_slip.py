@@ -87,6 +87,30 @@ def test_tilting_the_payload_turns_the_stops_as_the_same_way_of_the_slide_does()
     assert tilted.compute_voltage(0.0)[0] == pytest.approx(straight.compute_voltage(0.0)[0], abs=1e-9)
 
 
+def test_the_trim_hears_how_far_the_slide_moves_and_not_the_target():
+    """Its memory of either branch turns with friction, which a tilt turns too."""
+    force_law = law(slip())
+    go(force_law, 30.0, 18.0)
+    assert force_law.advance(20.0, 1000.0, 0.01, 5.0) == pytest.approx(2.0 - 5.0)
+    assert force_law.advance(20.0, 1000.0, 0.01, 5.0) == 0.0
+
+
+def test_a_weight_that_changes_in_free_air_turns_nothing():
+    """A tool that has lost contact slides outwards, on the rising branch, whichever way it is tilted."""
+    bench = enabled()
+    bench.write(payload_kg=0.3)
+    bench.force(20.0)
+    bench.run(1.0)
+    bench.plant.contact = False
+    bench.run(1.0)
+    shares = []
+    for tilt_rad in (1.5, 3.0, 1.5, 0.0):
+        bench.write(tilt_angle_rad=tilt_rad)
+        bench.run(0.1)
+        shares.append(bench.controller._loop.feedforward.branch_share)
+    assert shares == [1.0, 1.0, 1.0, 1.0]
+
+
 def test_chatter_of_the_setpoint_does_not_leave_the_band():
     bench = enabled()
     bench.force(20.0)
