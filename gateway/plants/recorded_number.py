@@ -28,9 +28,7 @@ def header_in_use(header: dict[str, Any]) -> dict[str, Any]:
 
 
 def _is_cell(cell: Any) -> bool:
-    from gateway.control.compensation.cell_map import (
-        CellMap,
-    )  # here, for a diagnosis of any other table loads no control
+    from gateway.control.compensation.cell_map import CellMap  # here: a diagnosis of any other table loads no control
 
     return (
         isinstance(cell, dict)

@@ -161,7 +161,8 @@ def _compute_answer(options: dict[str, Any], files: "AnswerFiles") -> "Answer":
             calibration=options["calibration"],
         )
         old = _read_old(options, sources.rig)
-        refuse_twice((*sources.paths, *(old.paths if old else ())))
+        if old:
+            refuse_twice((*sources.paths, *old.paths))
     named = (Path(options[name]) for name in ("rig", "columns", "calibration") if options[name])
     check_targets(files.given, (*sources.paths, *(old.paths if old else ()), *named))
     diagnosis, runtime_s = _run_diagnosis(sources, old, options)

@@ -9,6 +9,7 @@ from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.bsfm.ladder.check import CheckedLadder, Expectation, check_ladder, join_ladders
 from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.bsfm.ladder.measured_ladder import FALLING, RISING
+from gateway.bsfm.ladder.rows import _far_forces
 
 TOP_V, STEP_V, NEWTON_PER_VOLT = 8.0, 0.4, 8.0
 Table = dict[str, np.ndarray]
@@ -219,6 +220,15 @@ def test_what_a_logger_writes_for_no_value_is_no_reading(name: str, value: float
 def test_what_was_really_pressed_in_a_long_rest_is_no_sentinel() -> None:
     resting = recorded([0.0] * 4000 + stairs())
     assert check_table(resting).notes == ()
+
+
+def test_what_many_rows_of_one_command_say_is_its_force_and_what_one_says_is_none() -> None:
+    def far(*forces_n: float) -> list[int]:
+        force_n = np.array(forces_n)
+        return np.flatnonzero(_far_forces(np.ones(len(force_n)), force_n, np.isfinite(force_n))).tolist()
+
+    assert far(*[0.1] * 6, *[10.0] * 4) == [], "it came late in the dwell"
+    assert far(*[0.1] * 19, 10.0) == [19]
 
 
 def test_a_table_of_mostly_nothing_is_refused() -> None:
