@@ -59,9 +59,9 @@ def page(state: Path) -> Iterator[ServedPage]:
         yield page
 
 
-@pytest.fixture
-def chromium() -> Iterator[Any]:
-    """A browser without a window; skipped where Debian's chromium is absent."""
+@pytest.fixture(scope="module")
+def started_chromium() -> Iterator[Any]:
+    """A browser without a window, once for a file; skipped where Debian's chromium is absent."""
     if not os.access(CHROMIUM, os.X_OK):
         pytest.skip(f"{CHROMIUM} is not installed: apt-get install chromium")
     from playwright.sync_api import sync_playwright
@@ -72,3 +72,11 @@ def chromium() -> Iterator[Any]:
             yield browser
         finally:
             browser.close()
+
+
+@pytest.fixture
+def chromium(started_chromium: Any) -> Iterator[Any]:
+    """The browser, of which no window, cookie or stored word is left to the next test."""
+    yield started_chromium
+    for context in started_chromium.contexts:
+        context.close()
