@@ -26,6 +26,8 @@ LONGEST_STOP_S = 0.03
 LONGEST_LATE_S = 0.04
 LONGEST_GAP_S = 0.03
 """Inside of a request."""
+LONGEST_STALL_S = 0.04
+"""Of a network between two heartbeats, which come twice as often as a lease ends, or a little less."""
 LONGEST_PDU = 253
 COMMANDS_END = 400
 """Behind the blocks in which a master commands."""
@@ -79,6 +81,8 @@ def _soften(event: Event) -> Event:
     """One lost answer, or a short standstill, is what may not cost a force."""
     if event.what == "stop":
         return replace(event, numbers=(min(event.numbers[0], LONGEST_STOP_S), 0.0))
+    if event.what == "stall" and event.whom == "worker":
+        return replace(event, numbers=(min(event.numbers[0], LONGEST_STALL_S),))
     if event.what == "split":
         return replace(event, numbers=(event.numbers[0], min(event.numbers[1], LONGEST_GAP_S), 1.0))
     if event.what == "late":
@@ -91,7 +95,9 @@ def _soften(event: Event) -> Event:
 def _is_harmless(event: Event) -> bool:
     match event.whom:
         case "worker":
-            return event.what in ("burst", "split", "tare") or (event.what == "ask" and not _commands(event.data))
+            return event.what in ("burst", "split", "tare", "stall") or (
+                event.what == "ask" and not _commands(event.data)
+            )
         case "rival" | "fool":
             return event.what not in QUIET and not (event.what == "take" or _may_stop(event.data))
         case "villain" | "integrator" | "designer":

@@ -52,6 +52,8 @@ JAM_SHARE = 0.12
 UNITS = (b" N", b" t", b"lb", b" g", b"kg")
 PAUSES_S = (0.0003, 0.0012, 0.003, 0.012, 0.03, 0.2, 1.0, 6.0)
 """Shorter and longer than 1.5 and 3.5 characters of a bus, than a lease, and than half a frame is waited for."""
+STALLS_S = (0.02, 0.1, 0.3, 1.0, 3.0)
+"""Of a network; shorter and longer than a lease."""
 DISKS = ("disk_full", "disk_broken", "disk_read_only", "disk_stumbles", "disk_hung")
 
 
@@ -122,6 +124,15 @@ def _burst(chance: Random) -> Drawn:
     return [(0.0, Event(0.0, whom, "burst", (float(chance.choice((2, 5, 20, 60))), float(chance.random() < 0.5))))]
 
 
+def _network(chance: Random) -> Drawn:
+    """A network that stands still and then delivers what it has kept, or a master that is gone without a word."""
+    whom = chance.choice(("worker", "worker", "rival"))
+    if chance.random() < 0.3:
+        return [(0.0, Event(0.0, whom, "vanish"))]
+    stall_s = chance.choice(STALLS_S) * chance.uniform(0.7, 1.3)
+    return [(0.0, Event(0.0, whom, "stall", (round(stall_s, 4),)))]
+
+
 def _uploads(chance: Random) -> Drawn:
     """Two at about the same time, each in its own time."""
     first, second = chance.sample(("integrator", "designer"), 2)
@@ -189,4 +200,4 @@ def _record(*, on: bool) -> Event:
     return _say(0.0, do="record", on=on)
 
 
-KINDS = (_split, _split, _burst, _uploads, _simulate, _simulate, _cell, _power, _recorded)
+KINDS = (_split, _split, _burst, _network, _network, _uploads, _simulate, _simulate, _cell, _power, _recorded)

@@ -123,13 +123,34 @@ class Line:
     def __init__(
         self, inside: VirtualLoop, outside: VirtualLoop, caller: Caller, hear: Callable[[bytes], None]
     ) -> None:
-        self._inside = inside
+        self._inside, self._outside = inside, outside
+        self._held: bytearray | None = None
         self._transport = MemoryTransport(inside, outside, caller, hear)
         (server,) = inside.servers.values()
         inside.call_soon(lambda: self._transport.attach(server.make()))
 
     def send(self, data: bytes) -> None:
-        self._inside.call_later(DELAY_S, self._transport.feed, data)
+        if self._held is not None:
+            self._held += data
+        else:
+            self._inside.call_later(DELAY_S, self._transport.feed, data)
+
+    def stall(self, duration_s: float) -> None:
+        """Let nothing through for so long: what is sent meanwhile arrives then, in one piece."""
+        if self._held is None:
+            self._held = bytearray()
+            self._outside.call_later(duration_s, self._go_on)
+
+    def vanish(self) -> None:
+        """What is on its way is lost, and the other end is not told."""
+        self._held = None
 
     def close(self) -> None:
+        if self._held is not None:
+            self._go_on()  # what was sent before comes before
         self._inside.call_later(DELAY_S, self._transport.end)
+
+    def _go_on(self) -> None:
+        held, self._held = self._held, None
+        if held:
+            self._inside.call_later(DELAY_S, self._transport.feed, bytes(held))

@@ -47,6 +47,11 @@ class BusMaster(Master):
     def lose(self) -> None:
         self._give_up()
 
+    vanish = disconnect
+
+    def stall(self, duration_s: float) -> None:
+        """Nothing on a bus keeps what was said."""
+
     def ask(self, pdu: bytes, unit: int = UNIT) -> None:
         if self.connect() and len(self._queue) < MOST_WAITING:
             self._queue.append((pdu, unit))

@@ -94,11 +94,26 @@ class Master:
         self._waiting.clear()
 
     def disconnect(self) -> None:
+        self._give_up_waiting()
         if self._line:
-            for asked in self._waiting:
-                self._tell(asked, False)
             self._line.close()
         self.lose()
+
+    def _give_up_waiting(self) -> None:
+        for asked in self._waiting:
+            self._tell(asked, False)
+
+    def vanish(self) -> None:
+        """Lose its power: the other end is not told, and it begins anew when it is asked to."""
+        self._give_up_waiting()
+        if self._line:
+            self._line.vanish()
+        self.lose()
+
+    def stall(self, duration_s: float) -> None:
+        """A switch on the way begins anew: what it says arrives so much later, all at once."""
+        if self._line:
+            self._line.stall(duration_s)
 
     # -- requests
 
