@@ -33,16 +33,19 @@ def steps_of(set_up: Any, monkeypatch: pytest.MonkeyPatch, fails_at: str = "noth
     """Have no command run; return what is asked for as it comes. fails_at: a word of the command that is interrupted."""
     asked: list[str] = []
 
-    def run_step(command: Sequence[str], on_text: Callable[[str], None]) -> None:
-        asked.append(" ".join(command))
-        if "venv" in command:
-            (set_up.ENVIRONMENT / "bin").mkdir(parents=True)
-            set_up.PYTHON.symlink_to(sys.executable)
-        on_text("Collecting one==1\nCollecting two==2\nInstalling collected packages: one, two\n")
-        if fails_at in command:
+    def run_steps(commands: Sequence[Sequence[str]], on_text: Callable[[str], None]) -> None:
+        said = ""
+        for command, package in zip(commands, ("one", "two"), strict=False):
+            asked.append(" ".join(command))
+            if "venv" in command:
+                (set_up.ENVIRONMENT / "bin").mkdir(parents=True)
+                set_up.PYTHON.symlink_to(sys.executable)
+            said += f"Collecting {package}\nInstalling collected packages: {package}\n"
+            on_text(said)
+        if fails_at in commands[0]:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(set_up, "run_step", run_step)
+    monkeypatch.setattr(set_up, "run_steps", run_steps)
     return asked
 
 
@@ -62,7 +65,7 @@ def test_a_set_up_that_is_interrupted_leaves_no_stamp_and_is_finished_by_the_nex
     assert stamp.read_text() == "wanted\n"
     assert "finishing the set-up" in capsys.readouterr().err
     assert [word for line in asked for word in ("venv", "-r", "compileall", "-e") if f" {word} " in line] == [
-        "venv", "-r", "compileall", "-e",
+        "venv", "-r", "-r", "compileall", "-e",
     ]  # fmt: skip
 
 
@@ -86,7 +89,35 @@ def test_the_share_is_told_of_what_pip_says(set_up: Any, monkeypatch: pytest.Mon
     steps_of(set_up, monkeypatch)
     with progress.listen(lambda each: told.append(str(each))):
         set_up.install_packages(tmp_path / "lock")
-    assert told == ["fetching (2/5): 0 of 2", "installing (3/5): 0 of 2"]
+    assert told == ["fetching (2/5): 0 of 2", "fetching (2/5): 1 of 2", "installing (3/5): 0 of 2"]
+
+
+@pytest.mark.parametrize("lock", ["requirements.lock", "tests/requirements.lock"])
+def test_each_package_is_in_one_half_with_all_its_hashes(
+    lock: str, set_up: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    halves: list[list[str]] = []
+    monkeypatch.setattr(
+        set_up,
+        "run_steps",
+        lambda commands, tell: halves.extend(Path(each[-1]).read_text().splitlines() for each in commands),
+    )
+    set_up.install_packages(FILE.parents[1] / lock)
+    whole = (FILE.parents[1] / lock).read_text().splitlines()
+    assert sorted(halves[0] + halves[1]) == sorted(line for line in whole if not line.startswith("#"))
+    assert all(half[0].split("==")[0] for half in halves)
+    assert abs(len(halves[0]) - len(halves[1])) < len(whole) / 3
+
+
+def test_what_runs_side_by_side_is_heard_together_and_the_one_that_fails_is_told(set_up: Any) -> None:
+    heard: list[str] = []
+    fine, failing = (
+        [sys.executable, "-c", f"print({word!r}); raise SystemExit({code})"]
+        for word, code in (("fine", 0), ("lost", 4))
+    )
+    with pytest.raises(set_up.StepError, match=r"^lost\n.*ended with 4$"):
+        set_up.run_steps([fine, failing], heard.append)
+    assert heard[-1] == "fine\nlost\n"
 
 
 def test_a_step_that_fails_says_what_it_said_last(set_up: Any) -> None:

@@ -13,7 +13,9 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final
 
 ROOT: Final = Path(__file__).resolve().parents[1]
@@ -37,22 +39,32 @@ class StepError(Exception):
     """A command of the set-up has failed. The message ends with what it said last."""
 
 
-def run_step(command: Sequence[str], on_text: Callable[[str], None]) -> None:
-    """Run a command; hand on_text all that it has said so far, whenever there is more and now and then. StepError where it
-    fails."""
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, cwd=ROOT) as process:
-        assert process.stdout
-        said = ""
-        while True:
-            if select.select([process.stdout], [], [], _LOOK_S)[0]:
-                chunk = os.read(process.stdout.fileno(), 65536)
+def run_steps(commands: Sequence[Sequence[str]], on_text: Callable[[str], None]) -> None:
+    """Run commands side by side; hand on_text all that they have said so far, whenever there is more and now and then.
+    StepError where one fails, as soon as all have ended."""
+    with ExitStack() as stack:
+        processes = [
+            stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, cwd=ROOT))
+            for command in commands
+        ]
+        pipes = [process.stdout for process in processes if process.stdout]
+        said = dict.fromkeys(pipes, "")
+        while pipes:
+            for pipe in select.select(pipes, [], [], _LOOK_S)[0]:
+                chunk = os.read(pipe.fileno(), 65536)
+                said[pipe] += chunk.decode(errors="replace")
                 if not chunk:
-                    break
-                said += chunk.decode(errors="replace")
-            on_text(said)
-    if process.returncode:
-        last = "\n".join(deque(said.splitlines(), _KEPT_LINES))
-        raise StepError(f"{last}\n{' '.join(command)} ended with {process.returncode}")
+                    pipes.remove(pipe)
+            on_text("".join(said.values()))
+    for process, words in zip(processes, said.values(), strict=True):
+        if process.returncode:
+            last = "\n".join(deque(words.splitlines(), _KEPT_LINES))
+            raise StepError(f"{last}\n{' '.join(map(str, process.args))} ended with {process.returncode}")
+
+
+def run_step(command: Sequence[str], on_text: Callable[[str], None]) -> None:
+    """Run one command as `run_steps` does."""
+    run_steps([command], on_text)
 
 
 def make_environment() -> None:
@@ -65,20 +77,33 @@ def make_environment() -> None:
 
 
 def install_packages(lock: Path) -> None:
-    """Install what the lock names, and nothing else."""
-    pinned = len(re.findall(r"^[A-Za-z0-9][^#\n]*==", lock.read_text(encoding="utf-8"), re.MULTILINE))
+    """Install what the lock names, and nothing else: in two halves side by side, for one pip keeps one core busy."""
+    pinned = re.findall(
+        r"^[A-Za-z0-9][^#\n]*==[^\n]*\n(?:[ #][^\n]*\n)*", lock.read_text(encoding="utf-8"), re.MULTILINE
+    )
+    halves = [half for half in (pinned[::2], pinned[1::2]) if half]
     before = len(installed())
 
     def tell(said: str) -> None:
-        if found := _INSTALLING.search(said):
-            packages = found[1].count(",") + 1
+        if len(found := _INSTALLING.findall(said)) == len(halves):
+            packages = sum(line.count(",") + 1 for line in found)
             report("installing (3/5)", min(packages, len(installed()) - before), packages)
         else:
-            report("fetching (2/5)", min(pinned, len(_COLLECTED.findall(said))), pinned)
+            report("fetching (2/5)", min(len(pinned), len(_COLLECTED.findall(said))), len(pinned))
 
     tell("")
-    options = ["--progress-bar", "off", "--no-compile", "--require-hashes"]
-    run_step([*PIP, "install", *options, "-r", str(lock)], tell)
+    options = [
+        "--progress-bar",
+        "off",
+        "--no-compile",
+        "--no-deps",
+        "--require-hashes",
+    ]  # the lock names what they need
+    with TemporaryDirectory() as folder:
+        files = [Path(folder) / f"{number}.lock" for number in range(len(halves))]
+        for file, half in zip(files, halves, strict=True):
+            file.write_text("".join(half), encoding="utf-8")
+        run_steps([[*PIP, "install", *options, "-r", str(file)] for file in files], tell)
 
 
 def installed() -> list[Path]:
