@@ -10,7 +10,7 @@ NOTICES: Final = (
         "connection refused",
         "A client was turned away when it connected; the log line says by which rule. It reads as a connection "
         "that closes.",
-        "Its address is in none of the rig's allowed networks, or too many connections are open.",
+        "Its address is in none of the rig's allowed networks, or too many connections are open, none of them silent for 10 s.",
         "Add its network to network.allow in the rig file, or close connections that are not needed.",
     ),
     Explanation(

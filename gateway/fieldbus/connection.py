@@ -32,6 +32,9 @@ from gateway.modbus.peer import Peer
 from gateway.modbus.server import DataBank, answer, refuse_unit
 
 BUFFER_BYTES: Final = 1024  # 85 reads, or four of the longest requests
+GIVES_WAY_S: Final = 10.0
+"""So long a connection was silent that gives way where there is no room: most often its master has lost power or network, of
+which nobody is told, and begins anew. A few of these would keep it out until they have been idle for long enough."""
 _ACKNOWLEDGE_NOW: Final[int | None] = getattr(socket, "TCP_QUICKACK", None)
 _REQUESTS_IN_A_TURN: Final = 16  # a refused write costs more than a read: 85 of them from each of 32 peers are a stall
 
@@ -69,6 +72,17 @@ class ServerState:
     on_last_gone: Callable[[], None] = lambda: None
     closing: bool = False
 
+    def refusal(self, host: str, now_s: float) -> str | None:
+        """Return why this address may not connect now; None: it may, if need be in the place of a silent one."""
+        refusal = self.peers.refusal(host)
+        return refusal if refusal and not self.longest_silent(host, now_s) else None
+
+    def longest_silent(self, host: str, now_s: float) -> "Connection | None":
+        """Return the connection that gives way to a new one of this host, None where all are in use."""
+        rivals = self.peers.rivals(host)
+        silent = [each for each in self.connections if each.peer.host in rivals and each.silent_s(now_s) >= GIVES_WAY_S]
+        return max(silent, key=lambda each: (each.silent_s(now_s), -each.peer.port), default=None)
+
 
 class Connection(asyncio.BufferedProtocol):
     """Made by the server for each accepted socket. The server calls sweep() and abort(), the transport the rest."""
@@ -96,11 +110,14 @@ class Connection(asyncio.BufferedProtocol):
             return
         shown: Peer | None = transport.get_extra_info("modbus_peer")  # by its certificate
         self.peer = shown or Peer(str(address_of(peername[0])), peername[1], role=shared.settings.role)
-        if (refusal := shared.peers.refusal(self.peer.host)) is not None:
+        if (refusal := shared.refusal(self.peer.host, now_s)) is not None:
             shared.log("refused", f"W230 {self.peer}: {refusal}", now_s)
             self._transport.abort()
             return
-        self._admit(now_s)
+        silent = shared.longest_silent(self.peer.host, now_s)
+        self._admit(now_s)  # before the other one goes: an owner that comes back was never away
+        if silent:
+            silent.give_way(now_s)
 
     def _admit(self, now_s: float) -> None:
         shared = self._shared
@@ -228,6 +245,16 @@ class Connection(asyncio.BufferedProtocol):
             self._close("partial", f"W233 {self.peer}: a request stayed incomplete for {settings.partial_s:g} s")
         elif now_s - self._last_answer_s >= settings.idle_s:
             self._close("idle", f"{self.peer}: no request for {settings.idle_s:g} s")
+
+    def silent_s(self, now_s: float) -> float:
+        """Return for how long nothing was asked, s; 0 while something is under way or since the last sweep."""
+        is_in_use = self._answered or self._partial_since_s is not None or self._resume is not None
+        return 0.0 if is_in_use or self._closing_since_s is not None else now_s - self._last_answer_s
+
+    def give_way(self, now_s: float) -> None:
+        """Close for a new connection, which there would be no room for."""
+        silent_s = self.silent_s(now_s)
+        self._close("idle", f"{self.peer}: no request for {silent_s:.0f} s, and another connection needs its place")
 
     def close(self) -> None:
         """Close from the server's side; answers given so far are still delivered."""

@@ -41,15 +41,32 @@ class Peers:
 
     def refusal(self, host: str) -> str | None:
         """Return why this address may not connect now; None: it may."""
-        settings = self._settings
-        address = address_of(host)
-        if self._guarded and not any(address in network for network in settings.allow):
+        if not self._is_allowed(host):
             return "its address is in none of the allowed networks"
-        if sum(self._open.values()) >= settings.connections:
-            return f"{settings.connections} connections are open, the most allowed"
-        if not address.is_loopback and self._open.get(host, 0) >= settings.per_address:
-            return f"{settings.per_address} connections from its address are open, the most allowed"
+        if self._is_full:
+            return f"{self._settings.connections} connections are open, the most allowed"
+        if self._has_its_share(host):
+            return f"{self._settings.per_address} connections from its address are open, the most allowed"
         return None
+
+    def rivals(self, host: str) -> frozenset[str]:
+        """Return the addresses of which one connection, if ended, makes room for this one: its own where it has its share
+        already, else all that have more than one. Who has a single one keeps it."""
+        if not self._is_allowed(host):
+            return frozenset()
+        if self._has_its_share(host):
+            return frozenset((host,))
+        return frozenset(other for other, count in self._open.items() if count > 1) if self._is_full else frozenset()
+
+    def _is_allowed(self, host: str) -> bool:
+        return not self._guarded or any(address_of(host) in network for network in self._settings.allow)
+
+    @property
+    def _is_full(self) -> bool:
+        return sum(self._open.values()) >= self._settings.connections
+
+    def _has_its_share(self, host: str) -> bool:
+        return not is_loopback(host) and self._open.get(host, 0) >= self._settings.per_address
 
     def join(self, host: str) -> None:
         """Count one more connection of this host."""

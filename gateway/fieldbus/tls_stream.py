@@ -98,7 +98,7 @@ class TlsStream(asyncio.BufferedProtocol):
             return
         host = str(address_of(self._peername[0]))
         self.peer = Peer(host, self._peername[1])
-        if (refusal := shared.peers.refusal(host)) is not None:
+        if (refusal := shared.refusal(host, now_s)) is not None:
             self._refuse("refused", f"W230 {self.peer}: {refusal}")
             return
         if (refusal := self._handshakes.refusal(host, now_s)) is not None:

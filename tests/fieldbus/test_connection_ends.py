@@ -1,9 +1,11 @@
 """How a connection ends: deadlines, too many of one address, and who is told."""
 
 from dataclasses import replace
+from ipaddress import ip_network
 from typing import Any
 
-from gateway.fieldbus.connection import BUFFER_BYTES
+from gateway.fieldbus.connection import BUFFER_BYTES, GIVES_WAY_S
+from gateway.fieldbus.peers import Peers
 from gateway.modbus import Role, pdu
 from tests.fieldbus.by_hand import READ, framed
 
@@ -96,6 +98,43 @@ def test_the_33rd_connection_is_refused_even_on_loopback(stand: Any) -> None:
     made = stand()
     ends = [made.connect()[1] for _ in range(33)]
     assert [far.ended for far in ends] == [""] * 32 + ["aborted"]
+
+
+def test_a_master_that_lost_its_power_gets_the_place_of_its_silent_connection_back(stand: Any, deliver: Any) -> None:
+    """Nobody is told of such an end: after four a robot was kept out for a minute."""
+    made = stand()
+    ends = [made.connect(FAR) for _ in range(4)]
+    made.wait(GIVES_WAY_S + 1.0)
+    for number in (0, 1, 3):
+        deliver(*ends[number], framed(READ))
+    made.wait(1.0)
+    again = made.connect(FAR)[1]
+    assert [far.ended for _, far in ends] == ["", "", "closed", ""]
+    assert (again.ended, made.closed, len(made.shared.connections)) == ("", [], 4)
+    assert "no request for 12 s, and another connection needs its place" in made.log[0][1]
+
+
+def test_silent_connections_of_many_keep_nobody_out_and_who_has_only_one_keeps_it(stand: Any, deliver: Any) -> None:
+    made = stand(connections=4)
+    alone, many = made.connect("192.0.2.1")[1], [made.connect("192.0.2.2")[1] for _ in range(3)]
+    made.wait(GIVES_WAY_S - 1.0)
+    assert made.connect(FAR)[1].ended == "aborted", "none has been silent for long enough"
+    made.wait(2.0)
+    assert made.connect(FAR)[1].ended == ""
+    assert (alone.ended, sorted(far.ended for far in many)) == ("", ["", "", "closed"])
+    for name in ("192.0.2.3", "192.0.2.4"):
+        made.connect(name)
+    assert sorted(far.ended for far in many) == ["", "closed", "closed"]
+    assert alone.ended == "" and len(made.shared.connections) == 4
+
+
+def test_who_is_not_allowed_takes_nobody_s_place(stand: Any) -> None:
+    made = stand(connections=2, allow=(ip_network("192.0.2.0/24"),))
+    made.shared.peers = Peers(made.settings, guarded=True)
+    ends = [made.connect("192.0.2.1")[1] for _ in range(2)]
+    made.wait(GIVES_WAY_S + 1.0)
+    assert made.connect("198.51.100.1")[1].ended == "aborted"
+    assert [far.ended for far in ends] == ["", ""]
 
 
 def test_a_place_that_becomes_free_is_used_again(stand: Any) -> None:

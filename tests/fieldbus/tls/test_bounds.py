@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gateway.fieldbus import tls_stream
-from gateway.fieldbus.connection import _REQUESTS_IN_A_TURN
+from gateway.fieldbus.connection import _REQUESTS_IN_A_TURN, GIVES_WAY_S
 from gateway.fieldbus.tls_settings import HANDSHAKE_S, MOST_PENDING, MOST_PENDING_OF_ONE
 from gateway.fieldbus.tls_stream import LONGEST_RECORD
 from gateway.modbus import pdu
@@ -125,6 +125,22 @@ def test_who_shows_certificates_without_end_is_cut_before_they_are_judged(
             line.greet(context)
         assert line.socket.ended and not face.handshakes.pending
         assert face.log.pop().startswith(sentence) and not face.log
+
+
+def test_a_master_that_lost_its_power_gets_the_place_of_its_silent_connection_back(face: Face, folder: Folder) -> None:
+    lines = [face.accept("10.0.0.7") for _ in range(4)]
+    for line in lines:
+        line.greet(client(folder, "setpoint"))
+    face.clock.advance(1.0)
+    for connection in tuple(face.shared.connections):
+        connection.sweep(face.clock.time())
+    assert face.accept("10.0.0.7").socket.ended == "aborted", "none has been silent for long enough"
+    face.clock.advance(GIVES_WAY_S + 1.0)
+    again = face.accept("10.0.0.7")
+    assert [line.socket.ended for line in lines] == 4 * [""], "who has not shown a certificate takes nobody's place"
+    again.greet(client(folder, "setpoint"))
+    assert sorted(line.socket.ended for line in lines) == ["", "", "", "closed"] and not again.socket.ended
+    assert len(face.shared.connections) == 4 and face.closed == []
 
 
 def test_one_address_that_says_nothing_does_not_keep_the_others_out(face: Face) -> None:
