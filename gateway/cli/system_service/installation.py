@@ -87,6 +87,8 @@ def install(plan: Installation, root: Path) -> tuple[list[Path], bool]:
     """Write the plan's files below the root and, on a running machine, start the service. Return what was written, and whether
     the service ran before: it goes on as it was then, since a restart would drop the force. CliError where that is refused."""
     written, ran = [], False
+    for name in plan.files:
+        _refuse_link(root / name)
     for name, text in plan.files.items():
         path = root / name
         try:
@@ -157,6 +159,15 @@ def _refuse_hidden(path: str) -> None:
         raise CliError(f"E107 {path!r}: a unit has no such characters in a path", exit_codes.CONFIGURATION)
     if not Path(path).is_absolute():
         raise CliError(f"E107 {path}: the service needs an absolute path", exit_codes.CONFIGURATION)
+
+
+def _refuse_link(path: Path) -> None:
+    """A unit that somebody has masked, which is a link to nothing, must not begin to run by being written anew."""
+    if path.is_symlink():
+        target = path.readlink()
+        masked = f"the unit is masked; sudo systemctl unmask {path.name} allows it again"
+        words = masked if str(target) == "/dev/null" else f"a link to {target}; remove it, then install again"
+        raise CliError(f"E107 {path}: {words}", exit_codes.CONFIGURATION)
 
 
 def _refuse_no_networks(networks: Sequence[str]) -> None:

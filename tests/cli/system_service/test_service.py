@@ -131,6 +131,18 @@ def test_an_image_gets_the_files_and_one_unit_a_rig(tmp_path: Path) -> None:
     assert again.exit_code == 65 and "E107" in again.stderr and "force-gateway-irc5-cell.service" in again.stderr
 
 
+@pytest.mark.parametrize(
+    ("target", "told"), [("/dev/null", "unmask force-gateway-demo.service"), ("mine", "a link to mine")]
+)
+def test_a_unit_that_is_masked_or_linked_by_somebody_is_left_alone(tmp_path: Path, target: str, told: str) -> None:
+    units = tmp_path / "etc/systemd/system"
+    units.mkdir(parents=True)
+    (units / "force-gateway-demo.service").symlink_to(target)
+    result = gateway("service", "install", "demo", "--root", tmp_path, "--command", "/usr/bin/true")
+    assert result.exit_code == exit_codes.CONFIGURATION and told in result.output
+    assert [str(path.readlink()) for path in tmp_path.rglob("*") if not path.is_dir()] == [target]
+
+
 def test_a_service_with_a_dot_in_its_name_is_not_another_one(tmp_path: Path) -> None:
     """`uninstall cell-1.2` stopped and removed cell-1, whose force went with it."""
     units = tmp_path / "etc/systemd/system"
