@@ -67,11 +67,15 @@ def _shake(simulation: "Simulation", event: Event) -> None:
         _kill_guardian(simulation)
     elif event.what == "terminate":
         simulation.service.terminate()
-    elif event.what == "stop" and simulation.service.is_guarded:
+    elif event.what in ("stop", "freeze") and simulation.service.is_guarded:
+        if event.what == "freeze":
+            _freeze(simulation, event.numbers[0])
         simulation.service.stop_control(event.numbers[0])
         simulation.observer.history.awoken.append(simulation.clock.now_s + event.numbers[0])
         if event.numbers[0] > simulation.observer.bounds.stall_s:
             simulation._lose_control()
+    elif event.what == "stop_guardian":
+        _stop_guardian(simulation, event.numbers[0])
     elif event.what == "clock_jump":
         simulation.clock.jump_s += event.numbers[1]
     elif event.what == "disk_hung":
@@ -79,6 +83,21 @@ def _shake(simulation: "Simulation", event: Event) -> None:
     elif event.what in DISKS:
         SimulatedDisk.fails = DISKS[event.what]
         SimulatedDisk.go_on()
+
+
+def _freeze(simulation: "Simulation", duration_s: float) -> None:
+    """Whoever comes back from a standstill must not go on as if nothing had been."""
+    _stop_guardian(simulation, duration_s)
+    if duration_s > simulation.observer.bounds.stall_s + 2.0 * simulation.period_s:
+        thaws_s = simulation.clock.now_s + duration_s
+        simulation.outside.call_at(thaws_s, simulation.observer.note_disabled, thaws_s)
+
+
+def _stop_guardian(simulation: "Simulation", duration_s: float) -> None:
+    """Nobody looks after a control that is gone or stands still until it goes on: two faults at a time."""
+    simulation.service.stop_guardian(duration_s)
+    if simulation.observer.control_lost_s is not None:
+        simulation.observer.control_lost_s = max(simulation.observer.control_lost_s, simulation.service.thaws_s)
 
 
 def _kill_guardian(simulation: "Simulation") -> None:

@@ -187,7 +187,7 @@ class Simulation:
     def _happen_then(self, event: Event, events: Iterator[Event]) -> None:
         happen(self, event)
         if event.what == "terminate":
-            self.reasons.note(MACHINE, self.clock.now_s + DOWN_S)
+            self.reasons.note(MACHINE, max(self.clock.now_s, self.service.thaws_s) + DOWN_S)
         self._happen_next(events)
 
     def _expect_any_model(self) -> None:
@@ -231,7 +231,7 @@ class Simulation:
 
     def _lose_control(self) -> None:
         if self.observer.control_lost_s is None:
-            self.observer.control_lost_s = self.clock.now_s
+            self.observer.control_lost_s = max(self.clock.now_s, self.service.thaws_s)
 
     _was_watched = _has_set_bits = False
 
@@ -250,8 +250,8 @@ class Simulation:
         is_watched = self.person.watched_s is not None
         if is_watched or self._was_watched:
             self._follow_person(is_watched)
-        if self.observer.control_lost_s is not None and self.service.is_serving:
-            self.observer.control_lost_s = None
+        if self.service.is_serving:
+            self.observer.note_serving(self.clock.now_s)
         self.around.look()
         self.around.tell_reasons(self.reasons)
         if self.service.is_standing:

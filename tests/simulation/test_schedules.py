@@ -26,6 +26,7 @@ SHRUNK = 3
 SECONDS = float(os.environ.get("SIMULATION_SECONDS", "24"))
 """Of events; with its start and its healing a schedule is one of 30 s."""
 KEPT: list[tuple[int, list[Event]]] = [
+    (362, [Event(12.4675, "machine", "freeze", (1.4218,)), Event(13.5305, "world", "cell-cut", (1.0,))]),
     (15547, [Event(0.0097, "worker", "hold", (25.51,)), Event(0.011, "worker", "disconnect")]),
     (
         14508,

@@ -93,9 +93,8 @@ class RunningRig:
         self._lateness = Lateness(1.0 / rig.loop_hz)
         self._follow_rig()
         cell = rig.load_cell
-        self._cell_line = CellExchange(
-            cell_host(cell.device, cell.sign, cell.unit), self._ports.write_cell, cell.device
-        )
+        reads, stall_s = cell_host(cell.device, cell.sign, cell.unit), rig.control.supervision.stall_s
+        self._cell_line = CellExchange(reads, self._ports.write_cell, cell.device, stall_s)
         self._valve_line: ValveExchange | None = None
         if rig.valve:
             valve = rig.valve.device

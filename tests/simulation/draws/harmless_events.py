@@ -74,12 +74,12 @@ def _keep_harmless(drawn: Iterator[Event]) -> Iterator[Event]:
 
 def _shakes(event: Event) -> bool:
     """Whether a sample, an answer or a tick is lost by it."""
-    return event.what == "stop" or (event.whom in ("output", "load_cell", "valve") and event.what != "push")
+    return event.what in ("stop", "freeze") or (event.whom in ("output", "load_cell", "valve") and event.what != "push")
 
 
 def _soften(event: Event) -> Event:
     """One lost answer, or a short standstill, is what may not cost a force."""
-    if event.what == "stop":
+    if event.what in ("stop", "freeze"):
         return replace(event, numbers=(min(event.numbers[0], LONGEST_STOP_S), 0.0))
     if event.what == "stall" and event.whom == "worker":
         return replace(event, numbers=(min(event.numbers[0], LONGEST_STALL_S),))
@@ -105,7 +105,7 @@ def _is_harmless(event: Event) -> bool:
         case "person":
             return not _asks_to_stop(event.data)
         case "machine":
-            return event.what in (*DISKS, "disk_free", "clock_jump", "stop")
+            return event.what in (*DISKS, "disk_free", "clock_jump", "stop", "stop_guardian", "freeze")
         case "load_cell" | "valve":
             return event.what in ("push", *TRUTHFUL) or (event.what == FALSE and event.whom == "load_cell")
         case "output":

@@ -133,6 +133,15 @@ def _network(chance: Random) -> Drawn:
     return [(0.0, Event(0.0, whom, "stall", (round(stall_s, 4),)))]
 
 
+def _standstill(chance: Random) -> Drawn:
+    """A guardian, or the whole machine, that stands still for a while: suspended, copied to another host, swapped out."""
+    what, seconds = (
+        chance.choice(("stop_guardian", "freeze")),
+        chance.choice((0.05, 0.3, 1.0)) * chance.uniform(0.5, 1.5),
+    )
+    return [(0.0, Event(0.0, "machine", what, (round(seconds, 4),)))]
+
+
 def _uploads(chance: Random) -> Drawn:
     """Two at about the same time, each in its own time."""
     first, second = chance.sample(("integrator", "designer"), 2)
@@ -200,4 +209,17 @@ def _record(*, on: bool) -> Event:
     return _say(0.0, do="record", on=on)
 
 
-KINDS = (_split, _split, _burst, _network, _network, _uploads, _simulate, _simulate, _cell, _power, _recorded)
+KINDS = (
+    _split,
+    _split,
+    _burst,
+    _network,
+    _network,
+    _standstill,
+    _uploads,
+    _simulate,
+    _simulate,
+    _cell,
+    _power,
+    _recorded,
+)

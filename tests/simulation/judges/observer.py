@@ -198,13 +198,22 @@ class Observer:
         if self.disabled_s is None or is_going_down:
             self.disabled_s = now_s
 
+    def note_serving(self, now_s: float) -> None:
+        """Control is there; a moment later it is judged again by what it has heard."""
+        if self.control_lost_s is not None and now_s - self.control_lost_s > self._grace_s:
+            self.control_lost_s = None
+
+    @property
+    def _grace_s(self) -> float:
+        return GRACE_S + 2.0 * self.bounds.period_s
+
     def look(self, now_s: float) -> None:
         """Judge the voltage that stands now."""
         if self.voltage_v <= 0.0 or self.output_lost_s is not None:
             return
         standing_s = now_s - self.setting_s
         down_s = DOWN_S if self.is_run or now_s - self.run_ended_s < DOWN_S else 0.0
-        grace_s = GRACE_S + 2.0 * self.bounds.period_s
+        grace_s = self._grace_s
         if now_s - self.answer_spoiled_s <= self.bounds.reply_timeout_s + grace_s:
             grace_s += self.bounds.reply_timeout_s  # for nothing: it was lost, or late
         limits = (

@@ -133,8 +133,11 @@ class SimulatedSignals:
 class SimulatedService:
     """A gateway that is kept alive: its guardian, which keeps control alive, and systemd, which keeps the guardian.
 
-    on_death: control is gone; restarts: how many guardians came after the first.
+    on_death: control is gone; restarts: how many guardians came after the first; thaws_s: when a guardian that has been stopped
+    goes on.
     """
+
+    thaws_s = 0.0
 
     def __init__(
         self, rig: Rig, state: Path, outside: VirtualLoop, log: Log, clock: VirtualClock, *, records: bool = False
@@ -191,6 +194,12 @@ class SimulatedService:
             process.loop.halt()
             self._outside.call_later(duration_s, lambda: process.exit_code is None and process.loop.go_on())
 
+    def stop_guardian(self, duration_s: float) -> None:
+        """SIGSTOP: it does nothing for so long."""
+        if self._guardian:
+            self.thaws_s = max(self.thaws_s, self._clock.now_s + duration_s)
+            self._outside.call_at(self.thaws_s, self._wake)
+
     def kill_guardian(self) -> None:
         """SIGKILL: the kernel closes its lines, which is how control learns of it."""
         guardian, self._guardian = self._guardian, None
@@ -238,7 +247,7 @@ class SimulatedService:
     # -- the guardian's turns
 
     def _start(self) -> None:
-        self.restarts += 1
+        self.restarts, self.thaws_s = self.restarts + 1, 0.0
         self._signals = SimulatedSignals()
         self._guardian = guardian = Guardian(
             self._options,
@@ -257,13 +266,15 @@ class SimulatedService:
 
     def _wake(self) -> None:
         """Let the guardian look, as soon as what happens now has happened."""
-        if not self._is_awake:
+        if not self._is_awake and self._clock.now_s >= self.thaws_s:
             self._is_awake = True
             self._outside.call_soon(self._take_turns)
 
     def _take_turns(self) -> None:
         """Let the guardian do all that is to be done now, and wake it when the next thing is due."""
         self._is_awake = False
+        if self._clock.now_s < self.thaws_s:
+            return
         if self._timer:
             self._timer.cancel()
         guardian, turns = self._guardian, 0

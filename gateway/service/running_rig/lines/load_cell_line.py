@@ -9,14 +9,17 @@ argument, so that tests run it in virtual time.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import inf
 from typing import Final
 
+from gateway import defaults
 from gateway.control.inputs import WireCounts
 from gateway.devices import CellHost, DeviceProfile
 from gateway.devices.messages import ForceSample, Garbage, RepeatedSample
 from gateway.service.running_rig.lines.cell_identity import CellIdentity
 from gateway.service.running_rig.lines.unread_lines import UnreadLines
+from gateway.service.running_rig.lines.waiting_bytes import WaitingBytes
 
 _START_AGAIN_S: Final = (
     1.0  # a stream that has been silent for so long is begun anew: the amplifier had no power, perhaps
@@ -30,10 +33,16 @@ _FASTEST_HZ: Final = 250.0  # the loop's fastest tick: more readings would only 
 
 class CellExchange:
     """Asks through `write` what has to be asked, and tells what came. counts: since the start, whatever reset in between; what
-    was heard of readings, and what was garbled, its owner counts."""
+    was heard of readings, and what was garbled, its owner counts. stall_s: a longer pause of the loop is a standstill."""
 
-    def __init__(self, host: CellHost, write: Callable[[bytes], None], profile: DeviceProfile) -> None:
-        self._host = host
+    def __init__(
+        self,
+        host: CellHost,
+        write: Callable[[bytes], None],
+        profile: DeviceProfile,
+        stall_s: float = defaults.STALL_S,
+    ) -> None:
+        self._host, self._waiting = host, WaitingBytes(stall_s)
         self.unread = UnreadLines(profile)
         self.identity = CellIdentity(profile)
         self._write = write
@@ -54,6 +63,7 @@ class CellExchange:
 
     def reset(self) -> None:
         """Forget all that was received before: the port has been opened (again)."""
+        self._waiting = WaitingBytes(self._waiting.longest_s)
         self._host.forget()
         self.unread.forget()
         self.identity.begin()
@@ -70,9 +80,12 @@ class CellExchange:
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
         """Return what these bytes complete; the next question goes out at once where it is due and the wire needs no pause."""
+        came_s = self._waiting.came_s(now_s)
         if self.identity.is_due:
             return self._receive_identity(chunk, now_s)
         messages = self._host.receive(chunk, now_s)
+        if came_s < now_s:
+            messages = [replace(one, time_s=came_s) if isinstance(one, ForceSample) else one for one in messages]
         self.unread.hear(messages, now_s)
         if not self._question:  # a stream
             if any(not isinstance(one, Garbage) for one in messages):
@@ -97,6 +110,7 @@ class CellExchange:
 
     def tick(self, now_s: float) -> None:
         """Give up waiting for an overdue answer, and ask again; begin a stream that does not begin by itself."""
+        self._waiting.note_tick(now_s)
         if self._start and now_s >= self._start_s:
             self._start_s = now_s + _START_AGAIN_S
             self._write(self._start)

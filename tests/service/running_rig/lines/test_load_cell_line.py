@@ -67,6 +67,22 @@ def test_the_next_question_follows_the_answer_at_once(wire: Wire) -> None:
     assert wire.samples[-1].time_s == wire.now_s
 
 
+@pytest.mark.parametrize("is_tick_first", [True, False])
+def test_what_has_waited_for_a_loop_that_stood_still_is_as_old_as_it_may_be(is_tick_first: bool) -> None:
+    """A cell that had fallen silent meanwhile looked as if it spoke: its last words seemed to have come just then."""
+    wire = Wire(load_device("stream-st-gs"))
+    wire.tick()
+    wire.answer(5.0)
+    began_s = wire.now_s
+    wire.now_s += 0.5
+    steps = [lambda: wire.answer(6.0, 0.0), lambda: wire.tick(0.0)]
+    for step in steps[::-1] if is_tick_first else steps:
+        step()
+    wire.tick()
+    wire.answer(7.0, 0.005)
+    assert [sample.time_s for sample in wire.samples] == [began_s, began_s, wire.now_s]
+
+
 def test_there_is_never_a_second_question_before_the_answer_or_its_time(wire: Wire) -> None:
     wire.tick()
     for _ in range(9):
