@@ -31,6 +31,7 @@ from gateway.modbus.rtu import (
     LONGEST_ADU,
     SHORTEST_ADU,
     answer_length,
+    ends_in_silence,
     has_answer_length,
     has_request_length,
     is_broadcast_function,
@@ -248,7 +249,7 @@ class RtuReceiver:
             return len(self._echo.frame)
         if frame[1] == DIAGNOSTICS:
             lengths.append(_DIAGNOSTICS_BYTES)
-        if is_start and frame[0] != BROADCAST_UNIT and not has_request_length(frame[1]):
+        if is_start and frame[0] != BROADCAST_UNIT and ends_in_silence(frame):
             silence_at = next((mark for mark in self._marks if mark > at), len(self._burst))
             lengths.append(checksum_end(frame[: silence_at - at], SHORTEST_ADU))
         size = next((size for size in lengths if size and _is_whole(frame, size)), 0)
