@@ -89,6 +89,7 @@ class _ChainWalk:
         begin = self._begins_after or ChainEnd()
         if begin.number and begin not in self._dropped:
             self.file, self.line = first_file, 1
+            self.count, self.end = 0, ChainEnd()  # those that hold stand behind the break
             raise BrokenLine(f"is number {begin.number + 1}, and no line says that those before it were dropped")
         self.file, self.line = HEAD, 0
         if self._head is None:

@@ -23,8 +23,10 @@ NOTICES: Final = (
     Explanation(
         "W232",
         "not Modbus TCP",
-        "Another protocol id than 0, an impossible length, or TLS with hardly any Modbus in it; the connection was closed.",
-        "Another protocol on this port (HTTP, RTU over TCP), or a client that lost count of its bytes.",
+        "Another protocol id than 0, an impossible length, TLS that is damaged or has hardly any Modbus in it; the connection "
+        "was closed.",
+        "Another protocol on this port (HTTP, RTU over TCP), a client that lost count of its bytes, or two of its threads that "
+        "write at once.",
         "Choose Modbus TCP in the client, not RTU over TCP.",
     ),
     Explanation(

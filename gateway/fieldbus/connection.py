@@ -6,6 +6,8 @@ Decisions:
   faster on plain asyncio.
 - A peer that fills the whole buffer, or has had its requests of one turn, gives way: reading pauses until the loop has been
   round once.
+- Who waits for the rate of its address has its place in the row: one that pipelines would else be there first each time, and
+  a heartbeat of the same machine waited until its lease was over.
 - Answers of one wake-up are joined into one write. Requests that must wait stay in the framer while reading is paused,
   so what is held for a peer is at most one buffer and one partial frame.
 - A peer that does not read is closed when the transport asks to pause writing (its high-water mark is the cap).
@@ -24,7 +26,7 @@ from dataclasses import dataclass, field
 from typing import Final, Protocol, cast
 
 from gateway.fieldbus.peers import Peers, address_of
-from gateway.fieldbus.rate_limits import LogLimiter
+from gateway.fieldbus.rate_limits import LogLimiter, RequestRate
 from gateway.fieldbus.settings import ServerSettings
 from gateway.modbus.fast import READ_FRAME_BYTES, whole_answer, whole_read_answer
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer, encode
@@ -98,6 +100,8 @@ class Connection(asyncio.BufferedProtocol):
         self._answered = True
         self._last_answer_s = 0.0
         self._admitted = False
+        self._rate: RequestRate | None = None
+        self._has_place = False  # in the row of those who wait for the rate of one address
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Admit the peer, or abort the connection where there are too many."""
@@ -181,17 +185,20 @@ class Connection(asyncio.BufferedProtocol):
         if answered >= _REQUESTS_IN_A_TURN and len(self._framer):
             self._pause(0.0)
             return False
-        if self._rate is None:
+        if self._rate is None or self._has_place:
             return True
         wait_s = self._rate.wait_s(self._shared.clock.time())
         if wait_s > 0.0 and len(self._framer):
+            self._rate.spend()
+            self._has_place = True
             self._pause(wait_s)
             return False
         return True
 
     def _answer(self, request: Adu) -> bytes:
-        if self._rate is not None:
+        if self._rate is not None and not self._has_place:
             self._rate.spend()
+        self._has_place = False
         shared = self._shared
         if request.unit in shared.settings.units:
             pdu = answer(request.pdu, shared.bank, self.peer)
@@ -274,6 +281,9 @@ class Connection(asyncio.BufferedProtocol):
     def _stop(self) -> None:
         self._closing_since_s = self._shared.clock.time()
         self._fast_units = frozenset()
+        if self._rate is not None and self._has_place:
+            self._rate.give_back()
+        self._has_place = False
         if self._resume is not None:
             self._resume.cancel()
             self._resume = None

@@ -30,8 +30,12 @@ class RequestRate:
         return missing / self._rate_per_s if missing > _ROUNDING else 0.0
 
     def spend(self) -> None:
-        """Take one request out of the bucket."""
+        """Take one request out of the bucket; before its time, who asks behind it waits for longer."""
         self._tokens -= 1.0
+
+    def give_back(self) -> None:
+        """Put back one that was taken before its time, and was not used."""
+        self._tokens += 1.0
 
     def is_full(self, now_s: float) -> bool:
         """Return whether the bucket is as full as a new one."""

@@ -39,6 +39,12 @@ LONGEST_NAME: Final = 64
 CURVE: Final = "prime256v1"
 _EXPIRED, _NOT_YET = 10, 9  # X509_V_ERR_CERT_HAS_EXPIRED, X509_V_ERR_CERT_NOT_YET_VALID
 _PURPOSE: Final = 26
+_NO_WAY: Final = (
+    2,
+    20,
+    21,
+)  # X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT, ..._LOCALLY, X509_V_ERR_UNABLE_TO_VERIFY_LEAF_SIGNATURE
+_STRANGER: Final = (7, 18, 19)  # X509_V_ERR_CERT_SIGNATURE_FAILURE, ..._DEPTH_ZERO_SELF_SIGNED_CERT, ..._IN_CHAIN
 _NOT_TLS: Final = (
     "HTTP_REQUEST",
     "WRONG_VERSION_NUMBER",
@@ -119,7 +125,7 @@ def handshake_failure(error: ssl.SSLError) -> str:
             return f"W241 its certificate {state} (or its clock, or ours, is wrong): {cure}"
         if error.verify_code == _PURPOSE:
             return "W240 its certificate is not one for a client (a server's?)"
-        return f"W240 its certificate is not of our CA ({error.verify_message}): make one with the same CA"
+        return _doubt(error.verify_code, error.verify_message)
     if reason == "PEER_DID_NOT_RETURN_A_CERTIFICATE":
         return "W240 it showed no certificate: give the client its certificate and key"
     if reason in _NOT_TLS:
@@ -139,3 +145,13 @@ def handshake_failure(error: ssl.SSLError) -> str:
             f"W240 it refused our certificate ({reason.lower()}): give the client our CA, and the name it connects to"
         )
     return f"W244 the handshake failed: {reason.lower() or error}"
+
+
+def _doubt(code: int, message: str) -> str:
+    """Return what is wrong with a certificate that OpenSSL does not verify, within its days and of the right kind."""
+    if code in _STRANGER:
+        return f"W240 its certificate is not of our CA ({message}): make one with the same CA"
+    if code in _NO_WAY:
+        cure = "make one with the same CA, or have it send its whole chain"
+        return f"W240 its certificate is not of our CA, or comes without those between the two ({message}): {cure}"
+    return f"W240 its certificate is not accepted ({message}): force-gateway certs makes one that is"

@@ -247,10 +247,15 @@ class TlsStream(asyncio.BufferedProtocol):
                 size = cast(int, self._tls.read(len(buffer), cast(bytearray, buffer)))
             except ssl.SSLWantReadError:
                 break
-            except ssl.SSLError:  # a goodbye, or garbage: nothing more will come
+            except ssl.SSLError as error:
+                why = (error.reason or str(error)).lower().replace("_", " ")
+                sentence = (
+                    f"W232 {self.peer}: what came behind its last request is no TLS of this connection ({why}), closed"
+                )
+                self._shared.log("framing", sentence, self._shared.clock.time())
                 self.close()
                 return
-            if not size:
+            if not size:  # a goodbye
                 self.close()
                 return
             self._allowed_bytes = min(LONGEST_RECORD, self._allowed_bytes + _BYTES_FOR_ONE * size)

@@ -60,6 +60,11 @@ def has_request_length(function: int) -> bool:
     return function in _REQUEST
 
 
+def ends_in_silence(adu: bytes) -> bool:
+    """Decide whether nothing but silence ends the request that starts with these bytes, three or more."""
+    return adu[1] not in _REQUEST or (adu[1] == P.ENCAPSULATED and adu[2] != MEI_TYPE)
+
+
 def has_answer_length(function: int) -> bool:
     """Decide whether the length of an answer with this function can be known before its end, a refusal's included."""
     return function & 0x7F in _ANSWER

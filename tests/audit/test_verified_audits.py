@@ -47,6 +47,15 @@ def test_a_file_under_another_number_is_found(state: Path) -> None:
     assert broken and "its file is named by" in broken.text
 
 
+def test_no_line_holds_before_the_first_one_where_that_is_the_break(state: Path) -> None:
+    """`audit verify` said that the lines before it hold, and meant those behind it."""
+    first, *_ = files_of(state)
+    first.unlink()
+    verdict = verify_audit(state)
+    assert verdict.broken and "no line says that those before it were dropped" in verdict.broken.text
+    assert (verdict.broken.line, verdict.lines, verdict.end.number) == (1, 0, 0)
+
+
 def test_a_chain_that_is_written_anew_behind_what_was_dropped_is_found(tmp_path: Path) -> None:
     """Its lines hold, and its head too: only the hash of what was dropped tells."""
     file = AuditFile(tmp_path, FILE_BYTES, kept=3)

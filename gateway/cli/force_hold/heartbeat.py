@@ -10,7 +10,7 @@ from typing import Final
 
 from gateway import defaults
 from gateway.cli.errors import CliError
-from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, HoldWrite, StatusReading, status_reading_of
+from gateway.cli.force_hold.sequence import STATUS_NAMES, HoldEnd, HoldRun, HoldWrite, StatusReading, status_reading_of
 from gateway.cli.master.byte_order_proof import write_with_proof
 from gateway.cli.master.client import Assignment, GatewayClient
 from gateway.cli.master.refusal_text import explain_refusals
@@ -68,6 +68,7 @@ class HeartbeatThread(threading.Thread):
         self._clock = clock
         self._looked_s = 0.0
         find = client.register_map.find
+        self._shown = [find(name) for name in STATUS_NAMES]
         self._names = {
             name: find(name) for name in ("control_word", "force_setpoint", "force_ramp", "mode", "heartbeat")
         }
@@ -142,7 +143,7 @@ class HeartbeatThread(threading.Thread):
 
     def _look(self) -> None:
         with explain_refusals(self._client):
-            readings = self._client.read_block("status")
+            readings = self._client.read_values(self._shown)
         self.status = status_reading_of({reading.register.name: float(reading.value) for reading in readings})
         self.warned |= self.status.warnings
         self._looked_s = self._clock()

@@ -19,6 +19,13 @@ _STUCK_S: Final = 3.0  # a ramp down that makes no way for so long is not waited
 _ENABLE, _RESET = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT)
 
 
+STATUS_NAMES: Final = (
+    "state", "fault_code", "status_word", "limited_by", "warning_word", "force_measured", "force_requested",
+    "force_applied", "output_voltage",
+)  # fmt: skip
+"""Registers that a hold reads between its beats, and no more: on a serial line the whole block takes as long as a lease."""
+
+
 @dataclass(frozen=True, slots=True)
 class StatusReading:
     """The status registers, in their units; nan where the gateway has no value."""
@@ -35,7 +42,7 @@ class StatusReading:
 
 
 def status_reading_of(values: Mapping[str, float]) -> StatusReading:
-    """Return the status from the status block's values by register name."""
+    """Return the status from the values of STATUS_NAMES."""
     return StatusReading(
         state=State(int(values["state"])),
         fault=FaultCode(int(values["fault_code"])),

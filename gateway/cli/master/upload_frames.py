@@ -23,6 +23,7 @@ from gateway.modbus.pdu import (
     write_register_request,
     write_registers_request,
 )
+from gateway.modbus.rtu import encode_adu
 from gateway.registers import Register, RegisterMap
 from gateway.registers.upload.coefficients import HEAD_BYTES, SET_WORDS, TAIL_FROM, CoefficientSet, set_crc
 from gateway.registers.words import CommitAction
@@ -50,9 +51,9 @@ class Request:
             return write_register_request(self.address, self.words[0])
         return write_registers_request(self.address, struct.pack(f">{len(self.words)}H", *self.words))
 
-    def frame(self, transaction: int, unit: int) -> bytes:
-        """Return the request as it goes over TCP."""
-        return encode(Adu(transaction, unit, self.pdu))
+    def frame(self, transaction: int, unit: int, *, is_serial: bool) -> bytes:
+        """Return the request as it goes over TCP, or over a serial line, which has no transactions."""
+        return encode_adu(unit, self.pdu) if is_serial else encode(Adu(transaction, unit, self.pdu))
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,19 +131,19 @@ def register_names(register_map: RegisterMap) -> dict[int, str]:
     return names
 
 
-def listing(upload: UploadFrames, register_map: RegisterMap, unit: int) -> Iterator[str]:
+def listing(upload: UploadFrames, register_map: RegisterMap, unit: int, *, is_serial: bool) -> Iterator[str]:
     """Yield every request as text: function, address, frame in hexadecimal, and for FC16 each register with its value."""
     requests = (*upload.requests, upload.poll)
     for number, request in enumerate(requests, 1):
         yield f"frame {number} of {len(requests)}  {_title(request)}: {request.text}"
-        frame = request.frame(number, unit)
+        frame = request.frame(number, unit, is_serial=is_serial)
         for at in range(0, len(frame), _PER_LINE):
             yield f"    {frame[at : at + _PER_LINE].hex(' ').upper()}"
         if request.function == WRITE_REGISTERS:
             yield from _values(request, register_map)
 
 
-def facts(upload: UploadFrames, unit: int) -> list[dict[str, Any]]:
+def facts(upload: UploadFrames, unit: int, *, is_serial: bool) -> list[dict[str, Any]]:
     """Return every request as JSON objects, for --json."""
     return [
         {
@@ -151,7 +152,7 @@ def facts(upload: UploadFrames, unit: int) -> list[dict[str, Any]]:
             "address": request.address,
             "words": list(request.words),
             "count": request.count,
-            "frame": request.frame(number, unit).hex(" "),
+            "frame": request.frame(number, unit, is_serial=is_serial).hex(" "),
         }
         for number, request in enumerate((*upload.requests, upload.poll), 1)
     ]

@@ -42,16 +42,18 @@ def command(*, file: str, map_name: str, as_json: bool, **options: Any) -> None:
     FILE is a calibration file or a shipped name. A set that fails a check changes nothing.
     """
     from gateway.cli.master.upload_frames import facts, listing
+    from gateway.cli.master.wires import RtuWire
     from gateway.profiles import load_register_map
 
     calibration, register_map = _load(file), load_register_map(map_name)
     upload, unit = _upload(calibration, register_map, options), options["unit"]
+    is_serial = isinstance(options["wire"], RtuWire)
     only_print = options["print_frames"] and options["dry_run"]
     if options["print_frames"] and not as_json:
-        click.echo("\n".join(listing(upload, register_map, unit)))
+        click.echo("\n".join(listing(upload, register_map, unit, is_serial=is_serial)))
     sentence = {} if only_print else _send(upload, register_map, options)
     if as_json:
-        frames = {"frames": facts(upload, unit)} if options["print_frames"] else {}
+        frames = {"frames": facts(upload, unit, is_serial=is_serial)} if options["print_frames"] else {}
         click.echo(json.dumps({"sent": not only_print, **sentence, **frames}))
     elif not only_print:
         click.echo(_sentence(calibration, sentence))

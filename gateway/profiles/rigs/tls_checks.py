@@ -22,6 +22,7 @@ from gateway.profiles.rigs.rig_file import Network
 
 SOON_DAYS: Final = 30
 _PURPOSE: Final = 26  # X509_V_ERR_INVALID_PURPOSE
+_NO_ROOT: Final = 2  # X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT: of one that is trusted
 _FLIGHTS: Final = 3  # of a handshake: hello, certificate, end
 _MAKE: Final = "`force-gateway certs DIR` makes a CA, a server and clients"
 _NEW_ONES: Final = {
@@ -30,6 +31,7 @@ _NEW_ONES: Final = {
 }
 _NOT_YET, _EXPIRED = 9, 10  # X509_V_ERR_CERT_NOT_YET_VALID, X509_V_ERR_CERT_HAS_EXPIRED
 _REFUSALS: Final = {
+    _NO_ROOT: "is of a CA that another one has signed, which the file of `ca` lacks (add it there)",
     _PURPOSE: "is not one for a server (a client's?)",
     _EXPIRED: "is of a CA that has expired, as all that it has signed",
     _NOT_YET: "is of a CA that is not valid yet (this machine's clock?)",

@@ -14,6 +14,7 @@ from gateway.calibrations.upload import UploadRules, UploadService
 from gateway.cli.errors import CliError
 from gateway.cli.master.upload import UploadClient, place
 from gateway.modbus import MbapFramer, Peer, Role, answer
+from gateway.modbus.rtu import decode_adu
 from gateway.processes import exit_codes
 from gateway.profiles import load_calibration
 from gateway.registers import BankRules, RegisterBank, RegisterMap
@@ -236,6 +237,17 @@ def test_printing_with_a_dry_run_needs_no_gateway(call, file):
     assert "    1184  3E80 0000  slip_share_2 = 0.25" in lines
     assert "    1145  0001       commit = 1" in lines
     assert not [line for line in lines if len(line) > 120 and "commit_status" not in line]
+
+
+@pytest.mark.parametrize("fc06", [[], ["--fc06"]])
+def test_printed_for_a_serial_line_they_are_its_frames(call, file, fc06):
+    """They were those of TCP, which no line carries."""
+    by_tcp, serial = (frames_of(call, file, *fc06, *line) for line in ([], ["--rtu", "/dev/none", "--unit", 7]))
+    for tcp, frame in zip(by_tcp, serial, strict=True):
+        data = bytes.fromhex(frame["frame"])
+        assert decode_adu(data) == (7, bytes.fromhex(tcp["frame"])[7:])
+    printed = call("upload", file, *fc06, "--print-frames", "--dry-run", "--rtu", "/dev/none").output
+    assert printed.splitlines()[1].startswith("    01 06 03 E8 00 02 " if fc06 else "    01 10 03 E8 00 46 8C 00 02 ")
 
 
 def test_printing_alone_sends_as_well(gateway, address, call, file):

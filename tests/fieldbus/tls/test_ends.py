@@ -2,7 +2,7 @@
 
 import ssl
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -101,6 +101,26 @@ def test_who_says_goodbye_is_let_go_though_its_socket_stays_open(
     with pytest.raises(ssl.SSLWantReadError):
         line.tls.unwrap()
     line.exchange()
+    assert line.socket.ended and not face.shared.connections
+
+
+def damaged(record: bytes) -> bytes:
+    return record[:-1] + bytes((record[-1] ^ 1,))
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("broken", [damaged, lambda record: framed(READ), lambda record: 2 * record])
+def test_who_goes_on_with_something_else_than_its_tls_is_told_of(
+    face: Face, folder: Folder, version: ssl.TLSVersion, broken: Callable[[bytes], bytes]
+) -> None:
+    """As two threads of a client do that write to one connection: nobody said why it closes."""
+    line = face.accept()
+    line.greet(client(folder, "setpoint", version))
+    assert line.ask(framed(READ)) == framed(READ_ANSWER)
+    line.tls.write(framed(READ))
+    line.send(broken(line.outgoing.read()))
+    face.clock.advance(0.001)
+    assert len(face.log) == 1 and face.log[0].startswith("W232 setpoint (127.0.0.1:40000): what came behind its last ")
     assert line.socket.ended and not face.shared.connections
 
 

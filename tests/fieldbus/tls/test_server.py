@@ -192,3 +192,21 @@ def test_no_bytes_break_the_reading(folder: Folder) -> None:
         except ValueError:
             continue
         assert isinstance(shown.name, str)
+
+
+@pytest.mark.parametrize(
+    ("code", "message", "begins", "holds"),
+    [
+        (7, "certificate signature failure", "is not of our CA (", "same CA"),
+        (20, "unable to get local issuer certificate", "is not of our CA, or comes without", "whole chain"),
+        (34, "unhandled critical extension", "is not accepted (", "force-gateway certs"),
+        (66, "EE certificate key too weak", "is not accepted (", "force-gateway certs"),
+    ],
+)
+def test_who_has_a_certificate_of_our_ca_is_not_sent_to_look_for_another(
+    code: int, message: str, begins: str, holds: str
+) -> None:
+    error = ssl.SSLCertVerificationError(1, message)
+    error.reason, error.verify_code, error.verify_message = "CERTIFICATE_VERIFY_FAILED", code, message
+    told = handshake_failure(error)
+    assert told.startswith(f"W240 its certificate {begins}") and f"({message}): " in told and holds in told

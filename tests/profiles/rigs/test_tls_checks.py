@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.x509.oid import NameOID
 
 from gateway.cli.certificates import Signed, make_ca, make_server, store
 from gateway.fieldbus.peers import address_of
@@ -208,12 +209,39 @@ def test_an_owner_may_be_named_by_its_certificate(folder: Path) -> None:
     assert rig is not None and rig.network.owner == "certificate robot"
 
 
-def ending(ca: Signed, days: int) -> Signed:
+def signed_by(root: Signed, ca: Signed) -> Signed:
+    """The same CA, signed by another one."""
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "cell CA")])
+    old, now = ca.certificate, datetime.now(UTC)
+    builder = x509.CertificateBuilder(root.certificate.subject, name, ca.key.public_key(), x509.random_serial_number())
+    builder = builder.not_valid_before(now - timedelta(days=3)).not_valid_after(old.not_valid_after_utc)
+    builder = builder.add_extension(x509.BasicConstraints(ca=True, path_length=None), critical=True)
+    return Signed(builder.sign(root.key, hashes.SHA256()), ca.key)
+
+
+def test_a_ca_that_another_has_signed_wants_that_one_in_its_file(tmp_path: Path) -> None:
+    """It was said that the certificate is not signed by the CA of the face, which it is."""
+    root, ca = ending(make_ca(90), 90, path_length=None), make_ca(90)
+    ca = signed_by(root, ca)
+    store(make_server(ca, ("127.0.0.1",), 60), tmp_path, "gateway")
+    store(ca, tmp_path, "ca")
+    (fault,) = report(tmp_path, files()).faults
+    assert f"E175 {tmp_path}/gateway.crt is of a CA that another one has signed, which the file of `ca` lacks" in str(
+        fault
+    )
+    with (tmp_path / "ca.crt").open("ab") as file:
+        file.write(root.certificate.public_bytes(serialization.Encoding.PEM))
+    assert not report(tmp_path, files()).faults
+
+
+def ending(ca: Signed, days: int, **constraints: int | None) -> Signed:
     """The same CA with another end."""
     old, now = ca.certificate, datetime.now(UTC)
     builder = x509.CertificateBuilder(old.issuer, old.subject, ca.key.public_key(), old.serial_number)
     for extension in old.extensions:
-        builder = builder.add_extension(extension.value, extension.critical)
+        is_other = constraints and isinstance(extension.value, x509.BasicConstraints)
+        value = x509.BasicConstraints(ca=True, **constraints) if is_other else extension.value
+        builder = builder.add_extension(value, extension.critical)
     builder = builder.not_valid_before(now - timedelta(days=3)).not_valid_after(now + timedelta(days=days))
     return Signed(builder.sign(ca.key, hashes.SHA256()), ca.key)
 

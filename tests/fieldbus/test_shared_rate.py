@@ -1,0 +1,89 @@
+"""Connections of one address share its rate: each in its turn, and one that leaves takes nothing with it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
+from tests.fieldbus.conftest import HandClock, HandTimer
+
+FAR = "192.0.2.7"
+PIPELINE = framed(READ) * 80
+STEP_S = 0.001
+
+
+class WholeMilliseconds(HandClock):
+    """uvloop's: two that wait for the same request come back in one moment, in the order in which they have begun to wait."""
+
+    def call_later(self, delay: float, callback: Callable[[], None]) -> HandTimer:
+        timer = super().call_later(delay, callback)
+        timer.at_s = round(timer.at_s, 3)
+        return timer
+
+    def advance(self, seconds: float) -> None:
+        super().advance(seconds + 1e-6)
+        self.now_s = round(self.now_s, 3)
+
+
+def limited(stand: Any, requests_per_s: float) -> Any:
+    made = stand(requests_per_s=requests_per_s)
+    made.clock = made.shared.clock = WholeMilliseconds()
+    return made
+
+
+class Flood:
+    """A connection that has its next requests on the wire whenever it is read."""
+
+    def __init__(self, made: Any, deliver: Any) -> None:
+        self.connection, self.far = made.connect(FAR)
+        self._deliver, self._stream = deliver, b""
+
+    def go_on(self) -> None:
+        self._stream = self._stream or PIPELINE
+        self._stream = self._stream[self._deliver(self.connection, self.far, self._stream) :]
+
+
+def pass_time(made: Any, floods: list[Flood], seconds: float) -> None:
+    for _ in range(round(seconds / STEP_S)):
+        for flood in floods:
+            flood.go_on()
+        made.clock.advance(STEP_S)
+
+
+@pytest.mark.parametrize("floods", [1, 3])
+def test_who_asks_now_and_then_has_its_turn_beside_those_who_never_end(stand: Any, deliver: Any, floods: int) -> None:
+    """A heartbeat beside a panel on the same machine: 200 requests a second are for both, and a lease may be 0.2 s."""
+    made = limited(stand, 200.0)
+    others = [Flood(made, deliver) for _ in range(floods)]
+    pass_time(made, others, 1.0)
+    connection, far = made.connect(FAR)
+    for beat in range(1, 11):
+        deliver(connection, far, framed(READ))
+        pass_time(made, others, (floods + 1) / 200.0)
+        assert far.writes == beat
+        pass_time(made, others, 0.02)
+    assert far.written == framed(READ_ANSWER) * 10
+
+
+def test_a_place_of_one_that_leaves_is_free_again(stand: Any, deliver: Any) -> None:
+    made = limited(stand, 4.0)
+    connection, far = made.connect(FAR)
+    deliver(connection, far, framed(READ))
+    for _ in range(50):
+        leaving, end = made.connect(FAR)
+        deliver(leaving, end, framed(READ))
+        assert not end.written
+        end.abort()
+    deliver(connection, far, framed(READ))
+    made.clock.advance(0.25)
+    assert far.written == framed(READ_ANSWER) * 2
+
+
+def test_four_that_never_end_get_the_rate_together_and_each_its_part(stand: Any, deliver: Any) -> None:
+    made = limited(stand, 200.0)
+    floods = [Flood(made, deliver) for _ in range(4)]
+    pass_time(made, floods, 2.0)
+    counts = [len(flood.far.written) // len(framed(READ_ANSWER)) for flood in floods]
+    assert sum(counts) == pytest.approx(50 + 200 * 2, abs=4)
+    assert max(counts) - min(counts) <= 16, "a turn"
