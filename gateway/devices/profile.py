@@ -276,10 +276,10 @@ def _check_valve(profile: DeviceProfile) -> None:
     if profile.codec not in (TEMPLATE, MODBUS_RTU, RAW_BYTES):
         raise ValueError(f"codec {profile.codec} of a valve is not one of {TEMPLATE}, {MODBUS_RTU}, {RAW_BYTES}")
     if profile.is_raw:
-        asks = {
-            byte_count(one) for one in (profile.set_valve.push.ask, profile.set_valve.pull.ask, profile.read_valve.ask)
-        }
-        if len(asks) > 1:
+        push, pull, reading = profile.set_valve.push, profile.set_valve.pull, profile.read_valve
+        for answer in filter(None, (push.answer, pull.answer, reading.answer)):
+            byte_count(answer)
+        if len({byte_count(one.ask) for one in (push, pull, reading)}) > 1:
             raise ValueError(
                 "the sentences to a device that speaks in raw bytes have one length: it tells them by that"
             )
