@@ -303,8 +303,10 @@ def _check_load_cell(profile: DeviceProfile) -> None:
         raise ValueError("set_voltage, read_voltage, read_pressure and steps belong to an output")
     if profile.watchdog != "none":
         raise ValueError("watchdog belongs to an output: a load cell drives nothing")
-    if profile.stream and (profile.stream.ask or profile.stream.rate_hz <= 0):
-        raise ValueError("stream has a rate_hz and no ask")
+    if profile.stream and profile.stream.ask:
+        raise ValueError("a stream is not asked: leave `ask` out, or say read_force in place of stream")
+    if profile.stream and profile.stream.rate_hz <= 0:
+        raise ValueError("rate_hz of stream is missing: how many readings a second it sends")
     if profile.stream:
         _check_unasked(profile, "a load cell that streams")
     if profile.read_force and not profile.read_force.ask:
