@@ -312,7 +312,10 @@ def _check_load_cell(profile: DeviceProfile) -> None:
     if profile.read_force and not profile.read_force.ask:
         raise ValueError("read_force needs an ask")
     for text, _ in profile.reading.beyond_range:
-        if any(one.name not in profile.constants for one in compile_template(text).fields):
+        if any(
+            one.name not in profile.constants and not isinstance(one, Choice) for one in compile_template(text).fields
+        ):
             raise TemplateError(
-                f"{quote(text)} of overload or underload is said as it stands: no field in it but constants"
+                f"{quote(text)} of overload or underload carries no number and no text: nothing changes in it but words and "
+                "constants"
             )
