@@ -20,10 +20,11 @@ _NAMES: Final = {
     "\x01": "<SOH>", "\x02": "<STX>", "\x03": "<ETX>", "\x04": "<EOT>", "\x05": "<ENQ>", "\x06": "<ACK>", "\x15": "<NAK>",
     "\x1b": "<ESC>", "\t": "<TAB>",
 }  # fmt: skip
+CONTROL_CHARACTERS: Final = "".join(_NAMES)
 _WITH_NAMES: Final = str.maketrans(_NAMES)
 TEXT_CHARACTERS: Final = " -~\r\n\x02\x03\x1b\t"
 """What sentences mostly consist of: a line with other characters is noise where nobody has written it down."""
-_TEXT: Final = re.compile(rf"[{TEXT_CHARACTERS}{''.join(_NAMES)}]+(?<![\r\n])")
+_TEXT: Final = re.compile(rf"[{TEXT_CHARACTERS}{CONTROL_CHARACTERS}]+(?<![\r\n])")
 _SPELT: Final = re.compile(rf"{'|'.join(_NAMES.values())}|<(CR|LF)>|\\(x[0-9A-Fa-f]{{2}}|[rnt])")
 """A control character as messages and manuals show it, or as it stands between single quotes: no device says it so."""
 
