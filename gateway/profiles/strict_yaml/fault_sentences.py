@@ -188,6 +188,8 @@ def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
     value_text = value if isinstance(value, str) and _PLAIN.fullmatch(value) else quote_value(value)
     near = closest(value, choices) if isinstance(value, str) else _nearest(value, choices)
     shown = [choice if _PLAIN.fullmatch(choice) else f'"{choice}"' for choice in choices]
+    if isinstance(value, str) and value in choices:  # a number is wanted
+        return f'"{value}" is text: write {value} (take the quotes away)'
     if len(choices) == 1:
         return f"{value_text} is not {shown[0]}{_ONLY_CHOICE}"
     if "N" in choices and isinstance(value, str) and value in _NEWTONS:

@@ -104,3 +104,46 @@ stream:
 def test_a_stream_has_a_pace_and_no_question(new: str, sentence: str) -> None:
     (fault,) = told(("  rate_hz: 10", new), source=STREAM)
     assert sentence in fault
+
+
+RELAY = r"""name: my-relay
+description: relay
+role: valve
+source: manual of the maker, page 3
+certainty: manual
+hardware: never run on hardware
+codec: modbus-rtu
+serial: {baud: 9600}
+constants: {address: 1}
+set_valve:
+  push: {ask: "0500000000", answer: "0500000000"}
+  pull: {ask: "050000FF00", answer: "050000FF00"}
+read_valve: {ask: "0100000008", answer: "0101{state:00|01}", words: {"00": push, "01": pull}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('answer: "050000FF00"', 'answer: "05{"', "12:9 set_valve.pull: '05{': Single '{' encountered"),
+        ('answer: "050000FF00"', 'answer: "050000{relay}FF00"', "12:9 set_valve.pull: {relay:} is none of d, 04d, 02X"),
+        ('ask: "0500000000"', 'ask: "05{address:d}00"', "11:9 set_valve.push: '05{address:d}00': nothing marks the end"),
+        ('ask: "0100000008"', 'ask: "01{a!r}"', "13:13 read_valve: '01{a!r}': a field is {name:shape}"),
+        ('answer: "050000FF00"', 'answer: "050000{x:kg|lb}FF00"', "set_valve.pull.answer: '050000{x:kg|lb}FF00' is no PDU"),
+        ('answer: "050000FF00"', 'answer: "050000FF0"', "'050000FF0' is no PDU: hexadecimal digits in capitals, two for a"),
+        ('ask: "0100000008"', 'ask: "{address:04x}"', "13:19 read_valve.ask: '{address:04x}' is no PDU"),
+        ("{state:00|01}", "{state:0|1}", "'0101{state:0|1}' is no PDU"),
+    ],
+)  # fmt: skip
+def test_a_sentence_of_a_relay_that_means_nothing_is_told(old: str, new: str, sentence: str) -> None:
+    """Each of these ended `check` with an internal error."""
+    words = [('{"00": push, "01": pull}', '{"0": push, "1": pull}')] if "{state:0|1}" in new else []
+    assert any(sentence in fault for fault in told((old, new), *words, source=RELAY)), told(
+        (old, new), *words, source=RELAY
+    )
+
+
+def test_a_number_in_quotes_is_told_so() -> None:
+    """It was `19200 is not one of ..., 19200, ...; did you mean 19200?`."""
+    (fault,) = told(("baud: 19200", 'baud: "19200"'))
+    assert fault.endswith('serial.baud: "19200" is text: write 19200 (take the quotes away)')
