@@ -19,11 +19,14 @@ from gateway.cli.starter_rig import starter_rig
 
 if TYPE_CHECKING:
     from gateway.devices import DeviceProfile
+    from gateway.profiles import Checked
 
 _LATER: Final = "later"
 _OVER: Final = 1.3  # of force_max_n: where the over-force fault trips, unless the cell ends before
 _SATURATION: Final = 0.98  # of the cell's range
 _LEAST_TIMEOUT_S: Final = 0.05  # and of the starter rig
+_OUTPUT_TIMEOUT_S: Final = 0.1  # where the file does not say it, as the one below
+_RESPONSE_LAG_S: Final = 0.2
 _TOLERANCE_N: Final = 1.0  # of the starter rig, as the three below it
 _SMALLEST_N: Final = 2.0
 _PRECONTACT_N: Final = 3.0
@@ -51,6 +54,8 @@ class GuidedRig:
 def ask_rig(name: str) -> str:
     """Ask a person for a rig at the terminal; return its file."""
     click.echo("Enter takes what stands in brackets. Nothing is moved: the probe asks only what changes nothing.")
+    for file in faulty_devices():
+        click.echo(f"  {file} has faults and is not offered: force-gateway check {file}")
     rig = GuidedRig(name)
     _ask_line(rig, "output", "output", "the DAC or pressure regulator")
     _ask_line(rig, "load_cell", "load cell", "the load-cell amplifier")
@@ -74,6 +79,7 @@ def _ask_line(rig: GuidedRig, section: str, role: str, what: str) -> None:
         rig.settings[section, "port"] = port
     if role == "output":
         _ask_watchdog(rig, device)
+        _fit_output(rig, device, baud)
     else:
         _ask_unit(rig, device)
         _fit_supervision(rig, device, baud)
@@ -128,13 +134,24 @@ def _probe(port: str, profiles: "list[DeviceProfile]") -> tuple[str, int] | None
 
 def own_profiles(role: str) -> "Iterator[DeviceProfile]":
     """Yield the device files of this folder that are of a role and have no fault."""
+    for _, checked in _own_devices():
+        if not checked.faults and checked.value.role.value == role:
+            yield checked.value
+
+
+def faulty_devices() -> "Iterator[Path]":
+    """Yield the device files of this folder that have a fault."""
+    return (path for path, checked in _own_devices() if checked.faults)
+
+
+def _own_devices() -> "Iterator[tuple[Path, Checked]]":
     from gateway.profiles import check_file
 
     for path in sorted(own_files()):
         if re.search(r"^role:", path.read_text(encoding="utf-8", errors="replace"), re.MULTILINE):
             checked = check_file(str(path))
-            if checked.kind == "device" and not checked.faults and checked.value.role.value == role:
-                yield checked.value
+            if checked.kind == "device":
+                yield path, checked
 
 
 def _ask_watchdog(rig: GuidedRig, device: "DeviceProfile") -> None:
@@ -161,6 +178,15 @@ def _ask_unit(rig: GuidedRig, device: "DeviceProfile") -> None:
     )
 
 
+def _fit_output(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None:
+    """A bound on silence that this output can keep: it may take as long as its profile says, and one answer may be lost."""
+    from gateway.profiles.rigs.wire_checks import wire_cycle_s
+
+    longest_s = max(device.reply_timeout_s, 3.0 * wire_cycle_s(device, device.serial.at(baud)))
+    if longest_s > _OUTPUT_TIMEOUT_S:
+        rig.settings["supervision", "output_timeout_s"] = f"{1.05 * longest_s:.2g}"
+
+
 def _fit_supervision(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None:
     """Bounds that this amplifier can keep: of a slow one a sample is older, of a coarse one a count is larger."""
     from gateway.profiles.rigs.wire_checks import wire_cycle_s
@@ -169,6 +195,8 @@ def _fit_supervision(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None
     reading, said = device.reading, rig.settings
     period_s = max(wire_cycle_s(device, device.serial.at(baud)), 1.0 / reading.rate_hz if reading.rate_hz else 0.0)
     gap_s = 2.2 * period_s + (device.reply_timeout_s if reading.ask else 0.0)  # one lost answer is no fault
+    if period_s > _RESPONSE_LAG_S:
+        said["supervision", "response_lag_s"] = f"{1.1 * period_s:.2g}"
     said["supervision", "sample_timeout_s"] = f"{max(_LEAST_TIMEOUT_S, gap_s):.2g}"
     unit = said.get(("load_cell", "unit"), reading.unit)
     per_unit = NEWTON_PER_UNIT[unit] if unit else said.get(("load_cell", "newton_per_count"), reading.newton_per_count)

@@ -5,7 +5,7 @@ from functools import reduce
 from operator import xor
 from typing import Final, Literal
 
-ChecksumName = Literal["none", "dcon-sum", "sum-complement", "xor", "xor-hex"]
+ChecksumName = Literal["none", "dcon-sum", "sum-complement", "sum-decimal", "xor", "xor-hex", "xor-stx-etx"]
 
 
 def _nothing(body: bytes) -> bytes:
@@ -22,6 +22,11 @@ def _sum_complement(body: bytes) -> bytes:
     return b"%02X" % (-sum(body) % 256)
 
 
+def _sum_decimal(body: bytes) -> bytes:
+    """Sum of the character codes modulo 100, two decimal digits (General Measure M02, page 37: of all from STX on)."""
+    return b"%02d" % (sum(body) % 100)
+
+
 def _xor(body: bytes) -> bytes:
     """Exclusive or of all characters behind a leading `$`, after a star, as NMEA 0183 does."""
     return b"*%02X" % reduce(xor, body.removeprefix(b"$"), 0)
@@ -34,12 +39,19 @@ def _xor_hex(body: bytes) -> bytes:
     return b"%02X" % reduce(xor, inner.removesuffix(b"\\"), 0)
 
 
+def _xor_stx_etx(body: bytes) -> bytes:
+    """Exclusive or of what stands between STX and ETX, as two digits behind both (Pavone DAT 200, pages 22 and 24)."""
+    return b"%02X" % reduce(xor, body.removeprefix(b"\x02").removesuffix(b"\x03"), 0)
+
+
 _TRAILERS: Final[dict[ChecksumName, Callable[[bytes], bytes]]] = {
     "none": _nothing,
     "dcon-sum": _dcon_sum,
     "sum-complement": _sum_complement,
+    "sum-decimal": _sum_decimal,
     "xor": _xor,
     "xor-hex": _xor_hex,
+    "xor-stx-etx": _xor_stx_etx,
 }
 
 

@@ -57,7 +57,7 @@ class ForceReading:
     device is set to, and what a frame without one means. Raw counts of a converter have no unit but newton_per_count and
     zero_count, which a rig has measured. before: a sentence that is sent ahead of each question and not answered. modbus:
     registers, in place of frame and ask. overload, underload: what the device says in place of the frame where it has no
-    number to show; nothing in them changes but the profile's constants.
+    number to show; words in them change, and the profile's constants.
     """
 
     __pydantic_config__ = STRICT
@@ -256,7 +256,8 @@ def _check_signs(template: Template, number: Field, reading: ForceReading) -> No
     sign = template.field(SIGN)
     if sign and (not isinstance(sign, Choice) or [word.strip() for word in sign.words].count(MINUS) != 1):
         raise TemplateError(
-            f"{quote(template.text)}: {{{SIGN}:...}} is the sign of the force: one of its words is a minus"
+            f"{quote(template.text)}: {{{SIGN}:...}} is the sign of the force: one of its words is a minus. Where that is "
+            f"another character call it {{{STATUS}:...}}, and say which in `negative`"
         )
     if odd := sorted(set(reading.negative) - set(reading.quality)):
         raise TemplateError(f"{quote(template.text)}: negative names words of {{{STATUS}:...}}, and {odd[0]!r} is none")

@@ -10,8 +10,8 @@ from typing import Final
 
 LONGEST_LINE_BYTES: Final = 128  # the longest sentence of the shipped grammars is 40
 
-_SPELT: Final = re.compile(r"<?(CR|LF|STX|ETX|\\[rnx])", re.IGNORECASE)
-_SHOWN: Final = r'"\r\n", ETX "\x03"'
+_SPELT: Final = re.compile(r"<?(CR|LF|STX|ETX|EOT|\\[rnx])", re.IGNORECASE)
+_SHOWN: Final = r'"\r\n", ETX "\x03", EOT "\x04"'
 
 
 def no_terminator(text: str) -> str:

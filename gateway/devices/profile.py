@@ -276,10 +276,10 @@ def _check_valve(profile: DeviceProfile) -> None:
     if profile.codec not in (TEMPLATE, MODBUS_RTU, RAW_BYTES):
         raise ValueError(f"codec {profile.codec} of a valve is not one of {TEMPLATE}, {MODBUS_RTU}, {RAW_BYTES}")
     if profile.is_raw:
-        asks = {
-            byte_count(one) for one in (profile.set_valve.push.ask, profile.set_valve.pull.ask, profile.read_valve.ask)
-        }
-        if len(asks) > 1:
+        push, pull, reading = profile.set_valve.push, profile.set_valve.pull, profile.read_valve
+        for answer in filter(None, (push.answer, pull.answer, reading.answer)):
+            byte_count(answer)
+        if len({byte_count(one.ask) for one in (push, pull, reading)}) > 1:
             raise ValueError(
                 "the sentences to a device that speaks in raw bytes have one length: it tells them by that"
             )
@@ -303,14 +303,19 @@ def _check_load_cell(profile: DeviceProfile) -> None:
         raise ValueError("set_voltage, read_voltage, read_pressure and steps belong to an output")
     if profile.watchdog != "none":
         raise ValueError("watchdog belongs to an output: a load cell drives nothing")
-    if profile.stream and (profile.stream.ask or profile.stream.rate_hz <= 0):
-        raise ValueError("stream has a rate_hz and no ask")
+    if profile.stream and profile.stream.ask:
+        raise ValueError("a stream is not asked: leave `ask` out, or say read_force in place of stream")
+    if profile.stream and profile.stream.rate_hz <= 0:
+        raise ValueError("rate_hz of stream is missing: how many readings a second it sends")
     if profile.stream:
         _check_unasked(profile, "a load cell that streams")
     if profile.read_force and not profile.read_force.ask:
         raise ValueError("read_force needs an ask")
     for text, _ in profile.reading.beyond_range:
-        if any(one.name not in profile.constants for one in compile_template(text).fields):
+        if any(
+            one.name not in profile.constants and not isinstance(one, Choice) for one in compile_template(text).fields
+        ):
             raise TemplateError(
-                f"{quote(text)} of overload or underload is said as it stands: no field in it but constants"
+                f"{quote(text)} of overload or underload carries no number and no text: nothing changes in it but words and "
+                "constants"
             )

@@ -33,7 +33,7 @@ from gateway.devices.messages import (
 )
 from gateway.devices.profile import DeviceProfile, DeviceRole
 from gateway.devices.roles import CellDevice, CellHost
-from gateway.devices.template import quote
+from gateway.devices.template import compile_template, quote
 from gateway.devices.valve import ValveDevice, ValveHost
 from gateway.devices.valve_profile import ValveDirection
 
@@ -226,11 +226,21 @@ def _beyond_range(profile: DeviceProfile, unit: str | None, place: tuple[str, ..
     grammar = Grammar(profile)
     for key, sign in (("overload", 1.0), ("underload", -1.0)):
         for index, text in enumerate(getattr(profile.reading, key)):
-            body = grammar.encode(text)
-            if complaint := _other_meaning(grammar, text, body) or _misread(
-                cell_host(profile, unit=unit), grammar.line(body), sign * inf
-            ):
-                yield (*place, key, index), complaint
+            for body in _spellings(grammar, text):
+                if complaint := _other_meaning(grammar, text, body) or _misread(
+                    cell_host(profile, unit=unit), grammar.line(body), sign * inf
+                ):
+                    yield (*place, key, index), complaint
+                    break
+
+
+def _spellings(grammar: Grammar, template: str) -> Iterator[bytes]:
+    """Return the sentence with each of its words once."""
+    fields = compile_template(template).fields
+    yield grammar.encode(template)
+    for one in fields:
+        if isinstance(one, Choice) and one.name not in grammar.profile.constants:
+            yield from (grammar.encode(template, {one.name: word}) for word in one.words[1:])
 
 
 def _other_meaning(grammar: Grammar, text: str, body: bytes) -> str:
@@ -238,10 +248,17 @@ def _other_meaning(grammar: Grammar, text: str, body: bytes) -> str:
     reading = grammar.profile.reading
     if grammar.read(reading.frame, body, reading.may_be_blank):
         what_to_do = "leave it out where that means an overload already, else narrow the frame"
-        return f"{quote(text)} is an ordinary reading of {quote(reading.frame)}, too: {what_to_do}"
-    if [one for one, _ in reading.beyond_range].count(text) > 1:
-        return f"{quote(text)} stands here twice: it can mean one side only, leave the other out"
+        return f"{_quote_as(text, body)} is an ordinary reading of {quote(reading.frame)}, too: {what_to_do}"
+    others = [one for one, _ in reading.beyond_range if grammar.read(one, body) is not None]
+    if len(others) > 1:
+        return f"{_quote_as(text, body)} stands here twice: it can mean one side only, leave the other out"
     return ""
+
+
+def _quote_as(template: str, body: bytes) -> str:
+    """Return a template as a message shows it, and what it says here where that is something else."""
+    said = body.decode("ascii")
+    return quote(template) if said == template else f"{quote(template)}, as {quote(said)},"
 
 
 def _misread(host: CellHost, line: bytes, force_n: float) -> str:

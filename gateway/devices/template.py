@@ -1,8 +1,8 @@
 """A text template, compiled to an encoder and a decoder: "SET {counts:d}" is both `SET 512` and how to read it.
 
 There are no branches, loops or arithmetic here, and there never will be: a device that needs them gets a Python codec.
-Text is printable ASCII, and what frames have besides: STX, ETX, ESC, tab, and CR or LF ahead of the end. A template that
-could be read in two ways (two open fields without a mark between them) is refused when it is compiled.
+Text is printable ASCII, and what frames have besides: SOH, STX, ETX, EOT, ENQ, ACK, NAK, ESC, tab, and CR or LF ahead of
+the end. A template that could be read in two ways (two open fields without a mark between them) is refused when it is compiled.
 """
 
 import re
@@ -16,11 +16,16 @@ from typing import Final
 
 from gateway.devices.fields import Choice, Decimals, Field, Plain, TemplateError, Text, Value, ValueRefused, field_from
 
-_NAMES: Final = {"\x02": "<STX>", "\x03": "<ETX>", "\x1b": "<ESC>", "\t": "<TAB>"}
+_NAMES: Final = {
+    "\x01": "<SOH>", "\x02": "<STX>", "\x03": "<ETX>", "\x04": "<EOT>", "\x05": "<ENQ>", "\x06": "<ACK>", "\x15": "<NAK>",
+    "\x1b": "<ESC>", "\t": "<TAB>",
+}  # fmt: skip
+CONTROL_CHARACTERS: Final = "".join(_NAMES)
 _WITH_NAMES: Final = str.maketrans(_NAMES)
-TEXT_CHARACTERS: Final = f" -~\r\n{''.join(_NAMES)}"
-_TEXT: Final = re.compile(rf"[{TEXT_CHARACTERS}]+(?<![\r\n])")
-_SPELT: Final = re.compile(r"<(STX|ETX|ESC|TAB|CR|LF)>|\\(x[0-9A-Fa-f]{2}|[rnt])")
+TEXT_CHARACTERS: Final = " -~\r\n\x02\x03\x1b\t"
+"""What sentences mostly consist of: a line with other characters is noise where nobody has written it down."""
+_TEXT: Final = re.compile(rf"[{TEXT_CHARACTERS}{CONTROL_CHARACTERS}]+(?<![\r\n])")
+_SPELT: Final = re.compile(rf"{'|'.join(_NAMES.values())}|<(CR|LF)>|\\(x[0-9A-Fa-f]{{2}}|[rnt])")
 """A control character as messages and manuals show it, or as it stands between single quotes: no device says it so."""
 
 
@@ -120,12 +125,13 @@ def _pieces(text: str) -> list[str | Field]:
 def _check(text: str, pieces: list[str | Field]) -> None:
     if not _TEXT.fullmatch(text):
         raise TemplateError(
-            f"{text!r} is not printable text, STX, ETX, ESC or tab (the terminator at its end is a setting of its own)"
+            f"{text!r} is not printable text, SOH, STX, ETX, EOT, ENQ, ACK, NAK, ESC or tab (the terminator at its end is a "
+            "setting of its own)"
         )
     if spelt := _SPELT.search(text):
         raise TemplateError(
             f"{quote(text)}: {spelt[0]} would be {len(spelt[0])} characters on the wire. Between double quotes STX is "
-            '"\\x02", ETX "\\x03", ESC "\\x1b", a tab "\\t"; CR and LF at the end are the terminator'
+            '"\\x02", ETX "\\x03", ENQ "\\x05", ACK "\\x06", ESC "\\x1b", a tab "\\t"; CR and LF at the end are the terminator'
         )
     names = [piece.name for piece in pieces if not isinstance(piece, str)]
     if len(set(names)) != len(names):

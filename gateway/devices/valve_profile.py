@@ -35,6 +35,10 @@ class ValveSetting:
     ask: Annotated[str, MinLen(1)]  # the sentence that switches; of a Modbus device its PDU in hexadecimal digits
     answer: str = ""  # what the device answers; empty: nothing
 
+    def __post_init__(self) -> None:
+        for text in filter(None, (self.ask, self.answer)):
+            compile_template(text)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveSettings:
@@ -63,6 +67,7 @@ class ValveReading:
     words: Mapping[str, ValveDirection]  # the device's word -> push or pull
 
     def __post_init__(self) -> None:
+        compile_template(self.ask)
         field = compile_template(self.answer).field(STATE)
         if not isinstance(field, Choice):
             raise TemplateError(f"{quote(self.answer)} needs a field {{{STATE}:A|B}} with the device's words")

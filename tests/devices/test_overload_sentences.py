@@ -78,6 +78,23 @@ def test_a_checksum_counts_for_it_too(indicator: DeviceProfile) -> None:
     assert host.receive(b"S +*58\r\n", 0.0) == [ForceSample(inf, inf, Quality.OVERLOAD, 0.0)]
 
 
+def test_words_in_it_may_be_any_of_theirs(indicator: DeviceProfile) -> None:
+    """An indicator prints its overload in place of the digits, and goes on saying what else it says."""
+    profile = telling(
+        indicator, overload=("{mode:GS|NT},{unit:kg|lb},OVER",), underload=("{mode:GS|NT},{unit:kg|lb},UNDER",)
+    )
+    device, host = cell_device(profile), cell_host(profile)
+    assert device.frame(1e9) == b"GS,kg,OVER\r\n"
+    assert device.frame(-1e9) == b"GS,kg,UNDER\r\n"
+    for mode in (b"GS", b"NT"):
+        for unit in (b"kg", b"lb"):
+            for word, side in ((b"OVER", inf), (b"UNDER", -inf)):
+                line = b"%b,%b,%b\r\n" % (mode, unit, word)
+                assert host.receive(line, 1.0) == [ForceSample(side, side, Quality.OVERLOAD, 1.0)]
+    for line in (b"XX,kg,OVER\r\n", b"GS,t,OVER\r\n", b"GS,kg,OVERS\r\n"):
+        assert host.receive(line, 1.0) == [Garbage(line)]
+
+
 def test_a_constant_in_it_is_the_rigs() -> None:
     addressed = replace(load_device("stream-st-gs"), constants={"address": 5})
     profile = telling(addressed, frame="{address:02d},{force:+08.2f}", quality={}, unit="N",
@@ -102,7 +119,13 @@ FRAME = "{status:ST|US|OL},{mode:GS|NT},{force:+08.2f}{unit:kg|lb|g|N}"
         ({"overload": ["S\r\n"]}, "stream", "'S\\r\\n' is not printable text"),
         ({"overload": ["µ"]}, "stream", "'µ' is not printable text"),
         ({"overload": [""]}, "stream", "'' is not printable text"),
-        ({"overload": ["OL {force:d}"]}, "", "'OL {force:d}' of overload or underload is said as it stands"),
+        ({"overload": ["OL {force:d}"]}, "", "'OL {force:d}' of overload or underload carries no number and no text"),
+        ({"overload": ["OL {word:4s}"]}, "", "nothing changes in it but words and constants"),
+        ({"overload": ["{mode:GS|NT},OL,{unit:kg|lb|g|N}"], "underload": ["UL,{mode:GS|NT}"]}, "", None),
+        ({"overload": ["ST,GS,{force:------|+0001.00}kg"]}, "stream.overload[0]",
+         f"'ST,GS,{{force:------|+0001.00}}kg', as 'ST,GS,+0001.00kg', is an ordinary reading of '{FRAME}', too"),
+        ({"underload": ["NT,OL"], "overload": ["{mode:GS|NT},OL"]}, "stream.overload[0]",
+         "'{mode:GS|NT},OL', as 'NT,OL', stands here twice"),
         ({"overload": "S +"}, "stream.overload", "is not a list"),
     ],
 )  # fmt: skip

@@ -212,7 +212,7 @@ def test_blanks_are_a_value_only_where_they_may_be() -> None:
         ("SET {x:d}\r\n", "not printable"),
         ("", "not printable"),
         ("µ{x:d}", "not printable"),
-        ("\x01{x:d}", "not printable text, STX, ETX, ESC or tab"),
+        ("\x00{x:d}", "not printable text, SOH, STX, ETX, EOT, ENQ, ACK, NAK, ESC or tab"),
         ("{x:d}\n", "the terminator at its end is a setting of its own"),
         ("<STX>{x:d}", '<STX> would be 5 characters on the wire. Between double quotes STX is "\\x02"'),
         (r"\x02{x:d}", "\\x02 would be 4 characters on the wire"),

@@ -1,5 +1,6 @@
 """Relays that speak in raw bytes, and such that say nothing when they are set: KMtronic, Devantech USB-RLY02, Conrad."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -101,6 +102,20 @@ def test_both_ends_understand_each_other_however_the_bytes_come(profile: DeviceP
 def test_what_is_no_sentence_of_bytes_is_told(ask: str, told: str) -> None:
     with pytest.raises(ValueError, match=told):
         replace(KMTRONIC, set_valve=ValveSettings(push=ValveSetting(ask=ask), pull=ValveSetting(ask="FF0101")))
+
+
+@pytest.mark.parametrize("answer", ["FF010", "OK", "FC0101 FC", "fc0101fc", "FC01{relays:02X}FC"])
+def test_an_answer_that_is_no_sentence_of_bytes_is_told_and_quoted(answer: str) -> None:
+    pull = ValveSetting(ask="03010103", answer=answer)
+    with pytest.raises(ValueError, match=re.escape(f"{answer!r}: a sentence of raw bytes")):
+        replace(CONRAD, set_valve=ValveSettings(push=ValveSetting(ask="03010002", answer="FC0100FD"), pull=pull))
+
+
+@pytest.mark.parametrize("answer", ["FD01{state:0|1}", "fd01{state:00|01}", "FD{count:02X}{state:00|01}"])
+def test_a_reading_that_is_no_sentence_of_bytes_is_told_and_quoted(answer: str) -> None:
+    words = {"0": PUSH, "1": PULL} if "{state:0|1}" in answer else {"00": PUSH, "01": PULL}
+    with pytest.raises(ValueError, match=re.escape(f"{answer!r}: a sentence of raw bytes")):
+        replace(CONRAD, read_valve=ValveReading(ask="02010003", answer=answer, words=words))
 
 
 def test_raw_bytes_have_no_end_and_a_valve_no_other_codec() -> None:

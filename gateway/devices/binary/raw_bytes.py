@@ -4,7 +4,7 @@ In templates they are hexadecimal digits, two for a byte: `FF0101`, `FF01{state:
 """
 
 from gateway.devices.framing import Line
-from gateway.devices.template import compile_template
+from gateway.devices.template import compile_template, quote
 
 
 def byte_count(template: str) -> int:
@@ -15,11 +15,12 @@ def byte_count(template: str) -> int:
     digits = "".join(word for each in words for word in each)
     if any(len(each) != 1 for each in lengths) or any(one not in "0123456789ABCDEF" for one in digits):
         raise ValueError(
-            "a sentence of raw bytes is hexadecimal digits in capitals, nothing between them, and words of equal length"
+            f"{quote(template)}: a sentence of raw bytes is hexadecimal digits in capitals, nothing between them, and words of "
+            "equal length"
         )
     count, odd = divmod(sum(each.pop() for each in lengths), 2)
     if odd:
-        raise ValueError("a sentence of raw bytes has two digits for each")
+        raise ValueError(f"{quote(template)}: a sentence of raw bytes has two digits for each")
     return count
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Final
 
+from gateway.devices.fields import Choice, Field, HexNumber, RegisterNumber
 from gateway.devices.framing import no_terminator
 from gateway.devices.profile import ADDRESS, DeviceProfile
 from gateway.devices.template import compile_template, quote
@@ -46,13 +47,31 @@ def _no_pdus(profile: DeviceProfile) -> Found:
     """Sentences of a Modbus device that are no hexadecimal digits, or have what is added to them."""
     for place, text in _said(profile) if profile.is_modbus else ():
         pieces = compile_template(text).pieces
-        if not all(_DIGITS.issuperset(one) for one in pieces if isinstance(one, str)):
-            yield place, f"{quote(text)} is no PDU: hexadecimal digits in capitals, nothing between them"
-        elif len(pieces) == 1 and len(text) % 2 == 0 and _is_whole_frame(text):
+        if not all(map(_is_of_digits, pieces)) or sum(map(_digit_count, pieces)) % 2:
+            yield (
+                place,
+                f"{quote(text)} is no PDU: hexadecimal digits in capitals, two for a byte, nothing between them",
+            )
+        elif pieces == (text,) and _is_whole_frame(text):
             yield (
                 place,
                 f"{quote(text)} has its unit and checksum, which are added: leave out two digits and the last four",
             )
+
+
+def _is_of_digits(piece: str | Field) -> bool:
+    """Decide whether this part of a sentence becomes hexadecimal digits, always as many."""
+    if isinstance(piece, Choice):
+        return _DIGITS.issuperset("".join(piece.words)) and len({len(word) for word in piece.words}) == 1
+    if isinstance(piece, str):
+        return _DIGITS.issuperset(piece)
+    return isinstance(piece, RegisterNumber) or (isinstance(piece, HexNumber) and piece.letter == "X")
+
+
+def _digit_count(piece: str | Field) -> int:
+    if isinstance(piece, Choice | str):
+        return len(piece if isinstance(piece, str) else piece.words[0])
+    return len(piece.encode(0))
 
 
 def _is_whole_frame(digits: str) -> bool:

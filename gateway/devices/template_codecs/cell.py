@@ -77,10 +77,10 @@ class TemplateCellHost:
         self._sign, self._end = sign, self._reading.end
         self._lines = self._grammar.answers()
         self._known: dict[bytes, _KnownReading] = {}  # a force at rest says the same few sentences
-        self._beyond_range = {
-            self._grammar.encode(text): _KnownReading(raw, self._newtons(raw, {}), Quality.OVERLOAD)
+        self._beyond_range = tuple(
+            (text, _KnownReading(raw, self._newtons(raw, {}), Quality.OVERLOAD))
             for text, raw in self._reading.beyond_range
-        }
+        )
         self.resolution_n = self._reading.step * self._newton_per_unit
         self.gap_s = quiet_s(profile.serial.character_s) if profile.is_modbus else 0.0
 
@@ -116,7 +116,7 @@ class TemplateCellHost:
 
     def _understand(self, line: Line) -> _KnownReading | None:
         body = self._grammar.body(line)
-        meaning = self._beyond_range.get(body or b"") or self._read(body)
+        meaning = self._read(body) or self._read_beyond_range(body)
         if meaning is not None:
             if len(self._known) >= _MOST_KNOWN:
                 self._known.clear()
@@ -131,6 +131,10 @@ class TemplateCellHost:
             return None
         raw = self._raw(values)
         return _KnownReading(raw, self._newtons(raw, values), self._quality(raw, values))
+
+    def _read_beyond_range(self, body: bytes | None) -> _KnownReading | None:
+        """One of the sentences that the device says in place of a number; a word in them may be any of its words."""
+        return next((one for text, one in self._beyond_range if self._grammar.read(text, body) is not None), None)
 
     def _raw(self, values: dict[str, Value]) -> float:
         """The number of the device, in its own unit."""

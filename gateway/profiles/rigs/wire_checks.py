@@ -136,10 +136,18 @@ def check_reply_time(path: str, device: DeviceProfile, baud: int, talk: tuple[st
 
 
 def check_output_timeout(parts: Parts) -> Found:
-    """Yield a fault for a supervision.output_timeout_s that is shorter than one exchange with the output on the wire."""
+    """Yield a fault for a supervision.output_timeout_s that is shorter than one exchange with the output on the wire, and for
+    a device that is waited for longer than that: behind an answer that is lost the safe voltage waits, too."""
     took_s = max((took_s for _, took_s in _talks(parts)), default=0.0)
-    if parts.supervision and parts.supervision.output_timeout_s <= took_s:
-        timeout = second(parts.supervision.output_timeout_s)
+    device, bounds = of_role(parts.output_device, DeviceRole.OUTPUT), parts.supervision
+    if bounds and device and device.reply_timeout_s > bounds.output_timeout_s:
+        waits = f"{device.name} is waited for {second(device.reply_timeout_s)} (reply_timeout_s), and the safe voltage waits "
+        yield (
+            "output.device",
+            f"{waits}behind a lost answer: at most {second(bounds.output_timeout_s)} (output_timeout_s)",
+        )
+    if bounds and bounds.output_timeout_s <= took_s:
+        timeout = second(bounds.output_timeout_s)
         yield (
             "supervision.output_timeout_s",
             f"{timeout} is over before an answer can be there: {took_s:.3f} s on the wire",

@@ -34,6 +34,8 @@ _TYPES_ELSEWHERE: Final = dict.fromkeys(
 )
 """What is written as a `type` and has a place of its own."""
 _PLAIN: Final = re.compile(r"[\w.:/+ -]+")  # what reads well without quotes
+_MOST_KEYS: Final = 6  # of a group, in a sentence
+_ONLY_CHOICE: Final = ", the only choice"
 _SECRETS: Final = ("token", "password", "password_file")  # a password may stand in place of its file
 
 
@@ -186,8 +188,10 @@ def _choice(value: Any, context: dict[str, Any], unit: str) -> str:
     value_text = value if isinstance(value, str) and _PLAIN.fullmatch(value) else quote_value(value)
     near = closest(value, choices) if isinstance(value, str) else _nearest(value, choices)
     shown = [choice if _PLAIN.fullmatch(choice) else f'"{choice}"' for choice in choices]
+    if isinstance(value, str) and value in choices:  # a number is wanted
+        return f'"{value}" is text: write {value} (take the quotes away)'
     if len(choices) == 1:
-        return f"{value_text} is not {shown[0]}, the only choice"
+        return f"{value_text} is not {shown[0]}{_ONLY_CHOICE}"
     if "N" in choices and isinstance(value, str) and value in _NEWTONS:
         cure = f"; in its place: newton_per_count: {_NEWTONS[value]}"
     else:
@@ -201,6 +205,13 @@ def _nearest(value: Any, choices: list[str]) -> str | None:
         return None
     near = [choice for choice in choices if choice.isdecimal() and abs(value - int(choice)) <= 0.1 * int(choice)]
     return min(near, key=lambda choice: abs(value - int(choice)), default=None)
+
+
+def tell_group(sentence: str, known: list[str]) -> str:
+    """Return a sentence about a value in whose place a group of keys may stand, with the first of these keys."""
+    keys = one_of(known[:_MOST_KEYS]) + (" ..." if len(known) > _MOST_KEYS else "")
+    word, is_word, _ = sentence.partition(_ONLY_CHOICE)
+    return f"{word}, nor a group of keys: {keys}" if is_word else f"{sentence}: {keys}"
 
 
 _BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {

@@ -14,12 +14,13 @@ from typing import Any, Final, TypeVar, Union, cast, get_args, get_origin, get_t
 
 from pydantic import TypeAdapter, ValidationError
 
-from gateway.profiles.strict_yaml.fault_sentences import type_sentence, unit_of, unknown_key
+from gateway.profiles.strict_yaml.fault_sentences import tell_group, type_sentence, unit_of, unknown_key
 from gateway.profiles.strict_yaml.faults import FaultKind, Path, ProfileFault, path_text
 from gateway.profiles.strict_yaml.text import Document
 
 T = TypeVar("T")
 _MOST_FINDINGS: Final = 50
+_WORDS: Final = ("literal_error", "string_type", "int_type", "float_type", "bool_type")  # what is no word, no number
 
 
 @cache
@@ -35,7 +36,7 @@ def build(kind: type[T], document: Document, path: Path = ()) -> tuple[T | None,
         return value, []
     except ValidationError as error:
         findings = _keep_first_findings(error)
-    faults = [_fault(kind, document, path, finding) for finding in findings]
+    faults = [_fault(kind, document, path, *placed) for placed in _place_findings(document, path, findings)]
     return None, sorted(_without_echoes(faults))
 
 
@@ -71,8 +72,21 @@ def _steps(location: tuple[int | str, ...]) -> tuple[int | str, ...]:
     return tuple(step for step in location if not (isinstance(step, str) and any(sign in step for sign in "[(-")))
 
 
-def _fault(kind: type, document: Document, path: Path, finding: Mapping[str, Any]) -> ProfileFault:
-    place = _place(document, path, finding["loc"])
+def _place_findings(document: Document, path: Path, findings: list[Any]) -> list[tuple[Path, Any]]:
+    """Return one finding for each place of the document. Where a word or a group of keys may stand and a group does, what
+    keeps it from being the word is no finding beside what is wrong with the group."""
+    placed = [(_place(document, path, finding), finding) for finding in findings]
+    inside = {
+        place[:end] for place, finding in placed if finding["type"] not in _WORDS for end in range(len(place) + 1)
+    }
+    kept: dict[Path, Any] = {}
+    for place, finding in placed:
+        if not (finding["type"] in _WORDS and place in inside and isinstance(document.at(*place), dict)):
+            kept.setdefault(place, finding)
+    return list(kept.items())
+
+
+def _fault(kind: type, document: Document, path: Path, place: Path, finding: Mapping[str, Any]) -> ProfileFault:
     key = place[-1] if place else ""
     if finding["type"] == "missing":
         missing = f"is missing{_what_it_is(kind, place[len(path) :])}"
@@ -83,17 +97,21 @@ def _fault(kind: type, document: Document, path: Path, finding: Mapping[str, Any
         elsewhere = {name: group for name, group in groups_by_key(kind).items() if group != here}
         sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, elsewhere)
         return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=suggestion)
-    return document.fault(place, type_sentence(finding, document.at(*place), key))
+    value, group = document.at(*place), kind_at(kind, place[len(path) :])
+    sentence = type_sentence(finding, value, key)
+    if finding["type"] in ("dataclass_type", "literal_error") and value is not None and is_dataclass(group):
+        sentence = tell_group(sentence, names(group))
+    return document.fault(place, sentence)
 
 
-def _place(document: Document, path: Path, location: tuple[int | str, ...]) -> Path:
+def _place(document: Document, path: Path, finding: Mapping[str, Any]) -> Path:
     """pydantic's location as a path of the document: names of union members are left out, keys keep the file's type."""
-    place = path
+    place, location = path, finding["loc"]
     for index, step in enumerate(location):
         here = document.at(*place)
         if isinstance(here, dict):
             match = next((key for key in here if str(key) == str(step)), None)
-            if match is None and index + 1 < len(location):
+            if match is None and (index + 1 < len(location) or finding["type"] != "missing"):
                 continue
             place = (*place, step if match is None else match)
         elif isinstance(here, list) and isinstance(step, int):

@@ -20,6 +20,7 @@ from gateway.devices.messages import (
     ForceSample,
     OutputRequest,
     Pressure,
+    Quality,
     ReadPressure,
     ReadVoltage,
     RepeatedSample,
@@ -108,31 +109,36 @@ def _of_cell(profile: DeviceProfile) -> Iterator[HarmlessQuestion]:
         yield _who_it_is(profile, is_enough=False)
 
     def understands(received: bytes) -> str:
-        return _first_words(_cell_host(profile).receive(received, 0.0))
+        return _first_words(_cell_host(profile).receive(received, 0.0), knows_unit=_knows_unit(profile))
 
     yield HarmlessQuestion(_cell_host(profile).poll(), understands)
 
 
 def _cell_host(profile: DeviceProfile) -> CellHost:
     """Our end; where only a rig could say the unit, as if it were newtons. What it hears first of a stream may be cut."""
-    is_known = profile.reading.newton_per_unit or profile.reading.template.field(UNIT)
-    host = cell_host(profile, unit=None if is_known else "N")
+    host = cell_host(profile, unit=None if _knows_unit(profile) else "N")
     host.forget()
     return host
 
 
-def _first_words(messages: Sequence[object]) -> str:
-    return next((_words(one) for one in messages if isinstance(one, _MEANS_SOMETHING)), "")
+def _knows_unit(profile: DeviceProfile) -> bool:
+    return bool(profile.reading.newton_per_unit or profile.reading.template.field(UNIT))
 
 
-def _words(message: object) -> str:
+def _first_words(messages: Sequence[object], *, knows_unit: bool = False) -> str:
+    return next((_words(one, knows_unit=knows_unit) for one in messages if isinstance(one, _MEANS_SOMETHING)), "")
+
+
+def _words(message: object, *, knows_unit: bool) -> str:
     match message:
         case Accepted(voltage_v):
             return f"set to {voltage_v:.3f} V"
         case Pressure(pressure_pa):
             return f"{pressure_pa / 1e3:.1f} kPa"
-        case ForceSample(raw):
-            return f"reads {raw:g}"
+        case ForceSample(quality=Quality.OVERLOAD):
+            return "reads beyond its range"
+        case ForceSample(raw, force_n):
+            return f"reads {raw:g}" + (f", {force_n:.4g} N" if knows_unit else "")
         case _:
             return "a reading"
 

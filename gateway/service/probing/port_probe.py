@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from gateway.devices import DeviceProfile, SerialSettings
-from gateway.devices.template import quote
+from gateway.devices.template import CONTROL_CHARACTERS, quote
 from gateway.ports import PortEvents, SerialPort
 from gateway.ports.port import monotonic_s
 from gateway.service.probing.harmless_questions import (
@@ -216,6 +216,10 @@ def show_bytes(data: bytes) -> str:
     """Return bytes as people can read them: text as text, anything else in hexadecimal."""
     shown = data[:_SHOWN_BYTES]
     text = shown.decode("ascii", "replace")
-    is_text = shown.isascii() and all(one.isprintable() or one in "\r\n\t\x02\x03\x1b" for one in text)
+    printable = sum(one.isprintable() for one in text)
+    controls = sum(one in f"\r\n{CONTROL_CHARACTERS}" for one in text)
+    is_text = (
+        shown.isascii() and printable + controls == len(text) <= 2 * printable
+    )  # a short binary answer may be all controls
     more = "..." if len(data) > _SHOWN_BYTES else ""
     return quote(text) + more if is_text else shown.hex(" ") + more

@@ -90,6 +90,10 @@ def test_check_says_what_a_file_is_and_checks_it_as_that(file: str, is_one: str,
     assert answer.exit_code == exit_codes.CONFIGURATION
     assert re.search(r"^c2\.yaml:\d+:\d+ no_such_key: is not a known key", answer.stderr, re.MULTILINE), answer.stderr
     assert answer.stderr.endswith(f"1 fault; this {is_one.split(' ', 1)[1]} cannot be used\n")
+    (here / "c2.yaml").write_text(text + "\tname: 1\n", encoding="utf-8")  # no YAML: it was called a rig
+    answer = call("check", "c2.yaml")
+    assert re.search(r"^c2\.yaml:\d+:1: a tab", answer.stderr, re.MULTILINE), answer.stderr
+    assert answer.stderr.endswith(f"1 fault; this {is_one.split(' ', 1)[1]} cannot be used\n")
 
 
 @pytest.mark.parametrize(

@@ -72,4 +72,7 @@ def test_unknown_sections_and_fields_are_told_with_what_was_meant(tmp_path: Path
         "3:3 regulator.delay_ms: is not a known key; this quantity is given as delay_s: 0.08",
         "4:3 regulator.lag: is not a known key; did you mean lag_s? (a key ends with its unit)",
     ]
-    assert told(tmp_path, "name: 5\ncell: 3\n") == ["1:7 name: 5 is not text", "2:7 cell: 3 is not a group of keys"]
+    assert told(tmp_path, "name: 5\ncell: 3\n") == [
+        "1:7 name: 5 is not text",
+        "2:7 cell: 3 is not a group of keys: filter_s, noise_n, quantum_n, range_n, zero_n, zero_n_per_k ...",
+    ]

@@ -44,6 +44,8 @@ def told(folder: Path, **changes: Any) -> tuple[dict[str, str], dict[str, str]]:
          "1200: question and answer of set_voltage take 0.133 s on the wire, smc-itv-rc gives up after"),
         ({"rig__output__baud": 1200, "dac__reply_timeout_s": 0.5, "rig__supervision__output_timeout_s": 0.1},
          "supervision.output_timeout_s", "0.1 s is over before an answer can be there: 0.133 s on the wire"),
+        ({"dac__reply_timeout_s": 1, "rig__supervision__output_timeout_s": 0.1}, "output.device",
+         "smc-itv-rc is waited for 1 s (reply_timeout_s), and the safe voltage waits behind a lost answer: at most 0.1 s"),
         ({"rig__output__baud": 300, "dac__reply_timeout_s": 2, "rig__supervision__output_timeout_s": 2}, "output.baud",
          "a setting and a reading take 0.90 s on the wire, longer than supervision.response_lag_s = 0.2 s"),
         ({"dac__identity": {"ask": "*IDN?", "answer": f"{50 * 'M'},{{model:s}},1.0", "models": ["ITV1050"]}},

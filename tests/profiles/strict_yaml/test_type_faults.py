@@ -111,7 +111,7 @@ def test_a_missing_key_is_placed_at_its_group() -> None:
 
 def test_a_group_that_is_a_word_is_told_once() -> None:
     assert told(("trim: #", "trim: off #"), ("  gain_v_per_n_s: 0.3\n  limit_v: 0.5\n", ""))[0].endswith(
-        'trim: "off" is not a group of keys'
+        'trim: "off" is not a group of keys: gain_v_per_n_s, limit_v, dead_zone_n, memory_n'
     )
 
 

@@ -124,6 +124,52 @@ def test_enter_at_the_largest_force_is_accepted_for_every_pair_of_devices_and_ev
     assert len(pairs) > 40
 
 
+OWN_DAC = """name: own-dac
+description: a supply with a serial line
+role: output
+source: a test
+certainty: composed
+hardware: never run on hardware
+serial: {{baud: {baud}}}
+terminator: "\\n"
+reply_timeout_s: {reply_timeout_s}
+set_voltage: {{ask: "VOLT {{volts:.4f}}", answer: "OK", range: {{device: [0, 10], voltage_v: [0, 10]}}}}
+"""
+OWN_CELL = """name: own-cell
+description: a scale
+role: load cell
+source: a test
+certainty: composed
+hardware: never run on hardware
+serial: {{baud: 9600}}
+terminator: "\\r\\n"
+stream: {{frame: "{{force:8.3f}} kg", unit: kg, rate_hz: {rate_hz}}}
+"""
+
+
+@pytest.mark.parametrize(("baud", "reply_timeout_s", "rate_hz"), [(9600, 0.3, 10), (2400, 0.15, 4), (115200, 0.05, 2)])
+def test_devices_of_ones_own_that_take_their_time_are_accepted(
+    baud: int, reply_timeout_s: float, rate_hz: float, folder: Path
+) -> None:
+    (folder / "own-dac.yaml").write_text(OWN_DAC.format(baud=baud, reply_timeout_s=reply_timeout_s))
+    (folder / "own-cell.yaml").write_text(OWN_CELL.format(rate_hz=rate_hz))
+    result = answered("later", "own-dac", "", "y", "later", "own-cell", "", "98.07", "40")
+    found = check_report("own.yaml", simulated=True)
+    assert found.rig, (result.output, *map(str, found.faults))
+    bounds = found.rig.control.supervision
+    assert bounds.output_timeout_s >= reply_timeout_s and bounds.response_lag_s >= 1.0 / rate_hz
+
+
+def test_a_device_file_with_a_fault_is_told_and_not_offered(folder: Path) -> None:
+    """It was left out of the known ones without a word."""
+    (folder / "own-dac.yaml").write_text(OWN_DAC.format(baud=9601, reply_timeout_s=0.05))
+    (folder / "notes.yaml").write_text("some: notes\n")
+    result = answered("later", "smc-itv-rc", "", "y", "later", "", "", "98.07", "40")
+    assert "own-dac.yaml has faults and is not offered: force-gateway check own-dac.yaml" in result.output
+    assert "notes.yaml" not in result.output
+    assert "known: adam" in result.output
+
+
 def test_without_a_terminal_nothing_is_asked() -> None:
     result = CliRunner().invoke(command, ["init", "own"])
     assert result.exit_code == 0

@@ -68,7 +68,7 @@ def test_a_rig_whose_devices_answer_as_it_says(tmp_path: Path) -> None:
     assert "icpdas-702x answers at 9600 8N1: it says that it is 7021" in said
     assert r"asked '$01M\r', heard '!017021\r'" in said
     assert "the wire alone would carry" in said
-    assert "stream-st-gs answers at 115200 8N1: reads 0.51" in said
+    assert "stream-st-gs answers at 115200 8N1: reads 0.51, 5.001 N" in said, "and what that is"
     assert "readings/s; the wire carries 640" in said
     assert set(module.heard) <= {AskDevice(DeviceStep.IDENTITY)}, "nothing else was ever asked of it"
 
@@ -102,7 +102,9 @@ def test_listening_says_what_comes_and_sends_nothing() -> None:
     [
         (b"ST,+1\r\n", r"'ST,+1\r\n'"),
         (b"\x02+1.0\tN\x03", "'<STX>+1.0<TAB>N<ETX>'"),
+        (b"\x022    5.00\x0329\x04", "'<STX>2    5.00<ETX>29<EOT>'"),
         (b"\x01\x06\x00", "01 06 00"),
+        (b"\x01\x04\x02\x05\x06AB", "01 04 02 05 06 41 42"),
         (b"a" * 100, f"'{'a' * 48}'..."),
     ],
 )

@@ -46,6 +46,19 @@ def test_where_more_makes_no_sense_than_makes_some_it_is_no_stream(received: byt
     assert count_readings(STREAM, received) == count
 
 
+@pytest.mark.parametrize(
+    ("received", "said"),
+    [
+        (b"ST,GS,+0000.51kg\r\n", "reads 0.51, 5.001 N"),
+        (b"ST,GS,+0000.51N \r\n", ""),
+        (b"OL,GS,+9999.99kg\r\n", "reads beyond its range"),
+    ],
+)
+def test_a_reading_is_told_in_newtons_too(received: bytes, said: str) -> None:
+    (question,) = harmless_questions(STREAM)
+    assert question.understands(received) == said
+
+
 @pytest.mark.parametrize(("lines", "is_told"), [(2, False), (3, True)])
 def test_two_readings_alone_are_no_stream(lines: int, is_told: bool) -> None:
     assert (_streamed(STREAM, STREAM.serial, LINE * lines, 0.25) is not None) is is_told

@@ -1,0 +1,149 @@
+"""What the author of a device file is told: one sentence for one slip, at its place, with what may stand there."""
+
+import pytest
+
+from gateway.profiles.kinds.devices import read_device
+from gateway.profiles.strict_yaml.text import parse
+
+DAC = r"""name: my-dac
+description: 12 bit DAC
+role: output
+source: manual of the maker, page 12
+certainty: manual
+hardware: never run on hardware
+serial: {baud: 19200}
+terminator: "\r\n"
+constants: {address: 3}
+identity: {ask: "@{address:d} ID", answer: "@{address:d} ID {model:s}", models: [DAC12]}
+watchdog:
+  time_s: 1.0
+  tick_s: 0.001
+  arm: {ask: "@{address:d} W{time:d}", answer: "@{address:d} OK"}
+  disarm: {ask: "@{address:d} W0", answer: "@{address:d} OK"}
+  verify: {ask: "@{address:d} W?", answer: "@{address:d} W{time:d}"}
+set_voltage:
+  ask: "@{address:d} V{counts:d}"
+  answer: "@{address:d} OK"
+  range: {device: [0, 4095], voltage_v: [0.0, 10.0]}
+"""
+
+
+def told(*edits: tuple[str, str], source: str = DAC) -> list[str]:
+    """The faults of a file after `old -> new` edits, each without the file's name."""
+    for old, new in edits:
+        assert source.count(old) == 1, old
+        source = source.replace(old, new)
+    return [str(fault).removeprefix("my-dac.yaml:") for fault in read_device(parse(source.encode(), "my-dac.yaml"))[1]]
+
+
+def test_the_file_itself_is_right() -> None:
+    assert told() == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("models: [DAC12]", "models: []", "10:81 identity.models: has 0 entries, at least 1 are needed"),
+        (", models: [DAC12]", "", "10:1 identity.models: is missing"),
+        ("  tick_s: 0.001\n", "", "11:1 watchdog.tick_s: is missing (a value in s)"),
+        ("time_s: 1.0", "time_s: 0", "12:11 watchdog.time_s: 0 s is not above 0 s"),
+        ('answer: "@{address:d} W{time:d}"}', "}", "16:3 watchdog.verify.answer: is missing"),
+        ("tick_s: 0.001", "tick_ms: 1", "13:3 watchdog.tick_ms: is not a known key; this quantity is given as tick_s: 0.001"),
+        ("{address: 3}", "{address: {a: 3}}", "9:22 constants.address: a group of keys is not a whole number"),
+        ("{address: 3}", "{address: 1.5}", "9:22 constants.address: 1.5 is not a whole number"),
+    ],
+)  # fmt: skip
+def test_a_slip_where_a_word_or_a_group_may_stand_is_told_once(old: str, new: str, sentence: str) -> None:
+    """Each finding inside `watchdog` or `identity` had `literal['none']: has no value` beside it."""
+    assert told((old, new)) == [sentence]
+
+
+def test_what_the_whole_group_lacks_is_told_at_the_group() -> None:
+    (fault,) = told(('  verify: {ask: "@{address:d} W?", answer: "@{address:d} W{time:d}"}\n', ""))
+    assert fault.startswith("12:3 watchdog: a watchdog needs verify or status")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("serial: {baud: 19200}", "serial: 9600 8N1",
+         '7:9 serial: "9600 8N1" is not a group of keys: baud, data_bits, parity, stop_bits'),
+        ("range: {device: [0, 4095], voltage_v: [0.0, 10.0]}", "range: 10",
+         "20:10 set_voltage.range: 10 is not a group of keys: device, voltage_v"),
+        ('identity: {ask: "@{address:d} ID", answer: "@{address:d} ID {model:s}", models: [DAC12]}', "identity: DAC12",
+         "10:11 identity: DAC12 is not none, nor a group of keys: ask, answer, modbus, models"),
+    ],
+)  # fmt: skip
+def test_a_word_in_place_of_a_group_is_told_the_keys(old: str, new: str, sentence: str) -> None:
+    assert told((old, new)) == [sentence]
+
+
+STREAM = r"""name: my-cell
+description: amplifier
+role: load cell
+source: manual of the maker, page 3
+certainty: manual
+hardware: never run on hardware
+serial: {baud: 19200}
+terminator: "\r\n"
+stream:
+  frame: "{force:8.2f}"
+  unit: N
+  rate_hz: 10
+"""
+
+
+@pytest.mark.parametrize(
+    ("new", "sentence"),
+    [
+        ("  rate_hz: 0", "rate_hz of stream is missing: how many readings a second it sends"),
+        ("", "rate_hz of stream is missing"),
+        ("  rate_hz: 10\n  ask: W", "a stream is not asked: leave `ask` out, or say read_force in place of stream"),
+    ],
+)
+def test_a_stream_has_a_pace_and_no_question(new: str, sentence: str) -> None:
+    (fault,) = told(("  rate_hz: 10", new), source=STREAM)
+    assert sentence in fault
+
+
+RELAY = r"""name: my-relay
+description: relay
+role: valve
+source: manual of the maker, page 3
+certainty: manual
+hardware: never run on hardware
+codec: modbus-rtu
+serial: {baud: 9600}
+constants: {address: 1}
+set_valve:
+  push: {ask: "0500000000", answer: "0500000000"}
+  pull: {ask: "050000FF00", answer: "050000FF00"}
+read_valve: {ask: "0100000008", answer: "0101{state:00|01}", words: {"00": push, "01": pull}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('answer: "050000FF00"', 'answer: "05{"', "12:9 set_valve.pull: '05{': Single '{' encountered"),
+        ('answer: "050000FF00"', 'answer: "050000{relay}FF00"', "12:9 set_valve.pull: {relay:} is none of d, 04d, 02X"),
+        ('ask: "0500000000"', 'ask: "05{address:d}00"', "11:9 set_valve.push: '05{address:d}00': nothing marks the end"),
+        ('ask: "0100000008"', 'ask: "01{a!r}"', "13:13 read_valve: '01{a!r}': a field is {name:shape}"),
+        ('answer: "050000FF00"', 'answer: "050000{x:kg|lb}FF00"', "set_valve.pull.answer: '050000{x:kg|lb}FF00' is no PDU"),
+        ('answer: "050000FF00"', 'answer: "050000FF0"', "'050000FF0' is no PDU: hexadecimal digits in capitals, two for a"),
+        ('ask: "0100000008"', 'ask: "{address:04x}"', "13:19 read_valve.ask: '{address:04x}' is no PDU"),
+        ("{state:00|01}", "{state:0|1}", "'0101{state:0|1}' is no PDU"),
+    ],
+)  # fmt: skip
+def test_a_sentence_of_a_relay_that_means_nothing_is_told(old: str, new: str, sentence: str) -> None:
+    """Each of these ended `check` with an internal error."""
+    words = [('{"00": push, "01": pull}', '{"0": push, "1": pull}')] if "{state:0|1}" in new else []
+    assert any(sentence in fault for fault in told((old, new), *words, source=RELAY)), told(
+        (old, new), *words, source=RELAY
+    )
+
+
+def test_a_number_in_quotes_is_told_so() -> None:
+    """It was `19200 is not one of ..., 19200, ...; did you mean 19200?`."""
+    (fault,) = told(("baud: 19200", 'baud: "19200"'))
+    assert fault.endswith('serial.baud: "19200" is text: write 19200 (take the quotes away)')
