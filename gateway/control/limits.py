@@ -114,6 +114,11 @@ class VoltageLimiter:
         self._limits = limits
         self._pace = RateBudget()
 
+    @property
+    def is_lowest(self) -> bool:
+        """Decide whether no less voltage can be out."""
+        return self.voltage_v <= self._limits.voltage_min_v
+
     def earn(self, dt_s: float) -> None:
         """Add the time that has passed, within what one movement may claim."""
         self._pace.earn(dt_s)

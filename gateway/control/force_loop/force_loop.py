@@ -122,6 +122,11 @@ class ForceLoop:
         return self._limiter.voltage_v
 
     @property
+    def is_lowest(self) -> bool:
+        """Decide whether no less voltage can be out."""
+        return self._limiter.is_lowest
+
+    @property
     def applied_n(self) -> float:
         """The ramped target of this instant, contact force."""
         return self.feedforward.applied_n
