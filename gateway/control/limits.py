@@ -115,9 +115,14 @@ class VoltageLimiter:
         self._pace = RateBudget()
 
     @property
+    def lowest_v(self) -> float:
+        """The least voltage that may be out, for a force of 0."""
+        return self._limits.voltage_min_v
+
+    @property
     def is_lowest(self) -> bool:
         """Decide whether no less voltage can be out."""
-        return self.voltage_v <= self._limits.voltage_min_v
+        return self.voltage_v <= self.lowest_v
 
     def earn(self, dt_s: float) -> None:
         """Add the time that has passed, within what one movement may claim."""

@@ -264,8 +264,10 @@ class ForceLoop:
         push_v = self._compensated_v(wanted_v) - wanted_v if has_model else 0.0
         if demand.force_n <= 0.0:
             push_v = 0.0  # a release goes along its ramp in volts, too: pushing it would vent the tool at once
+        if not has_model:
+            model_v = wanted_v = self._limiter.lowest_v
         self.feedforward_v = model_v + push_v  # but for limits, the output is feedforward and trim, and nothing else
-        by_stage = self._limiter.drive(wanted_v + push_v if has_model else 0.0)
+        by_stage = self._limiter.drive(wanted_v + push_v)
         self.limited_by = strongest(by_stage, self._trim.limited_by, by_model, demand.force_limited_by)
         return self._settling.judge_force(demand, inputs, goal_n, law.applied_n)
 
