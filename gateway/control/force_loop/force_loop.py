@@ -3,9 +3,9 @@
 A step answers with an event of the state table (READY, RAMPING and HOLDING are decided here), or with the cause of a fault.
 A run of calibration drives the same limiter (`drive_run`), and the force that the model expects is kept here for all.
 
-When the trim may learn: in contact, on a new usable sample, in force mode, with no other limit acting, and with the target
-less than QUIET_N ahead of where the plant can be (not ramping fast). With a measured response: with less than NEAR_N of
-thrust on its way, whose force is counted as come.
+When the trim may learn: in contact, on a new usable sample, in force mode, with no other limit acting (but back from an end of
+the voltage's range), and with the target less than QUIET_N ahead of where the plant can be (not ramping fast). With a measured
+response: with less than NEAR_N of thrust on its way, whose force is counted as come.
 """
 
 from typing import Final, TypeAlias
@@ -36,7 +36,8 @@ Moved: TypeAlias = StateEvent | StopCause
 QUIET_N: Final = 3.0
 STILL_N: Final = 0.3  # the same where the response is measured
 LANDING_SHARE: Final = 0.2  # of a step's landing time: so late is the lags' inverse on a ramp, on the drawn machines
-_FORCE, _NONE, _TRIM_RANGE, _SMALLEST_FORCE = Mode.FORCE, LimitedBy.NONE, LimitedBy.TRIM_RANGE, LimitedBy.SMALLEST_FORCE
+_FORCE, _NONE, _VOLTAGE_RANGE = Mode.FORCE, LimitedBy.NONE, LimitedBy.VOLTAGE_RANGE
+_TRIM_RANGE, _SMALLEST_FORCE = LimitedBy.TRIM_RANGE, LimitedBy.SMALLEST_FORCE
 NEAR_N: Final = 1.0  # thrust on its way to the tool, that the model of the lags is trusted with
 
 
@@ -286,8 +287,10 @@ class ForceLoop:
             trim.reset()
         elif isinstance(trim, MeasuredTrim):
             self._learn_measured(trim, inputs, given_n)
-        elif self._may_learn(inputs) and abs(law.applied_n - law.reference_n) < QUIET_N:
-            trim.integrate(law.reference_n - inputs.reading.contact_n, inputs.reading.interval_s)
+        elif abs(law.applied_n - law.reference_n) < QUIET_N:
+            error_n = law.reference_n - inputs.reading.contact_n
+            if self._may_learn(inputs, error_n):
+                trim.integrate(error_n, inputs.reading.interval_s)
 
     def _learn_measured(self, trim: MeasuredTrim, inputs: LoopInputs, given_n: float) -> None:
         """The force that will come is the measured one and what the thrust on its way makes of it, the trim's own included. So
@@ -300,15 +303,18 @@ class ForceLoop:
         if abs(coming_n) >= NEAR_N or abs(law.applied_n - law.aimed_n) >= STILL_N:
             self._transient.push(coming_n)
             trim.rest()
-        elif self._may_learn(inputs):
+        elif self._may_learn(inputs, law.applied_n - reading.contact_n):
             error_n = law.applied_n - reading.contact_n - coming_n * law.yielded_share(coming_n)
             self._transient.observe(error_n, trim.noise_n, reading.interval_s)
             before_n, left_n = trim.value_n, error_n - self._transient.transient_n
             trim.integrate(left_n, law.slope_n_per_v(given_n), reading.interval_s)
             self._transient.correct(trim.value_n - before_n)
 
-    def _may_learn(self, inputs: LoopInputs) -> bool:
-        free = self.limited_by is _NONE or self.limited_by is _TRIM_RANGE  # of the step before
+    def _may_learn(self, inputs: LoopInputs, error_n: float) -> bool:
+        """error_n: wanted minus measured. At an end of the range what leads back is learned, or the trim would stay there."""
+        limit = self.limited_by  # of the step before
+        leads_back = limit is _VOLTAGE_RANGE and (error_n > 0.0) is self.is_lowest
+        free = limit is _NONE or limit is _TRIM_RANGE or leads_back
         return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and free and not self._has_leapt
 
     def _step_voltage(self, demand: Demand, inputs: LoopInputs) -> StateEvent:

@@ -112,10 +112,11 @@ def unreachable_words(evidence: Evidence) -> str:
 def _too_much_words(evidence: Evidence) -> str:
     above = f"more than the {evidence.target_n:.1f} N that are wanted"
     if evidence.is_lowest:
-        unit = "; or N read as kgf (A303): check the unit" if evidence.looks_like_another_unit else ""
+        may_be_unit = evidence.looks_like_another_unit and not evidence.was_in_band
+        unit = "; or N read as kgf (A303): check the unit" if may_be_unit else ""
         return (
-            f"{above}, and no lower voltage is possible: friction or the payload's weight keeps so much pressed; command "
-            f"more, or lift the tool before{unit}"
+            f"{above}, and no lower voltage is possible: friction, the payload's weight or something else keeps so much "
+            f"pressed; command more, or lift the tool before{unit}"
         )
     return f"{above}: trim at its limit or calibration off, or something else presses on the tool"
 

@@ -16,8 +16,8 @@ from gateway.control.settings import ControlSettings, LeadSettings, Trim
 from gateway.control.state_table import StateEvent
 from gateway.control.supervision.fault_detection import StopCause
 from gateway.registers.command import Command
-from gateway.registers.words import LimitedBy, Mode
-from tests.control.bench import bsfm, settings
+from gateway.registers.words import LimitedBy, Mode, State
+from tests.control.bench import bsfm, enabled, settings
 
 LINE = LineStatus()
 
@@ -186,3 +186,30 @@ def test_out_of_contact_the_course_begins_at_nothing() -> None:
     again = loop_of()
     again.step(wish(5.0, ramp_n_per_s=1e3), inputs(-3.0))
     assert again.feedforward.reference_n == 0.0
+
+
+def test_the_trim_comes_back_from_the_lowest_voltage():
+    """Something pressed for a while on a tool that was to press little; then 0.7 N stayed where 3 were wanted, for good."""
+    bench = enabled(settings())
+    bench.force(3.0)
+    assert bench.run(3.0).state is State.HOLDING
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 4.0)
+    bench.run(6.0)
+    assert (bench.last.voltage_v, bench.last.limited_by) == (0.0, LimitedBy.VOLTAGE_RANGE)
+    bench.alter_sample = lambda sample: replace(
+        sample, force_n=sample.force_n + 1.0
+    )  # as friction keeps of a tool at 0 V
+    assert bench.run(4.0).state is State.HOLDING
+    assert bench.last.force_measured_n == pytest.approx(3.0, abs=0.5)
+
+
+def test_the_trim_comes_back_from_the_highest_voltage():
+    rig = settings()
+    bench = enabled(replace(rig, limits=replace(rig.limits, voltage_max_v=4.4)))
+    bench.force(30.0)
+    bench.plant.gain_n_per_v = 6.0
+    bench.run(6.0)
+    assert (bench.last.voltage_v, bench.last.limited_by) == (4.4, LimitedBy.VOLTAGE_RANGE)
+    bench.plant.gain_n_per_v = 7.6
+    assert bench.run(4.0).state is State.HOLDING
+    assert bench.plant.force_n == pytest.approx(30.0, abs=1.0)
