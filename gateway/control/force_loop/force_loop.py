@@ -4,7 +4,7 @@ A step answers with an event of the state table (READY, RAMPING and HOLDING are 
 A run of calibration drives the same limiter (`drive_run`), and the force that the model expects is kept here for all.
 
 When the trim may learn: in contact, on a new usable sample, in force mode, with no other limit acting (but back from an end of
-the voltage's range), and with the target less than QUIET_N ahead of where the plant can be (not ramping fast). With a measured
+the range), and with the target less than QUIET_N ahead of where the plant can be (not ramping fast). With a measured
 response: with less than NEAR_N of thrust on its way, whose force is counted as come.
 """
 
@@ -20,7 +20,7 @@ from gateway.control.force_loop.lag_inverse import LinearizedLagInverse
 from gateway.control.force_loop.lead_compensator import LeadCompensator
 from gateway.control.force_loop.measured_trim import MeasuredTrim
 from gateway.control.force_loop.transient_estimate import TransientEstimate
-from gateway.control.force_loop.trim import TrimIntegral
+from gateway.control.force_loop.trim import LEARNING, TrimIntegral, blocked_way
 from gateway.control.inputs import LineStatus, LoopInputs
 from gateway.control.limits import TICK_S, NotFiniteError, VoltageLimiter, strongest
 from gateway.control.settings import ControlSettings, LoopTiming, Trim
@@ -36,8 +36,7 @@ Moved: TypeAlias = StateEvent | StopCause
 QUIET_N: Final = 3.0
 STILL_N: Final = 0.3  # the same where the response is measured
 LANDING_SHARE: Final = 0.2  # of a step's landing time: so late is the lags' inverse on a ramp, on the drawn machines
-_FORCE, _NONE, _VOLTAGE_RANGE = Mode.FORCE, LimitedBy.NONE, LimitedBy.VOLTAGE_RANGE
-_TRIM_RANGE, _SMALLEST_FORCE = LimitedBy.TRIM_RANGE, LimitedBy.SMALLEST_FORCE
+_FORCE, _NONE, _SMALLEST_FORCE = Mode.FORCE, LimitedBy.NONE, LimitedBy.SMALLEST_FORCE
 NEAR_N: Final = 1.0  # thrust on its way to the tool, that the model of the lags is trusted with
 
 
@@ -280,6 +279,7 @@ class ForceLoop:
 
     def _learn(self, inputs: LoopInputs, moved_n: float, given_n: float) -> None:
         law, trim = self.feedforward, self._trim
+        trim.blocked_way = blocked_way(self.limited_by, trim.value_v, is_lowest=self.is_lowest, is_low=law.is_low)
         trim.travel(moved_n)
         if inputs.reading.is_new and inputs.reading.is_usable:
             self._has_leapt = self._leaps.passes_over(inputs.reading.contact_n)
@@ -287,10 +287,9 @@ class ForceLoop:
             trim.reset()
         elif isinstance(trim, MeasuredTrim):
             self._learn_measured(trim, inputs, given_n)
-        elif abs(law.applied_n - law.reference_n) < QUIET_N:
+        elif self._may_learn(inputs) and abs(law.applied_n - law.reference_n) < QUIET_N:
             error_n = law.reference_n - inputs.reading.contact_n
-            if self._may_learn(inputs, error_n):
-                trim.integrate(error_n, inputs.reading.interval_s)
+            trim.integrate(error_n, inputs.reading.interval_s)
 
     def _learn_measured(self, trim: MeasuredTrim, inputs: LoopInputs, given_n: float) -> None:
         """The force that will come is the measured one and what the thrust on its way makes of it, the trim's own included. So
@@ -303,19 +302,16 @@ class ForceLoop:
         if abs(coming_n) >= NEAR_N or abs(law.applied_n - law.aimed_n) >= STILL_N:
             self._transient.push(coming_n)
             trim.rest()
-        elif self._may_learn(inputs, law.applied_n - reading.contact_n):
+        elif self._may_learn(inputs):
             error_n = law.applied_n - reading.contact_n - coming_n * law.yielded_share(coming_n)
             self._transient.observe(error_n, trim.noise_n, reading.interval_s)
             before_n, left_n = trim.value_n, error_n - self._transient.transient_n
             trim.integrate(left_n, law.slope_n_per_v(given_n), reading.interval_s)
             self._transient.correct(trim.value_n - before_n)
 
-    def _may_learn(self, inputs: LoopInputs, error_n: float) -> bool:
-        """error_n: wanted minus measured. At an end of the range what leads back is learned, or the trim would stay there."""
-        limit = self.limited_by  # of the step before
-        leads_back = limit is _VOLTAGE_RANGE and (error_n > 0.0) is self.is_lowest
-        free = limit is _NONE or limit is _TRIM_RANGE or leads_back
-        return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and free and not self._has_leapt
+    def _may_learn(self, inputs: LoopInputs) -> bool:
+        is_free = self.limited_by in LEARNING and not self._has_leapt  # of the step before
+        return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and is_free
 
     def _step_voltage(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
         self._trim.reset()
