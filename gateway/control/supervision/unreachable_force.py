@@ -105,7 +105,7 @@ def unreachable_words(evidence: Evidence) -> str:
         return _silent_words(evidence, pressure)
     clause = f"{pressure}; " if pressure else ""
     if evidence.factor < 0.5 and not pressure:
-        return "no air, valve closed or no contact"
+        return "no air or too little of it, valve closed, trim at its limit or calibration off"
     return f"{clause}target not reached: supply pressure too low, trim at its limit or calibration off"
 
 

@@ -161,8 +161,9 @@ def test_a_tenth_of_a_small_force_names_kgf_beside_the_missing_contact(
 
 
 def test_without_a_pressure_less_than_half_of_the_force_may_be_no_air_and_half_of_it_is_not() -> None:
-    words = [unreachable_words(Evidence(voltage_v=3.0, measured_n=n, expected_n=10.0)) for n in (4.9, 5.0)]
-    assert words[0] == "no air, valve closed or no contact" and words[1].startswith("target not reached")
+    words = [unreachable_words(Evidence(voltage_v=3.0, measured_n=n, expected_n=10.0)) for n in (2.4, 4.9, 5.0)]
+    assert words[0] == "no air, valve closed or no contact" and words[2].startswith("target not reached")
+    assert words[1].startswith("no air or too little of it") and "contact" not in words[1], "what is felt is touched"
 
 
 def test_a_force_that_weight_keeps_above_the_target_is_not_missing_air() -> None:
