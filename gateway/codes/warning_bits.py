@@ -40,9 +40,10 @@ class WarningBit(IntFlag):
         Explanation(
             "A301",
             "target unreachable",
-            "Voltage is out and much less force is measured than the model expects (2.31 V, 0.1 N instead of 17.9 N).",
-            "No air, a closed valve, or no contact; a tenth of the expected force is kgf read as N. The sentence "
-            "tells more.",
+            "The force stays off its target, mostly with voltage out and much less force than the model expects (2.31 V, "
+            "0.1 N instead of 17.9 N).",
+            "No air, a closed valve, no contact; a tenth of the force is kgf read as N; too much is friction or weight. The "
+            "sentence tells more.",
             "Open the air supply and look at its gauge; then bring the tool into contact; then compare the units.",
             is_warning=True,
         ),

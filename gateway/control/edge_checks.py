@@ -45,6 +45,7 @@ class Situation:
     """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; excuse: the
     machine, where that is the cause of it, or what the valve does; line_fault: what the output line reports, with its code;
     is_output_known: that the output answers, so that its voltage is ours; is_output_heard: that it answers at all;
+    is_lowest: no less voltage can be out;
     expected_n: force that the voltages of late still make, by the model; repeats: that the load cell seems to be frozen;
     ramps_down: the force goes to 0, and then the output off."""
 
@@ -58,6 +59,7 @@ class Situation:
     is_output_known: bool
     is_output_heard: bool
     voltage_v: float
+    is_lowest: bool
     applied_n: float
     expected_n: float
     repeats: str
@@ -90,6 +92,7 @@ class Readiness:
             is_output_known=line.acknowledged_v is not None and block is not RefusalReason.OUTPUT_FAULT,
             is_output_heard=line.fault is not _LOST and not self._parts.faults.is_silent(now_s, line),
             voltage_v=loop.voltage_v,
+            is_lowest=loop.is_lowest,
             applied_n=loop.applied_n,
             expected_n=loop.compute_expected_rise(),
             repeats=self._parts.faults.repeats,
@@ -234,7 +237,7 @@ class EdgeCheck:
     def _forbids_tare(self, command: Command, state: State, at: Situation) -> str:
         if state is State.FAULT:
             return "a fault is latched: fix its cause, then reset"
-        if at.state in ENABLED_STATES and at.voltage_v > 0.0:
+        if at.state in ENABLED_STATES and not at.is_lowest:
             return f"{at.voltage_v:.2f} V are out: disable the output or set the force to 0 first"
         if not at.is_output_known:
             return f"{at.line_fault or 'the output does not answer'}: {_UNKNOWN}"

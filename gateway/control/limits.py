@@ -16,7 +16,9 @@ from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
 
 TICK_S: Final = defaults.TICK_S  # nominal tick: what a movement may claim at once after rest
-LONGEST_STEP_S: Final = 0.02  # a later step catches up no more than this
+LONGEST_STEP_S: Final = (
+    0.045  # a later step catches up no more: two ticks of the slowest loop, and jitter, lie between two
+)
 
 Limited = tuple[float, LimitedBy]
 _NONE, _VOLTAGE_SLEW = LimitedBy.NONE, LimitedBy.VOLTAGE_SLEW  # a look-up on the class costs as much as a limit
@@ -113,6 +115,16 @@ class VoltageLimiter:
         self.voltage_v = limits.safe_voltage_v
         self._limits = limits
         self._pace = RateBudget()
+
+    @property
+    def lowest_v(self) -> float:
+        """The least voltage that may be out, for a force of 0."""
+        return self._limits.voltage_min_v
+
+    @property
+    def is_lowest(self) -> bool:
+        """Decide whether no less voltage can be out."""
+        return self.voltage_v <= self.lowest_v
 
     def earn(self, dt_s: float) -> None:
         """Add the time that has passed, within what one movement may claim."""

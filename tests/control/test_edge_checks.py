@@ -21,7 +21,7 @@ TARE, ENABLE = ControlBit.TARE, ControlBit.ENABLE
 REST = Situation(
     now_s=1.0, state=State.OFF, faulted_s=-inf, reading=Reading(0.0, 0.0, 0.0, 0.01, True, True, True),
     block=RefusalReason.NONE, excuse="", line_fault="", is_output_known=True, is_output_heard=True, voltage_v=0.0,
-    applied_n=0.0, expected_n=0.0, repeats="", ramps_down=False,
+    is_lowest=True, applied_n=0.0, expected_n=0.0, repeats="", ramps_down=False,
 )  # fmt: skip
 
 
@@ -48,7 +48,7 @@ def test_a_tare_waits_until_what_still_presses_is_within_what_a_zero_may_spread(
 
 @pytest.mark.parametrize(("state", "is_taken"), [(State.OFF, True), (State.READY, False)])
 def test_a_tare_is_refused_under_a_voltage_that_presses_and_not_for_the_safe_one(state: State, is_taken: bool) -> None:
-    assert (refusal(replace(REST, state=state, voltage_v=0.1), TARE) is None) is is_taken
+    assert (refusal(replace(REST, state=state, voltage_v=0.1, is_lowest=False), TARE) is None) is is_taken
 
 
 def test_a_zero_is_judged_with_the_payload_of_its_own_write() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.control import LineStatus
-from gateway.registers.words import ControlBit
+from gateway.registers.words import ControlBit, LimitedBy, State
 from tests.control.bench import Bench, settings
 
 
@@ -157,3 +157,17 @@ def test_the_weight_of_a_command_counts_in_the_step_of_its_arrival():
     before_n = bench.last.force_measured_n
     output = bench.write(payload_kg=1.0)
     assert output.force_measured_n - before_n == pytest.approx(9.80665)
+
+
+def test_a_rig_whose_regulator_rests_above_0_v_is_tared_at_force_0_and_nothing_limits_it():
+    """1 to 5 V: enabled, with setpoint 0, a tare was refused for the 1 V that cannot be less, and status_word said limited."""
+    rig = settings()
+    bench = enabled(replace(rig, limits=replace(rig.limits, voltage_min_v=1.0, safe_voltage_v=1.0)))
+    bench.run(1.0)
+    assert (bench.last.state, bench.last.voltage_v, bench.last.limited_by) == (State.READY, 1.0, LimitedBy.NONE)
+    bench.write(control_word=ControlBit.ENABLE | ControlBit.TARE)
+    assert bench.refused is None
+    bench.voltage(3.0)
+    bench.run(1.0)
+    bench.write(control_word=ControlBit.ENABLE | ControlBit.TARE)
+    assert bench.refused and "disable the output or set the force to 0 first" in bench.refused.text

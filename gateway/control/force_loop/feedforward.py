@@ -55,7 +55,7 @@ class Approach:
 
 class Feedforward:
     """Holds the applied target, its expected course in the plant (reference_n) and what the reversal remembers. branch_share:
-    place of the plant between the branches, -1 .. 1, by that memory."""
+    place of the plant between the branches, -1 .. 1, by that memory; is_low: the model's range begins above the aim."""
 
     def __init__(
         self, model: Bsfm, limits: Limits, response_lag_s: float, delay_s: float = 0.0, ahead_s: float = 0.0
@@ -87,6 +87,7 @@ class Feedforward:
         self._slid_n = 0.0
         self._pace = RateBudget()
         self._carry_over_v = 0.0
+        self.is_low = False
 
     def _remember(self, memory: Memory) -> None:
         self._memory, self.branch_share = memory, self.model.reversal.branch_share(memory)
@@ -231,6 +232,7 @@ class Feedforward:
             voltage_v, status = self.model.voltage_v(self.aimed_n - gravity_n, self.branch_share)
         except ValueError as error:
             raise ModelError(f"model: {error}") from error
+        self.is_low = status is InverseStatus.LOW
         if not isfinite(voltage_v):
             raise ModelError(f"model: {voltage_v} V for {self.aimed_n:.2f} N")
         return voltage_v + self._carry_over_v, _NONE if status is _OK else LimitedBy.CALIBRATION_RANGE

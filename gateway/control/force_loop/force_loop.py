@@ -3,9 +3,9 @@
 A step answers with an event of the state table (READY, RAMPING and HOLDING are decided here), or with the cause of a fault.
 A run of calibration drives the same limiter (`drive_run`), and the force that the model expects is kept here for all.
 
-When the trim may learn: in contact, on a new usable sample, in force mode, with no other limit acting, and with the target
-less than QUIET_N ahead of where the plant can be (not ramping fast). With a measured response: with less than NEAR_N of
-thrust on its way, whose force is counted as come.
+When the trim may learn: in contact, on a new usable sample, in force mode, with no other limit acting (but back from an end of
+the range), and with the target less than QUIET_N ahead of where the plant can be (not ramping fast). With a measured
+response: with less than NEAR_N of thrust on its way, whose force is counted as come.
 """
 
 from typing import Final, TypeAlias
@@ -20,7 +20,7 @@ from gateway.control.force_loop.lag_inverse import LinearizedLagInverse
 from gateway.control.force_loop.lead_compensator import LeadCompensator
 from gateway.control.force_loop.measured_trim import MeasuredTrim
 from gateway.control.force_loop.transient_estimate import TransientEstimate
-from gateway.control.force_loop.trim import TrimIntegral
+from gateway.control.force_loop.trim import LEARNING, TrimIntegral, blocked_way
 from gateway.control.inputs import LineStatus, LoopInputs
 from gateway.control.limits import TICK_S, NotFiniteError, VoltageLimiter, strongest
 from gateway.control.settings import ControlSettings, LoopTiming, Trim
@@ -36,7 +36,7 @@ Moved: TypeAlias = StateEvent | StopCause
 QUIET_N: Final = 3.0
 STILL_N: Final = 0.3  # the same where the response is measured
 LANDING_SHARE: Final = 0.2  # of a step's landing time: so late is the lags' inverse on a ramp, on the drawn machines
-_FORCE, _NONE, _TRIM_RANGE, _SMALLEST_FORCE = Mode.FORCE, LimitedBy.NONE, LimitedBy.TRIM_RANGE, LimitedBy.SMALLEST_FORCE
+_FORCE, _NONE, _SMALLEST_FORCE = Mode.FORCE, LimitedBy.NONE, LimitedBy.SMALLEST_FORCE
 NEAR_N: Final = 1.0  # thrust on its way to the tool, that the model of the lags is trusted with
 
 
@@ -120,6 +120,11 @@ class ForceLoop:
     def voltage_v(self) -> float:
         """Voltage on the output since the last step, V."""
         return self._limiter.voltage_v
+
+    @property
+    def is_lowest(self) -> bool:
+        """Decide whether no less voltage can be out."""
+        return self._limiter.is_lowest
 
     @property
     def applied_n(self) -> float:
@@ -259,8 +264,10 @@ class ForceLoop:
         push_v = self._compensated_v(wanted_v) - wanted_v if has_model else 0.0
         if demand.force_n <= 0.0:
             push_v = 0.0  # a release goes along its ramp in volts, too: pushing it would vent the tool at once
+        if not has_model:
+            model_v = wanted_v = self._limiter.lowest_v
         self.feedforward_v = model_v + push_v  # but for limits, the output is feedforward and trim, and nothing else
-        by_stage = self._limiter.drive(wanted_v + push_v if has_model else 0.0)
+        by_stage = self._limiter.drive(wanted_v + push_v)
         self.limited_by = strongest(by_stage, self._trim.limited_by, by_model, demand.force_limited_by)
         return self._settling.judge_force(demand, inputs, goal_n, law.applied_n)
 
@@ -272,6 +279,7 @@ class ForceLoop:
 
     def _learn(self, inputs: LoopInputs, moved_n: float, given_n: float) -> None:
         law, trim = self.feedforward, self._trim
+        trim.blocked_way = blocked_way(self.limited_by, trim.value_v, is_lowest=self.is_lowest, is_low=law.is_low)
         trim.travel(moved_n)
         if inputs.reading.is_new and inputs.reading.is_usable:
             self._has_leapt = self._leaps.passes_over(inputs.reading.contact_n)
@@ -280,7 +288,8 @@ class ForceLoop:
         elif isinstance(trim, MeasuredTrim):
             self._learn_measured(trim, inputs, given_n)
         elif self._may_learn(inputs) and abs(law.applied_n - law.reference_n) < QUIET_N:
-            trim.integrate(law.reference_n - inputs.reading.contact_n, inputs.reading.interval_s)
+            error_n = law.reference_n - inputs.reading.contact_n
+            trim.integrate(error_n, inputs.reading.interval_s)
 
     def _learn_measured(self, trim: MeasuredTrim, inputs: LoopInputs, given_n: float) -> None:
         """The force that will come is the measured one and what the thrust on its way makes of it, the trim's own included. So
@@ -301,8 +310,8 @@ class ForceLoop:
             self._transient.correct(trim.value_n - before_n)
 
     def _may_learn(self, inputs: LoopInputs) -> bool:
-        free = self.limited_by is _NONE or self.limited_by is _TRIM_RANGE  # of the step before
-        return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and free and not self._has_leapt
+        is_free = self.limited_by in LEARNING and not self._has_leapt  # of the step before
+        return inputs.touching and inputs.reading.is_new and inputs.reading.is_usable and is_free
 
     def _step_voltage(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
         self._trim.reset()

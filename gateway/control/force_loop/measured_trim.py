@@ -56,10 +56,11 @@ OTHER_WAY_N: Final = 1.0
 
 class MeasuredTrim:
     """value_n: the correction of the target, N; value_v: what that has come to in volts, told by whoever asked the model;
-    limited_by: whether it stands at its limit; hunted: it stands still because its corrections kept changing sign."""
+    limited_by: whether it stands at its limit; hunted: it stands still because its corrections kept changing sign;
+    blocked_way: as gateway.control.force_loop.trim says."""
 
     def __init__(self, settings: Trim, timing: LoopTiming) -> None:
-        self._settings = settings
+        self._settings, self.blocked_way = settings, 0
         self._timing = timing
         self._noise_n2 = self._lately_n2 = self._known_s = 0.0
         self._same_way_n = min(SAME_WAY_N, settings.memory_n)
@@ -166,7 +167,9 @@ class MeasuredTrim:
             return
         if self._turns and not self._way:
             self._stand(zone_n / WIDER**self._turns, interval_s)
-        if abs(self._smooth_n) > zone_n and self._seen_s >= LEAST_SEEN_S:
+        if self._smooth_n * self.blocked_way > 0.0:
+            self._way = 0
+        elif abs(self._smooth_n) > zone_n and self._seen_s >= LEAST_SEEN_S:
             self._turn(1 if self._smooth_n > 0.0 else -1)
         elif self._way * self._smooth_n < LEFT_SHARE * zone_n:
             self._way = 0

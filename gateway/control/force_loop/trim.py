@@ -27,14 +27,25 @@ SEEN_SAMPLES: Final = 3  # the same, of a slow one
 CALM_S: Final = 3.0  # so long between two of them, and it is not the trim that swings
 FREE_SWINGS: Final = 3  # what a step, or a workpiece, may make of it
 LEAST_PACE: Final = 0.02
+LEARNING: Final = (LimitedBy.NONE, LimitedBy.TRIM_RANGE, LimitedBy.VOLTAGE_RANGE, LimitedBy.CALIBRATION_RANGE)
+"""Limits at which a trim may learn, but away from its `blocked_way`."""
+
+
+def blocked_way(limited_by: LimitedBy, trim_v: float, *, is_lowest: bool, is_low: bool) -> int:
+    """Return the way that a trim may not go, -1 or 1, for the range ends there; 0: none. Back it must, or it would stay.
+    is_lowest: no less voltage can be out; is_low: the model's range begins above what is asked of it."""
+    if limited_by is LimitedBy.VOLTAGE_RANGE:
+        return -1 if is_lowest else 1
+    way = -1 if is_low else 1
+    return way if limited_by is LimitedBy.CALIBRATION_RANGE and way * trim_v >= 0.0 else 0
 
 
 class TrimIntegral:
     """value_v is added to the feedforward; limited_by says whether it stands at its limit; swings: how often the force has
-    gone from one side of this target to the other."""
+    gone from one side of this target to the other; blocked_way: see there."""
 
     def __init__(self, settings: Trim) -> None:
-        self._settings = settings
+        self._settings, self.blocked_way = settings, 0
         self.reset()
 
     @property
@@ -74,6 +85,8 @@ class TrimIntegral:
         self._count_swings(error_n, interval_s)
         zone_n = self._settings.dead_zone_n
         beyond_n = error_n - max(-zone_n, min(zone_n, error_n))
+        if beyond_n * self.blocked_way > 0.0:
+            return
         wanted_v = self.value_v + self._pace * self._settings.gain_v_per_n_s * beyond_n * interval_s
         self.value_v, self.limited_by = trim_limited(wanted_v, self._settings.limit_v)
 

@@ -44,7 +44,7 @@ class OneShotEvents:
         voltage mode. measured_n: contact force, smoothed."""
         is_unreachable = loop.unreachable
         is_first, self._was_unreachable = is_unreachable and not self._was_unreachable, is_unreachable
-        sentence = self._unreachable_sentence(loop.voltage_v, measured_n, inputs.expected_n) if is_first else ""
+        sentence = self._unreachable_sentence(loop, measured_n, inputs.expected_n) if is_first else ""
         if loop.in_band and inputs.touching:
             self._learn(loop.voltage_v)
         return sentence
@@ -56,8 +56,8 @@ class OneShotEvents:
             ratio, known = self._pressure_pa / voltage_v, self._learned_pa_per_v
             self._learned_pa_per_v = known + _LEARNING * (ratio - known) if isfinite(known) else ratio
 
-    def _unreachable_sentence(self, voltage_v: float, measured_n: float, expected_n: float) -> str:
-        learned = isfinite(self._learned_pa_per_v)
+    def _unreachable_sentence(self, loop: ForceLoop, measured_n: float, expected_n: float) -> str:
+        learned, voltage_v = isfinite(self._learned_pa_per_v), loop.voltage_v
         evidence = Evidence(
             voltage_v=voltage_v,
             measured_n=measured_n,
@@ -66,6 +66,8 @@ class OneShotEvents:
             expected_pa=voltage_v * (self._learned_pa_per_v if learned else self._profile_pa_per_v),
             learned=learned,
             was_in_band=self._was_in_band,
+            target_n=loop.applied_n,
+            is_lowest=loop.is_lowest,
         )
         return unreachable_sentence(evidence)
 

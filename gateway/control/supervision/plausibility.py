@@ -4,13 +4,13 @@ There is no separate test move: the first rise in contact is the test. Expected 
 after a first-order lag, above its force at rest. SIGN_INVERTED: the cell goes down where the model goes up, watched for
 as long as the output is enabled, with or without contact (a cell with swapped wires never reports contact). GAIN_WRONG:
 in contact, under 30 % of the expected rise beyond friction, or over 300 % of it and off by more than friction explains, until
-one rise has passed;
-later the same signature means lost air, which only warns, and so does a force that stays where it was: friction keeps a vented
-tool pressed. A force that is still rising is not too low yet: on a rig that has not been calibrated nobody knows how slow the
-plant is. While the first rise is too high the target is held back
-(`is_too_high`), so that a wrong gain is named before it becomes over-force. What pressed already when the output was enabled,
-and still leaves, has not risen: too high is judged by the rise above the lowest force since then. Below the contact threshold
-a cell that reads ten times too little looks like air: the tool waits, and the warning A301 tells.
+one rise has passed, or a smaller one has long been between half and twice of what is expected: a rig that presses little is
+pushed by its workpiece, too. Later the same signature means lost air, which only warns, and so does a force that stays where it
+was: friction keeps a vented tool pressed. A force that is still rising is not too low yet: on a rig that has not been
+calibrated nobody knows how slow the plant is. While the first rise is too high the target is held back (`is_too_high`), so that
+a wrong gain is named before it becomes over-force. What pressed already when the output was enabled, and still leaves, has not
+risen: too high is judged by the rise above the lowest force since then. Below the contact threshold a cell that reads ten times
+too little looks like air: the tool waits, and the warning A301 tells.
 """
 
 from typing import Final
@@ -24,6 +24,8 @@ _SMOOTHING_S: Final = 0.05  # of the measured rise: five readings of a 100 Hz ce
 _LASTING_S: Final = 0.3  # a violation must last this long: impacts and lag do not
 _LEAST_RISE_N: Final = 1.0  # below it noise decides
 _PROVING_RISE_N: Final = 5.0  # a rise of this size with the right gain ends the gain check
+_NEAR_S: Final = 3.0  # and a smaller one that has been near what is expected for so long
+_NEAR: Final = 2.0  # times more or less: no other unit is so near
 _LOWEST_SHARE: Final = 0.3  # of the expected rise beyond friction: kgf read as N is a tenth
 _HIGHEST_SHARE: Final = 3.0  # of it: N read as kgf is ten times
 _MOVED_SHARE: Final = (
@@ -101,7 +103,7 @@ class RiseCheck:
         reading alone that leapt counts as none: it would make the whole rise too high, or too low."""
         self._at_rest_n = self._lowest_n = self._calm_n
         self._base_n = min(self._calm_n, self._threshold_n)
-        self._wrong_sign_s = self._wrong_gain_s = self._right_gain_s = 0.0
+        self._wrong_sign_s = self._wrong_gain_s = self._right_gain_s = self._near_s = 0.0
         self._proven = False
         self.is_too_high = False
 
@@ -163,5 +165,7 @@ class RiseCheck:
         wrong = (self.is_too_high and self.rise_since_lowest_n > most_n) or (too_low and has_moved)
         self._wrong_gain_s = self._wrong_gain_s + interval_s if wrong else 0.0
         self._right_gain_s = self._right_gain_s + interval_s if expected_n >= _PROVING_RISE_N and not wrong else 0.0
-        self._proven = self._right_gain_s >= _LASTING_S
+        is_near = expected_n < _NEAR * self.measured_rise_n < _NEAR * _NEAR * expected_n
+        self._near_s = self._near_s + interval_s if is_near else 0.0
+        self._proven = self._right_gain_s >= _LASTING_S or self._near_s >= _NEAR_S
         return _WRONG_GAIN if self._wrong_gain_s >= _LASTING_S else _RIGHT

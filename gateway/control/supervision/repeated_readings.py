@@ -44,6 +44,7 @@ POOLS: Final = 128
 INTERVAL_SHARE: Final = 0.01
 CLEARLY: Final = 4.0  # standard errors of a pool that is not full
 _ALIKE: Final = 1.0e-9  # N: less is the rounding of a unit's conversion
+_OFF_GRID: Final = 0.1  # of a count, that a change is beside whole ones
 
 
 class RepeatedReadings:
@@ -61,6 +62,9 @@ class RepeatedReadings:
         self._value_n = nan
         self._run, self._is_dead = 0, False
         self._changes = 0
+        self._doubted: tuple[int, float] | None = (
+            None  # a finer count: the change that showed it, and the count before, N
+        )
         self._pool = Pool()
         self._window = SampleWindow()
         self._pools: dict[bool, deque[Spread]] = {way: deque(maxlen=POOLS) for way in (True, False)}
@@ -96,21 +100,39 @@ class RepeatedReadings:
     def _learn(self, step_n: float, under_force: bool) -> None:
         if self._is_dead:
             return
-        if step_n < 0.75 * self.count_n:  # what was judged with larger counts looks quieter than it is
-            self.count_n, self._window = step_n, SampleWindow()
+        self._refine(step_n)
         self._changes += 1
         self.runs.add(self._run)
-        level, steps = round(self._value_n / self.count_n), round(step_n / self.count_n)
         left = min(self._run, POOL_WINDOWS * WINDOW)
         while left:
-            left -= self._window.add(level, left)
+            left -= self._window.add(round(self._value_n / self.count_n), left)
             if self._window.is_full:
-                self._pool.add(self._window)
-                self._window = SampleWindow()
-                self._renew(under_force)
-        self._window.change(steps)
+                self._take_window(under_force)
+        self._window.change(round(step_n / self.count_n))
         if LONGEST_RUNS * self._run > self.limit and not self.runs.is_explained(self._run, self._stay):
             self.limit = LONGEST_RUNS * self._run
+
+    def _refine(self, step_n: float) -> None:
+        """See whether the counts are finer than was known. One false digit shows as much, in two changes one after the other:
+        so a finer count is doubted until a later change is none of whole counts as they were known before."""
+        if self._doubted:
+            change, before_n = self._doubted
+            counts = step_n / before_n
+            if self._changes > change + 1 and abs(counts - round(counts)) > _OFF_GRID:
+                self._doubted = None
+        if step_n < 0.75 * self.count_n:  # what was judged with larger counts looks quieter than it is
+            if self._doubted is None and self.count_n < inf:
+                self._doubted = self._changes, self.count_n
+            self.count_n, self._window = step_n, SampleWindow()
+
+    def _take_window(self, under_force: bool) -> None:
+        """Learn from a full window; where its count is doubted still, the noise would look larger than it is."""
+        window, self._window = self._window, SampleWindow()
+        if self._doubted:
+            (_, self.count_n), self._doubted = self._doubted, None
+            return
+        self._pool.add(window)
+        self._renew(under_force)
 
     def _renew(self, under_force: bool) -> None:
         """After a window: what all that is remembered, and the pool that is not full yet, allow."""

@@ -4,7 +4,8 @@ The pressure that the output device measures decides, where it measures one: too
 and no force, is no contact. What is enough has been seen while the force was right; before that it is read from the ranges of
 the device's profile, which is less certain, so that only very little and plenty count. Without a pressure there is the force
 itself: a tenth or ten times of what the model expects is kilograms read as newtons, and a force that was right before in the
-same enable rules out what was never right. What cannot be told apart is named together.
+same enable rules out what was never right. What cannot be told apart is named together. A force above the target has none of
+these causes: friction or weight keeps it, or the model expects less of a volt than the machine makes.
 """
 
 from dataclasses import dataclass
@@ -27,7 +28,8 @@ _LEAST_EXPECTED_PA: Final = 5.0e3
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """What is seen. pressure_pa: measured, expected_pa: at this voltage; nan: nobody knows. learned: expected_pa was seen while
-    the force was right; was_in_band: the force has been in band since the last enable."""
+    the force was right; was_in_band: the force has been in band since the last enable; target_n: what is gone for, nan where
+    nobody knows; is_lowest: no less voltage can be out."""
 
     voltage_v: float
     measured_n: float
@@ -36,6 +38,13 @@ class Evidence:
     expected_pa: float = nan
     learned: bool = False
     was_in_band: bool = False
+    target_n: float = nan
+    is_lowest: bool = False
+
+    @property
+    def is_too_much(self) -> bool:
+        """Decide whether the force is above the target."""
+        return self.measured_n > self.target_n
 
     @property
     def _pressure_share(self) -> float:
@@ -86,6 +95,8 @@ class Evidence:
 def unreachable_words(evidence: Evidence) -> str:
     """Return what it probably is, and one thing to do."""
     pressure = _pressure(evidence)
+    if evidence.is_too_much and (evidence.is_lowest or not evidence.looks_like_another_unit):
+        return _too_much_words(evidence)
     if evidence.no_air:
         return f"{pressure}: no air, or a closed valve; open the air supply and look at its gauge"
     if evidence.looks_like_another_unit:
@@ -94,8 +105,20 @@ def unreachable_words(evidence: Evidence) -> str:
         return _silent_words(evidence, pressure)
     clause = f"{pressure}; " if pressure else ""
     if evidence.factor < 0.5 and not pressure:
-        return "no air, valve closed or no contact"
+        return "no air or too little of it, valve closed, trim at its limit or calibration off"
     return f"{clause}target not reached: supply pressure too low, trim at its limit or calibration off"
+
+
+def _too_much_words(evidence: Evidence) -> str:
+    above = f"more than the {evidence.target_n:.1f} N that are wanted"
+    if evidence.is_lowest:
+        may_be_unit = evidence.looks_like_another_unit and not evidence.was_in_band
+        unit = "; or N read as kgf (A303): check the unit" if may_be_unit else ""
+        return (
+            f"{above}, and no lower voltage is possible: friction, the payload's weight or something else keeps so much "
+            f"pressed; command more, or lift the tool before{unit}"
+        )
+    return f"{above}: trim at its limit or calibration off, or something else presses on the tool"
 
 
 def _pressure(evidence: Evidence) -> str:

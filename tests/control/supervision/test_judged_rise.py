@@ -155,3 +155,15 @@ def test_what_a_model_expects_is_above_its_force_at_rest_and_friction_has_no_sig
     expected = ExpectedForce(sinking, 0.1, 0.0)
     assert expected.kept_n == 0.0, "below 0 nothing is pressed"
     assert expected.rise_n(1.0) == 0.0 and expected.force_n(1.0) == -3.0
+
+
+@pytest.mark.parametrize(
+    ("cell_n", "readings", "fault"), [(4.0, 48, RIGHT), (4.0, 47, GAIN), (1.9, 48, GAIN), (8.1, 48, GAIN)]
+)
+def test_a_small_rise_that_was_near_what_is_expected_for_3_s_has_no_other_unit(
+    cell_n: float, readings: int, fault: FaultCode
+) -> None:
+    """A rig that holds 4 N for hours was let go by a push of 9, with the units of the cell to blame."""
+    rise = Rise().at(cell_n)
+    assert rise.judged(4.0, readings) is RIGHT
+    assert rise.at(13.0).judged(4.0) is fault

@@ -161,5 +161,35 @@ def test_a_tenth_of_a_small_force_names_kgf_beside_the_missing_contact(
 
 
 def test_without_a_pressure_less_than_half_of_the_force_may_be_no_air_and_half_of_it_is_not() -> None:
-    words = [unreachable_words(Evidence(voltage_v=3.0, measured_n=n, expected_n=10.0)) for n in (4.9, 5.0)]
-    assert words[0] == "no air, valve closed or no contact" and words[1].startswith("target not reached")
+    words = [unreachable_words(Evidence(voltage_v=3.0, measured_n=n, expected_n=10.0)) for n in (2.4, 4.9, 5.0)]
+    assert words[0] == "no air, valve closed or no contact" and words[2].startswith("target not reached")
+    assert words[1].startswith("no air or too little of it") and "contact" not in words[1], "what is felt is touched"
+
+
+def test_a_force_that_weight_keeps_above_the_target_is_not_missing_air() -> None:
+    """12.8 N pressed where 5 were wanted, at 0 V, and the supply was blamed for too little pressure."""
+    bench = Bench(seed=8)
+    bench.run(0.3)
+    bench.enable(5.0, payload_kg=1.2)
+    said = told(bench)
+    assert (
+        "more than the 5.0 N that are wanted, and no lower voltage is possible: friction, the payload's weight" in said
+    )
+    assert "supply" not in said and "air" not in said
+
+
+def test_a_machine_that_is_stronger_than_its_calibration_is_not_missing_air() -> None:
+    bench = Bench(seed=9, gain_n_per_v=9.5)
+    bench.run(0.3)
+    bench.enable(30.0)
+    said = told(bench)
+    assert "more than the 30.0 N that are wanted: trim at its limit or calibration off" in said
+    assert "supply" not in said
+
+
+@pytest.mark.parametrize(("voltage_v", "is_lowest"), [(0.0, True), (0.4, False)])
+def test_what_friction_keeps_at_no_voltage_need_not_be_another_unit(voltage_v: float, is_lowest: bool) -> None:
+    seen = Evidence(voltage_v=voltage_v, measured_n=9.6, expected_n=0.5, target_n=3.0, is_lowest=is_lowest)
+    assert unreachable_words(seen).startswith("more than the 3.0 N that are wanted") == is_lowest
+    assert "N read as kgf" in unreachable_words(seen)
+    assert ("N read as kgf" not in unreachable_words(replace(seen, was_in_band=True))) == is_lowest
