@@ -19,6 +19,7 @@ function ageInWords(seconds) {
 
 function showState(state) {
   at("gone").hidden = true;
+  document.body.classList.remove("old");
   at("rig").textContent = state.rig + (state.simulated ? " (simulated)" : "");
   document.title = `${state.state} · ${state.rig} · force-gateway`;
   const badge = at("state");
@@ -104,6 +105,7 @@ api.on("gone", ({ sentence }) => {
   document.title = "no answer · force-gateway";
   at("gone").textContent = sentence;
   at("gone").hidden = false;
+  document.body.classList.add("old"); // the figures stay, and would look as if they were of now
 });
 addEventListener("hashchange", () => {
   openTab();

@@ -13,14 +13,17 @@ FIGURES = """async (state) => {
   const steering = makeSteering({});
   steering.samples({ force_n: [12.0] });
   steering.state(state);
-  return Array.from(steering.element.querySelectorAll("dd:not(.unit)"), (figure) => figure.textContent);
+  const shown = () => Array.from(steering.element.querySelectorAll("dd:not(.unit)"), (figure) => figure.textContent);
+  const told = [shown()];
+  steering.samples({ force_n: [12.5] });
+  return [...told, shown()];
 }"""
 
 
 @pytest.mark.parametrize(
     ("status", "measured_n", "force", "error"),
     [
-        (("enabled",), 11.98, "12.00", "-0.02"),
+        (("enabled",), 11.98, "11.98", "-0.02"),
         (("enabled", "pulling"), -11.98, "-11.98", "-0.02"),
         (("enabled",), None, "–", "–"),
     ],
@@ -33,6 +36,16 @@ def test_the_force_is_that_of_now_and_the_error_of_a_pull_is_that_of_a_push(
     force_state = LiveForce(requested_n=12.0, measured_n=measured_n, voltage_v=1.5)
     base = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="holding")
     window: Any = open_tab(chromium, page.address, "wiring")
-    shown = window.evaluate(FIGURES, replace(base, status=status, force=force_state).to_json())
+    shown, _ = window.evaluate(FIGURES, replace(base, status=status, force=force_state).to_json())
     assert shown == [force, "12.00", error, "1.500"]
+    window.close()
+
+
+def test_the_error_is_that_of_the_force_beside_it(page, chromium) -> None:
+    """Samples come 15 times a second, a state twice: 14.81 N beside a setpoint of 15 N had an error of +0.10 N."""
+    force_state = LiveForce(requested_n=12.0, measured_n=11.98, voltage_v=1.5)
+    base = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="holding")
+    window: Any = open_tab(chromium, page.address, "wiring")
+    _, shown = window.evaluate(FIGURES, replace(base, status=("enabled",), force=force_state).to_json())
+    assert shown == ["12.50", "12.00", "0.50", "1.500"]
     window.close()
