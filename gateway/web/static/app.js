@@ -62,8 +62,10 @@ async function openTab() {
     if (!element.hidden && other !== name) element.dispatchEvent(new Event("hidden"));
     element.hidden = other !== name;
     const link = document.querySelector(`#tabs a[href="#${other}"]`);
-    if (other === name) link.setAttribute("aria-current", "page");
-    else link.removeAttribute("aria-current");
+    if (other === name) {
+      link.setAttribute("aria-current", "page");
+      link.parentElement.scrollLeft = link.offsetLeft - 40; // on a narrow screen most of them are out of sight
+    } else link.removeAttribute("aria-current");
   }
   const element = at(`tab-${name}`);
   if (!mounted.has(name)) {

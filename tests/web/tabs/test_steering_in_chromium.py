@@ -1,4 +1,4 @@
-"""The big figures of the page: they say what is measured now, also where no sample of the ring comes."""
+"""The big figures of the page and its trend: they say what is measured now, also where no sample of the ring comes."""
 
 from dataclasses import replace
 from typing import Any
@@ -17,6 +17,17 @@ FIGURES = """async (state) => {
   const told = [shown()];
   steering.samples({ force_n: [12.5] });
   return [...told, shown()];
+}"""
+
+SILENCE = """async () => {
+  const { samples } = await import("/static/live/samples.js");
+  const told = [];
+  for (const clock_s of [100.4, 129.0]) {
+    if (!samples.time.length) samples.append({ time_s: [99.0, 100.0], force_n: [12.0, 12.0] });
+    samples.align({ time_unix_s: 5000.0 + clock_s, clock_s });
+    told.push([samples.now_s, samples.isFresh, samples.offset_s]);
+  }
+  return told;
 }"""
 
 
@@ -49,3 +60,13 @@ def test_the_error_is_that_of_the_force_beside_it(page, chromium) -> None:
     _, shown = window.evaluate(FIGURES, replace(base, status=("enabled",), force=force_state).to_json())
     assert shown == ["12.50", "12.00", "0.50", "1.500"]
     window.close()
+
+
+def test_time_goes_on_on_the_page_where_no_sample_comes(page, chromium) -> None:
+    """Of a silent cell the trend showed its last force as that of now, the fault that it was ahead of it, and the loop's
+    green point stood at a force that nobody measured."""
+    browser = chromium.new_context()
+    browser.route("**/events?*", lambda route: route.abort())
+    window: Any = open_tab(browser, page.address, "wiring")
+    assert window.evaluate(SILENCE) == [[100.4, True, 5000.0], [129.0, False, 5000.0]]
+    browser.close()
