@@ -16,7 +16,8 @@ const ANEW_MS = 10000;
 const PRESSES = /^\/api\/v1\/(command\/(?!stop)|calibrate\/start)/;
 let csrf = "";
 let source = null;
-let heardAt = 0;
+let heardAt = 0; // of the page's own start
+let openedAt = 0;
 let comeBack = 0;
 
 export const viewer = (() => {
@@ -82,7 +83,7 @@ export function tell(name, data) {
 export function listen() {
   if (source) return;
   const stream = (source = new EventSource(`/events?viewer=${viewer}`));
-  heardAt = performance.now();
+  openedAt = performance.now();
   for (const name of ["history", "samples", "state", "note", "gone"]) {
     stream.addEventListener(name, (event) => {
       heardAt = performance.now();
@@ -101,10 +102,11 @@ export function listen() {
 
 /** Of a line that is cut on its way, or a process that stands still, a browser hears no error: nothing comes, and that is all. */
 setInterval(() => {
-  const silent = performance.now() - heardAt;
+  const now = performance.now();
+  const silent = now - heardAt;
   if (!source || silent < SILENT_MS) return;
   tell("gone", { sentence: `Nothing has come from the gateway for ${Math.floor(silent / 1000)} s. What you see is old.` });
-  if (silent < ANEW_MS) return;
+  if (now - Math.max(heardAt, openedAt) < ANEW_MS) return;
   source.close();
   source = null;
   listen();
