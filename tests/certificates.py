@@ -54,5 +54,5 @@ def serial_of(name: str) -> str:
 def store_all(folder: Path) -> Folder:
     """Write all of them, once for each folder."""
     for name, each in signed().items():
-        made.store(each, folder, name)
+        made.store({name: each}, folder)
     return Folder(folder)

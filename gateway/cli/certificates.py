@@ -21,7 +21,7 @@ from gateway.modbus.certificate import ROLE_OID, encode_role
 from gateway.plain_file import read_plain
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 CA_NAME: Final = "force-gateway test CA"
 _SKEW: Final = timedelta(hours=1)  # a client's clock may be behind
@@ -78,19 +78,32 @@ def load_ca(folder: Path) -> Signed:
     return Signed(certificate, key)
 
 
-def store(signed: Signed, folder: Path, name: str) -> None:
-    """Write NAME.crt, and NAME.key for its owner's eyes only. FileExistsError rather than to overwrite."""
-    key = signed.key.private_bytes(
+def store(signed: "Mapping[str, Signed]", folder: Path) -> None:
+    """Write NAME.crt of each, and NAME.key for its owner's eyes only: all of them or none, for half of a CA would stand in
+    the way of the next. FileExistsError rather than to overwrite."""
+    written: list[Path] = []
+    try:
+        for name, one in signed.items():
+            for kind, data, mode in (("key", _key_of(one), 0o600), ("crt", _certificate_of(one), 0o644)):
+                path = folder / f"{name}.{kind}"
+                descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
+                written.append(path)
+                with os.fdopen(descriptor, "wb") as stream:
+                    stream.write(data)
+    except OSError:
+        for path in written:
+            path.unlink()
+        raise
+
+
+def _key_of(signed: Signed) -> bytes:
+    return signed.key.private_bytes(
         serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
     )
-    _write(folder / f"{name}.key", key, 0o600)
-    _write(folder / f"{name}.crt", signed.certificate.public_bytes(serialization.Encoding.PEM), 0o644)
 
 
-def _write(path: Path, data: bytes, mode: int) -> None:
-    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
-    with os.fdopen(descriptor, "wb") as stream:
-        stream.write(data)
+def _certificate_of(signed: Signed) -> bytes:
+    return signed.certificate.public_bytes(serialization.Encoding.PEM)
 
 
 def _sign(ca: Signed, name: str, days: int, extensions: "Sequence[x509.ExtensionType]") -> Signed:

@@ -134,4 +134,9 @@ def main() -> None:
         from gateway.cli.command_line.bash_completion import use_our_bash
 
         use_our_bash()
-    command(prog_name="force-gateway")
+    try:
+        command(prog_name="force-gateway")
+    except OSError as error:  # of the help itself, for which no verb runs: what it is printed to takes nothing
+        refused = translate_error(error, "--help", debug=False)
+        refused.show()
+        sys.exit(refused.exit_code)

@@ -38,6 +38,13 @@ _SECRET_WORD: Final = re.compile(
 )
 _IN_SECTION: Final = re.compile(r'(\b(?:web|mqtt)[\w.]*: \\?")[^"\\\n]+(?=\\?")')
 """What a fault quotes of the sections that hold secrets: `web: "TOKEN" is not a group of keys`."""
+_KNOWN_KEY: Final = (
+    r"(?:listen|token|host|port|tls|ca|certificate|key|username|password_file|base_topic|sparkplug|group|node|commands)"
+)
+_KEY_IN_SECTION: Final = re.compile(rf"(:\d+:\d+ (?:web|mqtt)\.)(?!{_KNOWN_KEY}(?:\.{_KNOWN_KEY})*: )[^\n]+?(?=: )")
+"""The same where it stands as a key: `web.TOKEN: is not a known key`."""
+_TAG_IN_SECTION: Final = re.compile(r"(:\d+:\d+ (?:web|mqtt)[\w.]*: tag `)[^`\n]+(?=`)")
+"""The same where it begins with a `!`, which makes a tag of it."""
 _LOGIN: Final = re.compile(r"(?<=://)[^/\s@\"]+(?=@)|(?<=\bbearer )[\w.~+/=-]+|(?<=\bbasic )[\w+/=]{8,}", re.I)
 _PEM: Final = re.compile(r"-----BEGIN [^-]+-----.*?(?:-----END [^-]+-----|\Z)", re.S)
 _IPV4: Final = re.compile(r"(?<![\d.])(?:\d{1,3}\.){3}\d{1,3}(?![\d.])")
@@ -53,7 +60,8 @@ class Redaction:
 
     def __call__(self, text: str) -> str:
         text = _PEM.sub("(a key or certificate, left out)", text)
-        text = _IN_SECTION.sub(r"\1(left out)", _SECRET_KEY.sub(r"\1(left out)", text))
+        for quoted in (_KEY_IN_SECTION, _TAG_IN_SECTION, _SECRET_KEY, _IN_SECTION):
+            text = quoted.sub(r"\1(left out)", text)
         text = _SECRET_WORD.sub(r"\1(left out)", _LOGIN.sub("(left out)", text))
         text = _IPV4.sub(lambda found: self._name_of(found[0]), text)
         return _MAYBE_IPV6.sub(lambda found: self._name_of(found[0]) if _is_ipv6(found[0]) else found[0], text)

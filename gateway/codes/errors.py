@@ -228,7 +228,7 @@ ERRORS: Final = (
     Explanation(
         "E422",
         "nothing to go on with",
-        "calibrate --resume found no recorded calibration run in the state directory.",
+        "calibrate --resume found no recorded calibration run in the state directory, or one that does not say its plan.",
         "Another --state or --rig than the one the run was started with.",
         "Compare with force-gateway recordings list, or begin a new run without --resume.",
     ),

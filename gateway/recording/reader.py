@@ -24,6 +24,7 @@ _FLOAT64: Final = struct.Struct("<d")
 _ROW_ITEM: Final = _FLOAT64.size
 _GROUPS: Final = ("ladder", "experiment", "plant_in_use", "rig_texts")
 """Of a header: what is a group of keys, where it is there."""
+_LARGEST: Final = 1.0e30
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,9 +167,27 @@ def _header(data: memoryview, path: Path) -> tuple[dict[str, Any], int]:
     names = header.get("columns")
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
         raise RecordingError(f"{path} has a header without columns: zeros of a power cut, or another program's file")
-    if wrong := [name for name in _GROUPS if not isinstance(header.get(name) or {}, dict)]:
-        raise RecordingError(f"{path} has a header whose {wrong[0]} is no group of keys: another program's file")
+    if strange := _strange_in(header):
+        raise RecordingError(f"{path} has a header whose {strange}: another program's file")
     return header, start + length
+
+
+def _strange_in(header: dict[str, Any]) -> str:
+    """Return what of a header no gateway writes, empty for nothing: whoever goes on with a ladder counts with what it says."""
+    if wrong := [name for name in _GROUPS if not isinstance(header.get(name) or {}, dict)]:
+        return f"{wrong[0]} is no group of keys"
+    ladder = {f"ladder.{name}": value for name, value in (header.get("ladder") or {}).items() if value is not None}
+    numbers = ladder | {"zero_n": header.get("zero_n", 0.0)}
+    if wrong := [name for name, value in numbers.items() if not _is_number(value)]:
+        return f"{wrong[0]} is no number"
+    earlier = header.get("continues", [])
+    if not isinstance(earlier, list) or not all(type(number) is int for number in earlier):
+        return "continues is no list of recordings' numbers"
+    return ""
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and abs(value) < _LARGEST
 
 
 def _said_by(document: bytes) -> dict[str, Any]:

@@ -150,7 +150,12 @@ class EventSource:
             self._state = _event("gone", {"sentence": f"the gateway does not answer: {error}"})
             self._send(self._state)
             return
-        more = {"words": words, "viewers": self.viewers, "commander": self._commands.commander}
+        more = {
+            "words": words,
+            "viewers": self.viewers,
+            "commander": self._commands.commander,
+            "clock_s": time.monotonic(),  # as the times of the samples: the newest may be old
+        }
         self._state = _event("state", state | more)
         self._send(self._state)
 

@@ -35,7 +35,7 @@ def generous_umask() -> Iterator[None]:
 
 @pytest.mark.usefixtures("generous_umask")
 def test_a_key_is_for_its_owners_eyes_alone(ca: Signed, tmp_path: Path) -> None:
-    store(ca, tmp_path, "ca")
+    store({"ca": ca}, tmp_path)
     assert stat.S_IMODE((tmp_path / "ca.key").stat().st_mode) == 0o600
 
 
@@ -44,8 +44,16 @@ def test_nothing_is_written_over_what_is_there(ca: Signed, tmp_path: Path, there
     """A CA whose key is gone has certified all its clients for nothing."""
     (tmp_path / there).write_text("precious")
     with pytest.raises(FileExistsError):
-        store(ca, tmp_path, "ca")
+        store({"ca": ca}, tmp_path)
     assert (tmp_path / there).read_text() == "precious"
+
+
+def test_where_one_cannot_be_written_none_is_left(ca: Signed, tmp_path: Path) -> None:
+    """On a full disk an empty ca.crt stayed beside its key: the same command refused it from then on."""
+    (tmp_path / "robot.crt").mkdir()
+    with pytest.raises(OSError, match="exists"):
+        store({"ca": ca, "robot": make_client(ca, "robot", Role.SETPOINT, 30)}, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["robot.crt"]
 
 
 def test_only_the_ca_signs_certificates(ca: Signed) -> None:
@@ -70,9 +78,9 @@ def test_a_client_s_certificate_is_no_server_s_and_the_other_way_round(ca: Signe
 
 
 def test_a_ca_with_another_s_key_signs_nothing(ca: Signed, tmp_path: Path) -> None:
-    store(ca, tmp_path, "ca")
+    store({"ca": ca}, tmp_path)
     assert load_ca(tmp_path).certificate == ca.certificate
-    store(make_ca(30), tmp_path, "other")
+    store({"other": make_ca(30)}, tmp_path)
     (tmp_path / "other.key").replace(tmp_path / "ca.key")
     with pytest.raises(ValueError, match=r"ca\.key does not fit ca\.crt"):
         load_ca(tmp_path)
@@ -83,7 +91,7 @@ def test_nothing_outlives_the_ca_that_has_signed_it(tmp_path: Path) -> None:
     short = make_ca(5)
     made = [make_server(short, ["127.0.0.1"], 30), make_client(short, "robot", Role.SETPOINT, 30)]
     assert {each.certificate.not_valid_after_utc for each in made} == {short.certificate.not_valid_after_utc}
-    store(short, tmp_path, "ca")
+    store({"ca": short}, tmp_path)
     said = CliRunner().invoke(command, ["certs", str(tmp_path), "--client", "robot:setpoint"])
     assert said.exit_code == 0
     ends = f"{short.certificate.not_valid_after_utc:%Y-%m-%d}"
@@ -114,7 +122,7 @@ def test_a_ca_that_cannot_sign_is_told_apart(
     tmp_path: Path, days: int, spoil: Callable[[Path], None] | None, sentence: str
 ) -> None:
     """An expired one signed for nothing and said that it had worked; a key with a password was an internal error."""
-    store(make_ca(days), tmp_path, "ca")
+    store({"ca": make_ca(days)}, tmp_path)
     if spoil:
         spoil(tmp_path)
     said = CliRunner().invoke(command, ["certs", str(tmp_path), "--client", "robot:setpoint"])

@@ -3,14 +3,18 @@
 import json
 import os
 import tarfile
+from dataclasses import fields
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner, Result
 
 from gateway.cli.main import command
 from gateway.cli.support_bundle import Redaction, collect
 from gateway.processes.event import encode_event, make_event
 from gateway.processes.event_file import EventFile
+from gateway.profiles.http_sections import Web
+from gateway.profiles.telemetry_sections import BrokerTls, Mqtt, SparkplugNode
 
 SECRETS = """web:
   token: s3cr3t-t0ken
@@ -64,6 +68,37 @@ def test_what_a_fault_quotes_of_a_section_with_secrets_does_not_go_in(tmp_path: 
     assert "s3cr3t" not in told and told.count("is not a group of keys") == 2
     event = next(line for line in told.splitlines() if line.startswith('{"time"'))
     assert 'web: "(left out)" is not' in json.loads(event)["text"]
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        "web: {s3cr3t-abc: 1}",
+        "web:\n  token s3cr3t-abc: x",
+        "web:\n  s3cr3t-abc: 1\n  s3cr3t-abc: 2",
+        "web:\n  token: !s3cr3t-abc x",
+        "web: !!s3cr3t-abc x",
+        "mqtt: {host: broker, password s3cr3t-abc: 1}",
+    ],
+)
+def test_a_secret_that_stands_as_a_key_or_tag_does_not_go_in_either(section: str, tmp_path: Path) -> None:
+    """`web.TOKEN: is not a known key` was in the bundle, and so were the events that had said it."""
+    rig = tmp_path / "cell.yaml"
+    rig.write_text(f"name: cell\n{section}\n")
+    checked = gateway("check", rig)
+    said = next(line for line in checked.output.splitlines() if "s3cr3t" in line)
+    state = with_events(tmp_path / "state", f"E151 {said}\n{said}")
+    told = gateway("report", "--show", "--rig", rig, "--state", state).output
+    assert "s3cr3t" not in told and "(left out)" in told
+
+
+def test_a_key_of_a_section_with_secrets_that_is_known_stays(tmp_path: Path) -> None:
+    keys = [each.name for kind in (Web, Mqtt, BrokerTls, SparkplugNode) for each in fields(kind)]
+    faults = "\n".join(
+        f"cell.yaml:2:{row} mqtt.{key}: what stands there is not text" for row, key in enumerate(keys, 1)
+    )
+    told = Redaction()(faults).splitlines()
+    assert [line.split("mqtt.")[1].split(":")[0] for line in told] == keys
 
 
 def test_an_address_of_ipv6_is_one_too() -> None:

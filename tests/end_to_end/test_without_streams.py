@@ -40,3 +40,11 @@ def test_a_gateway_without_streams_comes_up_and_obeys(tmp_path: Path, closed: tu
         gateway.kill()
         gateway.wait()
     assert (tmp_path / "lock").read_bytes() == b""
+
+
+@pytest.mark.parametrize("word", ["--help", "--version"])
+def test_a_help_that_nobody_can_take_is_one_sentence(word: str) -> None:
+    """It is printed before any verb runs, and ended with a traceback."""
+    with Path("/dev/full").open("w") as full:
+        asked = subprocess.run([sys.executable, "-m", "gateway", word], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert (asked.returncode, asked.stderr) == (1, "E106 No space left on device: the disk is full\n")

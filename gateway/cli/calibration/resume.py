@@ -18,6 +18,7 @@ from gateway.processes import exit_codes
 from gateway.recording import Recording, RecordingError, read_header, read_recording, recording_paths
 
 _NO_PLAN: Final = ("stairs", "top_v")  # what the header says beside the plan's own fields
+_PLAN: Final = ("groups", "minor_points", "step_v", "v_max_v")  # without which nobody knows what is left
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,18 +52,26 @@ class RestOfLadder:
 def find_rest_of_ladder(state: Path) -> RestOfLadder:
     """Return what is left of the last recorded ladder. CliError where none is recorded."""
     path, header = _last_ladder(state)
-    facts, last = header["ladder"], read_recording(path)
-    plan = {name: value for name, value in facts.items() if name not in _NO_PLAN}
-    plan["tare"] = (
-        False  # the zero is that of the first part (ladder_source); a slide that has pressed does not rest at it
-    )
-    plan["v_max_v"] = facts.get("top_v", plan["v_max_v"])  # the same stairs again, whatever model is in use by now
+    plan, last = _plan_of(header["ladder"], path), read_recording(path)
     earlier = {number: _whole_groups(_beside(path, number)) for number in header.get("continues", ())}
     climbed = earlier | {int(path.stem): _whole_groups(last)}
     used = [number for number, groups in climbed.items() if groups]
     finished = _is_finished(last) and all(earlier.values())
     groups, fingerprint = sum(climbed.values()), header.get("rig_fingerprint", "")
     return RestOfLadder(plan, groups, used, header.get("name", ""), fingerprint, path, finished)
+
+
+def _plan_of(facts: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Return the plan of a stopped ladder. CliError for one of another program, that does not say all of it."""
+    plan = {name: value for name, value in facts.items() if name not in _NO_PLAN}
+    plan["tare"] = (
+        False  # the zero is that of the first part (ladder_source); a slide that has pressed does not rest at it
+    )
+    plan["v_max_v"] = facts.get("top_v", plan.get("v_max_v"))  # the same stairs again, whatever model is in use by now
+    if missing := [name for name in _PLAN if plan.get(name) is None]:
+        sentence = f"{path} does not say the {', '.join(missing)} of its ladder, as a gateway's own does: begin anew"
+        raise CliError(f"E422 {sentence}, without --resume", exit_codes.DATA)
+    return plan
 
 
 def _last_ladder(state: Path) -> tuple[Path, dict[str, Any]]:

@@ -1,5 +1,6 @@
 """Files of an answer: all of them whole, or none, and never over what they were made from."""
 
+import contextlib
 import errno
 import os
 import threading
@@ -16,9 +17,11 @@ STDOUT: Final = Path("-")  # as the name of a file
 
 def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Raise UsageError where two outputs, or an output and an input, are one file, FileNotFoundError where no directory is,
-    IsADirectoryError where one is in the place of a file."""
+    IsADirectoryError where one is in the place of a file, OSError where links lead in a circle."""
     occupied = {path.resolve(): f"{path} is read" for path in inputs if path.exists()}
     for target in targets:
+        with contextlib.suppress(FileNotFoundError):
+            target.stat()  # links that lead in a circle lead nowhere
         if target.resolve() in occupied:
             raise click.UsageError(f"{target} would be overwritten: {occupied[target.resolve()]}")
         occupied[target.resolve()] = f"{target} is written by another option"

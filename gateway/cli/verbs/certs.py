@@ -110,6 +110,7 @@ def _make(folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: 
     from gateway.cli import certificates
 
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    made: dict[str, certificates.Signed] = {}
     if (folder / "ca.crt").exists():
         try:
             ca = certificates.load_ca(folder)
@@ -118,12 +119,12 @@ def _make(folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: 
             raise CliError(sentence, exit_codes.DATA) from None
         _say_earlier_end(folder, ca.certificate.not_valid_after_utc, days)
     else:
-        ca = certificates.make_ca(days)
-        certificates.store(ca, folder, "ca")
+        ca = made["ca"] = certificates.make_ca(days)
     if hosts:
-        certificates.store(certificates.make_server(ca, hosts, days), folder, "gateway")
+        made["gateway"] = certificates.make_server(ca, hosts, days)
+    made |= {name: certificates.make_client(ca, name, role, days) for name, role in clients.items()}
+    certificates.store(made, folder)
     for name, role in clients.items():
-        certificates.store(certificates.make_client(ca, name, role, days), folder, name)
         click.echo(f"{folder / name}.crt, .key   client {name}, role {role.name.lower()}")
 
 

@@ -15,7 +15,9 @@ from gateway.cli.options import json_option, name_option, state_directory
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
+    from gateway.recording import Recording
     from gateway.service.fitting.ladder_fit import LadderFit
+    from gateway.service.fitting.ladder_source import RigContext
 
 MODELS: Final = ("pfm", "psfm", "bfm", "bsfm")
 
@@ -130,7 +132,7 @@ def _fit(path: Path, options: dict[str, Any]) -> "LadderFit":
     from gateway.progress import report
     from gateway.recording.tables.mapping_file import column_mapping
     from gateway.service.fitting.ladder_fit import fit_recording
-    from gateway.service.fitting.ladder_source import RigContext, read_source
+    from gateway.service.fitting.ladder_source import read_source
 
     report("reading the recording")
     mapping = column_mapping(options["columns"])
@@ -138,14 +140,26 @@ def _fit(path: Path, options: dict[str, Any]) -> "LadderFit":
     question = FitRequest(
         models=models, orders=options["orders"], ties=Ties(options["ties"]), outliers=options["outliers"]
     )
-    background = RigContext(rig=options["rig"], state=options["state"], force_unit=options["force_unit"])
     recording = read_source(path, mapping)
+    background = _background(recording, options)
     report("checking the ladder")
     try:
         return fit_recording(recording, question, background, options["name"] or "")
     except LadderError as error:
         hint = f". {recording.suggestion}" if error.flaw is LadderFlaw.COLUMNS and recording.suggestion else ""
         raise CliError(f"E421 {path}: {error}{hint}", exit_codes.DATA) from None
+
+
+def _background(recording: "Recording", options: dict[str, Any]) -> "RigContext":
+    """Return by what it is judged: a gateway's recording by the calibration that is in use there, another table by the one
+    in use where --state says, else by the rig's own."""
+    from gateway.service.fitting.ladder_source import RigContext
+
+    rig, state = options["rig"], options["state"]
+    own = state_directory(state, rig)
+    if state is None and recording.path.parent == own / "recordings":
+        rig, state = rig or str(recording.header.get("rig") or "") or None, own
+    return RigContext(rig=rig, state=state, force_unit=options["force_unit"])
 
 
 def _beside(path: Path) -> Path:

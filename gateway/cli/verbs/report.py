@@ -7,8 +7,6 @@ import click
 from gateway.cli.errors import already_exists
 from gateway.cli.options import StateChoice, state_options
 
-EXAMPLES = ("report", "report mine.tar.gz --rig demo")
-
 EXAMPLES = ("report for-support.tar.gz", "report --show")
 
 

@@ -17,8 +17,6 @@ _ROOT = click.option(
 )
 
 
-EXAMPLES = ("service install demo --dry-run", "service install irc5-cell --dry-run --command /usr/bin/force-gateway")
-
 EXAMPLES = (
     "service install irc5-cell --dry-run --command /opt/force-gateway/bin/force-gateway",
     "service install demo --root image --command /opt/force-gateway/bin/force-gateway",

@@ -11,9 +11,13 @@ const latest = new Map();
 const tabs = new BroadcastChannel("force-gateway");
 const AWAY_MS = 2000;
 const COMMAND_MS = 5000;
+const SILENT_MS = 3000; // a state comes twice a second
+const ANEW_MS = 10000;
 const PRESSES = /^\/api\/v1\/(command\/(?!stop)|calibrate\/start)/;
 let csrf = "";
 let source = null;
+let heardAt = 0; // of the page's own start
+let openedAt = 0;
 let comeBack = 0;
 
 export const viewer = (() => {
@@ -79,8 +83,12 @@ export function tell(name, data) {
 export function listen() {
   if (source) return;
   const stream = (source = new EventSource(`/events?viewer=${viewer}`));
+  openedAt = performance.now();
   for (const name of ["history", "samples", "state", "note", "gone"]) {
-    stream.addEventListener(name, (event) => tell(name, JSON.parse(event.data)));
+    stream.addEventListener(name, (event) => {
+      heardAt = performance.now();
+      tell(name, JSON.parse(event.data));
+    });
   }
   stream.onopen = () => tell("open", true);
   stream.onerror = () => {
@@ -91,6 +99,18 @@ export function listen() {
     setTimeout(listen, 2000);
   };
 }
+
+/** Of a line that is cut on its way, or a process that stands still, a browser hears no error: nothing comes, and that is all. */
+setInterval(() => {
+  const now = performance.now();
+  const silent = now - heardAt;
+  if (!source || silent < SILENT_MS) return;
+  tell("gone", { sentence: `Nothing has come from the gateway for ${Math.floor(silent / 1000)} s. What you see is old.` });
+  if (now - Math.max(heardAt, openedAt) < ANEW_MS) return;
+  source.close();
+  source = null;
+  listen();
+}, 1000);
 
 /** Gives up the streams of all tabs of the page, and with each a connection: a browser has six for all, and each tab keeps one,
  *  or waits for one before us. The others come back by themselves. */

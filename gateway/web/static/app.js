@@ -10,23 +10,23 @@ const mounted = new Set();
 const at = (id) => document.getElementById(id);
 let aliveAt = 0;
 
+/** A calibration knows the day that it was made on, and no hour. */
 function ageInWords(seconds) {
-  if (seconds === null || seconds === undefined) return "";
-  const steps = [[86400 * 2, 86400, "days"], [3600 * 2, 3600, "h"], [120, 60, "min"], [0, 1, "s"]];
-  const [, unit, name] = steps.find(([least]) => seconds >= least);
-  return `${Math.floor(seconds / unit)} ${name}`;
+  if (seconds === null || seconds === undefined || seconds < 0) return ""; // not known, or by a clock that was wrong
+  const days = Math.floor(seconds / 86400);
+  return days < 1 ? ", of today" : `, ${days} ${days === 1 ? "day" : "days"} old`;
 }
 
 function showState(state) {
   at("gone").hidden = true;
+  document.body.classList.remove("old");
   at("rig").textContent = state.rig + (state.simulated ? " (simulated)" : "");
   document.title = `${state.state} · ${state.rig} · force-gateway`;
   const badge = at("state");
   if (badge.textContent !== state.state) badge.textContent = state.state; // a screen reader says it once
   badge.className = `badge ${BADGES[state.state] ?? ""}`;
-  const age = ageInWords(state.calibration.age_s);
-  at("calibration").textContent =
-    `${state.calibration.number} ${state.calibration.name}, ${state.calibration.kind}` + (age ? `, ${age} old` : "");
+  const { number, name, kind, age_s } = state.calibration;
+  at("calibration").textContent = `${number} ${name}, ${kind}${ageInWords(age_s)}`;
   at("owner").textContent = state.owner === "web" ? (state.commander === api.viewer ? "you" : "another page") : state.owner ?? "nobody";
   at("masters").textContent = state.peers.length;
   at("viewers").textContent = state.viewers;
@@ -61,8 +61,10 @@ async function openTab() {
     if (!element.hidden && other !== name) element.dispatchEvent(new Event("hidden"));
     element.hidden = other !== name;
     const link = document.querySelector(`#tabs a[href="#${other}"]`);
-    if (other === name) link.setAttribute("aria-current", "page");
-    else link.removeAttribute("aria-current");
+    if (other === name) {
+      link.setAttribute("aria-current", "page");
+      link.parentElement.scrollLeft = link.offsetLeft - 40; // on a narrow screen most of them are out of sight
+    } else link.removeAttribute("aria-current");
   }
   const element = at(`tab-${name}`);
   if (!mounted.has(name)) {
@@ -104,6 +106,7 @@ api.on("gone", ({ sentence }) => {
   document.title = "no answer · force-gateway";
   at("gone").textContent = sentence;
   at("gone").hidden = false;
+  document.body.classList.add("old"); // the figures stay, and would look as if they were of now
 });
 addEventListener("hashchange", () => {
   openTab();

@@ -114,6 +114,18 @@ def test_a_run_whose_last_stair_stood_when_it_ended_is_not_finished(monkeypatch:
     assert find_rest_of_ladder(Path()).finished is False
 
 
+@pytest.mark.parametrize("lost", ["groups", "minor_points", "step_v"])
+def test_a_ladder_that_does_not_say_its_plan_is_no_run_to_go_on_with(
+    lost: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was an internal error."""
+    recorded = Recorded(monkeypatch, {3: 1})
+    recorded.headers = {Path("0003.fgr"): {"ladder": {name: value for name, value in PLAN.items() if name != lost}}}
+    with pytest.raises(CliError, match=f"E422 0003.fgr does not say the {lost} of its ladder") as ended:
+        find_rest_of_ladder(Path())
+    assert ended.value.exit_code == exit_codes.DATA
+
+
 def test_without_a_ladder_there_is_nothing_to_go_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
     recorded = Recorded(monkeypatch, {})
     recorded.headers = {Path("0004.fgr"): {"rig": "demo"}}

@@ -11,6 +11,7 @@ import pytest
 
 from gateway.recording import Recorder
 
+COLUMNS = ("time_s", "command_v", "force_n")
 ORDERS = ("--models", "psfm,bsfm", "--orders", "1-2")
 
 
@@ -58,13 +59,30 @@ def test_the_report_loads_nothing_from_anywhere(tmp_path: Path, call) -> None:
 
 
 def test_a_recording_of_the_gateway_is_fitted_by_its_number(tmp_path: Path, call) -> None:
-    recorder = Recorder(tmp_path / "recordings", {"rig": "demo"}, ("time_s", "command_v", "force_n"))
+    recorder = Recorder(tmp_path / "recordings", {"rig": "demo"}, COLUMNS)
     for row in ladder_rows():
         recorder.append(row)
     recorder.close()
     answer = call("fit", "1", "--state", str(tmp_path), *ORDERS, "--json")
     assert answer.exit_code == 0, answer.output
     assert json.loads(answer.stdout)["report"] == str(tmp_path / "recordings" / "0001.fit.html")
+
+
+def test_a_recording_by_its_number_is_judged_by_the_calibration_that_is_in_use_there(
+    tmp_path: Path, call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without --state it was the rig's own, which was said to be in use: a fit that is far worse was offered."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    recorder = Recorder(tmp_path / "force-gateway" / "demo" / "recordings", {"rig": "demo"}, COLUMNS)
+    for row in ladder_rows():
+        recorder.append(row)
+    recorder.close()
+    words = ("fit", "1", "--rig", "demo", "--models", "bsfm", "--orders", "2", "--no-report", "--json")
+    before = json.loads(call(*words, "--store").stdout)
+    assert (before["measured"]["in_use"], before["calibration"]) == (1, 2)
+    assert call("calibration", "use", "2", "--rig", "demo").exit_code == 0
+    after = json.loads(call(*words).stdout)["measured"]
+    assert (after["in_use"], after["in_use_rms_n"]) == (2, pytest.approx(after["rms_n"], rel=1e-3))
 
 
 def test_store_adds_a_numbered_calibration_that_says_where_it_comes_from(tmp_path: Path, call) -> None:

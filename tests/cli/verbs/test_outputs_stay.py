@@ -71,3 +71,11 @@ def test_pages_are_written_where_a_link_leads_to(tmp_path: Path) -> None:
     (tmp_path / "out").symlink_to("there")
     write_all({tmp_path / "out": "a page"})
     assert (tmp_path / "out").is_symlink() and (tmp_path / "there").read_text() == "a page"
+
+
+def test_a_link_that_leads_in_a_circle_is_no_file_to_write_to(state: Path, call: Call) -> None:
+    """It was an internal error."""
+    (state.parent / "out").symlink_to("out")
+    answer = call("calibration", "compare", "1", "1", "--plot", "out", "--state", "state")
+    assert answer.exit_code == 1 and answer.output.startswith("E106 ") and "Too many levels" in answer.output
+    assert (state.parent / "out").is_symlink()

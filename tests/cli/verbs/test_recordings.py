@@ -131,6 +131,28 @@ def test_a_recording_of_another_program_hides_no_other_one(key: str, state: Path
     assert f"whose {key} is no group of keys" in call("recordings", "show", "3", "--state", state).output
 
 
+@pytest.mark.parametrize(
+    ("facts", "what"),
+    [
+        ({"ladder": {"groups": "four"}}, "ladder.groups is no number"),
+        ({"ladder": {"step_v": 10**400}}, "ladder.step_v is no number"),
+        ({"zero_n": None}, "zero_n is no number"),
+        ({"continues": 5}, "continues is no list of recordings' numbers"),
+        ({"continues": ["x"]}, "continues is no list of recordings' numbers"),
+    ],
+)
+def test_a_ladder_of_another_form_ends_no_verb_with_an_internal_error(
+    facts: dict, what: str, state: Path, call
+) -> None:
+    """List, fit and calibrate --resume ended with one, each for another of these."""
+    record(state, **facts)
+    listed = call("recordings", "list", "--json", "--state", state)
+    assert listed.exit_code == 0 and what in json.loads(listed.stdout)[-1]["fault"]
+    for verb in (["recordings", "show", "3"], ["fit", "3", "--no-report"]):
+        assert what in call(*verb, "--state", state).output
+    assert "E422" in call("calibrate", "--resume", "--yes", "--state", state).output
+
+
 @pytest.mark.parametrize("key", ["rig", "started_utc"])
 def test_a_header_of_another_program_with_a_number_for_a_name_is_listed(key: str, state: Path, call) -> None:
     """The list of all recordings ended with an internal error."""

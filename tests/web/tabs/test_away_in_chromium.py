@@ -3,6 +3,9 @@
 import json
 from typing import Any
 
+import pytest
+
+from gateway.web.events import EventSource
 from gateway.web.register_table import register_table
 from tests.service.rigs import demo
 from tests.web.tabs.conftest import record
@@ -68,6 +71,46 @@ def test_what_says_how_the_gateway_is_does_not_go_on_saying_it_while_that_is_awa
     served.answer = answer  # type: ignore[method-assign]
     expect(state).to_have_text("off", timeout=10_000)
     assert window.title().startswith("off")
+    window.close()
+
+
+def test_a_page_to_which_nothing_comes_any_more_says_that_it_is_old(
+    page, served: ScriptedControl, chromium, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A cable that is pulled ends no stream: a browser that only listens waits for ever, and the page said `holding`."""
+    from playwright.sync_api import expect
+
+    monkeypatch.setattr(EventSource, "_run", EventSource._tell_state)  # once, and nothing more
+    window = chromium.new_page()
+    window.clock.install()
+    window.goto(f"{page.address}/#live")
+    expect(window.locator("#state")).to_have_text("off", timeout=10_000)
+    window.clock.fast_forward(5_000)
+    expect(window.locator("#state")).to_have_text("no answer", timeout=10_000)
+    expect(window.locator("#gone")).to_contain_text("What you see is old")
+    assert float(window.locator("#tab-live").evaluate("(live) => getComputedStyle(live).opacity")) < 1.0
+    window.clock.fast_forward(10_000)
+    expect(window.locator("#state")).to_have_text("off", timeout=10_000)  # a fresh stream tells it
+    assert float(window.locator("#tab-live").evaluate("(live) => getComputedStyle(live).opacity")) == 1.0
+    window.close()
+
+
+@pytest.mark.parametrize(
+    ("age_s", "words"),
+    [(24_000.0, ", of today"), (90_000.0, ", 1 day old"), (5.5 * 86_400.0, ", 5 days old"), (None, ""), (-9.0, "")],
+)
+def test_the_age_of_a_calibration_is_told_in_the_days_that_are_known(
+    page, served: ScriptedControl, chromium, age_s: float | None, words: str
+) -> None:
+    """One of this minute was `6 h old`: of its date the hours of the day are no age."""
+    from playwright.sync_api import expect
+
+    answer, calibration = served.answer, {"number": 2, "name": "left cell", "kind": "stored", "age_s": age_s}
+    served.answer = lambda request: (  # type: ignore[method-assign]
+        answer(request) | ({"calibration": calibration} if request["do"] == "state" else {})
+    )
+    window = open_tab(chromium, page.address, "configuration")
+    expect(window.locator("#calibration")).to_have_text(f"2 left cell, stored{words}", timeout=10_000)
     window.close()
 
 

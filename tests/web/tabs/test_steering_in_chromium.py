@@ -1,4 +1,4 @@
-"""The big figures of the page: they say what is measured now, also where no sample of the ring comes."""
+"""The big figures of the page and its trend: they say what is measured now, also where no sample of the ring comes."""
 
 from dataclasses import replace
 from typing import Any
@@ -13,14 +13,28 @@ FIGURES = """async (state) => {
   const steering = makeSteering({});
   steering.samples({ force_n: [12.0] });
   steering.state(state);
-  return Array.from(steering.element.querySelectorAll("dd:not(.unit)"), (figure) => figure.textContent);
+  const shown = () => Array.from(steering.element.querySelectorAll("dd:not(.unit)"), (figure) => figure.textContent);
+  const told = [shown()];
+  steering.samples({ force_n: [12.5] });
+  return [...told, shown()];
+}"""
+
+SILENCE = """async () => {
+  const { samples } = await import("/static/live/samples.js");
+  const told = [];
+  for (const clock_s of [100.4, 129.0]) {
+    if (!samples.time.length) samples.append({ time_s: [99.0, 100.0], force_n: [12.0, 12.0] });
+    samples.align({ time_unix_s: 5000.0 + clock_s, clock_s });
+    told.push([samples.now_s, samples.isFresh, samples.offset_s]);
+  }
+  return told;
 }"""
 
 
 @pytest.mark.parametrize(
     ("status", "measured_n", "force", "error"),
     [
-        (("enabled",), 11.98, "12.00", "-0.02"),
+        (("enabled",), 11.98, "11.98", "-0.02"),
         (("enabled", "pulling"), -11.98, "-11.98", "-0.02"),
         (("enabled",), None, "–", "–"),
     ],
@@ -33,6 +47,26 @@ def test_the_force_is_that_of_now_and_the_error_of_a_pull_is_that_of_a_push(
     force_state = LiveForce(requested_n=12.0, measured_n=measured_n, voltage_v=1.5)
     base = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="holding")
     window: Any = open_tab(chromium, page.address, "wiring")
-    shown = window.evaluate(FIGURES, replace(base, status=status, force=force_state).to_json())
+    shown, _ = window.evaluate(FIGURES, replace(base, status=status, force=force_state).to_json())
     assert shown == [force, "12.00", error, "1.500"]
     window.close()
+
+
+def test_the_error_is_that_of_the_force_beside_it(page, chromium) -> None:
+    """Samples come 15 times a second, a state twice: 14.81 N beside a setpoint of 15 N had an error of +0.10 N."""
+    force_state = LiveForce(requested_n=12.0, measured_n=11.98, voltage_v=1.5)
+    base = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="holding")
+    window: Any = open_tab(chromium, page.address, "wiring")
+    _, shown = window.evaluate(FIGURES, replace(base, status=("enabled",), force=force_state).to_json())
+    assert shown == ["12.50", "12.00", "0.50", "1.500"]
+    window.close()
+
+
+def test_time_goes_on_on_the_page_where_no_sample_comes(page, chromium) -> None:
+    """Of a silent cell the trend showed its last force as that of now, the fault that it was ahead of it, and the loop's
+    green point stood at a force that nobody measured."""
+    browser = chromium.new_context()
+    browser.route("**/events?*", lambda route: route.abort())
+    window: Any = open_tab(browser, page.address, "wiring")
+    assert window.evaluate(SILENCE) == [[100.4, True, 5000.0], [129.0, False, 5000.0]]
+    browser.close()

@@ -141,3 +141,19 @@ def test_on_the_simulated_rig_a_run_is_stored_used_and_diagnosed(tmp_path: Path,
         assert gateway.words(CALIBRATION_IN_USE, 1) == [2]
     finally:
         stop(gateway)
+
+
+def test_on_a_narrow_screen_no_label_runs_into_its_value_and_the_open_tab_is_in_sight(page, state, chromium) -> None:
+    """`what happened` stood across what had happened, and Diagnosis was behind the edge."""
+    record(state)
+    window = open_tab(chromium, page.address, "recordings")
+    window.set_viewport_size({"width": 360, "height": 740})
+    cell = window.locator("td[data-label='what happened']")
+    cell.wait_for()
+    assert cell.evaluate("(cell) => getComputedStyle(cell).whiteSpace") == "normal"
+    for name in ("Configuration", "Live"):
+        window.evaluate(f"location.hash = '#{name.lower()}'")
+        window.locator(f"#tab-{name.lower()}:not([hidden])").wait_for()
+        link = window.get_by_role("link", name=name, exact=True).bounding_box()
+        assert link["x"] >= 0.0 and link["x"] + link["width"] <= 360.0
+    window.close()

@@ -29,7 +29,7 @@ export function makeLoop(samples, api) {
   function drawMeasured(chart) {
     const { command_v = [], force_n = [] } = samples.columns;
     dots(chart, command_v, force_n, { fill: colour("measured"), size: 2.4 });
-    if (!force_n.length) return;
+    if (!samples.isFresh) return; // where it stands now is not known
     const x = chart.valToPos(command_v.at(-1), "x", true);
     const y = chart.valToPos(force_n.at(-1), "y", true);
     const context = chart.ctx;

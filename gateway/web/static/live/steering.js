@@ -53,20 +53,25 @@ export function makeSteering(api) {
     act("record", { on }, on ? "Recording." : "The recording is kept: see Recordings.");
   });
 
+  /** The force, and the error of this very force. */
+  function showForce(measured) {
+    const wanted_n = state?.status.includes("enabled") ? state.force.requested_n : 0;
+    const along = state?.status.includes("pulling") ? -measured : measured; // a pull is measured negative, its setpoint is not
+    force.value.textContent = newton(measured);
+    error.value.textContent = measured !== null && wanted_n ? newton(along - wanted_n) : "–";
+  }
+
   return {
     element,
     samples({ force_n = [] }) {
-      if (force_n.length) force.value.textContent = newton(force_n.at(-1));
+      if (force_n.length) showForce(force_n.at(-1));
     },
     state(next) {
       state = next;
       const isOn = state.status.includes("enabled");
       wanted.value.textContent = newton(state.force.requested_n);
       voltage.value.textContent = state.force.voltage_v === null ? "–" : state.force.voltage_v.toFixed(3);
-      const measured = state.force.measured_n;
-      if (measured === null || state.status.includes("pulling")) force.value.textContent = newton(measured); // no sample comes
-      const along = state.status.includes("pulling") ? -measured : measured; // a pull is measured negative, its setpoint is not
-      error.value.textContent = isOn && measured !== null && state.force.requested_n ? newton(along - state.force.requested_n) : "–";
+      showForce(state.force.measured_n); // also where no sample comes
       input.max = state.limits.force_max_n;
       range.textContent = `${newton(state.limits.force_min_n)} .. ${newton(state.limits.force_max_n)} N`
         + (state.limits.lease_s ? `; lease ${Math.round(1000 * state.limits.lease_s)} ms, kept while this page is open` : "");

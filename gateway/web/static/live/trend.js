@@ -44,6 +44,7 @@ export function makeTrend(samples) {
     const { top, height, left, width } = chart.bbox;
     context.save();
     context.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+    context.textAlign = "left"; // the chart has left its own
     let row = 0;
     for (const mark of samples.marks) {
       const x = chart.valToPos(mark.unix_s - samples.offset_s, "x", true);

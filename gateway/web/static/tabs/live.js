@@ -56,6 +56,7 @@ export function mount(element, api) {
   });
   api.on("state", (state) => {
     if (!element.hidden) for (const part of parts) part.state?.(state);
+    ask(); // also where no sample comes: time goes on
   });
   samples.marks.forEach(alarms.tell);
   element.addEventListener("shown", () => {
