@@ -2,6 +2,7 @@
 
 import pytest
 
+from gateway.control.compensation.cell_map import CellMap
 from gateway.control.sample_conditioning import SampleConditioner, at_time
 from gateway.control.settings import Supervision
 from gateway.devices.messages import ForceSample, Quality
@@ -76,3 +77,18 @@ def test_a_zero_and_its_refusal_count_the_weight_the_same_way_pressed_or_pulled(
     moved_n = conditioner.take_zero(direction * 5.0)
     after_n = conditioner.read(1.21, sample(hung_n - 5.0, 1.21), direction * 5.0).contact_n
     assert (after_n, before_n - moved_n) == (pytest.approx(0.0), pytest.approx(0.0))
+
+
+CELLS = (None, CellMap(crosstalk_n_per_v=0.4), CellMap(crosstalk_n_per_v=-0.3, quadratic_per_n=2.0e-3, zero_n=0.4))
+
+
+@pytest.mark.parametrize("before", CELLS)
+@pytest.mark.parametrize("after", CELLS)
+def test_what_was_zero_is_zero_by_other_defects_of_the_cell_too(before: CellMap | None, after: CellMap | None) -> None:
+    """No voltage was out when the tare was taken: none of its zero is the voltage's."""
+    conditioner = SampleConditioner(BOUNDS, before)
+    for k in range(12):
+        conditioner.read(1.0, sample(3.0, 1.0 + 0.01 * k), 0.0)
+    conditioner.take_zero(0.0)
+    conditioner.use(after)
+    assert conditioner.read(1.2, sample(3.0, 1.2), 0.0).cell_n == pytest.approx(0.0, abs=1e-6)

@@ -155,3 +155,12 @@ def test_a_register_at_its_converters_end_is_an_overload(
     assert isinstance(sample, ForceSample) and sample.quality is quality
     (shown,) = cell_host(profile).receive(cell_device(profile).frame(inf), 0.0)
     assert isinstance(shown, ForceSample) and shown.quality is Quality.OVERLOAD
+
+
+def test_an_amplifier_that_says_no_unit_is_rehearsed_in_that_of_the_rig() -> None:
+    registers = WeightRegisters(first=0, last=1, weight=0, type="int32", decimals=2)
+    profile = replace(load_device("laumas-tlb"), read_force=ForceReading(modbus=registers))
+    in_kg, in_n = cell_device(profile, "kg").frame(9.80665), cell_device(profile, "N").frame(9.80665)
+    (sample,) = cell_host(profile, unit="kg").receive(in_kg, 0.0)
+    assert isinstance(sample, ForceSample) and (sample.raw, sample.force_n) == (1.0, pytest.approx(9.80665))
+    assert in_n != in_kg

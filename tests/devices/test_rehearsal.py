@@ -31,6 +31,9 @@ def loaded(folder: Path, name: str, **changes: Any) -> list[str]:
     return []
 
 
+PRESSURE = {"ask": "P?", "answer": "{p:d}", "range": {"device": [0, 10], "pressure_pa": [0, 10]}}
+
+
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
@@ -115,6 +118,10 @@ def test_an_output_that_could_not_work_is_told(changes: dict[str, Any], told: st
         ({"stream__frame": "{status:ST|US|OL},{force:+08.2f}", "stream__negative": ["US"]}, "the force stands here twice"),
         ({"stream": {"frame": "{force:+04X}", "newton_per_count": 1, "rate_hz": 10}}, None),
         ({"stream": None, "read_force": {"ask": "W?", "frame": "{force:+08.2f}"}}, None),
+        ({"stream": None}, "a load cell has either stream or read_force"),
+        ({"read_force": {"ask": "W?", "frame": "{force:+08.2f}", "unit": "N"}}, "has either stream or read_force"),
+        ({"steps": [{"ask": "INC", "by": 1}]}, "steps belong to an output"),
+        ({"read_pressure": PRESSURE}, "read_pressure and steps belong to an output"),
     ],
 )  # fmt: skip
 def test_a_load_cell_that_could_not_work_is_told(changes: dict[str, Any], told: str | None, tmp_path: Path) -> None:
@@ -132,6 +139,23 @@ def test_a_load_cell_that_could_not_work_is_told(changes: dict[str, Any], told: 
 def test_a_valve_that_could_not_work_is_told(changes: dict[str, Any], told: str | None, tmp_path: Path) -> None:
     faults = loaded(tmp_path, "mcu-valve", **changes)
     assert (faults == []) if told is None else any(told in fault for fault in faults), faults
+
+
+@pytest.mark.parametrize(
+    ("changes", "place"),
+    [
+        ({"identity__ask": "${address:02X}6C{channel:1d}"}, "identity: identity: the device reads '$016C0\\r'"),
+        (
+            {"watchdog__verify__ask": "${address:02X}6C{channel:1d}"},
+            "watchdog: watchdog verification: the device reads",
+        ),
+    ],
+)
+def test_a_question_beside_the_work_that_could_not_be_told_apart_is_told_where_it_stands(
+    changes: dict[str, Any], place: str, tmp_path: Path
+) -> None:
+    faults = loaded(tmp_path, "adam-4024", **changes)
+    assert any(place in fault for fault in faults), faults
 
 
 def test_a_weight_in_registers_without_a_sign_is_told_by_its_type(tmp_path: Path) -> None:

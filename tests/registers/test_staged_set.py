@@ -44,6 +44,11 @@ def staged(given: CoefficientSet = GOOD, *, length: int = 190, slot: int = 3, cr
     return words[:280] + trailer + bytes(10) + words[280:]
 
 
+def swapped(number: float) -> float:
+    data = struct.pack(">f", number)
+    return struct.unpack(">f", data[2:] + data[:2])[0]
+
+
 def fault_of(words: bytes) -> StagedFault:
     result = check_staged(words, LIMITS)
     assert isinstance(result, StagedFault)
@@ -112,6 +117,8 @@ def test_force_limits_of_its_own_come_out_as_the_decimals_that_were_meant(low_n,
         ({"force_low_n": float("nan")}, -1, UploadReason.FORCE_LIMITS),
         ({"falling_handles_n": (0.0, 30.0, 64.0), "force_high_n": 62.0}, -1, UploadReason.FORCE_LIMITS),
         ({"rising_handles_n": (-4.0, 20.0, 60.0), "force_low_n": -2.0}, -1, UploadReason.FORCE_LIMITS),
+        ({"force_high_n": swapped(40.0)}, -1, CoefficientReason.WORDS_SWAPPED),
+        ({"force_low_n": swapped(2.0)}, -1, CoefficientReason.WORDS_SWAPPED),
     ],
 )
 def test_a_bad_set_is_refused_with_index_and_reason(change, index, reason):

@@ -199,7 +199,7 @@ class SelfTestRun:
             self._leave_force("self_test.force_n is 0: nothing moves")
             return
         if self.findings[Item.RESOLUTION].verdict is FAILED:
-            self._leave_force("the cell repeats itself")
+            self._leave_force("the cell repeats itself" if is_constant(rest) else "the cell's counts are too coarse")
             return
         if self.findings[Item.ZERO].verdict is FAILED and self._rest_n > 0.0:
             self._leave_force("the zero is off: tare first")  # below 0 it may be the sign

@@ -24,13 +24,15 @@ SETTLING_S = 0.8  # at least, of a response of 120 ms
 class Played:
     """A cell whose force follows the voltage at once: force_n of it, with noise that neighbours show."""
 
-    def __init__(self, force_n: Callable[[float], float] | None = None, of: Known | None = None) -> None:
-        self.run = SelfTestRun(SelfTestPlan(), of or known())
+    def __init__(
+        self, force_n: Callable[[float], float] | None = None, of: Known | None = None, noise_n: float = 0.02
+    ) -> None:
+        self.run, self.noise_n = SelfTestRun(SelfTestPlan(), of or known()), noise_n
         self.force_n = force_n or (lambda volts: bsfm().force_n(volts, 1.0))
         self.volts, self.at_s, self.course = 0.0, 0.0, list[tuple[float, float, float, float]]()
 
     def step(self) -> None:
-        force_n = self.force_n(self.volts) + 0.02 * (-1) ** len(self.course)
+        force_n = self.force_n(self.volts) + self.noise_n * (-1) ** len(self.course)
         step = self.run.step(self.at_s, Reading(force_n, force_n, 0.0, TICK_S, True, True, True))
         self.volts = step.voltage_v
         assert step.phase is CalibrationPhase.SELF_TEST
@@ -138,3 +140,27 @@ def test_the_report_judges_both_lines_by_what_they_counted_during_the_test() -> 
     assert found[Item.OUTPUT_LINE].verdict is PASSED and found[Item.OUTPUT_LINE].text.startswith("0 of 100 questions")
     assert found[Item.CELL_LINE].verdict is PASSED and "0 unreadable" in found[Item.CELL_LINE].text
     assert played.run.report(7, FaultCode.NONE).number == 7
+
+
+@pytest.mark.parametrize(
+    ("stated_n", "noise_n", "pushed_n", "least", "most"), [(20.0, 0.02, 5.0, 2, 4), (3.0, 0.2, 0.9, 4, 8)]
+)
+def test_who_is_pushed_near_the_stated_force_ends_after_as_few_readings_as_the_noise_allows(
+    stated_n: float, noise_n: float, pushed_n: float, least: int, most: int
+) -> None:
+    rig = replace(settings(), self_test=SelfTestSettings(force_n=stated_n))
+    played = Played(of=Known(rig, bsfm()), noise_n=noise_n)
+    while played.at_s < REST_S + RISE_S + 2.0 * SETTLING_S + 1.0:
+        played.step()
+    assert not played.run.is_done
+    pushed_at, played.force_n = len(played.course), lambda volts: bsfm().force_n(volts, 1.0) + pushed_n
+    played.to_the_end()
+    assert least <= len(played.course) - pushed_at <= most
+
+
+@pytest.mark.parametrize(("noise_n", "words"), [(0.0, "the cell repeats itself"), (0.7, "counts are too coarse")])
+def test_a_cell_that_tells_no_force_apart_is_pressed_with_none_and_is_told_why(noise_n: float, words: str) -> None:
+    noisy_once = replace(known(), noise_n=0.1)
+    found = Played(of=noisy_once, noise_n=noise_n).to_the_end().run.findings
+    assert found[Item.RESOLUTION].verdict is FAILED
+    assert all(found[item].verdict is NOT_TESTED and words in found[item].text for item in FORCE_ITEMS)
