@@ -16,9 +16,7 @@ from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
 
 TICK_S: Final = defaults.TICK_S  # nominal tick: what a movement may claim at once after rest
-LONGEST_STEP_S: Final = (
-    0.045  # a later step catches up no more: two ticks of the slowest loop, and jitter, lie between two
-)
+LONGEST_STEP_S: Final = 0.045  # a later step catches up no more: two ticks of the slowest loop, and jitter
 
 Limited = tuple[float, LimitedBy]
 _NONE, _VOLTAGE_SLEW = LimitedBy.NONE, LimitedBy.VOLTAGE_SLEW  # a look-up on the class costs as much as a limit

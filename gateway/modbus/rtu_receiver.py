@@ -83,9 +83,7 @@ class RtuReceiver:
         self._silence_s = silence_s(baud, character_s)
         self._burst = bytearray()
         self._passed: list[RtuRequest] = []  # made out in what had to make room, and not taken yet
-        self._sizes: dict[
-            tuple[int, bool], int
-        ] = {}  # of the frames of one look, by place and whether one is known to begin
+        self._sizes: dict[tuple[int, bool], int] = {}  # in one look, by place and whether a frame is known to begin
         self._marks: list[int] = []  # places in the burst that a visible silence lies before
         self._last_s = 0.0
         self._wait_s = self._silence_s

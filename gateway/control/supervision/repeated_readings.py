@@ -62,9 +62,7 @@ class RepeatedReadings:
         self._value_n = nan
         self._run, self._is_dead = 0, False
         self._changes = 0
-        self._doubted: tuple[int, float] | None = (
-            None  # a finer count: the change that showed it, and the count before, N
-        )
+        self._doubted: tuple[int, float] | None = None  # a finer count: which change showed it, and the count before, N
         self._pool = Pool()
         self._window = SampleWindow()
         self._pools: dict[bool, deque[Spread]] = {way: deque(maxlen=POOLS) for way in (True, False)}
