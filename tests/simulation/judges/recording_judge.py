@@ -24,6 +24,8 @@ ON_WIRE_S = 0.08
 """From a setting's first byte to its last, behind whatever is on the wire before it."""
 AROUND_CUT_S = 0.1
 AWAKE_S = 0.02
+TURN_S = 0.05
+"""The longest pause of a loop between two ticks."""
 MOST_TOLD, MOST = 4, 20_000
 RANGE_N = 95.0
 """What is more may be called an overload."""
@@ -33,9 +35,9 @@ Row = dict[str, float]
 @dataclass
 class History:
     """What came from the load cell, N (None where it was no plain reading), what reached the output, V, and when somebody
-    tared, a line was cut, or control went on after a standstill; each with its time, s. is_plain: readings are sentences whose
-    number is the force; has_valve: one that pulls turns its sign; weighed_s: from then on a payload may hang at the cell, whose
-    weight the gateway takes off."""
+    tared, a line was cut, control went on after a standstill, or was about to stand still (a turn before); each with its time,
+    s. is_plain: readings are sentences whose number is the force; has_valve: one that pulls turns its sign; weighed_s: from
+    then on a payload may hang at the cell, whose weight the gateway takes off."""
 
     is_plain: bool = True
     has_valve: bool = False
@@ -45,6 +47,7 @@ class History:
     tares: deque[float] = field(default_factory=lambda: deque(maxlen=2_000))
     cuts: deque[float] = field(default_factory=lambda: deque(maxlen=2_000))
     awoken: deque[float] = field(default_factory=lambda: deque(maxlen=2_000))
+    frozen: deque[float] = field(default_factory=lambda: deque(maxlen=2_000))
 
     @property
     def is_whole(self) -> bool:
@@ -105,8 +108,8 @@ def _judge_laid(
     zeros_n, known_s = tuple[float, ...](), begun_s
     for row in rows:
         at_s = begun_s + row["time_s"]
-        if _is_near(history.awoken, at_s, AWAKE_S):
-            continue  # what has waited for it came before
+        if _is_near(history.awoken, at_s, AWAKE_S) or _is_near(history.frozen, at_s, TURN_S):
+            continue  # what has waited for it came before, or behind what it was taken for
         if _key(at_s) not in readings:
             yield f"nothing came at {at_s:.4f}"
             continue
