@@ -1,5 +1,7 @@
 """What is diagnosed: recordings by path or number, and the plant that they are compared with."""
 
+import contextlib
+import filecmp
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -107,11 +109,20 @@ def read_sources(
 
 
 def refuse_twice(paths: Sequence[Path]) -> None:
-    """Refuse a recording that is named twice: UsageError. Its noise would be what two have in common, and count as evidence."""
-    files = [path.resolve() for path in paths]
-    for at, file in enumerate(files):
-        if file in files[:at]:
-            raise click.UsageError(f"{paths[at]} is named twice: a recording is no evidence for itself; leave one out")
+    """Refuse a recording that is named twice, or a copy of it, as the rig's reference is one: UsageError. Its noise would be
+    what two have in common, and count as evidence."""
+    for at, path in enumerate(paths):
+        for first in paths[:at]:
+            is_same = path.resolve() == first.resolve()
+            if is_same or _is_copy(path, first):
+                what = "is named twice" if is_same else f"is a copy of {first}"
+                raise click.UsageError(f"{path} {what}: a recording is no evidence for itself; leave one out")
+
+
+def _is_copy(path: Path, other: Path) -> bool:
+    with contextlib.suppress(OSError):  # whoever reads it tells why
+        return filecmp.cmp(path, other, shallow=False)
+    return False
 
 
 def _calibration_noise(

@@ -1,5 +1,6 @@
 """What a diagnosis loads before it begins: of seconds, imports are the largest part that nobody sees. And what it refuses."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -27,14 +28,23 @@ def test_a_table_that_names_no_rig_is_diagnosed_without_what_reads_rigs_and_writ
 
 
 @pytest.mark.parametrize(
-    "words", [("{0}", "{1}"), ("{0}", "--against", "{1}"), ("{0}", "--against", "{2}", "--against", "{2}")]
+    ("words", "why"),
+    [
+        (("{0}", "{1}"), "is named twice"),
+        (("{0}", "--against", "{1}"), "is named twice"),
+        (("{0}", "--against", "{2}", "--against", "{2}"), "is named twice"),
+        (("{0}", "--against", "{3}"), "is a copy of {0}"),
+    ],
 )
-def test_a_recording_is_no_evidence_for_itself(words: tuple[str, ...], tmp_path: Path) -> None:
-    """Named twice, its noise was what two recordings had in common; against itself, whatever was found was no change."""
-    rows = "".join(f"{k / 100},{k % 5},{k % 7}\n" for k in range(400))
-    for name in ("a.csv", "b.csv"):
+def test_a_recording_is_no_evidence_for_itself(words: tuple[str, ...], why: str, tmp_path: Path) -> None:
+    """Named twice, its noise was what two recordings had in common; against itself, whatever was found was no change. The
+    rig's reference is a copy of a recording."""
+    for name, period in (("a.csv", 7), ("b.csv", 8)):
+        rows = "".join(f"{k / 100},{k % 5},{k % period}\n" for k in range(400))
         (tmp_path / name).write_text("time_s,command_v,force_n\n" + rows)
     (tmp_path / "same.csv").symlink_to(tmp_path / "a.csv")
-    given = [word.format(*(tmp_path / name for name in ("a.csv", "same.csv", "b.csv"))) for word in words]
-    refused = CliRunner().invoke(command, ["diagnose", *given, "--rig", "demo"])
-    assert refused.exit_code == 2 and "is named twice: a recording is no evidence for itself" in refused.stderr
+    shutil.copy(tmp_path / "a.csv", tmp_path / "copy.csv")
+    files = [tmp_path / name for name in ("a.csv", "same.csv", "b.csv", "copy.csv")]
+    refused = CliRunner().invoke(command, ["diagnose", *(word.format(*files) for word in words), "--rig", "demo"])
+    assert refused.exit_code == 2
+    assert f"{why.format(*files)}: a recording is no evidence for itself" in refused.stderr
