@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pymodbus.client import ModbusTcpClient
 
 _ASK_LOG = "its log (force-gateway events on its machine) says which"
-_WEAK = ("_KEY_TOO_SMALL", "_MD_TOO_WEAK")
+_WEAK = ("EE_KEY_TOO_SMALL", "CA_KEY_TOO_SMALL", "CA_MD_TOO_WEAK")
 _NOT_NOW = (9, 10)  # X509_V_ERR_CERT_NOT_YET_VALID, X509_V_ERR_CERT_HAS_EXPIRED
 
 
@@ -77,7 +77,7 @@ class TlsWire(TcpWire):
             return f"E172 {key} does not fit {certificate}: take the two made together"
         if b"ENCRYPTED" in key.read_bytes():
             return f"E174 {key} has a password, and nobody is asked for it: openssl pkey -in {key} -out NEW.key takes it off"
-        if reason.endswith(_WEAK):
+        if reason in _WEAK:
             why = reason.lower().replace("_", " ")
             return f"E174 {certificate} is refused by this machine's OpenSSL ({why}): make one with a stronger key"
         return f"E174 {ca}, {certificate} or {key} is no PEM file of its kind"

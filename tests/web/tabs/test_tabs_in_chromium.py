@@ -82,10 +82,12 @@ def test_a_run_whose_gateway_has_started_anew_is_told_as_ended(page, control, ch
 
 def test_who_skips_to_the_content_stays_in_the_tab(page, chromium) -> None:
     """It led to the live view."""
+    from playwright.sync_api import expect
+
     window = open_tab(chromium, page.address, "configuration")
     window.locator(".skip").focus()
     window.keyboard.press("Enter")
-    window.wait_for_function("document.activeElement.id === 'main'")
+    expect(window.locator("#main")).to_be_focused()
     assert window.evaluate("location.hash") == "#configuration"
     assert window.locator("#tab-configuration").is_visible()
     window.close()
