@@ -83,9 +83,23 @@ class Grammar:
             return bytes.fromhex(body.decode("ascii"))
         return add_checksum(body, self.profile.checksum) + terminator
 
-    def body(self, line: Line) -> bytes | None:
-        """Return the sentence in a line that arrived, None when it is overlong or its checksum is wrong."""
-        return strip_checksum(line.body, self.profile.checksum) if line.is_whole else None
+    def own_lines(self, asked: bytes) -> frozenset[bytes]:
+        """Return what comes of our own words through an adapter that hears itself: all at once, or each line."""
+        if self.profile.is_modbus or self.profile.is_raw:
+            return frozenset((asked,))
+        end = self.profile.question_terminator_bytes
+        return frozenset((asked, *(line + end for line in asked.split(end)[:-1])))
+
+    def expect_own_words(self, lines: Splitter, asked: bytes) -> None:
+        """Tell what cuts the device's bytes what went out, where no end of a line parts it from the answer."""
+        if isinstance(lines, RtuSplitter):
+            lines.asked = asked
+
+    def body(self, line: Line, asked: bytes = b"") -> bytes | None:
+        """Return the sentence in a line that arrived, None when it is overlong or its checksum is wrong.
+        asked: our own words, which an adapter that hears itself puts ahead of an answer; where they end as an answer does,
+        they are a line of their own."""
+        return strip_checksum(line.body.removeprefix(asked), self.profile.checksum) if line.is_whole else None
 
     def number_body(self, template: str, number: float) -> bytes:
         """Return the sentence with this number in it, nearest on the template's own grid; others in it are 0."""

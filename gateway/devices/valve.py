@@ -35,7 +35,7 @@ class ValveHost:
         self._grammar = Grammar(profile)
         self._lines = self._grammar.answers()
         self._expected: deque[Question] = deque(maxlen=1)
-        self.said, self._function = "", b""
+        self.said, self._function, self._asked = "", b"", b""
         self.gap_s = quiet_s(profile.serial.character_s) if profile.is_modbus else 0.0
 
     def request(self, question: Question) -> bytes:
@@ -49,11 +49,16 @@ class ValveHost:
         self._function = asks[-1][:2].encode("ascii")
         if isinstance(self._lines, ByteSplitter):
             self._lines.length = byte_count(answer or self._reading.answer)
-        return b"".join(self._grammar.question_line(self._grammar.encode(ask)) for ask in asks)
+        self._asked = b"".join(self._grammar.question_line(self._grammar.encode(ask)) for ask in asks)
+        self._grammar.expect_own_words(self._lines, self._asked)
+        return self._asked
 
     def receive(self, chunk: bytes) -> list[ValveDirection | Garbage]:
-        """Return the directions that these bytes tell: an obeyed setting, or what stands. Never raises."""
-        return [self._answer(line) for line in self._lines.feed(chunk)]
+        """Return the directions that these bytes tell: an obeyed setting, or what stands. Never raises. Our own words, which
+        an adapter may hear, are left out."""
+        found = [self._answer(line) for line in self._lines.feed(chunk)]
+        own = self._grammar.own_lines(self._asked)
+        return [one for one in found if not (isinstance(one, Garbage) and one.data in own)]
 
     def forget(self) -> None:
         """Drop half-received bytes and the expected answer."""
@@ -61,7 +66,7 @@ class ValveHost:
         self._expected.clear()
 
     def _answer(self, line: Line) -> ValveDirection | Garbage:
-        body = self._grammar.body(line)
+        body = self._grammar.body(line, self._asked)
         if not self._expected:
             return Garbage(line.data)
         question = self._expected[0]
@@ -72,7 +77,8 @@ class ValveHost:
             values = self._grammar.read(self._reading.answer, body)
             told = self._reading.words.get(str(values[STATE])) if values else None
         if told is None:
-            self.said = self._text_of(line, body)
+            if line.data not in self._grammar.own_lines(self._asked):
+                self.said = self._text_of(line, body)
             return Garbage(line.data)
         self._expected.clear()
         return told

@@ -1,17 +1,39 @@
 """An adapter that hears itself brings every question back: there must be one that this does not answer."""
 
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from gateway.devices import DeviceProfile, ValveHost, cell_host, output_host
-from gateway.devices.messages import ForceSample, Garbage, ReadPressure, ReadVoltage
+from gateway.devices import (
+    DeviceProfile,
+    ValveDevice,
+    ValveDirection,
+    ValveHost,
+    cell_device,
+    cell_host,
+    output_device,
+    output_host,
+)
+from gateway.devices.messages import (
+    Accepted,
+    ForceSample,
+    Garbage,
+    OutputReply,
+    OutputRequest,
+    Pressure,
+    ReadPressure,
+    ReadVoltage,
+    SetVoltage,
+)
 from gateway.devices.profile import DeviceRole
 from gateway.profiles import list_shipped
 from tests.devices.test_rehearsal import loaded
 from tests.profile_files import load_device
 
+Receive = Callable[[bytes], Sequence[object]]
 SHIPPED = [load_device(name) for name in list_shipped("device")]
 
 
@@ -31,6 +53,52 @@ def readings_of(profile: DeviceProfile) -> list[object]:
 @pytest.mark.parametrize("profile", SHIPPED, ids=[one.name for one in SHIPPED])
 def test_a_question_that_comes_back_is_no_reading(profile: DeviceProfile) -> None:
     assert all(isinstance(one, Garbage) for one in readings_of(profile))
+
+
+def asked_and_answered(profile: DeviceProfile) -> list[tuple[Receive, bytes, bytes]]:
+    """Each question of a profile that is answered: our end, what went out, and what the device says to it."""
+    if profile.role is DeviceRole.VALVE:
+        valve, relay = ValveHost(profile), ValveDevice(profile)
+        asked = valve.request(None)
+        return [(valve.receive, asked, relay.reply(None, ValveDirection.PULL))]
+    if profile.role is DeviceRole.LOAD_CELL:
+        unit = None if profile.reading.newton_per_unit else "N"
+        cell, amplifier = cell_host(profile, unit=unit), cell_device(profile, unit)
+        asked = cell.poll() or cell.start
+        return [(lambda chunk: cell.receive(chunk, 0.0), asked, amplifier.frame(5.0))] if asked else []
+    found: list[tuple[Receive, bytes, bytes]] = []
+    answers: dict[OutputRequest, OutputReply] = {SetVoltage(5.0): Accepted(5.0)}
+    answers |= {ReadVoltage(): Accepted(5.0)} if profile.read_voltage else {}
+    answers |= {ReadPressure(): Pressure(1e5)} if profile.read_pressure else {}
+    for question, answer in answers.items():
+        host, device = output_host(profile), output_device(profile)
+        asked = host.request(question)
+        heard = (one for one in device.receive(asked, 0.0) if not isinstance(one, Garbage))
+        answered = b"".join(device.reply(answer, to=one) for one in heard)
+        found.append((lambda chunk, host=host: host.receive(chunk, 0.0), asked, answered))  # type: ignore[misc]
+    return found
+
+
+OTHER_ENDS = (  # an answer ends otherwise than a question: what an adapter hears of us is no line of its own
+    replace(load_device("smc-itv-rc"), name="dac with lf", question_terminator="\n"),
+    replace(
+        load_device("mantracourt-dsc"), name="amplifier with semicolon", question_terminator=";", terminator="\r\n"
+    ),
+    replace(load_device("mcu-valve"), name="relay with cr", question_terminator="\r"),
+)
+
+
+@pytest.mark.parametrize("profile", [*SHIPPED, *OTHER_ENDS], ids=lambda one: one.name)
+def test_what_an_adapter_hears_of_us_is_read_over_and_is_no_noise(profile: DeviceProfile) -> None:
+    """It was counted as bytes that nobody can read, and motor cables were blamed (A341); where a question ends otherwise than
+    an answer, no answer was understood."""
+    for (receive, asked, answered), (receive_next, *_) in zip(
+        *(asked_and_answered(profile) for _ in range(2)), strict=True
+    ):
+        told = receive(asked + answered)
+        assert [one for byte in asked + answered for one in receive_next(bytes([byte]))] == [*told], "byte by byte"
+        assert told and not any(isinstance(one, Garbage) for one in told if asked != answered), asked
+        assert len(told) == 1
 
 
 def test_what_is_echoed_ahead_of_an_answer_does_no_harm() -> None:

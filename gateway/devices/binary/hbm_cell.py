@@ -54,11 +54,16 @@ class HbmCellHost(TemplateCellHost):
         self._buffer = b""
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
-        """Return the samples and the garbage that these bytes complete."""
+        """Return the samples and the garbage that these bytes complete, without our own words, which an adapter may hear."""
         self._buffer += chunk
         size, dropped = self._format.size + len(_END), b""
         found: list[ForceSample | Garbage | RepeatedSample] = []
         while len(self._buffer) >= size:
+            if self._asked and self._buffer.startswith(self._asked):
+                self._buffer = self._buffer[len(self._asked) :]
+                continue
+            if self._asked.startswith(self._buffer):
+                break
             if not self._buffer[:size].endswith(_END):
                 dropped, self._buffer = dropped + self._buffer[:1], self._buffer[1:]
                 continue

@@ -51,12 +51,14 @@ def exception_body(question: bytes, code: int) -> bytes:
 class RtuSplitter:
     """Like framing.LineSplitter: feed bytes, get the frames that they complete, each with its PDU in digits as body.
 
-    length_of: whole length of the frame that begins with these bytes, None while that is not known.
+    length_of: whole length of the frame that begins with these bytes, None while that is not known. asked: our own frame, which
+    an adapter that hears itself brings back ahead of the answer; read as an answer it may seem to be a much longer one.
     """
 
     def __init__(self, unit: int, length_of: Callable[[bytes], int | None]) -> None:
         self._unit = unit
         self._length_of = length_of
+        self.asked = b""
         self._buffer = b""
         self._dropped = b""
 
@@ -75,13 +77,19 @@ class RtuSplitter:
         """Return the frames that these bytes complete, and what was dropped before each; an unfinished one waits."""
         self._buffer += chunk
         lines: list[Line] = []
-        while len(self._buffer) > 1 and (length := self._frame_length()) <= len(self._buffer):
-            if length == 0 or (line := self._frame(length)) is None:
+        while len(self._buffer) > 1:
+            length = self._frame_length()
+            line = self._frame(length) if 0 < length <= len(self._buffer) else None
+            if line is not None:
+                lines += self._noise()
+                lines.append(line)
+                self._buffer = self._buffer[length:]
+            elif self.asked and self._buffer.startswith(self.asked):
+                self._buffer = self._buffer[len(self.asked) :]
+            elif length > len(self._buffer) or self.asked.startswith(self._buffer):
+                break
+            else:
                 self._dropped, self._buffer = self._dropped + self._buffer[:1], self._buffer[1:]
-                continue
-            lines += self._noise()
-            lines.append(line)
-            self._buffer = self._buffer[length:]
         if len(self._dropped) > LONGEST_ADU or (self._dropped and not self._buffer):
             lines += self._noise()
         return lines

@@ -76,6 +76,7 @@ class TemplateCellHost:
         self._newton_per_unit = newton_per_unit(profile, unit)
         self._sign, self._end = sign, self._reading.end
         self._lines = self._grammar.answers()
+        self._asked, self._own_lines = b"", frozenset[bytes]()
         self._known: dict[bytes, _KnownReading] = {}  # a force at rest says the same few sentences
         self._beyond_range = tuple(
             (text, _KnownReading(raw, self._newtons(raw, {}), Quality.OVERLOAD))
@@ -86,12 +87,19 @@ class TemplateCellHost:
 
     def poll(self) -> bytes:
         """Return the question for one sample, empty for a cell that streams."""
-        return _question(self._grammar, self._reading)
+        return self._remember(_question(self._grammar, self._reading))
 
     @property
     def start(self) -> bytes:
         """The sentence that begins the stream, empty where it needs none."""
-        return self._grammar.question_line(self._grammar.encode(self._reading.start)) if self._reading.start else b""
+        start = self._reading.start
+        return self._remember(self._grammar.question_line(self._grammar.encode(start))) if start else b""
+
+    def _remember(self, asked: bytes) -> bytes:
+        if asked:
+            self._asked, self._own_lines = asked, self._grammar.own_lines(asked)
+            self._grammar.expect_own_words(self._lines, asked)
+        return asked
 
     def forget(self) -> None:
         """Drop half a frame: what comes next of a stream may begin in the middle of a number, and so does the rest of a late
@@ -102,11 +110,12 @@ class TemplateCellHost:
             self._lines.skip()
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
-        """Return the samples and the garbage that these bytes complete. now_s: time of their arrival."""
+        """Return the samples and the garbage that these bytes complete, without our own words, which an adapter may hear.
+        now_s: time of their arrival."""
         known = self._known.get(chunk)
         if known is not None and self._lines.is_between_lines:
             return [known.at(now_s)]  # one whole sentence, and one of the few
-        return [self._sample(line, now_s) for line in self._lines.feed(chunk)]
+        return [self._sample(line, now_s) for line in self._lines.feed(chunk) if line.data not in self._own_lines]
 
     def _sample(self, line: Line, now_s: float) -> ForceSample | Garbage | RepeatedSample:
         if not line.is_whole:
@@ -115,7 +124,7 @@ class TemplateCellHost:
         return Garbage(line.data) if meaning is None else meaning.at(now_s)
 
     def _understand(self, line: Line) -> _KnownReading | None:
-        body = self._grammar.body(line)
+        body = self._grammar.body(line, self._asked)
         meaning = self._read(body) or self._read_beyond_range(body)
         if meaning is not None:
             if len(self._known) >= _MOST_KNOWN:

@@ -46,6 +46,7 @@ class TemplateOutputHost:
         self._lines = grammar.answers()
         self._checks = CheckSpelling(grammar)
         self._expected: deque[OutputRequest] = deque()
+        self._asked = b""
         watchdog = profile.own_watchdog
         self._tripped = grammar.encode(watchdog.refusal) if watchdog and watchdog.refusal else None
         self.sign_of_life = grammar.question_line(grammar.encode(watchdog.feed)) if watchdog and watchdog.feed else b""
@@ -89,6 +90,8 @@ class TemplateOutputHost:
         if not self._expected:
             self._lines.forget()  # bytes that came before the question are no part of its answer
         self._expected.append(message)
+        self._asked = data
+        self._grammar.expect_own_words(self._lines, data)
         return data
 
     def expect(self, message: OutputRequest) -> None:
@@ -101,8 +104,9 @@ class TemplateOutputHost:
         self._expected.clear()
 
     def receive(self, chunk: bytes, now_s: float) -> list[OutputReply]:
-        """Return the replies that these bytes complete. now_s: time of their arrival."""
-        return [self._reply(line) for line in self._lines.feed(chunk)]
+        """Return the replies that these bytes complete, without our own words. now_s: time of their arrival."""
+        replies = (self._reply(line) for line in self._lines.feed(chunk))
+        return [reply for reply in replies if reply is not None]
 
     def _encode_request(self, message: OutputRequest) -> bytes:
         if isinstance(message, AskDevice):
@@ -129,11 +133,13 @@ class TemplateOutputHost:
         same = isclose(step_v, self.resolution_v) and answered.range == self._grammar.set_voltage.range
         return self.resolution_v + (0.0 if same else step_v)
 
-    def _reply(self, line: Line) -> OutputReply:
-        reply = self._decode_reply(self._grammar.body(line)) if self._expected else None
+    def _reply(self, line: Line) -> OutputReply | None:
+        reply = self._decode_reply(self._grammar.body(line, self._asked)) if self._expected else None
         if reply is not None:
             self._expected.popleft()
             return reply
+        if line.data in self._grammar.own_lines(self._asked):  # an adapter has heard us: it is no noise
+            return None
         if len(self._expected) > 1:
             self._expected.clear()
         return Garbage(line.data)

@@ -69,9 +69,9 @@ def _who_it_is(profile: DeviceProfile, *, is_enough: bool) -> HarmlessQuestion:
     spelling = CheckSpelling(grammar)
 
     def answer(received: bytes) -> DeviceAnswer | None:
-        answers = (
-            spelling.answer(DeviceStep.IDENTITY, grammar.body(line)) for line in grammar.answers().feed(received)
-        )
+        lines = grammar.answers()
+        grammar.expect_own_words(lines, data)
+        answers = (spelling.answer(DeviceStep.IDENTITY, grammar.body(line, data)) for line in lines.feed(received))
         return next((one for one in answers if one), None)
 
     def understands(received: bytes) -> str:

@@ -18,6 +18,7 @@ from gateway.profiles.strict_yaml.text import parse
 from gateway.registers.words import State
 from tests.service.every_device.drawn_devices import (
     Profile,
+    choices,
     drawn_cell,
     drawn_counts,
     drawn_modbus_cell,
@@ -79,7 +80,7 @@ def rig_for(rng: Random, output: Profile, cell: Profile) -> dict[str, Any]:
     rig["supervision"] = {
         "lease_s": rng.choice([None, 0.2]),
         "sample_timeout_s": rng.choice([0.05, 0.3, 1.0]),
-        "output_timeout_s": rng.choice([0.1, 0.6]),
+        "output_timeout_s": max(rng.choice([0.1, 0.6]), min(0.6, output.get("reply_timeout_s", 0.1))),
         "sample_quantum_n": rng.choice([0.1, 1.0]),
         "saturation_n": 96,
     }
@@ -151,9 +152,6 @@ def test_the_draws_cover_the_schema_and_enough_of_them_are_accepted(all_drawn: l
     assert seen(lambda drawn: bool(drawn.output["set_voltage"].get("answer"))) == {True, False}
     for owner in ("output", "cell"):
         assert seen(lambda drawn, owner=owner: getattr(drawn, owner).get("terminator")) >= {"\r\n", "\r", "\n", "\x03"}
-        assert seen(lambda drawn, owner=owner: getattr(drawn, owner).get("checksum")) >= {
-            "none",
-            "dcon-sum",
-            "xor",
-            "xor-hex",
-        }
+        assert seen(lambda drawn, owner=owner: getattr(drawn, owner).get("checksum")) >= {"none", "dcon-sum", "xor"}
+    sums = seen(lambda drawn: drawn.output.get("checksum")) | seen(lambda drawn: drawn.cell.get("checksum"))
+    assert sums >= set(choices("DeviceProfile", "checksum"))

@@ -7,8 +7,10 @@ from dataclasses import replace
 import pytest
 
 from gateway.cli.port_probing import tell_report
-from gateway.devices import ValveDevice, ValveDirection, cell_device, output_device
-from gateway.devices.messages import ReadPressure
+from gateway.devices import DeviceProfile, ValveDevice, ValveDirection, cell_device, output_device
+from gateway.devices.binary.register_access import RegisterAccess
+from gateway.devices.device_checks.identity import Identity
+from gateway.devices.messages import DeviceAnswer, DeviceStep, ReadPressure
 from gateway.devices.profile import DeviceRole
 from gateway.ports import Pty
 from gateway.profiles import list_shipped, load_device
@@ -144,6 +146,29 @@ def test_an_output_is_asked_for_each_value_that_it_can_read_back(name: str) -> N
         device, questions = output_device(profile), harmless_questions(profile)
         asked = [request for one in questions for request in device.receive(one.data, 0.0)]
         assert (ReadPressure() in asked) is (profile.read_pressure is not None)
+
+
+MODBUS_DAC = replace(
+    load_device("waveshare-ao8b"),
+    identity=Identity(modbus=RegisterAccess(function=3, register=0x0103), models=(4021,)),
+)
+
+
+@pytest.mark.parametrize("profile", [*map(load_device, list_shipped("device")), MODBUS_DAC], ids=lambda one: one.name)
+def test_what_an_adapter_hears_of_us_ahead_of_a_name_is_read_over(profile: DeviceProfile) -> None:
+    """A question of Modbus RTU that came back was taken for the beginning of a long answer."""
+    if not profile.own_identity:
+        return
+    question = next(iter(harmless_questions(profile)))
+    if profile.role is DeviceRole.OUTPUT:
+        device = output_device(profile)
+        (request,) = device.receive(question.data, 0.0)
+        answer = device.reply(DeviceAnswer(DeviceStep.IDENTITY, is_right=True), to=request)  # type: ignore[arg-type]
+    else:
+        amplifier = cell_device(profile, "N")
+        amplifier.receive(question.data, 0.0)
+        answer = amplifier.take_answers()
+    assert "it says that it is" in question.understands(question.data + answer)
 
 
 @pytest.mark.parametrize("direction", list(ValveDirection))

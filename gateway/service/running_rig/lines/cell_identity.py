@@ -22,6 +22,7 @@ class CellIdentity:
     def begin(self) -> None:
         """Begin anew: the port has been opened, and another device may be behind it."""
         self._lines.forget()
+        self._grammar.expect_own_words(self._lines, self.question)
         self.is_due = bool(self.question)
         self.fault, self.said = FaultCode.NONE, ""
 
@@ -29,9 +30,9 @@ class CellIdentity:
         """Take the bytes of its answer; return those that are none."""
         garbage = []
         for line in self._lines.feed(chunk):
-            answer = self._checks.answer(DeviceStep.IDENTITY, self._grammar.body(line))
+            answer = self._checks.answer(DeviceStep.IDENTITY, self._grammar.body(line, self.question))
             if answer is None:
-                garbage.append(Garbage(line.data))
+                garbage += [] if line.data == self.question else [Garbage(line.data)]
                 continue
             self.is_due = False
             if not answer.is_right:
