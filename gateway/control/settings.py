@@ -3,7 +3,7 @@ and the JSON schema from the same annotations, so there is one place to change."
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Final
 
 from annotated_types import Ge, Gt, Le
 
@@ -39,6 +39,15 @@ class Defaults:
     in_band_time_s: Annotated[float, Ge(0)] = 0.1
     contact_threshold_n: Annotated[float, Gt(0)] = 0.5
     payload_kg: Annotated[float, Ge(0)] = 0.0
+
+
+OVERSHOOT_BANDS: Final = 2.0  # in_band_tolerance_n, so far a rise may go beyond its setpoint for three samples
+
+
+def over_force_room_n(limits: Limits, defaults: Defaults) -> float | None:
+    """Return how far over-force is above the largest setpoint, N, where a usual rise to that may trip it; else None."""
+    room_n = limits.over_force_n - limits.force_max_n
+    return room_n if room_n < OVERSHOOT_BANDS * defaults.in_band_tolerance_n else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,5 +1,7 @@
 """Where a check turns from yes to no, and the numbers that its sentence names."""
 
+from dataclasses import replace
+
 import pytest
 
 from gateway.control.messages import hunting_sentence
@@ -52,6 +54,10 @@ def test_an_over_force_far_from_the_model_is_blamed_on_the_cell() -> None:
     )
     assert over_force(61.0, 21.0) == "61.0 N measured, allowed 60.0 N, 21.0 N expected: a jam, or the tool was pushed"
     assert over_force(-61.0, -21.0).endswith("a jam, or the tool was pushed")
+    rig = settings()
+    near = FaultDetector(replace(rig, limits=replace(rig.limits, over_force_n=51.0)))
+    words = near._over_words(Reading(cell_n=51.0, contact_n=51.0), 47.0)
+    assert words.endswith("a jam, or the tool was pushed, or over_force_n is too near above force_max_n (1 N)")
     assert over_force(61.0, 20.0, overload=True).startswith("cell saturated (98 N is 98 % of its range)")
 
 

@@ -90,7 +90,17 @@ def test_a_frozen_cell_is_found_once_the_force_must_have_changed():
     bench.run(1.0)
     assert bench.last.fault is FaultCode.NONE  # nothing had to change
     bench.force(25.0)
-    assert_faulted(bench, FaultCode.SAMPLE_FROZEN, 0.5 + 2 * TICK_S)
+    assert_faulted(bench, FaultCode.SAMPLE_FROZEN, 0.1 + 0.5 + 2 * TICK_S)  # until the model has moved, and frozen_s
+
+
+def test_a_quiet_cell_behind_a_dead_time_is_not_called_frozen():
+    """It repeated itself for longer than frozen_s before each step, and the model moved 0.1 s before the machine."""
+    bench = Bench(noise_n=0.0, delay_s=0.12)
+    bench.run(0.3)
+    for target_n in (12.0, 40.0, 10.0, 35.0, 15.0, 45.0):
+        bench.enable(target_n)
+        bench.run(2.5)
+    assert bench.last.fault is FaultCode.NONE, bench.events
 
 
 def test_a_quiet_cell_under_friction_is_not_called_frozen():

@@ -17,7 +17,7 @@ from gateway.control.blame_for_silence import cause_of_silence
 from gateway.control.inputs import LineStatus
 from gateway.control.messages import fault_sentence, gain_sentence, sign_sentence, stuck_sentence
 from gateway.control.sample_conditioning import Reading
-from gateway.control.settings import ControlSettings
+from gateway.control.settings import ControlSettings, over_force_room_n
 from gateway.control.supervision.plausibility import ExpectedForce, RiseCheck
 from gateway.control.supervision.stuck_sensor import StuckSensorCheck
 from gateway.units import format_ms
@@ -84,6 +84,7 @@ class FaultDetector:
         self._limits = settings.limits
         self.safe_voltage_v = settings.limits.safe_voltage_v
         self._bounds = settings.supervision
+        self._room_n = over_force_room_n(settings.limits, settings.defaults)
         self._rise = RiseCheck(settings.defaults.contact_threshold_n)
         self._frozen = StuckSensorCheck(settings.supervision)
         self._over = 0
@@ -275,7 +276,7 @@ class FaultDetector:
         if abs(reading.cell_n) < self._limits.over_force_n:
             weight_n = reading.contact_n - reading.cell_n
             return f"{values}: {weight_n:.1f} N of it are the payload's weight, is `payload` the tool's own mass?"
-        far_off = abs(reading.contact_n) > _FAR_OFF * abs(expected_n)
-        return (
-            f"{values}: kgf and N mixed up, or a wrong span?" if far_off else f"{values}: a jam, or the tool was pushed"
-        )
+        if abs(reading.contact_n) > _FAR_OFF * abs(expected_n):
+            return f"{values}: kgf and N mixed up, or a wrong span?"
+        near = "" if self._room_n is None else f", or over_force_n is too near above force_max_n ({self._room_n:.2g} N)"
+        return f"{values}: a jam, or the tool was pushed{near}"

@@ -2,7 +2,8 @@
 
 In band means: target at its goal, contact, and the measured force within the tolerance, for the in-band time without a
 break. Without contact there is no band: a reading of 0.2 N in free air is not a held force. Target-unreachable means
-the same wait in vain, longer.
+the same wait in vain, longer. On a long ramp the force is compared with where the target is now, more roughly: air that fails
+on its way would else be told at its end, minutes later.
 
 Bounds: Supervision.unreachable_s, Defaults.in_band_time_s and Defaults.in_band_tolerance_n in control/settings.py.
 """
@@ -15,6 +16,8 @@ from gateway.control.inputs import LoopInputs
 from gateway.control.state_table import StateEvent
 
 _WAIT, _MOVE, _SETTLE = StateEvent.WAIT, StateEvent.MOVE, StateEvent.SETTLE
+_RAMP_BANDS: Final = 2.0  # tolerances, so far a force in contact may be off on a ramp, ...
+_RAMP_LATE_S: Final = 0.5  # ... and what the ramp gains in this time: lags that nobody has measured
 _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
 
 
@@ -46,6 +49,11 @@ class InBandTimer:
             self._in_since_s = inf
             self.unreachable = now_s - self._out_since_s >= self._unreachable_s
         self.in_band = now_s - self._in_since_s >= in_band_time_s
+
+    def go_along(self, now_s: float, is_near: bool) -> None:
+        """Compare on the way to the goal: nothing is in band yet, and what is not near counts as out of it."""
+        self.update(now_s, is_near, inf)
+        self._in_since_s = inf
 
 
 class SettlingCheck:
@@ -90,7 +98,7 @@ class SettlingCheck:
             self._band.restart()
             return _WAIT if applied_n <= 0.0 else _MOVE
         if abs(goal_n - applied_n) > demand.tolerance_n:
-            self._band.restart()
+            self._follow_ramp(demand, inputs, applied_n)
             return _MOVE
         inside = inputs.touching and abs(demand.force_n - applied_n) <= demand.tolerance_n
         inside = inside and abs(inputs.reading.contact_n - demand.force_n) <= demand.tolerance_n
@@ -98,6 +106,13 @@ class SettlingCheck:
         if self._band.in_band:
             return _SETTLE
         return _MOVE if inputs.touching or applied_n != goal_n else _WAIT
+
+    def _follow_ramp(self, demand: Demand, inputs: LoopInputs, applied_n: float) -> None:
+        if not inputs.touching:
+            self._band.restart()
+            return
+        most_n = _RAMP_BANDS * demand.tolerance_n + _RAMP_LATE_S * demand.ramp_n_per_s
+        self._band.go_along(inputs.now_s, abs(inputs.reading.contact_n - applied_n) <= most_n)
 
     def judge_voltage(self, demand: Demand, inputs: LoopInputs, *, is_slewing: bool) -> StateEvent:
         """Return the event of a step in voltage mode. is_slewing: the output is still on its way.

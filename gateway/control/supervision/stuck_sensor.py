@@ -2,9 +2,10 @@
 
 Two ways to tell. While the force changes: since the value last changed, the rising branch (the least force a voltage can
 leave) has somewhere been above the falling branch (the most it can leave) of another time, by more than five quanta. That is
-friction-proof; a single number would trip on every small reversal, where friction really holds the force. Only in contact: in
-free air a quiet cell rightly repeats itself. While the force stands still: more equal samples than the cell's own noise allows
-(repeated_readings), or than the rig says (frozen_equal_samples).
+friction-proof; a single number would trip on every small reversal, where friction really holds the force. It must have been so
+for frozen_s: the model begins to move with the voltage, the machine a dead time later, and a quiet cell has repeated itself
+for long before. Only in contact: in free air a quiet cell rightly repeats itself. While the force stands still: more equal
+samples than the cell's own noise allows (repeated_readings), or than the rig says (frozen_equal_samples).
 """
 
 from math import ceil, inf
@@ -44,7 +45,7 @@ class StuckSensorCheck:
         self._watch_model()
 
     def _watch_model(self) -> None:
-        self._same_s = 0.0
+        self._same_s = self._moved_s = 0.0
         self._least_n, self._most_n = -inf, inf
 
     def observe(self, reading: Reading, response: ExpectedForce, touching: bool) -> None:
@@ -63,12 +64,13 @@ class StuckSensorCheck:
         self._slack_n = _WIDER_LOOP * response.width_n
         self._least_n = max(self._least_n, response.rising_n)
         self._most_n = min(self._most_n, response.falling_n)
+        if self._least_n - self._most_n > self._least_change_n + self._slack_n:  # the force must have moved
+            self._moved_s += reading.interval_s
 
     @property
     def words(self) -> str:
         """Observation and why it cannot be, empty for a cell that may be alive."""
-        must_have_moved = self._least_n - self._most_n > self._least_change_n + self._slack_n
-        if self._same_s >= self._frozen_s and must_have_moved:
+        if self._moved_s >= self._frozen_s:
             return f"repeated for {self._same_s:.2f} s while the force must have changed"
         if self._reported_limit is not None or self._equal_s >= self._frozen_s:
             return self.repeats

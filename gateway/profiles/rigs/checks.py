@@ -12,7 +12,15 @@ from typing import Final
 from gateway import defaults
 from gateway.bsfm.model import Calibration
 from gateway.control.compensation.compensation import Compensation
-from gateway.control.settings import Defaults, LeadSettings, Limits, SelfTestSettings, Supervision, Trim
+from gateway.control.settings import (
+    Defaults,
+    LeadSettings,
+    Limits,
+    SelfTestSettings,
+    Supervision,
+    Trim,
+    over_force_room_n,
+)
 from gateway.devices import DeviceProfile
 from gateway.profiles.http_sections import Web
 from gateway.profiles.kinds.plants import PlantProfile
@@ -220,6 +228,22 @@ def check_rest_voltage(parts: Parts) -> Found:
         yield "limits.safe_voltage_v", f"{volt(limits.safe_voltage_v)}: {below}; {cure}"
 
 
+def check_over_force_room(parts: Parts) -> Found:
+    """Yield a warning for an over-force that a rise to the largest setpoint may trip, or a stuck force beyond it."""
+    if parts.limits is None:
+        return
+    trip_n = parts.limits.over_force_n
+    if parts.defaults and (room_n := over_force_room_n(parts.limits, parts.defaults)) is not None:
+        reason = f"{newton(trip_n)} is {room_n:.2g} N above force_max_n = {newton(parts.limits.force_max_n)}"
+        yield (
+            "limits.over_force_n",
+            f"{reason}: a rise to it may go so far beyond for a moment, and trip in normal work",
+        )
+    if parts.supervision and parts.supervision.stuck_n >= trip_n:
+        bound = f"{newton(parts.supervision.stuck_n)} is not below limits.over_force_n = {newton(trip_n)}"
+        yield "supervision.stuck_n", f"{bound}: a tool that is stuck in contact with less would not keep an enable back"
+
+
 def check_contact_threshold(parts: Parts) -> Found:
     """Yield a warning for a precontact force that is too small to feel contact with."""
     if (defaults := parts.defaults) is None:
@@ -297,6 +321,7 @@ FAULTS: Final[tuple[Check, ...]] = (
 WARNINGS: Final[tuple[Check, ...]] = (
     check_real_rig,
     check_rest_voltage,
+    check_over_force_room,
     check_contact_threshold,
     check_plant_supply,
     check_pace,

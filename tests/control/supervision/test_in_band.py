@@ -90,6 +90,27 @@ def test_no_setpoint_and_a_target_on_its_way_are_not_unreachable() -> None:
 
 
 @pytest.mark.parametrize(
+    ("contact_n", "touching", "is_unreachable"), [(2.0, True, True), (4.0, True, False), (0.0, False, False)]
+)
+def test_a_force_that_does_not_go_along_with_a_long_ramp_is_unreachable_before_its_end(
+    contact_n: float, touching: bool, is_unreachable: bool
+) -> None:
+    """Air failed on a ramp of 1 N/s: 30 N short at its end, half a minute later, and nothing was told."""
+    check, slow = SettlingCheck(UNREACHABLE_S), demand(40.0)._replace(ramp_n_per_s=1.0)
+    for now_s, applied_n in ((0.0, 5.0), (UNREACHABLE_S, 6.0)):
+        check.judge_force(slow, at(now_s, contact_n, touching=touching), 40.0, applied_n)
+    assert check.unreachable is is_unreachable
+
+
+def test_what_has_gone_along_with_a_ramp_still_has_to_be_held_at_its_end() -> None:
+    check, slow = SettlingCheck(UNREACHABLE_S), demand()._replace(ramp_n_per_s=1.0)
+    for now_s in (0.0, 1.0):
+        assert check.judge_force(slow, at(now_s, 7.0), 10.0, 7.0) is MOVE
+    assert check.judge_force(slow, at(2.0), 10.0, 10.0) is MOVE and not check.in_band
+    assert check.judge_force(slow, at(2.25), 10.0, 10.0) is SETTLE
+
+
+@pytest.mark.parametrize(
     ("expected_n", "touching", "is_slewing", "is_unreachable"),
     [(2.0, False, False, True), (1.9, False, False, False), (9.0, True, False, False), (9.0, False, True, False)],
 )

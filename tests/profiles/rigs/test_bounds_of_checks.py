@@ -132,6 +132,13 @@ BOUNDS: tuple[tuple[Check, str, Parts, Parts], ...] = (
         limits(safe_voltage_v=2.0, voltage_min_v=1.99),
     ),
     (
+        checks.check_over_force_room,
+        "limits.over_force_n",
+        replace(defaults(in_band_tolerance_n=1.0), limits=replace(LIMITS, over_force_n=52.0)),
+        replace(defaults(in_band_tolerance_n=1.0), limits=replace(LIMITS, over_force_n=51.9)),
+    ),
+    (checks.check_over_force_room, "supervision.stuck_n", supervision(stuck_n=59.9), supervision(stuck_n=60.0)),
+    (
         checks.check_contact_threshold,
         "defaults.precontact_force_n",
         defaults(precontact_force_n=0.51),
