@@ -156,3 +156,14 @@ def test_on_a_narrow_screen_no_label_runs_into_its_value_and_the_open_tab_is_in_
         link = window.get_by_role("link", name=name, exact=True).bounding_box()
         assert link["x"] >= 0.0 and link["x"] + link["width"] <= 360.0
     window.close()
+
+
+def test_an_unreadable_recording_has_no_time_and_no_duration(page, state, chromium) -> None:
+    """It began on Jan 1, 1970, and lasted 0.0 s."""
+    folder = record(state).parent
+    (folder / "0002.fgr").write_bytes(b"junk")
+    window = open_tab(chromium, page.address, "recordings")
+    row = window.locator("tr", has_text="unreadable: ")
+    row.wait_for()
+    assert [row.locator(f"td[data-label={name}]").inner_text() for name in ("started", "duration")] == ["–", "–"]
+    window.close()
