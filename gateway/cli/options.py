@@ -227,7 +227,7 @@ def state_options(function: Callable[..., Any]) -> Callable[..., Any]:
         rig_option(f"The rig that is meant  [default: the one that runs here, else {defaults.RIG}]", checks=False),
         click.option(
             "--state",
-            type=click.Path(path_type=Path, file_okay=False),
+            type=click.Path(path_type=Path, file_okay=False, readable=False),  # E105 tells it, and ends with 77
             help="State directory of the gateway  [default: the rig's]",
         ),
     ):

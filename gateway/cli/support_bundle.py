@@ -26,6 +26,7 @@ from gateway.defaults import HOST
 from gateway.plain_file import replaced_by
 
 EVENT_LINES: Final = 2000
+_NOT_IN_IT: Final = "not in it: "
 _LIBRARIES: Final = ("numpy", "scipy", "pymodbus", "pyserial", "pydantic", "uvloop", "numba", "pyarrow", "starlette")
 _SECRET_KEY: Final = re.compile(
     r"^(\s*(?:-\s*)?\"?(?:[\w.-]*(?:password|token|secret|passphrase|credential)[\w.-]*)\"?\s*[:=]\s*)\S.*$",
@@ -96,6 +97,11 @@ def collect(state: Path, rig_texts: Callable[[], Iterable[tuple[str, str]]]) -> 
     return {name: redact(_as_text(_or_sentence(make))) for name, make in parts.items()}
 
 
+def parts_missing(parts: dict[str, str]) -> list[str]:
+    """Return the names of the parts that say only why they are not in it."""
+    return [name for name, text in parts.items() if text.startswith(_NOT_IN_IT)]
+
+
 def pack_bundle(parts: dict[str, str], target: Path) -> None:
     """Write the parts as a tar.gz; OSError when the disk does not take it. Nothing half stays behind."""
     target = replaced_by(target)
@@ -123,7 +129,7 @@ def _or_sentence(make: Callable[[], str]) -> str:
     try:
         return make()
     except (CliError, ProfileError, OSError, ValueError) as error:
-        return f"not in it: {getattr(error, 'message', None) or error}"
+        return f"{_NOT_IN_IT}{getattr(error, 'message', None) or error}"
 
 
 def _versions() -> dict[str, Any]:
@@ -155,6 +161,7 @@ def _ask(state: Path, what: str) -> dict[str, Any]:
 
 def _listing(state: Path) -> str:
     lines = []
+    next(state.iterdir(), None)  # OSError where this user may not look: rglob finds nothing there, and says nothing
     for path in sorted(path for path in state.rglob("*") if path.is_file() and not path.is_symlink()):
         with contextlib.suppress(FileNotFoundError):  # a running gateway removes some
             lines.append(f"{path.stat().st_size:>12} {path.relative_to(state)}")

@@ -4,7 +4,7 @@ A token must not travel with recordings, which carry the rig's texts, nor be sho
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Protocol
 
@@ -20,7 +20,8 @@ from gateway.profiles.telemetry_sections import Mqtt
 
 _SECRETS: Final = ("token", "password")
 _COMMENT: Final = re.compile(r"(?:^|(?<=\s))#[^\n]*", re.M)
-_SAID: Final = re.compile(rf"(?:{'|'.join(_SECRETS)})[\"']?\s*[:=]\s*(\S.*)")
+_SAID: Final = re.compile(rf"(?:{'|'.join(_SECRETS)})[\"']?\s*[:=]\s*(\S.*)", re.I)
+_LEAST: Final = 8  # characters of a secret that is looked for in comments: a shorter one stands in any word
 _NULL: Final = "tag:yaml.org,2002:null"
 _BLANK: Final = "removed-from-this-copy"
 
@@ -111,33 +112,38 @@ def http_sections_of(file: HttpSections) -> dict[str, Any]:
 def without_secrets(text: str) -> str:
     """Return the text of a rig file with tokens and passwords blanked; it reads as before otherwise. Where a value ends YAML
     says: it may have spaces, commas and number signs in it, and go on in the next line. One in a comment, as of a former token,
-    goes to the end of its line."""
-    if not any(name in text for name in _SECRETS):
+    goes to the end of its line; a comment that has the present one goes as a whole."""
+    if not any(name in text.lower() for name in _SECRETS):
         return text
     document = yaml.compose(text, yaml.SafeLoader)
-    for first, end in sorted([*_secret_places(document), *_places_in_comments(text, document)], reverse=True):
+    nodes = list(_secret_nodes(document))
+    places = [(node.start_mark.index, node.end_mark.index) for node in nodes]
+    places += _places_in_comments(text, document, [node.value for node in nodes if len(node.value) >= _LEAST])
+    for first, end in sorted(places, reverse=True):
         text = text[:first] + _BLANK + text[first + len(text[first:end].rstrip()) :]
     return text
 
 
-def _secret_places(node: yaml.Node | None) -> Iterator[tuple[int, int]]:
-    """Yield where in the text the values of secrets stand: first character, and the one behind the last."""
+def _secret_nodes(node: yaml.Node | None) -> Iterator[yaml.ScalarNode]:
+    """Yield the values of secrets."""
     if isinstance(node, yaml.SequenceNode):
         for item in node.value:
-            yield from _secret_places(item)
+            yield from _secret_nodes(item)
     for key, value in node.value if isinstance(node, yaml.MappingNode) else ():
         if key.value in _SECRETS and isinstance(value, yaml.ScalarNode) and value.tag != _NULL:
-            yield value.start_mark.index, value.end_mark.index
+            yield value
         else:
-            yield from _secret_places(value)
+            yield from _secret_nodes(value)
 
 
-def _places_in_comments(text: str, document: yaml.Node | None) -> Iterator[tuple[int, int]]:
+def _places_in_comments(text: str, document: yaml.Node | None, secrets: Sequence[str]) -> Iterator[tuple[int, int]]:
     values, at = list(_value_places(document)), 0
     while comment := _COMMENT.search(text, at):
         at = comment.end()
         if inside := next((end for first, end in values if first <= comment.start() < end), 0):
             at = inside  # a number sign in a value begins no comment
+        elif any(secret in comment[0] for secret in secrets):
+            yield comment.start() + 1, comment.end()
         elif said := _SAID.search(comment[0]):
             yield comment.start() + said.start(1), comment.end()
 

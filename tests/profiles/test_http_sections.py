@@ -125,6 +125,11 @@ def test_a_fault_of_a_secret_does_not_quote_it(tmp_path: Path, section: str, tol
             'a: "it is # token: no comment" # a token, password: removed-from-this-copy',
         ),
         ("a: it#token:x\n#password:quokka", "a: it#token:x\n#password:removed-from-this-copy"),
+        ("# Token: quokka\na: 1\n", "# Token: removed-from-this-copy\na: 1\n"),
+        (
+            "# quokka-horse is our token\nweb: {token: quokka-horse} # as in the panel: quokka-horse\n",
+            "#removed-from-this-copy\nweb: {token: removed-from-this-copy} #removed-from-this-copy\n",
+        ),
         ("a: |\n  # token: of a text\nb: 1 # token\n", "a: |\n  # token: of a text\nb: 1 # token\n"),
     ],
 )

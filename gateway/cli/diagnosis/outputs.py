@@ -25,9 +25,7 @@ def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
         if target.resolve() in occupied:
             raise click.UsageError(f"{target} would be overwritten: {occupied[target.resolve()]}")
         occupied[target.resolve()] = f"{target} is written by another option"
-        if not target.parent.is_dir():
-            raise FileNotFoundError(errno.ENOENT, "no such directory", str(target.parent))
-        _refuse_directory(target)
+        _refuse_place(target)
 
 
 def write_all(texts: Mapping[Path, str]) -> None:
@@ -44,7 +42,7 @@ def write_all(texts: Mapping[Path, str]) -> None:
 
 def _write_all(texts: Mapping[Path, str], pressed: threading.Event) -> None:
     for path in texts:
-        _refuse_directory(path)
+        _refuse_place(path)
     devices = [path for path in texts if path.exists() and not path.is_file()]
     places = {path: Path(os.path.realpath(path)) for path in texts if path not in devices}  # a link stays one
     beside = {path: place.with_name(f".{place.name}.{os.getpid()}") for path, place in places.items()}
@@ -62,6 +60,8 @@ def _write_all(texts: Mapping[Path, str], pressed: threading.Event) -> None:
         path.write_text(texts[path], encoding="utf-8")
 
 
-def _refuse_directory(target: Path) -> None:
+def _refuse_place(target: Path) -> None:
+    if not target.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "no such directory", str(target.parent))
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, "it is a directory, and no file", str(target))

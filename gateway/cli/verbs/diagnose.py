@@ -83,7 +83,9 @@ EXAMPLES = ("diagnose press.csv --report why.html", "diagnose press.csv --rig de
 )
 @table_options
 @click.option("--fail-on", type=click.Choice(list(_FAILS)), help="Exit 1 on this verdict or a worse one.")
-@click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory, for numbers.")
+@click.option(
+    "--state", type=click.Path(path_type=Path, file_okay=False, readable=False), help="State directory, for numbers."
+)
 @click.option(
     "--against",
     metavar="OLD",

@@ -69,7 +69,9 @@ EXAMPLES = ("fit ladder.csv --models bsfm --orders 1-3", "fit ladder.csv --model
 @click.option("--no-report", is_flag=True, help="Write no report.")
 @click.option("--store", is_flag=True, help="Store the chosen fit as a numbered calibration (it is not activated).")
 @name_option
-@click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory of the gateway.")
+@click.option(
+    "--state", type=click.Path(path_type=Path, file_okay=False, readable=False), help="State directory of the gateway."
+)
 @rig_option("The rig it must be from  [default: the recording's own]")
 @json_option
 def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> None:

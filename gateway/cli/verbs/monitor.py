@@ -27,7 +27,7 @@ EXAMPLES = ("monitor", "monitor --svg monitor.svg --seconds 1")
 )
 @click.option(
     "--state",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=click.Path(path_type=Path, file_okay=False, readable=False),
     help="State directory, for last writers, where it is not the usual one.",
 )
 @gateway_options

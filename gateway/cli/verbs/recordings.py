@@ -153,17 +153,20 @@ def prune_command(*, dry_run: bool, yes: bool, state: StateChoice, days: float |
 
 @command.command(name="export")
 @click.argument("number", metavar="ID", type=click.IntRange(min=1))
-@click.option("--csv", "form", flag_value="csv", default="csv", help="CSV with # key: value lines (default).")
-@click.option("--parquet", "form", flag_value="parquet", help="Parquet with the facts as metadata.")
+@click.option("--csv", "form", flag_value="csv", help="CSV with # key: value lines (default).")
+@click.option(
+    "--parquet", "form", flag_value="parquet", help="Parquet with the facts as metadata (for -o FILE.parquet, too)."
+)
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path, allow_dash=True), help="File to write; - is stdout (CSV)."
 )
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 @state_options
-def export_command(*, number: int, form: str, output: Path | None, force: bool, state: StateChoice) -> None:
+def export_command(*, number: int, form: str | None, output: Path | None, force: bool, state: StateChoice) -> None:
     """Export recording ID (a number of `recordings list`)."""
     from gateway import recording as room
 
+    form = form or ("parquet" if output and output.suffix == ".parquet" else "csv")
     recording = room.read_recording(room.find_recording(state.directory, number))
     for note in recording.notes:
         click.echo(f"{recording.path}: {note}", err=True)

@@ -22,7 +22,7 @@ def command(*, file: Path, force: bool, show: bool, state: StateChoice) -> None:
     become master-1, master-2 ... Look at it before you send it: --show prints all of it. The gateway may be running
     or not.
     """
-    from gateway.cli.support_bundle import collect, pack_bundle
+    from gateway.cli.support_bundle import collect, pack_bundle, parts_missing
     from gateway.profiles import load_rig
 
     if file.exists() and not (force or show):
@@ -33,3 +33,5 @@ def command(*, file: Path, force: bool, show: bool, state: StateChoice) -> None:
         return
     pack_bundle(parts, file)
     click.echo(f"packed {', '.join(parts)} into {file}, {file.stat().st_size / 1e3:.1f} kB; look at it with --show")
+    for name in parts_missing(parts):
+        click.echo(f"{name} {parts[name].splitlines()[0]}", err=True)

@@ -45,7 +45,7 @@ EXAMPLES = ("run demo --sim", "run irc5-cell --sim --bind 127.0.0.1:0 --record")
 )
 @click.option(
     "--state",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=click.Path(path_type=Path, file_okay=False, readable=False),
     help="State directory (default: $XDG_STATE_HOME/force-gateway/RIG).",
 )
 @click.option("--record", is_flag=True, help="Record from the start.")

@@ -48,6 +48,7 @@ def install_command(*, rig: str, dry_run: bool, networks: tuple[str, ...], progr
     """
     from gateway.cli.system_service.installation import install, plan_installation
     from gateway.profiles import load_rig
+    from gateway.service.supervisor.run_options import stem_of
 
     plan = plan_installation(rig, load_rig(rig), networks=networks, command=program)
     if dry_run:
@@ -64,6 +65,7 @@ def install_command(*, rig: str, dry_run: bool, networks: tuple[str, ...], progr
         )
     elif root == Path("/"):
         click.echo(f"{plan.unit} runs; force-gateway service status, force-gateway service logs")
+        click.echo(f"for other verbs: --state /var/lib/force-gateway/{stem_of(rig)}, as root")
 
 
 @command.command(name="uninstall")

@@ -32,7 +32,9 @@ EXAMPLES = ("simulate press.csv --rig demo", "simulate press.csv --plant paper-s
 )
 @table_options
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path, dir_okay=False), help="Write the simulated series.")
-@click.option("--state", type=click.Path(path_type=Path, file_okay=False), help="State directory, for numbers.")
+@click.option(
+    "--state", type=click.Path(path_type=Path, file_okay=False, readable=False), help="State directory, for numbers."
+)
 @json_option
 def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str | None, **options: Any) -> None:
     """Run a plant over a recording, and compare the forces.

@@ -26,7 +26,9 @@ EXAMPLES = ("write force_setpoint=12 control_word=enable", "write mode=force --d
 @click.argument("assignments", metavar="NAME=VALUE...", nargs=-1, required=True, shell_complete=complete_assignments)
 @click.option("--dry-run", is_flag=True, help="Say what would be sent, and send nothing that writes.")
 @click.option(
-    "--state", type=click.Path(path_type=Path, file_okay=False), help="State directory: tells why in numbers."
+    "--state",
+    type=click.Path(path_type=Path, file_okay=False, readable=False),
+    help="State directory: tells why in numbers.",
 )
 @gateway_options
 @json_option

@@ -100,3 +100,13 @@ def test_a_file_for_a_number_says_which_list_has_the_numbers(verb: str, files: P
     answer = call(*verb.split(), "--state", "state", "rig.yaml")
     assert answer.exit_code == 2
     assert f"rig.yaml is a file: a number of `force-gateway {verb.split()[0]} list` is wanted" in answer.output
+
+
+@pytest.mark.parametrize("verb", ["recordings list", "events", "calibration list", "fit 1", "diagnose 1"])
+def test_a_state_that_this_user_may_not_read_is_no_wrong_usage(
+    verb: str, files: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a service's state anybody but root was told `Invalid value for '--state'`, with the exit code of a typing error."""
+    monkeypatch.setattr("os.access", lambda *asked, **more: False)  # root, who runs the tests, may read everything
+    answer = call(*verb.split(), "--state", "state")
+    assert answer.exit_code != 2 and "Invalid value" not in answer.output

@@ -79,3 +79,18 @@ def test_a_link_that_leads_in_a_circle_is_no_file_to_write_to(state: Path, call:
     answer = call("calibration", "compare", "1", "1", "--plot", "out", "--state", "state")
     assert answer.exit_code == 1 and answer.output.startswith("E106 ") and "Too many levels" in answer.output
     assert (state.parent / "out").is_symlink()
+
+
+@pytest.mark.parametrize("verb", [*VERBS, "recordings plot 1 -o out.svg"])
+def test_a_folder_that_is_not_there_is_told_by_its_own_name(verb: str, state: Path, call: Call) -> None:
+    """What was told was the name of a file beside it, which nobody had given: `.run.csv.9277`."""
+    answer = call(*verb.replace("out", "nowhere/out").split(), "--state", "state")
+    assert (answer.exit_code, answer.output) == (1, "E106 nowhere: no such directory\n")
+
+
+def test_a_recording_is_exported_as_its_file_is_called(state: Path, call: Call) -> None:
+    """`-o run.parquet` wrote a CSV of that name."""
+    assert call("recordings", "export", "1", "-o", "run.parquet", "--state", "state").exit_code == 0
+    assert (state.parent / "run.parquet").read_bytes()[:4] == b"PAR1"
+    assert call("recordings", "export", "1", "-o", "run.txt", "--state", "state").exit_code == 0
+    assert (state.parent / "run.txt").read_text().startswith("# ")

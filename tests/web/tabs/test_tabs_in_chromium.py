@@ -25,6 +25,15 @@ FIT = {
 }  # fmt: skip
 
 
+SECOND_COLUMN = """() => {
+  const table = document.createElement("table");
+  table.className = "registers";
+  table.innerHTML = "<tbody><tr><td>40001</td><td>0</td></tr></tbody>";
+  document.body.append(table);
+  return getComputedStyle(table.querySelector("td:nth-child(2)")).display;
+}"""
+
+
 def open_tab(browser: Any, address: str, tab: str) -> Any:
     """A tab of the page; what its scripts complain about fails the test."""
     window = browser.new_page()
@@ -158,4 +167,16 @@ def test_on_a_narrow_screen_no_label_runs_into_its_value_and_the_open_tab_is_in_
         window.locator(f"#tab-{name.lower()}:not([hidden])").wait_for()
         link = window.get_by_role("link", name=name, exact=True).bounding_box()
         assert link["x"] >= 0.0 and link["x"] + link["width"] <= 360.0
+    assert window.evaluate(SECOND_COLUMN) == "none"  # of the registers: their values stand behind the edge otherwise
+    window.close()
+
+
+def test_an_unreadable_recording_has_no_time_and_no_duration(page, state, chromium) -> None:
+    """It began on Jan 1, 1970, and lasted 0.0 s."""
+    folder = record(state).parent
+    (folder / "0002.fgr").write_bytes(b"junk")
+    window = open_tab(chromium, page.address, "recordings")
+    row = window.locator("tr", has_text="unreadable: ")
+    row.wait_for()
+    assert [row.locator(f"td[data-label={name}]").inner_text() for name in ("started", "duration")] == ["–", "–"]
     window.close()

@@ -148,6 +148,6 @@ export function bytes(count) {
 
 /** UTC, as files say it, in the reader's own time zone and form. */
 export function moment(utc) {
-  const date = new Date(utc);
+  const date = new Date(utc ?? NaN); // of nothing it would be 1970
   return Number.isNaN(date.getTime()) ? utc || "–" : date.toLocaleString(undefined, { dateStyle: "medium", timeStyle: "short" });
 }

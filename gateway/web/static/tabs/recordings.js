@@ -53,8 +53,8 @@ class RecordingsTab {
     }
     const heads = ["number", "started", "what happened", "duration", "size", ""];
     const rows = recordings.map((one) => [
-      String(one.number), moment(one.started_utc), h("span", { class: "long" }, one.fault || words(one)),
-      one.growing ? "running" : duration(one.duration_s), one.growing ? "–" : bytes(one.size_bytes),
+      String(one.number), moment(one.started_utc), h("span", { class: "long" }, one.fault ? `unreadable: ${one.fault}` : words(one)),
+      one.growing ? "running" : one.fault ? "–" : duration(one.duration_s), one.growing ? "–" : bytes(one.size_bytes),
       one.growing || one.fault ? "" : this.actions(one, noParquet),
     ]);
     return table("Recordings, the newest first", heads, rows, "list");
