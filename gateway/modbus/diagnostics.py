@@ -26,13 +26,6 @@ class ServerId(NamedTuple):
     text: bytes
 
 
-def loopback_request(data: bytes) -> bytes:
-    """Ask for the same bytes back. ValueError unless they are whole words that fit in one request."""
-    if len(data) % 2 or len(data) > 250:
-        raise ValueError(f"{len(data)} bytes to return, allowed are up to 250 in whole words")
-    return bytes((DIAGNOSTICS, 0, RETURN_QUERY_DATA)) + data
-
-
 def loopback_answer(pdu: bytes) -> bytes:
     """Return the request itself. RequestError: 01 other sub-functions, 03 half a word."""
     if len(pdu) < 3 or len(pdu) % 2 == 0:
@@ -41,11 +34,6 @@ def loopback_answer(pdu: bytes) -> bytes:
     if function != RETURN_QUERY_DATA:
         raise RequestError(RequestFault.FUNCTION, f"function 8 with sub-function {function}, served is 0", DIAGNOSTICS)
     return pdu
-
-
-def report_request() -> bytes:
-    """Ask who the server is and whether it runs."""
-    return bytes((REPORT_SERVER,))
 
 
 def report_answer(pdu: bytes, server: ServerId) -> bytes:

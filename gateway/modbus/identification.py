@@ -1,11 +1,11 @@
-"""Read device identification, FC43 with MEI type 14 (V1.1b3 section 6.21), both ends.
+"""Read device identification, FC43 with MEI type 14 (V1.1b3 section 6.21).
 
 Basic objects 0..2, regular 3..0x7F, extended 0x80..0xFF; codes 1, 2, 3 stream a category from an object on, 4 asks for
 one. A category beyond what the device has is answered with what it has; a stream from an unknown object starts again
 at 0.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 from gateway.modbus.errors import RequestError, RequestFault
@@ -19,11 +19,6 @@ INDIVIDUAL: Final = 4
 
 _LAST_OBJECT: Final = {BASIC: 0x02, REGULAR: 0x7F, EXTENDED: 0xFF}
 _ROOM: Final = 253 - 7  # a PDU less function, MEI type, code, conformity, more follows, next object, number of objects
-
-
-def identification_request(code: int, first_object: int = 0) -> bytes:
-    """Ask for a category from first_object on, or for one object with INDIVIDUAL."""
-    return bytes((ENCAPSULATED, MEI_TYPE, code, first_object))
 
 
 def identification_answer(pdu: bytes, identity: Mapping[int, bytes]) -> bytes:
@@ -41,28 +36,6 @@ def identification_answer(pdu: bytes, identity: Mapping[int, bytes]) -> bytes:
         raise RequestError(RequestFault.VALUE, f"read device identification code {code}, allowed 1 .. 4", code)
     numbers = sorted(number for number in identity if number <= _LAST_OBJECT[code])
     return _stream(code, numbers[numbers.index(first) if first in numbers else 0 :], identity)
-
-
-def parse_identification(data: bytes) -> tuple[dict[int, bytes], int | None]:
-    """Return the host's reading of an answer after its function byte: objects, and which to ask for next (None: no more).
-
-    Raises ValueError when the objects do not fill the answer exactly.
-    """
-    if len(data) < 6 or data[0] != MEI_TYPE:
-        raise ValueError("not a device identification answer")
-    objects = dict(_objects(data[6:]))
-    if len(objects) != data[5]:
-        raise ValueError(f"{data[5]} objects announced, {len(objects)} sent")
-    return objects, data[4] if data[3] else None
-
-
-def _objects(data: bytes) -> Iterator[tuple[int, bytes]]:
-    at = 0
-    while at < len(data):
-        if at + 2 > len(data) or at + 2 + data[at + 1] > len(data):
-            raise ValueError("an object is cut off")
-        yield data[at], data[at + 2 : at + 2 + data[at + 1]]
-        at += 2 + data[at + 1]
 
 
 def _individual(number: int, identity: Mapping[int, bytes]) -> bytes:

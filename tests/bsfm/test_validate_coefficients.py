@@ -64,6 +64,13 @@ def test_the_faulty_number_is_named_with_its_reason(change, index, reason):
     assert [(fault.index, fault.reason) for fault in faults] == [(index, reason)]
 
 
+@pytest.mark.parametrize(("weight", "faulty"), [(0.5, []), (0.5625, [17])])
+def test_a_weight_counts_in_those_of_a_first_one_at_its_very_limit_too(weight, faulty):
+    limits = replace(LIMITS, weight_min=0.25, weight_max=2.0)
+    given = replace(GOOD, rising_weights=(0.25, weight, 0.375), falling_weights=(0.25, 0.5, 0.375))
+    assert [fault.index for fault in validate_coefficients(given, limits)] == faulty
+
+
 def test_the_text_says_what_a_swapped_weight_was_meant_to_be():
     faults = validate_coefficients(replace(GOOD, rising_weights=(1.0, swapped(0.93), 1.2)), LIMITS)
     assert "words swapped 0.93" in faults[0].text

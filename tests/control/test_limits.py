@@ -127,3 +127,8 @@ def test_the_safe_voltage_is_the_rigs_and_comes_at_once_from_either_side(safe_v)
 def test_of_the_rigs_largest_force_and_a_calibrations_the_smaller_one_counts(own_n, largest_n):
     """The smallest one stays the rig's: a tool must come to its pre-contact force."""
     assert narrow_limits(LIMITS, own_n) == replace(LIMITS, force_max_n=largest_n)
+
+
+def test_a_rig_that_states_no_slope_rises_by_100_volts_a_second() -> None:
+    limiter = VoltageLimiter(Limits(force_max_n=50.0, over_force_n=60.0))
+    assert limiter.drive(10.0) is LimitedBy.VOLTAGE_SLEW and limiter.voltage_v == pytest.approx(100.0 * TICK_S)

@@ -190,3 +190,12 @@ def test_a_load_cell_is_no_output(indicator: DeviceProfile) -> None:
 def test_a_reading_that_means_nothing_is_told_to_its_author(reading: dict[str, object], hint: str) -> None:
     with pytest.raises(TemplateError, match=hint):
         ForceReading(**reading)  # type: ignore[arg-type]
+
+
+def test_what_begins_a_stream_is_a_whole_question_and_a_stream_that_needs_none_has_none(
+    indicator: DeviceProfile,
+) -> None:
+    assert cell_host(indicator).start == b""
+    assert indicator.stream
+    told = replace(indicator, stream=replace(indicator.stream, start="SIR"), question_terminator=";")
+    assert (cell_host(told).start, cell_host(told).poll()) == (b"SIR;", b"")

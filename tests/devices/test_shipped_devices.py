@@ -1,5 +1,6 @@
 """Every shipped profile says what it is, where it is from, and that nobody has run it; and both its ends work together."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,8 @@ import yaml
 
 from gateway.devices import DeviceProfile, cell_device, cell_host, output_device, output_host
 from gateway.devices.messages import Accepted, ForceSample, SetVoltage
+from gateway.devices.profile import DeviceRole
+from tests.profile_files import load_device
 
 FOLDER = Path(__file__).parents[2] / "profiles" / "devices"
 FILES = sorted(FOLDER.glob("*.yaml"))
@@ -43,3 +46,25 @@ def test_the_indicator_as_a_rig_sees_it(indicator: DeviceProfile) -> None:
     frame = cell_device(indicator).frame(5.0)
     assert len(frame) * indicator.serial.character_s * indicator.rate_hz < 0.5  # the stream fits its wire
     assert isinstance(cell_host(indicator).receive(frame, 0.0)[0], ForceSample)
+
+
+def silent(profile: DeviceProfile) -> DeviceProfile:
+    """The same, but that says nothing to a setting: it is asked for it in the same breath."""
+    assert profile.set_voltage and profile.read_voltage
+    return replace(profile, name=f"silent {profile.name}", set_voltage=replace(profile.set_voltage, answer=""))
+
+
+OUTPUTS = [one for one in (load_device(file.stem) for file in FILES) if one.role is DeviceRole.OUTPUT]
+OUTPUTS += [silent(load_device("smc-itv-rc")), silent(load_device("adam-4024"))]
+
+
+@pytest.mark.parametrize("profile", OUTPUTS, ids=lambda profile: profile.name)
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_what_the_guardian_waits_for_is_what_the_device_says_to_its_sentence(
+    profile: DeviceProfile, share: float
+) -> None:
+    host, device = output_host(profile), output_device(profile)
+    safe_v = profile.voltage_range_v[0] + share * (profile.voltage_range_v[1] - profile.voltage_range_v[0])
+    heard = device.receive(host.safe_frame(safe_v), 0.0)
+    said = b"".join(device.reply(Accepted(safe_v), to=one) for one in heard)
+    assert host.safe_reply and said == host.safe_reply

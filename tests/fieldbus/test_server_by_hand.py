@@ -72,3 +72,17 @@ def test_who_is_closed_gets_a_moment_to_read_its_answers_and_is_cut_then() -> No
         assert far.ended == "aborted" and not server.peers
 
     asyncio.run(scene())
+
+
+def test_who_was_still_arriving_when_it_closed_is_not_let_in() -> None:
+    async def scene() -> None:
+        server = await started(HandClock(), ServerSettings())
+        shared = server._shared
+        assert shared
+        await server.close()
+        late, far = Connection(shared), HandTransport("127.0.0.1")
+        far.connection = late
+        late.connection_made(far)  # type: ignore[arg-type]
+        assert far.ended == "aborted" and not shared.connections
+
+    asyncio.run(scene())

@@ -1,10 +1,15 @@
-"""The host's view of an answer: does it belong to the request, and what does it carry.
+"""The host's view of an answer: does it belong to the request, and what does it carry; and how a host asks what the gateway
+never does.
 
 No transaction logic here: a client compares transaction ids itself.
 """
 
+from collections.abc import Iterator
+
 from gateway.modbus.bits import unpack_bits
+from gateway.modbus.diagnostics import RETURN_QUERY_DATA
 from gateway.modbus.errors import ModbusError
+from gateway.modbus.identification import MEI_TYPE
 from gateway.modbus.pdu import (
     DIAGNOSTICS,
     ENCAPSULATED,
@@ -62,3 +67,40 @@ def _counted(answer: bytes) -> bytes:
     if len(answer) < 2 or len(answer) != 2 + answer[1]:
         raise AnswerMismatch(f"{len(answer) - 2} bytes where the answer counts {answer[1:2].hex() or 'none'}")
     return answer[2:]
+
+
+def identification_request(code: int, first_object: int = 0) -> bytes:
+    """Ask for a category from first_object on, or for one object with INDIVIDUAL."""
+    return bytes((ENCAPSULATED, MEI_TYPE, code, first_object))
+
+
+def parse_identification(data: bytes) -> tuple[dict[int, bytes], int | None]:
+    """Return the host's reading of an answer after its function byte: objects, and which to ask for next (None: no more).
+
+    Raises ValueError when the objects do not fill the answer exactly.
+    """
+    if len(data) < 6 or data[0] != MEI_TYPE:
+        raise ValueError("not a device identification answer")
+    objects = dict(_objects(data[6:]))
+    if len(objects) != data[5]:
+        raise ValueError(f"{data[5]} objects announced, {len(objects)} sent")
+    return objects, data[4] if data[3] else None
+
+
+def _objects(data: bytes) -> Iterator[tuple[int, bytes]]:
+    at = 0
+    while at < len(data):
+        if at + 2 > len(data) or at + 2 + data[at + 1] > len(data):
+            raise ValueError("an object is cut off")
+        yield data[at], data[at + 2 : at + 2 + data[at + 1]]
+        at += 2 + data[at + 1]
+
+
+def loopback_request(data: bytes) -> bytes:
+    """Ask for the same bytes back."""
+    return bytes((DIAGNOSTICS, 0, RETURN_QUERY_DATA)) + data
+
+
+def report_request() -> bytes:
+    """Ask who the server is and whether it runs."""
+    return bytes((REPORT_SERVER,))

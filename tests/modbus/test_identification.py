@@ -11,9 +11,8 @@ from gateway.modbus.identification import (
     INDIVIDUAL,
     REGULAR,
     identification_answer,
-    identification_request,
-    parse_identification,
 )
+from tests.modbus.host_answers import identification_request, parse_identification
 
 SHORT = {0: b"Company", 1: b"Product", 2: b"V2.11"}
 

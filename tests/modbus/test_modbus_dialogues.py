@@ -4,8 +4,7 @@ import pytest
 
 from gateway.modbus import Peer, ServerId, answer
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.modbus.diagnostics import loopback_request, report_request
-from tests.modbus.host_answers import answer_bits, answer_data
+from tests.modbus.host_answers import answer_bits, answer_data, loopback_request, report_request
 from tests.modbus.memory_bank import MemoryBank
 
 PEER = Peer("127.0.0.1", 4711)

@@ -8,8 +8,8 @@ from gateway.modbus import Peer, answer
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.bits import pack_bits, unpack_bits
 from gateway.modbus.crc import checksum_end, crc16
-from gateway.modbus.identification import identification_request
 from gateway.modbus.rtu import RtuFault, answer_length, decode_adu, encode_adu, request_length
+from tests.modbus.host_answers import identification_request
 from tests.modbus.memory_bank import MemoryBank
 
 REQUESTS = [
@@ -89,6 +89,7 @@ def test_a_coil_is_written_as_the_specification_has_it() -> None:
 
 def test_the_length_of_an_unknown_function_is_unknown() -> None:
     assert request_length(b"\x01\x41\x00\x00\x00\x00") is None
+    assert request_length(b"\x01\x2b\x0d\x00\x00\x00\x00") is None, "of function 43 only the identification is known"
 
 
 def test_a_length_beyond_the_longest_frame_is_no_length() -> None:

@@ -7,10 +7,9 @@ from itertools import product
 import pytest
 
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.modbus.diagnostics import loopback_request, report_request
-from gateway.modbus.identification import identification_request
 from gateway.modbus.rtu import encode_adu
 from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuRequest
+from tests.modbus.host_answers import identification_request, loopback_request, report_request
 from tests.modbus.rtu_bus import SILENCE_S, Bus
 
 READ = P.read_request(3, 100, 12)

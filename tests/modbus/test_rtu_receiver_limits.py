@@ -6,9 +6,9 @@ import pytest
 
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus import rtu_receiver
-from gateway.modbus.diagnostics import loopback_request, report_request
 from gateway.modbus.rtu import encode_adu
 from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuRequest, _is_whole
+from tests.modbus.host_answers import loopback_request, report_request
 from tests.modbus.rtu_bus import BAUD, CHARACTER_S, SILENCE_S, Bus
 from tests.modbus.test_rtu_receiver import COMMAND, INSIDE, OURS, READ, WRITE, answered
 

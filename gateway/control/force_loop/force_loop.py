@@ -234,7 +234,6 @@ class ForceLoop:
 
     def _drive_by_model(self, voltage_v: float, expected_n: float, branch_share: float, given_n: float = 0.0) -> None:
         self._trim.reset()
-        self._settling.restart()
         self.feedforward.take_over(expected_n, branch_share, given_n)
         self.feedforward_v = voltage_v
         self.limited_by = self._limiter.drive(voltage_v)

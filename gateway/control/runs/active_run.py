@@ -33,8 +33,6 @@ RecordedRun: TypeAlias = LadderRun | ExperimentRun
 AnyPlan: TypeAlias = RecordedPlan | SelfTestPlan
 AnyRun: TypeAlias = RecordedRun | SelfTestRun
 
-_OF_SELF_TEST: Final = (CalibrationPhase.SELF_TEST, CalibrationPhase.TESTED)
-_OF_EXPERIMENT: Final = (CalibrationPhase.EXPERIMENT, CalibrationPhase.RECORDED)
 _PHASES: Final = {phase: phase.name.lower().replace("_", " ") for phase in CalibrationPhase}
 
 
@@ -89,10 +87,10 @@ class ActiveRun:
 
     @property
     def kind(self) -> str:
-        """Word for what runs, or ran last."""
-        if self.phase in _OF_SELF_TEST or isinstance(self.run, SelfTestRun):
+        """Word for what runs."""
+        if isinstance(self.run, SelfTestRun):
             return "self-test"
-        return "experiment" if self.phase in _OF_EXPERIMENT or isinstance(self.run, ExperimentRun) else "calibration"
+        return "experiment" if isinstance(self.run, ExperimentRun) else "calibration"
 
     def use(self, model: Bsfm, timing: LoopTiming | None = None, cell_noise_n: float = 0.0, lag_s: float = 0.0) -> None:
         """Set what later runs compare with: the model, and what its calibration has measured of response and noise; lag_s:

@@ -64,8 +64,8 @@ class RtuSplitter:
 
     @property
     def is_between_lines(self) -> bool:
-        """Decide whether nothing is kept: what comes next begins a frame."""
-        return not self._buffer and not self._dropped
+        """Decide whether nothing is kept: what comes next begins a frame. What is dropped is told when the buffer is empty."""
+        return not self._buffer
 
     def forget(self) -> int:
         """Drop the unfinished frame; how many bytes that was."""

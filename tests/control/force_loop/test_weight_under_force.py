@@ -1,5 +1,6 @@
 """The payload's weight changes while the tool presses, by another payload or by a tilt: the slide makes room for it."""
 
+from dataclasses import replace
 from math import cos, radians
 
 import pytest
@@ -51,3 +52,19 @@ def test_a_tool_that_tilts_goes_no_further_than_its_weight_asks_for(tilt_deg: fl
     slide_n = HELD_N - STANDARD_GRAVITY_M_PER_S2 * cos(radians(tilt_deg))
     assert beyond_n(bench, seen, slide_n) < MOST_BEYOND_N
     assert bench.plant.force_n == pytest.approx(slide_n, abs=0.5)
+
+
+def test_a_weight_that_comes_in_free_air_turns_no_friction_round() -> None:
+    volts = []
+    for course_kg in ((0.3,), (0.01, 0.3)):
+        bench = enabled(contact=False)
+        bench.alter_sample = lambda sample, bench=bench: replace(
+            sample, force_n=sample.force_n - bench.command.payload_kg * STANDARD_GRAVITY_M_PER_S2
+        )
+        for payload_kg in course_kg:
+            bench.write(
+                control_word=ControlBit.ENABLE, force_setpoint_n=HELD_N, payload_kg=payload_kg, precontact_force_n=10.0
+            )
+            bench.run(0.25)  # what the cell says of the weight alone is soon called a wrong sign
+        volts.append(bench.last.voltage_v)
+    assert volts[1] == pytest.approx(volts[0], abs=1e-3) and volts[0] > 0.5

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
 from gateway.control import LineStatus
 from gateway.control.runs.active_run import ActiveRun
 from gateway.control.runs.ladder_run import LadderRow
 from gateway.control.runs.ladder_stairs import stairs_of
 from gateway.control.sample_conditioning import Reading
-from tests.control.bench import bsfm, settings
+from tests.control.bench import Bench, bsfm, settings
 from tests.control.runs.test_ladder_run import SHORT
 
 LIMITS = replace(settings().limits, force_max_n=60.0, over_force_n=70.0)
@@ -26,10 +27,12 @@ class Obedient:
         self.voltage_v = voltage_v
 
 
-def climb(direction: float, strength: float = 1.0) -> tuple[list[LadderRow], str, float]:
+def climb(direction: float, strength: float = 1.0, before: Bsfm | None = None) -> tuple[list[LadderRow], str, float]:
     """Climb the whole ladder on a machine that presses so much stronger than the calibration says, and with the rig's largest
-    force on each stair that is gone to in this direction: the rows, the sentence of the end, and the largest force."""
-    active, loop, rows, most_n = ActiveRun(CONTROL, bsfm()), Obedient(), list[LadderRow](), 0.0
+    force on each stair that is gone to in this direction: the rows, the sentence of the end, and the largest force.
+    before: model of the calibration that was in use at first."""
+    active, loop, rows, most_n = ActiveRun(CONTROL, before or bsfm()), Obedient(), list[LadderRow](), 0.0
+    active.use(bsfm())
     active.begin(UP_AND_DOWN, is_local=True)
     for k in range(100_000):
         run = active.run
@@ -66,3 +69,21 @@ def test_a_machine_that_is_stronger_than_it_was_calibrated_never_passes_the_larg
     assert end.startswith("calibration ladder done")
     assert 0.5 * LIMITS.force_max_n < most_n <= LIMITS.force_max_n
     assert len(rows) < len(stairs_of(UP_AND_DOWN, LIMITS, bsfm()))
+
+
+def test_what_keeps_a_run_below_goes_by_the_calibration_in_use_not_by_the_one_before() -> None:
+    """By one that ends at 2 V nothing would rise beyond."""
+    short = RationalBezier(0.0, 2.0, [0.0, 7.0, 14.0], [1.0, 1.0, 1.0])
+    swapped = climb(0.0, 1.7, Bsfm(Branches(short, short), LinearBlend(6.0)))
+    assert swapped == climb(0.0, 1.7) and swapped[2] <= LIMITS.force_max_n
+
+
+def test_a_run_of_this_machine_takes_the_force_at_rest_as_zero_where_it_is_asked_to() -> None:
+    for is_asked, zero_n in ((True, 2.0), (False, 0.0)):
+        bench = Bench()
+        bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 2.0)
+        bench.run(0.5)
+        bench.controller.active_run.ask(replace(SHORT, tare=is_asked))
+        bench.run(0.1)
+        assert bench.controller.active_run.running and bench.controller.zero_n == pytest.approx(zero_n, abs=0.15)
+        assert any(event.startswith("tare") for event in bench.events) is is_asked

@@ -1,5 +1,6 @@
 """What a ladder takes along to its next stair and what it leaves behind; what counts as rest; what is left out of it."""
 
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -134,3 +135,11 @@ def test_a_ladder_without_stairs_is_done_once_it_knows_rest_and_has_no_branch() 
         now_s += 0.01
     assert seen_v == {0.0} and run.is_done
     assert (run.rest_n, run.branch_share, run.eta_s) == (20.0, 1.0, 0.0)
+
+
+def test_a_step_that_tells_the_response_is_made_at_once_where_other_stairs_are_ramped_to() -> None:
+    for is_step, out_v in ((False, 0.0), (True, 5.0)):
+        run, _ = paced(5.0, ramp_s=1e9)
+        run.stairs = tuple(replace(one, is_step=is_step) for one in run.stairs)
+        feed(run, 1.0, 0.1, 0.0)
+        assert run.step(1.2, Reading()).voltage_v == pytest.approx(out_v, abs=1e-6)

@@ -98,6 +98,16 @@ def test_a_force_is_stuck_behind_one_second_without_a_break() -> None:
         assert one.is_stuck is is_stuck
 
 
+def test_what_was_left_at_rest_before_an_enable_does_not_count_behind_it() -> None:
+    """Else a force that only decays behind the next disable would be a stuck one, and keep the enable back."""
+    one = detector()
+    for _ in range(2):
+        for _ in range(15):
+            one.observe_rest(WELL._replace(contact_n=16.0))
+        assert not one.is_stuck
+        one.start()
+
+
 @pytest.mark.parametrize(
     ("line", "code"),
     [

@@ -2,7 +2,9 @@
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.control.supervision.lease import Lease
+from tests.control.bench import enabled, settings
 
 
 def test_a_lease_is_over_behind_its_length_and_at_once_where_its_owner_has_gone() -> None:
@@ -52,3 +54,12 @@ def test_a_sign_of_life_is_one_that_came_later_and_within_one_length(
     assert lease.is_fresh_since(since_s, now_s) is is_fresh
     assert lease.would_be_fresh_since(since_s, now_s, 7) is is_fresh
     assert lease.would_be_fresh_since(since_s, now_s, 8)
+
+
+def test_a_rig_that_says_no_more_than_a_length_goes_to_the_safe_voltage_behind_it() -> None:
+    bench = enabled(settings(lease_s=0.2))
+    bench.force(12.0)
+    bench.run(0.15)
+    assert bench.last.voltage_v > 0.0
+    output = bench.run(0.1)
+    assert (output.fault, output.voltage_v) == (FaultCode.MASTER_LOST, 0.0)
