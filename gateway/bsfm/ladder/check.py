@@ -28,6 +28,7 @@ KGF_SLACK: Final = 1.35  # plants of one kind differ by this much, not by 9.81
 FAR_RATIO: Final = 2.0
 CLIPPED_N: Final = 0.02  # stairs of a saturated cell agree to a count
 FEWEST_CLIPPED: Final = 3
+BEYOND_CELL: Final = 1.1  # times its saturation: no cell reads so much
 DIP_SHARE: Final = 0.02  # of the force range: a stair this far below an earlier one is no noise
 NOISE_AT: Final = 5.0
 UNSETTLED_SHARE: Final = 0.05
@@ -225,17 +226,23 @@ def _without_saturated(ladder: Ladder, saturation_n: float | None) -> tuple[Ladd
     if len(apart) < FEWEST_CLIPPED:
         return ladder, []
     clipped = ladder.voltage_v >= apart[0] - 1.0e-9  # the falling branch above that voltage starts from the clipped one
-    note = (
-        f"force stands at {top_n:.2f} N on {len(apart)} stairs from {apart[0]:.2f} V up: saturated load cell, or no more "
-        "supply pressure"
-    )
-    usable = ladder.part(~clipped)
-    ways = [int((usable.direction == way).sum()) for way in (RISING, FALLING)]
+    note = _clipped_sentence(top_n, apart, saturation_n)
+    ways = [int(((ladder.direction == way) & ~clipped).sum()) for way in (RISING, FALLING)]
     if clipped.mean() > 0.5 or min(ways) < 6:
         raise LadderError(
             LadderFlaw.SATURATED, f"{note}: too little is left to fit; lower --v-max or use a larger cell"
         )
+    usable = ladder.part(~clipped)
     return usable, [f"{note}: these stairs are left out, the calibration ends at {usable.voltage_v.max():.2f} V"]
+
+
+def _clipped_sentence(top_n: float, apart: Floats, saturation_n: float | None) -> str:
+    """apart: voltages of these stairs. No cell gives more than it saturates at: such a force is none of this one's."""
+    stairs = f"on {len(apart)} stairs from {apart[0]:.2f} V up"
+    if saturation_n is not None and top_n > BEYOND_CELL * saturation_n:
+        ends = f"the rig's load cell ends at {saturation_n:g} N"
+        return f"force goes up to {top_n:.6g} N {stairs}, {ends}: another unit, zero or cell"
+    return f"force stands at {top_n:.2f} N {stairs}: saturated load cell, or no more supply pressure"
 
 
 def _warn_of_unsettled(points: Points) -> list[str]:

@@ -87,7 +87,7 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
     named = [Path(options[name]) for name in ("rig", "columns") if options[name]]
     check_targets([target] if target else [], [path, *named])
     with show_progress("fitting"):
-        fit = _fit(path, options)
+        fit = _fit(path, options, stores=store)
     if store:
         fit.document["calibration"] = _store(fit, options)
     if target:
@@ -126,7 +126,7 @@ def _write_report(fit: "LadderFit", target: Path) -> None:
     fit.document["report"] = str(target)
 
 
-def _fit(path: Path, options: dict[str, Any]) -> "LadderFit":
+def _fit(path: Path, options: dict[str, Any], *, stores: bool) -> "LadderFit":
     """Return the fit; whatever is wrong with the data ends with exit code 65."""
     from gateway.bsfm.fit.evaluation import FitRequest
     from gateway.bsfm.fit.result import ModelName, Ties
@@ -143,6 +143,8 @@ def _fit(path: Path, options: dict[str, Any]) -> "LadderFit":
         models=models, orders=options["orders"], ties=Ties(options["ties"]), outliers=options["outliers"]
     )
     recording = read_source(path, mapping)
+    if stores and not (options["rig"] or recording.header.get("rig")):
+        options["rig"] = _rig_to_store_for(options["state"])
     background = _background(recording, options)
     report("checking the ladder")
     try:
@@ -162,6 +164,17 @@ def _background(recording: "Recording", options: dict[str, Any]) -> "RigContext"
     if state is None and recording.path.parent == own / "recordings":
         rig, state = rig or str(recording.header.get("rig") or "") or None, own
     return RigContext(rig=rig, state=state, force_unit=options["force_unit"])
+
+
+def _rig_to_store_for(state: Path | None) -> str:
+    """Return the rig of a table that names none: as `calibration use` takes it, or its number would be another one there."""
+    from gateway.cli.command_line.known_rigs import choose_rig
+    from gateway.cli.command_line.rig_choice import tell_rig
+    from gateway.service.fitting.ladder_source import rig_of_state
+
+    rig = rig_of_state(state) or choose_rig(None, state)
+    tell_rig(rig, state_directory(state, rig))
+    return rig
 
 
 def _beside(path: Path) -> Path:

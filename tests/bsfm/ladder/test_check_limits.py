@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gateway.bsfm.ladder.check import Expectation, join_ladders
-from gateway.bsfm.ladder.ladder_error import LadderFlaw
+from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from tests.bsfm.ladder.test_check import REFERENCE, Table, check_table, recorded, refuse_table, stairs, with_force
 
 ROWS_A_STAIR, STAIRS_UP = 20, 21
@@ -27,6 +27,14 @@ def test_where_the_cell_ends_is_known_a_noisy_stop_is_one() -> None:
     checked = check_table(table, known)
     assert checked.ladder.voltage_v.max() <= 6.4 and not checked.closed
     assert check_table(recorded(stairs())).closed, "and where it never was at its end"
+
+
+@pytest.mark.parametrize("other", [lambda force: 1000.0 * force + 100.0, lambda force: force + 500.0])
+def test_a_force_that_is_beyond_the_cell_on_every_stair_is_of_another_unit_or_zero(other) -> None:
+    known = Expectation(reference=REFERENCE, named="1", saturation_n=98.0, force_unit="N")
+    with pytest.raises(LadderError, match="load cell ends at 98 N: another unit, zero or cell") as refused:
+        check_table(with_force(other), known)
+    assert refused.value.flaw is LadderFlaw.SATURATED
 
 
 def test_a_force_that_still_moves_at_the_end_of_its_stairs_is_told() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gateway.cli.command_line import known_rigs
 from gateway.recording import Recorder
 
 COLUMNS = ("time_s", "command_v", "force_n")
@@ -91,6 +92,20 @@ def test_store_adds_a_numbered_calibration_that_says_where_it_comes_from(tmp_pat
     stored = (tmp_path / "calibrations" / f"{document['calibration']:04d}.yaml").read_text(encoding="utf-8")
     assert document["data_sha256"] in stored
     assert "ladder.csv" in stored
+
+
+def test_a_table_that_names_no_rig_is_stored_for_the_one_that_runs_and_judged_by_it(
+    tmp_path: Path, call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As `calibration use` takes it, which the answer advises: its number would be another calibration there."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setattr(known_rigs, "running_rigs", lambda: ["irc5-cell"])
+    path = written(tmp_path / "ladder.csv", ladder_rows())
+    path.write_text(path.read_text(encoding="utf-8").removeprefix("# rig: demo\n"), encoding="utf-8")
+    document = json.loads(call("fit", str(path), *ORDERS, "--store", "--json", "--no-report").stdout)
+    stored = [str(file.relative_to(tmp_path / "force-gateway")) for file in tmp_path.rglob("*.yaml")]
+    assert stored == [f"irc5-cell/calibrations/{document['calibration']:04d}.yaml"]
+    assert document["measured"]["allowed_rms_n"] is not None
 
 
 def test_semicolons_with_decimal_commas_and_kgf_are_understood(tmp_path: Path, call) -> None:
