@@ -222,6 +222,10 @@ class SerialPort:
     def _keep(self, data: bytes) -> None:
         self._unsent += data
         if len(self._unsent) > MOST_UNSENT_BYTES:
+            with contextlib.suppress(
+                termios.error
+            ):  # the driver's part of it would outlast the loss, and be sent after it
+                termios.tcflush(self._descriptor, termios.TCOFLUSH)
             self._fail(PortError("E111", f"{self._path} takes no bytes: more than {MOST_UNSENT_BYTES} unsent"))
 
     def _fail(self, failure: PortError) -> None:
