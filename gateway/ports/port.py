@@ -30,6 +30,11 @@ WRITE_DEADLINE_S: Final = 0.5
 takes longer is blocked (flow control, a dead adapter) and counts as lost."""
 
 
+CHUNK_BYTES: Final = 512
+"""Read at once; what else waits, the loop's next turn reads. Of 4 kB that a driver has kept, crafted ones took 26 ms in the
+search for a frame, and a device on USB has no baud rate that would part them."""
+
+
 def monotonic_s() -> float:
     """Return the time by the clock of every arrival time, s."""
     return time.monotonic()

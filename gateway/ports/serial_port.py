@@ -31,11 +31,12 @@ from gateway.ports.opening import (
     restore_settings,
     settings_of,
 )
-from gateway.ports.port import WRITE_DEADLINE_S, PortEvents, monotonic_s
+from gateway.ports.port import CHUNK_BYTES, WRITE_DEADLINE_S, PortEvents, monotonic_s
 from gateway.processes.disk_worker import DiskWorker
 
 MOST_UNSENT_BYTES: Final = 4096  # beyond it the line is stuck: no command here is longer than 40 bytes
-_CHUNK_BYTES: Final = 4096
+_DROPPED_BYTES: Final = 4096
+_MOST_DROPPED_READS: Final = 32  # twice what a terminal keeps: who talks without end is not waited for
 _FIRST_BACKOFF_S, _LONGEST_BACKOFF_S = 0.1, 2.0
 _REFUSALS: Final = ("E101", "E103")  # permission, another program: somebody must do something
 _REFUSALS_TOLD: Final = 3  # in a row: 0.6 s after the first
@@ -131,7 +132,9 @@ class SerialPort:
         """Drop what has arrived and was not read yet; how many bytes that was."""
         dropped = 0
         try:  # no `suppress`: three objects on every setpoint's way to the wire
-            while self.is_open and (chunk := os.read(self._descriptor, _CHUNK_BYTES)):
+            for _ in range(_MOST_DROPPED_READS):
+                if not (self.is_open and (chunk := os.read(self._descriptor, _DROPPED_BYTES))):
+                    break
                 dropped += len(chunk)
         except OSError:
             return dropped
@@ -197,7 +200,7 @@ class SerialPort:
 
     def _on_readable(self) -> None:
         try:
-            chunk = os.read(self._descriptor, _CHUNK_BYTES)
+            chunk = os.read(self._descriptor, CHUNK_BYTES)
         except BlockingIOError:
             return
         except OSError as error:
@@ -222,6 +225,10 @@ class SerialPort:
     def _keep(self, data: bytes) -> None:
         self._unsent += data
         if len(self._unsent) > MOST_UNSENT_BYTES:
+            with contextlib.suppress(
+                termios.error
+            ):  # the driver's part of it would outlast the loss, and be sent after it
+                termios.tcflush(self._descriptor, termios.TCOFLUSH)
             self._fail(PortError("E111", f"{self._path} takes no bytes: more than {MOST_UNSENT_BYTES} unsent"))
 
     def _fail(self, failure: PortError) -> None:

@@ -112,7 +112,7 @@ def _body(data: bytes, flags: int) -> dict[str, Any]:
         return {}
     try:
         body = json.loads(data[1:])
-    except ValueError:
+    except (ValueError, RecursionError):
         body = None
     if not isinstance(body, dict):
         raise ProtocolError(f"a message of {chr(data[0])!r} without its fields")

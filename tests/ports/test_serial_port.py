@@ -14,6 +14,7 @@ from gateway.devices import SerialSettings
 from gateway.devices.line_settings import Baud
 from gateway.ports import PortError, Pty
 from gateway.ports.opening import open_descriptor
+from gateway.ports.port import CHUNK_BYTES
 from tests.ports.raw_bytes import gather
 
 
@@ -90,13 +91,54 @@ def test_flushing_drops_what_was_not_read_yet(ear: Any, line: Pty) -> None:
 
 
 def test_flushing_drops_all_of_it_however_long_it_is(ear: Any, line: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gateway.ports.serial_port._CHUNK_BYTES", 2)
+    monkeypatch.setattr("gateway.ports.serial_port._DROPPED_BYTES", 2)
 
     async def scene() -> None:
         port = ear.port(line.path)
         await port.open()
         os.write(line.fd, b"stale")
         assert port.flush_input() == 5
+        port.close()
+
+    asyncio.run(scene())
+
+
+def test_a_device_that_talks_faster_than_it_can_be_read_does_not_hold_up_a_setpoint(
+    ear: Any, line: Pty, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is there is dropped ahead of each question."""
+    reads = 0
+
+    def endless(descriptor: int, size: int) -> bytes:
+        nonlocal reads
+        reads += 1
+        assert reads < 1000, "it is read for ever"
+        return b"7" * size
+
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "read", endless)
+            assert port.flush_input() >= 4096 + 65536, "all that a terminal keeps"
+        port.close()
+
+    asyncio.run(scene())
+
+
+def test_what_has_piled_up_comes_in_pieces_that_take_little_of_a_turn(ear: Any, line: Pty) -> None:
+    """4 kB of crafted bytes in one piece took 26 ms in the search for a frame; other ports and the tick have turns between."""
+
+    async def scene() -> None:
+        sizes: list[int] = []
+        port = ear.port(line.path)
+        port._on_bytes = lambda chunk, now_s: (sizes.append(len(chunk)), ear.on_bytes(chunk, now_s))
+        await port.open()
+        sent = bytes(range(1, 256)) * 8
+        os.write(line.fd, sent)
+        await ear.until(lambda: len(ear.data) == len(sent))
+        assert ear.data == sent
+        assert max(sizes) <= CHUNK_BYTES
         port.close()
 
     asyncio.run(scene())

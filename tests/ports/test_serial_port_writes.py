@@ -1,6 +1,7 @@
 """What is written to a serial port: in order, with a deadline for the last words, and no device can hold the loop up."""
 
 import asyncio
+import os
 import termios
 from typing import Any
 
@@ -42,6 +43,27 @@ def test_a_device_that_takes_no_bytes_is_a_lost_one(ear: Any, line: Pty) -> None
         assert ear.losses[0].code == "E111"
         assert f"more than {MOST_UNSENT_BYTES} unsent" in str(ear.losses[0])
         port.close()
+
+    asyncio.run(scene())
+
+
+def test_what_the_driver_held_of_a_device_that_took_no_bytes_is_not_sent_later(ear: Any, line: Pty) -> None:
+    """The guardian has the line open meanwhile, so that the driver keeps its buffer: 20 kB of old voltages went before the safe
+    one of the new beginning. What a pty's far end has received, 4 kB, nobody can take back."""
+
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        guardians = os.dup(ear.opened[-1])
+        while port.write(b"SET 512\r\n"):
+            pass
+        await ear.until(lambda: len(ear.opened) > 1)
+        assert port.write(b"SET 0\r\n")
+        heard = await gather(line.fd, 7)
+        os.close(guardians)
+        port.close()
+        assert heard.endswith(b"SET 0\r\n")
+        assert len(heard) <= 4096 + len(b"SET 0\r\n")
 
     asyncio.run(scene())
 

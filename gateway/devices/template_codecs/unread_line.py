@@ -11,7 +11,7 @@ from gateway.devices.binary.rtu_framing import answers, exception_text
 from gateway.devices.fields import Field
 from gateway.devices.force_reading import FORCE, UNIT, units_of
 from gateway.devices.profile import TEMPLATE, DeviceProfile, DeviceRole
-from gateway.devices.template import TEXT_CHARACTERS, Template, quote
+from gateway.devices.template import TEXT_CHARACTERS, Template, join_patterns, quote
 
 _TEXT: Final = re.compile(f"[{TEXT_CHARACTERS}]{{4,80}}".encode("ascii"))
 
@@ -60,7 +60,7 @@ def _other_unit(frame: Template, body: bytes) -> tuple[str, str] | None:
     piece = frame.pieces[at]
     words = (str(piece).strip(),) if isinstance(piece, str) else units_of(piece)
     around = [_pattern(one) if k != at else r" *([A-Za-z]{1,4}) *" for k, one in enumerate(frame.pieces)]
-    found = re.fullmatch("".join(around).encode("ascii"), body)
+    found = re.fullmatch(join_patterns(frame.pieces, around).encode("ascii"), body)
     other = found[1].decode("ascii") if found else words[0]
     return None if other in words else (other, " or ".join(words))
 

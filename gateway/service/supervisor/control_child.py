@@ -105,7 +105,7 @@ class ControlChild:
                 self._handle(process, message)
         except BlockingIOError:
             return
-        except (ValueError, KeyError, TypeError, OSError) as error:
+        except Exception as error:  # whatever it said: it has gone wrong, and must not take us with it
             self.reported_cause = Ending(
                 EndCause.NONSENSE, f"control process said {error!r}: internal error, please report it"
             )
@@ -131,6 +131,12 @@ class ControlChild:
         self.asked_s = min(self.asked_s, self.clock() - START_GRACE_S + STOP_BOUND_S)
 
     def _handle(self, process: Child, message: message_link.Message) -> None:
+        try:
+            self._follow(process, message)
+        finally:
+            message.drop_descriptors()  # a port's, kept behind nonsense, would keep its lock from the next control process
+
+    def _follow(self, process: Child, message: message_link.Message) -> None:
         if message.tag == message_link.HEARTBEAT:
             if self.heartbeat.is_up:  # before READY the start has its own, longer patience
                 self.heartbeat.record_beat(process, self.clock())
@@ -153,7 +159,6 @@ class ControlChild:
             self.reported_cause = Ending(EndCause.DEFECT, str(message.body["text"]))
         elif message.tag == message_link.READY:
             self.on_ready(message)
-        message.drop_descriptors()
 
     def _take_line(self, message: message_link.Message) -> None:
         if not message.descriptors:

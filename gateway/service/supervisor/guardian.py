@@ -165,7 +165,10 @@ class Guardian:
     def _announce(self, message: message_link.Message) -> None:
         info, banner = message.body["info"], message.body["banner"]
         heartbeat = self.control.heartbeat
-        heartbeat.stall_s = float(message.body["stall_s"])
+        stall_s = float(message.body["stall_s"])
+        if not 0.0 < stall_s < inf:  # nan too: nothing would ever be overdue
+            raise ValueError(f"stall_s {stall_s}")
+        heartbeat.stall_s = stall_s
         where = "plain modbus tcp is not served"
         if info["modbus"]:
             host, port = info["modbus"]

@@ -3,7 +3,7 @@
 A dead process may leave half a command behind, so the first safe frame can be swallowed into an unknown command: it is
 repeated until the acknowledgement comes, at most three times, and output is never flushed. What the device said before the
 frame is dropped: the unread answer to an older question may look like an acknowledgement (a pressure of 0 is `0` too).
-Standard library only.
+A call that fails, as an adapter's may once, ends one try and not the others. Standard library only.
 """
 
 import contextlib
@@ -13,6 +13,9 @@ import time
 from dataclasses import dataclass
 
 _REPEATS = 3
+_NO_ROOM_S = 0.001  # between two tries to write where none was taken
+_MOST_READS = 32  # of what was said before: twice what a terminal keeps, for who talks without end is not waited for
+_READ_BYTES = 4096
 
 
 @dataclass(frozen=True)
@@ -32,14 +35,12 @@ class SafeLine:
 
     def write_safe(self, reply_timeout_s: float = 0.1) -> bool:
         """Put the safe voltage on the wire. True when acknowledged, False when the device is silent or the port gone."""
-        try:
-            for _ in range(_REPEATS):
+        for _ in range(_REPEATS):
+            with contextlib.suppress(OSError):
                 _drop_input(self.descriptor)
                 _write_all(self.descriptor, self.frame, reply_timeout_s)
                 if not self.reply or self._wait_for_acknowledgement(reply_timeout_s):
                     return True
-        except OSError:
-            return False
         return False
 
     def _wait_for_acknowledgement(self, timeout_s: float) -> bool:
@@ -65,16 +66,26 @@ class SafeLine:
 
 
 def _drop_input(descriptor: int) -> None:
-    while _is_ready(descriptor, select.POLLIN, 0.0) and os.read(descriptor, 256):
-        pass
+    """Drop what can be read; what cannot is no reason to write nothing: a killed process may still have read it away."""
+    with contextlib.suppress(OSError):
+        for _ in range(_MOST_READS):
+            if not (_is_ready(descriptor, select.POLLIN, 0.0) and os.read(descriptor, _READ_BYTES)):
+                return
 
 
 def _write_all(descriptor: int, data: bytes, timeout_s: float) -> None:
-    view = memoryview(data)
+    view, deadline_s = memoryview(data), time.monotonic() + timeout_s
     while view:
-        if not _is_ready(descriptor, select.POLLOUT, timeout_s):
+        left_s = deadline_s - time.monotonic()
+        if left_s <= 0.0 or not _is_ready(descriptor, select.POLLOUT, left_s):
             raise OSError("the line does not take bytes")
-        view = view[os.write(descriptor, view) :]
+        sent = 0
+        with contextlib.suppress(BlockingIOError):
+            sent = os.write(descriptor, view)
+        if sent:
+            view, deadline_s = view[sent:], time.monotonic() + timeout_s
+        else:
+            time.sleep(_NO_ROOM_S)
 
 
 def _is_ready(descriptor: int, event: int, timeout_s: float) -> bool:

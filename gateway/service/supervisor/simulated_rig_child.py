@@ -100,7 +100,7 @@ class RigSupervisor:
             elif message is not None and message.tag == message_link.PTYS:
                 pid_field = {"pid": int(message.body["pid"])} if "pid" in message.body else {}
                 self._due_s, self._answer = inf, {"ptys": dict(message.body["ptys"]), **pid_field}
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, OverflowError):
             child.kill()
             self._on_death_of_child("its first words made no sense", now_s)
             return

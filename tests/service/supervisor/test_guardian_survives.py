@@ -131,6 +131,12 @@ def test_a_dead_childs_last_words_still_count(scene, port):
         b"b{}",
         b"f{}",
         b'r{"info": 3, "banner": "", "stall_s": "soon", "optional": {}}',
+        b'r{"info": {"modbus": null}, "banner": "", "stall_s": 0.1, "optional": []}',
+        b'r{"info": {"modbus": null}, "banner": "", "stall_s": 0.1, "optional": {}, "listening": [1]}',
+        b'r{"info": {"modbus": null}, "banner": "", "stall_s": NaN, "optional": {}}',
+        b'r{"info": {"modbus": null}, "banner": "", "stall_s": 1e999, "optional": {}}',
+        b'b{"pid": 1e999}',
+        b"c" + b'{"a":' * 2000 + b"1" + b"}" * 2000,
     ],
 )
 def test_a_control_process_that_talks_nonsense_is_replaced(scene, port, nonsense):
@@ -142,6 +148,19 @@ def test_a_control_process_that_talks_nonsense_is_replaced(scene, port, nonsense
     assert one.run(lambda: len(one.starter.started) == 2) is None
     assert port.wrote() == SAFE_FRAME
     assert Ending.from_json(one.starter.arguments[1]["restarted"]).cause is EndCause.NONSENSE
+
+
+def test_a_port_that_comes_with_nonsense_is_not_kept(scene, port):
+    """Who keeps it open keeps its lock, too, and no other control process could open it."""
+
+    def script(child: FakeChild) -> None:
+        dies_after(8, port, None)(child)
+        child.say(message_link.LINE, {"safe_frame": "zz", "safe_reply": "", "reply_end": ""}, port.writer)
+
+    one = scene(script, lives(port))
+    assert one.run(lambda: len(one.starter.started) == 2) is None
+    assert port.wrote() == SAFE_FRAME
+    assert_comes_up(one)  # and the scene counts descriptors
 
 
 def test_a_word_of_a_newer_version_is_passed_over(scene, port):

@@ -17,6 +17,7 @@ from gateway import defaults
 from gateway.control.inputs import WireCounts
 from gateway.devices import CellHost, DeviceProfile
 from gateway.devices.messages import ForceSample, Garbage, RepeatedSample
+from gateway.ports.port import CHUNK_BYTES
 from gateway.service.running_rig.lines.cell_identity import CellIdentity
 from gateway.service.running_rig.lines.unread_lines import UnreadLines
 from gateway.service.running_rig.lines.waiting_bytes import WaitingBytes
@@ -80,7 +81,7 @@ class CellExchange:
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
         """Return what these bytes complete; the next question goes out at once where it is due and the wire needs no pause."""
-        came_s = self._waiting.came_s(now_s)
+        came_s = self._waiting.came_s(now_s, is_rest_left=len(chunk) >= CHUNK_BYTES)
         if self.identity.is_due:
             return self._receive_identity(chunk, now_s)
         messages = self._host.receive(chunk, now_s)

@@ -1,0 +1,87 @@
+"""The guardian's final safe-voltage write on a line whose calls fail: an adapter that says no once, or talks without end."""
+
+import errno
+import os
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from gateway.ports import Pty
+from gateway.service.supervisor.safe_line import SafeLine
+
+FRAME, REPLY, END = b"SET 0\r\n", b"0\r\n", b"\r\n"
+SHORT_S = 0.05
+
+
+@pytest.fixture
+def pty() -> Iterator[Pty]:
+    pty = Pty()
+    os.set_blocking(pty.fd, False)
+    yield pty
+    pty.close()
+
+
+@pytest.fixture
+def client(pty: Pty) -> Iterator[int]:
+    descriptor = os.open(pty.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    yield descriptor
+    os.close(descriptor)
+
+
+def failing(call: Callable[..., object], numbers: list[int]) -> Callable[..., object]:
+    """Return the call with these errors first, one each time."""
+    left = list(numbers)
+
+    def fails_first(descriptor: int, data: object) -> object:
+        if left:
+            raise OSError(left.pop(0), "as told")
+        return call(descriptor, data)
+
+    return fails_first
+
+
+@pytest.mark.parametrize("number", [errno.EAGAIN, errno.EIO])
+def test_what_cannot_be_read_keeps_no_safe_voltage_from_the_wire(
+    pty: Pty, client: int, number: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A killed process reads on for a moment, and takes what was there to be dropped."""
+    os.write(pty.fd, b"512\r\n")
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "read", failing(os.read, [number]))
+        assert SafeLine(client, FRAME, b"", END).write_safe(SHORT_S)
+    assert os.read(pty.fd, 256) == FRAME
+
+
+@pytest.mark.parametrize("numbers", [[errno.EIO], [errno.EIO, errno.EIO], [errno.EAGAIN] * 5])
+def test_a_write_that_fails_for_a_moment_is_tried_again(
+    pty: Pty, client: int, numbers: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", failing(os.write, numbers))
+        assert SafeLine(client, FRAME, b"", END).write_safe(SHORT_S)
+    assert os.read(pty.fd, 256) == FRAME
+
+
+def test_a_line_that_takes_no_byte_for_ever_is_given_up(client: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    for refusal in (failing(os.write, [errno.EAGAIN] * 10**6), lambda descriptor, data: 0):
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "write", refusal)
+            assert not SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
+
+
+def test_a_device_that_talks_faster_than_it_can_be_read_is_told_all_the_same(
+    pty: Pty, client: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    talked = 0
+
+    def endless(descriptor: int, size: int) -> bytes:
+        nonlocal talked
+        talked += size
+        assert talked < 10**8, "nothing is written while it talks"
+        return b"7\r\n" * (size // 3)
+
+    os.write(pty.fd, b"7\r\n")
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "read", endless)
+        assert SafeLine(client, FRAME, b"", END).write_safe(SHORT_S)
+    assert os.read(pty.fd, 256) == FRAME
