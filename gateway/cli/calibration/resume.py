@@ -64,9 +64,7 @@ def find_rest_of_ladder(state: Path) -> RestOfLadder:
 def _plan_of(facts: dict[str, Any], path: Path) -> dict[str, Any]:
     """Return the plan of a stopped ladder. CliError for one of another program, that does not say all of it."""
     plan = {name: value for name, value in facts.items() if name not in _NO_PLAN}
-    plan["tare"] = (
-        False  # the zero is that of the first part (ladder_source); a slide that has pressed does not rest at it
-    )
+    plan["tare"] = False  # the zero is that of the first part: a slide that has pressed does not rest at it
     plan["v_max_v"] = facts.get("top_v", plan.get("v_max_v"))  # the same stairs again, whatever model is in use by now
     if missing := [name for name in _PLAN if plan.get(name) is None]:
         sentence = f"{path} does not say the {', '.join(missing)} of its ladder, as a gateway's own does: begin anew"

@@ -94,7 +94,7 @@ def test_exit_code_1_only_for_what_fail_on_asks(
 
 
 def test_what_is_known_goes_to_the_engine(tmp_path: Path, call: Call, engine: Engine) -> None:
-    first, second = table(tmp_path / "a.csv"), table(tmp_path / "b.csv")
+    first, second = table(tmp_path / "a.csv"), table(tmp_path / "b.csv", facts="# rig: demo\n# of another day\n")
     call("diagnose", str(first), str(second), "--without", "coulomb-friction", "--noise-floor-n", "0.1")
     measurements, plant, options = engine.asked[0]
     assert [measurement.name for measurement in measurements] == ["a.csv", "b.csv"]

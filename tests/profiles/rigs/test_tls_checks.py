@@ -223,8 +223,7 @@ def test_a_ca_that_another_has_signed_wants_that_one_in_its_file(tmp_path: Path)
     """It was said that the certificate is not signed by the CA of the face, which it is."""
     root, ca = ending(make_ca(90), 90, path_length=None), make_ca(90)
     ca = signed_by(root, ca)
-    store(make_server(ca, ("127.0.0.1",), 60), tmp_path, "gateway")
-    store(ca, tmp_path, "ca")
+    store({"gateway": make_server(ca, ("127.0.0.1",), 60), "ca": ca}, tmp_path)
     (fault,) = report(tmp_path, files()).faults
     assert f"E175 {tmp_path}/gateway.crt is of a CA that another one has signed, which the file of `ca` lacks" in str(
         fault
@@ -250,8 +249,7 @@ def ending(ca: Signed, days: int, **constraints: int | None) -> Signed:
 def test_the_ca_s_end_is_told_as_its_own(tmp_path: Path, days: int) -> None:
     """By its own days the gateway's certificate was good; it was called one of another CA, and a new one helped nobody."""
     ca = make_ca(40)
-    store(make_server(ca, ("127.0.0.1",), 20), tmp_path, "gateway")
-    store(ending(ca, days), tmp_path, "ca")
+    store({"gateway": make_server(ca, ("127.0.0.1",), 20), "ca": ending(ca, days)}, tmp_path)
     found = report(tmp_path, files())
     told = [str(each).split(" ", 1)[1] for each in (*found.faults, *found.warnings) if "fieldbus" in str(each)]
     own = f"fieldbus[0].certificate: W246 {tmp_path}/gateway.crt expires on 20"
