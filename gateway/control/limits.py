@@ -16,7 +16,8 @@ from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
 
 TICK_S: Final = defaults.TICK_S  # nominal tick: what a movement may claim at once after rest
-LONGEST_STEP_S: Final = 0.045  # a later step catches up no more: two ticks of the slowest loop, and jitter
+LONGEST_STEP_S: Final = 0.02  # a later step of the voltage catches up no more
+LONGEST_RAMP_STEP_S: Final = 0.045  # nor one of a ramp: two ticks of the slowest loop, and jitter
 
 Limited = tuple[float, LimitedBy]
 _NONE, _VOLTAGE_SLEW = LimitedBy.NONE, LimitedBy.VOLTAGE_SLEW  # a look-up on the class costs as much as a limit
@@ -84,14 +85,15 @@ def ramp_limited(target_n: float, last_n: float, rate_n_per_s: float, dt_s: floa
 
 
 class RateBudget:
-    """Seconds that a movement may claim now."""
+    """Seconds that a movement may claim now. longest_step_s: a step that comes later catches up no more."""
 
-    def __init__(self) -> None:
+    def __init__(self, longest_step_s: float = LONGEST_RAMP_STEP_S) -> None:
+        self._longest_step_s = longest_step_s
         self.available_s = TICK_S
 
     def earn(self, dt_s: float) -> None:
         """Add the time that has passed, within what one movement may claim."""
-        most_s = TICK_S if dt_s <= TICK_S else min(dt_s, LONGEST_STEP_S)
+        most_s = TICK_S if dt_s <= TICK_S else min(dt_s, self._longest_step_s)
         self.available_s = min(self.available_s + dt_s, most_s)
 
     def spend(self, step: float, rate_per_s: float) -> None:
@@ -112,7 +114,7 @@ class VoltageLimiter:
     def __init__(self, limits: Limits) -> None:
         self.voltage_v = limits.safe_voltage_v
         self._limits = limits
-        self._pace = RateBudget()
+        self._pace = RateBudget(LONGEST_STEP_S)
 
     @property
     def lowest_v(self) -> float:

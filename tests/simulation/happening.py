@@ -73,6 +73,7 @@ def _shake(simulation: "Simulation", event: Event) -> None:
         simulation.service.stop_control(event.numbers[0])
         simulation.observer.history.awoken.append(simulation.clock.now_s + event.numbers[0])
         if event.numbers[0] > simulation.observer.bounds.stall_s:
+            simulation.observer.history.frozen.append(simulation.clock.now_s - simulation.period_s)
             simulation._lose_control()
     elif event.what == "stop_guardian":
         _stop_guardian(simulation, event.numbers[0])
@@ -88,7 +89,6 @@ def _shake(simulation: "Simulation", event: Event) -> None:
 def _freeze(simulation: "Simulation", duration_s: float) -> None:
     """Whoever comes back from a standstill must not go on as if nothing had been."""
     _stop_guardian(simulation, duration_s)
-    simulation.observer.history.frozen.append(simulation.clock.now_s - simulation.period_s)
     if duration_s > simulation.observer.bounds.stall_s + 2.0 * simulation.period_s:
         thaws_s = simulation.clock.now_s + duration_s
         simulation.outside.call_at(thaws_s, simulation.observer.note_disabled, thaws_s)
