@@ -222,8 +222,7 @@ def ending(ca: Signed, days: int) -> Signed:
 def test_the_ca_s_end_is_told_as_its_own(tmp_path: Path, days: int) -> None:
     """By its own days the gateway's certificate was good; it was called one of another CA, and a new one helped nobody."""
     ca = make_ca(40)
-    store(make_server(ca, ("127.0.0.1",), 20), tmp_path, "gateway")
-    store(ending(ca, days), tmp_path, "ca")
+    store({"gateway": make_server(ca, ("127.0.0.1",), 20), "ca": ending(ca, days)}, tmp_path)
     found = report(tmp_path, files())
     told = [str(each).split(" ", 1)[1] for each in (*found.faults, *found.warnings) if "fieldbus" in str(each)]
     own = f"fieldbus[0].certificate: W246 {tmp_path}/gateway.crt expires on 20"
