@@ -150,7 +150,7 @@ def test_a_rig_where_the_service_cannot_see_it_is_refused(hidden: str) -> None:
 
 
 def recorded(number: int, groups: int, **header: Any) -> Any:
-    ladder = {"groups": 2, "minor_points": 0, "v_max_v": None, "tare": True, "stairs": 40, "top_v": 7.0}
+    ladder = {"groups": 2, "minor_points": 0, "step_v": 0.5, "v_max_v": None, "tare": True, "stairs": 40, "top_v": 7.0}
     return SimpleNamespace(
         number=number, path=Path(f"{number:04d}.fgr"), header={"ladder": ladder, **header}, climbed=groups
     )
