@@ -18,6 +18,7 @@ let csrf = "";
 let source = null;
 let heardAt = 0; // of the page's own start
 let openedAt = 0;
+let isGone = false;
 let comeBack = 0;
 
 export const viewer = (() => {
@@ -77,6 +78,7 @@ async function post(path, body) {
 
 export function tell(name, data) {
   latest.set(name, data);
+  if (name === "gone" || name === "state") isGone = name === "gone";
   for (const listener of listeners.get(name) ?? []) listener(data);
 }
 
@@ -103,9 +105,8 @@ export function listen() {
 /** Of a line that is cut on its way, or a process that stands still, a browser hears no error: nothing comes, and that is all. */
 setInterval(() => {
   const now = performance.now();
-  const silent = now - heardAt;
-  if (!source || silent < SILENT_MS) return;
-  tell("gone", { sentence: `Nothing has come from the gateway for ${Math.floor(silent / 1000)} s. What you see is old.` });
+  if (!source || now - heardAt < SILENT_MS) return;
+  if (!isGone) tell("gone", { sentence: "Nothing comes from the gateway any more. What you see is old." }); // once: it is read aloud
   if (now - Math.max(heardAt, openedAt) < ANEW_MS) return;
   source.close();
   source = null;
