@@ -17,6 +17,8 @@ from gateway.devices import (
     output_device,
     output_host,
 )
+from gateway.devices.binary.register_access import Function, RegisterAccess
+from gateway.devices.exchange import VoltageExchange
 from gateway.devices.messages import (
     Accepted,
     ForceSample,
@@ -99,6 +101,25 @@ def test_what_an_adapter_hears_of_us_is_read_over_and_is_no_noise(profile: Devic
         assert [one for byte in asked + answered for one in receive_next(bytes([byte]))] == [*told], "byte by byte"
         assert told and not any(isinstance(one, Garbage) for one in told if asked != answered), asked
         assert len(told) == 1
+
+
+@pytest.mark.parametrize("function", [3, 4])
+@pytest.mark.parametrize("register", [0, 6, 0x0103, 0x0104, 0x0201, 0x0304, 0x1001])
+@pytest.mark.parametrize("voltage_v", [0.0, 0.001, 2.59, 5.0, 10.0])
+def test_a_question_of_modbus_is_read_over_whatever_it_looks_like(
+    function: Function, register: int, voltage_v: float
+) -> None:
+    """With three for its first byte it is a whole answer; others would be the beginning of a long one."""
+    dac = load_device("waveshare-ao8b")
+    assert dac.read_voltage
+    access = RegisterAccess(function=function, register=register)
+    dac = replace(dac, read_voltage=VoltageExchange(modbus=access, range=dac.read_voltage.range))
+    host, device = output_host(dac), output_device(dac)
+    for chunk_bytes in (1, 3, 64):
+        asked = host.request(ReadVoltage())
+        heard = asked + device.reply(Accepted(voltage_v), to=ReadVoltage())
+        chunks = [heard[at : at + chunk_bytes] for at in range(0, len(heard), chunk_bytes)]
+        assert [one for chunk in chunks for one in host.receive(chunk, 0.0)] == [Accepted(pytest.approx(voltage_v))]
 
 
 def test_what_is_echoed_ahead_of_an_answer_does_no_harm() -> None:
