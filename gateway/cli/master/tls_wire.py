@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pymodbus.client import ModbusTcpClient
 
 _ASK_LOG = "its log (force-gateway events on its machine) says which"
+_WEAK = ("EE_KEY_TOO_SMALL", "CA_KEY_TOO_SMALL", "CA_MD_TOO_WEAK")
 _NOT_NOW = (9, 10)  # X509_V_ERR_CERT_NOT_YET_VALID, X509_V_ERR_CERT_HAS_EXPIRED
 
 
@@ -64,12 +65,22 @@ class TlsWire(TcpWire):
             context.load_verify_locations(self.files.ca)
             context.load_cert_chain(self.files.certificate, self.files.key, password=lambda: b"")
         except (ssl.SSLError, OSError, ValueError) as error:
-            if isinstance(error, ssl.SSLError) and error.reason == KEY_MISMATCH:
-                text = f"E172 {self.files.key} does not fit {self.files.certificate}: take the two made together"
-            else:
-                text = f"E174 {self.files.ca}, {self.files.certificate} or {self.files.key} is no PEM file of its kind"
-            raise CliError(text, exit_codes.DATA) from None
+            raise CliError(
+                self._unfit((isinstance(error, ssl.SSLError) and error.reason) or ""), exit_codes.DATA
+            ) from None
         return context
+
+    def _unfit(self, reason: str) -> str:
+        """Return what is wrong with the files. reason: OpenSSL's."""
+        ca, certificate, key = self.files.ca, self.files.certificate, self.files.key
+        if reason == KEY_MISMATCH:
+            return f"E172 {key} does not fit {certificate}: take the two made together"
+        if b"ENCRYPTED" in key.read_bytes():
+            return f"E174 {key} has a password, and nobody is asked for it: openssl pkey -in {key} -out NEW.key takes it off"
+        if reason in _WEAK:
+            why = reason.lower().replace("_", " ")
+            return f"E174 {certificate} is refused by this machine's OpenSSL ({why}): make one with a stronger key"
+        return f"E174 {ca}, {certificate} or {key} is no PEM file of its kind"
 
     def _greet(self, context: "ssl.SSLContext", plain: "socket.socket") -> "socket.socket":
         import ssl

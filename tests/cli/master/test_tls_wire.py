@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cryptography.hazmat.primitives import serialization
 
 from gateway.cli.errors import CliError
 from gateway.cli.master.tls_wire import TlsFiles, TlsWire
@@ -95,6 +96,23 @@ def test_a_file_that_is_missing_and_options_that_are(folder: Folder, call: Any, 
     assert (done.exit_code, done.stderr) == (65, f"E171 {tmp_path / 'gone.crt'}: No such file or directory\n")
     assert "--key is missing: TLS needs" in call("read", "state", *options(folder)[:4]).stderr
     assert "--rtu is of a serial line" in call("read", "state", "--rtu", "/dev/ttyS9", *options(folder)).stderr
+
+
+def test_a_key_with_a_password_and_a_weak_one_are_pem_files(folder: Folder, call: Any, tmp_path: Path) -> None:
+    """They were called none."""
+    key = serialization.load_pem_private_key(Path(folder.key("setpoint")).read_bytes(), None)
+    locked, form = serialization.BestAvailableEncryption(b"secret"), serialization.PrivateFormat
+    for name, kind in (("new", form.PKCS8), ("old", form.TraditionalOpenSSL)):
+        path = tmp_path / f"{name}.key"
+        path.write_bytes(key.private_bytes(serialization.Encoding.PEM, kind, locked))
+        done = call("read", "state", "--tls", folder.crt("ca"), "--cert", folder.crt("setpoint"), "--key", path)
+        assert (done.exit_code, done.stderr) == (
+            65,
+            f"E174 {path} has a password, and nobody is asked for it: openssl pkey -in {path} -out NEW.key takes it off\n",
+        )
+    weak = TlsFiles(Path(folder.crt("ca")), Path(folder.crt("setpoint")), Path(folder.key("setpoint")))
+    told = TlsWire("127.0.0.1", 802, weak)._unfit("EE_KEY_TOO_SMALL")
+    assert told.startswith(f"E174 {weak.certificate} is refused by this machine's OpenSSL (ee key too small): ")
 
 
 def test_certs_makes_what_a_rig_and_a_client_need_and_overwrites_nothing(tmp_path: Path, call: Any) -> None:
