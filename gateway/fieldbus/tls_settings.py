@@ -81,7 +81,7 @@ def _make_context(certificate: bytes, key: bytes, ca: bytes) -> ssl.SSLContext:
     context.options |= ssl.OP_NO_RENEGOTIATION | ssl.OP_NO_COMPRESSION
     context.set_ecdh_curve(CURVE)
     with _in_memory(certificate) as own, _in_memory(key) as secret, _in_memory(ca) as trusted:
-        context.load_cert_chain(own, secret)
+        context.load_cert_chain(own, secret, password=lambda: b"")  # else OpenSSL asks for it at the terminal
         context.load_verify_locations(trusted)
     return context
 
