@@ -46,7 +46,10 @@ def command(*, wire: "Wire", unit: int, map_name: str, as_json: bool) -> None:
         _run_to_its_end(run, shows=sys.stderr.isatty() and not as_json)
         with explain_refusals(client):
             answer = run.answer(wire)
+            why = run.tell_fault() if answer["result"] == "stopped" else ""
     _tell(answer, as_json=as_json)
+    if why:
+        click.echo(why, err=True)
     if answer["result"] not in ("passed", "warned"):
         sys.exit(1)
 
@@ -135,6 +138,18 @@ class _SelfTest:
         for name, item in answer["items"].items():
             item["text"] = told.get(name, {}).get("text", "")
         return answer
+
+    def tell_fault(self) -> str:
+        """Return the fault that has stopped it and what to do; empty where none is latched."""
+        from gateway.codes.faults import FaultCode
+
+        fault = FaultCode(int(self._read_values("fault_code")[0])).explanation
+        if not fault.code:
+            return ""
+        return (
+            f"{fault.code} {fault.title}: {fault.seen} The self-test has stopped\n"
+            f"  {fault.do} (force-gateway explain {fault.code})"
+        )
 
     def _read(self) -> dict[str, int]:
         from gateway.cli.master.refusal_text import explain_refusals
