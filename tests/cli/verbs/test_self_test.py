@@ -8,9 +8,10 @@ import pytest
 
 from gateway.cli.errors import CliError
 from gateway.cli.verbs import self_test
+from gateway.codes.faults import FaultCode
 from gateway.processes import exit_codes
 from gateway.registers import BankRules, RegisterBank, RegisterMap
-from gateway.registers.command import Command
+from gateway.registers.command import Command, Status
 from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import ControlBit, SelfTestResult, SelfTestVerdict
 
@@ -29,6 +30,7 @@ class DecidingBank:
         self.result, self.verdicts, self.beats = result, verdicts, set[int]()
         self.words: list[int] = []
         self.signal_at_start = 0
+        self.fault = FaultCode.NONE
 
     def hear(self, command: Command) -> None:
         if self.signal_at_start and not self.words:
@@ -38,12 +40,14 @@ class DecidingBank:
         is_over = len(self.beats) > 3 and self.result is not SelfTestResult.RUNNING
         result = self.result if is_over else SelfTestResult.RUNNING
         self.bank.self_test.show(1, result, self.verdicts if is_over else {})
+        self.bank.publish(Status(fault_code=self.fault if is_over else FaultCode.NONE))
 
 
 @pytest.fixture
 def tested(register_map: RegisterMap, serve, call):
-    def run(result: SelfTestResult, *options: str, **verdicts: SelfTestVerdict):
+    def run(result: SelfTestResult, *options: str, fault: FaultCode = FaultCode.NONE, **verdicts: SelfTestVerdict):
         rig = DecidingBank(register_map, result, dict.fromkeys(ITEMS, PASSED) | verdicts)
+        rig.fault = fault
         answer = call("self-test", "--gateway", serve(rig.bank).address, *options)
         return rig, answer
 
@@ -70,6 +74,16 @@ def test_json_has_every_item(tested) -> None:
     facts = json.loads(answer.output)
     assert answer.exit_code == 1 and (facts["result"], facts["number"]) == ("stopped", 1)
     assert list(facts["items"]) == list(ITEMS) and facts["items"]["sign"]["verdict"] == "not tested"
+
+
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_a_fault_that_has_stopped_it_is_told(tested, options: tuple[str, ...]) -> None:
+    """`self-test 1 stopped` was all that was said."""
+    _, answer = tested(SelfTestResult.STOPPED, *options, fault=FaultCode.MASTER_LOST)
+    assert answer.exit_code == 1 and answer.stderr.startswith("A310 master lost: ")
+    assert "The self-test has stopped\n  " in answer.stderr and "force-gateway explain A310" in answer.stderr
+    _, answer = tested(SelfTestResult.STOPPED, *options)
+    assert answer.exit_code == 1 and not answer.stderr
 
 
 def test_a_rig_without_one_refuses_with_what_to_do(register_map: RegisterMap, serve, call) -> None:
