@@ -378,7 +378,7 @@ DEFECTS = (
            "        self._parts.one_shot.start()\n",
            ("control/supervision/test_rise_check.py",)),
     Defect("a reading in free air is a held force", "control/supervision/in_band.py",
-           "inside = inputs.touching and abs(", "inside = abs(",
+           "may_be = inputs.touching and abs(", "may_be = abs(",
            ("control/test_commands.py",)),
     Defect("a reset in OFF leaves the device's own fault", "control/transitions.py",
            "        self.outcome.resets_device = True\n        if self.state is State.OFF:\n            return\n",

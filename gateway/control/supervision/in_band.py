@@ -2,22 +2,25 @@
 
 In band means: target at its goal, contact, and the measured force within the tolerance, for the in-band time without a
 break. Without contact there is no band: a reading of 0.2 N in free air is not a held force. Target-unreachable means
-the same wait in vain, longer. On a long ramp the force is compared with where the target is now, more roughly: air that fails
-on its way would else be told at its end, minutes later.
+the same wait in vain, longer, and that by the force behind a low-pass: of a cell whose noise is as large as the band single
+readings are inside however far off the force is. On a long ramp the force is compared with where the target is now, more
+roughly: air that fails on its way would else be told at its end, minutes later.
 
 Bounds: Supervision.unreachable_s, Defaults.in_band_time_s and Defaults.in_band_tolerance_n in control/settings.py.
 """
 
-from math import inf
+from math import inf, isfinite
 from typing import Final
 
 from gateway.control.demand import Demand
 from gateway.control.inputs import LoopInputs
+from gateway.control.sample_conditioning import Reading
 from gateway.control.state_table import StateEvent
 
 _WAIT, _MOVE, _SETTLE = StateEvent.WAIT, StateEvent.MOVE, StateEvent.SETTLE
 _RAMP_BANDS: Final = 2.0  # tolerances, so far a force in contact may be off on a ramp, ...
 _RAMP_LATE_S: Final = 0.5  # ... and what the ramp gains in this time: lags that nobody has measured
+_SMOOTHING_S: Final = 0.3  # of the force that is called missed
 _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
 
 
@@ -39,16 +42,14 @@ class InBandTimer:
         self.in_band = False
         self.unreachable = False
 
-    def update(self, now_s: float, is_inside: bool, in_band_time_s: float) -> None:
-        """Compare once more. is_inside: the comparison of this moment, with the target at its goal."""
-        if is_inside:
-            self._in_since_s = min(self._in_since_s, now_s)
-            self._out_since_s, self.unreachable = inf, False
-        else:
-            self._out_since_s = min(self._out_since_s, now_s)
-            self._in_since_s = inf
-            self.unreachable = now_s - self._out_since_s >= self._unreachable_s
+    def update(self, now_s: float, is_inside: bool, in_band_time_s: float, *, is_out: bool | None = None) -> None:
+        """Compare once more. is_inside: the comparison of this moment, with the target at its goal; is_out: whether that is
+        missed, where it is not the same."""
+        self._in_since_s = min(self._in_since_s, now_s) if is_inside else inf
         self.in_band = now_s - self._in_since_s >= in_band_time_s
+        is_out = not is_inside if is_out is None else is_out and not self.in_band
+        self._out_since_s = min(self._out_since_s, now_s) if is_out else inf
+        self.unreachable = now_s - self._out_since_s >= self._unreachable_s
 
     def go_along(self, now_s: float, is_near: bool) -> None:
         """Compare on the way to the goal: nothing is in band yet, and what is not near counts as out of it."""
@@ -65,6 +66,7 @@ class SettlingCheck:
     def __init__(self, unreachable_s: float) -> None:
         self._band = InBandTimer(unreachable_s)
         self._answer = InBandTimer(unreachable_s)
+        self._smooth_n: float | None = None  # contact force behind a low-pass, None where it begins anew
         self._driven_v: float | None = None  # that the band is of; None: it is of a force, or of nothing
 
     @property
@@ -86,7 +88,7 @@ class SettlingCheck:
         """Restart all timers: no setpoint is pursued."""
         self._band.restart()
         self._answer.restart()
-        self._driven_v = None
+        self._driven_v = self._smooth_n = None
 
     def judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float, applied_n: float) -> StateEvent:
         """Return the event of a step in force mode. goal_n: where the ramp of the applied force leads."""
@@ -98,14 +100,24 @@ class SettlingCheck:
             self._band.restart()
             return _WAIT if applied_n <= 0.0 else _MOVE
         if abs(goal_n - applied_n) > demand.tolerance_n:
+            self._smooth_n = None
             self._follow_ramp(demand, inputs, applied_n)
             return _MOVE
-        inside = inputs.touching and abs(demand.force_n - applied_n) <= demand.tolerance_n
-        inside = inside and abs(inputs.reading.contact_n - demand.force_n) <= demand.tolerance_n
-        self._band.update(inputs.now_s, inside, demand.in_band_time_s)
+        may_be = inputs.touching and abs(demand.force_n - applied_n) <= demand.tolerance_n
+        inside = may_be and abs(inputs.reading.contact_n - demand.force_n) <= demand.tolerance_n
+        out = not may_be or abs(self._smooth(inputs.reading) - demand.force_n) > demand.tolerance_n
+        self._band.update(inputs.now_s, inside, demand.in_band_time_s, is_out=out)
         if self._band.in_band:
             return _SETTLE
         return _MOVE if inputs.touching or applied_n != goal_n else _WAIT
+
+    def _smooth(self, reading: Reading) -> float:
+        if self._smooth_n is None or not isfinite(self._smooth_n):
+            self._smooth_n = reading.contact_n
+        elif reading.is_new and reading.is_usable:
+            share = reading.interval_s / (_SMOOTHING_S + reading.interval_s)
+            self._smooth_n += share * (reading.contact_n - self._smooth_n)
+        return self._smooth_n
 
     def _follow_ramp(self, demand: Demand, inputs: LoopInputs, applied_n: float) -> None:
         if not inputs.touching:

@@ -102,6 +102,20 @@ def test_a_force_that_does_not_go_along_with_a_long_ramp_is_unreachable_before_i
     assert check.unreachable is is_unreachable
 
 
+@pytest.mark.parametrize(
+    ("readings_n", "is_unreachable"), [((7.0, 9.5), True), ((8.0, 12.0), False), ((7.5, 9.9), True)]
+)
+def test_noise_does_not_hide_a_force_that_is_off_and_makes_none_of_one_that_is_not(
+    readings_n: tuple[float, float], is_unreachable: bool
+) -> None:
+    """A cell of 1 N rms: 2.9 N were missing for good, the band was 1 N, and nothing was told."""
+    check = SettlingCheck(UNREACHABLE_S)
+    for k in range(400):
+        reading = Reading(contact_n=readings_n[k % 2], interval_s=0.01, is_new=True, is_usable=True)
+        check.judge_force(demand(), at(0.01 * k)._replace(reading=reading), 10.0, 10.0)
+    assert (check.unreachable, check.in_band) == (is_unreachable, False)
+
+
 def test_what_has_gone_along_with_a_ramp_still_has_to_be_held_at_its_end() -> None:
     check, slow = SettlingCheck(UNREACHABLE_S), demand()._replace(ramp_n_per_s=1.0)
     for now_s in (0.0, 1.0):
