@@ -55,6 +55,8 @@ PRESSURE = {"ask": "P?", "answer": "{p:d}", "range": {"device": [0, 10], "pressu
         ({"terminator": "é"}, "terminator and question_terminator are ASCII text"),
         ({"terminator": "\n\r"}, None),
         ({"terminator": ";FF", "question_terminator": "*"}, None),
+        ({"terminator": ";FF", "question_terminator": "*", "read_voltage__ask": "RE*Q"}, "has the terminator in its"),
+        ({"terminator": ";FF", "question_terminator": "*", "refusals__unknown": "NO*"}, None),
         ({"refusals__unknown": "ERR {code:d}"}, None),
         (
             {"set_voltage__answer": "OK {counts:d}", "refusals__unknown": "{word:OK|NO} {code:d}"},
@@ -118,6 +120,8 @@ def test_an_output_that_could_not_work_is_told(changes: dict[str, Any], told: st
         ({"stream__frame": "{status:ST|US|OL},{force:+08.2f}", "stream__negative": ["US"]}, "the force stands here twice"),
         ({"stream": {"frame": "{force:+04X}", "newton_per_count": 1, "rate_hz": 10}}, None),
         ({"stream": None, "read_force": {"ask": "W?", "frame": "{force:+08.2f}"}}, None),
+        ({"stream__rate_hz": 0.5}, None),
+        ({"stream__rate_hz": 0}, "stream has a rate_hz and no ask"),
         ({"stream": None}, "a load cell has either stream or read_force"),
         ({"read_force": {"ask": "W?", "frame": "{force:+08.2f}", "unit": "N"}}, "has either stream or read_force"),
         ({"steps": [{"ask": "INC", "by": 1}]}, "steps belong to an output"),

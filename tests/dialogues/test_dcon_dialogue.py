@@ -183,3 +183,10 @@ def test_a_module_with_several_outputs_names_one() -> None:
     assert host.request(SetVoltage(5.0)) == b"#012+05.000\r"
     assert host.request(ReadVoltage()) == b"$0162\r"
     assert host.receive(b">\r!01+05.000\r", 0.0) == [Accepted(5.0), Accepted(5.0)]
+
+
+def test_a_simulated_watchdog_that_has_tripped_says_so_in_the_words_of_the_module() -> None:
+    host = output_host(I7021)
+    host.request(SetVoltage(5.0))
+    said = output_device(I7021).reply(WatchdogTripped())
+    assert (said, host.receive(said, 0.0)) == (b"!\r", [WatchdogTripped()])

@@ -13,6 +13,18 @@ from tests.fieldbus.by_hand import READ, READ_ANSWER, end_of, exchange, framed
 from tests.modbus.memory_bank import MemoryBank
 
 
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2"])
+def test_it_listens_where_it_was_told_to_and_nowhere_else(run: Any, serve: Any, host: str) -> None:
+    """A server for this machine alone that heard the network would need no allow-list for it."""
+
+    async def main() -> None:
+        async with serve(host) as running:
+            listening = running.server._listener._sockets
+            assert [each.getsockname()[0] for each in listening] == [host]
+
+    run(main())
+
+
 def test_closing_leaves_nothing_behind_and_frees_the_port(run: Any, serve: Any) -> None:
     async def main() -> None:
         async with serve() as running:

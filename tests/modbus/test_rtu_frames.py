@@ -99,6 +99,9 @@ def test_a_length_beyond_the_longest_frame_is_no_length() -> None:
 def test_the_longest_frame_is_one_and_a_longer_one_is_none() -> None:
     longest = encode_adu(1, bytes(253))
     assert decode_adu(longest) == (1, bytes(253)) and len(longest) == 256
+    for length in (0, 254):
+        with pytest.raises(ValueError, match=f"not {length}"):
+            encode_adu(1, bytes(length))
     with pytest.raises(RtuFault, match="257 bytes"):
         decode_adu(longest + b"\0")
 

@@ -6,7 +6,7 @@ more than what is done with it. So all that does not depend on the voltage is wo
 
 from math import isfinite
 
-from gateway.devices.fields import Field, Text, ValueRefused
+from gateway.devices.fields import Field, ValueRefused
 from gateway.devices.grammar import Grammar
 from gateway.devices.template import compile_template
 
@@ -24,8 +24,6 @@ class VoltageSentence:
         self._least, self._most = scale.device[0] - half_step, scale.device[1] + half_step
         self._per_unit: int = 10**self._decimals
         self._lowest, self._highest = scale.grid(self._decimals)
-        has_text = any(isinstance(one, Text) for one in compile_template(exchange.ask).fields)
-        self._is_plain = self._number is not None and not has_text
         self._is_bare, self._terminator = grammar.is_bare, grammar.profile.question_terminator_bytes
         self._around: tuple[str, str] | None = None  # before and behind the number, from the first setting on
 
@@ -38,7 +36,7 @@ class VoltageSentence:
             raise ValueRefused(f"{voltage_v} V, {self._grammar.profile.name} takes {low_v:g} .. {high_v:g} V")
         steps = min(self._highest, max(self._lowest, round(number * self._per_unit)))
         number = float(steps) / self._per_unit
-        if self._number is None or not self._is_plain:
+        if self._number is None:
             return self._grammar.question_line(self._grammar.number_body(self._template, number))
         before, behind = self._around or self._spell_around(self._number)
         body = f"{before}{self._number.encode(round(number, self._decimals))}{behind}".encode("ascii")

@@ -181,6 +181,11 @@ def test_a_length_of_no_bytes_or_of_more_than_four_is_none(der: str) -> None:
         read_certificate(bytes.fromhex(der))
 
 
+def test_a_certificate_that_is_cut_is_told_so() -> None:
+    with pytest.raises(ValueError, match="not a certificate .it ends too early"):
+        read_certificate(bytes.fromhex("30050101"))
+
+
 def test_no_bytes_break_the_reading(folder: Folder) -> None:
     der = ssl.PEM_cert_to_DER_cert(Path(folder.crt("setpoint")).read_text())
     for cut in range(len(der)):
