@@ -1,5 +1,6 @@
 """Numbers of the command line with bounds: a refusal says what is allowed, as the gateway's own refusals do."""
 
+from math import isfinite
 from typing import Any
 
 import click
@@ -42,4 +43,6 @@ class Quantity(click.FloatRange):
         low, high = self.min, self.max
         if not ((low is None or number >= low) and (high is None or number <= high)):  # so that nan is none
             self.fail(describe_allowed(str(value), low, high, self._unit), param, ctx)
+        if not isfinite(number):  # JSON has no word for it: the gateway could not even say what is wrong
+            self.fail(f"{value} is not a finite number", param, ctx)
         return number

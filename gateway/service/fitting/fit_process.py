@@ -38,7 +38,8 @@ def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]
         rig = load_rig(rig_name)
         store = CalibrationStore(state, rig.calibration)
         selected = store.find_selected().document or rig.calibration
-        request = FitRequest(reference_span_n=selected.blend_span_n)
+        has_span = selected.blend_span_n > 0.0 or not selected.slip_radii_v  # with stops a master may leave it 0
+        request = FitRequest(reference_span_n=selected.blend_span_n if has_span else None)
         fit = fit_recording(read_source(recording), request, RigContext(rig=rig_name, state=state))
         fresh = calibration_of(fit, rig.load_cell.range_n)
         number = store.find_data(fresh.data_sha256)

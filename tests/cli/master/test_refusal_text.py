@@ -140,6 +140,8 @@ def test_a_limit_that_only_registers_can_tell_is_told(
         (("calibrate", "--groups", "500"), "500: allowed 1 .. 100"),
         (("calibrate", "--step", "0.001"), "0.001 V: allowed at least 0.01 V"),
         (("calibrate", "--v-max", "nan"), "nan V: allowed at least 0.1 V"),
+        (("calibrate", "--v-max", "inf"), "inf is not a finite number"),
+        (("calibrate", "--step", "1e400"), "1e400 is not a finite number"),
     ],
 )
 def test_what_no_gateway_can_take_is_refused_with_what_is_allowed(words: tuple[str, ...], said: str, call) -> None:

@@ -124,6 +124,17 @@ def test_the_blend_of_the_calibration_in_use_is_what_a_ladder_without_reversals_
     assert fits.asked[1][1].reference_span_n == fits.made.blend_span_n != request.reference_span_n
 
 
+@pytest.mark.parametrize(("stops", "span_n"), [({"slip_radii_v": (1.5,), "slip_shares": (1.0,)}, None), ({}, 0.0)])
+def test_a_blend_that_slip_stops_leave_unused_is_none_for_a_ladder_without_reversals(
+    stops: dict[str, Any], span_n: float | None, fits: Fits, tmp_path: Path
+) -> None:
+    """A set with stops may come with a span of 0: taken over it would switch the branches at each reversal."""
+    store = store_of(tmp_path)
+    store.use(store.add(calibration(8, blend_span_n=0.0, **stops)))
+    fit_and_store(tmp_path / "1.fgr", "demo", tmp_path)
+    assert fits.asked[0][1].reference_span_n == span_n
+
+
 @pytest.mark.parametrize(("rejected", "code"), [("", 0), ("it is out of band", 65)])
 def test_the_process_ends_well_only_with_a_fit_that_is_offered(
     fits: Fits, rejected: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
