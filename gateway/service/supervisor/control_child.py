@@ -6,6 +6,7 @@ The guardian decides when it is started, killed and started again. Standard libr
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import isnan
 from typing import Any, Final
 
 from gateway.processes import message_link
@@ -73,7 +74,7 @@ class ControlChild:
         if self.memory is None or self.process is None or not self.heartbeat.is_up:
             return
         beat_s = self.memory.beat_s
-        if beat_s != self._beat_s:
+        if beat_s != self._beat_s and not isnan(beat_s):  # with nan no silence would ever be too long
             self._beat_s = beat_s
             self.heartbeat.record_beat(self.process, min(beat_s, self.clock()))
 

@@ -95,6 +95,13 @@ def test_a_time_that_has_not_come_counts_as_now_and_once(beating):
     assert one.now_s <= 100.0 + 2 * STALL_S + 1e-6
 
 
+def test_what_is_no_time_is_no_beat(beating):
+    one, memory = beating
+    memory.beat(math.nan)
+    assert one.run(lambda: len(one.starter.started) == 2) is None
+    assert one.now_s == pytest.approx(100.0 + STALL_S)
+
+
 def test_what_a_dead_process_has_left_is_no_beat_of_the_next(beating):
     one, memory = beating
     memory.beat(100.05)

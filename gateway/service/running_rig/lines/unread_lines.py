@@ -17,6 +17,7 @@ class UnreadLines:
 
     def __init__(self, profile: DeviceProfile) -> None:
         self._profile = profile
+        self._explained, self._explanation = b"", ""
         self.forget()
 
     def forget(self) -> None:
@@ -38,5 +39,8 @@ class UnreadLines:
         return self.explain(self._last)
 
     def explain(self, line: bytes) -> str:
-        """Return what one line says that was not understood, and what to do; empty where it is no text."""
-        return explain_unread(self._profile, line)
+        """Return what one line says that was not understood, and what to do; empty where it is no text. Asked at each decision,
+        and looked for once: a frame in noise took a millisecond of each."""
+        if line != self._explained:
+            self._explained, self._explanation = line, explain_unread(self._profile, line)
+        return self._explanation

@@ -103,9 +103,12 @@ def test_while_it_is_away_nobody_is_sent_to_where_it_was(rigs: Rigs) -> None:
     assert rigs.prepared == [True, True], "the first one has worked"
 
 
-def test_a_rig_that_talks_nonsense_is_killed(rigs: Rigs) -> None:
+@pytest.mark.parametrize(
+    "nonsense", [b"y[1]", b'b{"pid": 1e999}', b'y{"ptys": 3}', b"y" + b'{"a":' * 2000 + b"}" * 2000]
+)
+def test_a_rig_that_talks_nonsense_is_killed(rigs: Rigs, nonsense: bytes) -> None:
     rigs.one.ask(NOW_S)
-    rigs.started[0].theirs.send(b"y[1]")
+    rigs.started[0].theirs.send(nonsense)
     rigs.hears()
     assert rigs.started[0].exit_code == -9
     assert "made no sense" in rigs.said[0]
