@@ -64,6 +64,7 @@ class CoefficientLimits:
     cell_range_n: float
     voltage_min_v: float = 0.0
     voltage_max_v: float = 10.0
+    voltage_range_least_v: float = 0.1  # over less no ladder is fitted
     weight_min: float = 1.0e-3
     weight_max: float = 1.0e3
     slope_floor_n_per_v: float = SLOPE_FLOOR_N_PER_V

@@ -52,10 +52,8 @@ def _frame_faults(stored: Coefficients, limits: CoefficientLimits) -> Iterator[C
     low, high, span = stored.x0_v, stored.x1_v, stored.blend_span_n
     swapped = _swapped_faults(stored, limits)
     yield from swapped
-    if not swapped and not limits.voltage_min_v <= low < high <= limits.voltage_max_v:
-        allowed = f"{limits.voltage_min_v:g} <= x0 < x1 <= {limits.voltage_max_v:g}"
-        text = f"range {low:g} .. {high:g} V: {allowed} V is allowed"
-        yield CoefficientFault(WHOLE, CoefficientReason.VOLTAGE_RANGE, text)
+    if not swapped:
+        yield from _range_faults(low, high, limits)
     if not swapped and not 0.0 <= span <= limits.blend_span_max_n:
         text = f"blend span {span:g} N: 0 .. {limits.blend_span_max_n:g} N is allowed"
         yield CoefficientFault(WHOLE, CoefficientReason.BLEND_SPAN, text)
@@ -63,6 +61,17 @@ def _frame_faults(stored: Coefficients, limits: CoefficientLimits) -> Iterator[C
     if len(lengths) != 1 or not 2 <= next(iter(lengths)) <= ORDER_MAX + 1:
         text = f"2 to {ORDER_MAX + 1} handles and as many weights per branch are needed"
         yield CoefficientFault(WHOLE, CoefficientReason.ORDER, text)
+
+
+def _range_faults(low: float, high: float, limits: CoefficientLimits) -> Iterator[CoefficientFault]:
+    """Of a range that is next to nothing every force would be the same voltage: what presses would be let go."""
+    text = ""
+    if not limits.voltage_min_v <= low < high <= limits.voltage_max_v:
+        text = f"{limits.voltage_min_v:g} <= x0 < x1 <= {limits.voltage_max_v:g} V is allowed"
+    elif high - low < limits.voltage_range_least_v:
+        text = f"a range of {limits.voltage_range_least_v:g} V and more is allowed"
+    if text:
+        yield CoefficientFault(WHOLE, CoefficientReason.VOLTAGE_RANGE, f"range {low:g} .. {high:g} V: {text}")
 
 
 def _swapped_faults(stored: Coefficients, limits: CoefficientLimits) -> list[CoefficientFault]:

@@ -53,6 +53,8 @@ def test_a_good_set_has_no_fault():
         ({"rising_handles_n": (0.5, 0.6, 38.0)}, 0, CoefficientReason.SLOPE_FLOOR),
         ({"falling_handles_n": (0.5, 13.0, 38.0)}, -1, CoefficientReason.CROSSING),
         ({"x1_v": 10.5}, -1, CoefficientReason.VOLTAGE_RANGE),
+        ({"x1_v": 1e-40}, -1, CoefficientReason.VOLTAGE_RANGE),
+        ({"x0_v": 4.95}, -1, CoefficientReason.VOLTAGE_RANGE),
         ({"x0_v": math.nan}, -1, CoefficientReason.VOLTAGE_RANGE),
         ({"x0_v": -0.5}, -1, CoefficientReason.VOLTAGE_RANGE),
         ({"blend_span_n": math.nan}, -1, CoefficientReason.BLEND_SPAN),
