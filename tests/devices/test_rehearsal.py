@@ -121,7 +121,7 @@ def test_an_output_that_could_not_work_is_told(changes: dict[str, Any], told: st
         ({"stream": {"frame": "{force:+04X}", "newton_per_count": 1, "rate_hz": 10}}, None),
         ({"stream": None, "read_force": {"ask": "W?", "frame": "{force:+08.2f}"}}, None),
         ({"stream__rate_hz": 0.5}, None),
-        ({"stream__rate_hz": 0}, "stream has a rate_hz and no ask"),
+        ({"stream__rate_hz": 0}, "rate_hz of stream is missing"),
         ({"stream": None}, "a load cell has either stream or read_force"),
         ({"read_force": {"ask": "W?", "frame": "{force:+08.2f}", "unit": "N"}}, "has either stream or read_force"),
         ({"steps": [{"ask": "INC", "by": 1}]}, "steps belong to an output"),
