@@ -97,8 +97,8 @@ def test_who_skips_to_the_content_stays_in_the_tab(page, chromium) -> None:
     window.locator(".skip").focus()
     window.keyboard.press("Enter")
     expect(window.locator("#main")).to_be_focused()
+    expect(window.locator("#tab-configuration")).to_be_visible()
     assert window.evaluate("location.hash") == "#configuration"
-    assert window.locator("#tab-configuration").is_visible()
     window.close()
 
 
