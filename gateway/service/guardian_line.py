@@ -13,6 +13,8 @@ from gateway.service.heartbeat_memory import HeartbeatMemory
 
 _BEATS_PER_STALL: Final = 8  # at least so many fit into the silence that kills; each wakes the guardian
 
+_LONGEST_CAUSE: Final = 2000  # characters: an exception may hold all that it could not read, and the line takes 64 KiB
+
 
 class GuardianLine:
     """Our end of the guardian's line. memory: where the loop beats; without it each beat is a message. on_ports: the simulated
@@ -72,8 +74,8 @@ class GuardianLine:
         self._tell(guardian_link.KEEP, facts)
 
     def first_cause(self, cause: str) -> None:
-        """Tell the guardian of an internal error, in words: this process is about to end."""
-        self._tell(guardian_link.FIRST_CAUSE, {"text": cause})
+        """Tell the guardian of an internal error, in words: this process is about to end. Of a long one the beginning."""
+        self._tell(guardian_link.FIRST_CAUSE, {"text": cause[:_LONGEST_CAUSE]})
 
     def note_safe(self) -> None:
         """Tell the guardian that the safe voltage has gone out as the last one: from now on no heartbeat is to be missed."""

@@ -106,6 +106,23 @@ def test_what_has_waited_until_the_end_is_still_told(ends: Pair) -> None:
     assert last and last.body == {"text": "internal error: ZeroDivisionError()"}
 
 
+@pytest.mark.parametrize("size", [100_000, 1_000_000])
+def test_a_cause_of_any_length_is_told_by_its_beginning(ends: Pair, size: int) -> None:
+    """An exception may hold what it could not read; a message that is too long has no end, and was taken for nonsense."""
+
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        guardian.first_cause(f"internal error: UnicodeDecodeError('utf-8', b'{'x' * size}')")
+        told = message_link.receive(ends[0])
+        assert told is not None and told.tag == message_link.FIRST_CAUSE
+        assert told.body["text"].startswith("internal error: UnicodeDecodeError('utf-8', b'xxx")
+        assert len(told.body["text"]) < 10_000
+        guardian.close()
+
+    asyncio.run(scene())
+
+
 def test_a_line_that_is_closed_reads_and_beats_no_more(ends: Pair) -> None:
     """Its number may be another file's by then, and the memory goes with it."""
     number = os.memfd_create("beat")

@@ -9,6 +9,7 @@ A call that fails, as an adapter's may once, ends one try and not the others. St
 import contextlib
 import os
 import select
+import termios
 import time
 from dataclasses import dataclass
 
@@ -36,6 +37,8 @@ class SafeLine:
     def write_safe(self, reply_timeout_s: float = 0.1) -> bool:
         """Put the safe voltage on the wire. True when acknowledged, False when the device is silent or the port gone."""
         for _ in range(_REPEATS):
+            with contextlib.suppress(termios.error):  # a program may have stopped it, and its stop outlasts it
+                termios.tcflow(self.descriptor, termios.TCOON)
             with contextlib.suppress(OSError):
                 _drop_input(self.descriptor)
                 _write_all(self.descriptor, self.frame, reply_timeout_s)

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import termios
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -84,4 +85,11 @@ def test_a_device_that_talks_faster_than_it_can_be_read_is_told_all_the_same(
     with monkeypatch.context() as patch:
         patch.setattr(os, "read", endless)
         assert SafeLine(client, FRAME, b"", END).write_safe(SHORT_S)
+    assert os.read(pty.fd, 256) == FRAME
+
+
+def test_a_terminal_that_another_program_has_stopped_sends_again(pty: Pty, client: int) -> None:
+    """Control looks for it ten times a second, and may die in between: the voltage stood until the next one opened the port."""
+    termios.tcflow(client, termios.TCOOFF)
+    assert SafeLine(client, FRAME, b"", END).write_safe(SHORT_S)
     assert os.read(pty.fd, 256) == FRAME
