@@ -37,11 +37,13 @@ def swinging_sentence(force_n: float) -> str:
     )
 
 
-def sign_sentence(rise_n: float, expected_n: float) -> str:
-    """Return A302 in numbers, and what to do."""
+def sign_sentence(rise_n: float, expected_n: float, *, was_right: bool = False) -> str:
+    """Return A302 in numbers, and what to do. was_right: the force has risen as it should since the enable."""
+    cure = "swap the cell's signal wires or set sign: -1"
+    if was_right:
+        cure = "it was right before in this enable: a tilt that tilt_angle does not tell, or something that pulls on the tool"
     return fault_sentence(
-        FaultCode.SIGN_INVERTED,
-        f"force went {rise_n:+.1f} N where {expected_n:+.1f} N were expected: swap the cell's signal wires or set sign: -1",
+        FaultCode.SIGN_INVERTED, f"force went {rise_n:+.1f} N where {expected_n:+.1f} N were expected: {cure}"
     )
 
 

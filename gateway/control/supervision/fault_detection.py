@@ -264,7 +264,8 @@ class FaultDetector:
             observation = f"{reading.cell_n:.2f} N {words}: amplifier or cell is dead"
             return stop_cause(FaultCode.SAMPLE_FROZEN, observation)
         if self._response_fault is _WRONG_SIGN:
-            return StopCause(FaultCode.SIGN_INVERTED, sign_sentence(self._rise.measured_rise_n, expected_n()))
+            sentence = sign_sentence(self._rise.measured_rise_n, expected_n(), was_right=self._rise.is_proven)
+            return StopCause(FaultCode.SIGN_INVERTED, sentence)
         if self._response_fault is _WRONG_GAIN:
             return StopCause(FaultCode.GAIN_WRONG, gain_sentence(self._rise.wrong_rise_n, expected_n()))
         return None

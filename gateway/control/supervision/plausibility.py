@@ -108,6 +108,11 @@ class RiseCheck:
         self.is_too_high = False
 
     @property
+    def is_proven(self) -> bool:
+        """Decide whether one rise since the beginning had the right sign and gain."""
+        return self._proven
+
+    @property
     def measured_rise_n(self) -> float:
         """Rise of the measured force since the check began, N."""
         return self._calm_n - self._base_n

@@ -81,3 +81,18 @@ def test_behind_a_tare_a_force_that_rises_is_told_from_one_that_stays_as_before(
         judged.append(course)
     assert FaultCode.GAIN_WRONG in judged[0]
     assert judged[1] == judged[0]
+
+
+def test_a_sign_that_was_right_in_this_enable_is_not_blamed_on_the_wires() -> None:
+    """A tool of 2 kg that was tilted without a word of it."""
+    for held_s in (0.0, 3.0):
+        bench = Bench(seed=4)
+        bench.run(0.3)
+        bench.plant.sign = 1.0 if held_s else -1.0
+        bench.enable(12.0)
+        bench.run(held_s)
+        bench.plant.sign = -1.0
+        bench.run(1.0)
+        (sentence,) = (event for event in bench.events if event.startswith("A302"))
+        assert ("swap the cell's signal wires" in sentence) == (not held_s)
+        assert ("it was right before in this enable: a tilt" in sentence) == bool(held_s)
