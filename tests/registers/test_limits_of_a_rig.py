@@ -29,6 +29,12 @@ def test_the_least_force_of_a_rig_and_0_are_taken_in_words_and_floats(make_bank,
         assert "allowed 0 and 2.1 .. 60 N" in refused.sentence
 
 
+def test_a_least_force_of_less_than_a_newton_is_one_as_well(make_bank, master_of):
+    master = master_of(make_bank(setpoint_min_n=0.5), "10.0.0.1")
+    master.write(FORCE, 50)
+    assert "allowed 0 and 0.5 .. 60 N" in master.refusal(master.write, FORCE, 49).sentence
+
+
 def test_a_force_in_words_without_a_sign_has_its_hundredths_as_a_float_too(document, master_of):
     """A map of one's own for forces up to 655.35 N: 12.5 N as a float was "not a whole number"."""
     document = deepcopy(document)

@@ -128,6 +128,11 @@ def test_a_bad_set_is_refused_with_index_and_reason(change, index, reason):
     assert fault.sentence(16).endswith("active set 16 unchanged")
 
 
+def test_force_limits_that_no_branch_reaches_are_told_with_what_is_reached():
+    fault = fault_of(staged(replace(GOOD, force_high_n=61.0)))
+    assert fault.text == "force limits 1 .. 61 N, the branches reach 0 .. 60 N"
+
+
 def test_length_crc_slot_and_unused_word_are_checked():
     fault = fault_of(staged(length=139))
     assert (fault.index, fault.reason) == (WHOLE, UploadReason.LENGTH)
