@@ -3,7 +3,8 @@
 The error of the branches alone is no measure of a model that is to drive a rig: each stair is compared with its own branch
 there, and a reversal that leaves both for a while costs nothing. Here the memory moves with the measured forces, as in
 control, and the model's force at each measured voltage is compared with the measured one. Where no reversal part was measured
-the way of reversing is an assumption, which a staircase cannot judge; there the branches are all that is compared.
+the way of reversing is an assumption, which a staircase cannot judge; there the branches are all that is compared. But not of
+a model with slip stops: those were measured, and its branches alone are reached only far behind a turn.
 """
 
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.ladder.check import CheckedLadder
 from gateway.bsfm.ladder.measured_ladder import RISING, Ladder
 from gateway.bsfm.model import Bsfm
+from gateway.bsfm.slip.reversal import LinearBlend
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,7 @@ def branch_error_n(model: Bsfm, ladder: Ladder) -> Floats:
 
 def measured_error_n(model: Bsfm, checked: CheckedLadder) -> Floats:
     """Return model minus measured at every stair and every point of the walk, whose first only says where it began."""
-    if len(checked.minor_v) < 2:
+    if len(checked.minor_v) < 2 and isinstance(model.reversal, LinearBlend):
         return branch_error_n(model, checked.ladder)
     ladder = walked_error_n(model, checked.ladder.voltage_v, checked.ladder.force_n)
     return np.concatenate([ladder, walked_error_n(model, checked.minor_v, checked.minor_n)[1:]])

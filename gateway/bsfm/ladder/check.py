@@ -31,6 +31,7 @@ FEWEST_CLIPPED: Final = 3
 BEYOND_CELL: Final = 1.1  # times its saturation: no cell reads so much
 DIP_SHARE: Final = 0.02  # of the force range: a stair this far below an earlier one is no noise
 NOISE_AT: Final = 5.0
+NOISY_DIP: Final = 2.0  # times the noise of a reading: means of a few readings differ by that
 UNSETTLED_SHARE: Final = 0.05
 
 
@@ -84,7 +85,7 @@ def check_ladder(
     notes += [*walk.left_out, *_check_scale(rows, slope_n_per_v, expected)]
     ladder, clipped = _without_saturated(ladder, expected.saturation_n)
     notes += [*clipped, *_warn_of_unsettled(points)]
-    _check_increasing(ladder)
+    _check_increasing(ladder, points.noise_n)
     return CheckedLadder(
         ladder,
         walk.minor_v,
@@ -259,7 +260,7 @@ def _warn_of_unsettled(points: Points) -> list[str]:
     return [warning]
 
 
-def _check_increasing(ladder: Ladder) -> None:
+def _check_increasing(ladder: Ladder, noise_n: float) -> None:
     """A branch whose mean falls on the way up describes no inverse, whatever is fitted to it."""
     limit_n = max(0.5, DIP_SHARE * float(np.ptp(ladder.force_n)))
     for way, words in ((RISING, "up"), (FALLING, "down")):
@@ -272,9 +273,15 @@ def _check_increasing(ladder: Ladder) -> None:
             raise LadderError(
                 LadderFlaw.NOT_INCREASING,
                 f"on the way {words} {mean_n[peak]:.2f} N at {voltage_v[peak]:.2f} V but only {mean_n[worst]:.2f} N at "
-                f"{voltage_v[worst]:.2f} V: a force that is not increasing with voltage has no inverse; slipping tool, leak, "
-                "or a jam at one place",
+                f"{voltage_v[worst]:.2f} V: a force that is not increasing with voltage has no inverse; "
+                f"{_cause_of_dip(dip_n, noise_n)}",
             )
+
+
+def _cause_of_dip(dip_n: float, noise_n: float) -> str:
+    if dip_n < NOISY_DIP * noise_n:
+        return f"single readings spread by {noise_n:.2f} N, which may hide the steps: longer stairs, more groups"
+    return "slipping tool, leak, or a jam at one place"
 
 
 def _mean_by_stair(ladder: Ladder, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:

@@ -50,6 +50,11 @@ def test_a_force_that_dips_on_the_way_down_has_no_inverse_either() -> None:
     assert error.flaw is LadderFlaw.NOT_INCREASING and "on the way down" in str(error)
 
 
+def test_steps_that_the_noise_hides_are_not_called_a_slipping_tool() -> None:
+    error = refuse_table(with_force(lambda force: force + noise_n(len(force), 6.0)))
+    assert error.flaw is LadderFlaw.NOT_INCREASING and "which may hide the steps" in str(error)
+
+
 def test_groups_of_several_parts_stay_apart() -> None:
     """A fit leaves them out one at a time, and two under one number would be one."""
     first, second = check_table(recorded(stairs(2))), check_table(recorded(stairs(3), seed=2))

@@ -1,6 +1,7 @@
 """Which fits are offered: a bad one, or one worse than what is in use, is kept with its reason and not used by accident."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 from math import pi, sin
 from pathlib import Path
@@ -9,7 +10,10 @@ import numpy as np
 import pytest
 
 from gateway.bsfm import CoefficientLimits
-from gateway.bsfm.fit.model_error import Error
+from gateway.bsfm.fit.model_error import Error, branch_error_n, measured_error_n
+from gateway.bsfm.ladder.check import CheckedLadder
+from gateway.bsfm.ladder.measured_ladder import Ladder
+from gateway.bsfm.slip.reversal import LinearBlend
 from gateway.calibrations.activation import Activation
 from gateway.calibrations.store import CalibrationStore
 from gateway.numbered_documents.store import StoreError
@@ -101,3 +105,20 @@ def test_without_a_reversal_part_the_branches_are_judged_and_it_is_said(tmp_path
     measured = json.loads(Path(result["document"]).read_text(encoding="utf-8"))["measured"]
     assert not measured["reversals"]
     assert measured["rms_n"] < 0.3
+
+
+def test_slip_stops_in_use_are_judged_with_their_reversals_by_a_ladder_without_a_reversal_part() -> None:
+    """Their branches lie beside the stairs behind the top: a fit five times worse than what is in use was offered."""
+    model = load_rig("demo").calibration.model()
+    forces_n = [*np.linspace(1.0, 58.0, 8).tolist(), *np.linspace(58.0, 1.0, 8)[1:].tolist()]
+    memory, before_n, volts = model.reversal.start(), forces_n[0], []
+    for force_n in forces_n:
+        memory, before_n = model.memory_after(memory, before_n, force_n), force_n
+        volts.append(model.voltage_v(force_n, model.branch_share(memory))[0])
+    way, none = [1] * 8 + [-1] * 7, np.array([])
+    ladder = Ladder(np.array(volts), np.array(forces_n), np.array(way), np.zeros(15, int))
+    checked = CheckedLadder(ladder, none, none, 0.1, 8.0, ())
+    assert Error.of(branch_error_n(model, ladder)).rms_n > 0.5
+    assert Error.of(measured_error_n(model, checked)).max_n < 0.01
+    blend = replace(model, reversal=LinearBlend(14.0))
+    assert np.array_equal(measured_error_n(blend, checked), branch_error_n(model, ladder)), "its span may be assumed"
