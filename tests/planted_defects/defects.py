@@ -77,7 +77,7 @@ DEFECTS = (
     Defect("an enable does not wait for the output's word", "control/supervision/fault_detection.py",
            "if line.acknowledged_v is None or not", "if not", (*_DETECTION, *_WIRED)),
     Defect("a frozen cell is believed", "control/supervision/stuck_sensor.py",
-           "if self._moved_s >= self._frozen_s:", "if False:",
+           "if self._same_s >= self._frozen_s and self._moved_s", "if False and self._moved_s",
            ("control/supervision/test_stuck_sensor.py", "control/supervision/test_fault_detection.py")),
     Defect("a sample from the past is new", "control/sample_conditioning.py",
            "        if time_s <= last_s:", "        if time_s == last_s:", ("control/test_sample_conditioning.py",)),

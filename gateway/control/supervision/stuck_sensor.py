@@ -3,9 +3,9 @@
 Two ways to tell. While the force changes: since the value last changed, the rising branch (the least force a voltage can
 leave) has somewhere been above the falling branch (the most it can leave) of another time, by more than five quanta. That is
 friction-proof; a single number would trip on every small reversal, where friction really holds the force. It must have been so
-for frozen_s: the model begins to move with the voltage, the machine a dead time later, and a quiet cell has repeated itself
-for long before. Only in contact: in free air a quiet cell rightly repeats itself. While the force stands still: more equal
-samples than the cell's own noise allows (repeated_readings), or than the rig says (frozen_equal_samples).
+for a good part of frozen_s: the model begins to move with the voltage, the machine a dead time later, and a quiet cell has
+repeated itself for long before. Only in contact: in free air a quiet cell rightly repeats itself. While the force stands still:
+more equal samples than the cell's own noise allows (repeated_readings), or than the rig says (frozen_equal_samples).
 """
 
 from math import ceil, inf
@@ -19,6 +19,7 @@ from gateway.control.supervision.repeated_readings import RepeatedReadings
 _QUANTA: Final = 5.0
 SLOW_S: Final = 2.0
 """From which on it is said how late a frozen cell would be found."""
+_DEAD_SHARE: Final = 0.6  # of frozen_s, 0.3 s of 0.5: no machine here answers a voltage as late as that
 _WIDER_LOOP: Final = 0.5  # friction may have grown by this share of the loop since the calibration
 
 
@@ -70,7 +71,7 @@ class StuckSensorCheck:
     @property
     def words(self) -> str:
         """Observation and why it cannot be, empty for a cell that may be alive."""
-        if self._moved_s >= self._frozen_s:
+        if self._same_s >= self._frozen_s and self._moved_s >= _DEAD_SHARE * self._frozen_s:
             return f"repeated for {self._same_s:.2f} s while the force must have changed"
         if self._reported_limit is not None or self._equal_s >= self._frozen_s:
             return self.repeats
