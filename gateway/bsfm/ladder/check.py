@@ -281,7 +281,7 @@ def _check_increasing(ladder: Ladder, noise_n: float) -> None:
 def _cause_of_dip(dip_n: float, noise_n: float) -> str:
     if dip_n < NOISY_DIP * noise_n:
         return f"single readings spread by {noise_n:.2f} N, which may hide the steps: longer stairs, more groups"
-    return "slipping tool, leak, or a jam at one place"
+    return "slipping tool, contact or air lost on the way, leak, or a jam at one place"
 
 
 def _mean_by_stair(ladder: Ladder, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:

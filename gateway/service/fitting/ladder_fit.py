@@ -55,8 +55,8 @@ def fit_recording(recording: Recording, request: FitRequest, context: RigContext
 
 
 def default_name(document: Document) -> str:
-    """Return the name of a calibration that nobody has named: model and order."""
-    return f"{document['chosen']['model']}-{document['chosen']['order']}"
+    """Return the name of a calibration that nobody has named: model and order, which slip stops may have raised."""
+    return f"{document['chosen']['model']}-{len(document['model']['rising_weights']) - 1}"
 
 
 def calibration_of(fit: LadderFit, cell_range_n: float) -> Calibration:

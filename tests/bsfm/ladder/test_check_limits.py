@@ -48,6 +48,7 @@ def test_a_force_that_dips_on_the_way_down_has_no_inverse_either() -> None:
     dip = (stair >= STAIRS_UP) & (table["command_v"] > 4.0) & (table["command_v"] < 5.5)
     error = refuse_table(table | {"force_n": np.where(dip, table["force_n"] - 12.0, table["force_n"])})
     assert error.flaw is LadderFlaw.NOT_INCREASING and "on the way down" in str(error)
+    assert "contact or air lost on the way" in str(error), "what a ladder cannot see of itself"
 
 
 def test_steps_that_the_noise_hides_are_not_called_a_slipping_tool() -> None:

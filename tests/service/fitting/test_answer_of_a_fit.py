@@ -207,3 +207,10 @@ def test_a_document_that_another_one_of_this_number_has_left_is_not_told_as_its_
     (tmp_path / "calibrations" / "0002.json").write_text('{"calibration": 2, "kept": "of another one"}')
     told = fit_and_store(tmp_path / "1.fgr", "demo", tmp_path)
     assert json.loads(Path(told["document"]).read_text())["kept"] is True
+
+
+@pytest.mark.parametrize(("weights", "name"), [((1.0, 1.2), "bsfm-1"), ((1.0, 0.9, 1.2), "bsfm-2")])
+def test_a_calibration_that_nobody_has_named_bears_the_order_that_it_has(weights: tuple[float, ...], name: str) -> None:
+    """Slip stops are fitted with branches of a higher order than the chosen staircase: it was listed as bsfm-1, bsfm n=2."""
+    document = {"chosen": {"model": "bsfm", "order": 1}, "model": {"rising_weights": list(weights)}}
+    assert ladder_fit.default_name(document) == name
