@@ -163,3 +163,11 @@ def test_a_tenth_of_a_small_force_names_kgf_beside_the_missing_contact(
 def test_without_a_pressure_less_than_half_of_the_force_may_be_no_air_and_half_of_it_is_not() -> None:
     words = [unreachable_words(Evidence(voltage_v=3.0, measured_n=n, expected_n=10.0)) for n in (4.9, 5.0)]
     assert words[0] == "no air, valve closed or no contact" and words[1].startswith("target not reached")
+
+
+@pytest.mark.parametrize(("share", "learned", "no_air"), [(0.3, True, True), (0.3, False, False), (0.1, False, True)])
+def test_how_little_is_no_air_depends_on_whether_enough_was_seen(share: float, learned: bool, no_air: bool) -> None:
+    evidence = Evidence(
+        voltage_v=4.0, measured_n=1.0, expected_n=20.0, pressure_pa=share * 4.0e5, expected_pa=4.0e5, learned=learned
+    )
+    assert evidence.no_air is no_air
