@@ -1,9 +1,11 @@
 """What the controller tells its parts, and says of itself, beside what the force does."""
 
+from dataclasses import replace
+
 import pytest
 
 from gateway.codes.refusals import RefusalReason
-from gateway.control import CalibrationInUse, Controller
+from gateway.control import CalibrationInUse, Controller, Defaults
 from gateway.control.compensation.compensation import Compensation, OutsideForce
 from gateway.registers.words import State
 from tests.control.bench import Bench, bsfm, enabled, settings
@@ -57,3 +59,12 @@ def test_a_payload_that_presses_alone_is_no_residual_of_the_model() -> None:
     bench.run(1.0)
     assert bench.last.force_measured_n == pytest.approx(4.9, abs=0.2)
     assert bench.last.model_residual_n == pytest.approx(0.0, abs=0.2)
+
+
+def test_a_stop_is_over_before_the_guardian_would_end_it_however_slow_the_rigs_ramp_is() -> None:
+    slow = replace(settings(), defaults=Defaults(force_ramp_n_per_s=1.0))
+    bench = enabled(slow)
+    bench.write(force_setpoint_n=45.0, force_ramp_n_per_s=400.0)
+    bench.run(1.0)
+    bench.controller.stop()
+    assert bench.seconds_until(lambda output: bench.controller.has_stopped, 6.0) < 4.1

@@ -92,3 +92,11 @@ def test_what_was_zero_is_zero_by_other_defects_of_the_cell_too(before: CellMap 
     conditioner.take_zero(0.0)
     conditioner.use(after)
     assert conditioner.read(1.2, sample(3.0, 1.2), 0.0).cell_n == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_zero_is_the_mean_of_a_fifth_of_a_second() -> None:
+    conditioner = SampleConditioner(BOUNDS)
+    for k in range(40):
+        conditioner.read(1.0, sample(9.0 if k < 20 else 1.0 if k < 35 else 1.4, 1.0 + 0.01 * k), 0.0)
+    conditioner.take_zero(0.0)
+    assert conditioner.zero_n == pytest.approx(1.1)

@@ -62,3 +62,8 @@ def test_readings_straightened_otherwise_are_no_zero() -> None:
     bench.controller.compensate(bench.settings, PARTS["cell"], IN_USE)
     bench.write(control_word=ControlBit.TARE)
     assert bench.refused and "usable samples" in bench.refused.text
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_a_compensation_of_one_part_is_one(name: str) -> None:
+    assert PARTS[name].is_null is (name == "nothing")

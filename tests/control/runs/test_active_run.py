@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
+from gateway.codes.refusals import RefusalReason
 from gateway.control import LineStatus
 from gateway.control.runs.active_run import ActiveRun
 from gateway.control.runs.ladder_run import LadderRow
@@ -87,3 +88,4 @@ def test_a_run_of_this_machine_takes_the_force_at_rest_as_zero_where_it_is_asked
         bench.run(0.1)
         assert bench.controller.active_run.running and bench.controller.zero_n == pytest.approx(zero_n, abs=0.15)
         assert any(event.startswith("tare") for event in bench.events) is is_asked
+        assert bench.last.enable_block is RefusalReason.CALIBRATING

@@ -53,6 +53,9 @@ def test_what_the_cell_could_not_measure_is_no_force() -> None:
     ceiling = ceiling_at(MOST_N, 0.0)
     ceiling.observe(reading(nan, is_usable=False))
     assert ceiling.is_reached(0.0)
+    for _ in range(2):
+        ceiling.observe(reading(MOST_N))
+        assert ceiling.is_reached(0.0)
 
 
 @pytest.mark.parametrize(("noise_n", "is_reached"), [(0.0, False), (0.2, False), (0.5, True)])

@@ -193,3 +193,11 @@ def test_what_friction_keeps_at_no_voltage_need_not_be_another_unit(voltage_v: f
     assert unreachable_words(seen).startswith("more than the 3.0 N that are wanted") == is_lowest
     assert "N read as kgf" in unreachable_words(seen)
     assert ("N read as kgf" not in unreachable_words(replace(seen, was_in_band=True))) == is_lowest
+
+
+@pytest.mark.parametrize(("share", "learned", "no_air"), [(0.3, True, True), (0.3, False, False), (0.1, False, True)])
+def test_how_little_is_no_air_depends_on_whether_enough_was_seen(share: float, learned: bool, no_air: bool) -> None:
+    evidence = Evidence(
+        voltage_v=4.0, measured_n=1.0, expected_n=20.0, pressure_pa=share * 4.0e5, expected_pa=4.0e5, learned=learned
+    )
+    assert evidence.no_air is no_air

@@ -19,6 +19,7 @@ from gateway.service.supervisor.safe_line import SafeLine
 from tests.service.rigs import demo
 
 FRAME, REPLY, END = b"SET 0\r\n", b"0\r\n", b"\r\n"
+PATIENT_S = 5.0  # where the answer comes, and is not waited for any longer
 SHORT_S = 0.05
 
 
@@ -108,7 +109,7 @@ def test_a_line_that_takes_a_byte_at_a_time_gets_the_whole_frame(monkeypatch: py
 
 def test_an_acknowledged_safe_voltage_is_written_once(pty: Pty, client: int) -> None:
     with Regulator(pty) as device:
-        assert SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
+        assert SafeLine(client, FRAME, REPLY, END).write_safe(PATIENT_S)
     assert device.heard == [SetVoltage(0.0)]
 
 
@@ -137,7 +138,7 @@ def test_another_answer_does_not_acknowledge(pty: Pty, client: int, other: bytes
 
 def test_the_answer_to_an_older_question_may_come_before_the_acknowledgement(pty: Pty, client: int) -> None:
     with Regulator(pty, answers=lambda reply: b"510\r\n" + reply) as device:
-        assert SafeLine(client, FRAME, REPLY, END).write_safe(SHORT_S)
+        assert SafeLine(client, FRAME, REPLY, END).write_safe(PATIENT_S)
     assert len(device.heard) == 1
 
 
