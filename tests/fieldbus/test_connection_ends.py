@@ -128,6 +128,18 @@ def test_silent_connections_of_many_keep_nobody_out_and_who_has_only_one_keeps_i
     assert alone.ended == "" and len(made.shared.connections) == 4
 
 
+def test_one_that_is_closing_already_gives_way_once(stand: Any, deliver: Any) -> None:
+    made = stand()
+    (closing, stuck), *others = made.connect(FAR, stuck=True), *(made.connect(FAR) for _ in range(3))
+    made.wait(1.0)
+    for connection, far in others:
+        deliver(connection, far, framed(READ))
+    made.wait(GIVES_WAY_S + 1.0)
+    closing.give_way(made.clock.time())
+    assert (stuck.ended, made.connect(FAR)[1].ended) == ("closed", "")
+    assert sorted(far.ended for _, far in others) == ["", "", "closed"]
+
+
 def test_who_is_not_allowed_takes_nobody_s_place(stand: Any) -> None:
     made = stand(connections=2, allow=(ip_network("192.0.2.0/24"),))
     made.shared.peers = Peers(made.settings, guarded=True)

@@ -217,6 +217,21 @@ def test_the_trim_comes_back_from_the_highest_voltage():
     assert bench.plant.force_n == pytest.approx(30.0, abs=1.0)
 
 
+@pytest.mark.parametrize("way", [1, -1])
+def test_the_trim_learns_nothing_more_at_an_end_of_the_range(way):
+    """What it learned there would have to be forgotten first, and until then the force stays beyond the target."""
+    rig = settings()
+    bench = enabled(replace(rig, limits=replace(rig.limits, voltage_max_v=4.0)))
+    bench.force(30.0 if way > 0 else 3.0)
+    if way < 0:
+        bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 6.0)
+    bench.seconds_until(lambda output: output.limited_by is LimitedBy.VOLTAGE_RANGE, 9.0)
+    reached_v = bench.last.trim_v
+    bench.run(6.0)
+    assert bench.last.limited_by is LimitedBy.VOLTAGE_RANGE
+    assert bench.last.trim_v == pytest.approx(reached_v, abs=0.02)
+
+
 @pytest.mark.parametrize("response", [None, Response(dead_time_s=0.05, lag_s=0.08)], ids=["rig file", "measured"])
 def test_a_machine_with_less_friction_than_its_calibration_is_pressed_below_that_ones_range(response):
     """6 N were the least by the calibration; what the machine lacked of 4 N, nobody made good, and air was called missing."""

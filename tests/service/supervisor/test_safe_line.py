@@ -96,17 +96,6 @@ def test_a_device_that_never_stops_talking_is_not_listened_to_for_ever(pty: Pty,
     writer.join()
 
 
-def test_a_line_that_takes_a_byte_at_a_time_gets_the_whole_frame(monkeypatch: pytest.MonkeyPatch) -> None:
-    reader, writer = os.pipe()
-    write = os.write
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "write", lambda descriptor, data: write(descriptor, data[:1]))
-        assert SafeLine(writer, FRAME, b"", END).write_safe(SHORT_S)
-    assert os.read(reader, 64) == FRAME
-    os.close(reader)
-    os.close(writer)
-
-
 def test_an_acknowledged_safe_voltage_is_written_once(pty: Pty, client: int) -> None:
     with Regulator(pty) as device:
         assert SafeLine(client, FRAME, REPLY, END).write_safe(PATIENT_S)
