@@ -32,6 +32,8 @@ _SMALLEST_N: Final = 2.0
 _PRECONTACT_N: Final = 3.0
 _CONTACT_N: Final = 0.5
 _MOST_N: Final = 40.0
+_STUCK_N: Final = 15.0  # where the file does not say it
+_LEAST_STUCK_N: Final = 1.0  # the starter rig's calibration expects a little less at 0 V
 _ATTEMPTS: Final = 3  # to mend answers that check refuses; then the file is written with its faults told
 Settings = dict[tuple[str, str], Any]
 
@@ -220,6 +222,7 @@ def _ask_forces(rig: GuidedRig) -> None:
         ("limits", "force_max_n"): f"{most_n:g}",
         ("limits", "over_force_n"): f"{min(_OVER * most_n, 0.95 * range_n):.4g}",
         ("supervision", "saturation_n"): f"{_SATURATION * range_n:.4g}",
+        ("supervision", "stuck_n"): f"{max(_LEAST_STUCK_N, min(_STUCK_N, most_n)):.4g}",
         ("limits", "smallest_force_n"): f"{min(_SMALLEST_N, most_n / 10.0):.2g}",
         ("defaults", "precontact_force_n"): f"{min(_PRECONTACT_N, most_n / 5.0):.2g}",
         ("defaults", "contact_threshold_n"): f"{min(_CONTACT_N, most_n / 10.0):.2g}",

@@ -13,10 +13,11 @@ def fault_sentence(fault: FaultCode, detail: str) -> str:
     return f"{fault.code} {detail}"
 
 
-def unreachable_sentence(evidence: Evidence) -> str:
-    """Return A301 in numbers, with what it probably is."""
+def unreachable_sentence(evidence: Evidence, direction: float = 1.0) -> str:
+    """Return A301 in numbers, with what it probably is. direction: -1 where the tool pulls."""
+    shown_n, model_n = direction * evidence.measured_n, direction * evidence.expected_n
     return (
-        f"A301 {evidence.voltage_v:.2f} V out, {evidence.measured_n:.1f} N measured, {evidence.expected_n:.1f} expected: "
+        f"A301 {evidence.voltage_v:.2f} V out, {shown_n:.1f} N measured, {model_n:.1f} expected: "
         f"{unreachable_words(evidence)}"
     )
 

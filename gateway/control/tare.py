@@ -7,6 +7,8 @@ only coefficients are restored.
 """
 
 from collections import deque
+from itertools import pairwise
+from statistics import fmean, median
 from typing import Final
 
 from gateway.control.settings import Supervision
@@ -14,6 +16,7 @@ from gateway.control.settings import Supervision
 _WINDOW: Final = 20  # readings: 0.2 s of a 100 Hz cell
 _APART_S: Final = 0.0075  # of a faster one the samples of so long are one reading: it would not see a slow decay
 _FEWEST: Final = 5
+_NOISE_RANGE: Final = 7.0 * 1.4826 / 2.0**0.5  # times the median step between neighbours: what white noise stays within
 _LARGEST_SHARE: Final = 0.5  # of the saturation: a zero beyond it leaves no range to measure
 
 
@@ -52,11 +55,19 @@ class Zero:
         if len(recent) < _FEWEST:
             return f"{len(recent)} usable samples, at least {_FEWEST} are needed"
         spread_n, mean_n = max(recent) - min(recent), self._mean_n()
-        if spread_n > self.largest_spread_n:
+        if spread_n > self.largest_spread_n and not self._is_noise(spread_n):
             return f"force not steady: {spread_n:.2f} N between samples, allowed {self.largest_spread_n:.2f} N"
         if abs(mean_n + gravity_n) > self._largest_n:
             return f"{mean_n:.1f} N at rest, allowed {self._largest_n:.0f} N: stuck in contact or wrong cell"
         return ""
+
+    def _is_noise(self, spread_n: float) -> bool:
+        """Decide whether the samples scatter so from each one to the next, and go nowhere: halves of a force that goes on as
+        far as allowed differ by half of that."""
+        recent, half = list(self._recent_n), len(self._recent_n) // 2
+        moved_n = abs(fmean(recent[half:]) - fmean(recent[:half]))
+        step_n = median(abs(after_n - before_n) for before_n, after_n in pairwise(recent))
+        return spread_n <= _NOISE_RANGE * step_n and moved_n <= 0.5 * self.largest_spread_n
 
     def _mean_n(self) -> float:
         return sum(self._recent_n) / len(self._recent_n)

@@ -65,8 +65,9 @@ class SignalDifference:
 def replay_control(recording: Recording, setup: ReplaySetup) -> Columns:
     """Return what control decides at each row with this set-up. RecordingError for what cannot be replayed."""
     _check(recording)
+    supervision = replace(setup.rig.control.supervision, lease_s=None)
     controller = Controller(
-        replace(setup.rig.control, supervision=replace(setup.rig.control.supervision, lease_s=None)),
+        replace(setup.rig.control, supervision=supervision, valve=None),  # whose readback no recording holds
         setup.rig.calibration_in_use(setup.calibration),
         compensation=replace(setup.rig.compensation, cell=None),  # the recorded force is the corrected one
     )

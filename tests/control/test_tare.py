@@ -1,11 +1,14 @@
 """The zero of the load cell, as a master takes it: when it is taken, and when it is refused."""
 
 from dataclasses import replace
+from random import Random
 
 import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.control import LineStatus
+from gateway.control.settings import Supervision
+from gateway.control.tare import Zero
 from gateway.registers.words import ControlBit, LimitedBy, State
 from tests.control.bench import Bench, settings
 
@@ -171,3 +174,37 @@ def test_a_rig_whose_regulator_rests_above_0_v_is_tared_at_force_0_and_nothing_l
     bench.run(1.0)
     bench.write(control_word=ControlBit.ENABLE | ControlBit.TARE)
     assert bench.refused and "disable the output or set the force to 0 first" in bench.refused.text
+
+
+NOISE_N = 0.2
+
+
+def taken(readings_n) -> list[bool]:
+    """Of each trial, whether its last readings are a zero."""
+    zero, answers = Zero(Supervision()), []
+    for trial in readings_n:
+        zero.forget()
+        for force_n in trial:
+            zero.observe(force_n, 0.01)
+        answers.append(not zero.unsteady(0.0))
+    return answers
+
+
+def noisy(shape) -> list[list[float]]:
+    """200 trials of 0.2 s each around a force that goes as `shape` from 0 to 1."""
+    rng = Random(5)
+    return [[2.0 + shape(k / 19.0) + rng.gauss(0.0, NOISE_N) for k in range(20)] for _ in range(200)]
+
+
+def test_a_tare_is_not_refused_for_the_noise_of_the_cell():
+    """One in seven was with the 0.12 N of the demo rig's cell, nearly all with 0.2 N: their range goes with the noise."""
+    assert sum(taken(noisy(lambda share: 0.0))) >= 190
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [lambda share: -1.2 * share, lambda share: 3.0 if 0.4 < share < 0.6 else 0.0, lambda share: 2.0 * (share > 0.9)],
+    ids=["falls", "knock", "steps"],
+)
+def test_what_changes_within_that_noise_is_no_zero_all_the_same(shape):
+    assert sum(taken(noisy(shape))) <= 10

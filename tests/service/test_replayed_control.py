@@ -9,6 +9,7 @@ import pytest
 from gateway.bsfm.model import Calibration
 from gateway.codes.faults import FaultCode
 from gateway.control import CellMap
+from gateway.control.settings import ValveControl
 from gateway.recording import Recording, RecordingError, list_recordings, read_recording
 from gateway.registers.words import State
 from gateway.service.replayed_control import ReplaySetup, SignalDifference, compare_decisions, replay_control
@@ -73,6 +74,15 @@ def test_the_replay_decides_as_the_gateway_did(recording: Recording, own: Replay
     assert found["state"].rows <= 6
     assert found["command_v"].rms < 0.17
     assert np.ptp(recording.columns["command_v"]) > 4.0
+
+
+def test_a_rig_with_a_valve_replays_what_it_pushed_with(recording: Recording, own: ReplaySetup) -> None:
+    """Nobody read the valve back, so it was waited for to the end: 0 N in every row."""
+    control = replace(own.rig.control, valve=ValveControl())
+    with_valve = replace(own, rig=replace(own.rig, control=control))
+    replayed, pushed = replay_control(recording, with_valve), replay_control(recording, own)
+    assert pushed["applied_n"].max() == pytest.approx(35.1)
+    assert not any(one.rows for one in compare_decisions(recording.columns["time_s"], pushed, replayed))
 
 
 def test_another_calibration_differs_in_what_it_decides_and_not_in_what_it_was_asked(

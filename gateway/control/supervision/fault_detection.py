@@ -78,11 +78,13 @@ def _lateness(line: LineStatus, allowed_s: float) -> StopCause:
 
 
 class FaultDetector:
-    """Counts on every new sample; `first_cause` is asked once per step while enabled."""
+    """Counts on every new sample; `first_cause` is asked once per step while enabled. direction: -1 where the tool pulls; a
+    pull counts as positive here, and sentences tell forces as the registers do."""
 
     def __init__(self, settings: ControlSettings) -> None:
         self._limits = settings.limits
         self.safe_voltage_v = settings.limits.safe_voltage_v
+        self.direction = 1.0
         self._bounds = settings.supervision
         self._room_n = over_force_room_n(settings.limits, settings.defaults)
         self._rise = RiseCheck(settings.defaults.contact_threshold_n)
@@ -184,8 +186,9 @@ class FaultDetector:
         if self._over and reading.overload:
             return self._over_words(reading, 0.0)
         if self._over:
-            return f"{reading.contact_n:.1f} N measured, over-force is {self._limits.over_force_n:.1f} N: free the tool"
-        return stuck_sentence(reading.contact_n, self._bounds.stuck_n) if self.is_stuck else ""
+            shown_n = self.direction * reading.contact_n
+            return f"{shown_n:.1f} N measured, over-force is {self._limits.over_force_n:.1f} N: free the tool"
+        return stuck_sentence(self.direction * reading.contact_n, self._bounds.stuck_n) if self.is_stuck else ""
 
     def _stall_words(self, now_s: float, line: LineStatus) -> str:
         """Why nothing begins right behind a stall, empty where there was none: what is asked for may have waited in a socket,
@@ -261,10 +264,11 @@ class FaultDetector:
             return stop_cause(FaultCode.OVER_FORCE, self._over_words(reading, expected_n()))
         if words := self._frozen.words:
             self._frozen.note_trip()
-            observation = f"{reading.cell_n:.2f} N {words}: amplifier or cell is dead"
+            observation = f"{self.direction * reading.cell_n:.2f} N {words}: amplifier or cell is dead"
             return stop_cause(FaultCode.SAMPLE_FROZEN, observation)
         if self._response_fault is _WRONG_SIGN:
-            sentence = sign_sentence(self._rise.measured_rise_n, expected_n(), was_right=self._rise.is_proven)
+            rise_n, model_n = self.direction * self._rise.measured_rise_n, self.direction * expected_n()
+            sentence = sign_sentence(rise_n, model_n, was_right=self._rise.is_proven)
             return StopCause(FaultCode.SIGN_INVERTED, sentence)
         if self._response_fault is _WRONG_GAIN:
             return StopCause(FaultCode.GAIN_WRONG, gain_sentence(self._rise.wrong_rise_n, expected_n()))
@@ -273,9 +277,10 @@ class FaultDetector:
     def _over_words(self, reading: Reading, expected_n: float) -> str:
         if reading.overload:
             return f"cell saturated ({self._bounds.saturation_n:.0f} N is 98 % of its range): over-force, open or shorted wires"
-        values = f"{reading.contact_n:.1f} N measured, allowed {self._limits.over_force_n:.1f} N, {expected_n:.1f} N expected"
+        shown_n, model_n = self.direction * reading.contact_n, self.direction * expected_n
+        values = f"{shown_n:.1f} N measured, allowed {self._limits.over_force_n:.1f} N, {model_n:.1f} N expected"
         if abs(reading.cell_n) < self._limits.over_force_n:
-            weight_n = reading.contact_n - reading.cell_n
+            weight_n = self.direction * (reading.contact_n - reading.cell_n)
             return f"{values}: {weight_n:.1f} N of it are the payload's weight, is `payload` the tool's own mass?"
         if abs(reading.contact_n) > _FAR_OFF * abs(expected_n):
             return f"{values}: kgf and N mixed up, or a wrong span?"

@@ -18,9 +18,11 @@ _LEAST_V: Final = 0.2  # below it the ratio is offset and noise
 
 
 class OneShotEvents:
-    """Remembers what has been told. stuck_n: measured at the safe voltage, from which a force counts as stuck."""
+    """Remembers what has been told. stuck_n: measured at the safe voltage, from which a force counts as stuck. direction: as
+    that of FaultDetector."""
 
     def __init__(self, stuck_n: float) -> None:
+        self.direction = 1.0
         self._was_unreachable = False
         self._was_stuck = self._was_hunting = False
         self._stuck_n = stuck_n
@@ -69,7 +71,7 @@ class OneShotEvents:
             target_n=loop.applied_n,
             is_lowest=loop.is_lowest,
         )
-        return unreachable_sentence(evidence)
+        return unreachable_sentence(evidence, self.direction)
 
     def hunting_event(self, loop: ForceLoop) -> str:
         """Return a sentence where the trim has just begun to hunt. Ask after each step in force or voltage mode."""
@@ -82,4 +84,4 @@ class OneShotEvents:
     def stuck_event(self, is_stuck: bool, reading: Reading) -> str:
         """Return a sentence where a force has just been found stuck at the safe voltage. Ask while the output is off."""
         is_first, self._was_stuck = is_stuck and not self._was_stuck, is_stuck
-        return stuck_sentence(reading.contact_n, self._stuck_n) if is_first else ""
+        return stuck_sentence(self.direction * reading.contact_n, self._stuck_n) if is_first else ""

@@ -75,7 +75,7 @@ class Turning:
                 parts.faults.start_rise()  # what was left when the output was enabled has gone meanwhile
             return False
         direction = -1.0 if valve.is_pulling else 1.0
-        self._conditioner.direction = direction
+        self._conditioner.direction = parts.faults.direction = parts.one_shot.direction = direction
         self._commands.turn(direction)
         parts.faults.shift_zero(2.0 * parts.faults.measured_n)
         parts.faults.start()

@@ -194,7 +194,8 @@ def check_display_range(parts: Parts) -> Found:
         message = reading.device.reading
         per_count = reading.host.resolution_n / message.step
         key = "force_max_n" if message.says_overload else "over_force_n"
-        wanted_n, end_n = getattr(limits, key), message.largest_shown * per_count
+        offset = max(0.0, parts.load_cell.sign * message.zero_count)  # which a push begins at
+        wanted_n, end_n = getattr(limits, key), (message.largest_shown - offset) * per_count
         if wanted_n > end_n:
             yield f"limits.{key}", f"{newton(wanted_n)} is beyond what {reading.device.name} can show: {end_n:.4g} N"
 

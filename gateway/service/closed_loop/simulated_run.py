@@ -1,7 +1,7 @@
 """One run of the controller against the twin, in virtual time: ticks, samples of the cell and a master's writes, as the
 gateway has them, without processes and wires."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan, radians
 from typing import Final
 
@@ -52,8 +52,9 @@ class SimulatedLoop:
     def __init__(self, driver: ControlSetup, plant: Plant, seed: int, inputs: frozenset[str]) -> None:
         self._twin = condition_twin(plant, driver.model.voltage_range_v[1], seed)
         self._voltage_v = 0.0
+        supervision = replace(driver.settings.supervision, lease_s=None)  # this master has no heartbeat
         self._controller = Controller(
-            driver.settings,
+            replace(driver.settings, supervision=supervision, valve=None),  # and the plant pushes
             CalibrationInUse(apply_command_map(driver.model, driver.compensation.command), 1),
             compensation=driver.compensation,
         )

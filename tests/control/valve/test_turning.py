@@ -39,7 +39,7 @@ class Stand:
             start=lambda: note("faults start"),
             start_rise=lambda: note("the rise starts"),
         )
-        parts = SimpleNamespace(loop=self.loop, faults=faults)
+        parts = SimpleNamespace(loop=self.loop, faults=faults, one_shot=SimpleNamespace())
         self.machine: Any = SimpleNamespace(parts=parts, is_enabled=False, tell=note)
         conditioner = SampleConditioner(rig.supervision)
         self.turning = Turning(self.switch, self.commands, conditioner, rig, model or bsfm())
@@ -95,6 +95,7 @@ def test_with_the_readback_everything_turns_once() -> None:
     assert not stand.did
     stand.run(3 * TICK_S, 0.0, PULL)
     assert stand.did == ["shifted 3.0", "faults start", "loop rests", "the valve pulls"]
+    assert stand.machine.parts.faults.direction == stand.machine.parts.one_shot.direction == -1.0
 
 
 def test_behind_a_switch_that_turned_nothing_the_rise_is_judged_from_there() -> None:

@@ -114,3 +114,19 @@ def test_half_a_step_of_an_output_must_fit_into_the_band_and_no_whole_one(tmp_pa
     steps = {f"dac__set_voltage__{key}": value for key, value in coarse.items()}
     faults, _ = told(tmp_path, **steps, rig__defaults__in_band_tolerance_n=5.0)
     assert "output.device" not in faults
+
+
+@pytest.mark.parametrize(("sign", "zero_count"), [(1, 80_000), (-1, -80_000)])
+def test_a_display_of_raw_counts_ends_as_far_from_its_zero_as_a_push_can_go(
+    sign: int, zero_count: int, tmp_path: Path
+) -> None:
+    """99999 counts of a millinewton were 100 N, also where 80000 of them are no force: beyond 20 N it stood still."""
+    cell: dict[str, Any] = {"frame": "W {force:+06d}", "unit": None, "blank_is_overload": None, "quality": None}
+    counts = {"newton_per_count": 0.001, "sign": sign}
+    changes = {f"cell__stream__{key}": value for key, value in cell.items()}
+    changes |= {f"rig__load_cell__{key}": value for key, value in counts.items()}
+    faults, _ = told(tmp_path, **changes, rig__load_cell__zero_count=zero_count)
+    assert faults == {"limits.over_force_n": "75 N is beyond what stream-st-gs can show: 20 N"}
+    for other in (0, -zero_count):
+        faults, _ = told(tmp_path, **changes, rig__load_cell__zero_count=other)
+        assert not faults

@@ -1,18 +1,22 @@
 """One run against the twin, with the controller or the loop played: what counts of it, and what is said to whom when."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.control import NO_COMPENSATION, ControlSettings
+from gateway.control.settings import ValveControl
 from gateway.defaults import TICK_S
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
 from gateway.service.closed_loop import simulated_run
 from gateway.service.closed_loop.schedule import SETTLED_S, SetpointSegment
-from gateway.service.closed_loop.simulated_run import SimulatedLoop, simulate_run
+from gateway.service.closed_loop.simulated_run import ControlSetup, SimulatedLoop, simulate_run
 from gateway.twin.surroundings import Surroundings
+from tests.service.rigs import demo, with_supervision
 
 HOLD_S = 1.0
 
@@ -108,3 +112,20 @@ def test_a_master_writes_what_has_changed_and_wants_nothing_behind_a_fault() -> 
     loop._controller.state = State.FAULT
     loop._write(0.4, 13.0, 0.0)
     assert (loop._command.control_word, loop._command.force_setpoint_n) == (ControlBit(0), 0.0)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [with_supervision(demo(), lease_s=0.2).control, replace(demo().control, valve=ValveControl())],
+    ids=["lease", "valve"],
+)
+def test_a_rig_with_a_lease_or_a_valve_presses_as_one_without(settings: ControlSettings) -> None:
+    """Nobody beat and nobody read the valve back: the force was off by all of the setpoint, before and after."""
+    schedule: Any = SimpleNamespace(wishes=(SetpointSegment(0.5, 1.5, 10.0, 10.0),), columns=())
+    rig = demo()
+    assert rig.plant
+    run, plain = (
+        simulate_run(ControlSetup(one, rig.calibration.model(), NO_COMPENSATION), rig.plant, schedule, 1, frozenset())
+        for one in (settings, rig.control)
+    )
+    assert run.fault == "" and run.rms_n == plain.rms_n < 0.5

@@ -124,6 +124,17 @@ def test_enter_at_the_largest_force_is_accepted_for_every_pair_of_devices_and_ev
     assert len(pairs) > 40
 
 
+@pytest.mark.parametrize(("range_n", "stuck_n"), [("5", 2.0), ("20", 8.0), ("98.07", 15.0)])
+def test_a_tool_that_is_stuck_with_the_largest_force_of_a_small_cell_keeps_an_enable_back(
+    range_n: str, stuck_n: float
+) -> None:
+    """15 N stood for every cell, beyond the over-force of a small one: `check` warned of what nobody had answered."""
+    answered("later", "", "", "y", "later", "", "", range_n, "")
+    found = check_report("own.yaml", simulated=True)
+    assert found.rig and found.rig.control.supervision.stuck_n == stuck_n
+    assert not [fault for fault in found.warnings if fault.path == "supervision.stuck_n"]
+
+
 OWN_DAC = """name: own-dac
 description: a supply with a serial line
 role: output
