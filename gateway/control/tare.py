@@ -16,7 +16,8 @@ from gateway.control.settings import Supervision
 _WINDOW: Final = 20  # readings: 0.2 s of a 100 Hz cell
 _APART_S: Final = 0.0075  # of a faster one the samples of so long are one reading: it would not see a slow decay
 _FEWEST: Final = 5
-_NOISE_RANGE: Final = 7.0 * 1.4826 / 2.0**0.5  # times the median step between neighbours: what white noise stays within
+_DEVIATION: Final = 1.4826 / 2.0**0.5  # times the median step between neighbours: the standard deviation of white noise
+_NOISE_RANGE: Final = 7.0  # standard deviations, which it stays within
 _LARGEST_SHARE: Final = 0.5  # of the saturation: a zero beyond it leaves no range to measure
 
 
@@ -62,12 +63,15 @@ class Zero:
         return ""
 
     def _is_noise(self, spread_n: float) -> bool:
-        """Decide whether the samples scatter so from each one to the next, and go nowhere: halves of a force that goes on as
-        far as allowed differ by half of that."""
+        """Decide whether the samples scatter so from each one to the next, go nowhere, and give a mean to rely on: halves of a
+        force that goes on as far as allowed differ by half of that, and a mean may be wrong by a quarter."""
         recent, half = list(self._recent_n), len(self._recent_n) // 2
         moved_n = abs(fmean(recent[half:]) - fmean(recent[:half]))
-        step_n = median(abs(after_n - before_n) for before_n, after_n in pairwise(recent))
-        return spread_n <= _NOISE_RANGE * step_n and moved_n <= 0.5 * self.largest_spread_n
+        noise_n = _DEVIATION * median(abs(after_n - before_n) for before_n, after_n in pairwise(recent))
+        is_still = (
+            moved_n <= 0.5 * self.largest_spread_n and noise_n <= 0.25 * self.largest_spread_n * len(recent) ** 0.5
+        )
+        return is_still and spread_n <= _NOISE_RANGE * noise_n
 
     def _mean_n(self) -> float:
         return sum(self._recent_n) / len(self._recent_n)

@@ -190,10 +190,14 @@ def taken(readings_n) -> list[bool]:
     return answers
 
 
-def noisy(shape) -> list[list[float]]:
+def noisy(shape, noise_n=NOISE_N) -> list[list[float]]:
     """200 trials of 0.2 s each around a force that goes as `shape` from 0 to 1."""
     rng = Random(5)
-    return [[2.0 + shape(k / 19.0) + rng.gauss(0.0, NOISE_N) for k in range(20)] for _ in range(200)]
+    return [[2.0 + shape(k / 19.0) + rng.gauss(0.0, noise_n) for k in range(20)] for _ in range(200)]
+
+
+def test_noise_that_leaves_no_mean_to_rely_on_gives_no_zero():
+    assert sum(taken(noisy(lambda share: 0.0, 1.2))) <= 10
 
 
 def test_a_tare_is_not_refused_for_the_noise_of_the_cell():
