@@ -8,7 +8,7 @@ ALARMS: Final = (
     Explanation(
         "A402",
         "restarted too often",
-        "Five restarts within 60 s; the safe voltage is held and the gateway has stopped.",
+        "Five restarts within 60 s: the gateway has stopped; the line says whether the safe voltage was acknowledged.",
         "What ended the control process is still there; the line counts the causes.",
         "Read the first A401 line, not the last; machine-busy in the count means A403. Then start again.",
     ),

@@ -68,9 +68,10 @@ class EventLog:
         return lambda cause, sentence: self._say(source, cause, sentence)
 
     def note(self, cause: str, sentence: str) -> None:
-        """Write an event to the file only, where the terminal shows it already. Not limited."""
+        """Write an event to the file only, where the terminal shows it already; to the terminal where the file does not take
+        it. Not limited."""
         if self._disk:
-            self._disk.put(self._event(cause, sentence))
+            self._disk.put(_NotedEvent(*self._event(cause, sentence)))
 
     def __enter__(self) -> Self:
         for drain in self._drains():
@@ -255,13 +256,18 @@ def _terminal_writer(write: Callable[[str], object] | None) -> Callable[[EventRe
     return to_journal or (lambda event: to_terminal(format_event(event) + "\n"))
 
 
+class _NotedEvent(EventRecord):
+    """One that the terminal has not been given."""
+
+
 class _EventFileWriter:
-    """Events to the file; the first that it does not take raises the alarm, the first that it takes again ends it."""
+    """Events to the file; the first that it does not take raises the alarm, the first that it takes again ends it. tell: what
+    the terminal is given."""
 
     def __init__(
-        self, file: EventFile, alarm: Callable[[EventRecord], None], event: Callable[[str, str], EventRecord]
+        self, file: EventFile, tell: Callable[[EventRecord], None], event: Callable[[str, str], EventRecord]
     ) -> None:
-        self._file, self._alarm, self._event = file, alarm, event
+        self._file, self._tell, self._event = file, tell, event
         self._lost = 0
 
     def __call__(self, event: EventRecord) -> None:
@@ -271,7 +277,9 @@ class _EventFileWriter:
             self._lost += 1
             if self._lost == 1:
                 sentence = f"E150 events are not kept: {tell_refusal(error)}; control goes on, stderr has them"
-                self._alarm(self._event("events", sentence))
+                self._tell(self._event("events", sentence))
+            if isinstance(event, _NotedEvent):  # the sentence above says that it is there
+                self._tell(event)
             return
         if self._lost:
             sentence = f"E150 {self._lost} events were not kept before this one"

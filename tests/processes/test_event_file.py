@@ -194,6 +194,16 @@ def test_a_full_disk_is_one_alarm_and_its_end_says_what_is_missing(tmp_path: Pat
     assert [each.text for each in kept(tmp_path)] == ["again", "7 events were not kept before this one"]
 
 
+def test_what_is_noted_is_on_the_terminal_where_the_file_does_not_take_it(tmp_path: Path) -> None:
+    """E150 says so; a restart's reasons for not recording, or for another calibration, stood nowhere."""
+    lines: queue.Queue[str] = queue.Queue()
+    with EventLog(lines.put, file=FullDisk(tmp_path)) as log:
+        log("start", "said")
+        log.note("start", "not recording")
+        said = [lines.get(timeout=5).rstrip("\n").partition("start ")[2] for _ in range(3)]
+    assert sorted(said) == ["", "not recording", "said"], "once each, beside E150"
+
+
 def test_a_line_that_the_disk_takes_half_of_does_not_spoil_the_next(tmp_path: Path, monkeypatch) -> None:
     file, write = EventFile(tmp_path), os.write
     monkeypatch.setattr(event_file.os, "write", lambda descriptor, data: write(descriptor, data[: len(data) // 2]))

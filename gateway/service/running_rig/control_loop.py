@@ -74,9 +74,8 @@ class ControlLoop:
         cell: CellExchange,
         process: LoopProcess,
     ) -> None:
-        self.bank = bank
-        self.controller = controller
-        self.output = output
+        self.bank, self.controller = bank, controller
+        self.output, self._cell = output, cell
         self.recordings: Recordings | None = None
         self.calibration_runs: CalibrationRuns | None = None
         self.ring: SampleRing | None = None
@@ -95,7 +94,6 @@ class ControlLoop:
         self.residual_cause = ResidualCause.NONE
         self.plant_id = 0
         self._shown_self_test = controller.active_run.self_test
-        self._cell = cell
         self.clock, self._log = process.clock, process.log
         self.processor_time, self._lateness = process.processor_time, process.lateness
         self._last_tick_s: float | None = None
@@ -200,6 +198,7 @@ class ControlLoop:
     def on_output_opened(self) -> None:
         """Forget what the output said before: the port has been opened again."""
         self.output.reset()
+        self._output_noise.forget()
         self.output_lost = FaultCode.NONE
 
     def on_output_closed(self) -> None:
@@ -215,6 +214,7 @@ class ControlLoop:
     def on_cell_opened(self) -> None:
         """Forget what the cell said before: the port has been opened again."""
         self._cell.reset()
+        self._cell_noise.forget()
         self.cell_lost = False
 
     def _late_s(self, now_s: float) -> float:

@@ -71,7 +71,11 @@ class LineNoise(_RateWarning):
     def __init__(self, line: str, explain: Callable[[bytes], str] = lambda line: "") -> None:
         super().__init__()
         self._line, self._explain = line, explain
-        self._recent = _RecentSums(3)
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew: another device may be behind the port, and what the one before said well says nothing of this one."""
+        self.is_on, self._recent = False, _RecentSums(3)
 
     def hear(self, messages: Sequence[object], now_s: float, is_late: bool = False) -> str:
         """Return a sentence where noise begins with these messages, else an empty one. is_late: they are answers, and our loop

@@ -260,7 +260,7 @@ class Guardian:
         self.log("restart", words.restart_sentence(ending, how, acknowledged))
         pause_s = self.restarts.count(now_s, ending.cause)
         if pause_s is None:
-            self.log("restart", words.too_many_sentence(self.restarts.causes))
+            self.log("restart", words.too_many_sentence(self.restarts.causes, acknowledged))
             return exit_codes.FAILED
         self.next_start, self.control.asked_s = ending, now_s + pause_s
         self.manager.starting(f"control is started again: {ending.text}", pause_s + 2.0 * START_GRACE_S)

@@ -67,10 +67,15 @@ def describe_acknowledgement(acknowledged: bool | None) -> str:
     return {True: "acknowledged", False: "not acknowledged", None: "no line was open"}[acknowledged]
 
 
-def too_many_sentence(causes: Counter[EndCause]) -> str:
-    """Return what the log says when the guardian gives up."""
+def too_many_sentence(causes: Counter[EndCause], acknowledged: bool | None) -> str:
+    """Return what the log says when the guardian gives up. acknowledged: of the last safe voltage, see above."""
     counts = ", ".join(f"{count} {cause.value}" for cause, count in causes.most_common())
-    sentence = f"A402 five restarts in {WINDOW_S:.0f} s ({counts}): the safe voltage is held, the gateway stops"
+    sentence = f"A402 five restarts in {WINDOW_S:.0f} s ({counts}): the gateway stops, "
+    if acknowledged is not None:
+        sentence += "safe voltage "
+    sentence += describe_acknowledgement(acknowledged)
+    if acknowledged is False:
+        sentence += ": the tool may still press"
     if causes.most_common(1)[0][0] is EndCause.MACHINE_BUSY:
         sentence += "; the machine is too busy for it (A403)"
     return sentence

@@ -100,6 +100,26 @@ def test_a_line_of_which_nothing_can_be_read_is_not_blamed_on_a_motor() -> None:
     assert "another speed" in told[2] and "3 of 3 messages (15 bytes)" in told[2]
 
 
+@pytest.mark.parametrize(
+    ("hear", "again"),
+    [
+        (on_output, lambda wired: wired.loop.on_output_opened()),
+        (on_cell, lambda wired: wired.loop.on_cell_opened()),
+    ],
+    ids=["output", "load cell"],
+)
+def test_another_device_behind_a_port_is_not_blamed_on_a_motor(hear: Hear, again: Hear) -> None:
+    """Behind a plug that came back, what the device before had said well counted for it."""
+    wired = broken(Wired().ready(), hear, 3, 0.02)
+    (before,) = wired.said("A341")
+    assert "motor" in before
+    again(wired)
+    for _ in range(LEAST):
+        hear(wired)
+    _, told = wired.said("A341")
+    assert "3 of 3 messages" in told and "motor" not in told
+
+
 # -- A342
 
 

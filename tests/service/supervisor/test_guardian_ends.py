@@ -129,6 +129,25 @@ def test_a_loop_that_falls_silent_while_it_ramps_down_is_not_waited_for(scene, p
     assert any("stopped as asked" in line and "without a tick" in line for line in one.noted), one.noted
 
 
+@pytest.mark.parametrize(
+    ("acknowledged", "said"),
+    [(True, "safe voltage acknowledged"), (False, "safe voltage not acknowledged: the tool may still press")],
+)
+def test_who_gives_up_says_whether_the_safe_voltage_stands(scene, port, monkeypatch, acknowledged, said):
+    """It was called held, whatever the device had answered."""
+    monkeypatch.setattr(SafeLine, "write_safe", lambda line: acknowledged)
+    one = scene(dies_after(4, port))
+    assert one.run() == 1
+    assert one.said[-1].startswith("A402 five restarts")
+    assert one.said[-1].endswith(f"the gateway stops, {said}")
+
+
+def test_who_gives_up_without_ever_a_line_claims_no_safe_voltage(scene, port):
+    one = scene(dies_after(0, port))
+    assert one.run() == 1
+    assert one.said[-1].endswith("the gateway stops, no line was open")
+
+
 def test_a_safe_voltage_that_nobody_acknowledges_is_told_at_the_end_too(scene, port, monkeypatch):
     """The person at the terminal saw a gateway that had stopped as asked, beside a tool that went on pressing."""
     one = scene(lives(port))
