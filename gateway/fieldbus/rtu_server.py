@@ -114,6 +114,7 @@ class ModbusRtuServer:
 
     def _on_lost(self, error: PortError) -> None:
         self._was_lost = True
+        self._stop_timer()
         self._receiver.forget()
         self._log(f"face {self.settings.peer}", str(error))
         self._on_peer_closed(self.settings.peer)
