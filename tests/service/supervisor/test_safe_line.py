@@ -7,7 +7,7 @@ import resource
 import select
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 
@@ -60,21 +60,6 @@ class Regulator:
             return self._device.reply(Accepted(request.voltage_v))
         assert isinstance(request, Garbage)
         return self._device.reply(self._device.refusal(request))
-
-
-@pytest.fixture
-def pty() -> Iterator[Pty]:
-    pty = Pty()
-    os.set_blocking(pty.fd, False)
-    yield pty
-    pty.close()
-
-
-@pytest.fixture
-def client(pty: Pty) -> Iterator[int]:
-    descriptor = os.open(pty.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    yield descriptor
-    os.close(descriptor)
 
 
 def test_a_device_that_never_stops_talking_is_not_listened_to_for_ever(pty: Pty, client: int) -> None:

@@ -3,30 +3,13 @@
 import errno
 import os
 import termios
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 
 from gateway.ports import Pty
 from gateway.service.supervisor.safe_line import SafeLine
-
-FRAME, REPLY, END = b"SET 0\r\n", b"0\r\n", b"\r\n"
-SHORT_S = 0.05
-
-
-@pytest.fixture
-def pty() -> Iterator[Pty]:
-    pty = Pty()
-    os.set_blocking(pty.fd, False)
-    yield pty
-    pty.close()
-
-
-@pytest.fixture
-def client(pty: Pty) -> Iterator[int]:
-    descriptor = os.open(pty.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    yield descriptor
-    os.close(descriptor)
+from tests.service.supervisor.test_safe_line import END, FRAME, PATIENT_S, REPLY, SHORT_S
 
 
 def failing(call: Callable[..., object], numbers: list[int]) -> Callable[..., object]:
@@ -93,3 +76,31 @@ def test_a_terminal_that_another_program_has_stopped_sends_again(pty: Pty, clien
     termios.tcflow(client, termios.TCOOFF)
     assert SafeLine(client, FRAME, b"", END).write_safe(SHORT_S)
     assert os.read(pty.fd, 256) == FRAME
+
+
+def test_a_line_that_takes_a_byte_at_a_time_gets_the_whole_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    reader, writer = os.pipe()
+    write = os.write
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", lambda descriptor, data: write(descriptor, data[:1]))
+        assert SafeLine(writer, FRAME, b"", END).write_safe(SHORT_S)
+    assert os.read(reader, 64) == FRAME
+    os.close(reader)
+    os.close(writer)
+
+
+def test_a_line_that_has_no_room_for_a_moment_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    reader, writer = os.pipe()
+    write, refusals = os.write, iter(range(9))
+
+    def refuse_first(descriptor: int, data: bytes) -> int:
+        if next(refusals, None) is not None:
+            raise BlockingIOError
+        return write(descriptor, data)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", refuse_first)
+        assert SafeLine(writer, FRAME, b"", END).write_safe(PATIENT_S)
+    assert os.read(reader, 64) == FRAME
+    os.close(reader)
+    os.close(writer)
