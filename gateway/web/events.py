@@ -166,10 +166,13 @@ class EventSource:
 
     async def _tell_notes(self) -> None:
         reading = asyncio.ensure_future(asyncio.to_thread(self._read_notes))
-        await asyncio.wait([reading], timeout=_HANGS_S)
-        if not reading.done():
-            self._add_notes([make_event(time.time(), "page", "events", _HANGS)._asdict()])
-        self._add_notes(await reading)
+        try:
+            await asyncio.wait([reading], timeout=_HANGS_S)
+            if not reading.done():
+                self._add_notes([make_event(time.time(), "page", "events", _HANGS)._asdict()])
+            self._add_notes(await reading)
+        finally:
+            reading.cancel()  # wait() leaves it be where the page's server ends first
 
     def _add_notes(self, fresh: list[dict[str, Any]]) -> None:
         self._notes = (self._notes + fresh)[-_KEPT_NOTES:]

@@ -90,6 +90,33 @@ def test_a_disk_that_hangs_under_the_log_keeps_nobody_waiting_and_is_said(
     assert "the disk has not given the log" in first and second == "master lost"
 
 
+def test_a_server_that_ends_while_the_log_is_read_leaves_no_reading_behind(
+    tmp_path: Path, ring: tuple[int, SampleRing], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a busy machine the reading of the log outlived the server, and a gate failed on it once in dozens of runs."""
+    begun, goes_on = threading.Event(), threading.Event()
+
+    def read_slowly(reader: events.EventReader) -> Iterator[EventRecord]:
+        begun.set()
+        goes_on.wait(10.0)
+        return iter(())
+
+    monkeypatch.setattr(events.EventReader, "read_stored", read_slowly)
+
+    async def scene() -> set[str]:
+        source = EventSource(Context(tmp_path), RingRows(ring[0]), test_events.Commands())  # type: ignore[arg-type]
+        stream = source.stream("me")
+        await anext(stream)
+        await asyncio.to_thread(begun.wait, 10.0)
+        await stream.aclose()
+        await source.close()
+        left_over = {task.get_name() for task in asyncio.all_tasks() if task is not asyncio.current_task()}
+        goes_on.set()
+        return left_over
+
+    assert asyncio.run(scene()) == set()
+
+
 class Fields(dict[str, Any]):
     """An event as it is shown, of which is known whether it is still there."""
 
