@@ -53,7 +53,8 @@ class RegisterCommands:
 
 
 def is_stop(payload: bytes) -> bool:
-    """Decide whether a command clears the control word, and sets nothing to anything but 0."""
+    """Decide whether a command clears the control word, and sets nothing else to anything but 0. A heartbeat beside it, which
+    who commands a rig with a lease sends in each command, presses nothing."""
     try:
         registers = _registers(payload)
     except ValueError:
@@ -62,18 +63,20 @@ def is_stop(payload: bytes) -> bool:
 
 
 def _does_stop(registers: dict[str, float]) -> bool:
-    return not any(registers.values()) and any(_is_control_word(name) for name in registers)
+    sets = any(value for name, value in registers.items() if not _is(name, "heartbeat"))
+    return not sets and any(_is(name, "control_word") for name in registers)
 
 
-def _is_control_word(name: str) -> bool:
-    return name.partition("@")[0] == "control_word"
+def _is(name: str, register: str) -> bool:
+    """Decide whether a name, of whatever block, is that of a register."""
+    return name.partition("@")[0] == register
 
 
 def _in_order(registers: dict[str, float]) -> list[tuple[str, float]]:
     """Return them as they are to be written."""
     if not _does_stop(registers):
         return list(registers.items())
-    return sorted(registers.items(), key=lambda register: not _is_control_word(register[0]))
+    return sorted(registers.items(), key=lambda register: not _is(register[0], "control_word"))
 
 
 def _registers(payload: bytes) -> dict[str, float]:

@@ -95,6 +95,9 @@ def test_what_came_while_the_process_stood_still_presses_nothing_and_a_stop_stop
         (b'{"control_word": 0, "control_word@float_abcd": 1}', False),
         (b'{"force_setpoint": 0, "control_word": 0}', True),
         (b'{"force_setpoint": 30, "control_word": 0}', False),
+        (b'{"heartbeat": 7, "control_word": 0}', True),  # as whoever commands a rig with a lease sends it
+        (b'{"heartbeat@float_abcd": 7, "force_setpoint": 0, "control_word": 0}', True),
+        (b'{"heartbeat": 7}', False),
         (b'{"force_setpoint": 0}', False),
         (b"{}", False),
         (b"[", False),

@@ -145,6 +145,11 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
             },
             ["1000c8000204" + "00000000"],
         ),
+        (
+            b'{"heartbeat": 7, "control_word": 0}',
+            {"ok": True, "written": ["control_word", "heartbeat"]},
+            ["100000000102" + "0000", "100004000102" + "0007"],  # of a guest the heartbeat is refused, the stop is not
+        ),
         (b'{"control_word": 0.7}', None, []),
         (b'{"control_word": 1.5}', None, []),
         (b'{"heartbeat": 0.5}', None, []),
