@@ -140,6 +140,15 @@ class SerialPort:
             return dropped
         return dropped
 
+    def drop_unsent(self) -> None:
+        """Drop what was handed over and is not on the wire yet, as far as the driver lets us."""
+        if not self.is_open:
+            return
+        asyncio.get_running_loop().remove_writer(self._descriptor)
+        self._unsent = b""
+        with contextlib.suppress(*SERIAL_FAILURES):  # the next read or write tells of what is gone
+            termios.tcflush(self._descriptor, termios.TCOFLUSH)
+
     async def drain(self, deadline_s: float = WRITE_DEADLINE_S) -> None:
         """Wait until the driver has taken every byte. PortError after deadline_s."""
         end_s = monotonic_s() + deadline_s
@@ -225,10 +234,7 @@ class SerialPort:
     def _keep(self, data: bytes) -> None:
         self._unsent += data
         if len(self._unsent) > MOST_UNSENT_BYTES:
-            with contextlib.suppress(
-                termios.error
-            ):  # the driver's part of it would outlast the loss, and be sent after it
-                termios.tcflush(self._descriptor, termios.TCOFLUSH)
+            self.drop_unsent()  # the driver's part of it would outlast the loss, and be sent after it
             self._fail(PortError("E111", f"{self._path} takes no bytes: more than {MOST_UNSENT_BYTES} unsent"))
 
     def _fail(self, failure: PortError) -> None:

@@ -218,3 +218,25 @@ def test_what_waited_before_a_loss_is_not_sent_after_it_and_nothing_looks_at_a_c
         other.close()
 
     asyncio.run(scene())
+
+
+def test_what_is_dropped_is_not_sent_and_what_comes_behind_it_is(ear: Any, line: Pty) -> None:
+    """A line that stands still takes nothing: what waits here is dropped, and of the driver's what the far end has not got."""
+
+    async def scene() -> None:
+        port = ear.port(line.path)
+        await port.open()
+        while not port._unsent:
+            assert port.write(b"SET 512\r\n" * 100)
+        port.drop_unsent()
+        assert port.unsent_bytes == 0
+        assert port.write(b"SET 0\r\n")
+        heard = b""
+        while not heard.endswith(b"SET 0\r\n"):
+            heard += await gather(line.fd, 1)
+        assert len(heard) <= 4096 + len(b"SET 0\r\n")
+        assert not asyncio.get_running_loop().remove_writer(ear.opened[-1])
+        port.close()
+        port.drop_unsent()
+
+    asyncio.run(scene())

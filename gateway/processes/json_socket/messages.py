@@ -10,6 +10,8 @@ _DEEPEST: Final = 10
 _MOST_KEYS: Final = 64
 _LONGEST_KEY: Final = 100
 _MOST_VALUES: Final = 3000
+_MOST_DIGITS: Final = 600  # in a row; the longest Modbus request in hex has 506
+_DIGITS_AS_ZEROS: Final = bytes.maketrans(b"123456789", b"000000000")
 
 
 def error_answer(sentence: str) -> Answer:
@@ -17,6 +19,11 @@ def error_answer(sentence: str) -> Answer:
     if len(sentence) > _LONGEST_SENTENCE:
         sentence = f"{sentence[:_LONGEST_SENTENCE]} ..."
     return {"ok": False, "error": sentence}
+
+
+def has_huge_number(line: bytes) -> bool:
+    """Decide whether a text may hold a number of very many digits: to read one takes longer than to read as many others."""
+    return b"0" * _MOST_DIGITS in line.translate(_DIGITS_AS_ZEROS)
 
 
 def why_too_large(request: Any) -> str:

@@ -25,7 +25,14 @@ from typing import Any, Final
 
 from gateway.processes.disk_worker import DiskWorker
 from gateway.processes.json_socket.connection import JsonConnection, SocketLimits, close_with_sentence
-from gateway.processes.json_socket.messages import Answer, encode_answer, error_answer, refuse_constant, why_too_large
+from gateway.processes.json_socket.messages import (
+    Answer,
+    encode_answer,
+    error_answer,
+    has_huge_number,
+    refuse_constant,
+    why_too_large,
+)
 
 Handler = Callable[[dict[str, Any]], Answer | Future[Answer]]
 """A future, done in the loop, is for what waits for a disk."""
@@ -270,6 +277,8 @@ class JsonLineServer:
         return text.encode() + b"\n"
 
     def _handle_line(self, line: bytes) -> Answer | Future[Answer]:
+        if has_huge_number(line):
+            return error_answer("a number of more digits than any that means something")
         try:
             request = json.loads(line, parse_constant=refuse_constant)
             handler = self._handlers[request["do"]]

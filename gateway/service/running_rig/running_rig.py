@@ -89,6 +89,7 @@ class RunningRig:
         self._ports = RigPorts(rig, ports, handed, log, guardian.take_back)
         checks = DeviceChecks(host, is_waived=rig.accept_no_device_watchdog)
         self._line = OutputExchange(host, self._ports.write_output, rig.output.device.reply_timeout_s, checks, rest_v)
+        self._line.drop_unsent = self._ports.drop_output
         self._counters = SchedulerCounters(os.getpid())
         self._lateness = Lateness(1.0 / rig.loop_hz)
         self._follow_rig()

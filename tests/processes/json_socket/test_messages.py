@@ -2,11 +2,13 @@
 
 import json
 from math import inf, nan
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from gateway.processes.json_socket.messages import encode_answer, refuse_constant, why_too_large
+from gateway.processes.json_socket.messages import encode_answer, has_huge_number, refuse_constant, why_too_large
+from gateway.processes.json_socket.server import JsonLineServer
 
 
 def nested(depth: int) -> Any:
@@ -39,3 +41,27 @@ def test_what_is_no_number_is_null_wherever_it_stands(pack: Any) -> None:
     text = encode_answer({"all": pack([1.0, nan, inf])})
     json.loads(text, parse_constant=refuse_constant)
     assert text.count("null") == 2
+
+
+@pytest.mark.parametrize("number", ["9" * 4299, "-" + "1" * 601, "0." + "3" * 700])
+def test_a_number_of_very_many_digits_is_told_before_it_is_read(number: str) -> None:
+    assert has_huge_number(f'{{"do": "x", "a": [1, {number}]}}'.encode())
+
+
+def test_the_longest_numbers_that_mean_something_are_read() -> None:
+    request = {"do": "modbus", "pdu": "0" * 506, "a": [-1.7976931348623157e308] * 3000}
+    assert not has_huge_number(json.dumps(request).encode())
+
+
+def test_a_server_answers_a_huge_number_without_asking_its_handler(tmp_path: Path) -> None:
+    asked: list[object] = []
+
+    def take(request: dict[str, Any]) -> dict[str, Any]:
+        asked.append(request)
+        return {}
+
+    server = JsonLineServer(tmp_path / "s.sock", {"x": take})
+    answer = server.answer(b'{"do": "x", "a": ' + b"9" * 4000 + b"}\n")
+    assert isinstance(answer, bytes)
+    assert b"more digits" in answer
+    assert not asked

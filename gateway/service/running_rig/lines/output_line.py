@@ -12,6 +12,7 @@ an honest device would look like one that alters its settings. So after a time-o
 given up answers that one, and what was asked last is still out. One that repeats neither is believed by nobody: the line is
 left alone for one reply time, then asked anew. A falling voltage never waits.
 After any of them the setting is read or sent anew: the device may have lost its power, and stand where it then begins.
+What a line that stands still has not sent of a given-up question is dropped: no older voltage goes out before the safe one.
 An answer that comes twice has the same effect: where an echo repeats the setting before, the line is left alone as well.
 
 Between the first setting, which is the safe one, and any other stand the questions of device_checks. A watchdog is fed by a
@@ -80,6 +81,7 @@ class OutputExchange:
     ) -> None:
         """rest_v: voltage that stands while nothing is wanted."""
         self._host, self._rest_v = host, rest_v
+        self.drop_unsent: Callable[[], None] | None = None  # of the port, once a question is given up
         self.checks = checks or DeviceChecks(host, is_waived=False)
         self._write, self._reply_timeout_s = write, reply_timeout_s
         self._given_up = GivenUpQuestions(reply_timeout_s)
@@ -90,24 +92,22 @@ class OutputExchange:
         """Forget all that was received before: the port has been opened (again)."""
         self._host.forget()
         self.checks.begin()
-        self._free_s = self._next_feed_s = 0.0
+        self._free_s = self._next_feed_s = self.answer_late_s = 0.0
         self._wanted_v: float | None = None
         self._in_flight: OutputRequest | None = None
         self._asked_v = self._before_v = inf
-        self._sent_v = self._setting_s = nan
+        self._sent_v = self._setting_s = self.pressure_pa = nan
         self.standing_v: float | None = None
-        self._is_overdue = False  # a question was given up, its answer may still come
         self._given_up.forget()
-        self.answer_late_s = 0.0
+        self._is_overdue = False  # a question was given up, its answer may still come
         self._is_behind = False  # the answer to one of them came, that to the last question is out
         self._refused_v = nan  # a moment ago: perhaps the watchdog has tripped, which is asked before the next try
         self._is_altered = False  # the last echo was another voltage
         self._quiet_until_s = self._sent_s = self._next_poll_s = self._said_s = 0.0
-        self._polls, self._frame, self._unread = 0, b"", ""
+        self._polls, self._frame, self._unread, self._line_fault = 0, b"", "", FaultCode.NONE
         self._failures: dict[object, int] = {}
         self.acknowledged_v: float | None = None
         self.unanswered_since_s: float | None = None
-        self._line_fault, self.pressure_pa = FaultCode.NONE, nan
 
     @property
     def fault(self) -> FaultCode:
@@ -155,6 +155,8 @@ class OutputExchange:
         """Give up waiting for an overdue answer and ask again; unanswered_since_s keeps the age of the silence."""
         if self._in_flight is not None and now_s - self._sent_s > self._reply_timeout_s:
             self._give_up(self._in_flight)
+            if self.drop_unsent:
+                self.drop_unsent()
             self._next_poll_s = now_s  # ask again at once: three tries fit into the bound on silence
         self._send_next(now_s)
 
@@ -255,8 +257,7 @@ class OutputExchange:
             self._is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
             return
         self._given_up.questions.clear()
-        self.answer_late_s = 0.0
-        self.round_trip_s = now_s - self._sent_s
+        self.answer_late_s, self.round_trip_s = 0.0, now_s - self._sent_s
         if isinstance(request, AskDevice):
             self._take_check(request, reply)
         elif isinstance(reply, WatchdogTripped):

@@ -106,6 +106,11 @@ class RigPorts:
             self.output.flush_input()  # at most one question is out: whatever is there answers none of ours
             self.output.write(data)
 
+    def drop_output(self) -> None:
+        """Drop what the output's line has not sent of questions that nobody waits for any more."""
+        if not self._is_closing:
+            self.output.drop_unsent()
+
     def write_cell(self, data: bytes) -> None:
         """Write a question to a load cell that speaks only when asked."""
         if not self._is_closing:

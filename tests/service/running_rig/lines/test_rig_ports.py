@@ -11,6 +11,7 @@ import pytest
 from gateway.ports import PortError, Pty, serial_port
 from gateway.profiles import load_rig
 from gateway.service.running_rig.lines.rig_ports import RigPorts
+from tests.ports.raw_bytes import gather
 
 LINES = ("output", "load_cell", "valve")
 
@@ -255,3 +256,24 @@ def test_a_port_that_is_there_and_does_not_open_is_told_in_the_log(far_ends: dic
         assert port
         port._on_refused(PortError("E101", f"{port.path}: user anna may not open it"))
     assert said == [f"E101 {path}: user anna may not open it; tried again until it opens" for path in paths.values()]
+
+
+def test_what_the_output_has_not_sent_is_dropped_and_its_last_voltage_is_not(
+    far_ends: dict[str, Pty], tmp_path: Path
+) -> None:
+    async def scene() -> None:
+        scene = Scene(far_ends, tmp_path)
+        await scene.ports.open(is_restart=False)
+        while not scene.ports.output.unsent_bytes:
+            scene.ports.write_output(b"SET 512\r\n" * 10)
+        scene.ports.drop_output()
+        assert scene.ports.output.unsent_bytes == 0
+        await scene.ports.write_last(b"SET 0\r\n")
+        scene.ports.drop_output()
+        heard = b""
+        while not heard.endswith(b"SET 0\r\n"):
+            heard += await gather(far_ends["output"].fd, 1)
+        assert len(heard) <= 4096 + len(b"SET 0\r\n")
+        scene.ports.close()
+
+    asyncio.run(scene())
