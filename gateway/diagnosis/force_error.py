@@ -44,7 +44,8 @@ class GainVerdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CommandedForce:
-    """Rows of a run: time, s; the force that the master asks for and the one measured, N; whether the row counts."""
+    """Rows of a run: time, s; the force that the master asks for and the one measured, N, negative where the tool pulls;
+    whether the row counts."""
 
     time_s: Floats
     wanted_n: Floats
@@ -87,7 +88,7 @@ def commanded_force(columns: Mapping[str, Floats]) -> CommandedForce:
     """Return the rows of a recording, or of the sample ring, by its column names. ValueError names a column that is missing.
 
     A row counts where the state says that a force is held or on its way, without a fault; without these columns where the
-    setpoint is above 0. What is asked stands until the next row that says it.
+    setpoint is above 0. What is asked stands until the next row that says it; asked with a valve that pulls, it is negative.
     """
     if missing := [name for name in NEEDED if name not in columns]:
         raise ValueError(f"no column {' and no column '.join(missing)}")
@@ -96,6 +97,8 @@ def commanded_force(columns: Mapping[str, Floats]) -> CommandedForce:
         counts &= np.isin(columns["state"], (State.RAMPING, State.HOLDING))
     if "fault_code" in columns:
         counts &= columns["fault_code"] == 0.0
+    if "pulling" in columns:
+        wanted_n = np.where(columns["pulling"] == 1.0, -wanted_n, wanted_n)
     return CommandedForce(columns["time_s"], wanted_n, _without_absurd(columns["force_n"]), counts)
 
 
@@ -117,7 +120,13 @@ def error_blocks(run: CommandedForce) -> tuple[ErrorBlock, ...]:
     settled, from_n = _since_change(run)
     began = np.maximum.accumulate(np.abs(run.wanted_n - run.wanted_n[:1]) > _SAME_N)
     is_known = began | (run.time_s - run.time_s[:1] >= SETTLED_S)  # a run may begin on the way to its first force
-    counts = run.counts & is_known & np.isfinite(run.measured_n) & np.isfinite(run.wanted_n) & (run.wanted_n > _SAME_N)
+    counts = (
+        run.counts
+        & is_known
+        & np.isfinite(run.measured_n)
+        & np.isfinite(run.wanted_n)
+        & (np.abs(run.wanted_n) > _SAME_N)
+    )
     squares_n2 = (run.measured_n - run.wanted_n) ** 2
     blocks = []
     for first, stop in _stretches(run, counts, settled):
@@ -125,7 +134,7 @@ def error_blocks(run: CommandedForce) -> tuple[ErrorBlock, ...]:
         is_settled = bool(settled[first])
         start_n = to_n if is_settled else came_from_n
         total_n2 = float(squares_n2[first:stop].sum())
-        blocks.append(ErrorBlock(start_n, to_n, to_n >= came_from_n, is_settled, stop - first, total_n2))
+        blocks.append(ErrorBlock(start_n, to_n, abs(to_n) >= abs(came_from_n), is_settled, stop - first, total_n2))
     return tuple(blocks)
 
 
@@ -138,7 +147,7 @@ def rms_n(blocks: Iterable[ErrorBlock]) -> float:
 
 def compare_runs(before: Sequence[ErrorBlock], after: Sequence[ErrorBlock]) -> ForceChange:
     """Return what has changed from one run to the other, on the tasks that both have."""
-    width_n = max((block.to_n for block in (*before, *after)), default=1.0) / _LEVELS
+    width_n = max((abs(block.to_n) for block in (*before, *after)), default=1.0) / _LEVELS
     tasks = sorted({_task(block, width_n) for block in before} & {_task(block, width_n) for block in after})
     runs = [[block for block in run if _task(block, width_n) in tasks] for run in (before, after)]
     rows, squares = zip(*(_by_task(run, tasks, width_n) for run in runs), strict=True)

@@ -61,10 +61,15 @@ def keep_reference(state: Path, reference: ForceReference | None) -> None:
 
 def read_reference(state: Path, plant: int) -> ForceReference | None:
     """Return the reference that was kept for this plant; None where there is none, or a damaged one."""
+    reference = kept_reference(state)
+    return reference if reference and reference.plant == plant else None
+
+
+def kept_reference(state: Path) -> ForceReference | None:
+    """Return the reference that was kept last, for whichever plant; None as of `read_reference`."""
     try:
         facts = read_object(state / "plants" / _FILE)
         blocks = tuple(ErrorBlock(**block) for block in facts.pop("blocks"))
-        reference = ForceReference(**facts, blocks=blocks)
+        return ForceReference(**facts, blocks=blocks)
     except (OSError, ValueError, TypeError, KeyError):
         return None
-    return reference if reference.plant == plant else None

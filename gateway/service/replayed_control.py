@@ -19,6 +19,7 @@ from gateway.devices.messages import ForceSample, Quality
 from gateway.profiles import Rig
 from gateway.progress import report
 from gateway.recording import Recording, RecordingError
+from gateway.recording.tables.row_validity import pulled_rows
 from gateway.recording.tables.time_axis import check_time_axis
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
@@ -95,6 +96,11 @@ def _check(recording: Recording) -> None:
         raise RecordingError(
             f"{recording.path} holds a ladder, a plan or a self-test: its commands came from a run and not from a master, "
             "and are not in it"
+        )
+    if pulled := int(pulled_rows(recording.columns).sum()):
+        raise RecordingError(
+            f"{recording.path} holds {pulled} rows in which the tool pulled: when its valve switched is not in it, and control"
+            " is replayed pushing"
         )
 
 

@@ -150,3 +150,10 @@ def test_the_lines_for_the_rig_file_are_yaml_whatever_the_folder_is_called(host:
     (face,) = yaml.safe_load(f"fieldbus:{text}")["fieldbus"]
     assert face["bind"] == ("127.0.0.1" if host == "cell3.local" else host)
     assert [Path(face[key]).is_file() for key in ("certificate", "key", "ca")] == [True] * 3
+
+
+def test_an_empty_name_is_no_folder_for_a_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    refused = CliRunner().invoke(command, ["certs", ""])
+    assert refused.exit_code == 2 and "an empty name is no folder" in refused.stderr
+    assert not list(tmp_path.iterdir())

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from gateway.diagnosis.force_error import CommandedForce, ErrorBlock, GainVerdict, compare_runs, error_blocks, rms_n
+from gateway.diagnosis.force_error import (
+    CommandedForce,
+    ErrorBlock,
+    GainVerdict,
+    commanded_force,
+    compare_runs,
+    error_blocks,
+    rms_n,
+)
 
 ROWS_HZ = 50.0
 
@@ -75,3 +83,14 @@ def test_only_what_was_asked_of_both_is_compared():
     apart = compare_runs(before, more)
     assert (apart.verdict, apart.blocks) == (GainVerdict.UNKNOWN, (0, 0))
     assert "are needed" in apart.why
+
+
+def test_a_pull_is_compared_with_a_pull_and_its_error_is_not_twice_the_force():
+    """Its setpoint is positive and its readings negative: each row was off by twice the force that was asked."""
+    pushed = run(0.2, 1)
+    columns = {"time_s": pushed.time_s, "setpoint_n": pushed.wanted_n, "force_n": -pushed.measured_n}
+    pulled = commanded_force(columns | {"pulling": np.ones(pushed.time_s.size)})
+    ways = [(block.rising, block.rows) for block in error_blocks(pulled)]
+    assert ways == [(block.rising, block.rows) for block in error_blocks(pushed)]
+    assert rms_n(error_blocks(pulled)) == pytest.approx(rms_n(error_blocks(pushed)))
+    assert compare_runs(error_blocks(pulled), error_blocks(pushed)).blocks == (0, 0)

@@ -21,6 +21,7 @@ from gateway.recording.care.keeping import (
     why_protected,
 )
 from gateway.recording.care.summaries import list_summaries
+from gateway.recording.tables.column_names import DERIVED, PULLING
 
 NOW_S = 1_700_000_000.0
 COLUMNS = ("time_s", "force_n", "setpoint_n", "applied_n", "model_residual_n", "fault_code")
@@ -49,6 +50,15 @@ def test_a_summary_says_what_happened_by_name_and_number(tmp_path: Path) -> None
     assert summary["happened"] == "run, 1 change of setpoint, up to 20 N, 20.0 to 29.0 N measured, residual 3 N"
     assert summary["facts"]["force_range_n"] == [20.0, 29.0]
     assert summary["facts"]["residual_rms_n"] == pytest.approx(3.0)
+
+
+def test_a_summary_says_how_long_the_tool_pulled(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "recordings", {}, ("time_s", *DERIVED, PULLING))
+    for row in range(10):
+        recorder.append((row * 0.1, *(0.0 for _ in DERIVED), float(2 <= row < 7)))
+    recorder.close()
+    (summary,) = list_summaries(tmp_path)
+    assert "pulled for 0.5 s" in summary["happened"] and summary["facts"]["pulled_s"] == 0.5
 
 
 def test_a_plan_is_named_and_faults_by_their_codes(tmp_path: Path) -> None:

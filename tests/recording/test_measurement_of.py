@@ -205,6 +205,18 @@ def test_what_our_recorder_derives_from_the_force_is_no_covariate() -> None:
     assert "state" in measured(state=derived["state"]).covariates
 
 
+def test_rows_of_a_pull_are_told_and_not_judged_by_a_plant_that_pushes() -> None:
+    """They were taken for a push whose cell's sign had turned."""
+    derived, pulling = {name: np.zeros(N) for name in DERIVED}, np.where(TIME_S < 2.0, 1.0, 0.0)
+    found = measured(pulling=pulling, force_n=np.where(pulling, -1.0, 1.0) * columns()["force_n"], **derived)
+    assert not found.usable[pulling == 1.0].any() and found.usable[pulling == 0.0].all()
+    assert noted(found, "400 rows in which the tool pulled are not judged: the plant pushes")
+    assert not noted(found, "sign turned") and "pulling" not in found.covariates
+    with pytest.raises(RecordingError, match=r"0 usable rows .*1000 rows in which the tool pulled"):
+        measured(pulling=np.ones(N), **derived)
+    assert "pulling" in measured(pulling=pulling).covariates, "whatever another table means by it"
+
+
 def test_a_thousand_covariates_are_taken_and_told() -> None:
     noise = np.random.default_rng(2).normal(size=(1000, N))
     found = measured(**{f"c{k}": noise[k] for k in range(1000)})

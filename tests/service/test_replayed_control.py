@@ -168,6 +168,16 @@ def test_a_recording_of_a_run_is_refused(recording: Recording, own: ReplaySetup,
         replay_control(replace(recording, columns=columns), own)
 
 
+def test_a_recording_of_a_pull_is_refused(recording: Recording, own: ReplaySetup) -> None:
+    """It was replayed as a push: its readings were those of a cell whose sign has turned."""
+    pulled = changed(recording, slice(100, 110), pulling=1.0)
+    with pytest.raises(RecordingError, match="10 rows in which the tool pulled"):
+        replay_control(pulled, own)
+    before = replace(recording, columns={k: v for k, v in recording.columns.items() if k != "pulling"})
+    decided = [replay_control(one, own) for one in (before, recording)]
+    assert not [one for one in compare_decisions(recording.columns["time_s"], *decided) if one.rows]
+
+
 def test_a_time_that_runs_backwards_is_refused_with_its_row(recording: Recording, own: ReplaySetup) -> None:
     """As by every other verb: control was played over it, and the differences told were of no machine."""
     time_s = recording.columns["time_s"].copy()

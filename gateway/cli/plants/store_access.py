@@ -111,15 +111,26 @@ def now_utc() -> str:
 def change(state: StateChoice, request: dict[str, Any], before: str | None) -> dict[str, Any]:
     """Use another plant or roll back. request: {"use": N} or {"rollback": True}; before: the run that the watch compares
     with, None: the newest one. Return the gateway's answer, or what was done here where none runs, and the reference."""
-    directory = state.directory
-    kept = _keep_reference(state, request.get("use", 0), before)
+    from gateway.plants.force_reference import keep_reference, kept_reference
+
+    earlier = kept_reference(state.directory)
+    kept = _keep_reference(state, request.get("use", 0), before)  # before the change: the watch reads it as it comes
+    try:
+        return _change(state.directory, request) | kept
+    except CliError:
+        if kept:  # the plant that stays in use is compared with its own
+            keep_reference(state.directory, earlier)
+        raise
+
+
+def _change(directory: Path, request: dict[str, Any]) -> dict[str, Any]:
     with not_running(directory) as is_free:
         if is_free:
-            return _change_without_gateway(directory, request) | kept
+            return _change_without_gateway(directory, request)
     answer = ask_until_done(directory, "plant", request)
     if answer["failed"]:
         raise CliError(answer["said"], exit_codes.DATA)
-    return answer | kept
+    return answer
 
 
 def _change_without_gateway(directory: Path, request: dict[str, Any]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from gateway.cli.command_line.byte_count import ByteCount
 from gateway.cli.command_line.completion_words import complete_recording_numbers
 from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.errors import CliError, already_exists
@@ -137,7 +138,13 @@ def delete_command(*, number: int, yes: bool, state: StateChoice) -> None:
 @click.option(
     "--days", type=click.FloatRange(min=0, min_open=True), help="Delete older ones  [default: as the rig says]"
 )
-@click.option("--bytes", "most_bytes", type=click.IntRange(min=0), help="Of all together  [default: as the rig says]")
+@click.option(
+    "--bytes",
+    "most_bytes",
+    type=ByteCount(),
+    metavar="SIZE",
+    help="Of all together (20G, 500MB)  [default: as the rig says]",
+)
 @_yes
 @state_options
 def prune_command(*, dry_run: bool, yes: bool, state: StateChoice, days: float | None, most_bytes: int | None) -> None:

@@ -16,13 +16,14 @@ _LEAST_ROWS: Final = 2  # to say something of
 @dataclass(frozen=True, slots=True)
 class Happened:
     """ran: a run, a ladder or a plan; force_n: lowest and highest measured; residual_n: measured less what the model expects,
-    root of the mean square; None where the recording does not tell."""
+    root of the mean square; None where the recording does not tell; pulled_s: how long the tool pulled."""
 
     ran: str
     setpoint_changes: int = 0
     most_setpoint_n: float = 0.0
     force_n: tuple[float, float] | None = None
     residual_n: float | None = None
+    pulled_s: float = 0.0
     faults: tuple[str, ...] = ()
 
     def as_words(self) -> str:
@@ -33,6 +34,8 @@ class Happened:
             words.append(f"{changes} {what} of setpoint, up to {self.most_setpoint_n:.4g} N")
         if self.force_n:
             words.append(f"{self.force_n[0]:.1f} to {self.force_n[1]:.1f} N measured")
+        if self.pulled_s:
+            words.append(f"pulled for {self.pulled_s:.3g} s")
         if self.residual_n is not None:
             words.append(f"residual {self.residual_n:.2g} N")
         return ", ".join([*words, *(f"fault {name}" for name in self.faults)])
@@ -44,6 +47,7 @@ class Happened:
             "setpoint_changes": self.setpoint_changes,
             "force_range_n": self.force_n and list(self.force_n),
             "residual_rms_n": self.residual_n,
+            **({"pulled_s": round(self.pulled_s, 3)} if self.pulled_s else {}),
             "faults": list(self.faults),
         }
 
@@ -61,6 +65,7 @@ def tell_happened(recording: Recording) -> Happened | None:
         most_setpoint_n=float(setpoints.max()) if changes else 0.0,
         force_n=(float(force_n.min()), float(force_n.max())) if len(force_n) else None,
         residual_n=_residual_n(recording),
+        pulled_s=_pulled_s(recording),
         faults=tuple(_name_of_fault(code) for code in faults),
     )
 
@@ -70,6 +75,17 @@ def _known(recording: Recording, name: str) -> "NDArray[np.float64]":
 
     values = recording.columns.get(name, np.empty(0))
     return values[np.isfinite(values)]
+
+
+def _pulled_s(recording: Recording) -> float:
+    """Return how long the tool pulled: each such row until the next one."""
+    import numpy as np
+
+    from gateway.recording.tables.row_validity import pulled_rows
+
+    if "time_s" not in recording.columns:
+        return 0.0
+    return float(np.nansum(np.diff(recording.columns["time_s"])[pulled_rows(recording.columns)[:-1]]))
 
 
 def _residual_n(recording: Recording) -> float | None:

@@ -37,3 +37,6 @@ DERIVED: Final = (
 
 SENT: Final = ("sent_v", "sent_age_s")
 """What our recorder writes since it knows the wire: the last voltage sent, and how long before the row."""
+
+PULLING: Final = "pulling"
+"""What our recorder writes since it knows a valve: 1 while the tool pulls, where forces are negative; else 0."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gateway.bsfm.ladder.plan import LABELS
 from gateway.recording.tables.column_mapping import join_names
-from gateway.recording.tables.column_names import CONTRACT, DERIVED, SENT
+from gateway.recording.tables.column_names import CONTRACT, DERIVED, PULLING, SENT
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def extract_covariates(
     names = [
         name
         for name in columns
-        if name not in MEASUREMENT_COLUMNS and not (ours and name in (*DERIVED, *LABELS, *SENT))
+        if name not in MEASUREMENT_COLUMNS and not (ours and name in (*DERIVED, *LABELS, *SENT, PULLING))
     ]
     dropped: dict[str, list[str]] = {}
     covariates: dict[str, Floats] = {}

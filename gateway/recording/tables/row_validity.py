@@ -1,10 +1,12 @@
 """Which readings may be judged: valid by the quality column, and not the one before written down again."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gateway.recording.tables.column_names import DERIVED, PULLING
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -22,6 +24,13 @@ _FINE_STEPS: Final = 5.0
 _ENDS: Final = (0.05, 0.95)
 _BEYOND: Final = 5.0  # times as far away as nine tenths of all readings lie apart, or from 0
 _REMEMBERED_S: Final = 1.0  # that a force still follows what drove it
+
+
+def pulled_rows(columns: Mapping[str, Floats]) -> Flags:
+    """Return the rows in which the tool pulled, by our recorder: none of what was recorded before it knew, or by others."""
+    if PULLING in columns and set(DERIVED) <= set(columns):
+        return np.asarray(columns[PULLING] == 1.0)
+    return np.zeros(len(columns["time_s"]), dtype=bool)
 
 
 def valid_by_quality(quality: Floats, is_ours: bool) -> tuple[Flags, list[str]]:

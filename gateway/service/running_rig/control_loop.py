@@ -26,7 +26,6 @@ from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
 from gateway.registers.command import Command, Status
 from gateway.registers.residual_cause import ResidualCause
-from gateway.registers.words import StatusBit
 from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.lateness import Lateness
@@ -35,13 +34,12 @@ from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
 from gateway.service.running_rig.rate_warnings import LineNoise, SlowLoop
-from gateway.service.running_rig.recording.recorded_row import row_of
+from gateway.service.running_rig.recording.recorded_row import is_pull, row_of
 from gateway.service.running_rig.recording.recordings import Recordings
 
 _FRESH_PERIODS: Final = 1.05  # a tick decides nothing so soon after a sample or a command; more than 1: a cell's jitter
 _ENDING: Final = int(WarningBit.SERIAL_NOISE | WarningBit.SLOW_LOOP)
 _RESTARTED: Final = int(WarningBit.RESTARTED)
-_PULLING: Final = int(StatusBit.PULLING)
 _LONG_SILENCE_S: Final = 0.03  # a shorter one needs no explanation
 _LONGEST_SILENCE_S: Final = 10.0  # then it is no hiccup any more
 
@@ -326,5 +324,5 @@ class ControlLoop:
             for taker in (self.recordings, self.calibration_runs):
                 if taker:
                     taker.append(sample, decision, line)
-            if self.ring and not int(decision.status) & _PULLING:  # its plant pushes
+            if self.ring and not is_pull(decision):  # its plant pushes
                 self.ring.append(row_of(sample.time_s, sample, decision, line))

@@ -10,9 +10,11 @@ from click.testing import CliRunner, Result
 
 import gateway.diagnosis
 from gateway.cli.main import command
+from gateway.cli.plants import store_access
 from gateway.plants.force_reference import read_reference
 from gateway.plants.store import PlantStore
 from gateway.processes import exit_codes
+from gateway.processes.state_lock import hold_state_lock
 from gateway.profiles.kinds.plant_writer import plant_text
 from gateway.recording import Recorder
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
@@ -73,6 +75,22 @@ def test_use_keeps_how_large_the_error_was_before(added):
     kept = read_reference(added, 1)
     assert kept is not None and (kept.recording, kept.plant_before) == ("0001.fgr", 0)
     assert read_reference(added, 2) is None, "it was kept for plant 1"
+
+
+def test_a_plant_that_is_refused_leaves_the_reference_of_the_one_in_use(added, monkeypatch):
+    """The watch of the plant that stayed in use had nothing to compare with any more."""
+    record_held(added, 0.4)
+    assert call(added, "use", 1).exit_code == 0
+    before = read_reference(added, 1)
+    file = added.parent / "another.yaml"
+    file.write_text(plant_text(bowed()), encoding="utf-8")
+    call(added, "add", file)
+    answer = {"busy": False, "job": 1, "failed": True, "said": "W246 the output is enabled"}
+    monkeypatch.setattr(store_access, "ask_until_done", lambda directory, verb, request: answer)
+    with hold_state_lock(added):
+        refused = call(added, "use", 2)
+    assert refused.exit_code == exit_codes.DATA and "the output is enabled" in refused.stderr
+    assert before and read_reference(added, 1) == before
 
 
 def test_show_and_compare(added):

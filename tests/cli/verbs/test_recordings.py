@@ -101,6 +101,20 @@ def test_prune_says_what_would_go_before_it_goes(state: Path, call) -> None:
     assert "nothing to delete" in call("recordings", "prune", "--days", "30", "--state", state).output
 
 
+@pytest.mark.parametrize(
+    ("size", "goes"), [("1MB", False), ("2 G", False), ("500k", False), ("1b", True), ("0.5kB", True), ("0", True)]
+)
+def test_prune_takes_sizes_as_people_write_them(state: Path, call, size: str, goes: bool) -> None:
+    told = call("recordings", "prune", "--dry-run", "--bytes", size, "--state", state)
+    assert told.exit_code == 0 and ("would delete" in told.output) is goes, told.output
+
+
+@pytest.mark.parametrize("size", ["", "-1", "1 parsec", "1e3", "nan", "MB"])
+def test_prune_says_how_a_size_is_written(state: Path, call, size: str) -> None:
+    told = call("recordings", "prune", "--dry-run", "--bytes", size, "--state", state)
+    assert told.exit_code == 2 and "500k, 1MB or 2G" in words_of(told.stderr)
+
+
 def test_prune_takes_the_rigs_own_limits_and_says_where_there_are_none(
     state: Path, call, tmp_path: Path, rig_file_with_retention: Path
 ) -> None:

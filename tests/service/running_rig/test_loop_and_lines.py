@@ -13,6 +13,7 @@ from gateway.profiles import load_device
 from gateway.registers.words import LimitedBy, State, StatusBit
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
+from gateway.service.running_rig.recording.recorded_row import COLUMNS, row_of
 from tests.service.running_rig.simulated_rig import SmallRig
 from tests.service.wired import ENABLE, Wired
 
@@ -93,6 +94,15 @@ def test_rows_of_a_pull_are_none_of_the_ring_whose_plant_pushes() -> None:
         wired.loop.decision = decision._replace(status=status)
         wired.loop._record()
         assert len(rows) == count
+
+
+def test_a_row_says_whether_the_tool_pulled() -> None:
+    wired = Wired().ready()
+    sample, decision = wired.loop.sample, wired.loop.decision
+    assert sample and decision
+    for status, pulls in ((StatusBit.PULLING | StatusBit.ENABLED, 1.0), (StatusBit.SWITCHING, 0.0)):
+        row = row_of(0.0, sample, decision._replace(status=status), wired.exchange.line)
+        assert dict(zip(COLUMNS, row, strict=True))["pulling"] == pulls
 
 
 def test_a_row_has_the_decision_that_its_sample_has_brought_about() -> None:

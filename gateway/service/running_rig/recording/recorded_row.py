@@ -7,12 +7,14 @@ this row.
 
 from gateway.control.inputs import Output
 from gateway.devices.messages import ForceSample, Quality
-from gateway.recording.tables.column_names import DERIVED, SENT
+from gateway.recording.tables.column_names import DERIVED, PULLING, SENT
+from gateway.registers.words import StatusBit
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.units import kilopascal_from_pascal
 
-COLUMNS = ("time_s", "command_v", "force_n", "pressure_kpa", "quality", *DERIVED, *SENT)
+COLUMNS = ("time_s", "command_v", "force_n", "pressure_kpa", "quality", *DERIVED, *SENT, PULLING)
 
+_PULLING = int(StatusBit.PULLING)
 _QUALITY_NUMBER = {Quality.OK: 0.0, Quality.UNSTABLE: 1.0, Quality.OVERLOAD: 2.0}
 
 
@@ -34,4 +36,10 @@ def row_of(time_s: float, sample: ForceSample, decision: Output, line: LineState
         decision.model_residual_n,
         line.sent_v,
         sample.time_s - line.sent_s,
+        float(is_pull(decision)),
     )
+
+
+def is_pull(decision: Output) -> bool:
+    """Decide whether the tool pulls."""
+    return bool(int(decision.status) & _PULLING)
