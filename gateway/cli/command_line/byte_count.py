@@ -9,12 +9,12 @@ _TIMES: Final = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "t": 10**12}
 _SIZE: Final = re.compile(r"(\d{1,18}(?:\.\d{0,9})?) ?([kmgt]?)b?", re.ASCII | re.IGNORECASE)
 
 
-class ByteCount(click.ParamType):
+class ByteCount(click.IntRange):
     """A number of bytes, with or without a unit."""
 
     name = "size"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the bytes that a text means."""
         match = _SIZE.fullmatch(str(value).strip())
         if not match:
