@@ -8,7 +8,7 @@ import asyncio
 import os
 from collections import deque
 from collections.abc import Callable
-from math import inf
+from math import ceil, inf
 
 from gateway.devices import SerialSettings
 from gateway.ports import PortError, PortEvents
@@ -24,12 +24,14 @@ STRANGE_S = 0.05
 
 
 class Direction:
-    """One direction of a wire. through_s: when its last byte is through; is_cut: what is on it arrives nowhere."""
+    """One direction of a wire. through_s: when its last byte is through; is_cut: what is on it arrives nowhere; waiting: what
+    has not arrived yet, and when its first byte begins."""
 
-    __slots__ = ("is_cut", "through_s")
+    __slots__ = ("is_cut", "through_s", "waiting")
 
     def __init__(self) -> None:
         self.through_s, self.is_cut = 0.0, False
+        self.waiting: deque[tuple[float, bytes]] = deque()
 
 
 class Cable:
@@ -56,6 +58,18 @@ class Cable:
         for direction in (self._to_device, self._to_host):
             direction.is_cut = True
         self._to_device, self._to_host = Direction(), Direction()
+
+    def drop_unsent(self) -> None:
+        """Of what the host has written only what is on the wire by now arrives: its driver forgets the rest."""
+        now_s, dropped = self._outside.time(), self._to_device
+        if not dropped.waiting:
+            return
+        dropped.is_cut, self._to_device = True, Direction()
+        for begin_s, data in dropped.waiting:
+            if sent := data[: max(0, ceil((now_s - begin_s) / self._character_s))]:
+                self._to_device.through_s = through_s = begin_s + len(sent) * self._character_s
+                self._to_device.waiting.append((begin_s, sent))
+                self._outside.call_at(through_s + 1e-9, self._arrive, self._to_device, sent)
 
     @property
     def backlog_s(self) -> float:
@@ -120,13 +134,16 @@ class Cable:
         data = data[: max(0, MOST_QUEUED - int((begin_s - now_s) / self._character_s))]
         if data:
             direction.through_s = through_s = begin_s + len(data) * self._character_s
+            direction.waiting.append((begin_s, data))
             self._outside.call_at(through_s + 1e-9, take, direction, data)
 
     def _arrive(self, direction: Direction, data: bytes) -> None:
+        direction.waiting.popleft()
         if not direction.is_cut:
             self.on_device(data, self._outside.time())
 
     def _reach_host(self, direction: Direction, data: bytes) -> None:
+        direction.waiting.popleft()
         if self.port and not direction.is_cut:
             self.heard_s = self._outside.time()
             self.on_host(data, self.heard_s)
@@ -179,6 +196,10 @@ class SimulatedPort:
         dropped = len(self._buffer)
         self._buffer.clear()
         return dropped
+
+    def drop_unsent(self) -> None:
+        if self.is_open:
+            self._cable.drop_unsent()
 
     async def write_last(self, data: bytes, deadline_s: float = 0.5) -> None:
         if not self.write(data):
