@@ -1,17 +1,17 @@
 """What every generated client needs of a map: addresses, scales, bits, texts. One table, from which each language derives.
 
-A client writes the whole command block and reads the whole status block in one cycle, and uploads a model in four writes and a
+A client writes the command block and reads the whole status block in one cycle, and uploads a model in four writes and a
 commit. Registers are asked for by name; a map of the user's own that lacks one is told so, all missing ones at once.
 """
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from ipaddress import ip_address
 from struct import unpack
 from typing import Final
 
-from gateway import VERSION, defaults
+from gateway import VERSION
+from gateway.clients.endpoint import Endpoint
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
@@ -19,7 +19,6 @@ from gateway.registers.map.register_map import Register, RegisterMap, UnknownReg
 from gateway.registers.values import WordOrder, pack_number
 from gateway.registers.writes.byte_order_echo import PROOF
 
-_IPV4: Final = 4
 TEXT_LENGTH: Final = 56
 """Characters of a text: a RAPID string, the shortest that a language allows, has 80, and up to 23 of them say what failed."""
 
@@ -57,41 +56,6 @@ STATUS_BITS: Final = {
 
 class MissingRegisterError(LookupError):
     """The map lacks what a client needs; the message names all of it."""
-
-
-@dataclass(frozen=True)
-class Endpoint:
-    """Where the gateway listens: address, port, unit id. cautions: what of the rig makes a client less than it says, in
-    sentences that fit a line of RAPID."""
-
-    host: str
-    port: int
-    unit: int
-    cautions: tuple[str, ...] = ()
-
-    @property
-    def shown_port(self) -> str:
-        """The port as pages name it: 0 is none that anybody can ask, but says that one is chosen at each start."""
-        return str(self.port or "PORT")
-
-    @property
-    def unit_option(self) -> str:
-        """Return what our own verbs need beside the address where the rig answers other units only."""
-        return "" if self.unit == defaults.UNIT_ID else f" --unit {self.unit}"
-
-    def to_fill_in(self, *, from_elsewhere: bool) -> tuple[str, ...]:
-        """Return what the integrator has to put in by hand, for no rig can know it. from_elsewhere: on another machine."""
-        sentences = []
-        host = ip_address(self.host)
-        if not self.port:
-            sentences.append("FILL IN the port: the rig's network.port is 0, another at each start.")
-        if host.is_unspecified:
-            sentences.append("FILL IN the address: the rig listens on every one of its machine.")
-        elif from_elsewhere and host.is_loopback:
-            sentences.append(f"FILL IN the address: no other machine reaches {host}.")
-        elif from_elsewhere and host.version > _IPV4:
-            sentences.append("FILL IN an IPv4 address: this client knows no IPv6.")
-        return tuple(sentences)
 
 
 @dataclass(frozen=True)
@@ -172,6 +136,13 @@ class ExchangeTable:
         """(first address, words) of what one write carries: all named registers of the command block."""
         return _span(self.command)
 
+    @cached_property
+    def values_first(self) -> int:
+        """The place behind control_word in the command block, from which a new force is written while enable stays as it is:
+        written again it would be a new rise. 0 in a map whose heartbeat does not stand behind it, too."""
+        places = [self.at(name, "command").address - self.command_span[0] for name in ("control_word", "heartbeat")]
+        return places[0] + 1 if places[0] < places[1] else 0
+
     @property
     def status_span(self) -> tuple[int, int]:
         """(first address, words) of what one read brings."""
@@ -229,6 +200,8 @@ class ExchangeTable:
             "command_first": command_first,
             "command_words": command_words,
             "command_last": command_words - 1,
+            "values_first": self.values_first,
+            "values_words": command_words - self.values_first,
             "status_first": status_first,
             "status_words": status_words,
             "status_last": status_words - 1,

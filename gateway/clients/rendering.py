@@ -11,7 +11,8 @@ from string import Template
 from typing import Final
 
 from gateway import defaults
-from gateway.clients.exchange import Endpoint, ExchangeTable
+from gateway.clients.endpoint import Endpoint
+from gateway.clients.exchange import ExchangeTable
 from gateway.clients.spellings import SPELLINGS
 from gateway.control.settings import LeaseAction
 from gateway.profiles import Rig

@@ -15,6 +15,7 @@ from gateway.registers.upload.staging import StagedFault, check_staged
 from gateway.registers.words import CommitStatus, ControlBit, State, StatusBit
 from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 
+COMMAND_WORDS, HEARTBEAT = 13, 4
 ECHO_AT = struct.pack(">H", 416)
 
 
@@ -139,13 +140,18 @@ class GatewayAtHand:
 
     @property
     def words(self) -> list[tuple[int, ...]]:
-        """Every whole command that was written."""
-        return [words for address, words in self.writes if address == 0]
+        """Every command that was written, whole or the words behind an earlier one's control word."""
+        found: list[tuple[int, ...]] = []
+        for address, words in self.writes:
+            if address + len(words) == COMMAND_WORDS:
+                before = found[-1] if found else (0,)
+                found.append((*before[:address], *words))
+        return found
 
     @property
     def beats(self) -> list[int]:
         """Every heartbeat that was written, alone or within a command."""
-        return [words[4] if address == 0 else words[0] for address, words in self.writes]
+        return [words[HEARTBEAT - address] for address, words in self.writes]
 
     @property
     def uploads(self) -> list[tuple[int, bytes]]:

@@ -1,4 +1,5 @@
-"""Two masters at one gateway: who commands nothing takes no other master's force, whatever words it has set beside enable."""
+"""Two masters at one gateway: who commands nothing takes no other master's force, whatever words it has set beside enable, and
+who commands a force undoes no other master's stop."""
 
 from __future__ import annotations
 
@@ -67,3 +68,21 @@ def test_a_word_that_is_set_while_nobody_presses_goes_out_and_with_the_next_enab
     client.disable()
     cycles(client)
     assert not gateway.bank.command.control_word and not client.enabled
+
+
+def test_a_force_that_changes_each_cycle_does_not_undo_another_master_s_stop(
+    client: Any, gateway: GatewayAtHand
+) -> None:
+    """The whole command went out with each new force, enable in it: behind a stop by MQTT it was holding again in 0.3 s."""
+    client.enable(12.0)
+    cycles(client)
+    client.force(12.5)
+    cycles(client)
+    assert gateway.bank.command.force_setpoint_n == 12.5 and gateway.bank.command.control_word == 1
+    gateway.stop_from_elsewhere()
+    client.force(13.0)
+    cycles(client)
+    assert gateway.bank.command.control_word == 0
+    assert gateway.bank.command.force_setpoint_n == 0.0 and gateway.bank.owner is None, "nor does it keep others out"
+    assert client.ended and not client.enabled
+    assert "another master" in client.text

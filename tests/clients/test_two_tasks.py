@@ -134,12 +134,15 @@ def test_a_force_that_is_set_beside_a_refusal_of_another_is_the_one_that_holds()
         assert gateway.bank.command.force_setpoint_n == 5.0
 
 
+@pytest.mark.parametrize("force_n", [9.0, 7.0])
 @pytest.mark.parametrize("language", ["rapid", "urscript"])
-def test_a_disable_at_any_place_of_an_exchange_takes_the_force_off(language: str) -> None:
+def test_a_disable_at_any_place_of_an_exchange_takes_the_force_off(language: str, force_n: float) -> None:
+    """Beside a heartbeat, too: it was taken for sent with that, and the force ended by its lease alone."""
+
     def prepare(client: Any, _gateway: GatewayAtHand) -> None:
         client.enable(7.0)
         cycles(client, 2)
-        client.force(9.0)
+        client.force(force_n)
 
     for client, gateway in every_place(language, prepare, [lambda client: client.disable()]):
         assert gateway.bank.command.control_word == 0 and not client.enabled and not client.ended

@@ -231,7 +231,9 @@ def test_the_s7_table_is_what_the_generated_block_asks(monkeypatch: pytest.Monke
     client = S7(render_client(MAP, "scl", Endpoint("10.1.2.3", 502, 1)), GatewayAtHand(MAP))
     client.enable(12.0)
     client.begin_upload({"order": 1}, 0)
-    for _ in range(10):
+    for cycle in range(10):
+        client.force(12.0 + cycle)
+        client.cycle()
         client.cycle()
     rows = rows_of(page_of("irc5-cell"), "Siemens S7-1200/1500: requests")
     assert asked == {tuple(row[:3]) for name, row in rows.items() if name != "request"}

@@ -55,6 +55,7 @@ def spell_scl(table: ExchangeTable) -> dict[str, str]:
     stage = {name: table.at(name, "staging").address for name in ("order", "length", "commit", "commit_status")}
     numbers = {
         "command": table.command_span[0],
+        "values": table.command_span[0] + table.values_first,
         "heartbeat": table.at("heartbeat", "command").address,
         "echo": table.at("byte_order_echo", "proof").address,
         "hash": table.at("map_hash", "proof").address,

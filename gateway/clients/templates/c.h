@@ -19,8 +19,8 @@ ${fill_in} *     static fg_client gateway;
  *     }
  *     fg_disable(&gateway); fg_exchange(&gateway); fg_close(&gateway);
  *
- * One exchange is one FC23: it writes the whole command block where something has changed, else the heartbeat alone (to
- * repeat enable would undo another master's stop), and reads the whole status block. While nothing is commanded it is one
+ * One exchange is one FC23: it writes the command block where control_word has changed, the words behind that where they
+ * have, else the heartbeat alone (to repeat enable would undo another master's stop), and reads the whole status block. While nothing is commanded it is one
  * FC03, so a client that only watches owns nothing and disturbs nobody.
  * A program that stops lets the lease end, and the gateway takes the force off: call fg_exchange from the loop that decides
  * about the force, not from a thread that goes on when that loop stands.
@@ -45,6 +45,7 @@ enum { FG_OK = 0, FG_REFUSED = 1, FG_LOST = 2, FG_RANGE = 3, FG_FAILED = 4, FG_W
 
 enum {
     FG_COMMAND_FIRST = ${command_first}, FG_COMMAND_WORDS = ${command_words},
+    FG_VALUES_FIRST = ${values_first}, /* words from here on are written without enable, while that stays as it is */
     FG_STATUS_FIRST = ${status_first}, FG_STATUS_WORDS = ${status_words}
 };
 
@@ -463,6 +464,13 @@ static int fg_has_changed(const fg_client *client) {
     return memcmp(client->want, client->good, sizeof client->want) != 0;
 }
 
+/* Where the words begin that go out. Enable only where it changes: repeated beside a new force it would be a new rise behind
+   another master's stop. */
+static uint16_t fg_first_to_write(const fg_client *client) {
+    if (client->off_pending || client->once) return 0;
+    return memcmp(client->want, client->good, FG_VALUES_FIRST * sizeof client->want[0]) ? 0 : FG_VALUES_FIRST;
+}
+
 /* Writes ${echo_number} to byte_order_echo, once a connection: a rig may want it before the first enable. Where it is refused and that
    matters, the command is refused with its reason. */
 static int fg_prove_byte_order(fg_client *client) {
@@ -479,6 +487,7 @@ static int fg_prove_byte_order(fg_client *client) {
 static int fg_go_on(fg_client *client) {
     uint8_t frame[FG_FRAME];
     int was_on = client->good[FG_CONTROL_WORD] & FG_ENABLE, stays_on = client->want[FG_CONTROL_WORD] & FG_ENABLE, result;
+    if (!was_on) client->good[FG_FORCE_SETPOINT] = 0;
     memcpy(client->want, client->good, sizeof client->want);
     client->once = 0;
     if (was_on && stays_on) client->pulls = (client->good[FG_CONTROL_WORD] & FG_VALVE_PULL) != 0;
@@ -495,9 +504,8 @@ static int fg_go_on(fg_client *client) {
 
 int fg_exchange(fg_client *client) {
     uint8_t frame[FG_FRAME], exception;
-    uint16_t sent[FG_COMMAND_WORDS], command[FG_COMMAND_WORDS];
+    uint16_t sent[FG_COMMAND_WORDS], command[FG_COMMAND_WORDS], first = FG_HEARTBEAT, count = 1;
     int result = fg_connect(client), changed = fg_has_changed(client);
-    size_t length;
     if (result != FG_OK) return result;
     if (!changed && client->want[FG_CONTROL_WORD] == 0) return fg_refresh(client);
     if ((result = fg_prove_byte_order(client)) != FG_OK) return result;
@@ -506,14 +514,13 @@ int fg_exchange(fg_client *client) {
     memcpy(command, sent, sizeof command);
     command[FG_CONTROL_WORD] |= client->once;
     command[FG_HEARTBEAT] = ++client->heartbeat;
-    client->transaction++;
-    if (changed)
-        length = fg_frame_exchange(frame, client->transaction, client->unit, FG_COMMAND_FIRST, FG_COMMAND_WORDS, command);
-    else
-        length = fg_frame_exchange(frame, client->transaction, client->unit, FG_COMMAND_FIRST + FG_HEARTBEAT, 1,
-                                   command + FG_HEARTBEAT);
+    if (changed) {
+        first = fg_first_to_write(client);
+        count = (uint16_t)(FG_COMMAND_WORDS - first);
+    }
     client->asked = sent[FG_CONTROL_WORD];
-    result = fg_ask(client, frame, length);
+    result = fg_ask(client, frame, fg_frame_exchange(frame, ++client->transaction, client->unit,
+                                                     (uint16_t)(FG_COMMAND_FIRST + first), count, command + first));
     if (result == FG_REFUSED) {
         exception = client->exception;
         client->off_pending = client->asked = 0;
@@ -528,6 +535,8 @@ int fg_exchange(fg_client *client) {
     client->once = 0;
     client->off_pending = client->asked = 0;
     fg_follow(client);
+    /* Behind a stop: the gateway keeps the force, and who set it owns it; the next write takes it back. */
+    if (changed && first && !client->good[FG_CONTROL_WORD]) client->good[FG_FORCE_SETPOINT] = sent[FG_FORCE_SETPOINT];
     return FG_OK;
 }
 

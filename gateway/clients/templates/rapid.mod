@@ -59,11 +59,11 @@ MODULE ForceGateway
   ! A new fgForce while enabled: WaitTime 0.2 before fgInBand counts,
   ! it is still that of the old force.
   !
-  ! One cycle is one FC23: it writes the whole command block where
-  ! something has changed, else the heartbeat alone (to repeat enable
-  ! would undo another master's stop), and reads the whole status
-  ! block. While nothing is commanded it is one FC03, which disturbs
-  ! no other master.
+  ! One cycle is one FC23: it writes the command block where
+  ! control_word has changed, the words behind that where they have,
+  ! else the heartbeat alone (to repeat enable would undo another
+  ! master's stop), and reads the whole status block. While nothing is
+  ! commanded it is one FC03, which disturbs no other master.
   ! This module never enables by itself:
   !    refused  the last accepted command goes on (a refused write
   !             would not renew the lease); fgText says why
@@ -137,6 +137,8 @@ ${bit_constants}
   ! ---- blocks -------------------------------------------------------
   LOCAL CONST num COMMAND_FIRST:=${command_first};
   LOCAL CONST num COMMAND_WORDS:=${command_words};
+  ! So many are written only where enable changes, or an edge beside it
+  LOCAL CONST num CONTROL_WORDS:=${values_first};
   LOCAL CONST num STATUS_FIRST:=${status_first};
   LOCAL CONST num STATUS_WORDS:=${status_words};
   LOCAL CONST num BACKOFF_FIRST:=0.25;
@@ -242,7 +244,7 @@ ${crc_table}];
     ENDIF
     FgCollect;
     IF FgHasChanged() THEN
-      FgWriteAndRead 1,COMMAND_WORDS;
+      FgWriteAndRead FgFirstToWrite(),COMMAND_WORDS;
     ELSEIF nWant{FG_C_CONTROL_WORD}<>0 THEN
       FgWriteAndRead FG_C_HEARTBEAT,FG_C_HEARTBEAT;
     ELSE
@@ -350,9 +352,21 @@ ${crc_table}];
     RETURN FALSE;
   ENDFUNC
 
+  ! Where the words begin that go out, from 1. Enable only where it
+  ! changes: repeated beside a new force it would be a new rise behind
+  ! another master's stop
+  LOCAL FUNC num FgFirstToWrite()
+    IF bOffPending OR nOnce<>0 RETURN 1;
+    FOR i FROM 1 TO COMMAND_WORDS DO
+      IF i<=CONTROL_WORDS AND nWant{i}<>nGood{i} RETURN 1;
+    ENDFOR
+    RETURN CONTROL_WORDS+1;
+  ENDFUNC
+
   ! Words nFrom .. nTo of the command, counted from 1
   LOCAL PROC FgWriteAndRead(num nFrom,num nTo)
     VAR bool bGivesUp;
+    VAR num nStored;
     IF NOT bProven FgProveByteOrder;
     nHeartbeat:=(nHeartbeat+1) MOD 65536;
     FgFrameExchange nFrom,nTo;
@@ -375,7 +389,13 @@ ${crc_table}];
     nGood:=nWant;
     nOnce:=0;
     bAsking:=FALSE;
+    nStored:=nWant{FG_C_FORCE_SETPOINT};
     FgFollow;
+    IF nFrom>1 AND nFrom<nTo AND NOT FgIsOn() THEN
+      ! Behind a stop: the gateway keeps the force, and who set it owns
+      ! it; the next write takes it back
+      nGood{FG_C_FORCE_SETPOINT}:=nStored;
+    ENDIF
   ENDPROC
 
   ! ${echo_number}, which a rig may want before the first enable; where a
@@ -405,7 +425,10 @@ ${crc_table}];
     VAR bool bSent;
     nOnce:=0;
     ! Never to TRUE: T_ROB1 may have taken it back meanwhile
-    IF NOT FgIsOn() fgEnable:=FALSE;
+    IF NOT FgIsOn() THEN
+      fgEnable:=FALSE;
+      nGood{FG_C_FORCE_SETPOINT}:=0;
+    ENDIF
     IF FgIsOn() AND FgHasBit(nWant{FG_C_CONTROL_WORD},FG_ENABLE) THEN
       IF Round(fgForce*${force_counts})=nWant{FG_C_FORCE_SETPOINT} THEN
         fgForce:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};

@@ -8,7 +8,8 @@ from shlex import quote
 from typing import Final
 
 from gateway import defaults
-from gateway.clients.exchange import Endpoint, ExchangeTable, s7_address
+from gateway.clients.endpoint import Endpoint
+from gateway.clients.exchange import ExchangeTable, s7_address
 from gateway.clients.rendering import endpoint_of, is_no_address
 from gateway.clients.wiring.section import Row, Section
 from gateway.control.settings import LeaseAction
@@ -151,7 +152,9 @@ def _requests(table: ExchangeTable) -> Iterator[tuple[str, bool, int, int]]:
     yield f"map_hash, 0x{table.map.map_hash:08X}, once a connection", False, table.at("map_hash", "proof").address, 2
     yield "status", False, status, status_words
     yield "byte_order_echo, 1234.5 once a connection", True, table.at("byte_order_echo", "proof").address, 2
-    yield "command, when something has changed", True, command, words
+    yield "command, when its control word has changed", True, command, words
+    if first_value := table.values_first:
+        yield "command without it, when the rest has", True, command + first_value, words - first_value
     yield "heartbeat alone", True, table.at("heartbeat", "command").address, 1
     yield "model: order, rising branch", True, first, part_a
     yield "model: falling branch, force limits", True, first + part_a, part_b

@@ -1,0 +1,44 @@
+"""Where a generated client finds its gateway, and what of that no rig can know."""
+
+from dataclasses import dataclass
+from ipaddress import ip_address
+from typing import Final
+
+from gateway import defaults
+
+_IPV4: Final = 4
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """Where the gateway listens: address, port, unit id. cautions: what of the rig makes a client less than it says, in
+    sentences that fit a line of RAPID."""
+
+    host: str
+    port: int
+    unit: int
+    cautions: tuple[str, ...] = ()
+
+    @property
+    def shown_port(self) -> str:
+        """The port as pages name it: 0 is none that anybody can ask, but says that one is chosen at each start."""
+        return str(self.port or "PORT")
+
+    @property
+    def unit_option(self) -> str:
+        """Return what our own verbs need beside the address where the rig answers other units only."""
+        return "" if self.unit == defaults.UNIT_ID else f" --unit {self.unit}"
+
+    def to_fill_in(self, *, from_elsewhere: bool) -> tuple[str, ...]:
+        """Return what the integrator has to put in by hand, for no rig can know it. from_elsewhere: on another machine."""
+        sentences = []
+        host = ip_address(self.host)
+        if not self.port:
+            sentences.append("FILL IN the port: the rig's network.port is 0, another at each start.")
+        if host.is_unspecified:
+            sentences.append("FILL IN the address: the rig listens on every one of its machine.")
+        elif from_elsewhere and host.is_loopback:
+            sentences.append(f"FILL IN the address: no other machine reaches {host}.")
+        elif from_elsewhere and host.version > _IPV4:
+            sentences.append("FILL IN an IPv4 address: this client knows no IPv6.")
+        return tuple(sentences)
