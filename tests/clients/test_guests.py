@@ -86,3 +86,6 @@ def test_a_force_that_changes_each_cycle_does_not_undo_another_master_s_stop(
     assert gateway.bank.command.force_setpoint_n == 0.0 and gateway.bank.owner is None, "nor does it keep others out"
     assert client.ended and not client.enabled
     assert "another master" in client.text
+    client.force(14.0)
+    cycles(client)
+    assert gateway.bank.command.force_setpoint_n == 0.0 and gateway.bank.owner is None

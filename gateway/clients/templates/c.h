@@ -505,7 +505,10 @@ static int fg_go_on(fg_client *client) {
 int fg_exchange(fg_client *client) {
     uint8_t frame[FG_FRAME], exception;
     uint16_t sent[FG_COMMAND_WORDS], command[FG_COMMAND_WORDS], first = FG_HEARTBEAT, count = 1;
-    int result = fg_connect(client), changed = fg_has_changed(client);
+    int result = fg_connect(client), changed;
+    /* Whoever sets a force owns it, and keeps others out. */
+    if (!(client->want[FG_CONTROL_WORD] & FG_ENABLE)) client->want[FG_FORCE_SETPOINT] = 0;
+    changed = fg_has_changed(client);
     if (result != FG_OK) return result;
     if (!changed && client->want[FG_CONTROL_WORD] == 0) return fg_refresh(client);
     if ((result = fg_prove_byte_order(client)) != FG_OK) return result;
