@@ -138,10 +138,10 @@ class ExchangeTable:
 
     @cached_property
     def values_first(self) -> int:
-        """The place behind control_word in the command block, from which a new force is written while enable stays as it is:
-        written again it would be a new rise. 0 in a map whose heartbeat does not stand behind it, too."""
-        places = [self.at(name, "command").address - self.command_span[0] for name in ("control_word", "heartbeat")]
-        return places[0] + 1 if places[0] < places[1] else 0
+        """The place behind control_word, which each map has first: from there on a new force is written while enable stays as
+        it is, for written again that would be a new rise."""
+        control = self.at("control_word", "command")
+        return control.address + control.words - self.command_span[0]
 
     @property
     def status_span(self) -> tuple[int, int]:

@@ -6,10 +6,15 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
+import pytest
+
+from gateway.modbus import Peer
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
 from tests.clients.scenes import cycles
+
+OTHER = Peer("10.0.0.7", 40001)
 
 
 def set_ramp(client: Any) -> None:
@@ -70,12 +75,16 @@ def test_a_word_that_is_set_while_nobody_presses_goes_out_and_with_the_next_enab
     assert not gateway.bank.command.control_word and not client.enabled
 
 
+@pytest.mark.parametrize("scans", range(0, 10, 2))
 def test_a_force_that_changes_each_cycle_does_not_undo_another_master_s_stop(
-    client: Any, gateway: GatewayAtHand
+    client: Any, gateway: GatewayAtHand, scans: int
 ) -> None:
-    """The whole command went out with each new force, enable in it: behind a stop by MQTT it was holding again in 0.3 s."""
+    """The whole command went out with each new force, enable in it: behind a stop by MQTT it was holding again in 0.3 s.
+    scans: where between its requests a PLC is when the stop comes."""
     client.enable(12.0)
     cycles(client)
+    for _ in range(scans if isinstance(client, Plc) else 0):
+        client.scan()
     client.force(12.5)
     cycles(client)
     assert gateway.bank.command.force_setpoint_n == 12.5 and gateway.bank.command.control_word == 1
@@ -89,3 +98,31 @@ def test_a_force_that_changes_each_cycle_does_not_undo_another_master_s_stop(
     client.force(14.0)
     cycles(client)
     assert gateway.bank.command.force_setpoint_n == 0.0 and gateway.bank.owner is None
+
+
+def test_a_force_that_another_master_has_taken_over_is_asked_to_be_taken_back_no_more_than_twice(
+    client: Any, gateway: GatewayAtHand
+) -> None:
+    """It went out behind a stop, and its owner took it back; by then the other one had taken over, and refuses."""
+    client.enable(12.0)
+    cycles(client)
+    answer = gateway.answer
+
+    def stop_and_take_over(request: bytes) -> bytes:
+        is_new_force = b"\x05\x14" in request  # 13.00 N
+        if is_new_force:
+            gateway.stop_from_elsewhere()
+        answered = answer(request)
+        if is_new_force:
+            gateway.take_over_from_elsewhere()
+            gateway.bank.write_registers(0, b"\0\x08", OTHER)
+        return answered
+
+    gateway.answer = stop_and_take_over  # type: ignore[method-assign]
+    client.force(13.0)
+    cycles(client, 3)
+    gateway.answer = answer  # type: ignore[method-assign]
+    refused = len(gateway.exceptions)
+    cycles(client, 9)
+    assert len(gateway.exceptions) <= max(2, refused) and client.ended
+    assert gateway.bank.owner == OTHER.host

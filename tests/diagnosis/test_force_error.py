@@ -85,12 +85,19 @@ def test_only_what_was_asked_of_both_is_compared():
     assert "are needed" in apart.why
 
 
+def as_pull(pushed: CommandedForce) -> CommandedForce:
+    columns = {"time_s": pushed.time_s, "setpoint_n": pushed.wanted_n, "force_n": -pushed.measured_n}
+    return commanded_force(columns | {"pulling": np.ones(pushed.time_s.size)})
+
+
 def test_a_pull_is_compared_with_a_pull_and_its_error_is_not_twice_the_force():
     """Its setpoint is positive and its readings negative: each row was off by twice the force that was asked."""
-    pushed = run(0.2, 1)
-    columns = {"time_s": pushed.time_s, "setpoint_n": pushed.wanted_n, "force_n": -pushed.measured_n}
-    pulled = commanded_force(columns | {"pulling": np.ones(pushed.time_s.size)})
+    pushed, pushed_later = run(0.2, 1), run(0.2, 1, levels=(5.2, 20.4, 10.3, 30.4, 15.1))
+    pulled, pulled_later = as_pull(pushed), as_pull(pushed_later)
     ways = [(block.rising, block.rows) for block in error_blocks(pulled)]
     assert ways == [(block.rising, block.rows) for block in error_blocks(pushed)]
     assert rms_n(error_blocks(pulled)) == pytest.approx(rms_n(error_blocks(pushed)))
     assert compare_runs(error_blocks(pulled), error_blocks(pushed)).blocks == (0, 0)
+    pairs = ((pulled, pulled_later), (pushed, pushed_later))
+    changes = [compare_runs(error_blocks(before), error_blocks(after)) for before, after in pairs]
+    assert changes[0].blocks == changes[1].blocks != (0, 0), "levels a little apart are the same task"

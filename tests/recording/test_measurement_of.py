@@ -214,7 +214,8 @@ def test_rows_of_a_pull_are_told_and_not_judged_by_a_plant_that_pushes() -> None
     assert not noted(found, "sign turned") and "pulling" not in found.covariates
     with pytest.raises(RecordingError, match=r"0 usable rows .*1000 rows in which the tool pulled"):
         measured(pulling=np.ones(N), **derived)
-    assert "pulling" in measured(pulling=pulling).covariates, "whatever another table means by it"
+    foreign = measured(pulling=pulling)
+    assert "pulling" in foreign.covariates and foreign.usable.all(), "whatever another table means by it"
 
 
 def test_a_thousand_covariates_are_taken_and_told() -> None:

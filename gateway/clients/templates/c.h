@@ -20,8 +20,8 @@ ${fill_in} *     static fg_client gateway;
  *     fg_disable(&gateway); fg_exchange(&gateway); fg_close(&gateway);
  *
  * One exchange is one FC23: it writes the command block where control_word has changed, the words behind that where they
- * have, else the heartbeat alone (to repeat enable would undo another master's stop), and reads the whole status block. While nothing is commanded it is one
- * FC03, so a client that only watches owns nothing and disturbs nobody.
+ * have, else the heartbeat alone (to repeat enable would undo another master's stop), and reads the whole status block.
+ * While nothing is commanded it is one FC03, so a client that only watches owns nothing and disturbs nobody.
  * A program that stops lets the lease end, and the gateway takes the force off: call fg_exchange from the loop that decides
  * about the force, not from a thread that goes on when that loop stands.
  * fg_exchange waits for the answer: a millisecond usually, at most timeout_ms (500) for each of its requests. A name instead of
@@ -467,8 +467,8 @@ static int fg_has_changed(const fg_client *client) {
 /* Where the words begin that go out. Enable only where it changes: repeated beside a new force it would be a new rise behind
    another master's stop. */
 static uint16_t fg_first_to_write(const fg_client *client) {
-    if (client->off_pending || client->once) return 0;
-    return memcmp(client->want, client->good, FG_VALUES_FIRST * sizeof client->want[0]) ? 0 : FG_VALUES_FIRST;
+    int is_whole = client->off_pending || client->once || client->want[FG_CONTROL_WORD] != client->good[FG_CONTROL_WORD];
+    return is_whole ? 0 : FG_VALUES_FIRST;
 }
 
 /* Writes ${echo_number} to byte_order_echo, once a connection: a rig may want it before the first enable. Where it is refused and that

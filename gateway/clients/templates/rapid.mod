@@ -137,8 +137,6 @@ ${bit_constants}
   ! ---- blocks -------------------------------------------------------
   LOCAL CONST num COMMAND_FIRST:=${command_first};
   LOCAL CONST num COMMAND_WORDS:=${command_words};
-  ! So many are written only where enable changes, or an edge beside it
-  LOCAL CONST num CONTROL_WORDS:=${values_first};
   LOCAL CONST num STATUS_FIRST:=${status_first};
   LOCAL CONST num STATUS_WORDS:=${status_words};
   LOCAL CONST num BACKOFF_FIRST:=0.25;
@@ -357,10 +355,8 @@ ${crc_table}];
   ! another master's stop
   LOCAL FUNC num FgFirstToWrite()
     IF bOffPending OR nOnce<>0 RETURN 1;
-    FOR i FROM 1 TO COMMAND_WORDS DO
-      IF i<=CONTROL_WORDS AND nWant{i}<>nGood{i} RETURN 1;
-    ENDFOR
-    RETURN CONTROL_WORDS+1;
+    IF nWant{FG_C_CONTROL_WORD}<>nGood{FG_C_CONTROL_WORD} RETURN 1;
+    RETURN FG_C_CONTROL_WORD+1;
   ENDFUNC
 
   ! Words nFrom .. nTo of the command, counted from 1
@@ -425,10 +421,7 @@ ${crc_table}];
     VAR bool bSent;
     nOnce:=0;
     ! Never to TRUE: T_ROB1 may have taken it back meanwhile
-    IF NOT FgIsOn() THEN
-      fgEnable:=FALSE;
-      nGood{FG_C_FORCE_SETPOINT}:=0;
-    ENDIF
+    IF NOT FgIsOn() fgEnable:=FALSE;
     IF FgIsOn() AND FgHasBit(nWant{FG_C_CONTROL_WORD},FG_ENABLE) THEN
       IF Round(fgForce*${force_counts})=nWant{FG_C_FORCE_SETPOINT} THEN
         fgForce:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};

@@ -153,8 +153,7 @@ def _requests(table: ExchangeTable) -> Iterator[tuple[str, bool, int, int]]:
     yield "status", False, status, status_words
     yield "byte_order_echo, 1234.5 once a connection", True, table.at("byte_order_echo", "proof").address, 2
     yield "command, when its control word has changed", True, command, words
-    if first_value := table.values_first:
-        yield "command without it, when the rest has", True, command + first_value, words - first_value
+    yield "command without it, when the rest has", True, command + table.values_first, words - table.values_first
     yield "heartbeat alone", True, table.at("heartbeat", "command").address, 1
     yield "model: order, rising branch", True, first, part_a
     yield "model: falling branch, force limits", True, first + part_a, part_b

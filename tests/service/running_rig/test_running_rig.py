@@ -15,7 +15,7 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.devices import SerialSettings
 from gateway.modbus import Peer
-from gateway.ports import PortError
+from gateway.ports import PortError, SerialPort
 from gateway.ports.opening import open_descriptor
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
@@ -35,6 +35,25 @@ async def pressing(rig: RunningRig, devices: OwnDevices, volts: float = 4.0) -> 
     rig.bank.write_registers(0, struct.pack(">6H", 1, 0, 0, 1, 0, round(1000 * volts)), MASTER)
     while devices.setting_v < volts - 0.1:
         await asyncio.sleep(0.005)
+
+
+def test_the_port_drops_what_it_has_not_sent_of_each_question_that_is_given_up(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A line that stood still kept three older voltages, and sent them before the safe one when it went on."""
+    dropped: list[str] = []
+    monkeypatch.setattr(SerialPort, "drop_unsent", lambda port: dropped.append(port.path))
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        await pressing(rig, devices)
+        assert not dropped
+        devices.is_silent = True
+        rig.bank.write_registers(0, struct.pack(">6H", 1, 0, 0, 1, 0, 5000), MASTER)
+        while len(dropped) < 2:
+            await asyncio.sleep(0.005)
+
+    with_running_rig(devices, scene)
+    assert set(dropped) == {str(devices.output.link)}
 
 
 def test_masters_do_not_wait_after_a_restart_for_a_device_that_is_silent(devices: OwnDevices) -> None:
