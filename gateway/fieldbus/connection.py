@@ -37,7 +37,7 @@ BUFFER_BYTES: Final = 1024  # 85 reads, or four of the longest requests
 GIVES_WAY_S: Final = 10.0
 """So long a connection was silent that gives way where there is no room: most often its master has lost power or network, of
 which nobody is told, and begins anew. A few of these would keep it out until they have been idle for long enough."""
-_ACKNOWLEDGE_NOW: Final[int | None] = getattr(socket, "TCP_QUICKACK", None)
+_ACKNOWLEDGE_NOW: Final[int] = getattr(socket, "TCP_QUICKACK", 0)
 _REQUESTS_IN_A_TURN: Final = 16  # a refused write costs more than a read: 85 of them from each of 32 peers are a stall
 
 
@@ -155,11 +155,11 @@ class Connection(asyncio.BufferedProtocol):
 
     def _receive(self, size: int) -> None:
         """Whatever is not exactly one frame from an unlimited peer."""
-        if self._closing_since_s is not None:
+        if self._is_closing:
             return
         self._framer.push(self._view[:size])
         self._answer_complete_requests()
-        if size == BUFFER_BYTES and self._resume is None and self._closing_since_s is None:
+        if size == BUFFER_BYTES and not (self._is_paused or self._is_closing):
             self._pause(0.0)
 
     def _answer_complete_requests(self) -> None:
@@ -210,7 +210,7 @@ class Connection(asyncio.BufferedProtocol):
         """A partial frame counts from its first byte, so that a byte now and then does not keep it alive."""
         if answered:
             self._answered = True
-        if not len(self._framer) or self._resume is not None:
+        if not len(self._framer) or self._is_paused:
             self._partial_since_s = None
             return
         self._acknowledge()
@@ -220,9 +220,17 @@ class Connection(asyncio.BufferedProtocol):
     def _acknowledge(self) -> None:
         """Let the peer send the rest of its frame now. The option holds for what has come so far only."""
         wire = self._transport.get_extra_info("socket")
-        if wire is not None and _ACKNOWLEDGE_NOW is not None:
+        if wire is not None and _ACKNOWLEDGE_NOW:
             with suppress(OSError):  # it has left: the transport will say so
                 wire.setsockopt(socket.IPPROTO_TCP, _ACKNOWLEDGE_NOW, 1)
+
+    @property
+    def _is_paused(self) -> bool:
+        return self._resume is not None
+
+    @property
+    def _is_closing(self) -> bool:
+        return self._closing_since_s is not None
 
     def _pause(self, delay_s: float) -> None:
         self._transport.pause_reading()
@@ -230,8 +238,8 @@ class Connection(asyncio.BufferedProtocol):
 
     def _resume_reading(self) -> None:
         self._resume = None
-        self._answer_complete_requests()
-        if self._resume is None:
+        self._answer_complete_requests()  # of too many refused writes it pauses again
+        if not self._is_paused:
             self._transport.resume_reading()
 
     def pause_writing(self) -> None:
@@ -246,7 +254,7 @@ class Connection(asyncio.BufferedProtocol):
         if self._closing_since_s is not None:
             if now_s - self._closing_since_s >= settings.partial_s:
                 self._transport.abort()
-        elif self._answered or self._resume is not None:
+        elif self._answered or self._is_paused:
             self._answered, self._last_answer_s = False, now_s
         elif self._partial_since_s is not None and now_s - self._partial_since_s >= settings.partial_s:
             self._close("partial", f"W233 {self.peer}: a request stayed incomplete for {settings.partial_s:g} s")
@@ -255,8 +263,8 @@ class Connection(asyncio.BufferedProtocol):
 
     def silent_s(self, now_s: float) -> float:
         """Return for how long nothing was asked, s; 0 while something is under way or since the last sweep."""
-        is_in_use = self._answered or self._partial_since_s is not None or self._resume is not None
-        return 0.0 if is_in_use or self._closing_since_s is not None else now_s - self._last_answer_s
+        is_in_use = self._answered or self._partial_since_s is not None or self._is_paused
+        return 0.0 if is_in_use or self._is_closing else now_s - self._last_answer_s
 
     def give_way(self, now_s: float) -> None:
         """Close for a new connection, which there would be no room for."""

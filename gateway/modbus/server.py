@@ -62,8 +62,8 @@ def answer(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
         refusal.is_write = function in P.WRITES
         bank.note_refusal(refusal, peer)
         return P.exception_pdu(function, refusal.code)
-    except ModbusError as refusal:
-        return P.exception_pdu(function, refusal.code)
+    except ModbusError as error:
+        return P.exception_pdu(function, error.code)
 
 
 def refuse_unit(request: tuple[int, bytes], served: Sequence[int], bank: DataBank, peer: Peer) -> bytes:

@@ -79,9 +79,10 @@ class _Scale(NamedTuple):
 
 
 class _Run(NamedTuple):
-    """Neighbouring published registers, packed in one go: which of them, and where each face has them."""
+    """Neighbouring published registers, packed in one go: which of them (end: one behind), and where each face has them."""
 
-    span: slice
+    first: int
+    end: int
     words: Struct
     words_at: int
     high_first: Struct
@@ -128,8 +129,8 @@ class StatusBlock:
     def _pack(self, counts: Sequence[int], numbers: Sequence[float]) -> None:
         data = self._image.data
         for run in self._runs:
-            floats = numbers[run.span]
-            run.words.pack_into(data, run.words_at, *counts[run.span])
+            floats = numbers[run.first : run.end]
+            run.words.pack_into(data, run.words_at, *counts[run.first : run.end])
             run.high_first.pack_into(data, run.high_first_at, *floats)
             low_first = words_swapped_from_little_endian(run.low_first.pack(*floats))
             data[run.low_first_at : run.low_first_at + len(low_first)] = low_first
@@ -178,5 +179,5 @@ def _runs(register_map: RegisterMap, published: Sequence[Register]) -> list[_Run
         count, offset = stop - start, published[start].address - first
         high, low = (2 * (bases[order] + 2 * offset) for order in (WordOrder.ABCD, WordOrder.CDAB))
         words, floats, little = Struct(f">{count}H"), Struct(f">{count}f"), Struct(f"<{count}f")
-        runs.append(_Run(slice(start, stop), words, 2 * published[start].address, floats, high, little, low))
+        runs.append(_Run(start, stop, words, 2 * published[start].address, floats, high, little, low))
     return runs

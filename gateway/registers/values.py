@@ -65,7 +65,7 @@ def pack_number(kind: str, order: WordOrder, number: float) -> bytes:
     else:
         low, high = RAW_LIMITS[kind]
         if number != number and kind == "int16":
-            low = number = UNAVAILABLE_INT16
+            low, number = UNAVAILABLE_INT16, float(UNAVAILABLE_INT16)
         if not low <= number <= high:
             raise ValueError(f"{number:g} does not fit in {kind}: {low} .. {high}")
         data = _STRUCTS[kind].pack(round(number))

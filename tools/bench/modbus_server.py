@@ -1,12 +1,13 @@
 """Requests per second and CPU per request of our Modbus TCP server, beside a libmodbus C server and stock pymodbus.
 
-    python tools/bench/modbus_server.py [--seconds 3] [--rounds 5] [--connections 16] [--bank real|simple] [--json]
+    python tools/bench/modbus_server.py [--seconds 3] [--rounds 5] [--connections 16] [--bank real|simple] [--compiled] [--json]
 
 Same load generator for all (harness/modbus_load.c: one outstanding request per connection, one epoll), same run, rounds
 interleaved so that a busy machine hurts all alike; rates are medians over rounds, CPU is the server process's user + system
 time over all its requests. Only ratios mean something: read them, not the absolute numbers.
 With the real bank (the default) our FC16 checks thirteen values, owner and state and makes a Command, where the others copy
 words; --bank simple copies words too, and so compares the servers alone.
+--compiled: beside them ours from a wheel of `tools/compile_wheel`, which takes a minute to make.
 What is absent (gcc, libmodbus, uvloop, pymodbus) is skipped, and said.
 """
 
@@ -30,7 +31,9 @@ from gateway.progress import report, reported
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT)]
-GOALS = {"read": {"ours on uvloop": 1.0, "ours on asyncio": 0.85}, "write": {"ours on uvloop": 0.6}}
+LOOPS = ("uvloop", "asyncio")
+GOALS = {"read": {"uvloop": 1.0, "asyncio": 0.85}, "write": {"uvloop": 0.6}}
+"""Of ours, on each loop."""
 YARDSTICK = "libmodbus (C)"
 
 
@@ -83,10 +86,13 @@ def serve(which: str, loop: str, bank: str) -> None:
 
 @dataclass
 class Contender:
-    """One server in a process of its own, and what was measured of it."""
+    """One server in a process of its own, and what was measured of it. loop: of ours; modules: folder of other modules than
+    the checkout's."""
 
     name: str
     command: list[str]
+    loop: str = ""
+    modules: Path | None = None
     process: subprocess.Popen[str] | None = None
     stderr: int | None = None
     port: int = 0
@@ -97,8 +103,11 @@ class Contender:
 
     def start(self, stack: ExitStack) -> None:
         """Start the server and read its port."""
+        environment = {**os.environ, "PYTHONPATH": str(self.modules)} if self.modules else None
         self.process = stack.enter_context(
-            subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=self.stderr, text=True, cwd=ROOT)
+            subprocess.Popen(
+                self.command, stdout=subprocess.PIPE, stderr=self.stderr, text=True, cwd=ROOT, env=environment
+            )
         )
         stack.callback(self.process.kill)
         assert self.process.stdout is not None
@@ -157,15 +166,29 @@ def is_importable(module: str) -> bool:
     return is_there
 
 
-def contenders(into: Path, bank: str) -> list[Contender]:
+def compiled_modules(into: Path) -> Path | None:
+    """Make and unpack a compiled wheel; where that fails, say so and return None."""
+    report("compiling the gateway, about a minute")
+    done = subprocess.run([sys.executable, ROOT / "tools" / "compile_wheel", into], capture_output=True, text=True)
+    if done.returncode:
+        print(f"SKIPPED ours, compiled: {done.stderr.strip()}", file=sys.stderr)
+        return None
+    shutil.unpack_archive(done.stdout.strip(), into / "compiled", "zip")
+    return into / "compiled"
+
+
+def contenders(into: Path, bank: str, *, with_compiled: bool) -> list[Contender]:
     """Return the servers that this machine can run."""
     me = [sys.executable, str(Path(__file__).resolve())]
     servers: list[Contender] = []
     if (server := compile_c("libmodbus_server.c", into, "-lmodbus")) is not None:
         servers.append(Contender(YARDSTICK, [str(server)]))
-    if is_importable("uvloop"):
-        servers.append(Contender("ours on uvloop", [*me, "--serve", "ours", "--loop", "uvloop", "--bank", bank]))
-    servers.append(Contender("ours on asyncio", [*me, "--serve", "ours", "--loop", "asyncio", "--bank", bank]))
+    compiled = compiled_modules(into) if with_compiled else None
+    for loop in LOOPS if is_importable("uvloop") else LOOPS[1:]:
+        serve = [*me, "--serve", "ours", "--loop", loop, "--bank", bank]
+        servers.append(Contender(f"ours on {loop}", serve, loop))
+        if compiled is not None:
+            servers.append(Contender(f"compiled, {loop}", serve, loop, compiled))
     if is_importable("pymodbus"):
         servers.append(
             Contender("stock pymodbus", [*me, "--serve", "pymodbus", "--loop", "asyncio"], stderr=subprocess.DEVNULL)
@@ -189,7 +212,7 @@ def measure_servers(
 
 def row(server: Contender, yardstick: Contender | None, kind: str) -> dict[str, object]:
     """Return a server's figures beside those of the yardstick."""
-    goal = GOALS[kind].get(server.name)
+    goal = GOALS[kind].get(server.loop)
     rate = server.rate_per_s / yardstick.rate_per_s if yardstick else None
     cpu = server.cpu_us / yardstick.cpu_us if yardstick and yardstick.cpu_us else None
     reached = None if goal is None or rate is None else rate >= goal
@@ -225,6 +248,7 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--connections", type=int, default=16)
     parser.add_argument("--bank", choices=("simple", "real"), default="real", help="what ours writes into")
+    parser.add_argument("--compiled", action="store_true", help="measure the compiled wheel, too")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--serve", choices=("ours", "pymodbus"), help=argparse.SUPPRESS)
     parser.add_argument("--loop", choices=("uvloop", "asyncio"), default="asyncio", help=argparse.SUPPRESS)
@@ -247,7 +271,7 @@ def compare(arguments: argparse.Namespace) -> int:
         load = compile_c("modbus_load.c", into)
         if load is None:
             return 1
-        servers = contenders(into, arguments.bank)
+        servers = contenders(into, arguments.bank, with_compiled=arguments.compiled)
         for server in servers:
             server.start(stack)
         titles = {"read": "FC03, 32 registers", "write": "FC16, 13 registers"}
