@@ -3,7 +3,8 @@
 `{"force_setpoint": 12.0, "control_word": 1}` asks for 12 N and enables; `{"control_word": 0}` stops. The first refusal ends
 a command; the answer says what was written. A rig with a lease wants `heartbeat` from whoever commands, as from every master.
 What does nothing but stop begins with the control word, wherever that stands: it is granted to every master, and what a master
-without the setpoint is refused before it would be the end of the stop.
+without the setpoint is refused before it would be the end of the stop. Of any other command that ends with the control word at
+0, a force beside it say, this is written behind a refusal, too: who sends it wants the output off.
 """
 
 import json
@@ -31,16 +32,29 @@ class RegisterCommands:
 
     async def carry_out(self, payload: bytes) -> dict[str, Any]:
         """Write what the payload says; return what was written, and why no more."""
-        written: list[str] = []
         try:
             registers = _registers(payload)
-            stops = _does_stop(registers)
-            for name, value in _in_order(registers):
+        except ValueError as error:
+            return {"ok": False, "written": [], "error": str(error)}
+        order = _in_order(registers)
+        written, error = await self._write_until_refused(order, stops=_does_stop(registers))
+        if error:
+            last = [(name, value) for name, value in order if _is(name, "control_word")][-1:]
+            off = [(name, value) for name, value in last if not value and name not in written]
+            written += (await self._write_until_refused(off, stops=True))[0]
+            return {"ok": False, "written": written, "error": error}
+        return {"ok": True, "written": written}
+
+    async def _write_until_refused(self, order: list[tuple[str, float]], *, stops: bool) -> tuple[list[str], str]:
+        """Return what was written, and why no more; empty where all was."""
+        written: list[str] = []
+        try:
+            for name, value in order:
                 await self._write(name, value, stops=stops)
                 written.append(name)
         except (OSError, ValueError, LookupError, OverflowError) as error:
-            return {"ok": False, "written": written, "error": str(error) or type(error).__name__}
-        return {"ok": True, "written": written}
+            return written, str(error) or type(error).__name__
+        return written, ""
 
     async def _write(self, name: str, value: float, *, stops: bool) -> None:
         register = self._map.find(name)
