@@ -65,7 +65,7 @@ class Controller:
         self._faults.expect_noise(calibration.noise_n)
         self._conditioner = SampleConditioner(settings.supervision, compensation.cell)
         self._turning = Turning(self._valve, self._commands, self._conditioner, settings, model)
-        self._edge_check = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self._most_pull_n)
+        self._edge_check = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self.most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._one_shot = OneShotEvents(settings.supervision.stuck_n)
         self._reading, self._line = NO_READING, LineStatus()
@@ -99,8 +99,7 @@ class Controller:
         self._machine.is_stopping = True
 
     def use(self, calibration: CalibrationInUse) -> None:
-        """Swap the calibration; while enabled the voltage difference fades instead of jumping, and a force above the new
-        set's limits is left by the ramp. What was measured with it sets the pace from now on."""
+        """Swap the calibration and its pace; while enabled the voltage fades over, a force above its limits is ramped down."""
         self._calibration = calibration
         self._use_model()
         self._inform_runs(calibration)
@@ -115,7 +114,8 @@ class Controller:
         self._turning.use(model, timed)
         self._commands.use(model)
 
-    def _most_pull_n(self) -> float:
+    def most_pull_n(self) -> float:
+        """Return the largest setpoint of a pull, N, by the calibration in use."""
         return self._turning.most_pull_n(self._calibration)
 
     def _inform_runs(self, calibration: CalibrationInUse) -> None:

@@ -10,13 +10,15 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.live.live_state import LiveState
-from gateway.registers.words import State
+from gateway.profiles import load_rig
+from gateway.registers.words import ControlBit, State
 from gateway.service.live_answers import AlarmTimes
 from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.starting import StartError
 from tests.control.bench import bsfm
 from tests.service.requests.test_hostile_requests import Stage
 from tests.service.rigs import demo
+from tests.service.wired import Wired
 
 ENABLE_12_N = "10000000020400" + "01" + "04b0"
 DISABLE = "060000" + "0000"
@@ -79,6 +81,16 @@ def test_limits_are_those_that_a_setpoint_meets(stage: Stage) -> None:
     run.use(replace(bsfm(), limits_n=(2.0, 25.3)))
     limits = LiveState.from_json(ask(stage, {"do": "state"})).limits
     assert (limits.force_min_n, limits.force_max_n) == (2.0, 25.3)
+
+
+def test_where_the_slide_pulls_the_limit_is_that_of_pulling(tmp_path: Path) -> None:
+    stage = Stage(tmp_path, Wired(load_rig("paper-pull", simulated=True)).ready())
+    pushes = LiveState.from_json(ask(stage, {"do": "state"})).limits
+    stage.wired.write(0, ControlBit.VALVE_PULL)
+    pulls = LiveState.from_json(ask(stage, {"do": "state"})).limits
+    stage.close()
+    assert pulls.force_max_n == stage.wired.controller.most_pull_n() < pushes.force_max_n - 1.0
+    assert pulls.force_min_n == pushes.force_min_n
 
 
 def test_the_page_has_the_role_of_every_plain_face(stage: Stage) -> None:
