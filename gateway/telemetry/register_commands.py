@@ -37,12 +37,12 @@ class RegisterCommands:
         except ValueError as error:
             return {"ok": False, "written": [], "error": str(error)}
         order = _in_order(registers)
-        written, error = await self._write_until_refused(order, stops=_does_stop(registers))
-        if error:
+        written, refused = await self._write_until_refused(order, stops=_does_stop(registers))
+        if refused:
             last = [(name, value) for name, value in order if _is(name, "control_word")][-1:]
             off = [(name, value) for name, value in last if not value and name not in written]
             written += (await self._write_until_refused(off, stops=True))[0]
-            return {"ok": False, "written": written, "error": error}
+            return {"ok": False, "written": written, "error": refused}
         return {"ok": True, "written": written}
 
     async def _write_until_refused(self, order: list[tuple[str, float]], *, stops: bool) -> tuple[list[str], str]:
