@@ -6,7 +6,8 @@ come as one piece. So silence only says when to look; what is a frame, its lengt
 
 - Nothing is executed before the line has been silent for 3.5 characters since the last read: the answer must wait that long
   anyway, and what follows a request may show that its master has given up.
-- A frame whose length is known and that is incomplete gets 20 ms for its rest, unless a whole one begins after a silence.
+- A frame whose length is known and that is incomplete gets 20 ms for its rest, unless a whole one begins after a silence. A
+  frame in many pieces has these 20 ms once: an adapter delays them all alike. What is older is noise.
 - Everything on the bus is followed, requests to other units and their answers too, each skipped as a whole: what is inside
   of a frame is never taken for a request, whatever it looks like. An answer to FC03 is longer than its request, one to FC16
   shorter, and read as a request either would swallow what comes after it.
@@ -21,6 +22,7 @@ come as one piece. So silence only says when to look; what is a frame, its lengt
 Source: "MODBUS over Serial Line Specification and Implementation Guide V1.02", sections 2.2, 2.4 and 2.5.1.
 """
 
+from bisect import bisect_right
 from typing import Final, NamedTuple
 
 from gateway.modbus.crc import checksum_end, crc16
@@ -45,6 +47,7 @@ MOST_BYTES: Final = 512
 """Held without a silence: twice the longest frame. What comes before is dropped, but for the latest requests in it."""
 
 _MOST_PASSED: Final = 8
+_MOST_PIECES: Final = 8  # of a frame, without a look at the time between them: a program may be late, too
 _STRAY_BYTES: Final = 2  # before or behind a request that is answered: a line that floats makes one or two
 _DIAGNOSTICS_BYTES: Final = 8  # the usual FC08: a sub-function with one word
 _FRAMED: Final = frozenset(
@@ -73,18 +76,20 @@ class RtuReceiver:
     """
 
     __slots__ = (
-        "_burst", "_echo", "_last_s", "_marks", "_passed", "_silence_s", "_sizes", "_unit", "_units", "_wait_s", "frames",
-        "noise_bytes",
+        "_burst", "_character_s", "_echo", "_ends_s", "_last_s", "_marks", "_passed", "_silence_s", "_sizes", "_unit", "_units",
+        "_wait_s", "frames", "noise_bytes",
     )  # fmt: skip
 
     def __init__(self, unit: int, baud: int, character_s: float, *, may_echo: bool = True) -> None:
         self._unit = unit
         self._units: set[int] = set()  # others that were heard on this line
+        self._character_s = character_s
         self._silence_s = silence_s(baud, character_s)
         self._burst = bytearray()
         self._passed: list[RtuRequest] = []  # made out in what had to make room, and not taken yet
         self._sizes: dict[tuple[int, bool], int] = {}  # in one look, by place and whether a frame is known to begin
         self._marks: list[int] = []  # places in the burst that a visible silence lies before
+        self._ends_s: list[float] = []  # when what lies before each of these silences had arrived
         self._last_s = 0.0
         self._wait_s = self._silence_s
         self._echo = RtuEcho(character_s, self._silence_s, may_echo=may_echo)
@@ -100,6 +105,7 @@ class RtuReceiver:
         """Append what has arrived by now."""
         if self._burst and now_s - self._last_s >= self._silence_s:
             self._marks.append(len(self._burst))
+            self._ends_s.append(self._last_s)
         self._burst += data
         self._last_s, self._wait_s = now_s, self._silence_s
         if len(self._burst) > MOST_BYTES:
@@ -115,7 +121,7 @@ class RtuReceiver:
         is_waiting = pending > (_STRAY_BYTES if found and self._burst[found[-1][0]] == self._unit else 0)
         if is_waiting and not is_final:
             self._wait_s = SPLIT_S
-            return passed
+            return passed + self._give_up(found)
         requests = self._requests(found)
         self.frames += len(found)
         self.noise_bytes += noise
@@ -135,7 +141,24 @@ class RtuReceiver:
 
     def _drop(self, count: int) -> None:
         del self._burst[:count]
-        self._marks = [mark - count for mark in self._marks if mark > count]
+        passed = bisect_right(self._marks, count)
+        self._marks, self._ends_s = [mark - count for mark in self._marks[passed:]], self._ends_s[passed:]
+
+    def _give_up(self, found: list[tuple[int, int]]) -> list[RtuRequest]:
+        """Drop what began too long ago for a frame that is still coming, and return the requests among it. Noise that comes
+        byte by byte would else be looked through with each byte by the half kilobyte, and took a whole core from control."""
+        count, at = len(self._burst), 0
+        for mark, end_s in zip(self._marks, self._ends_s, strict=True) if len(self._marks) > _MOST_PIECES else ():
+            if self._last_s - end_s <= SPLIT_S + (count - mark) * self._character_s:
+                break
+            at = mark
+        at = min([at, *(place for place, size in found if place < at < place + size)])
+        gone = [(place, size) for place, size in found if place < at]
+        requests = self._requests(gone)
+        self.frames += len(gone)
+        self.noise_bytes += at - sum(size for _, size in gone)
+        self._drop(at)
+        return [request._replace(is_answered=False) for request in requests]
 
     def _shorten(self) -> None:
         """Drop the frames that can be made out, then what is older than the longest frame. Requests among them are kept, the

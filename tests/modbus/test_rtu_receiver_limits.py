@@ -1,6 +1,7 @@
 """Where the receiver's decisions end: the shortest silence, stray bytes, frames across a silence, and what is forgotten."""
 
 from itertools import pairwise
+from random import Random
 
 import pytest
 
@@ -228,3 +229,42 @@ def test_frames_inside_of_frames_take_no_time_that_doubles_with_each(monkeypatch
     bus.send(*(frame[at:end] for at, end in pairwise([*places, len(frame)])), pause_s=1.5 * SILENCE_S)
     assert bus.send(OURS).requests() == answered()
     assert len(looked) < 40 * levels
+
+
+def test_slow_noise_is_looked_through_as_it_comes_and_not_all_of_it_with_each_byte(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A byte in 2 ms, each behind a silence, took a whole core, and control and its loop with it."""
+    measured: list[int] = []
+    measure = RtuReceiver._measure_frame
+
+    def counted(receiver: RtuReceiver, at: int, *, is_start: bool) -> int:
+        measured.append(at)
+        return measure(receiver, at, is_start=is_start)
+
+    monkeypatch.setattr(RtuReceiver, "_measure_frame", counted)
+    noise = bytes(Random(7).choices(b"\x00\x01\x03\x10", k=500))
+    bus = Bus(baud=115200)
+    bus.send(*(bytes((byte,)) for byte in noise), pause_s=0.002)
+    assert len(measured) < 15 * len(noise)
+    assert bus.send(OURS).requests() == answered()
+    assert bus.receiver.noise_bytes == len(noise) and bus.receiver.frames == 1
+
+
+def test_a_frame_in_as_many_pieces_as_an_adapter_makes_is_one() -> None:
+    """Each 16 ms hand-over has what the line has brought since; a machine that is late hands over more, later."""
+    long = encode_adu(1, P.write_registers_request(0, bytes(242)))
+    for baud in (2400, 9600, 19200, 115200):
+        size = max(1, int(0.016 * baud / 11))
+        pieces = [long[at : at + size] for at in range(0, len(long), size)]
+        bus = Bus(baud=baud)
+        bus.send(*pieces[:-2], pause_s=0.016).send(pieces[-2], pause_s=0.0195)
+        assert bus.send(pieces[-1]).requests() == [RtuRequest(1, long[1:-2], True)], baud
+
+
+def test_a_request_that_slow_noise_follows_is_executed_and_not_answered() -> None:
+    bus = Bus()
+    bus.send(COMMAND[:-1]).send(COMMAND[-1:] + b"\x07\x03\xf0", pause_s=0.004)
+    bus.send(*(b"\x07",) * 12, pause_s=0.004)
+    assert [request for _, request in bus.heard] == [RtuRequest(1, WRITE, False)]
+    assert bus.heard[0][0] < 100.0 + 0.006 + 12 * 0.004
