@@ -23,6 +23,7 @@ Source: "MODBUS over Serial Line Specification and Implementation Guide V1.02", 
 """
 
 from bisect import bisect_right
+from math import inf
 from typing import Final, NamedTuple
 
 from gateway.modbus.crc import checksum_end, crc16
@@ -48,6 +49,9 @@ MOST_BYTES: Final = 512
 
 _MOST_PASSED: Final = 8
 _MOST_PIECES: Final = 8  # of a frame, without a look at the time between them: a program may be late, too
+_REST_PER_BYTE_S: Final = 40e-6
+"""After looks that left noise, for each byte of it: a look takes an eighth of this at most, and noise no more of a core."""
+_LOOKS_AHEAD_S: Final = 0.1  # as much may be looked at without a rest
 _STRAY_BYTES: Final = 2  # before or behind a request that is answered: a line that floats makes one or two
 _DIAGNOSTICS_BYTES: Final = 8  # the usual FC08: a sub-function with one word
 _FRAMED: Final = frozenset(
@@ -76,8 +80,8 @@ class RtuReceiver:
     """
 
     __slots__ = (
-        "_burst", "_character_s", "_echo", "_ends_s", "_last_s", "_marks", "_passed", "_silence_s", "_sizes", "_unit", "_units",
-        "_wait_s", "frames", "noise_bytes",
+        "_burst", "_character_s", "_echo", "_ends_s", "_last_s", "_marks", "_next_look_s", "_passed", "_silence_s", "_sizes",
+        "_unit", "_units", "_wait_s", "frames", "noise_bytes",
     )  # fmt: skip
 
     def __init__(self, unit: int, baud: int, character_s: float, *, may_echo: bool = True) -> None:
@@ -92,6 +96,7 @@ class RtuReceiver:
         self._ends_s: list[float] = []  # when what lies before each of these silences had arrived
         self._last_s = 0.0
         self._wait_s = self._silence_s
+        self._next_look_s = -inf
         self._echo = RtuEcho(character_s, self._silence_s, may_echo=may_echo)
         self.frames = 0
         self.noise_bytes = 0
@@ -99,7 +104,7 @@ class RtuReceiver:
     @property
     def deadline_s(self) -> float | None:
         """Time at which `take` has something to decide, if nothing arrives before; None: the line is silent."""
-        return self._last_s + self._wait_s if self._burst or self._passed else None
+        return max(self._last_s + self._wait_s, self._next_look_s) if self._burst or self._passed else None
 
     def receive(self, data: bytes, now_s: float) -> None:
         """Append what has arrived by now."""
@@ -113,7 +118,7 @@ class RtuReceiver:
 
     def take(self, now_s: float) -> list[RtuRequest]:
         """Return the requests that the silence has ended, in order; none while more may belong to the last one."""
-        if now_s < self._last_s + self._wait_s:
+        if now_s < self._last_s + self._wait_s or now_s < self._next_look_s:
             return []
         passed, self._passed = self._passed, []
         is_final = self._wait_s >= SPLIT_S  # not by the time alone: a program that was late first reads what has come
@@ -121,6 +126,8 @@ class RtuReceiver:
         is_waiting = pending > (_STRAY_BYTES if found and self._burst[found[-1][0]] == self._unit else 0)
         if is_waiting and not is_final:
             self._wait_s = SPLIT_S
+            rests_from_s = max(now_s, self._next_look_s + _LOOKS_AHEAD_S)
+            self._next_look_s = rests_from_s + len(self._burst) * _REST_PER_BYTE_S - _LOOKS_AHEAD_S
             return passed + self._give_up(found)
         requests = self._requests(found)
         self.frames += len(found)

@@ -268,3 +268,20 @@ def test_a_request_that_slow_noise_follows_is_executed_and_not_answered() -> Non
     bus.send(*(b"\x07",) * 12, pause_s=0.004)
     assert [request for _, request in bus.heard] == [RtuRequest(1, WRITE, False)]
     assert bus.heard[0][0] < 100.0 + 0.006 + 12 * 0.004
+
+
+@pytest.mark.parametrize("pool", [bytes(range(256)), b"\x00\x01\x03\x10"])
+def test_noise_that_never_ends_is_looked_at_for_an_eighth_of_a_core_and_no_request_behind_it_waits(pool: bytes) -> None:
+    """16 bytes in 1.8 ms of 115200 baud are silent for a moment each time, and half a kilobyte was looked through in it."""
+    chance, looked_at, now_s = Random(3), 0, 0.0
+    receiver = RtuReceiver(1, 115200, 11 / 115200)
+    for _ in range(5000):
+        receiver.receive(bytes(chance.choices(pool, k=16)), now_s)
+        while (deadline_s := receiver.deadline_s) is not None and deadline_s < now_s + 0.0018:
+            looked_at += len(receiver._burst)
+            assert receiver.take(deadline_s) == []
+        now_s += 0.0018
+    assert 0.1 * now_s / 40e-6 < looked_at < now_s / 40e-6 + 5 * MOST_BYTES
+    receiver.receive(OURS, now_s + 0.02)
+    silent_s = receiver.deadline_s or 0.0
+    assert silent_s < now_s + 0.05 and receiver.take(silent_s) == answered()
