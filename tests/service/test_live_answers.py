@@ -10,13 +10,15 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.live.live_state import LiveState
-from gateway.registers.words import State
+from gateway.profiles import load_rig
+from gateway.registers.words import ControlBit, State
 from gateway.service.live_answers import AlarmTimes
 from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.starting import StartError
 from tests.control.bench import bsfm
 from tests.service.requests.test_hostile_requests import Stage
 from tests.service.rigs import demo
+from tests.service.wired import Wired
 
 ENABLE_12_N = "10000000020400" + "01" + "04b0"
 DISABLE = "060000" + "0000"
@@ -79,6 +81,22 @@ def test_limits_are_those_that_a_setpoint_meets(stage: Stage) -> None:
     run.use(replace(bsfm(), limits_n=(2.0, 25.3)))
     limits = LiveState.from_json(ask(stage, {"do": "state"})).limits
     assert (limits.force_min_n, limits.force_max_n) == (2.0, 25.3)
+
+
+def test_the_largest_setpoint_of_a_pull_is_told_while_it_is_asked_for_and_taken(tmp_path: Path) -> None:
+    """The page offered 60 N, and 34 N were refused by W309."""
+    stage = Stage(tmp_path, Wired(load_rig("paper-pull")).ready())
+    told = lambda: LiveState.from_json(ask(stage, {"do": "state"})).limits.force_max_n  # noqa: E731
+    pushed_n = told()
+    send(stage, f"060000{ControlBit.VALVE_PULL:04x}")
+    most_n = told()
+    assert most_n == pytest.approx(0.75 * pushed_n, rel=0.1)
+    assert send(stage, f"060001{round(100.0 * most_n) + 1:04x}") == "8603"
+    assert "W309" in ask(stage, {"do": "state"})["last_refusal"]
+    assert send(stage, f"060001{round(100.0 * most_n):04x}")[:2] == "06"
+    send(stage, DISABLE)
+    assert told() == pushed_n
+    stage.close()
 
 
 def test_the_page_has_the_role_of_every_plain_face(stage: Stage) -> None:
