@@ -2,8 +2,9 @@
 
 `{"force_setpoint": 12.0, "control_word": 1}` asks for 12 N and enables; `{"control_word": 0}` stops. The first refusal ends
 a command; the answer says what was written. A rig with a lease wants `heartbeat` from whoever commands, as from every master.
-What does nothing but stop begins with the control word, wherever that stands: it is granted to every master, and what a master
-without the setpoint is refused before it would be the end of the stop.
+A stop, the control word as 0, is written first, wherever it stands: it is granted to every master, and what a master without
+the setpoint is refused before it would be the end of the stop. A force beside it is refused: behind a stop it would stand for
+the next enable.
 """
 
 import json
@@ -16,6 +17,7 @@ from gateway.live.control_link import ANSWER_S, ControlLink
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.map.register_map import Register, RegisterMap
 
+_SETPOINTS: Final = ("force_setpoint", "voltage_setpoint")
 _LONGEST: Final = 16_384
 """Bytes of a command: far beyond one that names every register, and too few to nest deeply."""
 
@@ -36,25 +38,29 @@ class RegisterCommands:
             registers = _registers(payload)
             stops = _does_stop(registers)
             for name, value in _in_order(registers):
-                await self._write(name, value, stops=stops)
+                if stops and value and _is(name, *_SETPOINTS):
+                    raise ValueError(
+                        f"{name}: {value:g} is not written beside control_word 0, which stops and clears it"
+                    )
+                await self._write(name, value, at_any_time=stops and (not value or _is(name, "heartbeat")))
                 written.append(name)
         except (OSError, ValueError, LookupError, OverflowError) as error:
             return {"ok": False, "written": written, "error": str(error) or type(error).__name__}
         return {"ok": True, "written": written}
 
-    async def _write(self, name: str, value: float, *, stops: bool) -> None:
+    async def _write(self, name: str, value: float, *, at_any_time: bool) -> None:
         register = self._map.find(name)
         register.check_meant(value)
         request = P.write_registers_request(register.address, _encoded(register, value))
         asked = {"do": "modbus", "via": "mqtt", "unit": self._unit, "pdu": request.hex()}
-        answer = await self._link.ask(asked if stops else asked | {"until_s": self._clock() + ANSWER_S})
+        until = {} if at_any_time else {"until_s": self._clock() + ANSWER_S}
+        answer = await self._link.ask(asked | until)
         if P.is_exception(bytes.fromhex(answer["pdu"])):
             raise ValueError(f"{name}: {answer.get('refusal') or 'refused'}")
 
 
 def is_stop(payload: bytes) -> bool:
-    """Decide whether a command clears the control word, and sets nothing else to anything but 0. A heartbeat beside it, which
-    who commands a rig with a lease sends in each command, presses nothing."""
+    """Decide whether a command clears the control word, whatever stands beside that."""
     try:
         registers = _registers(payload)
     except ValueError:
@@ -63,13 +69,13 @@ def is_stop(payload: bytes) -> bool:
 
 
 def _does_stop(registers: dict[str, float]) -> bool:
-    sets = any(value for name, value in registers.items() if not _is(name, "heartbeat"))
-    return not sets and any(_is(name, "control_word") for name in registers)
+    words = [value for name, value in registers.items() if _is(name, "control_word")]
+    return bool(words) and not any(words)
 
 
-def _is(name: str, register: str) -> bool:
-    """Decide whether a name, of whatever block, is that of a register."""
-    return name.partition("@")[0] == register
+def _is(name: str, *registers: str) -> bool:
+    """Decide whether a name, of whatever block, is that of one of these registers."""
+    return name.partition("@")[0] in registers
 
 
 def _in_order(registers: dict[str, float]) -> list[tuple[str, float]]:

@@ -150,6 +150,24 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
             {"ok": True, "written": ["control_word", "heartbeat"]},
             ["100000000102" + "0000", "100004000102" + "0007"],  # of a guest the heartbeat is refused, the stop is not
         ),
+        (
+            b'{"force_setpoint@float_abcd": 30, "control_word": 0}',
+            {
+                "ok": False,
+                "written": ["control_word"],
+                "error": "force_setpoint@float_abcd: 30 is not written beside control_word 0, which stops and clears it",
+            },
+            ["100000000102" + "0000"],
+        ),
+        (
+            b'{"voltage_setpoint": 2.5, "mode": 1, "control_word": 0}',
+            {
+                "ok": False,
+                "written": ["control_word"],
+                "error": "voltage_setpoint: 2.5 is not written beside control_word 0, which stops and clears it",
+            },
+            ["100000000102" + "0000"],
+        ),
         (b'{"control_word": 0.7}', None, []),
         (b'{"control_word": 1.5}', None, []),
         (b'{"heartbeat": 0.5}', None, []),
