@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from gateway.cli.main import command
+from gateway.clients import Endpoint, ExchangeTable
 from gateway.profiles import load_register_map
 from gateway.profiles.device_table import render_devices
 from gateway.registers import render_block, render_most_used
@@ -34,6 +35,17 @@ def test_the_tables_of_registers_are_the_map_s():
     assert part("gateway/registers/README.md", "command block") == render_block(registers, "command"), (
         "run tools/readme"
     )
+
+
+def test_who_writes_a_program_is_warned_of_an_enable_that_undoes_a_stop():
+    """What the generated clients do about it, and what `wiring` says, is for who writes one by hand as well."""
+    registers = load_register_map("force-v1")
+    words = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    warning = words.split("undoes another master's stop", 1)[1].split("- A rig may", 1)[0]
+    behind = ExchangeTable(registers, Endpoint("127.0.0.1", 502, 1)).values_first
+    assert f"from {registers.find('control_word').address + behind + 40001} on" in warning
+    enabled = next(bit for bit, name in registers.find("status_word").bits.items() if name == "enabled")
+    assert f"bit {enabled} of `status_word`" in warning and "setpoint 0" in warning
 
 
 def test_the_table_of_devices_is_what_the_files_say():

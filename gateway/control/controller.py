@@ -65,7 +65,7 @@ class Controller:
         self._faults.expect_noise(calibration.noise_n)
         self._conditioner = SampleConditioner(settings.supervision, compensation.cell)
         self._turning = Turning(self._valve, self._commands, self._conditioner, settings, model)
-        self._edge_check = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self.most_pull_n)
+        self._checks = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self.most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._one_shot = OneShotEvents(settings.supervision.stuck_n)
         self._reading, self._line = NO_READING, LineStatus()
@@ -99,7 +99,8 @@ class Controller:
         self._machine.is_stopping = True
 
     def use(self, calibration: CalibrationInUse) -> None:
-        """Swap the calibration and its pace; while enabled the voltage fades over, a force above its limits is ramped down."""
+        """Swap the calibration; while enabled the voltage difference fades instead of jumping, and a force above the new
+        set's limits is left by the ramp. What was measured with it sets the pace from now on."""
         self._calibration = calibration
         self._use_model()
         self._inform_runs(calibration)
@@ -115,7 +116,7 @@ class Controller:
         self._commands.use(model)
 
     def most_pull_n(self) -> float:
-        """Return the largest setpoint of a pull, N, by the calibration in use."""
+        """Return the largest setpoint of a pull, N."""
         return self._turning.most_pull_n(self._calibration)
 
     def _inform_runs(self, calibration: CalibrationInUse) -> None:
@@ -140,8 +141,7 @@ class Controller:
 
     def refusal_of(self, now_s: float, proposal: ProposedWrite, line: LineStatus) -> EdgeRefusal | None:
         """Return why a command cannot be taken now; None: the next step takes it. Nothing changes by asking."""
-        at_once = self.takes_at_once(proposal)
-        return None if at_once else self._edge_check.refusal(proposal, self._situation(now_s, line))
+        return None if self.takes_at_once(proposal) else self._checks.refusal(proposal, self._situation(now_s, line))
 
     def takes_at_once(self, proposal: ProposedWrite) -> bool:
         """Decide whether nothing about a command has to be asked. Most writes are so: a setpoint, a heartbeat."""
@@ -152,7 +152,7 @@ class Controller:
 
     def refusal_of_run(self, now_s: float, plan: AnyPlan) -> str:
         """Return why a run that this machine wants cannot begin: a sentence, empty where it can; by the line as it last was."""
-        refused = self._edge_check.of_run(plan, self._situation(now_s, self._line))
+        refused = self._checks.of_run(plan, self._situation(now_s, self._line))
         return f"W305 {refused.text}" if refused else ""
 
     def safe_output(self, fault: FaultCode) -> Output:

@@ -28,6 +28,10 @@ _DENIED: Final = {errno.EACCES, errno.EPERM}
 _ABSENT: Final = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR}
 _NO_PORT: Final = {errno.ENOTTY, errno.EISDIR}
 _HELD: Final = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EBUSY}
+_SHORTAGES: Final = {
+    errno.EMFILE: "the gateway has as many files open as it may: raise LimitNOFILE of its unit, or `ulimit -n`",
+    errno.ENFILE: "this machine has no more files to open: /proc/sys/fs/file-nr shows use and limit; end what opens so many",
+}
 _NUMBER_IN_TEXT: Final = re.compile(r"\((\d+), '")
 
 
@@ -65,6 +69,8 @@ def explain_open_failure(path: str, error: Exception, present: Sequence[str]) ->
     number = errno_of(error)
     if number in _ABSENT:
         return PortError("E102", _missing(path, present))
+    if number in _SHORTAGES:
+        return PortError("E102", f"{path} does not open: {_SHORTAGES[number]}")
     if number in _NO_PORT:
         return PortError("E102", f"{path} is no serial port: `force-gateway ports` lists those of this machine")
     return PortError("E102", f"{path} does not open as a serial port: {error}")
@@ -74,6 +80,11 @@ def classify_open_failure(error: Exception) -> PortCode:
     """Return the code alone of why a port did not open, which takes no time."""
     number = errno_of(error)
     return "E101" if number in _DENIED else "E103" if number in _HELD else "E102"
+
+
+def is_shortage(error: BaseException | None) -> bool:
+    """Decide whether a port did not open for want of descriptors, which no plug has to do with."""
+    return isinstance(error, Exception) and errno_of(error) in _SHORTAGES
 
 
 def explain_loss(path: str, error: Exception | None) -> PortError:

@@ -18,7 +18,7 @@ import termios
 from typing import Any, Final
 
 from gateway.devices import SerialSettings
-from gateway.ports.errors import SERIAL_FAILURES, PortError, explain_changed_settings, explain_loss
+from gateway.ports.errors import SERIAL_FAILURES, PortError, explain_changed_settings, explain_loss, is_shortage
 from gateway.ports.identity import PtyIdentity
 from gateway.ports.latency import set_low_latency
 from gateway.ports.opening import (
@@ -38,7 +38,7 @@ MOST_UNSENT_BYTES: Final = 4096  # beyond it the line is stuck: no command here 
 _DROPPED_BYTES: Final = 4096
 _MOST_DROPPED_READS: Final = 32  # twice what a terminal keeps: who talks without end is not waited for
 _FIRST_BACKOFF_S, _LONGEST_BACKOFF_S = 0.1, 2.0
-_REFUSALS: Final = ("E101", "E103")  # permission, another program: somebody must do something
+_REFUSALS: Final = ("E101", "E103")  # permission, another program: somebody must do something; for a shortage as well
 _REFUSALS_TOLD: Final = 3  # in a row: 0.6 s after the first
 _CLOSE_DEADLINE_S: Final = 0.25
 _LOOK_S: Final = 0.1  # at the settings: a microsecond
@@ -287,7 +287,8 @@ class SerialPort:
     def _note_refusal(self, error: PortError) -> None:
         """It is there again and does not open: told once, and not at the first time, for udev gives permissions a moment after
         the name."""
-        self._refusals = self._refusals + 1 if error.code in _REFUSALS else 0
+        is_refused = error.code in _REFUSALS or is_shortage(error.__cause__)
+        self._refusals = self._refusals + 1 if is_refused else 0
         if self._refusals == _REFUSALS_TOLD and isinstance(error.__cause__, Exception):
             self._tell_refusal(self._path, error.__cause__)
 

@@ -47,6 +47,10 @@ def main(arguments: list[str]) -> int:
     # A machine that shuts down, or `pkill`, tells every process: the guardian answers, and asks us to ramp. A handler, for
     # what is ignored stays so in a child.
     signal.signal(signal.SIGTERM, lambda *_: None)
+    with contextlib.suppress(
+        OSError
+    ):  # what cleans up a disk takes it from a gateway that runs: then it is there again
+        Path(options["state"]).mkdir(parents=True, exist_ok=True, mode=0o700)
     with EventLog(source="control", file=EventFile(Path(options["state"]))) as log:
         try:
             rig = kept_rig(options["rig"], simulated=options["simulate"])

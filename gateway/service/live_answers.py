@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from math import isfinite
+from math import floor, isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -139,8 +139,8 @@ class LiveAnswers:
         low_n, high_n = model.force_range_n
         if model.limits_n:
             low_n, high_n = max(low_n, model.limits_n[0]), min(high_n, model.limits_n[1])
-        if command.control_word & ControlBit.VALVE_PULL:
-            high_n = min(high_n, loop.controller.most_pull_n())
+        if self._rig.valve and command.control_word & ControlBit.VALVE_PULL:
+            high_n = floor(100.0 * loop.controller.most_pull_n()) / 100.0  # rounded up it would be refused
         return live.LiveLimits(
             force_min_n=max(control.limits.smallest_force_n, low_n),
             force_max_n=min(control.limits.force_max_n, high_n),

@@ -2,9 +2,9 @@
 
 `{"force_setpoint": 12.0, "control_word": 1}` asks for 12 N and enables; `{"control_word": 0}` stops. The first refusal ends
 a command; the answer says what was written. A rig with a lease wants `heartbeat` from whoever commands, as from every master.
-What does nothing but stop begins with the control word, wherever that stands: it is granted to every master, and what a master
-without the setpoint is refused before it would be the end of the stop. Of any other command that ends with the control word at
-0, a force beside it say, this is written behind a refusal, too: who sends it wants the output off.
+A stop, the control word as 0, is written first, wherever it stands: it is granted to every master, and what a master without
+the setpoint is refused before it would be the end of the stop. A force beside it is refused: behind a stop it would stand for
+the next enable.
 """
 
 import json
@@ -17,6 +17,7 @@ from gateway.live.control_link import ANSWER_S, ControlLink
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.map.register_map import Register, RegisterMap
 
+_SETPOINTS: Final = ("force_setpoint", "voltage_setpoint")
 _LONGEST: Final = 16_384
 """Bytes of a command: far beyond one that names every register, and too few to nest deeply."""
 
@@ -32,43 +33,34 @@ class RegisterCommands:
 
     async def carry_out(self, payload: bytes) -> dict[str, Any]:
         """Write what the payload says; return what was written, and why no more."""
-        try:
-            registers = _registers(payload)
-        except ValueError as error:
-            return {"ok": False, "written": [], "error": str(error)}
-        order = _in_order(registers)
-        written, refused = await self._write_until_refused(order, stops=_does_stop(registers))
-        if refused:
-            last = [(name, value) for name, value in order if _is(name, "control_word")][-1:]
-            off = [(name, value) for name, value in last if not value and name not in written]
-            written += (await self._write_until_refused(off, stops=True))[0]
-            return {"ok": False, "written": written, "error": refused}
-        return {"ok": True, "written": written}
-
-    async def _write_until_refused(self, order: list[tuple[str, float]], *, stops: bool) -> tuple[list[str], str]:
-        """Return what was written, and why no more; empty where all was."""
         written: list[str] = []
         try:
-            for name, value in order:
-                await self._write(name, value, stops=stops)
+            registers = _registers(payload)
+            stops = _does_stop(registers)
+            for name, value in _in_order(registers):
+                if stops and value and _is(name, *_SETPOINTS):
+                    raise ValueError(
+                        f"{name}: {value:g} is not written beside control_word 0, which stops and clears it"
+                    )
+                await self._write(name, value, at_any_time=stops and (not value or _is(name, "heartbeat")))
                 written.append(name)
         except (OSError, ValueError, LookupError, OverflowError) as error:
-            return written, str(error) or type(error).__name__
-        return written, ""
+            return {"ok": False, "written": written, "error": str(error) or type(error).__name__}
+        return {"ok": True, "written": written}
 
-    async def _write(self, name: str, value: float, *, stops: bool) -> None:
+    async def _write(self, name: str, value: float, *, at_any_time: bool) -> None:
         register = self._map.find(name)
         register.check_meant(value)
         request = P.write_registers_request(register.address, _encoded(register, value))
         asked = {"do": "modbus", "via": "mqtt", "unit": self._unit, "pdu": request.hex()}
-        answer = await self._link.ask(asked if stops else asked | {"until_s": self._clock() + ANSWER_S})
+        until = {} if at_any_time else {"until_s": self._clock() + ANSWER_S}
+        answer = await self._link.ask(asked | until)
         if P.is_exception(bytes.fromhex(answer["pdu"])):
             raise ValueError(f"{name}: {answer.get('refusal') or 'refused'}")
 
 
 def is_stop(payload: bytes) -> bool:
-    """Decide whether a command clears the control word, and sets nothing else to anything but 0. A heartbeat beside it, which
-    who commands a rig with a lease sends in each command, presses nothing."""
+    """Decide whether a command clears the control word, whatever stands beside that."""
     try:
         registers = _registers(payload)
     except ValueError:
@@ -77,13 +69,13 @@ def is_stop(payload: bytes) -> bool:
 
 
 def _does_stop(registers: dict[str, float]) -> bool:
-    sets = any(value for name, value in registers.items() if not _is(name, "heartbeat"))
-    return not sets and any(_is(name, "control_word") for name in registers)
+    words = [value for name, value in registers.items() if _is(name, "control_word")]
+    return bool(words) and not any(words)
 
 
-def _is(name: str, register: str) -> bool:
-    """Decide whether a name, of whatever block, is that of a register."""
-    return name.partition("@")[0] == register
+def _is(name: str, *registers: str) -> bool:
+    """Decide whether a name, of whatever block, is that of one of these registers."""
+    return name.partition("@")[0] in registers
 
 
 def _in_order(registers: dict[str, float]) -> list[tuple[str, float]]:

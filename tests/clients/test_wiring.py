@@ -46,7 +46,7 @@ def test_every_shipped_rig_has_a_page(rig: str, form: str) -> None:
     text = call("wiring", rig, "--format", form)
     network = load_rig(rig).network
     assert f"{network.bind}:{network.port}" in text
-    for word in ("TCON_IP_v4", "FG_HOST", "ClientTCP", "register output", "mbpoll -1"):
+    for word in ("TCON_IP_v4", "FG_HOST", "ClientTCP", "register output", "mbpoll -1", "undoes another master's stop"):
         assert word in text
 
 

@@ -70,6 +70,42 @@ def test_a_replug_without_permission_is_told_once_and_opens_when_it_is_given(
     asyncio.run(scene())
 
 
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [(errno.EMFILE, "has as many files open as it may: raise LimitNOFILE"), (errno.ENFILE, "/proc/sys/fs/file-nr")],
+)
+def test_a_port_that_does_not_open_for_want_of_descriptors_is_told_once(
+    line: Pty, ear: Any, monkeypatch: pytest.MonkeyPatch, number: int, words: str
+) -> None:
+    """The log's last word was "unplugged?" for as long as the shortage took."""
+    refusals: list[PortError] = []
+
+    def refusing(*arguments: Any, **keywords: Any) -> int:
+        raise OSError(number, os.strerror(number))
+
+    async def scene() -> None:
+        events = PortEvents(ear.on_bytes, ear.on_lost, ear.on_open, refusals.append)
+        port = SerialPort(line.path, SerialSettings(baud=9600), events)
+        await port.open()
+        port._lose(PortError("E102", "unplugged?"))
+        with monkeypatch.context() as short:
+            short.setattr("serial.serialposix.os.open", refusing)
+            for _ in range(6):
+                port._stop_reopening()
+                port._reopen()
+        port._stop_reopening()
+        async with asyncio.timeout(5):
+            while not refusals:
+                await asyncio.sleep(0.001)
+        port._reopen()
+        (refusal,) = refusals
+        assert str(refusal).startswith(f"E102 {line.path} does not open: ") and words in str(refusal)
+        assert port.is_open
+        port.close()
+
+    asyncio.run(scene())
+
+
 def failure(code: str) -> PortError:
     numbers = {"E101": errno.EACCES, "E102": errno.ENOENT, "E103": errno.EAGAIN}
     refusal = explain_in_brief("/dev/ttyX", OSError(numbers[code], "refused"))

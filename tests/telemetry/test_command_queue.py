@@ -94,7 +94,8 @@ def test_what_came_while_the_process_stood_still_presses_nothing_and_a_stop_stop
         (b'{"control_word": 2}', False),  # a reset wants the heartbeat that came before it
         (b'{"control_word": 0, "control_word@float_abcd": 1}', False),
         (b'{"force_setpoint": 0, "control_word": 0}', True),
-        (b'{"force_setpoint": 30, "control_word": 0}', False),
+        (b'{"force_setpoint": 30, "control_word": 0}', True),
+        (b'{"force_ramp": 30, "control_word": 0}', True),
         (b'{"heartbeat": 7, "control_word": 0}', True),  # as whoever commands a rig with a lease sends it
         (b'{"heartbeat@float_abcd": 7, "force_setpoint": 0, "control_word": 0}', True),
         (b'{"heartbeat": 7}', False),
@@ -104,7 +105,7 @@ def test_what_came_while_the_process_stood_still_presses_nothing_and_a_stop_stop
         (b"\xff", False),
     ],
 )
-def test_a_stop_is_what_clears_the_control_word_and_sets_nothing(payload: bytes, stops: bool) -> None:
+def test_a_stop_is_what_clears_the_control_word_whatever_stands_beside_it(payload: bytes, stops: bool) -> None:
     assert is_stop(payload) is stops
 
 

@@ -103,8 +103,8 @@ def _describe_error(measured: dict[str, Any]) -> str:
     )
     if measured["allowed_rms_n"] is not None:
         words += f"; allowed {measured['allowed_rms_n']:.3f} N"
-    if measured["in_use_rms_n"] is not None:
-        words += f"; calibration {measured['in_use']} in use has {measured['in_use_rms_n']:.3f} N on them"
+    if measured["compared_rms_n"] is not None:
+        words += f"; {measured['compared_with']} has {measured['compared_rms_n']:.3f} N on them"
     return words
 
 

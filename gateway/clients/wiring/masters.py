@@ -97,6 +97,11 @@ def _network_sentences(rig: Rig, table: ExchangeTable) -> tuple[str, ...]:
             "which. A robot or PLC needs one that stays: set network.port (502 is Modbus' own)."
         )
     sentences += _rights(rig)
+    values = table.command_span[0] + table.values_first
+    sentences.append(
+        "A program of your own that writes control_word in each cycle, enable in it, undoes another master's stop: write it "
+        f"only when you want it changed, else from address {values} (4{values + 1:04d}) on. The generated clients do so."
+    )
     if network.require_byte_order_echo:
         echo = table.map.find("byte_order_echo").address
         sentences.append(

@@ -62,7 +62,9 @@ class JsonLineServer:
         self._path = path
         self._handlers = handlers
         self._log = log
+        self._is_serving = False  # from `start` to `close`, whether it has a socket or waits for one
         self._listener: socket.socket | None = None
+        self._file: os.stat_result | None = None
         self._callers: dict[JsonConnection, None] = {}  # in the order in which they last spoke
         self._queue: deque[Callable[[], None]] = deque()
         self._turn: asyncio.TimerHandle | None = None
@@ -71,19 +73,20 @@ class JsonLineServer:
         self._told = ""  # why its file leads elsewhere
 
     async def start(self) -> str:
-        """Begin to serve; empty, or a sentence that says why nothing is served."""
+        """Begin to serve; empty, or a sentence that says why nothing is served: tried again, but for a path that is too
+        long, until `close`."""
         if (length := len(os.fsencode(self._path))) > _LONGEST_PATH:
             why = f"{length} bytes of path, a socket takes {_LONGEST_PATH}: give a shorter --state DIR"
             return self._unserved(why)
+        self.loop, self._is_serving = asyncio.get_running_loop(), True
         try:
             self._path.unlink(missing_ok=True)
             self._listener = self._bind()
         except OSError as error:
-            return self._unserved(error.strerror or str(error))
-        self.loop = asyncio.get_running_loop()
+            self._told = error.strerror or str(error)
         self._await_connection()
         self._sweep()
-        return ""
+        return self._unserved(self._told) if self._told else ""
 
     def _unserved(self, why: str) -> str:
         return f"{self._path} is not served, its tools will not find this gateway: {why}"
@@ -105,11 +108,10 @@ class JsonLineServer:
 
     async def close(self) -> None:
         """Close at once: a caller that reads nothing would never let go of a polite close."""
-        if self._listener is None:
+        if not self._is_serving:
             return
-        self.loop.remove_reader(self._listener)
-        self._listener.close()
-        self._listener = None
+        self._is_serving = False
+        self._let_go()
         for caller in tuple(self._callers):
             caller.close()
         for timer in (self._turn, self._sweep_timer):
@@ -123,13 +125,20 @@ class JsonLineServer:
             with contextlib.suppress(OSError):
                 self._path.unlink(missing_ok=True)
 
+    def _let_go(self) -> None:
+        if self._listener:
+            self.loop.remove_reader(self._listener)
+            self._listener.close()
+            self._listener = None
+
     # -- its file
 
     def _why_lost(self) -> str | None:
         """Return why the path no longer leads here, empty where it does; None where it leads nowhere. While the socket is open
         the number of its inode is given to no other."""
         try:
-            return "" if os.path.samestat(self._path.stat(), self._file) else "another file has its name"
+            there = self._path.stat()
+            return "" if self._file and os.path.samestat(there, self._file) else "another file has its name"
         except FileNotFoundError:
             return None
         except OSError as error:
@@ -146,13 +155,13 @@ class JsonLineServer:
 
     def _on_looked(self, why: str | BaseException | None) -> None:
         self._is_looking = False
-        if self._listener is not None and not isinstance(why, BaseException):  # else no thread was to be had
+        if self._is_serving and not isinstance(why, BaseException):  # else no thread was to be had
             self._keep_file(why)
 
     def _keep_file(self, why: str | None) -> None:
-        """Make a new file where it is gone: who cleans up a folder must not part a gateway from its tools. What others have
+        """Make a new file where there is none: who cleans up a folder must not part a gateway from its tools. What others have
         put in its place stays theirs. why: it leads elsewhere."""
-        if why is None and self._listener is not None:
+        if why is None:
             try:
                 fresh = self._bind()
             except OSError as error:
@@ -160,11 +169,11 @@ class JsonLineServer:
                     return  # another file has come since: the next look tells what it is
                 why = error.strerror or str(error)
             else:
-                self.loop.remove_reader(self._listener)
-                self._listener.close()
+                was = "removed: it is served again" if self._listener else "not to be had: it is served now"
+                self._let_go()
                 self._listener = fresh
                 self._await_connection()
-                self._log("socket", f"{self._path} was removed: it is served again")
+                self._log("socket", f"{self._path} was {was}")
         if why and why != self._told:
             self._log("socket", f"E152 {self._unserved(why)}")
         self._told = why or ""

@@ -2,8 +2,8 @@
 
 Two bounds. The band: beyond an RMS error of in_band_tolerance_n a settled force is out of band about as often as in it, before
 the trim has done anything. The calibration in use, on the same data: a fit that is worse by more than a tenth, and by more than
-a twentieth of the band (below that nobody feels it), would be a step back. A fit that fails is kept with the reason, for data
-and figures are of use, but it is not offered.
+a twentieth of the band (below that nobody feels it), would be a step back. Where no gateway's state is asked, the rig's own
+calibration takes its place. A fit that fails is kept with the reason, for data and figures are of use, but it is not offered.
 """
 
 from dataclasses import dataclass
@@ -19,14 +19,16 @@ WORSE_SHARE: Final = 0.05  # of the band: a smaller difference is none
 
 @dataclass(frozen=True, slots=True)
 class Acceptance:
-    """error: on all measured points; allowed_n: of its RMS, None where the rig is not known; in_use: the same data by the
-    calibration in use, None where there is none for this rig; rejected: why it is not offered, empty where it is; has_walk:
-    partial reversals are among the points."""
+    """error: on all measured points; allowed_n: of its RMS, None where the rig is not known; other: the same data by another
+    calibration, None where the rig is not known; in_use: its number, None where nobody has said that it is in use; named:
+    which it is, in words; rejected: why the fit is not offered, empty where it is; has_walk: partial reversals are among the
+    points."""
 
     error: Error
     allowed_n: float | None
-    in_use: Error | None
-    in_use_number: int
+    other: Error | None
+    in_use: int | None
+    named: str
     rejected: str
     has_walk: bool
 
@@ -38,22 +40,31 @@ class Acceptance:
             "points": self.error.points,
             "reversals": self.has_walk,
             "allowed_rms_n": self.allowed_n,
-            "in_use": self.in_use_number if self.in_use else None,
-            "in_use_rms_n": self.in_use.rms_n if self.in_use else None,
+            "in_use": self.in_use,
+            "in_use_rms_n": self.other.rms_n if self.other and self.in_use is not None else None,
+            "compared_with": self.named,
+            "compared_rms_n": self.other.rms_n if self.other else None,
             "rejected": self.rejected,
         }
 
 
-def judge_fit(evaluation: Evaluation, tolerance_n: float | None, in_use: Calibration | None) -> Acceptance:
-    """Decide whether a fit is offered, offered with notes, or kept but not offered.
-    tolerance_n: the rig's in_band_tolerance_n, None where nobody knows the rig; in_use: what is active on it."""
+def judge_fit(
+    evaluation: Evaluation, tolerance_n: float | None, reference: Calibration | None, *, is_in_use: bool = True
+) -> Acceptance:
+    """Decide whether a fit is offered, offered with notes, or kept but not offered. tolerance_n: the rig's
+    in_band_tolerance_n, None where nobody knows the rig; reference: what is active on it, or not is_in_use, its own one."""
     error = Error.of(measured_error_n(evaluation.model, evaluation.checked))
-    other = Error.of(measured_error_n(in_use.model(), evaluation.checked)) if in_use else None
-    number, has_walk = in_use.number if in_use else 0, len(evaluation.checked.minor_v) > 1
-    if tolerance_n is None:
-        return Acceptance(error, None, other, number, "", has_walk)
-    bounds = (*_beyond_band(error, tolerance_n), *(_worse(error, other, number, tolerance_n) if other else ()))
-    return Acceptance(error, tolerance_n, other, number, _sentence(error, bounds), has_walk)
+    has_walk = len(evaluation.checked.minor_v) > 1
+    if reference is None:
+        other, in_use, named = None, None, ""
+    else:
+        other = Error.of(measured_error_n(reference.model(), evaluation.checked))
+        in_use = reference.number if is_in_use else None
+        named = f"calibration {reference.number} {'in use' if is_in_use else 'of the rig file'}"
+    bounds: tuple[str, ...] = ()
+    if tolerance_n is not None:
+        bounds = (*_beyond_band(error, tolerance_n), *(_worse(error, other, named, tolerance_n) if other else ()))
+    return Acceptance(error, tolerance_n, other, in_use, named, _sentence(error, bounds), has_walk)
 
 
 def _sentence(error: Error, bounds: tuple[str, ...]) -> str:
@@ -70,7 +81,7 @@ def _beyond_band(error: Error, tolerance_n: float) -> tuple[str, ...]:
     return () if error.rms_n <= tolerance_n else (f"allowed {tolerance_n:.3f} N (in_band_tolerance_n of the rig)",)
 
 
-def _worse(error: Error, other: Error, number: int, tolerance_n: float) -> tuple[str, ...]:
+def _worse(error: Error, other: Error, named: str, tolerance_n: float) -> tuple[str, ...]:
     bound_n = max(WORSE_BY * other.rms_n, other.rms_n + WORSE_SHARE * tolerance_n)
-    comparison = f"{other.rms_n:.3f} N by calibration {number} in use on the same data"
+    comparison = f"{other.rms_n:.3f} N by {named} on the same data"
     return () if error.rms_n <= bound_n else (comparison,)

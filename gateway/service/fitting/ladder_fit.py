@@ -43,7 +43,7 @@ def fit_recording(recording: Recording, request: FitRequest, context: RigContext
     sentence where the data must not be fitted."""
     recording, context = in_unit(recording, context.force_unit), replace(context, force_unit=None)
     evaluation = evaluate(check_source(recording, context), request)
-    verdict = judge_fit(evaluation, *acceptance_bounds(recording, context))
+    verdict = judge_fit(evaluation, *acceptance_bounds(recording, context), is_in_use=context.state is not None)
     document = fit_document(evaluation, recording.path, recording.header)
     document["data_sha256"] = data_sha256(evaluation.checked)
     response = measure_recorded_response(recording, evaluation)

@@ -1,5 +1,6 @@
-"""What a control process leaves, through the guardian, to the one that is started when it dies: the recording goes on, and a
-calibration or a plant that is another one now (their files are gone, say) is told. By itself a start knows only what it finds.
+"""What a control process leaves, through the guardian, to the one that is started when it dies: the recording goes on, a TLS
+face whose port is any free one (0) keeps it, and a calibration or a plant that is another one now (their files are gone, say)
+is told. By itself a start knows only what it finds.
 """
 
 from collections.abc import Mapping
@@ -17,6 +18,11 @@ class Handover:
     def __init__(self, kept: Mapping[str, Any], *, record: bool) -> None:
         self._kept = kept
         self._record = record
+
+    @property
+    def tls_ports(self) -> dict[str, int]:
+        """The port of each TLS face, by its place in `fieldbus`, as masters know it."""
+        return dict(self._kept.get("tls_ports", {}))
 
     def recording(self, now_s: float) -> WantedRecording | None:
         """Return what is to be recorded; None: nothing, or its time is over by now_s (monotonic)."""

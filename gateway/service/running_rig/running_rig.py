@@ -190,6 +190,7 @@ class RunningRig:
         for note in notes:
             self._log.note("start", note)
         self._note_start(restarted)
+        self._faces.tls_ports = handover.tls_ports
         faces = await self._faces.start(bind, is_restart=bool(restarted))
         self._show_faces()
         return banner.Ready(
@@ -207,6 +208,7 @@ class RunningRig:
     def _show_faces(self) -> None:
         modbus = self._faces.modbus
         self._running |= {"port": modbus[1] if modbus else None, "serial": self._faces.serial_paths}
+        self._guardian.keep(tls_ports=self._faces.tls_ports)
 
     def _note_start(self, restarted: Ending | None) -> None:
         """So that the audit shows what was changed while no gateway ran."""

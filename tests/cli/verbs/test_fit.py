@@ -86,6 +86,19 @@ def test_a_recording_by_its_number_is_judged_by_the_calibration_that_is_in_use_t
     assert (after["in_use"], after["in_use_rms_n"]) == (2, pytest.approx(after["rms_n"], rel=1e-3))
 
 
+def test_a_table_that_no_gateways_state_is_asked_about_is_compared_with_nothing_in_use(tmp_path: Path, call) -> None:
+    """It was said of the rig's own calibration, whatever was in use."""
+    path = written(tmp_path / "exported.csv", ladder_rows())
+    words = ("fit", str(path), "--models", "bsfm", "--orders", "2", "--no-report")
+    shown = " ".join(call(*words).output.split())
+    assert "calibration 1 of the rig file has " in shown and "in use" not in shown
+    measured = json.loads(call(*words, "--json").stdout)["measured"]
+    assert (measured["in_use"], measured["in_use_rms_n"]) == (None, None)
+    assert f"{measured['compared_rms_n']:.3f} N on them" in shown
+    there = " ".join(call(*words, "--state", str(tmp_path), "--rig", "demo").output.split())
+    assert "calibration 1 in use has " in there
+
+
 def test_store_adds_a_numbered_calibration_that_says_where_it_comes_from(tmp_path: Path, call) -> None:
     path = written(tmp_path / "ladder.csv", ladder_rows())
     document = json.loads(call("fit", str(path), *ORDERS, "--store", "--state", str(tmp_path), "--json").stdout)

@@ -61,6 +61,27 @@ def test_a_socket_whose_file_is_removed_is_served_again(folder_too: bool, tmp_pa
     assert not path.exists()
 
 
+def test_a_socket_that_could_not_be_made_at_the_start_is_served_when_it_can(tmp_path: Path) -> None:
+    """Behind a restart of control whose state directory was away nothing tried again: no tool and no page found it."""
+    path = tmp_path / "state" / "control.sock"
+
+    async def play() -> None:
+        said: asyncio.Queue[str] = asyncio.Queue()
+        server = JsonLineServer(
+            path, {"echo": lambda request: {"said": 1}}, lambda _, text: said.put_nowait(text), OFTEN
+        )
+        assert "is not served" in await server.start()
+        path.parent.mkdir()
+        async with asyncio.timeout(10):
+            assert "it is served now" in await said.get()
+        assert said.empty(), "why it was not is what start has told"
+        assert await answer(path)
+        await server.close()
+
+    asyncio.run(play())
+    assert not path.exists()
+
+
 def test_what_stands_in_its_place_is_told_once_and_stays(tmp_path: Path) -> None:
     path = tmp_path / "state" / "control.sock"
 

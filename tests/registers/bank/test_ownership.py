@@ -53,6 +53,18 @@ def test_anybody_may_stop_and_nothing_else_is_taken(bank, master, other, command
     assert bank.read_registers(116, 2) == bytes(4)
 
 
+def test_the_whole_block_written_again_undoes_another_s_stop_and_the_words_behind_enable_do_not(bank, master, other):
+    """As README and `wiring` say; and a setpoint that goes on being written owns, where 0 does not."""
+    master.write(0, 1, 1200, 0, 0, 1)
+    other.write(0, 0)
+    master.write(1, 1300, 0, 0, 2)
+    assert (bank.command.control_word, bank.owner) == (0, "10.0.0.1")
+    master.write(1, 0, 0, 0, 3)
+    assert (bank.command.control_word, bank.owner) == (0, None)
+    master.write(0, 1, 1300, 0, 0, 4)
+    assert bank.command.control_word == ControlBit.ENABLE
+
+
 @pytest.mark.parametrize(("stands", "written", "left"), [(32, 0, 0), (33, 1, 1), (32, 2, 0), (32, 4, 0)])
 def test_anybody_may_end_a_run_and_nothing_else_is_taken(make_bank, master_of, stands, written, left):
     """Clearing bit 5 is no request for more, whatever stands beside it; an enable is one."""

@@ -86,6 +86,23 @@ def test_a_certificate_that_is_connected_to_one_face_still_has_not_gone_with_its
     asyncio.run(asyncio.wait_for(scene(), 20.0))
 
 
+def test_a_face_on_any_free_port_has_the_same_one_behind_a_restart(folder: Folder) -> None:
+    """As plain Modbus TCP has: a master that connected again found nobody."""
+
+    async def scene() -> None:
+        rig = rig_with(folder)
+        before, after = (Served(replace(rig, fieldbus=(RtuFace(type="rtu"), *rig.fieldbus))) for _ in range(2))
+        async with before.running():
+            port = before.told[1].facts["port"]
+        after.faces.tls_ports = dict(before.faces.tls_ports)
+        assert after.faces.tls_ports == {"2": port}
+        async with after.running(is_restart=True):
+            assert [face.facts["port"] for face in after.told if face.type == "tls"] == [port]
+            assert after.faces.tls_ports == {"2": port}
+
+    asyncio.run(asyncio.wait_for(scene(), 20.0))
+
+
 def test_who_is_revoked_in_the_rig_file_stays_out(folder: Folder) -> None:
     async def scene() -> None:
         rig = rig_with(folder)

@@ -1,12 +1,17 @@
 """The state directory that a first start makes: calibrations, recordings and who has written what are its owner's business."""
 
+import json
 import os
+import socket
 import stat
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from gateway.processes import exit_codes
 from gateway.service.supervisor import guardian
 from gateway.service.supervisor.run_options import RunOptions
 
@@ -32,6 +37,18 @@ def test_the_state_directory_is_for_its_owner_alone(tmp_path: Path, monkeypatch:
     state = tmp_path / "force-gateway" / "demo"
     with pytest.raises(_EnoughSeenError):
         guardian.run(RunOptions(state=state))
+    assert stat.S_IMODE(state.stat().st_mode) == 0o700
+
+
+@pytest.mark.usefixtures("generous_umask")
+def test_a_control_process_that_is_started_again_makes_it_anew(tmp_path: Path) -> None:
+    """Whoever cleans up a disk takes it from a gateway that runs: its control socket could not be made behind a restart."""
+    state, (ours, its) = tmp_path / "force-gateway" / "demo", socket.socketpair()
+    options = {"rig": "no-such-rig", "simulate": True, "state": str(state), "rtu": None}
+    words = (sys.executable, "-m", "gateway.service.control_process", str(its.fileno()), json.dumps(options))
+    with ours, its:
+        ended = subprocess.run(words, pass_fds=[its.fileno()], capture_output=True, text=True, timeout=60, check=False)
+    assert "no-such-rig" in ended.stderr and ended.returncode == exit_codes.CONFIGURATION
     assert stat.S_IMODE(state.stat().st_mode) == 0o700
 
 

@@ -57,6 +57,7 @@ class Faces:
         ]
         self._make_tls = partial(make_tls_server, rig, bank=bank, on_peer_closed=self._on_closed, log=log)
         self._tls: list[ModbusTlsServer] = []
+        self.tls_ports: dict[str, int] = {}  # by place in `fieldbus`: of a free port (0) the one that masters know
         self.modbus: tuple[str, int] | None = None  # where plain Modbus TCP is bound, once it is
         self.on_served: Callable[[], None] = lambda: None  # one that a restart could not serve is served
         self._to_come = FacesToCome(log, lambda: self.on_served())
@@ -111,8 +112,9 @@ class Faces:
     def _listening(self, bind: list[Any] | None) -> list[tuple[str, Serve]]:
         """Return the faces that listen on an address, by name, each with what serves it."""
         plain: list[tuple[str, Serve]] = [("tcp", partial(self._serve_tcp, bind))] if self._tcp else []
-        secure = (face for face in self._rig.fieldbus if isinstance(face, TlsFace))
-        return [*plain, *(("tls", partial(self._serve_tls, face)) for face in secure)]
+        placed = enumerate(self._rig.fieldbus, start=1)
+        secure = ((str(place), face) for place, face in placed if isinstance(face, TlsFace))
+        return [*plain, *(("tls", partial(self._serve_tls, place, face)) for place, face in secure)]
 
     async def _serve_tcp(self, bind: list[Any] | None) -> ServedFace:
         assert self._tcp
@@ -120,9 +122,10 @@ class Faces:
         self.modbus = await listen(self._tcp, *(bind or (network.bind, network.port)))
         return tcp_face(*self.modbus, network.units)
 
-    async def _serve_tls(self, face: TlsFace) -> ServedFace:
-        server = self._make_tls(face)
-        host, port = await listen(server, face.bind, face.port, "`port:` of the tls face, such as 8802")
+    async def _serve_tls(self, place: str, face: TlsFace) -> ServedFace:
+        server, port = self._make_tls(face), face.port or self.tls_ports.get(place, 0)
+        host, port = await listen(server, face.bind, port, "`port:` of the tls face, such as 8802")
+        self.tls_ports[place] = port
         self._tls.append(server)
         return tls_face(host, port, self._rig.network.units)
 
