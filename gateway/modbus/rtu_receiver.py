@@ -118,7 +118,7 @@ class RtuReceiver:
 
     def take(self, now_s: float) -> list[RtuRequest]:
         """Return the requests that the silence has ended, in order; none while more may belong to the last one."""
-        if now_s < self._last_s + self._wait_s or now_s < self._next_look_s:
+        if (deadline_s := self.deadline_s) is None or now_s < deadline_s:
             return []
         passed, self._passed = self._passed, []
         is_final = self._wait_s >= SPLIT_S  # not by the time alone: a program that was late first reads what has come

@@ -139,7 +139,7 @@ class LiveAnswers:
         low_n, high_n = model.force_range_n
         if model.limits_n:
             low_n, high_n = max(low_n, model.limits_n[0]), min(high_n, model.limits_n[1])
-        if self._rig.valve and command.control_word & ControlBit.VALVE_PULL:
+        if command.control_word & ControlBit.VALVE_PULL:
             high_n = floor(100.0 * loop.controller.most_pull_n()) / 100.0  # rounded up it would be refused
         return live.LiveLimits(
             force_min_n=max(control.limits.smallest_force_n, low_n),

@@ -91,6 +91,7 @@ def test_the_largest_setpoint_of_a_pull_is_told_while_it_is_asked_for_and_taken(
     send(stage, f"060000{ControlBit.VALVE_PULL:04x}")
     most_n = told()
     assert most_n == pytest.approx(0.75 * pushed_n, rel=0.1)
+    assert most_n == round(most_n, 2) <= stage.wired.controller.most_pull_n(), "as a word can say it, and never more"
     assert send(stage, f"060001{round(100.0 * most_n) + 1:04x}") == "8603"
     assert "W309" in ask(stage, {"do": "state"})["last_refusal"]
     assert send(stage, f"060001{round(100.0 * most_n):04x}")[:2] == "06"
