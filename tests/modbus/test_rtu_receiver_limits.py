@@ -236,13 +236,8 @@ def test_slow_noise_is_looked_through_as_it_comes_and_not_all_of_it_with_each_by
 ) -> None:
     """A byte in 2 ms, each behind a silence, took a whole core, and control and its loop with it."""
     measured: list[int] = []
-    measure = RtuReceiver._measure_frame
-
-    def counted(receiver: RtuReceiver, at: int, *, is_start: bool) -> int:
-        measured.append(at)
-        return measure(receiver, at, is_start=is_start)
-
-    monkeypatch.setattr(RtuReceiver, "_measure_frame", counted)
+    ends = RtuReceiver._claimed_end
+    monkeypatch.setattr(RtuReceiver, "_claimed_end", lambda heard, at: measured.append(at) or ends(heard, at))
     noise = bytes(Random(7).choices(b"\x00\x01\x03\x10", k=500))
     bus = Bus(baud=115200)
     bus.send(*(bytes((byte,)) for byte in noise), pause_s=0.002)
@@ -262,16 +257,21 @@ def test_a_frame_in_as_many_pieces_as_an_adapter_makes_is_one() -> None:
         assert bus.send(pieces[-1]).requests() == [RtuRequest(1, long[1:-2], True)], baud
 
 
-@pytest.mark.parametrize("first", [b"", COMMAND[:5]])
-def test_a_request_that_slow_noise_follows_is_executed_and_not_answered(first: bytes) -> None:
-    """Whole, or with an adapter's pause in it, which is not cut there when what came before the pause is given up."""
+def test_a_request_that_slow_noise_follows_is_executed_and_not_answered() -> None:
     bus = Bus()
-    bus.send(*(first, COMMAND[len(first) :] + b"\x07\x03\xf0")[not first :], pause_s=0.004)
-    bus.send(*(b"\x07",) * 12, pause_s=0.004)
+    bus.send(COMMAND + b"\x07\x03\xf0", *(b"\x07",) * 12, pause_s=0.004)
     assert [request for _, request in bus.heard] == [RtuRequest(1, WRITE, False)]
-    assert bus.heard[0][0] < 100.0 + 0.01 + 12 * 0.004
+    assert bus.heard[0][0] < 100.05
     bus.pause(1.0)
     assert (bus.receiver.frames, bus.receiver.noise_bytes) == (1, 3 + 12)
+
+
+def test_a_frame_of_others_is_not_cut_where_its_first_piece_is_given_up() -> None:
+    begun = INSIDE.index(COMMAND)
+    bus = Bus(baud=115200)
+    bus.send(encode_adu(7, READ)).requests()
+    bus.send(*(b"\x07",) * 9, pause_s=0.004).send(INSIDE[:begun], pause_s=0.0195)
+    assert bus.send(INSIDE[begun:] + b"\x07\x03\xf0", *(b"\x07",) * 12, pause_s=0.004).requests() == []
 
 
 def test_a_request_behind_a_moment_of_noise_is_answered_at_once() -> None:
