@@ -57,6 +57,7 @@ class ModbusRtuServer:
         )
         self._noise = _NoiseReport(str(serial))
         self._timer: asyncio.TimerHandle | None = None
+        self._due_s = 0.0
         self._was_lost = False
         events = PortEvents(self._on_bytes, self._on_lost, self._on_open, self._on_refused, self._on_restored)
         self.port = SerialPort(settings.path, serial, events) if settings.path else None
@@ -127,13 +128,15 @@ class ModbusRtuServer:
 
     def _on_bytes(self, chunk: bytes, now_s: float) -> None:
         self._receiver.receive(chunk, now_s)
-        if self._timer is None:
+        deadline_s = self._receiver.deadline_s
+        if self._timer is None or (deadline_s is not None and deadline_s < self._due_s):
             self._wait(now_s)
 
     def _wait(self, now_s: float) -> None:
         """Come back when the receiver has something to decide. One timer is enough: a later deadline is waited for anew."""
+        self._stop_timer()
         if (deadline_s := self._receiver.deadline_s) is not None:
-            delay_s = max(0.0, deadline_s - now_s)
+            self._due_s, delay_s = deadline_s, max(0.0, deadline_s - now_s)
             self._timer = asyncio.get_running_loop().call_later(delay_s, self._on_time)
 
     def _on_time(self) -> None:
