@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from gateway import defaults
 from gateway.cli.control_socket import ask
-from gateway.cli.errors import disk_hangs
+from gateway.cli.errors import CliError, NoAnswerError, disk_hangs
 from gateway.processes.state_lock import hold_state_lock
 
 _PATIENCE_S: Final = defaults.COMMIT_PATIENCE_S
@@ -16,14 +16,22 @@ _POLL_S: Final = 0.02
 
 
 def ask_until_done(directory: Path, verb: str, request: dict[str, Any]) -> dict[str, Any]:
-    """Ask the running gateway for a change; return its answer when it is through. CliError when it does not come to an end."""
-    job = ask(directory, {"do": verb, **request})
-    answer, deadline_s = job, time.monotonic() + _PATIENCE_S
-    while answer["busy"] and answer["job"] == job["job"]:
-        if time.monotonic() > deadline_s:
-            raise disk_hangs(f"the gateway has not answered for {_PATIENCE_S:g} s")
-        time.sleep(_POLL_S)
-        answer = ask(directory, {"do": verb})
+    """Ask the running gateway for a change; return its answer when it is through. CliError where it refuses, NoAnswerError
+    where it does not say how it went: it may make the change all the same."""
+    is_asked = False
+    try:
+        job = ask(directory, {"do": verb, **request})
+        is_asked, answer, deadline_s = True, job, time.monotonic() + _PATIENCE_S
+        while answer["busy"] and answer["job"] == job["job"]:
+            if time.monotonic() > deadline_s:
+                raise disk_hangs(f"the gateway has not answered for {_PATIENCE_S:g} s")
+            time.sleep(_POLL_S)
+            answer = ask(directory, {"do": verb})
+    except CliError as error:
+        if not (is_asked or isinstance(error, NoAnswerError)):
+            raise
+        unknown = f"it may make the change all the same: force-gateway {verb} list shows what is in use"
+        raise NoAnswerError(f"{error}; {unknown}", error.exit_code) from None
     return answer
 
 

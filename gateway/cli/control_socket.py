@@ -3,10 +3,11 @@
 import json
 import re
 import socket
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.cli.errors import CliError
+from gateway.cli.errors import CliError, NoAnswerError
 from gateway.processes import exit_codes
 
 _TIMEOUT_S: Final = 2.0
@@ -15,14 +16,21 @@ _LONGEST_ANSWER: Final = 1 << 20
 
 
 def ask(state: Path, request: dict[str, Any], socket_name: str = "control.sock") -> dict[str, Any]:
-    """Return the answer of the gateway that runs on this state directory; CliError when there is none or it refuses."""
+    """Return the answer of the gateway that runs on this state directory; CliError when there is none or it refuses, and as
+    NoAnswerError where it was there and may have done what it was asked for."""
     path = state / socket_name
+    kind = CliError
+
+    def note_asked() -> None:
+        nonlocal kind
+        kind = NoAnswerError
+
     try:
-        answer = _exchange(path, json.dumps(request).encode() + b"\n")
+        answer = _exchange(path, json.dumps(request).encode() + b"\n", note_asked)
     except PermissionError:
         raise CliError(f"E105 {path}: belongs to the user who runs the gateway", exit_codes.PERMISSION) from None
     except (OSError, ValueError) as error:
-        raise CliError(
+        raise kind(
             f"E140 no gateway answers on {path} ({getattr(error, 'strerror', None) or error}); "
             "is it running, with the same --state or rig?",
             exit_codes.DEVICE,
@@ -33,10 +41,11 @@ def ask(state: Path, request: dict[str, Any], socket_name: str = "control.sock")
     return answer
 
 
-def _exchange(path: Path, line: bytes) -> dict[str, Any]:
+def _exchange(path: Path, line: bytes, on_asked: Callable[[], None]) -> dict[str, Any]:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
         link.settimeout(_TIMEOUT_S)
         link.connect(str(path))
+        on_asked()
         link.sendall(line)
         with link.makefile("rb") as stream:
             answer = json.loads(stream.readline(_LONGEST_ANSWER) or b"null")

@@ -28,6 +28,10 @@ class CliError(click.ClickException):
         click.echo(self.format_message(), file=file or sys.stderr)
 
 
+class NoAnswerError(CliError):
+    """Whoever was asked was there, and has not answered: what it was asked for may be done all the same."""
+
+
 def already_exists(target: Path, instead: str = "--force overwrites it") -> CliError:
     """Return E405: a verb would overwrite something. instead: what to do."""
     return CliError(f"E405 {target} exists and was left alone; {instead}")

@@ -38,6 +38,14 @@ def swinging_sentence(force_n: float) -> str:
     )
 
 
+def noisy_sentence(force_n: float) -> str:
+    """Return W361, which says why the state does not become holding."""
+    return (
+        f"W361 at {force_n:.1f} N single readings keep leaving the band that their mean is in, so nothing counts as holding: "
+        "the noise is as large as the band, or the tool shakes; a wider in_band_tolerance, or a filter on the amplifier"
+    )
+
+
 def sign_sentence(rise_n: float, expected_n: float, *, was_right: bool = False) -> str:
     """Return A302 in numbers, and what to do. was_right: the force has risen as it should since the enable."""
     cure = "swap the cell's signal wires or set sign: -1"

@@ -110,6 +110,11 @@ def _holm(chances: Mapping[str, float]) -> set[str]:
     return fallen
 
 
+def undated(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows that no trend counts for want of a day, where they have an answer."""
+    return [row for row in rows if not row["error_code"] and _day(row["date"]) is None]
+
+
 def _day(text: str) -> date | None:
     try:
         return date.fromisoformat(text)

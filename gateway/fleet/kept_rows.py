@@ -27,7 +27,7 @@ class KeptRows:
 
     def known(self, tasks: list[Task]) -> dict[Task, Row]:
         """Return the rows that are kept for these tasks: of files that have not changed since, without an error."""
-        by_place = {(row["file"], row["sha256"]): row for row in self._read() if not row.get("error_code")}
+        by_place = {(row.get("file"), row.get("sha256")): row for row in self._read() if not row.get("error_code")}
         return {task: by_place[task.path, task.sha256] for task in tasks if (task.path, task.sha256) in by_place}
 
     def __enter__(self) -> Self:
@@ -61,7 +61,8 @@ class KeptRows:
         read: list[Row] = []
         for line in lines:
             with contextlib.suppress(ValueError):
-                read.append(json.loads(line))
+                if isinstance(row := json.loads(line), dict):
+                    read.append(row)
         return read[1:] if read and read[0] == self._head else []
 
 

@@ -6,8 +6,9 @@ real run of this rig, made before: the newest recording in which a force was com
 
 import json
 from dataclasses import asdict, dataclass
+from math import isfinite
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from gateway.control.compensation.cell_map import CellMap
 from gateway.diagnosis.force_error import FEWEST_BLOCKS, ErrorBlock
@@ -69,7 +70,17 @@ def kept_reference(state: Path) -> ForceReference | None:
     """Return the reference that was kept last, for whichever plant; None as of `read_reference`."""
     try:
         facts = read_object(state / "plants" / _FILE)
-        blocks = tuple(ErrorBlock(**block) for block in facts.pop("blocks"))
-        return ForceReference(**facts, blocks=blocks)
-    except (OSError, ValueError, TypeError, KeyError):
+        blocks = tuple(_block_of(block) for block in facts["blocks"])
+        return ForceReference(int(facts["plant"]), str(facts["recording"]), int(facts["plant_before"]), blocks)
+    except (OSError, ValueError, TypeError, KeyError, OverflowError):
         return None
+
+
+def _block_of(facts: dict[str, Any]) -> ErrorBlock:
+    """Return a block as it was kept. ValueError, TypeError or KeyError for anything else: the watch would end over it, at
+    each start anew."""
+    block = ErrorBlock(**facts)
+    numbers = (block.from_n, block.to_n, block.squares_n2, float(block.rows))
+    if not (all(map(isfinite, numbers)) and block.rows > 0 and block.squares_n2 >= 0.0):
+        raise ValueError(f"no block of a run: {block}")
+    return block

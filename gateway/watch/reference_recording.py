@@ -57,9 +57,10 @@ def read_reference_recording(state: Path) -> ReferenceRecording | None:
     """Return the rig's reference; None where none was kept, or its file is gone."""
     try:
         reference = ReferenceRecording(**read_object(state / _FOLDER / _FACTS))
+        is_whole = isinstance(reference.name, str) and isinstance(reference.kept_utc, str)
+        return reference if is_whole and reference_path(state, reference).is_file() else None
     except (OSError, ValueError, TypeError):
         return None
-    return reference if reference_path(state, reference).is_file() else None
 
 
 def keep_reference_recording(state: Path, recording: Path, calibration: int | None = None) -> ReferenceRecording:

@@ -13,7 +13,7 @@ import pytest
 from gateway.cli import change_in_use, control_socket
 from gateway.cli.calibration import resume, store_access
 from gateway.cli.change_in_use import ask_until_done, not_running
-from gateway.cli.errors import CliError
+from gateway.cli.errors import CliError, NoAnswerError
 from gateway.cli.master.client import Assignment, GatewayClient
 from gateway.cli.system_service.installation import plan_installation
 from gateway.cli.system_service.unit_file import STOP_S
@@ -55,8 +55,27 @@ def test_another_ones_job_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_change_without_an_end_is_not_waited_for_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(change_in_use, "_PATIENCE_S", 0.05)
     monkeypatch.setattr(change_in_use, "ask", lambda directory, request: {"busy": True, "job": 1})
-    with pytest.raises(CliError, match="E431 the gateway has not answered for"):
+    with pytest.raises(
+        NoAnswerError, match=r"E431 the gateway has not answered for .*; it may make the change all the same"
+    ):
         ask_until_done(Path(), "calibration", {"use": 2})
+
+
+def test_a_gateway_that_is_gone_while_it_changes_may_have_made_the_change(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter([{"busy": True, "job": 1}])
+
+    def asked(directory: Path, request: dict[str, Any]) -> dict[str, Any]:
+        for answer in answers:
+            return answer
+        raise CliError("E140 no gateway answers", exit_codes.DEVICE)
+
+    monkeypatch.setattr(change_in_use, "ask", asked)
+    with pytest.raises(NoAnswerError, match=r"E140 .*; it may make .*: force-gateway plant list shows") as caught:
+        ask_until_done(Path(), "plant", {"use": 2})
+    assert caught.value.exit_code == exit_codes.DEVICE
+    with pytest.raises(CliError, match=r"E140 no gateway answers$") as refused:
+        ask_until_done(Path(), "plant", {"use": 2})
+    assert not isinstance(refused.value, NoAnswerError), "of what was never asked nothing is done"
 
 
 @pytest.mark.parametrize(("said", "told"), [(b"", "no answer"), (b"[]", "no answer"), (b"{", "E140")])
@@ -76,14 +95,14 @@ def test_a_gateway_that_ends_over_a_question_is_told_as_one_that_is_gone(
 
         thread = threading.Thread(target=serve)
         thread.start()
-        with pytest.raises(CliError, match="E140 no gateway answers") as caught:
+        with pytest.raises(NoAnswerError, match="E140 no gateway answers") as caught:
             control_socket.ask(Path(), {"do": "running"})
         thread.join()
     assert told in str(caught.value) and caught.value.exit_code == exit_codes.DEVICE
 
 
 def test_a_gateway_of_another_user_is_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(path: Path, line: bytes) -> dict[str, Any]:
+    def refuse(*_: Any) -> dict[str, Any]:
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(control_socket, "_exchange", refuse)

@@ -45,6 +45,19 @@ def test_a_broken_file_is_a_row_and_the_second_call_computes_only_that(tmp_path:
     assert "<h1>No cell has 4 days" in (tmp_path / "out/report.html").read_text()
 
 
+@pytest.mark.parametrize(("folder", "is_told"), [("date=2026-11-01", False), ("date=23.11.2026", True), ("", True)])
+def test_recordings_that_no_trend_counts_for_want_of_a_day_are_told(tmp_path: Path, folder: str, is_told: bool) -> None:
+    """Each cell had 0 days, however many recordings it had."""
+    wish = Wish((), 1.0, 11, duration_s=20.0, colour="white", columns=(), jitter=False, noise_n=0.1, family="smooth")
+    place = tmp_path / "in" / "cell=1" / folder
+    place.mkdir(parents=True)
+    file = write_csv(make(wish), place)
+    done = gateway("fleet", "diagnose", f"{tmp_path}/in/**/*.csv", "--scheduler", "serial", "-o", tmp_path / "out")
+    assert done.exit_code == 0, done.stderr
+    told = f"no trend counts 1 recording: in no folder date=YYYY-MM-DD ({file})"
+    assert (told in done.stderr) is is_told
+
+
 def test_a_pattern_without_a_file_and_a_scheduler_without_a_scheme_are_refused(tmp_path: Path) -> None:
     nothing = gateway("fleet", "fit", f"{tmp_path}/*.csv")
     assert nothing.exit_code == 65 and "E190" in nothing.stderr

@@ -42,3 +42,13 @@ def test_wherever_the_file_is_cut_whole_rows_are_read_and_written_behind(tmp_pat
         assert list(known) == TASKS[: max(0, whole[:length].count(b"\n") - 1)]
         fill(file, *(task for task in TASKS if task not in known))
         assert list(kept(file).known(TASKS)) == TASKS
+
+
+def test_a_line_that_is_no_row_is_passed_over(tmp_path: Path) -> None:
+    """Of a file that somebody has edited: the verb ended with an internal error."""
+    file = tmp_path / "rows.jsonl"
+    fill(file, TASKS[0])
+    with file.open("a") as stream:
+        stream.write('3\n[]\n"a"\nnull\n{"a": 1}\n')
+    fill(file, TASKS[1])
+    assert list(kept(file).known(TASKS)) == TASKS

@@ -138,3 +138,17 @@ def test_a_plant_in_use_that_no_gateway_writes_is_a_sentence_and_no_internal_err
     for written in (said, json.dumps(said)):
         with pytest.raises(RecordingError, match="of plant_in_use what no gateway writes"):
             header_in_use({"plant_in_use": written})
+
+
+@pytest.mark.parametrize(
+    ("name", "spoilt"), [("squares_n2", "much"), ("squares_n2", nan), ("rows", 0), ("from_n", None), ("to_n", [1])]
+)
+def test_a_reference_whose_numbers_are_none_is_none(tmp_path: Path, name: str, spoilt: object) -> None:
+    """The watch ended over it at each start, until it was given up, and with it what it says of the machine."""
+    record(tmp_path, 0.5)
+    keep_reference(tmp_path, find_reference(tmp_path, 3, None))
+    file = tmp_path / "plants" / "reference.json"
+    facts = json.loads(file.read_text())
+    facts["blocks"][0][name] = spoilt
+    file.write_text(json.dumps(facts))
+    assert read_reference(tmp_path, 3) is None

@@ -225,19 +225,20 @@ def test_what_is_said_to_be_deleted_is_gone_after_a_power_cut_too(
     assert acts == ["unlink", "fsync"]
 
 
+@pytest.mark.parametrize("part", ["delete_recording", "is_being_recorded"])
 def test_one_recording_that_the_disk_does_not_let_go_keeps_no_other_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, part: str
 ) -> None:
     for days_ago in (40.0, 30.0, 20.0):
         record(tmp_path, days_ago=days_ago)
-    delete, refusing = keeping.delete_recording, {1}
+    whole = getattr(keeping, part)
 
-    def refuse(path: Path, reference: str) -> str:
-        if int(path.stem) in refusing:
+    def refuse(path: Path, *more: str) -> Any:
+        if int(path.stem) == 1:
             raise PermissionError(errno.EACCES, "Permission denied", str(path))
-        return delete(path, reference)
+        return whole(path, *more)
 
-    monkeypatch.setattr(keeping, "delete_recording", refuse)
+    monkeypatch.setattr(keeping, part, refuse)
     gone = prune_recordings(tmp_path, Retention(days=10.0), "")
     assert ([int(one.path.stem) for one in gone], numbers(tmp_path)) == ([2, 3], [1])
     with pytest.raises(PermissionError):

@@ -149,6 +149,15 @@ def test_a_recording_from_before_the_calibration_came_into_use_is_none(tmp_path)
     assert FirstGoodRecording(tmp_path).keep(1.0e12) is None
 
 
+@pytest.mark.parametrize(("name", "spoilt"), [("file", 3), ("file", None), ("file", "\0"), ("name", None)])
+def test_a_note_whose_names_are_none_is_no_reference(tmp_path, name, spoilt):
+    """The watch ended over it at each start, and no recording was pruned."""
+    keep_reference_recording(tmp_path, record(tmp_path))
+    note = tmp_path / "reference" / "reference.json"
+    note.write_text(json.dumps(json.loads(note.read_text()) | {name: spoilt}))
+    assert read_reference_recording(tmp_path) is None
+
+
 def test_a_damaged_note_is_no_reference(tmp_path):
     keep_reference_recording(tmp_path, record(tmp_path))
     (tmp_path / "reference" / "reference.json").write_text("{")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from gateway import VERSION
 from gateway.cli.change_in_use import ask_until_done, not_running
-from gateway.cli.errors import CliError
+from gateway.cli.errors import CliError, NoAnswerError
 from gateway.cli.options import StateChoice
 from gateway.numbered_documents.store import StoredDocument, StoreError
 from gateway.plants.in_use import compensation_on, with_cell_terms
@@ -117,6 +117,11 @@ def change(state: StateChoice, request: dict[str, Any], before: str | None) -> d
     kept = _keep_reference(state, request.get("use", 0), before)  # before the change: the watch reads it as it comes
     try:
         return _change(state.directory, request) | kept
+    except NoAnswerError as error:  # more likely than not it takes the new one
+        if kept:
+            said = f"{error}; the reference of the watch is kept for plant {request['use']}"
+            raise NoAnswerError(said, error.exit_code) from None
+        raise
     except CliError:
         if kept:  # the plant that stays in use is compared with its own
             keep_reference(state.directory, earlier)

@@ -105,7 +105,7 @@ def _work(verb: str, compute: "Callable[[Task], Row]", columns: Sequence[str], o
     from gateway.cli.diagnosis.progress_line import show_progress
     from gateway.cli.fleet.files import KEPT, write_files
     from gateway.extras import require
-    from gateway.fleet.drift import find_drifts
+    from gateway.fleet.drift import find_drifts, undated
     from gateway.fleet.kept_rows import KeptRows
     from gateway.fleet.page import headline
     from gateway.fleet.tasks import find_tasks
@@ -125,6 +125,7 @@ def _work(verb: str, compute: "Callable[[Task], Row]", columns: Sequence[str], o
     cells = find_drifts(rows)
     files = write_files(folder, rows, cells, verb)
     failed = [row for row in rows if row["error_code"]]
+    _tell_undated(undated(rows))
     if options["as_json"]:
         from gateway.cli.fleet.files import cell_row
 
@@ -205,6 +206,13 @@ def _engine_of(name: str, workers: int) -> "Engine":
         require("distributed")
         return cluster(name)
     raise click.UsageError(f"--scheduler {name}: serial, processes or tcp://HOST:PORT of a Dask scheduler")
+
+
+def _tell_undated(rows: "list[Row]") -> None:
+    """A folder `date=23.11.2026` would else be a cell without days, and nothing said why."""
+    if rows:
+        where = f"{rows[0]['file']}{' and others' if rows[1:] else ''}"
+        click.echo(f"no trend counts {count_of(rows, 'recording')}: in no folder date=YYYY-MM-DD ({where})", err=True)
 
 
 def _tell(rows: "list[Row]", failed: "list[Row]", taken_over: int, files: list[Path]) -> None:

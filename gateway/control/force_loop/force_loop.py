@@ -179,6 +179,11 @@ class ForceLoop:
         """Decide whether the setpoint cannot be reached."""
         return self._settling.unreachable
 
+    @property
+    def is_noisy(self) -> bool:
+        """Decide whether nothing settles for single readings that leave the band."""
+        return self._settling.is_noisy
+
     def elapse(self, dt_s: float, line: LineStatus) -> None:
         """Advance the models: dt_s has passed with the present voltage on the output, whoever drives it. The model of the lags
         hears what the wire has really taken, where that is known: it carries one setting at a time."""

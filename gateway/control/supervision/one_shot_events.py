@@ -9,7 +9,13 @@ from typing import Final
 from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.force_loop.measured_trim import MOST_TURNS
 from gateway.control.inputs import LineStatus, LoopInputs
-from gateway.control.messages import hunting_sentence, stuck_sentence, swinging_sentence, unreachable_sentence
+from gateway.control.messages import (
+    hunting_sentence,
+    noisy_sentence,
+    stuck_sentence,
+    swinging_sentence,
+    unreachable_sentence,
+)
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.unreachable_force import Evidence
 
@@ -24,22 +30,24 @@ class OneShotEvents:
     def __init__(self, stuck_n: float) -> None:
         self.direction = 1.0
         self._was_unreachable = False
-        self._was_stuck = self._was_hunting = False
+        self._was_stuck = self._was_hunting = self._has_told_noise = False
         self._stuck_n = stuck_n
         self._was_in_band = False
         self._pressure_pa = self._profile_pa_per_v = self._learned_pa_per_v = nan
 
     def start(self) -> None:
         """Begin a new enable: nothing has been in band since."""
-        self._was_in_band = False
+        self._was_in_band = self._has_told_noise = False
 
     def observe_line(self, line: LineStatus) -> None:
         """Take over the pressure that the output device measures."""
         self._pressure_pa, self._profile_pa_per_v = line.pressure_pa, line.pressure_pa_per_v
 
-    def movement_events(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> tuple[str, str]:
+    def movement_events(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> tuple[str, str, str]:
         """Return what a step in force or voltage mode is the first to show. measured_n: contact force, smoothed."""
-        return self.unreachable_event(loop, measured_n, inputs), self.hunting_event(loop)
+        noisy = "" if self._has_told_noise or not loop.is_noisy else noisy_sentence(loop.applied_n)
+        self._has_told_noise = self._has_told_noise or loop.is_noisy
+        return self.unreachable_event(loop, measured_n, inputs), self.hunting_event(loop), noisy
 
     def unreachable_event(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> str:
         """Return a sentence where the target has just become unreachable, else nothing. Ask after each step in force or

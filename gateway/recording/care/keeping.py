@@ -110,11 +110,13 @@ def _statuses(paths: list[Path]) -> Iterator[tuple[os.stat_result, Path]]:
 
 
 def _may_go(path: Path, reference: str) -> bool:
-    """What has gone already need not go."""
+    """What has gone already need not go; of what cannot be looked at, another user's say, its deletion tells."""
     try:
         return not why_protected(path, reference)
     except FileNotFoundError:
         return False
+    except OSError:
+        return True
 
 
 def _why_it_goes(age_s: float | None, total_bytes: int, retention: Retention) -> str:

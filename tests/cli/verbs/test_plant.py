@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import gateway.diagnosis
+from gateway.cli.errors import NoAnswerError
 from gateway.cli.main import command
 from gateway.cli.plants import store_access
 from gateway.plants.force_reference import read_reference
@@ -91,6 +92,22 @@ def test_a_plant_that_is_refused_leaves_the_reference_of_the_one_in_use(added, m
         refused = call(added, "use", 2)
     assert refused.exit_code == exit_codes.DATA and "the output is enabled" in refused.stderr
     assert before and read_reference(added, 1) == before
+
+
+def test_a_plant_that_a_silent_gateway_may_take_has_its_own_reference(added, monkeypatch):
+    """The old one was put back, and the gateway took the plant: its watch had nothing to compare with, and nobody was told."""
+    record_held(added, 0.4)
+
+    def silent(*_):
+        raise NoAnswerError("E431 the gateway has not answered for 20 s")
+
+    monkeypatch.setattr(store_access, "ask_until_done", silent)
+    with hold_state_lock(added):
+        unknown = call(added, "use", 1)
+    assert unknown.exit_code == exit_codes.FAILED
+    assert "not answered for 20 s; the reference of the watch is kept for plant 1" in unknown.stderr
+    kept = read_reference(added, 1)
+    assert kept and kept.recording == "0001.fgr"
 
 
 def test_show_and_compare(added):

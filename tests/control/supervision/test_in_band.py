@@ -157,3 +157,24 @@ def test_a_voltage_settles_where_it_is_out_and_not_on_its_way_or_at_none() -> No
     assert check.judge_voltage(off, at(0.75), is_slewing=False) is WAIT
     assert check.judge_voltage(off, at(0.8), is_slewing=True) is MOVE
     assert check.judge_voltage(asked, at(0.875), is_slewing=False) is MOVE
+
+
+@pytest.mark.parametrize(
+    ("swing_n", "in_band_time_s", "is_noisy"),
+    [(1.5, 0.25, True), (0.9, 0.25, False), (0.9, 20.0, False), (8.0, 0.25, True)],
+)
+def test_a_force_whose_single_readings_leave_the_band_is_noisy_and_one_that_must_stay_in_it_for_long_is_not(
+    swing_n: float, in_band_time_s: float, is_noisy: bool
+) -> None:
+    check, asked = SettlingCheck(UNREACHABLE_S), demand()._replace(in_band_time_s=in_band_time_s)
+    seen = []
+    for k in range(700):
+        reading = Reading(contact_n=10.0 + (-1) ** k * swing_n, is_new=True, is_usable=True, interval_s=0.01)
+        check.judge_force(asked, at(0.01 * k)._replace(reading=reading), 10.0, 10.0)
+        seen.append(check.is_noisy)
+    assert (any(seen[:500]), seen[-1]) == (False, is_noisy)
+    check.judge_force(asked._replace(force_n=30.0), at(7.0), 30.0, 10.0)
+    check.judge_force(asked._replace(force_n=30.0), at(7.5, 30.0), 30.0, 30.0)
+    assert not check.is_noisy, "another setpoint waits anew"
+    check.restart()
+    assert not check.is_noisy
