@@ -101,6 +101,7 @@ QUIET: dict[str, Columns] = {
     "a constant command": columns(command_v=np.full(TIME_S.size, 2.0), force_n=15.0 + noise(0.1)),
     "no command at all": columns(command_v=np.zeros(TIME_S.size), force_n=noise(0.1)),
     "a force that is unrelated to the command": columns(force_n=noise(3.0)),
+    "a gateway at rest with a dead cell": columns(command_v=np.zeros(TIME_S.size), force_n=np.full(TIME_S.size, 0.1)),
 }
 
 

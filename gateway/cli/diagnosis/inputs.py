@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
+import numpy as np
 
 from gateway import defaults
 from gateway.cli.errors import CliError, no_such_recording
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 _WIRE_S: Final = 0.035  # a frame at 9600 baud, the amplifier's own period, and the sampling
 REFERENCE: Final = "reference"
+_LEAST_MOVE_V: Final = 0.2  # the trim of a force that is held moves less
 """What stands for the rig's reference recording where a recording is named."""
 START_PLANT: Final = defaults.PLANT
 _ANY_STATE: Final = defaults.RIG  # whose state directory is meant where neither --state nor --rig says one
@@ -106,6 +108,16 @@ def read_sources(
         is_own=plant is (known.plant_profile if known else plant_of_first),
         is_rehearsal=any(map(is_rehearsal, recordings)),
     )
+
+
+def refuse_still(old: Sources) -> None:
+    """Refuse older recordings in none of which the command moves (CliError 65): they show nothing of the machine, and what was
+    there before would be told as a change."""
+    commands = [each.command_v for each in old.measurements]
+    if not any(drive is None or np.nanmax(drive) - np.nanmin(drive) > _LEAST_MOVE_V for drive in commands):
+        names = ", ".join(each.name for each in old.measurements)
+        why = "the command does not move, so nobody knows from it what belongs to the machine; --against one with work in it"
+        raise CliError(f"E403 {names}: {why}", exit_codes.DATA)
 
 
 def refuse_twice(paths: Sequence[Path]) -> None:

@@ -214,14 +214,16 @@ def _check_effect(name: str | None) -> None:
 def _read_old(options: dict[str, Any], rig: str) -> "Sources | None":
     """The recordings that the new ones are compared with; None where --against names none. rig: of the new ones, whose
     reference is meant."""
-    from gateway.cli.diagnosis.inputs import REFERENCE, read_sources, reference_file
+    from gateway.cli.diagnosis.inputs import REFERENCE, read_sources, reference_file, refuse_still
     from gateway.cli.options import state_directory
 
     if not options["against"]:
         return None
     directory = state_directory(options["state"], options["rig"] or rig or None)
     names = [str(reference_file(directory)) if each == REFERENCE else each for each in options["against"]]
-    return read_sources(names, rig=options["rig"], columns=options["columns"], state=options["state"])
+    old = read_sources(names, rig=options["rig"], columns=options["columns"], state=options["state"])
+    refuse_still(old)
+    return old
 
 
 def _run_diagnosis(sources: "Sources", old: "Sources | None", options: dict[str, Any]) -> "tuple[Diagnosis, float]":

@@ -86,7 +86,8 @@ def find_rests(measurement: Measurement, usable: np.ndarray) -> Iterator[slice]:
 
 
 def _rest_noise(measurement: Measurement, left_n: Floats, rests: Sequence[slice]) -> tuple[float, float] | None:
-    """Standard deviation of the noise, N, and how many independent readings of it there are; None where rests are short."""
+    """Standard deviation of the noise, N, and how many independent readings of it there are; None where rests are short, or
+    nothing moves in them."""
     row_s = float(np.median(np.diff(measurement.time_s)))
     rested_rows = sum(rest.stop - rest.start for rest in rests)
     if rested_rows * row_s < _LEAST_RESTS_S:
@@ -100,7 +101,10 @@ def _rest_noise(measurement: Measurement, left_n: Floats, rests: Sequence[slice]
     seen = np.concatenate(lines)
     spectrum = fit_to_lines(seen, np.concatenate(power), rows)
     model = spectrum(np.maximum(np.arange(rows // 2 + 1), float(seen.min())))
-    independent = float(np.sum(model)) ** 2 / float(np.sum(model**2)) * 2.0 * rested_rows / rows
+    squares = float(np.sum(model**2))
+    if squares <= 0.0:
+        return None  # one value, bit for bit: of a dead cell nobody knows the noise
+    independent = float(np.sum(model)) ** 2 / squares * 2.0 * rested_rows / rows
     return float(np.sqrt(np.mean(model))), independent
 
 

@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,3 +49,19 @@ def test_a_recording_is_no_evidence_for_itself(words: tuple[str, ...], why: str,
     refused = CliRunner().invoke(command, ["diagnose", *(word.format(*files) for word in words), "--rig", "demo"])
     assert refused.exit_code == 2
     assert f"{why.format(*files)}: a recording is no evidence for itself" in refused.stderr
+
+
+@pytest.mark.parametrize("old", [("still.csv",), ("still.csv", "moves.csv")], ids=["alone", "beside one that does"])
+def test_a_machine_at_rest_is_none_to_compare_with(old: tuple[str, ...], tmp_path: Path, call: Any) -> None:
+    """Of the same machine, unchanged, presliding or crosstalk was told as a change since."""
+    noise_n = np.random.default_rng(5).normal(0.0, 0.1, (3, 1500))
+    time_s = np.arange(1500) * 0.02
+    for at, (name, swing_v) in enumerate((("new.csv", 1.0), ("still.csv", 0.0), ("moves.csv", 1.0))):
+        volts = 2.0 + swing_v * np.sin(time_s)
+        rows = np.stack([time_s, volts, 8.0 * volts - 3.0 + noise_n[at]], axis=1)
+        np.savetxt(tmp_path / name, rows, delimiter=",", header="time_s,command_v,force_n", comments="")
+    against = [word for name in old for word in ("--against", str(tmp_path / name))]
+    answer = call("diagnose", str(tmp_path / "new.csv"), *against, "--rig", "demo")
+    is_refused = old == ("still.csv",)
+    assert answer.exit_code == (65 if is_refused else 0), answer.output
+    assert ("E403 still.csv: the command does not move" in answer.stderr) is is_refused
