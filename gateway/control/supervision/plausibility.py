@@ -40,18 +40,18 @@ _RIGHT, _WRONG_GAIN = FaultCode.NONE, FaultCode.GAIN_WRONG
 
 
 class ExpectedForce:
-    """What the model expects now: both branches at the lagged voltage, N of cell force above rest."""
+    """What the model expects now: both branches at the lagged voltage, N of cell force above rest. lag_s: dead time too."""
 
     def __init__(self, model: Bsfm, lag_s: float, rest_v: float, stands_v: float | None = None) -> None:
         """stands_v: voltage whose pressure stands at the beginning, None for rest_v."""
-        self._lag_s = lag_s
+        self.lag_s = lag_s
         self._rest_v = rest_v
-        self._lagged_v = rest_v if stands_v is None else stands_v
+        self._lagged_v = self._voltage_v = rest_v if stands_v is None else stands_v
         self.use(model)
 
     def retime(self, lag_s: float) -> None:
         """Replace the lag, s."""
-        self._lag_s = lag_s
+        self.lag_s = lag_s
 
     def use(self, model: Bsfm) -> None:
         """Expect by another model from now on; the lagged voltage stays."""
@@ -61,8 +61,9 @@ class ExpectedForce:
 
     def advance(self, voltage_v: float, dt_s: float) -> None:
         """Advance the model: voltage_v stood on the output for the last dt_s."""
+        self._voltage_v = voltage_v
         if dt_s > 0.0 and voltage_v != self._lagged_v:
-            self._lagged_v += (voltage_v - self._lagged_v) * dt_s / (self._lag_s + dt_s)
+            self._lagged_v += (voltage_v - self._lagged_v) * dt_s / (self.lag_s + dt_s)
             self._evaluate()
 
     def _evaluate(self) -> None:
@@ -75,6 +76,12 @@ class ExpectedForce:
     def rise_n(self, branch_share: float) -> float:
         """Return the same above the force at rest."""
         return self.force_n(branch_share) - self._rest_n
+
+    def bounds_n(self) -> tuple[float, float]:
+        """Return the least and the most cell force, N, of a machine that follows at once, by the lag or in between: a dead
+        time is in the lag, behind which a machine arrives sooner than a lag of that length."""
+        rising_n, falling_n = self._model.branch_forces_n(self._voltage_v)
+        return min(rising_n, self.rising_n), max(falling_n, self.falling_n)
 
     @property
     def kept_n(self) -> float:

@@ -19,7 +19,7 @@ from gateway.control.supervision.repeated_readings import RepeatedReadings
 _QUANTA: Final = 5.0
 SLOW_S: Final = 2.0
 """From which on it is said how late a frozen cell would be found."""
-_DEAD_SHARE: Final = 0.6  # of frozen_s, 0.3 s of 0.5: no machine here answers a voltage as late as that
+_DEAD_SHARE: Final = 0.6  # of frozen_s, 0.3 s of 0.5: who answers a voltage as late as that has measured it
 _WIDER_LOOP: Final = 0.5  # friction may have grown by this share of the loop since the calibration
 
 
@@ -32,7 +32,7 @@ class StuckSensorCheck:
         self._reported_limit = supervision.frozen_equal_samples
         self._noise = RepeatedReadings()
         self._value_n = inf
-        self._slack_n = 0.0
+        self._slack_n = self._answer_s = 0.0
         self.start()
 
     def expect_noise(self, noise_n: float) -> None:
@@ -62,16 +62,17 @@ class StuckSensorCheck:
             self._same_s += reading.interval_s
         if not touching:
             self._watch_model()
-        self._slack_n = _WIDER_LOOP * response.width_n
-        self._least_n = max(self._least_n, response.rising_n)
-        self._most_n = min(self._most_n, response.falling_n)
+        self._slack_n, self._answer_s = _WIDER_LOOP * response.width_n, response.lag_s
+        least_n, most_n = response.bounds_n()
+        self._least_n = max(self._least_n, least_n)
+        self._most_n = min(self._most_n, most_n)
         if self._least_n - self._most_n > self._least_change_n + self._slack_n:  # the force must have moved
             self._moved_s += reading.interval_s
 
     @property
     def words(self) -> str:
         """Observation and why it cannot be, empty for a cell that may be alive."""
-        if self._same_s >= self._frozen_s and self._moved_s >= _DEAD_SHARE * self._frozen_s:
+        if self._same_s >= self._frozen_s and self._moved_s >= max(_DEAD_SHARE * self._frozen_s, self._answer_s):
             return f"repeated for {self._same_s:.2f} s while the force must have changed"
         if self._reported_limit is not None or self._equal_s >= self._frozen_s:
             return self.repeats

@@ -1,0 +1,43 @@
+"""A machine that answers late, and a load cell without noise: it repeats itself until the force comes, and from then on again.
+No such cell is called frozen, and one that is frozen is found."""
+
+import pytest
+
+from gateway.bsfm.model import Response
+from gateway.codes.faults import FaultCode
+from gateway.control import CalibrationInUse
+from tests.control.bench import Bench, bsfm, has_fault
+
+STEPS_N = (12.0, 40.0, 10.0, 35.0, 15.0, 45.0)
+LATE = [(0.08, 0.09), (0.2, 0.09), (0.3, 0.09), (0.4, 0.05), (0.4, 0.2)]
+
+
+def late_machine(delay_s: float, lag_s: float) -> Bench:
+    """The bench with this dead time; its calibration has measured both."""
+    bench = Bench(noise_n=0.0, delay_s=delay_s)
+    bench.controller.use(CalibrationInUse(bsfm(), 2, Response(dead_time_s=delay_s + 0.01, lag_s=lag_s)))
+    bench.run(0.3)
+    bench.enable(STEPS_N[0])
+    return bench
+
+
+@pytest.mark.parametrize(("delay_s", "lag_s"), LATE)
+@pytest.mark.parametrize("hold_s", [1.5, 4.0])
+def test_no_cell_of_a_late_machine_is_called_frozen(delay_s: float, lag_s: float, hold_s: float) -> None:
+    """The model, one lag as long as dead time and lags together, moved on when the machine had long arrived: A312 in a step."""
+    bench = late_machine(delay_s, lag_s)
+    for force_n in STEPS_N:
+        bench.force(force_n)
+        bench.run(hold_s)
+        assert bench.last.fault is FaultCode.NONE, force_n
+    assert bench.last.force_measured_n > 40.0
+
+
+@pytest.mark.parametrize(("delay_s", "lag_s"), LATE)
+def test_a_cell_of_a_late_machine_that_freezes_is_found_in_the_next_step(delay_s: float, lag_s: float) -> None:
+    bench = late_machine(delay_s, lag_s)
+    bench.run(4.0)
+    bench.cell_frozen = True
+    bench.force(40.0)
+    found_s = bench.seconds_until(has_fault(FaultCode.SAMPLE_FROZEN), 3.0)
+    assert found_s < 1.0 + 2.0 * (delay_s + lag_s)
