@@ -83,6 +83,19 @@ def test_newton_in_place_of_kgf_while_holding_is_told_by_the_factor() -> None:
     assert "is what N read as kgf looks like (A303)" in said
 
 
+def test_air_that_fails_under_a_voltage_is_told_though_friction_keeps_the_tool_in_contact() -> None:
+    """HOLDING at 1 N of 24 was all that anybody was told, for good."""
+    bench = holding(Measured(seed=1))
+    bench.voltage(3.0)
+    bench.run(1.0)
+    assert bench.last.state is State.HOLDING and not bench.last.status & StatusBit.TARGET_UNREACHABLE
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 1.0)  # what friction keeps
+    bench.plant.air = False
+    said = told(bench)
+    assert bench.last.status & StatusBit.CONTACT
+    assert "0 kPa measured, 270 kPa expected: no air, or a closed valve" in said
+
+
 def test_without_a_pressure_what_was_right_before_counts_and_no_more_is_claimed() -> None:
     bench = holding(Bench(seed=5))
     bench.plant.air = False
