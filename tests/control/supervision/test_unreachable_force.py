@@ -200,6 +200,25 @@ def test_a_machine_that_is_stronger_than_its_calibration_is_not_missing_air() ->
     assert "supply" not in said
 
 
+def test_a_band_that_is_narrower_than_any_force_stands_is_no_matter_of_air() -> None:
+    """1 in the register for 1 N is 0.01 N: 20.0 N of 20 N were called a supply pressure that is too low."""
+    bench = Measured(seed=1)
+    bench.run(0.3)
+    bench.enable(20.0, in_band_tolerance_n=0.01)
+    said = told(bench)
+    assert "N off: in_band_tolerance is too small" in said and "supply" not in said and "calibration" not in said
+
+
+@pytest.mark.parametrize(
+    ("measured_n", "is_near"), [(9.71, True), (9.69, False), (10.29, True), (10.31, False), (nan, False)]
+)
+def test_only_what_is_next_to_its_target_is_blamed_on_the_band(measured_n: float, is_near: bool) -> None:
+    seen = Evidence(voltage_v=1.0, measured_n=measured_n, expected_n=10.0, target_n=10.0)
+    assert ("in_band_tolerance" in unreachable_words(seen)) is is_near
+    low = replace(seen, measured_n=0.9, target_n=1.0)
+    assert "in_band_tolerance" not in unreachable_words(low), "so little may be noise, or friction without air"
+
+
 @pytest.mark.parametrize(("voltage_v", "is_lowest"), [(0.0, True), (0.4, False)])
 def test_what_friction_keeps_at_no_voltage_need_not_be_another_unit(voltage_v: float, is_lowest: bool) -> None:
     seen = Evidence(voltage_v=voltage_v, measured_n=9.6, expected_n=0.5, target_n=3.0, is_lowest=is_lowest)
