@@ -175,6 +175,11 @@ class ForceLoop:
         return self._settling.in_band
 
     @property
+    def holds_force(self) -> bool:
+        """Decide the same of a force: in voltage mode the voltage is what is held."""
+        return self._settling.holds_force
+
+    @property
     def unreachable(self) -> bool:
         """Decide whether the setpoint cannot be reached."""
         return self._settling.unreachable

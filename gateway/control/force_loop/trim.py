@@ -27,8 +27,14 @@ SEEN_SAMPLES: Final = 3  # the same, of a slow one
 CALM_S: Final = 3.0  # so long between two of them, and it is not the trim that swings
 FREE_SWINGS: Final = 3  # what a step, or a workpiece, may make of it
 LEAST_PACE: Final = 0.02
-LEARNING: Final = (LimitedBy.NONE, LimitedBy.TRIM_RANGE, LimitedBy.VOLTAGE_RANGE, LimitedBy.CALIBRATION_RANGE)
-"""Limits at which a trim may learn, but away from its `blocked_way`."""
+LEARNING: Final = (
+    LimitedBy.NONE,
+    LimitedBy.TRIM_RANGE,
+    LimitedBy.VOLTAGE_RANGE,
+    LimitedBy.CALIBRATION_RANGE,
+    LimitedBy.FORCE_RANGE,
+)
+"""Limits at which a trim may learn, but away from its `blocked_way`. That of the setpoint leaves the voltage free."""
 
 
 def blocked_way(limited_by: LimitedBy, trim_v: float, *, is_lowest: bool, is_low: bool) -> int:

@@ -23,6 +23,8 @@ _RAMP_LATE_S: Final = 0.5  # ... and what the ramp gains in this time: lags that
 _SMOOTHING_S: Final = 0.3  # of the force that is called missed
 _NOISY_S: Final = 5.0  # beyond the in-band time, with the mean inside and nothing settled
 _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
+_LEAST_SHARE: Final = 0.3  # of the expected force: less is no answer, though friction may keep the tool in contact, ...
+_SLACK_N: Final = 1.0  # ... but for so much, which zero and noise may hide
 
 
 class InBandTimer:
@@ -79,8 +81,13 @@ class SettlingCheck:
         return self._band.in_band
 
     @property
+    def holds_force(self) -> bool:
+        """Decide whether what is in band is a force, and not a voltage."""
+        return self._band.in_band and self._driven_v is None
+
+    @property
     def unreachable(self) -> bool:
-        """Decide whether the target has been missed, or the cell silent in voltage mode, for too long."""
+        """Decide whether the target has been missed, or a voltage has made no force, for too long."""
         return self._band.unreachable or self._answer.unreachable
 
     def retime(self, unreachable_s: float) -> None:
@@ -139,7 +146,9 @@ class SettlingCheck:
         """Return the event of a step in voltage mode. is_slewing: the output is still on its way.
 
         A lower voltage is out at once: what was held before has not been held at this one."""
-        answered = is_slewing or inputs.touching or inputs.expected_n < _ANSWER_N
+        least_n = _LEAST_SHARE * inputs.expected_n - _SLACK_N
+        is_felt = inputs.touching and inputs.reading.contact_n >= least_n
+        answered = is_slewing or is_felt or inputs.expected_n < _ANSWER_N
         self._answer.update(inputs.now_s, answered, inf)
         if is_slewing or demand.voltage_v != self._driven_v:
             self._driven_v = demand.voltage_v

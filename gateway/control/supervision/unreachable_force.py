@@ -19,6 +19,8 @@ _FRICTION_N: Final = 2.0  # what friction may hold beside it, where the true for
 _TIMES: Final = 3.0
 _LEAST_N: Final = 0.3  # less is noise and zero
 _LEAST_TOLD_N: Final = 0.15  # from here on it is told beside the likelier cause
+_NEAR_N: Final = 0.3  # off the target by less is what count, noise and a trim's dead zone leave, ...
+_PRESSED_N: Final = 1.0  # ... of a force from here on
 _SILENT_SHARE: Final = 0.25
 _LITTLE, _ENOUGH = 0.5, 0.7  # of the pressure that was seen at this voltage while the force was right
 _VERY_LITTLE, _PLENTY = 0.2, 0.5  # of what the ranges of the device say
@@ -45,6 +47,11 @@ class Evidence:
     def is_too_much(self) -> bool:
         """Decide whether the force is above the target."""
         return self.measured_n > self.target_n
+
+    @property
+    def is_near(self) -> bool:
+        """Decide whether so little is missing or too much that the band is what keeps it from being in band."""
+        return self.measured_n >= _PRESSED_N and abs(self.measured_n - self.target_n) <= _NEAR_N
 
     @property
     def _pressure_share(self) -> float:
@@ -95,6 +102,9 @@ class Evidence:
 def unreachable_words(evidence: Evidence) -> str:
     """Return what it probably is, and one thing to do."""
     pressure = _pressure(evidence)
+    if evidence.is_near and not evidence.no_air:
+        off_n = abs(evidence.measured_n - evidence.target_n)
+        return f"only {off_n:.2f} N off: in_band_tolerance is too small, or in other units"
     if evidence.is_too_much and (evidence.is_lowest or not evidence.looks_like_another_unit):
         return _too_much_words(evidence)
     if evidence.no_air:

@@ -139,6 +139,17 @@ def test_a_voltage_is_unanswered_where_a_force_is_expected_and_nothing_is_felt(
     assert not check.unreachable, "in force mode the voltage is not what is asked for"
 
 
+@pytest.mark.parametrize(("contact_n", "is_unreachable"), [(6.1, True), (6.3, False), (24.0, False)])
+def test_a_voltage_is_unanswered_where_friction_alone_keeps_the_tool_in_contact(
+    contact_n: float, is_unreachable: bool
+) -> None:
+    check = SettlingCheck(UNREACHABLE_S)
+    for now_s in (0.0, UNREACHABLE_S):
+        check.judge_voltage(demand(), at(now_s, contact_n, expected_n=24.0), is_slewing=False)
+    assert check.unreachable is is_unreachable
+    assert check.in_band and not check.holds_force
+
+
 def test_a_restart_forgets_both_waits() -> None:
     check = SettlingCheck(UNREACHABLE_S)
     for now_s in (0.0, UNREACHABLE_S):

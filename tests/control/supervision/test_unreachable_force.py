@@ -83,6 +83,19 @@ def test_newton_in_place_of_kgf_while_holding_is_told_by_the_factor() -> None:
     assert "is what N read as kgf looks like (A303)" in said
 
 
+def test_air_that_fails_under_a_voltage_is_told_though_friction_keeps_the_tool_in_contact() -> None:
+    """HOLDING at 1 N of 24 was all that anybody was told, for good."""
+    bench = holding(Measured(seed=1))
+    bench.voltage(3.0)
+    bench.run(1.0)
+    assert bench.last.state is State.HOLDING and not bench.last.status & StatusBit.TARGET_UNREACHABLE
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 1.0)  # what friction keeps
+    bench.plant.air = False
+    said = told(bench)
+    assert bench.last.status & StatusBit.CONTACT
+    assert "0 kPa measured, 270 kPa expected: no air, or a closed valve" in said
+
+
 def test_without_a_pressure_what_was_right_before_counts_and_no_more_is_claimed() -> None:
     bench = holding(Bench(seed=5))
     bench.plant.air = False
@@ -185,6 +198,25 @@ def test_a_machine_that_is_stronger_than_its_calibration_is_not_missing_air() ->
     said = told(bench)
     assert "more than the 30.0 N that are wanted: trim at its limit or calibration off" in said
     assert "supply" not in said
+
+
+def test_a_band_that_is_narrower_than_any_force_stands_is_no_matter_of_air() -> None:
+    """1 in the register for 1 N is 0.01 N: 20.0 N of 20 N were called a supply pressure that is too low."""
+    bench = Measured(seed=1)
+    bench.run(0.3)
+    bench.enable(20.0, in_band_tolerance_n=0.01)
+    said = told(bench)
+    assert "N off: in_band_tolerance is too small" in said and "supply" not in said and "calibration" not in said
+
+
+@pytest.mark.parametrize(
+    ("measured_n", "is_near"), [(9.71, True), (9.69, False), (10.29, True), (10.31, False), (nan, False)]
+)
+def test_only_what_is_next_to_its_target_is_blamed_on_the_band(measured_n: float, is_near: bool) -> None:
+    seen = Evidence(voltage_v=1.0, measured_n=measured_n, expected_n=10.0, target_n=10.0)
+    assert ("in_band_tolerance" in unreachable_words(seen)) is is_near
+    low = replace(seen, measured_n=0.9, target_n=1.0)
+    assert "in_band_tolerance" not in unreachable_words(low), "so little may be noise, or friction without air"
 
 
 @pytest.mark.parametrize(("voltage_v", "is_lowest"), [(0.0, True), (0.4, False)])

@@ -9,7 +9,7 @@ from gateway.control import Controller
 from gateway.control.compensation.compensation import Compensation, OutsideForce
 from gateway.control.inputs import CalibrationInUse
 from gateway.control.valve.pull_model import scale_forces
-from gateway.registers.words import ControlBit, State
+from gateway.registers.words import ControlBit, LimitedBy, State
 from tests.control.bench import bsfm
 from tests.control.valve.valve_bench import BIT_4, ENABLE, PULL, SHARE, ValveBench
 
@@ -79,3 +79,13 @@ def test_what_happens_when_a_pull_turns_round_is_that_of_pushing_by_the_share_of
     assert isinstance(pull.reversal, LinearBlend)
     assert pull.reversal.span_n == pytest.approx(SHARE * 6.0)
     assert pull.limits_n == pytest.approx((SHARE * 2.0, SHARE * 40.0))
+
+
+def test_a_pull_that_a_calibration_has_lowered_is_trimmed_as_any_other() -> None:
+    """Nobody asks less of the voltage than what the calibration says: only the setpoint is bounded."""
+    bench = ValveBench().pulling(15.0)
+    bench.controller.use(CalibrationInUse(replace(bsfm(), limits_n=(0.0, 14.0)), 2))
+    bench.run(3.0)
+    assert bench.last.limited_by is LimitedBy.FORCE_RANGE and bench.last.force_accepted_n == SHARE * 14.0
+    assert bench.plant.force_n == pytest.approx(SHARE * 14.0, abs=0.5)
+    assert bench.last.state is State.HOLDING
