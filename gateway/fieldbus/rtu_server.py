@@ -24,6 +24,9 @@ from gateway.modbus.server import DataBank, answer
 from gateway.ports import PacedPty, PortError, PortEvents, SerialPort
 from gateway.ports.port import monotonic_s
 
+STANDSTILL_S: Final = 0.5
+"""So long a process stands still that who asked before has given up: on a bus the answer would be taken for the next one's."""
+_AFTERMATH_S: Final = 0.05  # behind it what has waited is read, and its silence awaited
 _REPORT_PERIOD_S: Final = 60.0
 _WRONG_LINE_BYTES: Final = 24  # three requests' worth without one that can be read: the line is set otherwise
 
@@ -58,6 +61,7 @@ class ModbusRtuServer:
         self._noise = _NoiseReport(str(serial))
         self._timer: asyncio.TimerHandle | None = None
         self._due_s = 0.0
+        self._mute_until_s = 0.0
         self._was_lost = False
         events = PortEvents(self._on_bytes, self._on_lost, self._on_open, self._on_refused, self._on_restored)
         self.port = SerialPort(settings.path, serial, events) if settings.path else None
@@ -139,8 +143,14 @@ class ModbusRtuServer:
             self._due_s, delay_s = deadline_s, max(0.0, deadline_s - now_s)
             self._timer = asyncio.get_running_loop().call_later(delay_s, self._on_time)
 
+    def note_standstill(self) -> None:
+        """Answer nothing that may have waited through a standstill; it is executed all the same, a stop may be in it."""
+        self._mute_until_s = monotonic_s() + _AFTERMATH_S
+
     def _on_time(self) -> None:
         self._timer = None
+        if monotonic_s() - self._due_s > STANDSTILL_S:
+            self.note_standstill()
         for request in self._receiver.take(monotonic_s()):
             self._execute(request)
         now_s = monotonic_s()
@@ -150,7 +160,8 @@ class ModbusRtuServer:
 
     def _execute(self, request: RtuRequest) -> None:
         pdu = answer(request.pdu, self._bank, self.settings.peer)
-        if not request.is_answered or self._backlog_bytes > LONGEST_ADU:
+        is_late = monotonic_s() < self._mute_until_s
+        if not request.is_answered or is_late or self._backlog_bytes > LONGEST_ADU:
             return
         frame = encode_adu(request.unit, pdu)
         if self.port:

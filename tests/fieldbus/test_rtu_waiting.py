@@ -7,10 +7,11 @@ import pytest
 
 from gateway.devices import SerialSettings
 from gateway.fieldbus import ModbusRtuServer, RtuSettings, rtu_server
+from gateway.fieldbus.rtu_server import STANDSTILL_S
 from gateway.modbus import Peer
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.rtu import encode_adu
-from gateway.modbus.rtu_receiver import silence_s
+from gateway.modbus.rtu_receiver import RtuRequest, silence_s
 from tests.fieldbus.conftest import NotingBank
 
 LINE = SerialSettings(baud=115200)
@@ -18,30 +19,76 @@ READ = P.read_request(3, 10, 2)
 NOISE = b"\x03\x03\x00"
 
 
-def test_a_request_soon_behind_noise_is_answered_after_its_own_silence(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Noise that may be the beginning of a frame is waited for by 20 ms; the request behind it waited as long."""
-    now_s, timers = 0.0, list[tuple[float, Any]]()
+class Scene:
+    """A face whose loop and clock are the test's, with what it has executed and sent."""
 
-    class Loop:
-        def call_later(self, delay_s: float, callback: Any) -> Any:
-            timer = (now_s + delay_s, callback)
-            timers.append(timer)
-            return SimpleNamespace(cancel=lambda: timers.remove(timer))
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_s = 100.0
+        self.timers = list[tuple[float, Any]]()
+        self.executed = list[tuple[float, bytes]]()
+        self.sent = list[tuple[float, bytes]]()
+        monkeypatch.setattr(rtu_server.asyncio, "get_running_loop", lambda: self)
+        monkeypatch.setattr(rtu_server, "monotonic_s", lambda: self.now_s)
+        settings = RtuSettings("/dev/serial/none", LINE, unit=3, peer=Peer("serial:1"))
+        self.server = ModbusRtuServer(NotingBank(), settings, on_peer_closed=lambda _: None, log=lambda *_: None)
+        execute = self.server._execute
 
-    monkeypatch.setattr(rtu_server.asyncio, "get_running_loop", Loop)
-    monkeypatch.setattr(rtu_server, "monotonic_s", lambda: now_s)
-    settings = RtuSettings("/dev/serial/none", LINE, unit=3, peer=Peer("serial:1"))
-    server = ModbusRtuServer(NotingBank(), settings, on_peer_closed=lambda _: None, log=lambda *_: None)
-    executed = list[tuple[float, bytes]]()
-    monkeypatch.setattr(server, "_execute", lambda request: executed.append((now_s, request.pdu)))
-    chunks = [(0.0, NOISE), (0.01, encode_adu(3, READ)), (0.02, encode_adu(3, READ))]
-    while chunks or timers:
-        if timers and (not chunks or timers[0][0] < chunks[0][0]):
-            now_s, callback = timers.pop(0)
+        def note(request: RtuRequest) -> None:
+            self.executed.append((self.now_s, request.pdu))
+            execute(request)
+
+        monkeypatch.setattr(self.server, "_execute", note)
+        write = SimpleNamespace(write=lambda data: self.sent.append((self.now_s, data)), unsent_bytes=0, path="none")
+        monkeypatch.setattr(self.server, "port", write)
+
+    def call_later(self, delay_s: float, callback: Any) -> Any:
+        timer = (self.now_s + delay_s, callback)
+        self.timers.append(timer)
+        assert len(self.timers) == 1
+        return SimpleNamespace(cancel=lambda: self.timers.remove(timer))
+
+    def run(self, until_s: float) -> None:
+        """Call what is due until then."""
+        while self.timers and self.timers[0][0] <= until_s:
+            due_s, callback = self.timers.pop(0)
+            self.now_s = max(self.now_s, due_s)
             callback()
-        else:
-            now_s, data = chunks.pop(0)
-            server._on_bytes(data, now_s)
-        assert len(timers) <= 1
+        self.now_s = until_s
+
+    def hear(self, *data: bytes) -> None:
+        """Let each arrive, 10 ms apart."""
+        for chunk in data:
+            self.server._on_bytes(chunk, self.now_s)
+            self.run(self.now_s + 0.01)
+
+
+@pytest.fixture
+def scene(monkeypatch: pytest.MonkeyPatch) -> Scene:
+    return Scene(monkeypatch)
+
+
+def test_a_request_soon_behind_noise_is_answered_after_its_own_silence(scene: Scene) -> None:
+    """Noise that may be the beginning of a frame is waited for by 20 ms; the request behind it waited as long."""
+    scene.hear(NOISE, encode_adu(3, READ), encode_adu(3, READ))
     silent_s = silence_s(LINE.baud, LINE.character_s)
-    assert executed == [(pytest.approx(begin_s + silent_s), READ) for begin_s in (0.01, 0.02)]
+    assert scene.executed == [(pytest.approx(begin_s + silent_s), READ) for begin_s in (100.01, 100.02)]
+    assert len(scene.sent) == 2
+
+
+@pytest.mark.parametrize(("stood_s", "answers"), [(STANDSTILL_S - 0.1, 1), (STANDSTILL_S + 0.1, 0)])
+@pytest.mark.parametrize("is_read", [True, False])
+def test_who_asked_before_a_standstill_is_not_answered_behind_it(
+    scene: Scene, stood_s: float, answers: int, is_read: bool
+) -> None:
+    """It has given up: its next question would have this answer. is_read: before, or it has waited in the port."""
+    if is_read:
+        scene.server._on_bytes(encode_adu(3, READ), scene.now_s)
+    scene.now_s += stood_s
+    if not is_read:
+        scene.server._on_bytes(encode_adu(3, READ), scene.now_s)
+        if answers == 0:
+            scene.server.note_standstill()  # as the loop's tick tells
+    scene.run(scene.now_s + 0.1)
+    assert (len(scene.executed), len(scene.sent)) == (1, answers)
+    scene.hear(encode_adu(3, READ))
+    assert len(scene.sent) == answers + 1

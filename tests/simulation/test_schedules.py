@@ -186,6 +186,7 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(3.4592, "rival", "hold", (31.12,)),
         ],
     ),
+    (100498, [Event(19.3475, "rival", "hold", (55.26,)), Event(19.8816, "machine", "freeze", (1.1745,))]),
     (5017, [Event(4.2694, "worker", "ask", (0,), b"\x10\x00\t\x00\x01\x02\x00!")]),
     (
         11927,

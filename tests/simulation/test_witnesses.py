@@ -90,6 +90,17 @@ def test_of_answers_that_come_together_nobody_knows_which_is_the_older(
     assert [line.partition(" at ")[0] for line in observer.broken] == ["I4"] * is_broken
 
 
+@pytest.mark.parametrize(("reset_s", "is_broken"), [(1.05, False), (0.5, True)])
+def test_a_fault_that_goes_without_a_reset_is_seen_however_late_it_is_read(
+    observer: Observer, reset_s: float, is_broken: bool
+) -> None:
+    observer.note_accepted(2, reset_s)
+    for state, fault, read_s in ((4, 1, 1.0), (0, 0, 1.5)):  # a standstill between
+        words = [0, state, *[0] * 8, fault, *[0] * (STATUS_WORDS - 11)]
+        observer.note_status(struct.pack(f">2x{STATUS_WORDS}H", *words), read_s)
+    assert [line.partition(" at ")[0] for line in observer.broken] == ["I5"] * is_broken
+
+
 HELD_N = 20.0
 
 

@@ -175,19 +175,14 @@ class ForceLoop:
         return self._settling.in_band
 
     @property
-    def holds_force(self) -> bool:
-        """Decide the same of a force: in voltage mode the voltage is what is held."""
-        return self._settling.holds_force
+    def settling(self) -> SettlingCheck:
+        """Return what decides whether a force has settled, and why it has not."""
+        return self._settling
 
     @property
     def unreachable(self) -> bool:
         """Decide whether the setpoint cannot be reached."""
         return self._settling.unreachable
-
-    @property
-    def is_noisy(self) -> bool:
-        """Decide whether nothing settles for single readings that leave the band."""
-        return self._settling.is_noisy
 
     def elapse(self, dt_s: float, line: LineStatus) -> None:
         """Advance the models: dt_s has passed with the present voltage on the output, whoever drives it. The model of the lags

@@ -45,8 +45,8 @@ class OneShotEvents:
 
     def movement_events(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> tuple[str, str, str]:
         """Return what a step in force or voltage mode is the first to show. measured_n: contact force, smoothed."""
-        noisy = "" if self._has_told_noise or not loop.is_noisy else noisy_sentence(loop.applied_n)
-        self._has_told_noise = self._has_told_noise or loop.is_noisy
+        noisy = "" if self._has_told_noise or not loop.settling.is_noisy else noisy_sentence(loop.applied_n)
+        self._has_told_noise = self._has_told_noise or loop.settling.is_noisy
         return self.unreachable_event(loop, measured_n, inputs), self.hunting_event(loop), noisy
 
     def unreachable_event(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> str:
@@ -55,7 +55,7 @@ class OneShotEvents:
         is_unreachable = loop.unreachable
         is_first, self._was_unreachable = is_unreachable and not self._was_unreachable, is_unreachable
         sentence = self._unreachable_sentence(loop, measured_n, inputs.expected_n) if is_first else ""
-        if loop.holds_force and inputs.touching:
+        if loop.settling.holds_force and inputs.touching:
             self._learn(loop.voltage_v)
         return sentence
 

@@ -285,6 +285,7 @@ class RunningRig:
 
     def _on_tick(self, expirations: int, late_s: float) -> None:
         self.loop.on_tick(expirations, late_s)
+        self._faces.note_tick(expirations / self._rig.loop_hz + late_s)
         self._watchdogs.follow(watchdog_word(self._rig, self._ports, self._line))
         now_s = time.monotonic()
         self._guardian.heartbeat(now_s)

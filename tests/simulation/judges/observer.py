@@ -82,6 +82,7 @@ class Observer:
     _begun_s: float = 0.0
     _pressing_s: float = 0.0
     _fault: int | None = None
+    _fault_s: float = 0.0  # when it was read: over a standstill long before now
     _reset_s: float = -1.0
     _unheard_s: float = -1.0
     _enabled_s: float = -1.0
@@ -178,12 +179,15 @@ class Observer:
         state, fault = words[1], words[10]
         if state == FAULT and not fault:
             self.complain("I11", "a fault without a cause", now_s)
-        if self._fault and now_s - self._reset_s > 0.2:
+        if self._fault and self._fault_s - self._reset_s > 0.2:
             if state != FAULT:
                 self.complain("I5", f"fault {self._fault} is gone without a reset", now_s)
             elif fault != self._fault:
                 self.complain("I11", f"fault {self._fault} became {fault}", now_s)
-        self._fault = fault if state == FAULT else None  # in OFF it says why control was started again
+        self._fault, self._fault_s = (
+            fault if state == FAULT else None,
+            now_s,
+        )  # in OFF it says why control was started again
 
     def note_death(self, now_s: float, until_s: float) -> None:
         """Control has died: the next one begins in OFF, and shows why it was started. until_s: as in `note_cut`."""

@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any
 
 from gateway.fieldbus import ModbusRtuServer, ModbusTcpServer, ModbusTlsServer, RtuSettings, TlsSettings
+from gateway.fieldbus.rtu_server import STANDSTILL_S
 from gateway.modbus import Peer, Role
 from gateway.ports import PortError, SerialPort
 from gateway.processes import exit_codes
@@ -115,6 +116,12 @@ class Faces:
         placed = enumerate(self._rig.fieldbus, start=1)
         secure = ((str(place), face) for place, face in placed if isinstance(face, TlsFace))
         return [*plain, *(("tls", partial(self._serve_tls, place, face)) for place, face in secure)]
+
+    def note_tick(self, since_s: float) -> None:
+        """Note how long ago the tick before this one was due, s: behind a standstill a bus is not answered what waited."""
+        if since_s > STANDSTILL_S:
+            for face in self._serial:
+                face.note_standstill()
 
     async def _serve_tcp(self, bind: list[Any] | None) -> ServedFace:
         assert self._tcp
