@@ -63,7 +63,7 @@ class Controller:
         self._loop = ForceLoop(settings, model, compensation.timing)
         self._faults = FaultDetector(settings)
         self._faults.expect_noise(calibration.noise_n)
-        self._conditioner = SampleConditioner(settings.supervision, compensation.cell)
+        self._conditioner = SampleConditioner(settings.supervision, compensation.cell, is_behind_death=unclean_restart)
         self._turning = Turning(self._valve, self._commands, self._conditioner, settings, model)
         self._checks = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self.most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)

@@ -46,9 +46,9 @@ class SampleConditioner:
     """Turns samples into readings; a sample given twice is not new the second time. direction: -1 where the tool pulls, so that
     a pull is a positive force in all that follows."""
 
-    def __init__(self, supervision: Supervision, cell: CellMap | None = None) -> None:
-        """cell: its known defects; None: the reading is the force."""
-        self._zero = Zero(supervision)
+    def __init__(self, supervision: Supervision, cell: CellMap | None = None, *, is_behind_death: bool = False) -> None:
+        """cell: its known defects; None: the reading is the force; is_behind_death: as of `Zero`."""
+        self._zero = Zero(supervision, is_behind_death=is_behind_death)
         self._cell = cell
         self._saturation_n = supervision.saturation_n
         self._timeout_s = supervision.sample_timeout_s

@@ -3,7 +3,8 @@
 Allowed only while nothing presses on purpose: output off, or enabled with setpoint 0; and only on a steady, usable
 signal, so that a force that is still decaying cannot become the zero. The payload's weight is added first: after a tare
 the contact force reads 0 at the present tilt, and a later tilt is still compensated. A restart forgets the zero:
-only coefficients are restored.
+only coefficients are restored. Where the process before has died, what it pressed with may still be leaving: during the dead
+time it stands as steady as a zero, so any but a small reading is waited for.
 """
 
 from collections import deque
@@ -18,22 +19,26 @@ _APART_S: Final = 0.0075  # of a faster one the samples of so long are one readi
 _FEWEST: Final = 5
 _DEVIATION: Final = 1.4826 / 2.0**0.5  # times the median step between neighbours: the standard deviation of white noise
 _NOISE_RANGE: Final = 7.0  # standard deviations, which it stays within
+_LEAVING_LAGS: Final = 5.0  # response lags behind the start, until what pressed before it has gone
 _LARGEST_SHARE: Final = 0.5  # of the saturation: a zero beyond it leaves no range to measure
 
 
 class Zero:
     """Collects cell forces as converted (before tare); `zero_n` is what is subtracted from them."""
 
-    def __init__(self, supervision: Supervision) -> None:
+    def __init__(self, supervision: Supervision, *, is_behind_death: bool = False) -> None:
+        """is_behind_death: the process before has not ended in order."""
         self.zero_n = 0.0
         self._recent_n: deque[float] = deque(maxlen=_WINDOW)
         self._since_s = self._sum_n = 0.0
         self._samples = 0
         self.largest_spread_n = max(5.0 * supervision.sample_quantum_n, 0.5)
         self._largest_n = _LARGEST_SHARE * supervision.saturation_n
+        self._may_leave_s = _LEAVING_LAGS * supervision.response_lag_s if is_behind_death else 0.0
 
     def observe(self, force_n: float, interval_s: float = _APART_S) -> None:
         """Keep one more usable sample, N. interval_s: since the one before."""
+        self._may_leave_s -= interval_s
         self._since_s, self._sum_n, self._samples = self._since_s + interval_s, self._sum_n + force_n, self._samples + 1
         if self._since_s >= _APART_S:
             self._recent_n.append(self._sum_n / self._samples)
@@ -58,6 +63,9 @@ class Zero:
         spread_n, mean_n = max(recent) - min(recent), self._mean_n()
         if spread_n > self.largest_spread_n and not self._is_noise(spread_n):
             return f"force not steady: {spread_n:.2f} N between samples, allowed {self.largest_spread_n:.2f} N"
+        if self._may_leave_s > 0.0 and abs(mean_n + gravity_n) > self.largest_spread_n:
+            left_s = max(0.1, self._may_leave_s)
+            return f"{mean_n:.1f} N, which may have been pressed before this start and still leave: wait {left_s:.1f} s"
         if abs(mean_n + gravity_n) > self._largest_n:
             return f"{mean_n:.1f} N at rest, allowed {self._largest_n:.0f} N: stuck in contact or wrong cell"
         return ""

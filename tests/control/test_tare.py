@@ -6,11 +6,11 @@ from random import Random
 import pytest
 
 from gateway.codes.faults import FaultCode
-from gateway.control import LineStatus
+from gateway.control import CalibrationInUse, Controller, LineStatus
 from gateway.control.settings import Supervision
 from gateway.control.tare import Zero
 from gateway.registers.words import ControlBit, LimitedBy, State
-from tests.control.bench import Bench, settings
+from tests.control.bench import Bench, bsfm, settings
 
 
 def enabled(control=None, **plant) -> Bench:
@@ -65,6 +65,36 @@ def test_a_tare_under_force_is_refused():
     assert bench.refused and "V are out: disable the output or set the force to 0 first" in bench.refused.text
     assert output.events == ()
     assert bench.run(0.1).force_measured_n == pytest.approx(12.0, abs=1.0)
+
+
+@pytest.mark.parametrize("has_died", [True, False])
+def test_what_a_process_that_died_has_pressed_is_no_zero_though_it_stands_for_its_dead_time(has_died):
+    """A tare 0.1 s behind a restart took 39.9 N as zero; up to 15 N nothing told later, and each force was so much more."""
+    bench = Bench()
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1), unclean_restart=has_died)
+    taken = []
+    for rest_n, wait_s in ((6.0, 0.1), (1.0, 1.0)):
+        bench.alter_sample = lambda sample, rest_n=rest_n: replace(sample, force_n=sample.force_n + rest_n)
+        bench.run(wait_s)
+        bench.write(control_word=ControlBit.TARE)
+        taken.append(round(bench.controller.zero_n))
+    assert taken == ([0, 1] if has_died else [6, 1])
+
+
+def test_behind_a_death_a_reading_of_nothing_is_a_zero_at_once_and_any_once_all_has_left():
+    bench = Bench()
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1), unclean_restart=True)
+    bench.run(0.1)
+    bench.write(control_word=ControlBit.TARE)
+    assert bench.refused is None
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 6.0)
+    lag_s = bench.settings.supervision.response_lag_s
+    bench.run(5.0 * lag_s - 0.15)
+    bench.write(control_word=ControlBit.TARE)
+    assert bench.refused and "may have been pressed before this start and still leave: wait 0.1 s" in bench.refused.text
+    bench.run(0.1)
+    bench.write(control_word=ControlBit.TARE)
+    assert bench.refused is None and bench.controller.zero_n == pytest.approx(6.0, abs=0.2)
 
 
 def test_a_tare_of_a_decaying_force_is_refused():
