@@ -46,7 +46,8 @@ class Situation:
     machine, where that is the cause of it, or what the valve does; line_fault: what the output line reports, with its code;
     is_output_known: that the output answers, so that its voltage is ours; is_output_heard: that it answers at all;
     is_lowest: no less voltage can be out;
-    expected_n: force that the voltages of late still make, by the model; repeats: that the load cell seems to be frozen;
+    expected_n: force that the voltages of late still make, or one that the output may have kept, by the model;
+    repeats: that the load cell seems to be frozen;
     ramps_down: the force goes to 0, and then the output off."""
 
     now_s: float
@@ -94,7 +95,7 @@ class Readiness:
             voltage_v=loop.voltage_v,
             is_lowest=loop.is_lowest,
             applied_n=loop.applied_n,
-            expected_n=loop.compute_expected_rise(),
+            expected_n=max(loop.compute_expected_rise(), loop.left.rise_n),
             repeats=self._parts.faults.repeats,
             ramps_down=machine.is_ramping_down or machine.is_stopping,
         )

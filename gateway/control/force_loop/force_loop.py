@@ -28,7 +28,7 @@ from gateway.control.state_table import StateEvent
 from gateway.control.supervision.fault_detection import StopCause, stop_cause
 from gateway.control.supervision.in_band import SettlingCheck
 from gateway.control.supervision.leaping_readings import LeapCheck
-from gateway.control.supervision.plausibility import ExpectedForce
+from gateway.control.supervision.plausibility import ExpectedForce, LeftForce
 from gateway.registers.words import LimitedBy, Mode
 
 Moved: TypeAlias = StateEvent | StopCause
@@ -51,6 +51,7 @@ class ForceLoop:
         self._tune(settings, model)
         self.feedforward = Feedforward(model, settings.limits, *self._course(settings))
         self.expected = ExpectedForce(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
+        self.left = LeftForce(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
         self._limiter = VoltageLimiter(settings.limits)
         self.feedforward_v = 0.0
         self.limited_by = LimitedBy.NONE
@@ -74,6 +75,7 @@ class ForceLoop:
         self.expected.retime(settings.supervision.response_lag_s)
         self._settling.retime(settings.supervision.unreachable_s)
         self.expected.use(model)
+        self.left.use(model, settings.supervision.response_lag_s)
         if not is_same or self._is_retimed:
             self._is_retimed = False
             self._retime(model, settings, given_n)
@@ -192,6 +194,7 @@ class ForceLoop:
         if isinstance(self._lead, LinearizedLagInverse):
             self._lead.set_wire_time(line.wire_s)
         self.expected.advance(self.voltage_v, dt_s)
+        self.left.advance(self.voltage_v, line, dt_s)
 
     def rest(self) -> None:
         """Go to the safe voltage at once and forget everything learned: disabled."""

@@ -17,6 +17,7 @@ from typing import Final
 
 from gateway.bsfm import Bsfm
 from gateway.codes.faults import FaultCode
+from gateway.control.inputs import LineStatus
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.leaping_readings import LeapLimit
 
@@ -92,6 +93,31 @@ class ExpectedForce:
     def width_n(self) -> float:
         """Force that friction alone can explain, N."""
         return abs(self.falling_n - self.rising_n)
+
+
+class LeftForce:
+    """Force that still leaves, at most, by what may stand on the output. A device that hears nothing may keep its voltage:
+    what is wanted of it meanwhile takes no force away."""
+
+    def __init__(self, model: Bsfm, lag_s: float, rest_v: float) -> None:
+        self._rest_v = self._may_stand_v = self._lagged_v = rest_v
+        self.use(model, lag_s)
+
+    def use(self, model: Bsfm, lag_s: float) -> None:
+        """Expect by another model and its lag, s, from now on; the lagged voltage stays."""
+        self._model, self._lag_s = model, lag_s
+
+    def advance(self, wanted_v: float, line: LineStatus, dt_s: float) -> None:
+        """Advance the model by dt_s. Of a line that tells nothing of its settings what is wanted stands."""
+        tells = line.sent_v is not None or line.acknowledged_v is None
+        stands_v = line.standing_v if tells else wanted_v
+        self._may_stand_v = max(self._may_stand_v, wanted_v) if stands_v is None else stands_v
+        self._lagged_v += (self._may_stand_v - self._lagged_v) * dt_s / (self._lag_s + dt_s)
+
+    @property
+    def rise_n(self) -> float:
+        """Above the force at rest, N."""
+        return self._model.force_n(self._lagged_v, 1.0) - self._model.force_n(self._rest_v, 1.0)
 
 
 class RiseCheck:

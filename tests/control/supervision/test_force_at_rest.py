@@ -3,6 +3,9 @@
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.control import LineStatus
+from gateway.control.supervision.plausibility import LeftForce
+from tests.control.bench import bsfm
 from tests.control.supervision.test_judged_rise import GAIN, RIGHT, Rise
 
 KEPT_N = 6.0  # pressed at rest: of 30 N that are expected too little for a rise, and 1.5 N are a move
@@ -53,3 +56,18 @@ def test_a_tare_moves_the_lowest_force_with_it() -> None:
     rise = Rise(10.0)
     rise.check.shift(-10.0)
     assert rise.at(20.0).judged(2.0) is RIGHT
+
+
+def test_what_may_stand_on_an_output_leaves_from_when_something_else_surely_does() -> None:
+    left, lag_s = LeftForce(bsfm(), 0.1, 0.0), 0.1
+    before_n = bsfm().force_n(4.0, 1.0)
+    for stands_v, wanted_v, share in ((4.0, 4.0, 1.0), (None, 0.0, 1.0), (0.0, 0.0, 0.37), (None, 0.0, 0.14)):
+        line = LineStatus(acknowledged_v=4.0, sent_v=wanted_v, standing_v=stands_v)
+        for _ in range(2000 if share == 1.0 else 100):
+            left.advance(wanted_v, line, 0.01 * lag_s)
+        assert left.rise_n == pytest.approx(share * before_n, rel=0.15)
+    lost = LineStatus(acknowledged_v=None, sent_v=None, standing_v=None)
+    left.advance(4.0, LineStatus(acknowledged_v=4.0, sent_v=4.0, standing_v=4.0), 10.0)
+    kept_n = left.rise_n
+    left.advance(0.0, lost, 10.0)
+    assert left.rise_n >= kept_n, "a port that is away takes no force away"

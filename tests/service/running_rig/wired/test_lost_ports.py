@@ -7,9 +7,11 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.registers import Refusal
 from gateway.registers.words import State
-from tests.service.rigs import demo
+from tests.service.rigs import demo, strict
 from tests.service.running_rig.wired.test_faults import TICK_S, assert_fails_with, assert_heals_after_reset, at_twenty
-from tests.service.wired import ENABLE, Wired
+from tests.service.wired import ENABLE, RESET, Wired
+
+TARE = 4
 
 
 def test_an_unplugged_output_is_a_fault_at_once_and_comes_back_safe() -> None:
@@ -90,3 +92,28 @@ def test_a_short_stall_is_no_fault() -> None:
     wired.stall(0.08)
     wired.run(0.3)
     assert wired.state is State.HOLDING
+
+
+@pytest.mark.parametrize("force_n", [5.0, 12.0])
+def test_what_an_output_has_kept_pressed_while_it_was_away_is_no_zero(force_n: float) -> None:
+    """A regulator that hears nothing keeps its pressure. Back, it is told the safe voltage, and for its dead time the force
+    stands: `reset, tare, enable` took it for the zero, and each force was so much more from then on."""
+    wired = Wired(strict()).pressing(force_n)
+    wired.run(0.5)
+    wired.unplug()
+    wired.run(1.0)
+    assert float(wired.twin.measured_n) > force_n - 1.0
+    wired.replug()
+    wired.until(lambda: is_taken(wired, RESET, heartbeat=7), 2.0)
+    assert float(wired.twin.measured_n) > force_n - 1.0, "it still presses"
+    wired.until(lambda: is_taken(wired, TARE), 2.0)
+    assert abs(wired.controller.zero_n) < 1.5, "what friction keeps"
+
+
+def is_taken(wired: Wired, word: int, heartbeat: int = 0) -> bool:
+    """Written as soon as it is taken."""
+    try:
+        wired.write(0, word, 0, 0, 0, heartbeat)
+    except Refusal:
+        return False
+    return True
