@@ -56,7 +56,7 @@ class ForceLoop:
         self.feedforward_v = 0.0
         self.limited_by = LimitedBy.NONE
         self._approach = Approach()
-        self._settling = SettlingCheck(settings.supervision.unreachable_s)
+        self.settling = SettlingCheck(settings.supervision.unreachable_s)
         self._was_touching = self._has_leapt = False
         self._wanted_v = 0.0
 
@@ -73,7 +73,7 @@ class ForceLoop:
         is_same = model == law.model and settings.timing == self._measured and settings.lead == self._lead_settings
         law.use(model, given_n, self._is_correcting)
         self.expected.retime(settings.supervision.response_lag_s)
-        self._settling.retime(settings.supervision.unreachable_s)
+        self.settling.retime(settings.supervision.unreachable_s)
         self.expected.use(model)
         self.left.use(model, settings.supervision.response_lag_s)
         if not is_same or self._is_retimed:
@@ -174,17 +174,12 @@ class ForceLoop:
     @property
     def in_band(self) -> bool:
         """Decide whether the force has been within the tolerance of the setpoint for the in-band time."""
-        return self._settling.in_band
-
-    @property
-    def settling(self) -> SettlingCheck:
-        """Return what decides whether a force has settled, and why it has not."""
-        return self._settling
+        return self.settling.in_band
 
     @property
     def unreachable(self) -> bool:
         """Decide whether the setpoint cannot be reached."""
-        return self._settling.unreachable
+        return self.settling.unreachable
 
     def elapse(self, dt_s: float, line: LineStatus) -> None:
         """Advance the models: dt_s has passed with the present voltage on the output, whoever drives it. The model of the lags
@@ -202,7 +197,7 @@ class ForceLoop:
         self.feedforward.reset()
         self._trim.reset()
         self._leaps.forget()
-        self._settling.restart()
+        self.settling.restart()
         self._approach, self.feedforward_v, self.limited_by = Approach(), 0.0, LimitedBy.NONE
         self._was_touching = False  # or the next contact, which is still to come, would count as lost
 
@@ -276,7 +271,7 @@ class ForceLoop:
         self.feedforward_v = model_v + push_v  # but for limits, the output is feedforward and trim, and nothing else
         by_stage = self._limiter.drive(wanted_v + push_v)
         self.limited_by = strongest(by_stage, self._trim.limited_by, by_model, demand.force_limited_by)
-        return self._settling.judge_force(demand, inputs, goal_n, law.applied_n)
+        return self.settling.judge_force(demand, inputs, goal_n, law.applied_n)
 
     def _compensated_v(self, wanted_v: float) -> float:
         self._wanted_v = wanted_v
@@ -325,7 +320,7 @@ class ForceLoop:
         self.feedforward.take_over(inputs.expected_n, gravity_n=demand.gravity_n + inputs.outside_n)
         self.feedforward_v = demand.voltage_v
         self.limited_by = self._limiter.drive(demand.voltage_v)
-        return self._settling.judge_voltage(demand, inputs, is_slewing=self.limited_by is LimitedBy.VOLTAGE_SLEW)
+        return self.settling.judge_voltage(demand, inputs, is_slewing=self.limited_by is LimitedBy.VOLTAGE_SLEW)
 
 
 def _fault_of(error: ModelError | NotFiniteError) -> StopCause:
