@@ -62,7 +62,7 @@ class ValveSwitch:
             self.commanded = status.stands
         self._vented_s = min(self._vented_s, now_s) if is_vented else inf
         if wanted is not None and wanted is not self.commanded and self._may_switch(now_s):
-            self.commanded, self._told_s = wanted, now_s
+            self.commanded, self._told_s, self._differs_s = wanted, now_s, inf  # a new order has its own time
         is_confirmed = self.commanded is not None and status.stands is self.commanded
         self._has_been_told = self._has_been_told or is_confirmed or self.order is not None
         is_known = self._has_been_told and status.stands is not None

@@ -32,6 +32,20 @@ def test_a_readback_that_is_wrong_for_less_than_the_bound_is_none_of_its_faults_
     assert faults.index(True) == pytest.approx(650, abs=2) and all(faults[652:])
 
 
+def test_a_valve_that_is_told_to_and_fro_has_its_time_for_each_word() -> None:
+    """Two masters enabled and disabled in turn, on a rig whose valve rests at pull: it follows each word 0.08 s later, and was
+    blamed for standing elsewhere since 0.5 s (W308, A356). Once the last word has stood for so long, it is blamed."""
+    switch, faults = ValveSwitch(ValveControl(pull_area_share=0.75, dwell_s=0.0, timeout_s=0.5)), []
+    told: list[ValveDirection] = []
+    for k in range(400):
+        wanted = PUSH if k >= 300 or k // 8 % 2 else PULL
+        told.append(switch.commanded or PUSH)
+        stands = PULL if k >= 300 else told[max(0, k - 7)]
+        switch.step(0.01 * k, wanted, ValveStatus(stands), is_vented=True)
+        faults.append(switch.first_cause(0.01 * k) is not None)
+    assert faults.index(True) == pytest.approx(296 + 50, abs=2)
+
+
 @pytest.mark.parametrize(
     ("safe", "waits"), [(SafeDirection.PUSH, True), (SafeDirection.PULL, False), (SafeDirection.KEEP, False)]
 )
