@@ -54,6 +54,14 @@ def test_only_the_first_value_behind_a_clearing_is_the_bank_s_and_the_next_one_i
     assert commands.lease_age_s(3.5) == 0.5
 
 
+def test_what_a_master_writes_ahead_of_the_bank_s_clearing_is_its_own_beat() -> None:
+    """Nothing is seen of a clearing that a write follows at once: a reset behind it was refused for want of a heartbeat."""
+    commands = tracker()
+    commands.expect_clearing()
+    commands.take(2.0, Command(heartbeat=5, number=3))
+    assert commands.lease_age_s(2.5) == 0.5
+
+
 def test_limits_of_a_calibration_end_with_it() -> None:
     """A smaller one before leaves no trace."""
     commands = CommandTracker(settings())

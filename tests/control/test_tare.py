@@ -81,6 +81,18 @@ def test_what_a_process_that_died_has_pressed_is_no_zero_though_it_stands_for_it
     assert taken == ([0, 1] if has_died else [6, 1])
 
 
+@pytest.mark.parametrize(
+    ("reads_n", "payload_kg", "is_refused"), [(-6.0, 0.0, True), (-5.88, 0.6, False), (0.0, 0.6, True)]
+)
+def test_behind_a_death_a_pull_is_no_zero_and_a_payload_that_hangs_is_none_of_it(reads_n, payload_kg, is_refused):
+    bench = Bench()
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1), unclean_restart=True)
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + reads_n)
+    bench.run(0.1)
+    bench.write(payload_kg=payload_kg, control_word=ControlBit.TARE)
+    assert ("may have been pressed before this start" in (bench.refused.text if bench.refused else "")) is is_refused
+
+
 def test_behind_a_death_a_reading_of_nothing_is_a_zero_at_once_and_any_once_all_has_left():
     bench = Bench()
     bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1), unclean_restart=True)

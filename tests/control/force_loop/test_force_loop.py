@@ -22,6 +22,9 @@ from gateway.registers.words import LimitedBy, Mode, State
 from tests.control.bench import Bench, bsfm, enabled, settings
 
 LINE = LineStatus()
+RESPONSES = (None, Response(dead_time_s=0.05, lag_s=0.08))
+KINDS = ("rig file", "measured")
+"""Of a calibration's response: which trim corrects."""
 
 
 def loop_of(rig: ControlSettings | None = None, timing: TimingCompensation | None = None) -> ForceLoop:
@@ -217,6 +220,19 @@ def test_the_trim_comes_back_from_the_highest_voltage():
     assert bench.plant.force_n == pytest.approx(30.0, abs=1.0)
 
 
+@pytest.mark.parametrize("response", RESPONSES, ids=KINDS)
+def test_the_trim_goes_no_further_than_to_the_end_of_the_range(response):
+    """Beyond it, it would have to come back before the force does."""
+    rig = settings()
+    bench = Bench(replace(rig, limits=replace(rig.limits, voltage_max_v=4.0)), gain_n_per_v=6.8)
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1, response))
+    bench.run(0.3)
+    bench.enable(26.0)
+    output = bench.run(3.0)
+    assert output.limited_by is LimitedBy.VOLTAGE_RANGE
+    assert output.feedforward_v + output.trim_v == pytest.approx(4.0, abs=0.02)
+
+
 @pytest.mark.parametrize("way", [1, -1])
 def test_the_trim_learns_nothing_more_at_an_end_of_the_range(way):
     """What it learned there would have to be forgotten first, and until then the force stays beyond the target."""
@@ -232,7 +248,7 @@ def test_the_trim_learns_nothing_more_at_an_end_of_the_range(way):
     assert bench.last.trim_v == pytest.approx(reached_v, abs=0.02)
 
 
-@pytest.mark.parametrize("response", [None, Response(dead_time_s=0.05, lag_s=0.08)], ids=["rig file", "measured"])
+@pytest.mark.parametrize("response", RESPONSES, ids=KINDS)
 def test_a_machine_with_less_friction_than_its_calibration_is_pressed_below_that_ones_range(response):
     """6 N were the least by the calibration; what the machine lacked of 4 N, nobody made good, and air was called missing."""
     lifted = Branches(

@@ -189,3 +189,39 @@ def test_a_force_whose_single_readings_leave_the_band_is_noisy_and_one_that_must
     assert not check.is_noisy, "another setpoint waits anew"
     check.restart()
     assert not check.is_noisy
+
+
+def test_a_restart_forgets_how_long_single_readings_have_left_the_band() -> None:
+    check = SettlingCheck(UNREACHABLE_S)
+    for k in range(700):
+        reading = Reading(contact_n=10.0 + (-1) ** k * 1.5, is_new=True, is_usable=True, interval_s=0.01)
+        check.judge_force(demand(), at(0.01 * k)._replace(reading=reading), 10.0, 10.0)
+    assert check.is_noisy
+    check.restart()
+    check.judge_force(demand(), at(7.0), 10.0, 10.0)
+    assert not check.is_noisy
+
+
+def test_at_a_new_setpoint_the_force_of_the_one_before_counts_for_nothing() -> None:
+    """Behind a low-pass it went on for 0.9 s: a noisy force that had arrived at once was called missed."""
+    check, swing_n = SettlingCheck(0.5), 1.5
+    for k in range(300):
+        target_n = 10.0 if k < 200 else 30.0
+        reading = Reading(contact_n=target_n + (-1) ** k * swing_n, is_new=True, is_usable=True, interval_s=0.01)
+        inputs = at(0.01 * k)._replace(reading=reading)
+        check.judge_force(demand(target_n), inputs, target_n, 20.0 if k == 200 else target_n)
+        assert not check.unreachable
+
+
+@pytest.mark.parametrize(
+    ("is_new", "is_usable", "is_missed"), [(True, True, True), (False, True, False), (True, False, False)]
+)
+def test_only_a_new_and_usable_reading_says_that_the_force_is_off(
+    is_new: bool, is_usable: bool, is_missed: bool
+) -> None:
+    check, right = SettlingCheck(0.5), Reading(contact_n=10.0, is_new=True, is_usable=True, interval_s=0.01)
+    check.judge_force(demand(), at(0.0)._replace(reading=right), 10.0, 10.0)
+    for k in range(1, 150):
+        off = Reading(contact_n=5.0, is_new=is_new, is_usable=is_usable, interval_s=0.01)
+        check.judge_force(demand(), at(0.01 * k)._replace(reading=off), 10.0, 10.0)
+    assert check.unreachable is is_missed

@@ -167,3 +167,18 @@ def test_a_small_rise_that_was_near_what_is_expected_for_3_s_has_no_other_unit(
     rise = Rise().at(cell_n)
     assert rise.judged(4.0, readings) is RIGHT
     assert rise.at(13.0).judged(4.0) is fault
+
+
+@pytest.mark.parametrize("is_new_start", [False, True])
+def test_the_time_near_what_is_expected_is_one_without_a_break(is_new_start: bool) -> None:
+    """Two seconds near it, twice, are no proof that the cell has the right unit."""
+    rise = Rise().at(4.0)
+    assert rise.judged(4.0, 32) is RIGHT
+    if is_new_start:
+        rise.hold(0.0)
+        rise.check.start()
+        rise.hold(4.0)
+    else:
+        rise.judged(1.5, 2)  # beyond twice of it
+    assert rise.judged(4.0, 32) is RIGHT
+    assert rise.at(13.0).judged(4.0) is GAIN

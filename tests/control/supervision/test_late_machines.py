@@ -1,12 +1,17 @@
 """A machine that answers late, and a load cell without noise: it repeats itself until the force comes, and from then on again.
 No such cell is called frozen, and one that is frozen is found."""
 
+from collections.abc import Iterable
+
 import pytest
 
 from gateway.bsfm.model import Response
 from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse
-from tests.control.bench import Bench, bsfm, has_fault
+from gateway.control.sample_conditioning import Reading
+from gateway.control.supervision.plausibility import ExpectedForce
+from gateway.control.supervision.stuck_sensor import StuckSensorCheck
+from tests.control.bench import Bench, bsfm, has_fault, settings
 
 STEPS_N = (12.0, 40.0, 10.0, 35.0, 15.0, 45.0)
 LATE = [(0.08, 0.09), (0.2, 0.09), (0.3, 0.09), (0.4, 0.05), (0.4, 0.2)]
@@ -41,3 +46,25 @@ def test_a_cell_of_a_late_machine_that_freezes_is_found_in_the_next_step(delay_s
     bench.force(40.0)
     found_s = bench.seconds_until(has_fault(FaultCode.SAMPLE_FROZEN), 3.0)
     assert found_s < 1.0 + 2.0 * (delay_s + lag_s)
+
+
+def watched(volts: Iterable[float], lag_s: float) -> list[str]:
+    """What the check says of a cell that repeats 12 N in contact, while these voltages stand for a sample each."""
+    check, response = StuckSensorCheck(settings().supervision), ExpectedForce(bsfm(), lag_s, 0.0, stands_v=2.0)
+    reading, words = Reading(12.0, 12.0, 0.0, 0.01, True, True, True, False, 12.0), []
+    for voltage_v in volts:
+        response.advance(voltage_v, 0.01)
+        check.observe(reading, response, True)
+        words.append(check.words)
+    return words
+
+
+@pytest.mark.parametrize("lag_s", [0.02, 0.5])
+def test_a_cell_has_the_time_of_its_machine_to_move_and_never_less_than_0_3_s(lag_s: float) -> None:
+    words = watched([2.0] * 150 + [6.0] * 150, lag_s)
+    found_s = 0.01 * (words.index(next(filter(None, words))) - 149)
+    assert max(0.3, lag_s) - 1e-9 <= found_s < max(0.3, lag_s) + 0.3
+
+
+def test_a_push_that_is_over_before_the_machine_answers_need_not_move_it() -> None:
+    assert not any(watched([2.0] * 150 + [6.0] * 3 + [2.0] * 150, 0.5))
