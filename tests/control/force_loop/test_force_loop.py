@@ -70,6 +70,16 @@ def test_behind_a_run_the_force_goes_on_from_what_is_reached_and_no_higher_than_
     assert loop.applied_n == pytest.approx(applied_n, abs=0.01) and loop.branch_share == -1.0
 
 
+def test_what_still_leaves_is_told_by_the_calibration_in_use_and_its_pace() -> None:
+    loop = pressed(loop_of(), 20.0)
+    loop.use(bsfm(2.0), 0.0, settings(response_lag_s=10.0))
+    assert loop.left.rise_n == pytest.approx(40.0, abs=2.0)
+    loop.drive_run(0.0, 1.0)
+    for _ in range(100):
+        loop.elapse(0.01, LINE)
+    assert loop.left.rise_n > 30.0, "of 10 s one has passed"
+
+
 def test_a_descent_never_goes_up_and_ends_at_0() -> None:
     loop = pressed(loop_of(), 20.0)
     loop.drive_run(1.0, 1.0)
