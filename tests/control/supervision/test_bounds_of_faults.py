@@ -45,6 +45,25 @@ def test_the_largest_force_itself_is_over_it_and_stays_so_over_a_start() -> None
     assert fault(one) is FaultCode.NONE
 
 
+def test_over_force_is_a_row_of_samples_and_one_below_it_begins_a_new_one() -> None:
+    one, most_n = detector(), settings().limits.over_force_n
+    for _ in range(3):
+        observe(one, most_n, 2)
+        assert fault(one) is FaultCode.NONE
+        observe(one, 0.0, 1)
+
+
+def test_a_cell_that_has_repeated_itself_at_rest_is_looked_at_anew_from_an_enable_on() -> None:
+    """Told to allow two equal samples, and resting at 0 without noise, it would be dead at each enable."""
+    one, response = FaultDetector(settings(frozen_equal_samples=2)), ExpectedForce(bsfm(), 0.1, 0.0)
+    still = WELL._replace(raw_n=0.0, cell_n=0.0, contact_n=0.0)
+    for _ in range(3):
+        one.observe(still, response, 1.0, False)
+    assert fault(one) is FaultCode.SAMPLE_FROZEN
+    one.start()
+    assert fault(one) is FaultCode.NONE
+
+
 @pytest.mark.parametrize(
     ("cell_n", "words"),
     [(8.0, "92.0 N of it are the payload's weight"), (100.0, "kgf and N mixed up"), (-92.0, "kgf and N mixed up")],
