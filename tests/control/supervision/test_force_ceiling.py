@@ -30,6 +30,14 @@ def test_a_stair_is_judged_with_the_payloads_weight(weight_n: float, is_beyond: 
     assert ceiling_at(cell_n, weight_n).is_beyond(5.0, 0.0) is is_beyond
 
 
+def test_behind_a_way_down_a_stair_is_judged_by_those_of_its_own_way_up() -> None:
+    cell_n = bsfm().force_n(3.0, 1.0)
+    ceiling = ceiling_at(cell_n, 20.0)
+    for direction in (-1, 1):
+        ceiling.observe_row(LadderRow(PlannedStair(3.0, direction, 0, CalibrationPhase.LADDER), cell_n, 1.0, True))
+    assert ceiling.is_beyond(5.0, 0.0)
+
+
 @pytest.mark.parametrize(("weight_n", "is_reached"), [(0.0, False), (20.0, True)])
 def test_the_force_of_now_is_judged_with_it_too(weight_n: float, is_reached: bool) -> None:
     assert ceiling_at(35.0, weight_n).is_reached(0.0) is is_reached
