@@ -95,6 +95,8 @@ class TlsWire(TcpWire):
             raise CliError(f"E176 {why}; {cure}", exit_codes.DEVICE) from None
         except OSError as error:
             reason = error.reason if isinstance(error, ssl.SSLError) else error.strerror
+            if isinstance(error, TimeoutError):
+                reason = f"no answer within {TIMEOUT_S:g} s"
             why = f"no TLS with {self.where}: {(reason or 'the connection ended').lower().replace('_', ' ')}"
             raise CliError(f"E176 {why}; is this the port of its line `modbus tls`?", exit_codes.DEVICE) from None
 
