@@ -11,6 +11,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.registers.words import ControlBit
 from gateway.registers.writes.proposed_write import EdgeRefusal
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged, refuse_commands
+from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
 from tests.clients.scenes import MAP, WHERE, command, commands, cycles
 
 
@@ -119,3 +120,17 @@ def test_the_python_client_takes_an_enable_back_whose_answer_was_lost(gateway: G
     client._ask = answer
     client.exchange()
     assert commands(gateway) == [command(1, 1200), command(0, 0)] and client.ended
+
+
+@pytest.mark.parametrize("has_looked", [False, True])
+def test_the_first_heartbeat_of_a_program_is_not_the_last_of_the_one_before(
+    client: Any, gateway: GatewayAtHand, has_looked: bool
+) -> None:
+    """A reset wants a new one: of a short program that was started again and again each was refused."""
+    gateway.bank.write_registers(4, b"\0\1", gateway.peer)
+    gateway.publish(0.0, on=False)
+    if has_looked or isinstance(client, (Irc5, Plc, UniversalRobot)):  # their cycles go on while nobody commands
+        cycles(client)
+    client.reset()
+    cycles(client)
+    assert [words[0] for words in gateway.words] == [2] and gateway.beats[0] == 2

@@ -369,6 +369,10 @@ ${crc_table}];
     VAR num nStored;
     IF NOT bProven FgProveByteOrder;
     nHeartbeat:=(nHeartbeat+1) MOD 65536;
+    IF nHeartbeat=fgStatus{FG_S_HEARTBEAT_ECHO} THEN
+      ! Of before a start of the controller: a reset wants a new one
+      nHeartbeat:=(nHeartbeat+1) MOD 65536;
+    ENDIF
     FgFrameExchange nFrom,nTo;
     bAsking:=nWant{FG_C_CONTROL_WORD}<>0;
     FgAsk 23;
