@@ -24,7 +24,7 @@ TEXT_LENGTH: Final = 56
 
 COMMAND: Final = ("control_word", "force_setpoint", "force_ramp", "mode", "heartbeat", "command_sequence")
 STATUS: Final = (
-    "status_word state force_measured fault_code warning_word refusal_address refusal_reason refusal_value"
+    "status_word state force_measured fault_code warning_word heartbeat_echo refusal_address refusal_reason refusal_value"
 ).split()
 STAGING: Final = (
     "order falling_b_0 blend_span length crc32 target_slot commit commit_status failing_index failing_reason slip_stops"

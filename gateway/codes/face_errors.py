@@ -84,9 +84,10 @@ FACE_ERRORS: Final = (
         "E131",
         "connected, but no Modbus answer",
         "The connection was accepted, and no answer came within a second, or one that is not Modbus.",
-        "Another program listens there, the allow-list of the gateway closes your connection, or its unit id is "
-        "another.",
-        "Check port and --unit; the rig's network.allow must contain this machine's address.",
+        "Another program listens there, its allow-list closes your connection, its unit id is another; where it answered "
+        "before, it has stopped.",
+        "Check port and --unit; the rig's network.allow must contain this machine's address. Where it answered before, "
+        "look at `force-gateway events` on its machine.",
     ),
     Explanation(
         "E171",

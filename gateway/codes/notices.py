@@ -63,7 +63,8 @@ NOTICES: Final = (
         "certificate of a client not accepted",
         "A client connected by TLS without a certificate, with one of another CA, or did not accept the gateway's.",
         "The CA in the rig file is not the one that signed it, or the client does not know the gateway's CA.",
-        "Make the client's certificate with the same CA: force-gateway certs DIR --client NAME:ROLE.",
+        "Make the client's certificate with the same CA: force-gateway certs DIR --client NAME:ROLE. New files of the "
+        "gateway's own count from its next start.",
     ),
     Explanation(
         "W241",

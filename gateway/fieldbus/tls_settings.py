@@ -136,7 +136,8 @@ def handshake_failure(error: ssl.SSLError) -> str:
         return "W240 its certificate is of another curve than P-256, of no use to TLS 1.2: make one of P-256, or use TLS 1.3"
     if "CERTIFICATE_EXPIRED" in reason:
         return (
-            "W240 it finds our certificate expired or not valid yet (or its clock, or ours, is wrong): make a new one"
+            "W240 it finds our certificate expired or not valid yet (or its clock, or ours, is wrong): make a new one and "
+            "start the gateway with it; it goes on with the files that it was started with"
         )
     if "ALERT" in reason:
         return (

@@ -7,7 +7,11 @@ from typing import Any
 import pytest
 
 from gateway.clients import render_client
+from gateway.codes.refusals import RefusalReason
+from gateway.registers.words import ControlBit
+from gateway.registers.writes.proposed_write import EdgeRefusal
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged, refuse_commands
+from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
 from tests.clients.scenes import MAP, WHERE, command, commands, cycles
 
 
@@ -63,6 +67,32 @@ def test_an_off_that_is_refused_behind_a_loss_is_not_asked_for_again_and_again(
     assert len(asked) == 1 and client.ended
 
 
+@pytest.mark.parametrize(
+    ("ask", "behind"),
+    [
+        pytest.param(lambda client: client.enable(20.0), [command(1, 2000)], id="another force"),
+        pytest.param(lambda client: client.enable(65.0), [command(1, 6500)], id="a force that is refused"),
+        pytest.param(lambda client: client.tare(), [command(4, 0)], id="a tare that is refused"),
+    ],
+)
+def test_what_is_asked_for_behind_a_loss_waits_for_off(
+    client: Any, gateway: GatewayAtHand, ask: Any, behind: list[tuple[int, ...]]
+) -> None:
+    """Beside it OFF went out with a tare, or was none, and was refused with it: 12 N were pressed on, and no more was said."""
+    tare = EdgeRefusal(RefusalReason.TARE_REFUSED, ControlBit.TARE, "12.00 N are pressed")
+    gateway.bank.on_asked = lambda proposal: tare if ControlBit.TARE in proposal.command.control_word else None
+    client.enable(12.0)
+    cycles(client)
+    gateway.is_cut = True
+    cycles(client, 3)
+    gateway.is_cut = False
+    ask(client)
+    for _ in range(6):
+        client.cycle(1.0)
+    assert commands(gateway) == [command(1, 1200), command(0, 0), *behind]
+    assert gateway.bank.command.force_setpoint_n == (0.0 if gateway.exceptions else 20.0)
+
+
 def test_the_python_client_takes_an_enable_back_whose_answer_was_lost(gateway: GatewayAtHand) -> None:
     python: dict[str, Any] = {}
     exec(render_client(MAP, "python", WHERE), python)
@@ -90,3 +120,17 @@ def test_the_python_client_takes_an_enable_back_whose_answer_was_lost(gateway: G
     client._ask = answer
     client.exchange()
     assert commands(gateway) == [command(1, 1200), command(0, 0)] and client.ended
+
+
+@pytest.mark.parametrize("has_looked", [False, True])
+def test_the_first_heartbeat_of_a_program_is_not_the_last_of_the_one_before(
+    client: Any, gateway: GatewayAtHand, has_looked: bool
+) -> None:
+    """A reset wants a new one: of a short program that was started again and again each was refused."""
+    gateway.bank.write_registers(4, b"\0\1", gateway.peer)
+    gateway.publish(0.0, on=False)
+    if has_looked or isinstance(client, (Irc5, Plc, UniversalRobot)):  # their cycles go on while nobody commands
+        cycles(client)
+    client.reset()
+    cycles(client)
+    assert [words[0] for words in gateway.words] == [2] and gateway.beats[0] == 2

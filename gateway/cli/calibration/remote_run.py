@@ -6,7 +6,6 @@ thread: a terminal that is slow to draw costs no lease. Both use one connection,
 
 import threading
 from collections.abc import Callable
-from contextlib import suppress
 from math import nan
 from typing import Any, Final, TypeVar
 
@@ -67,15 +66,18 @@ class RemoteRun:
         try:
             self._command(int(ControlBit.START_CALIBRATION))
         except CliError as error:
-            if error.exit_code != exit_codes.DEVICE or not self._has_begun():
+            if error.exit_code != exit_codes.DEVICE or not self._has_begun(error):
                 raise
         self._beat.start()
 
-    def _has_begun(self) -> bool:
-        """Decide whether the run goes although the answer to its start was lost: then it needs somebody who follows it."""
-        with suppress(CliError):
+    def _has_begun(self, lost: CliError) -> bool:
+        """Decide whether the run goes although the answer to its start was lost: then it needs somebody who follows it.
+        CliError where nobody tells."""
+        try:
             return self.look().phase not in ("idle", *ENDED)
-        return False
+        except CliError:
+            sentence = f"{lost.format_message()}\nthe start was sent, and may have been heard; {self.lost_words}"
+            raise CliError(sentence, lost.exit_code) from None
 
     def look(self) -> RunStatus:
         """Read from the registers how far the run is; asked again where an answer is lost, as noise on a line does."""

@@ -2,6 +2,7 @@
 slow to draw, never costs the lease.
 """
 
+import re
 import threading
 from collections.abc import Callable
 from contextlib import suppress
@@ -162,7 +163,11 @@ class HeartbeatThread(threading.Thread):
             self._wait(_SHORTEST_PERIOD_S)
 
     def _lost_words(self, error: CliError) -> str:
-        what = f"the gateway at {self._client.where} is lost ({error.format_message().partition(':')[0]})"
+        where = self._client.where
+        code, _, told = error.format_message().partition(" ")
+        behind = told.partition(where)[2].lstrip(": ") or told  # the place is said already, and has a colon in it
+        seen = re.split("[:;]", behind)[0]
+        what = f"the gateway at {where} is lost ({code} {seen})"
         if not self.hold.is_pressing:
             return f"{what}; nothing had been enabled"
         if self._lease is None:

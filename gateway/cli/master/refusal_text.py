@@ -12,7 +12,8 @@ from typing import Final
 from gateway.cli.errors import CliError
 from gateway.cli.master.client import Frame, GatewayClient, RefusedError, RegisterReading
 from gateway.codes.refusals import RefusalReason
-from gateway.modbus.errors import NAMES
+from gateway.modbus.errors import NAMES, TARGET_SILENT
+from gateway.registers.refusal import NO_ADDRESS
 
 _LAST_REFUSAL: Final = ("refusal_address", "refusal_reason", "refusal_value")
 
@@ -77,11 +78,14 @@ def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, st
 
 def _last_refusal(client: GatewayClient, frames: list[Frame]) -> tuple[RefusalReason, int, str]:
     """Reason, address and place in words of the last refusal; NONE where the server has no such registers or they tell of
-    another request."""
+    another request. Who asks for a unit that is not served can read none of them: that is the reason."""
     try:
         address, reason, value = client.read_values([client.register_map.find(name) for name in _LAST_REFUSAL])
         kind = RefusalReason(int(reason.value))
-    except (CliError, RefusedError, LookupError, ValueError):
+    except RefusedError as refused:
+        is_unit = refused.code == TARGET_SILENT
+        return (RefusalReason.UNIT, NO_ADDRESS, "asked by --unit") if is_unit else (RefusalReason.NONE, 0, "")
+    except (CliError, LookupError, ValueError):
         return RefusalReason.NONE, 0, ""
     at = int(address.value)
     if not any(frame.address <= at < frame.address + len(frame.words) for frame in frames):

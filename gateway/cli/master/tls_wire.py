@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gateway.cli.errors import CliError
-from gateway.cli.master.wires import TIMEOUT_S, TcpWire
+from gateway.cli.master.wires import NETWORK_CUT, TIMEOUT_S, TcpWire
 from gateway.modbus.certificate import KEY_MISMATCH
 from gateway.plain_file import check_plain
 from gateway.processes import exit_codes
@@ -95,6 +95,8 @@ class TlsWire(TcpWire):
             raise CliError(f"E176 {why}; {cure}", exit_codes.DEVICE) from None
         except OSError as error:
             reason = error.reason if isinstance(error, ssl.SSLError) else error.strerror
+            if isinstance(error, TimeoutError):
+                reason = f"no answer within {TIMEOUT_S:g} s"
             why = f"no TLS with {self.where}: {(reason or 'the connection ended').lower().replace('_', ' ')}"
             raise CliError(f"E176 {why}; is this the port of its line `modbus tls`?", exit_codes.DEVICE) from None
 
@@ -102,8 +104,12 @@ class TlsWire(TcpWire):
         """Return E176: with TLS 1.3 a client learns with its first request only that its certificate was refused."""
         from pymodbus.exceptions import ConnectionException
 
-        if isinstance(error, (OSError, ConnectionException)):
+        is_closed = isinstance(error, (OSError, ConnectionException))
+        cause = "closed the connection" if is_closed else f"did not answer unit {unit} within {TIMEOUT_S:g} s"
+        if has_answered:
+            return self._lost(cause, f"refuses {self.files.certificate} by now" if is_closed else NETWORK_CUT)
+        if is_closed:
             why = "another CA, expired, no role in it, or revoked"
-            text = f"E176 {self.where} closed the connection: it probably refuses {self.files.certificate} ({why}); {_ASK_LOG}"
+            text = f"E176 {self.where} {cause}: it probably refuses {self.files.certificate} ({why}); {_ASK_LOG}"
             return CliError(text, exit_codes.DEVICE)
-        return CliError(f"E131 {self.where} did not answer unit {unit} within {TIMEOUT_S:g} s", exit_codes.DEVICE)
+        return CliError(f"E131 {self.where} {cause}", exit_codes.DEVICE)

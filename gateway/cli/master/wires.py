@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from gateway.devices.line_settings import SerialSettings
 
 TIMEOUT_S: Final = 1.0
+NETWORK_CUT: Final = "the network between is cut"
 _LONGEST_EXCHANGE_BYTES: Final = 2 * 256
 _LOCAL: Final = "localhost"
 _PARITY: Final = {"none": "N", "even": "E", "odd": "O"}
@@ -111,11 +112,18 @@ class TcpWire:
 
         reset = isinstance(error, (OSError, ConnectionException))
         cause = "closed the connection" if reset else f"did not answer unit {unit} within {TIMEOUT_S:g} s"
+        if has_answered:  # neither port nor unit id nor network are to blame
+            return self._lost(cause, NETWORK_CUT)
         return CliError(
             f"E131 {self.where} {cause}: not a Modbus server, the port of its line `modbus tls` (give --tls, --cert and "
             "--key), another unit id, or this machine is not on its allow-list",
             exit_codes.DEVICE,
         )
+
+    def _lost(self, cause: str, or_else: str) -> CliError:
+        """Return what is told of a gateway that has answered before."""
+        told = f"E131 {self.where} {cause}, though it answered before: it has stopped or started anew, or {or_else}"
+        return CliError(f"{told}; its log (force-gateway events on its machine) says which", exit_codes.DEVICE)
 
 
 @dataclass(frozen=True, slots=True)

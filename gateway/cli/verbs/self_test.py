@@ -3,7 +3,6 @@
 import json
 import sys
 import time
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -61,12 +60,22 @@ def _run_to_its_end(run: "_SelfTest", *, shows: bool) -> None:
     try:
         is_over = watch_to_the_end(run.begin, lambda: run.follow(shows=shows), run.stop)
     except CliError as error:
-        if error.exit_code == exit_codes.DEVICE and run.may_run():  # an answer is lost: nobody looks at it any more
-            with suppress(CliError):
-                run.stop()
-        raise
+        if error.exit_code != exit_codes.DEVICE:
+            raise
+        raise CliError(f"{error.format_message()}\n  {_what_is_left(run)}", error.exit_code) from None
     if not is_over:
         raise CliError("self-test stopped; the force went to 0")
+
+
+def _what_is_left(run: "_SelfTest") -> str:
+    """Stop a test behind an answer that is lost, for nobody looks at it any more; return what is known of it in words."""
+    try:
+        if not run.may_run():
+            return "the self-test has not begun"
+        run.stop()
+    except CliError:
+        return "whether the self-test goes on there nobody knows; it ends by itself, and by control_word 0"
+    return "the self-test was stopped; the force went to 0"
 
 
 class _SelfTest:
@@ -95,12 +104,10 @@ class _SelfTest:
 
     def may_run(self) -> bool:
         """Decide whether it runs. Where the answer to its start was lost the gateway is asked: what presses there may be
-        another master's, which no stop of ours may end."""
+        another master's, which no stop of ours may end. CliError where it does not answer."""
         from gateway.registers.words import SelfTestResult
 
-        with suppress(CliError):
-            return self._has_begun or self._read()["result"] == SelfTestResult.RUNNING
-        return False
+        return self._has_begun or self._read()["result"] == SelfTestResult.RUNNING
 
     def stop(self) -> None:
         """End the test: the force goes to 0."""

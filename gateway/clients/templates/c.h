@@ -512,11 +512,15 @@ int fg_exchange(fg_client *client) {
     if (result != FG_OK) return result;
     if (!changed && client->want[FG_CONTROL_WORD] == 0) return fg_refresh(client);
     if ((result = fg_prove_byte_order(client)) != FG_OK) return result;
-    memcpy(sent, client->want, sizeof sent);
+    if (!client->seen && (result = fg_refresh(client)) != FG_OK) return result;
+    /* Behind a loss OFF goes alone: what is asked for since then waits, for its refusal would be that of OFF. */
+    memcpy(sent, client->off_pending ? client->good : client->want, sizeof sent);
     if (client->once & FG_RESET_FAULT) sent[FG_CONTROL_WORD] = sent[FG_FORCE_SETPOINT] = 0; /* an enable behind it waits */
     memcpy(command, sent, sizeof command);
-    command[FG_CONTROL_WORD] |= client->once;
-    command[FG_HEARTBEAT] = ++client->heartbeat;
+    if (!client->off_pending) command[FG_CONTROL_WORD] |= client->once;
+    /* Not the one that stands there, of an earlier start of this program, say: a reset wants a new one. */
+    if (++client->heartbeat == client->words[${st_heartbeat_echo}]) ++client->heartbeat;
+    command[FG_HEARTBEAT] = client->heartbeat;
     if (changed) {
         first = fg_first_to_write(client);
         count = (uint16_t)(FG_COMMAND_WORDS - first);
@@ -535,7 +539,7 @@ int fg_exchange(fg_client *client) {
     if (result == FG_OK) result = fg_take_words(client, frame, FG_STATUS_WORDS, client->words);
     if (result != FG_OK) return result;
     memcpy(client->good, sent, sizeof client->good);
-    client->once = 0;
+    if (!client->off_pending) client->once = 0;
     client->off_pending = client->asked = 0;
     fg_follow(client);
     /* Behind a stop: the gateway keeps the force, and who set it owns it; the next write takes it back. */

@@ -301,6 +301,9 @@ ${crc_table}];
       nWant{FG_C_FORCE_SETPOINT}:=nCounts;
       fgEnded:=FALSE;
     ENDIF
+    ! Behind a loss OFF goes alone: what is asked for since then waits,
+    ! for its refusal would be that of OFF
+    IF bOffPending nWant:=nGood;
   ENDPROC
 
   ! T_ROB1 stands: this task must not keep its force up
@@ -362,12 +365,18 @@ ${crc_table}];
   ! Words nFrom .. nTo of the command, counted from 1
   LOCAL PROC FgWriteAndRead(num nFrom,num nTo)
     VAR bool bGivesUp;
+    VAR bool bOff;
     VAR num nStored;
     IF NOT bProven FgProveByteOrder;
     nHeartbeat:=(nHeartbeat+1) MOD 65536;
+    IF nHeartbeat=fgStatus{FG_S_HEARTBEAT_ECHO} THEN
+      ! Of before a start of the controller: a reset wants a new one
+      nHeartbeat:=(nHeartbeat+1) MOD 65536;
+    ENDIF
     FgFrameExchange nFrom,nTo;
     bAsking:=nWant{FG_C_CONTROL_WORD}<>0;
     FgAsk 23;
+    bOff:=bOffPending;
     bOffPending:=FALSE;
     IF nException<>0 THEN
       bAsking:=FALSE;
@@ -383,7 +392,7 @@ ${crc_table}];
     FgTakeWords STATUS_WORDS;
     bOffRefused:=FALSE;
     nGood:=nWant;
-    nOnce:=0;
+    IF NOT bOff nOnce:=0;
     bAsking:=FALSE;
     nStored:=nWant{FG_C_FORCE_SETPOINT};
     FgFollow;
@@ -629,7 +638,8 @@ ${status_decoding}
     FgPutByte 2*nCount;
     FOR i FROM nFrom TO nTo DO
       IF i=FG_C_CONTROL_WORD THEN
-        FgPutWord nWant{i}+nOnce;
+        IF bOffPending FgPutWord nWant{i};
+        IF NOT bOffPending FgPutWord nWant{i}+nOnce;
       ELSEIF i=FG_C_HEARTBEAT THEN
         FgPutWord nHeartbeat;
       ELSE

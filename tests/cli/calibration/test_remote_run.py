@@ -12,6 +12,7 @@ from gateway.cli.errors import CliError
 from gateway.cli.master.client import Assignment, Frame, RefusedError
 from gateway.cli.master.wires import TcpWire
 from gateway.codes.faults import FaultCode
+from gateway.processes import exit_codes
 from gateway.registers import BankRules, Register, RegisterBank, RegisterMap
 from gateway.registers.command import Command, Status
 from gateway.registers.rig_rules import BASIC_BITS
@@ -158,6 +159,21 @@ def test_a_heartbeat_whose_answer_is_lost_is_followed_by_the_next(monkeypatch: p
     run._beat.join(5.0)
     assert not run._beat.is_alive() and client.beats == 3
     run.close()
+
+
+def test_a_start_of_which_nobody_tells_any_more_may_have_been_heard(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lost answer alone was told, which reads as one that has begun nothing."""
+    run = remote(client := PlayedClient(CalibrationPhase.IDLE))
+
+    def lose(*_: object) -> None:
+        monkeypatch.setattr(client, "read_values", lose)
+        raise CliError("E131 no answer", exit_codes.DEVICE)
+
+    monkeypatch.setattr(client, "write", lose)
+    with pytest.raises(CliError) as told:
+        run.begin()
+    assert told.value.exit_code == exit_codes.DEVICE
+    assert str(told.value) == f"E131 no answer\nthe start was sent, and may have been heard; {run.lost_words}"
 
 
 def test_before_a_run_elsewhere_its_force_is_asked_for_and_no_number_of_ours(call: Any) -> None:

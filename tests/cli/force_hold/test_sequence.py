@@ -11,10 +11,11 @@ from gateway.cli.errors import CliError
 from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
 from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, HoldWrite, StatusReading, status_reading_of
 from gateway.cli.master.client import GatewayClient
-from gateway.cli.master.wires import TcpWire
+from gateway.cli.master.wires import RtuWire, TcpWire
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control.settings import LeaseAction
+from gateway.devices import SerialSettings
 from gateway.registers import RegisterMap
 from gateway.registers.words import State
 from tests.cli.conftest import PlainBank, Server
@@ -200,8 +201,39 @@ def test_a_gateway_that_is_gone_is_told_with_what_happens_now(bank: PlainBank, s
     beat.join(10.0)
     assert isinstance(beat.failure, CliError)
     assert beat.failure.exit_code == 69
-    assert beat.failure.format_message().startswith("E180 the gateway at 127.0.0.1:")
+    seen = "E131 closed the connection, though it answered before"
+    assert beat.failure.format_message().startswith(f"E180 the gateway at {server.address} is lost ({seen}); ")
     assert beat.failure.format_message().endswith("the lease of 200 ms is over: it ramps to 0 N")
+
+
+@pytest.mark.parametrize(
+    ("wire", "told", "seen"),
+    [
+        (
+            TcpWire("cell-3", 5020),
+            "E131 cell-3:5020 closed the connection: no",
+            "E131 closed the connection",
+        ),
+        (
+            TcpWire("::1", 5020),
+            "E130 no gateway at ::1:5020: Connection refused; not running",
+            "E130 Connection refused",
+        ),
+        (
+            RtuWire("/dev/ttyS7", SerialSettings(baud=19200)),
+            "E123 /dev/ttyS7: no answer within 1 s: no",
+            "E123 no answer within 1 s",
+        ),
+    ],
+)
+def test_what_was_seen_of_a_loss_is_more_than_the_place(
+    wire: TcpWire | RtuWire, told: str, seen: str, register_map: RegisterMap
+) -> None:
+    """`E131 127.0.0.1` or `E123 /dev/ttyS7` was all that it said."""
+    beat = HeartbeatThread(
+        GatewayClient(wire, 1, register_map), HoldRun(12.0, heartbeat=1, resets=False), None, time.monotonic
+    )
+    assert beat._lost_words(CliError(told)) == f"the gateway at {wire.where} is lost ({seen}); nothing had been enabled"
 
 
 def test_a_gateway_that_comes_back_in_time_is_held_on(bank: PlainBank, serve: Serve, beating: Beating) -> None:

@@ -215,9 +215,11 @@ def test_a_server_that_hangs_up_is_no_gateway(call) -> None:
 
 @pytest.mark.parametrize("words", [("read", "state"), ("write", "control_word=1"), ("hold", "12"), ("upload", "demo")])
 def test_a_foreign_unit_is_an_exception_and_not_a_timeout_or_another_map(words: tuple[str, ...], fake, call) -> None:
+    """And told as one: that a read of 2 at 412 met a silent unit says nothing of --unit."""
     answer = call(*words, "--unit", "7", "--gateway", fake.address)
     assert answer.exit_code == 1
-    assert "exception 0B" in answer.stderr
+    assert answer.stderr.startswith("W222 unit id not served: exception 0B")
+    assert "Use unit id 1" in answer.stderr
 
 
 def test_more_registers_than_one_request_carries_are_read_in_several(fake) -> None:

@@ -146,3 +146,18 @@ def test_who_answers_more_or_fewer_registers_than_were_asked_for_is_asked_once(
     ):
         client.read_words(0, 2)
     assert asked == [0]
+
+
+def test_neither_port_nor_unit_nor_network_are_to_blame_for_a_gateway_that_ends_behind_its_answers(
+    fake: Any, register_map: RegisterMap
+) -> None:
+    """It was called no Modbus server, the TLS port, another unit id, or one with an allow-list."""
+    with GatewayClient(TcpWire("127.0.0.1", fake.port), 1, register_map) as client:
+        client.check_map()
+        fake.stop()
+        with pytest.raises(CliError) as told:
+            client.check_map()
+    assert str(told.value) == (
+        f"E131 {fake.address} closed the connection, though it answered before: it has stopped or started anew, or the network "
+        "between is cut; its log (force-gateway events on its machine) says which"
+    )

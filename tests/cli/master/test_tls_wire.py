@@ -13,6 +13,8 @@ import pytest
 from cryptography.hazmat.primitives import serialization
 
 from gateway.cli.errors import CliError
+from gateway.cli.master import wires
+from gateway.cli.master.client import GatewayClient
 from gateway.cli.master.tls_wire import TlsFiles, TlsWire
 from gateway.fieldbus import ModbusTlsServer, ServerSettings, TlsSettings
 from tests.certificates import Folder, serial_of, store_all
@@ -42,6 +44,9 @@ class TlsServer(threading.Thread):
         await server.close()
 
     def stop(self) -> None:
+        """A second call does nothing."""
+        if not self.is_alive():
+            return
         self._loop.call_soon_threadsafe(self._end.set)
         self.join(10)
 
@@ -88,6 +93,31 @@ def test_what_does_not_fit_is_told(
         code,
         words.format(port=server.port),
     )
+
+
+def test_a_gateway_that_ends_behind_its_answers_has_not_refused_the_certificate(
+    server: TlsServer, folder: Folder, register_map: Any
+) -> None:
+    """A self-test whose gateway was killed was told that its certificate was probably refused."""
+    files = TlsFiles(*(Path(one) for one in (folder.crt("ca"), folder.crt("setpoint"), folder.key("setpoint"))))
+    with GatewayClient(TlsWire("127.0.0.1", server.port, files), 1, register_map) as client:
+        client.check_map()
+        server.stop()
+        with pytest.raises(
+            CliError, match=r"^E131 127\.0\.0\.1:\d+ closed the connection, though it answered before: "
+        ):
+            client.check_map()
+
+
+def test_a_handshake_without_an_answer_is_no_connection_that_ended(
+    folder: Folder, call: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a gateway that stands still, or a network that is cut: it was said that the connection ended."""
+    monkeypatch.setattr(wires, "TIMEOUT_S", 0.05)
+    with socket.create_server(("127.0.0.1", 0)) as deaf:
+        where = f"127.0.0.1:{deaf.getsockname()[1]}"
+        done = call("read", "state", "--gateway", where, *options(folder))
+    assert done.exit_code == 69 and done.stderr.startswith(f"E176 no TLS with {where}: no answer within 1 s; ")
 
 
 def test_a_file_that_is_missing_and_options_that_are(folder: Folder, call: Any, tmp_path: Path) -> None:

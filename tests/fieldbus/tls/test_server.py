@@ -117,6 +117,7 @@ def test_a_client_that_finds_us_expired_is_not_told_to_look_for_another_ca() -> 
     error.reason = "SSLV3_ALERT_CERTIFICATE_EXPIRED"
     told = handshake_failure(error)
     assert told.startswith("W240 ") and "expired" in told and "clock" in told and "give the client" not in told
+    assert "start the gateway with it" in told, "a new one was made, and the old one served on"
 
 
 def test_a_stranger_to_the_allow_list_begins_no_handshake(face: Face) -> None:
