@@ -55,8 +55,8 @@ class WarningBit(IntFlag):
             "A340",
             "trim at its limit",
             "The slow correction by the load cell has used up its range.",
-            "The calibration no longer fits: another supply pressure, tool or temperature.",
-            "Tare in the air, compare model_residual, then calibrate again.",
+            "The calibration no longer fits: another supply pressure, tool or temperature; or the load cell's span is wrong.",
+            "Tare in the air, compare model_residual and the cell with a known weight, then calibrate again.",
             is_warning=True,
         ),
     )

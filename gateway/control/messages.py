@@ -22,6 +22,16 @@ def unreachable_sentence(evidence: Evidence, direction: float = 1.0) -> str:
     )
 
 
+def saturated_sentence(voltage_v: float, trim_v: float, measured_n: float, expected_n: float) -> str:
+    """Return A340 in numbers, with what it probably is: a load cell of another span looks so, and a calibration would take it
+    for right. Forces as the registers tell them."""
+    return (
+        f"A340 {voltage_v:.2f} V out, {measured_n:.1f} N measured, {expected_n:.1f} expected, the trim at its limit of "
+        f"{trim_v:+.2f} V: supply pressure, calibration or the load cell's span is off; compare the cell with a "
+        "known weight before you calibrate again"
+    )
+
+
 def hunting_sentence(force_n: float, turns: int) -> str:
     """Return W360, which says that the trim has backed off."""
     return (

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gateway.live.control_link import ControlLink
+from gateway.live.control_link import ANSWER_S, ControlLink
 from gateway.live.live_state import LiveAlarm
 from gateway.processes.json_socket.server import JsonLineServer
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
@@ -216,6 +216,31 @@ def test_a_command_is_written_in_order_until_the_first_refusal(
     assert [request["pdu"] for request in asked] == pdus
     assert {request["via"] for request in asked} <= {"mqtt"}
     assert all(("until_s" in request) is not is_stop(payload) for request in asked), "a stop is wanted however late"
+
+
+def test_of_a_stop_that_comes_late_the_stop_alone_is_carried_out(tmp_path: Path) -> None:
+    """A ramp beside it would stand for whoever enables next: nobody waits for that any more, and a heartbeat moves nothing."""
+    late_s, carried_out = 100.0, list[str]()
+
+    def modbus(request: dict[str, Any]) -> dict[str, Any]:
+        if request.get("until_s", late_s) < late_s:
+            raise ValueError("it waited for longer than whoever asked: nothing was done")
+        carried_out.append(request["pdu"])
+        return {"pdu": request["pdu"][:10]}
+
+    async def scene() -> dict[str, Any]:
+        control, link = JsonLineServer(tmp_path / "control.sock", {"modbus": modbus}), ControlLink(tmp_path)
+        await control.start()
+        commands = RegisterCommands(load_rig("demo").register_map, link, 1, clock=lambda: late_s - 10.0 * ANSWER_S)
+        told = await commands.carry_out(b'{"heartbeat": 7, "force_ramp": 5, "control_word": 0}')
+        await link.close()
+        await control.close()
+        return told
+
+    answer = asyncio.run(scene())
+    assert answer["ok"] is False and answer["written"] == ["control_word", "heartbeat"]
+    assert "it waited for longer" in answer["error"]
+    assert carried_out == ["100000000102" + "0000", "100004000102" + "0007"]
 
 
 def test_what_must_not_be_carried_out_is_told_and_asks_nobody() -> None:

@@ -1,9 +1,10 @@
-"""Sentences for the log that are told once, when something begins: target unreachable, trim hunting, force stuck at rest.
+"""Sentences for the log that are told once, when something begins: target unreachable, trim at its limit, trim hunting, force
+stuck at rest.
 
 Each `..._event` answers with its sentence the first time, and with nothing as long as it goes on.
 """
 
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from typing import Final
 
 from gateway.control.force_loop.force_loop import ForceLoop
@@ -12,6 +13,7 @@ from gateway.control.inputs import LineStatus, LoopInputs
 from gateway.control.messages import (
     hunting_sentence,
     noisy_sentence,
+    saturated_sentence,
     stuck_sentence,
     swinging_sentence,
     unreachable_sentence,
@@ -20,6 +22,7 @@ from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.unreachable_force import Evidence
 
 _LEARNING: Final = 0.02  # of each new ratio of pressure to voltage
+_AT_LIMIT_S: Final = 3.0  # that a trim stands at its limit until it is told
 _LEAST_V: Final = 0.2  # below it the ratio is offset and noise
 
 
@@ -30,24 +33,37 @@ class OneShotEvents:
     def __init__(self, stuck_n: float) -> None:
         self.direction = 1.0
         self._was_unreachable = False
-        self._was_stuck = self._was_hunting = self._has_told_noise = False
+        self._was_stuck = self._was_hunting = self._has_told_noise = self._has_told_limit = False
+        self._at_limit_since_s = inf
         self._stuck_n = stuck_n
         self._was_in_band = False
         self._pressure_pa = self._profile_pa_per_v = self._learned_pa_per_v = nan
 
     def start(self) -> None:
         """Begin a new enable: nothing has been in band since."""
-        self._was_in_band = self._has_told_noise = False
+        self._was_in_band = self._has_told_noise = self._has_told_limit = False
 
     def observe_line(self, line: LineStatus) -> None:
         """Take over the pressure that the output device measures."""
         self._pressure_pa, self._profile_pa_per_v = line.pressure_pa, line.pressure_pa_per_v
 
-    def movement_events(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> tuple[str, str, str]:
+    def movement_events(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> tuple[str, ...]:
         """Return what a step in force or voltage mode is the first to show. measured_n: contact force, smoothed."""
         noisy = "" if self._has_told_noise or not loop.settling.is_noisy else noisy_sentence(loop.applied_n)
         self._has_told_noise = self._has_told_noise or loop.settling.is_noisy
-        return self.unreachable_event(loop, measured_n, inputs), self.hunting_event(loop), noisy
+        saturated = self.saturated_event(loop, measured_n, inputs)
+        return self.unreachable_event(loop, measured_n, inputs), self.hunting_event(loop), noisy, saturated
+
+    def saturated_event(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> str:
+        """Return a sentence, once in an enable, where a force is in band and the trim has stood at its limit for a while: what
+        is not in band is unreachable. Ask after each step in force or voltage mode. measured_n: contact force, smoothed."""
+        self._at_limit_since_s = min(self._at_limit_since_s, inputs.now_s) if loop.is_trim_at_limit else inf
+        has_lasted = inputs.now_s - self._at_limit_since_s >= _AT_LIMIT_S
+        if self._has_told_limit or not (has_lasted and loop.settling.holds_force):
+            return ""
+        self._has_told_limit = True
+        shown_n, model_n = self.direction * measured_n, self.direction * inputs.expected_n
+        return saturated_sentence(loop.voltage_v, loop.trim_v, shown_n, model_n)
 
     def unreachable_event(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> str:
         """Return a sentence where the target has just become unreachable, else nothing. Ask after each step in force or

@@ -63,6 +63,7 @@ class RepeatedReadings:
         self._run, self._is_dead = 0, False
         self._changes = 0
         self._doubted: tuple[int, float] | None = None  # a finer count: which change showed it, and the count before, N
+        self._least_later_n = inf  # of the changes since
         self._pool = Pool()
         self._window = SampleWindow()
         self._pools: dict[bool, deque[Spread]] = {way: deque(maxlen=POOLS) for way in (True, False)}
@@ -112,22 +113,26 @@ class RepeatedReadings:
 
     def _refine(self, step_n: float) -> None:
         """See whether the counts are finer than was known. One false digit shows as much, in two changes one after the other:
-        so a finer count is doubted until a later change is none of whole counts as they were known before."""
-        if self._doubted:
-            change, before_n = self._doubted
-            counts = step_n / before_n
-            if self._changes > change + 1 and abs(counts - round(counts)) > _OFF_GRID:
+        so a finer count is doubted until a later change is none of whole counts as they were known before. Where none were,
+        before the first changes, it is doubted until a later change is one such count; else the least later one counts."""
+        if self._doubted and self._changes > self._doubted[0] + 1:
+            counts, counts_before = step_n / self.count_n, step_n / self._doubted[1]
+            self._least_later_n = min(self._least_later_n, step_n)
+            if abs(counts - 1.0) <= _OFF_GRID or abs(counts_before - round(counts_before)) > _OFF_GRID:
                 self._doubted = None
         if step_n < 0.75 * self.count_n:  # what was judged with larger counts looks quieter than it is
-            if self._doubted is None and self.count_n < inf:
-                self._doubted = self._changes, self.count_n
+            if self._doubted is None or self._doubted[1] == inf:
+                self._doubted = self._changes, inf if self._doubted else self.count_n
+                self._least_later_n = inf
             self.count_n, self._window = step_n, SampleWindow()
 
     def _take_window(self, under_force: bool) -> None:
         """Learn from a full window; where its count is doubted still, the noise would look larger than it is."""
         window, self._window = self._window, SampleWindow()
         if self._doubted:
-            (_, self.count_n), self._doubted = self._doubted, None
+            before_n = min(self._doubted[1], self._least_later_n)
+            if before_n < inf:
+                self.count_n, self._doubted = before_n, None
             return
         self._pool.add(window)
         self._renew(under_force)

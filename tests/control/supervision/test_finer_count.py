@@ -26,6 +26,18 @@ def test_a_cell_that_rightly_repeats_itself_is_not_dead_behind_one_false_digit(r
         assert Watched().after(DisturbedCell(0.2, seed, rate_hz), 3000.0 / rate_hz) == inf
 
 
+@pytest.mark.parametrize("disturbed_at", [1, 2, 3, 4])
+@pytest.mark.parametrize("counts", [0.1, 0.2, 0.3])
+def test_a_false_digit_in_the_first_readings_is_no_count_either(disturbed_at: int, counts: float) -> None:
+    """There was no larger count to go back to: of a quiet cell the first change of all was kept for good, and two of these
+    eight were called frozen."""
+    for seed in range(8):
+        watched, cell = Watched(), DisturbedCell(counts, seed, 20.0)
+        cell.disturbed_at = disturbed_at
+        assert watched.after(cell, 150.0) == inf
+        assert watched.watch._noise.count_n == pytest.approx(QUANTUM_N)
+
+
 @pytest.mark.parametrize("disturbed_at", [30, 400, 1500])
 def test_how_soon_a_frozen_cell_is_found_is_told_behind_a_false_digit_as_without(disturbed_at: int) -> None:
     found_s = []

@@ -5,6 +5,7 @@ from math import nan
 
 import pytest
 
+from gateway.codes.warning_bits import WarningBit
 from gateway.control.supervision.unreachable_force import Evidence, unreachable_words
 from gateway.registers.words import State, StatusBit
 from tests.control.bench import Bench, settings
@@ -233,3 +234,31 @@ def test_how_little_is_no_air_depends_on_whether_enough_was_seen(share: float, l
         voltage_v=4.0, measured_n=1.0, expected_n=20.0, pressure_pa=share * 4.0e5, expected_pa=4.0e5, learned=learned
     )
     assert evidence.no_air is no_air
+
+
+@pytest.mark.parametrize("span", [0.78, 0.8])
+def test_a_force_in_band_by_the_whole_trim_is_told_with_what_a_wrong_span_would_spoil(span: float) -> None:
+    """HOLDING, a bit of the warning word, and no line: 24 N pressed for 20 N, and the cure was to calibrate with that cell."""
+    bench = Bench(settings(), seed=1, unit=span)
+    bench.run(0.3)
+    for _ in range(2):  # once in an enable
+        bench.events.clear()
+        bench.enable(20.0)
+        bench.run(8.0)
+        assert (bench.last.state, bench.last.warnings) == (State.HOLDING, WarningBit.TRIM_SATURATED)
+        assert bench.plant.force_n > 24.0
+        (said,) = (event for event in bench.events if event[:4] in ("A340", "A301"))
+        assert " 19." in said and " 24." in said, "what the cell says, and the model"
+        assert "its limit" in said and "span is off" in said and "known weight" in said
+        bench.disable()
+        bench.run(1.0)
+
+
+@pytest.mark.parametrize("span", [0.9, 1.0, 1.16])
+def test_a_trim_within_its_range_says_nothing_and_a_missed_target_only_that(span: float) -> None:
+    bench = Bench(settings(), seed=1, unit=span)
+    bench.run(0.3)
+    bench.enable(20.0)
+    bench.run(8.0)
+    told_codes = [event[:4] for event in bench.events if event.startswith("A3")]
+    assert told_codes == (["A301"] if span > 1.1 else [])
