@@ -215,5 +215,13 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(14.9935, "rival", "split", (0.111, 0.012, 1.0)),
         ],
     ),
+    (
+        404188,
+        [
+            Event(22.8875, "worker", "hold", (38.82,)),
+            Event(23.3698, "machine", "freeze", (1.3308,)),
+            Event(23.7587, "worker", "reset"),
+        ],
+    ),
 ]
 """Schedules that once broke a law, or were said to: the seed of the machine, and what happened to it."""

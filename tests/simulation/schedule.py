@@ -153,7 +153,7 @@ class Simulation:
         self._happen_next(iter(events))
         self._run_for(duration_s)
         self.held_force.end()
-        self._heal()
+        heal(self)
         self.observer.broken += judge_audit(self._folder, self.masters["healer"].name)
         self.observer.history.cuts.append(self.clock.now_s)  # what is on the wire now comes no more
         if self.observer.history.is_whole:
@@ -198,7 +198,7 @@ class Simulation:
     # -- what goes on
 
     def _note_pdu(self, host: str, pdu: bytes, is_answered: bool) -> None:
-        self.status.note_write(host if is_answered else "", pdu, self.clock.now_s)
+        self.status.note_write(host if is_answered else "", pdu, self._done_s(is_answered))
         self.explained.note_write(host, self.clock.now_s)
         if (control := control_of(pdu)) is not None and control & TARE:
             self._note_tare()
@@ -217,7 +217,11 @@ class Simulation:
             self._was_watched = False
         self._has_set_bits |= control == BITS and is_answered
         note = self.observer.note_accepted if is_answered else self.observer.note_unanswered
-        note(control, self.clock.now_s)
+        note(control, self._done_s(is_answered))
+
+    def _done_s(self, is_answered: bool) -> float:
+        """When a write has been executed at the latest: whose master has hung up is, when a machine goes on that stands."""
+        return self.clock.now_s if is_answered else max(self.clock.now_s, self.service.thaws_s)
 
     def _on_death(self) -> None:
         self.status.forget_owner()
@@ -275,9 +279,6 @@ class Simulation:
         self.clock.run_until(self.clock.now_s + duration_s)
 
     # -- healing (I13)
-
-    def _heal(self) -> None:
-        heal(self)
 
     def _read_force_n(self) -> float:
         """The force that the gateway shows, N; not a number where nobody answers."""

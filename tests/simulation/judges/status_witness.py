@@ -47,7 +47,8 @@ class StatusWitness:
         self._last_s = at_s
 
     def note_write(self, host: str, pdu: bytes, now_s: float) -> None:
-        """A write was taken, or nobody knows whether it was. host: where it is known, and that it was taken."""
+        """A write was taken, or nobody knows whether it was. host: where it is known, and that it was taken; now_s: at the
+        latest."""
         if (control := control_of(pdu)) is not None:
             self._commands.append((now_s, host, control))
         self._written += ((now_s, counts) for counts in setpoints_of(pdu))
