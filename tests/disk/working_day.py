@@ -13,7 +13,7 @@ from gateway.profiles import load_calibration
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.disk.watched_disk import WatchedDisk, watching
 from tests.plants.test_plant_store import numbered
-from tests.simulation.healing import HELD_N
+from tests.simulation.healing import HELD_N, heal
 from tests.simulation.kernel.edges import NotedRunningRig, SimulatedDisk, simulated_edges
 from tests.simulation.schedule import Simulation
 
@@ -105,7 +105,7 @@ class Day:
 
     def end(self) -> list[str]:
         """Hold a force once more, and say what was broken."""
-        self.simulation._heal()
+        heal(self.simulation)
         self._holder = "healer"
         service = self.simulation.service
         broken = [*self.simulation.observer.broken, *self.simulation.masters["worker"].complaints]

@@ -140,6 +140,37 @@ def test_one_that_is_closing_already_gives_way_once(stand: Any, deliver: Any) ->
     assert sorted(far.ended for _, far in others) == ["", "", "closed"]
 
 
+def test_who_has_been_silent_for_longest_gives_way_and_only_where_there_is_no_room(stand: Any, deliver: Any) -> None:
+    made = stand(connections=4)
+    ends = [made.connect("192.0.2.2") for _ in range(3)]
+    made.wait(1.0)
+    deliver(*ends[0], framed(READ))
+    deliver(*ends[2], framed(READ))
+    made.wait(GIVES_WAY_S + 1.0)
+    made.connect("192.0.2.3")
+    assert [far.ended for _, far in ends] == ["", "", ""], "there is room"
+    made.connect("192.0.2.4")
+    assert [far.ended for _, far in ends] == ["", "closed", ""]
+
+
+def test_who_is_amid_a_request_does_not_give_way(stand: Any, deliver: Any) -> None:
+    made = stand(connections=2, partial_s=60.0)
+    ends = [made.connect("192.0.2.2") for _ in range(2)]
+    made.wait(1.0)
+    for connection, far in ends:
+        deliver(connection, far, framed(READ)[:7])
+    made.wait(GIVES_WAY_S + 1.0)
+    assert (made.connect(FAR)[1].ended, [far.ended for _, far in ends]) == ("aborted", ["", ""])
+
+
+def test_a_master_that_takes_its_own_silent_place_was_never_away(stand: Any) -> None:
+    """Its command would be nobody's for a moment, and a lease of its own begins with that."""
+    made = stand(per_address=1)
+    silent = made.connect(FAR)[1]
+    made.wait(GIVES_WAY_S + 1.0)
+    assert (made.connect(FAR)[1].ended, silent.ended, made.closed) == ("", "closed", [])
+
+
 def test_who_is_not_allowed_takes_nobody_s_place(stand: Any) -> None:
     made = stand(connections=2, allow=(ip_network("192.0.2.0/24"),))
     made.shared.peers = Peers(made.settings, guarded=True)

@@ -278,8 +278,6 @@ class Simulation:
     def _run_for(self, duration_s: float) -> None:
         self.clock.run_until(self.clock.now_s + duration_s)
 
-    # -- healing (I13)
-
     def _read_force_n(self) -> float:
         """The force that the gateway shows, N; not a number where nobody answers."""
         self.masters["healer"].ask(read_pdu(102, 1))
