@@ -90,7 +90,15 @@ OTHER_ENDS = (  # an answer ends otherwise than a question: what an adapter hear
 )
 
 
-@pytest.mark.parametrize("profile", [*SHIPPED, *OTHER_ENDS], ids=lambda one: one.name)
+def of_two_bytes() -> DeviceProfile:
+    """A value is shorter than the question for it."""
+    amplifier = load_device("hbm-aed-binary")
+    assert amplifier.read_force
+    reading = replace(amplifier.read_force, frame="{force:int16}", end_count=32767)
+    return replace(amplifier, name="amplifier with two bytes", read_force=reading)
+
+
+@pytest.mark.parametrize("profile", [*SHIPPED, *OTHER_ENDS, of_two_bytes()], ids=lambda one: one.name)
 def test_what_an_adapter_hears_of_us_is_read_over_and_is_no_noise(profile: DeviceProfile) -> None:
     """It was counted as bytes that nobody can read, and motor cables were blamed (A341); where a question ends otherwise than
     an answer, no answer was understood."""
