@@ -99,3 +99,19 @@ def test_a_command_below_zero_is_none() -> None:
     table = recorded(stairs())
     error = refuse_table(table | {"command_v": table["command_v"] - 2.0})
     assert error.flaw is LadderFlaw.COLUMNS
+
+
+def test_rows_of_our_own_run_that_have_no_number_take_no_other_row_s_stair() -> None:
+    """Labels are of rows: without the rows in front of them that are left out they would be a stair further down."""
+    table = recorded(stairs(2))
+    stair = np.arange(len(table["time_s"])) // ROWS_A_STAIR
+    last = stair == stair.max()
+    group = np.where(last, -1, stair // (2 * STAIRS_UP - 1))
+    table |= {"phase": np.where(last, 5, 3), "group": group, "stair": stair}
+    table = {name: column.astype(float) for name, column in table.items()}
+    whole = check_table(table).ladder
+    for first, count in ((0, 15), (405, 4)):
+        gaps = {name: column.copy() for name, column in table.items()}
+        gaps["force_n"][first : first + count] = np.nan
+        assert check_table(gaps).ladder.force_n == pytest.approx(whole.force_n, abs=0.2)
+        assert list(check_table(gaps).ladder.group) == list(whole.group)
