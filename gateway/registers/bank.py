@@ -10,8 +10,8 @@ Whether an edge can be taken now control says, asked before anything is stored: 
 Decisions: a write to a read-only register is 02, as to an address that cannot be written. Refused reads are noted like
 refused writes, so that a newcomer's 40001 can be explained. Clearing enable also clears control_word, force_setpoint
 and voltage_setpoint (an old voltage must not wait for the next enable), releases the ownership, and is granted to any
-peer, as is clearing start_calibration: then nothing else of its write is taken. A takeover in the write that disables
-holds. byte_order_echo takes 1234.5 in both word orders and reads back as written; it proves the order of one host.
+peer without an edge beside it, as is clearing start_calibration: then nothing else of its write is taken. A takeover in the
+write that disables holds. byte_order_echo takes 1234.5 in both word orders and reads back; it proves the order of one host.
 """
 
 from collections.abc import Callable, Mapping, Sequence

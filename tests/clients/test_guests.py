@@ -47,6 +47,18 @@ def test_a_word_that_is_set_while_another_master_presses_is_not_its_stop(client:
     assert gateway.bank.command.force_ramp_n_per_s == 50.0, "it waited for the other one's end"
 
 
+@pytest.mark.parametrize("edge", ["tare", "reset"])
+def test_an_edge_that_is_asked_for_while_another_master_presses_is_refused_and_not_its_stop(
+    client: Any, gateway: GatewayAtHand, edge: str
+) -> None:
+    """It goes out in a whole command with enable 0: it took the force, nothing was tared, and no word said so."""
+    cycles(client)
+    gateway.take_over_from_elsewhere()
+    getattr(client, edge)()
+    cycles(client)
+    assert held_elsewhere(gateway) and "W210" in client.text and len(gateway.exceptions) == 1
+
+
 def test_a_guest_that_connects_again_stops_nobody(client: Any, gateway: GatewayAtHand) -> None:
     """Each loss of a panel with a ramp in its data was the end of the force that a robot held."""
     set_ramp(client)

@@ -11,8 +11,9 @@ from gateway.codes.refusals import RefusalReason
 from gateway.registers.words import ControlBit
 from gateway.registers.writes.proposed_write import EdgeRefusal
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged, refuse_commands
+from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
-from tests.clients.scenes import MAP, WHERE, command, commands, cycles
+from tests.clients.scenes import MAP, TEXTS, WHERE, command, commands, cycles
 
 
 def test_an_enable_whose_answer_is_lost_is_taken_back(client: Any, gateway: GatewayAtHand) -> None:
@@ -134,3 +135,27 @@ def test_the_first_heartbeat_of_a_program_is_not_the_last_of_the_one_before(
     client.reset()
     cycles(client)
     assert [words[0] for words in gateway.words] == [2] and gateway.beats[0] == 2
+
+
+def test_how_a_connection_was_lost_is_told_by_the_client_of_c(gateway: GatewayAtHand) -> None:
+    """Of a gateway that had closed it, that nobody answered in time; of one that is not there, that it did not accept in time;
+    of an answer that was cut, that it belonged to another question."""
+    client = CProgram(TEXTS["c"], gateway)
+    ask, told = gateway.ask, list[str]()
+
+    def close(frame: bytes) -> bytes:
+        raise ConnectionResetError
+
+    def refuse() -> None:
+        raise Unplugged
+
+    for act in (close, lambda frame: ask(frame)[:-2], lambda frame: b""):
+        gateway.ask = ask  # type: ignore[method-assign]
+        client.cycle(5.0)
+        gateway.ask = act  # type: ignore[method-assign, assignment]
+        client.cycle()
+        told.append(client.text.rpartition(": ")[2])
+    gateway.connect = refuse  # type: ignore[method-assign]
+    client.cycle(5.0)
+    assert told == ["closed by the gateway", "no answer in time", "no answer in time"]
+    assert client.text.endswith(": Connection refused")

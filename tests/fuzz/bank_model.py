@@ -156,7 +156,7 @@ class BankModel:
         stops = bool(before & ENABLE and not word & ENABLE)
         takes = bool(word & TAKE)
         if self.owner not in (None, host) and not takes:
-            if not stops:
+            if not stops or word & MOMENTARY:
                 if not word and tuple(covers) == (0,):
                     return
                 raise Refused(6)

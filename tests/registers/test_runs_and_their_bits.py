@@ -102,13 +102,13 @@ def test_enable_that_falls_beside_a_run_s_bit_that_stands_is_a_stop(make_bank, m
 
 
 def test_of_somebody_else_s_stop_nothing_else_is_taken(make_bank, master_of) -> None:
-    """No edge that stands beside it, and no bit that is not enable."""
+    """No bit that is not enable."""
     bank, handed = make_bank(supported_bits=ALL), list[Command]()
     owner, other = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
     owner.write(0, 1 | PULL, 1200)
     bank.on_command = handed.append
     assert other.refusal(other.write, 0, 1).reason is RefusalReason.NOT_OWNER, "the valve is none of its business"
-    other.write(0, RESET | PULL)
+    other.write(0, PULL)
     assert handed[0].stops and not handed[0].control_word
 
 

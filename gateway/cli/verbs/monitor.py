@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options
+from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.cli.live_monitor.poll import Poller
@@ -52,6 +54,8 @@ def command(*, svg: Path | None, seconds: float | None, wire: "Wire", **options:
         if svg or options["once"] or not sys.stdout.isatty():
             _watch(poller, seconds or 0.0)
             _picture(poller, svg) if svg else _text(poller)
+            if poller.trouble:  # it stands in the frame, too; who asks for one frame may look at the exit code alone
+                raise CliError(poller.trouble, exit_codes.DEVICE)
         else:
             _live(poller, seconds)
 

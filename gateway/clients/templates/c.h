@@ -281,10 +281,15 @@ static int fg_connect_address(const struct addrinfo *to, long long until_ms) {
     fcntl(made, F_SETFD, FD_CLOEXEC);
     fcntl(made, F_SETFL, O_NONBLOCK);
     if (connect(made, to->ai_addr, to->ai_addrlen) == 0) return made;
-    if (errno == EINPROGRESS && fg_wait(made, POLLOUT, until_ms) &&
-        getsockopt(made, SOL_SOCKET, SO_ERROR, &error, &length) == 0 && error == 0)
+    if (errno != EINPROGRESS) {
+        error = errno;
+    } else if (!fg_wait(made, POLLOUT, until_ms)) {
+        error = ETIMEDOUT;
+    } else if (getsockopt(made, SOL_SOCKET, SO_ERROR, &error, &length) == 0 && error == 0) {
         return made;
+    }
     close(made);
+    errno = error;
     return -1;
 }
 
@@ -293,6 +298,7 @@ static int fg_check_map(fg_client *client);
 static int fg_connect(fg_client *client) {
     struct addrinfo hints, *found = NULL, *each;
     long long until_ms;
+    int error;
     char service[8];
     if (client->socket >= 0) return FG_OK;
     if (fg_now_ms() < client->retry_at_ms) return FG_LOST;
@@ -306,20 +312,22 @@ static int fg_connect(fg_client *client) {
     until_ms = fg_now_ms() + client->timeout_ms;
     /* A name may have several addresses: "localhost" is ::1 first where there is IPv6, and the gateway listens on 127.0.0.1. */
     for (each = found; each && client->socket < 0; each = each->ai_next) client->socket = fg_connect_address(each, until_ms);
+    error = errno;
     freeaddrinfo(found);
     client->known = client->proven = client->seen = 0;
     if (client->socket >= 0) return fg_check_map(client);
-    fg_drop(client, "not accepted in time");
+    fg_drop(client, error == ETIMEDOUT ? "not accepted in time" : strerror(error));
     return FG_LOST;
 }
 
+/* This and the next: 1 done, 0 not in time, -1 the connection has ended. */
 static int fg_take_bytes(fg_client *client, uint8_t *to, size_t count, long long until_ms) {
     size_t got = 0;
     while (got < count) {
         ssize_t taken;
         if (!fg_wait(client->socket, POLLIN, until_ms)) return 0;
         taken = recv(client->socket, to + got, count - got, 0);
-        if (taken == 0 || (taken < 0 && errno != EINTR && errno != EAGAIN)) return 0;
+        if (taken == 0 || (taken < 0 && errno != EINTR && errno != EAGAIN)) return -1;
         if (taken > 0) got += (size_t)taken;
     }
     return 1;
@@ -331,10 +339,15 @@ static int fg_send_bytes(fg_client *client, const uint8_t *from, size_t count, l
         ssize_t sent;
         if (!fg_wait(client->socket, POLLOUT, until_ms)) return 0;
         sent = send(client->socket, from + put, count - put, MSG_NOSIGNAL);
-        if (sent < 0 && errno != EINTR && errno != EAGAIN) return 0;
+        if (sent < 0 && errno != EINTR && errno != EAGAIN) return -1;
         if (sent > 0) put += (size_t)sent;
     }
     return 1;
+}
+
+static int fg_lose(fg_client *client, int how) {
+    fg_drop(client, how < 0 ? "closed by the gateway" : "no answer in time");
+    return FG_LOST;
 }
 
 /* Sends a frame and takes the answer's PDU into `frame`. FG_REFUSED: an exception, in client->exception. */
@@ -342,17 +355,16 @@ static int fg_ask(fg_client *client, uint8_t *frame, size_t length) {
     long long until_ms = fg_now_ms() + client->timeout_ms;
     uint8_t function = frame[7], unit = frame[6];
     uint16_t transaction = fg_get(frame), rest;
+    int how;
     client->exception = 0;
-    if (!fg_send_bytes(client, frame, length, until_ms) || !fg_take_bytes(client, frame, FG_HEADER, until_ms)) {
-        fg_drop(client, "no answer in time");
-        return FG_LOST;
-    }
+    if ((how = fg_send_bytes(client, frame, length, until_ms)) <= 0) return fg_lose(client, how);
+    if ((how = fg_take_bytes(client, frame, FG_HEADER, until_ms)) <= 0) return fg_lose(client, how);
     rest = fg_get(frame + 4);
-    if (fg_get(frame) != transaction || fg_get(frame + 2) != 0 || frame[6] != unit || rest < 3 || rest > 254 ||
-        !fg_take_bytes(client, frame + FG_HEADER, rest - 1u, until_ms)) {
+    if (fg_get(frame) != transaction || fg_get(frame + 2) != 0 || frame[6] != unit || rest < 3 || rest > 254) {
         fg_drop(client, "an answer that does not belong to the question");
         return FG_LOST;
     }
+    if ((how = fg_take_bytes(client, frame + FG_HEADER, rest - 1u, until_ms)) <= 0) return fg_lose(client, how);
     if (frame[7] == (function | 0x80)) {
         client->exception = frame[8];
         return FG_REFUSED;

@@ -5,7 +5,8 @@ knows: whether the bit of a run was held at 1 (04), and whether an enable has it
 
 Who clears enable wants the output off, and is never refused; an edge beside it is decided all the same, so that a lone
 start_calibration or tare while a force is held is an answer with a reason, and no stop. start_calibration or start_self_test
-alone keeps the output: then the bit takes enable's place.
+alone keeps the output: then the bit takes enable's place. Of who owns nothing an edge is refused (06), and the stop beside it
+with it: taken for a stop alone, a guest's tare would be the end of the force, and its answer a lie.
 """
 
 from collections.abc import Callable
@@ -156,9 +157,9 @@ class Admission:
             is_stop, written = True, written & ~RUN_BITS
         if self._ownership.admits(write.host) or (written & TAKE and self._ownership.may_take_over(write.host)):
             return _PermittedWrite(values, written, is_stop)
-        if is_stop:
+        asks_for_more = written & (EDGE_BITS | ENABLE & ~before)  # than a stop or the end of a run, as anybody may
+        if is_stop and not asks_for_more:
             return _PermittedWrite(commands.values.copy(), 0, True)
-        asks_for_more = written & ~before & ENABLE  # than the end of a run, which anybody may ask for
         if falls & RUN_BITS and not asks_for_more:
             return _PermittedWrite(commands.values.copy(), before & ~RUN_BITS, False)
         if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):

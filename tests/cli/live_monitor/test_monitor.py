@@ -15,6 +15,7 @@ from gateway.cli.live_monitor.poll import Poller, WriterSource
 from gateway.cli.live_monitor.register_table import View, Writer
 from gateway.cli.master.client import GatewayClient, RegisterReading
 from gateway.cli.master.wires import TcpWire
+from gateway.cli.verbs import monitor
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.modbus import Peer
@@ -213,6 +214,13 @@ def test_no_gateway_at_the_start_ends_with_69(call) -> None:
     answer = call("monitor", "--once", "--gateway", "127.0.0.1:1")
     assert answer.exit_code == 69
     assert answer.stderr.startswith("E130 ")
+
+
+def test_a_gateway_that_ends_while_it_is_watched_ends_with_69_too(fake, call, monkeypatch) -> None:
+    """The frame said so, and the exit code 0."""
+    monkeypatch.setattr(monitor, "_watch", lambda poller, seconds: (fake.stop(), poller.poll_or_note()))
+    answer = call("monitor", "--once", "--gateway", fake.address)
+    assert (answer.exit_code, answer.stderr[:5]) == (69, "E131 ") and "NO ANSWER" in answer.stdout
 
 
 def test_a_gateway_that_comes_back_is_found_again(serve, fake, register_map: RegisterMap) -> None:

@@ -63,6 +63,8 @@ class CProgram:
             data = self.gateway.ask(bytes(frame[:count]))
         except Unplugged:
             return 0
+        except ConnectionResetError:
+            return -1
         ctypes.memmove(answer, data, len(data))
         return len(data)
 

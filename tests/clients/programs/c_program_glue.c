@@ -29,7 +29,7 @@ int at_hand_setsockopt(int s, int l, int o, const void *v, socklen_t n) { (void)
 int at_hand_getsockopt(int s, int l, int o, void *v, socklen_t *n) { (void)s; (void)l; (void)o; (void)v; (void)n; return 0; }
 int at_hand_poll(struct pollfd *waited, nfds_t count, int ms) {
     (void)count;
-    if (waited->events & POLLOUT || first < end) return 1;
+    if (waited->events & POLLOUT || first < end || end < 0) return 1;
     clock_ms += ms;
     return 0;
 }
@@ -42,6 +42,7 @@ ssize_t at_hand_send(int s, const void *data, size_t count, int flags) {
 ssize_t at_hand_recv(int s, void *data, size_t count, int flags) {
     size_t given = count < (size_t)(end - first) ? count : (size_t)(end - first);
     (void)s; (void)flags;
+    if (end < 0) return 0; /* the far end has closed */
     memcpy(data, waiting + first, given);
     first += (int)given;
     return (ssize_t)given;

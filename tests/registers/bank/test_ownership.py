@@ -65,10 +65,10 @@ def test_the_whole_block_written_again_undoes_another_s_stop_and_the_words_behin
     assert bank.command.control_word == ControlBit.ENABLE
 
 
-@pytest.mark.parametrize(("stands", "written", "left"), [(32, 0, 0), (33, 1, 1), (32, 2, 0), (32, 4, 0)])
+@pytest.mark.parametrize(("stands", "written", "left"), [(32, 0, 0), (33, 1, 1), (32, 16, 0)])
 def test_anybody_may_end_a_run_and_nothing_else_is_taken(make_bank, master_of, stands, written, left):
-    """Clearing bit 5 is no request for more, whatever stands beside it; an enable is one."""
-    bank = make_bank(supported_bits=BASIC_BITS | ControlBit.START_CALIBRATION)
+    """Clearing bit 5 is no request for more; an enable is one, and so is an edge."""
+    bank = make_bank(supported_bits=BASIC_BITS | ControlBit.START_CALIBRATION | ControlBit.VALVE_PULL)
     owner, other = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
     owner.write(0, stands, 0, 50)
     other.write(0, written, 1300, 70)
@@ -80,6 +80,18 @@ def test_anybody_may_end_a_run_and_nothing_else_is_taken(make_bank, master_of, s
     assert other.word(0) == left
     owner.write(0, 32)
     assert other.refusal(other.write, 0, 1).reason is RefusalReason.NOT_OWNER
+
+
+@pytest.mark.parametrize("edge", [2, 4, 6])
+@pytest.mark.parametrize("stands", [1, 32])
+def test_an_edge_of_somebody_else_is_refused_and_no_stop(make_bank, master_of, stands, edge):
+    """A panel's tare took the force that a robot held, was answered as taken, and nothing was tared."""
+    bank = make_bank(supported_bits=BASIC_BITS | ControlBit.START_CALIBRATION)
+    owner, other = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
+    owner.write(0, stands)
+    for write, *words in ((other.write, 0, edge), (other.write, 0, edge, 0, 0, 0, 5), (other.write_float, 200, edge)):
+        assert other.refusal(write, *words).reason is RefusalReason.NOT_OWNER
+    assert bank.command.control_word == stands and bank.owner == "10.0.0.1"
 
 
 def test_a_takeover_lasts_when_its_command_rests(bank, master, other):
