@@ -221,6 +221,7 @@ class Controller:
         if not reading.is_new:
             return
         touching = self._contact.update(reading)
+        self._loop.expected.outside_n = self._outside_n
         self._faults.observe(reading, self._loop.expected, self._loop.branch_share, touching)
         if not self._machine.is_enabled:
             self._faults.observe_rest(reading)
@@ -236,8 +237,7 @@ class Controller:
         if edges.stops and self._machine.is_enabled:
             self._machine.disable(f"disabled by {self._commands.who}")
         elif edges.falls & RUN_BITS and self.active_run.running:
-            stopped = f"{self.active_run.kind} stopped by {self._commands.who}"
-            self._machine.end_run(stopped, self._given_n)
+            self._machine.end_run(f"{self.active_run.kind} stopped by {self._commands.who}", self._given_n)
         if edges.rises & _RESET:
             self._machine.reset()
         if edges.rises & _TARE:
