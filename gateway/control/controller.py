@@ -217,10 +217,12 @@ class Controller:
     def _sense(self, now_s: float, sample: ForceSample | None, line: LineStatus) -> None:
         around = (line.temperature_c, self._loop.voltage_v)
         self._one_shot.observe_line(line)
+        self._conditioner.note_output(is_known=line.acknowledged_v is not None)
         self._reading = reading = self._conditioner.read(now_s, sample, self._commands.gravity_n, around)
         if not reading.is_new:
             return
         touching = self._contact.update(reading)
+        self._loop.expected.outside_n = self._outside_n
         self._faults.observe(reading, self._loop.expected, self._loop.branch_share, touching)
         if not self._machine.is_enabled:
             self._faults.observe_rest(reading)
@@ -236,8 +238,7 @@ class Controller:
         if edges.stops and self._machine.is_enabled:
             self._machine.disable(f"disabled by {self._commands.who}")
         elif edges.falls & RUN_BITS and self.active_run.running:
-            stopped = f"{self.active_run.kind} stopped by {self._commands.who}"
-            self._machine.end_run(stopped, self._given_n)
+            self._machine.end_run(f"{self.active_run.kind} stopped by {self._commands.who}", self._given_n)
         if edges.rises & _RESET:
             self._machine.reset()
         if edges.rises & _TARE:
@@ -289,9 +290,8 @@ class Controller:
 
     def _target(self) -> Demand:
         """What to go for now: the command's demand, or on a ramp down 0 N, within the time whatever the force is."""
-        demand = self._commands.demand
         is_to_zero = self._machine.is_ramping_down or (self._valve is not None and self._valve.is_switching)
-        return ramp_down_demand(demand, self._settings) if is_to_zero else demand
+        return ramp_down_demand(self._commands.demand, self._settings) if is_to_zero else self._commands.demand
 
     def _move(self, now_s: float, dt_s: float) -> None:
         if self._machine.state is _RUNNING:

@@ -63,6 +63,11 @@ class SampleConditioner:
         self._zero.forget()
         self._cell = cell
 
+    def note_output(self, *, is_known: bool) -> None:
+        """Note whether the output has confirmed a voltage: as long as nobody knows what stands there, it may press."""
+        if not is_known:
+            self._zero.expect_left()
+
     def read(
         self, now_s: float, sample: ForceSample | None, gravity_n: float, around: tuple[float, float] = (nan, 0.0)
     ) -> Reading:

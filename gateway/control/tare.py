@@ -4,7 +4,8 @@ Allowed only while nothing presses on purpose: output off, or enabled with setpo
 signal, so that a force that is still decaying cannot become the zero. The payload's weight is added first: after a tare
 the contact force reads 0 at the present tilt, and a later tilt is still compensated. A restart forgets the zero:
 only coefficients are restored. Where the process before has died, what it pressed with may still be leaving: during the dead
-time it stands as steady as a zero, so any but a small reading is waited for.
+time it stands as steady as a zero, so any but a small reading is waited for. An output that was not heard may have kept it for
+longer: the wait begins when it has confirmed a voltage.
 """
 
 from collections import deque
@@ -34,7 +35,8 @@ class Zero:
         self._samples = 0
         self.largest_spread_n = max(5.0 * supervision.sample_quantum_n, 0.5)
         self._largest_n = _LARGEST_SHARE * supervision.saturation_n
-        self._may_leave_s = _LEAVING_LAGS * supervision.response_lag_s if is_behind_death else 0.0
+        self._leaving_s = _LEAVING_LAGS * supervision.response_lag_s
+        self._may_leave_s = self._leaving_s if is_behind_death else 0.0
 
     def observe(self, force_n: float, interval_s: float = _APART_S) -> None:
         """Keep one more usable sample, N. interval_s: since the one before."""
@@ -43,6 +45,10 @@ class Zero:
         if self._since_s >= _APART_S:
             self._recent_n.append(self._sum_n / self._samples)
             self._since_s, self._sum_n, self._samples = 0.0, 0.0, 0
+
+    def expect_left(self) -> None:
+        """Expect from now on that what was pressed before may still leave."""
+        self._may_leave_s = self._leaving_s
 
     def forget(self) -> None:
         """Forget all samples after the stream was interrupted: they do not describe now."""
@@ -65,7 +71,7 @@ class Zero:
             return f"force not steady: {spread_n:.2f} N between samples, allowed {self.largest_spread_n:.2f} N"
         if self._may_leave_s > 0.0 and abs(mean_n + gravity_n) > self.largest_spread_n:
             left_s = max(0.1, self._may_leave_s)
-            return f"{mean_n:.1f} N, which may have been pressed before this start and still leave: wait {left_s:.1f} s"
+            return f"{mean_n:.1f} N, which may be left of what was pressed before the output was heard: wait {left_s:.1f} s"
         if abs(mean_n + gravity_n) > self._largest_n:
             return f"{mean_n:.1f} N at rest, allowed {self._largest_n:.0f} N: stuck in contact or wrong cell"
         return ""

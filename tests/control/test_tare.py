@@ -103,7 +103,10 @@ def test_behind_a_death_a_reading_of_nothing_is_a_zero_at_once_and_any_once_all_
     lag_s = bench.settings.supervision.response_lag_s
     bench.run(5.0 * lag_s - 0.15)
     bench.write(control_word=ControlBit.TARE)
-    assert bench.refused and "may have been pressed before this start and still leave: wait 0.1 s" in bench.refused.text
+    assert (
+        bench.refused
+        and "may be left of what was pressed before the output was heard: wait 0.1 s" in bench.refused.text
+    )
     bench.run(0.1)
     bench.write(control_word=ControlBit.TARE)
     assert bench.refused is None and bench.controller.zero_n == pytest.approx(6.0, abs=0.2)

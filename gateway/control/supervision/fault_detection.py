@@ -89,7 +89,7 @@ class FaultDetector:
         self._room_n = over_force_room_n(settings.limits, settings.defaults)
         self._rise = RiseCheck(settings.defaults.contact_threshold_n)
         self._frozen = StuckSensorCheck(settings.supervision)
-        self._over = 0
+        self._over, self._outside_n = 0, 0.0
         self._response_fault = FaultCode.NONE
         self._stuck_s = 0.0
         self._stood_still_s, self._stall_ended_s = 0.0, -inf
@@ -111,6 +111,7 @@ class FaultDetector:
 
     def observe(self, reading: Reading, response: ExpectedForce, branch_share: float, touching: bool) -> None:
         """Count a new sample, enabled or not."""
+        self._outside_n = response.outside_n
         self._rise.smooth(reading)
         self._frozen.observe(reading, response, touching)
         is_over = reading.overload or abs(reading.contact_n) >= self._limits.over_force_n
@@ -271,7 +272,9 @@ class FaultDetector:
             sentence = sign_sentence(rise_n, model_n, was_right=self._rise.is_proven)
             return StopCause(FaultCode.SIGN_INVERTED, sentence)
         if self._response_fault is _WRONG_GAIN:
-            return StopCause(FaultCode.GAIN_WRONG, gain_sentence(self._rise.wrong_rise_n, expected_n()))
+            return StopCause(
+                FaultCode.GAIN_WRONG, gain_sentence(self._rise.wrong_rise_n, expected_n() + self._outside_n)
+            )
         return None
 
     def _over_words(self, reading: Reading, expected_n: float) -> str:

@@ -41,11 +41,12 @@ _RIGHT, _WRONG_GAIN = FaultCode.NONE, FaultCode.GAIN_WRONG
 
 
 class ExpectedForce:
-    """What the model expects now: both branches at the lagged voltage, N of cell force above rest. lag_s: dead time too."""
+    """What the model expects now: both branches at the lagged voltage, N of cell force above rest. lag_s: dead time too.
+    outside_n: known force that something else brings onto the workpiece (compensation), beside the model's."""
 
     def __init__(self, model: Bsfm, lag_s: float, rest_v: float, stands_v: float | None = None) -> None:
         """stands_v: voltage whose pressure stands at the beginning, None for rest_v."""
-        self.lag_s = lag_s
+        self.lag_s, self.outside_n = lag_s, 0.0
         self._rest_v = rest_v
         self._lagged_v = self._voltage_v = rest_v if stands_v is None else stands_v
         self.use(model)
@@ -192,16 +193,19 @@ class RiseCheck:
         if self._wrong_sign_s >= _LASTING_S:
             return FaultCode.SIGN_INVERTED
         if not self._proven and touching and expected_n >= _LEAST_RISE_N:
-            return self._judge_gain(expected_n, response.width_n + _SLACK_N, response.kept_n, interval_s)
+            return self._judge_gain(expected_n, response, interval_s)
         self.is_too_high = False
         return _RIGHT
 
-    def _judge_gain(self, expected_n: float, slack_n: float, kept_n: float, interval_s: float) -> FaultCode:
-        off_n = self.measured_rise_n - expected_n
-        most_n = max(expected_n + slack_n + kept_n, _HIGHEST_SHARE * expected_n)
+    def _judge_gain(self, expected_n: float, response: "ExpectedForce", interval_s: float) -> FaultCode:
+        """What is known to come from outside may show in the reading, or have been there at the last tare."""
+        slack_n, outside_n = response.width_n + _SLACK_N, response.outside_n
+        least_n, highest_n = expected_n + min(0.0, outside_n), expected_n + max(0.0, outside_n)
+        most_n = max(highest_n + slack_n + response.kept_n, _HIGHEST_SHARE * highest_n)
         self.is_too_high = self.smooth_n - max(self._base_n, self._lowest_n) > most_n
         coming_n = max(0.0, self._calm_n - self._behind_n) * _UNKNOWN_LAG_S / _TREND_S
-        too_low = -off_n > slack_n and self.measured_rise_n + coming_n < _LOWEST_SHARE * (expected_n - slack_n)
+        is_low = least_n - self.measured_rise_n > slack_n
+        too_low = is_low and self.measured_rise_n + coming_n < _LOWEST_SHARE * (least_n - slack_n)
         has_moved = self._calm_n - self._at_rest_n > _MOVED_SHARE * expected_n
         wrong = (self.is_too_high and self.rise_since_lowest_n > most_n) or (too_low and has_moved)
         self._wrong_gain_s = self._wrong_gain_s + interval_s if wrong else 0.0

@@ -64,8 +64,8 @@ class StuckSensorCheck:
             self._watch_model()
         self._slack_n, self._answer_s = _WIDER_LOOP * response.width_n, response.lag_s
         least_n, most_n = response.bounds_n()
-        self._least_n = max(self._least_n, least_n)
-        self._most_n = min(self._most_n, most_n)
+        self._least_n = max(self._least_n, least_n + response.outside_n)
+        self._most_n = min(self._most_n, most_n + response.outside_n)
         if self._least_n - self._most_n > self._least_change_n + self._slack_n:  # the force must have moved
             self._moved_s += reading.interval_s
 

@@ -20,6 +20,7 @@ from gateway.control.inputs import Output
 from gateway.control.runs.active_run import RecordedPlan
 from gateway.control.runs.experiment_run import ExperimentRun
 from gateway.devices.messages import ForceSample
+from gateway.plants.in_use import in_use_facts
 from gateway.processes.disk_worker import DiskWorker
 from gateway.profiles import Rig
 from gateway.profiles.kinds.plans import plan_of
@@ -149,6 +150,10 @@ class CalibrationRuns:
             "result": self._result,
         }
 
+    def use_plant(self, rig: Rig) -> None:
+        """Take the rig with another plant in use: the recording of the next run says how its rows were read."""
+        self._rig = rig
+
     # -- from the loop
 
     def follow(self, decision: Output) -> None:
@@ -223,6 +228,7 @@ class CalibrationRuns:
             "rig_file": str(rig.file),
             "rig_texts": dict(rig.texts),
             "calibration": self._controller.calibration_id,
+            "plant_in_use": in_use_facts(rig),
             "simulated": rig.simulated,
             "seed": rig.seed,
             **header_of_plan(run),

@@ -305,8 +305,7 @@ class RunningRig:
         self._recordings.calibration = active.calibration
         self._audit.note_gateway("calibration in use", new=active.calibration.number)
         self._guardian.keep(**self._in_use())
-        lowered = self.bank.set_active_model(active.calibration, active.pointer.active.slot_word)
-        if lowered:
+        if lowered := self.bank.set_active_model(active.calibration, active.pointer.active.slot_word):
             self._log("calibration", lowered)
         self.loop.refresh()
 
@@ -315,6 +314,7 @@ class RunningRig:
         self._rig = rig
         self.controller.compensate(rig.control, rig.compensation, rig.calibration_in_use(self._calibration))
         self._recordings.use_plant(rig)
+        self._calibration_runs.use_plant(rig)
         self._audit.note_gateway("plant in use", new=self._plants.status()["active"])
         self._guardian.keep(**self._in_use())
         self._follow_plant()

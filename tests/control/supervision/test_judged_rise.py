@@ -21,7 +21,7 @@ class Rise:
     """Contact from 0.5 N on; the cell's low-pass has come to rest before each judgement."""
 
     def __init__(self, rest_n: float = 0.0) -> None:
-        self.check = RiseCheck(0.5)
+        self.check, self.outside_n = RiseCheck(0.5), 0.0
         self.hold(rest_n)
         self.check.start()
 
@@ -30,7 +30,9 @@ class Rise:
             self.check.smooth(Reading(cell_n=cell_n, interval_s=TICK_S, is_new=True, is_usable=True))
 
     def judged(self, expected_n: float, times: int = LASTS, *, touching: bool = True, kept_n: float = 0.0) -> FaultCode:
-        model: Any = SimpleNamespace(rise_n=lambda share: expected_n, width_n=WIDTH_N, kept_n=kept_n)
+        model: Any = SimpleNamespace(
+            rise_n=lambda share: expected_n, width_n=WIDTH_N, kept_n=kept_n, outside_n=self.outside_n
+        )
         return [self.check.judge(model, 1.0, touching, TICK_S) for _ in range(times)][-1]
 
     def at(self, cell_n: float) -> "Rise":
@@ -64,6 +66,26 @@ def test_what_the_rise_says_of_sign_and_gain(
     rise = Rise().at(cell_n)
     assert rise.judged(expected_n, LASTS - 1, touching=touching) is RIGHT, "it has to last"
     assert rise.judged(expected_n, 1, touching=touching) is fault
+
+
+@pytest.mark.parametrize(
+    ("outside_n", "cell_n", "expected_n", "fault"),
+    [
+        (8.0, 27.1, 1.0, GAIN),  # three times 9
+        (8.0, 26.9, 1.0, RIGHT),
+        (8.0, 5.0, 20.0, GAIN),  # it may have been taken for zero: as without
+        (8.0, 5.2, 20.0, RIGHT),
+        (-8.0, 2.6, 20.0, GAIN),  # under 0.3 of the 9 beyond friction
+        (-8.0, 2.8, 20.0, RIGHT),
+        (-8.0, 4.1, 1.0, GAIN),
+    ],
+)
+def test_what_is_known_to_come_from_outside_may_show_and_need_not(
+    outside_n: float, cell_n: float, expected_n: float, fault: FaultCode
+) -> None:
+    rise = Rise()
+    rise.outside_n = outside_n
+    assert rise.at(cell_n).judged(expected_n) is fault
 
 
 def test_what_friction_kept_when_the_model_was_measured_is_no_wrong_gain() -> None:

@@ -34,6 +34,7 @@ def test_another_calibration_or_plant_is_known_everywhere_at_once(devices: OwnDe
         other = replace(rig._rig, description="with another plant")
         rig._on_plant(other)
         assert recordings.plant_in_use == in_use_facts(other)
+        assert rig._calibration_runs._rig is other, "what a run is recorded with"
         assert rig.controller.calibration_id == number, "it brings back no calibration of before"
         assert rig._rig is other, "what comes next is judged by it"
 

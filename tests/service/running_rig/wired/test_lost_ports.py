@@ -110,6 +110,21 @@ def test_what_an_output_has_kept_pressed_while_it_was_away_is_no_zero(force_n: f
     assert abs(wired.controller.zero_n) < 1.5, "what friction keeps"
 
 
+@pytest.mark.parametrize("has_died", [True, False])
+@pytest.mark.parametrize("force_n", [5.0, 40.0])
+def test_nor_is_it_where_the_gateway_was_started_anew_meanwhile(has_died: bool, force_n: float) -> None:
+    """However long ago: it is told the safe voltage when it comes back, and 40 N were the zero of all that followed."""
+    wired = Wired(strict()).pressing(force_n)
+    wired.unplug()
+    wired.start(unclean=has_died)
+    wired.loop.on_output_closed()
+    wired.run(3.0)
+    wired.replug()
+    assert float(wired.twin.measured_n) > force_n - 1.0
+    wired.until(lambda: is_taken(wired, TARE), 2.0)
+    assert abs(wired.controller.zero_n) < 1.5, "what friction keeps"
+
+
 def is_taken(wired: Wired, word: int, heartbeat: int = 0) -> bool:
     """Written as soon as it is taken."""
     try:
