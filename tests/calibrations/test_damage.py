@@ -9,7 +9,7 @@ from random import Random
 import pytest
 
 from gateway.calibrations.store import CalibrationStore
-from gateway.numbered_documents import selection
+from gateway.numbered_documents import selection, store
 from gateway.numbered_documents.selection import BUILT_IN
 from gateway.numbered_documents.store import StoreError
 from gateway.processes.durable_file import add_checksum, verify_checksum
@@ -89,6 +89,21 @@ def test_after_damage_a_rollback_does_not_lead_to_the_damaged_one(used):
     used.use(used.add(calibration(4)))
     (used.directory / "0004.yaml").write_bytes(b"")
     used.use(2)
+    assert go_back(used).active.number == 3
+
+
+def test_a_rollback_leads_to_what_the_disk_did_not_give_for_a_moment(used, monkeypatch):
+    """It may be whole, and has been in use until now."""
+
+    def refuse(path: Path) -> bytes:
+        if path.name == "0003.yaml":
+            raise OSError(5, "Input/output error", str(path))
+        return read(path)
+
+    read = store.read_regular
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "read_regular", refuse)
+        used.use(used.add(calibration(4)))
     assert go_back(used).active.number == 3
 
 

@@ -37,12 +37,11 @@ def test_the_ladders_of_what_is_in_use_of_the_one_before_and_of_slots_stay(tmp_p
 
 def test_the_parts_that_a_resumed_run_went_on_from_stay_with_it(tmp_path: Path) -> None:
     store = CalibrationStore(tmp_path)
-    record(tmp_path)
-    record(tmp_path)
-    record(tmp_path, continues=[1])
-    (used,) = made_from(store, 5, "recording 0003.fgr: 60 stairs 0-8-0 V")
+    for continues in ([], [1], [], [1, 2]):
+        record(tmp_path, continues=continues)
+    (used,) = made_from(store, 5, "recording 0004.fgr: 60 stairs 0-8-0 V")
     store.use(used)
-    assert kept_ladders(tmp_path) == {"0001.fgr", "0003.fgr"}
+    assert kept_ladders(tmp_path) == {"0001.fgr", "0002.fgr", "0004.fgr"}
 
 
 @pytest.mark.parametrize(

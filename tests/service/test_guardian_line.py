@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import errno
 import os
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,16 @@ from gateway.service.heartbeat_memory import HeartbeatMemory
 from tests.processes.test_message_link import Pair, ends
 
 __all__ = ["ends"]
+
+
+def fill(link: socket.socket) -> int:
+    """Send until the line takes nothing more; return how many messages wait in it."""
+    sent = 0
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            message_link.send(link, message_link.HEARTBEAT)
+            sent += 1
+    return sent
 
 
 def test_a_loop_that_beats_in_memory_wakes_nobody(ends: Pair) -> None:
@@ -90,11 +101,7 @@ def test_what_has_waited_until_the_end_is_still_told(ends: Pair) -> None:
     async def scene() -> int:
         ends[1].setblocking(False)
         guardian = GuardianLine(ends[1])
-        sent = 0
-        with contextlib.suppress(BlockingIOError):
-            while True:
-                message_link.send(ends[1], message_link.HEARTBEAT)
-                sent += 1
+        sent = fill(ends[1])
         guardian.first_cause("internal error: ZeroDivisionError()")
         for _ in range(sent):
             assert message_link.receive(ends[0]) == message_link.Message(message_link.HEARTBEAT)
@@ -104,6 +111,29 @@ def test_what_has_waited_until_the_end_is_still_told(ends: Pair) -> None:
     assert asyncio.run(scene()) > 0
     last = message_link.receive(ends[0])
     assert last and last.body == {"text": "internal error: ZeroDivisionError()"}
+
+
+def test_what_the_line_did_not_take_goes_with_the_next_beat_and_in_order(ends: Pair) -> None:
+    """The port of the output among it, which nobody would guard until something else was told."""
+    memory = os.memfd_create("beat")
+
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1], HeartbeatMemory(memory))
+        waiting = fill(ends[1])
+        guardian.hand_over(memory, b"SET 0\r\n", b"0\r\n", b"\r\n")
+        guardian.keep(calibration=3)
+        for _ in range(waiting):
+            assert message_link.receive(ends[0]) == message_link.Message(message_link.HEARTBEAT)
+        guardian.heartbeat(1.0)
+        line, kept = message_link.receive(ends[0]), message_link.receive(ends[0])
+        assert line and kept and (line.tag, len(line.descriptors)) == (message_link.LINE, 1)
+        assert (kept.tag, kept.body) == (message_link.KEEP, {"calibration": 3})
+        line.drop_descriptors()
+        guardian.close()
+
+    asyncio.run(scene())
+    os.close(memory)
 
 
 @pytest.mark.parametrize("size", [100_000, 1_000_000])

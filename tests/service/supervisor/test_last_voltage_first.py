@@ -95,6 +95,19 @@ def test_a_line_that_is_lost_is_kept_open_by_nobody_and_its_device_is_not_taken_
     assert "safe voltage acknowledged" in one.said[-1], "the next one has a line of its own"
 
 
+def test_a_line_that_one_process_has_lost_is_no_word_about_the_next_one(scene, port):
+    """Which has opened none yet: there was nothing to be acknowledged."""
+    one = scene(lives(port), lambda child: None)
+    assert_comes_up(one)
+    one.child.say(message_link.LINE_LOST, {})
+    for count in (2, 3):
+        one.child.dies(-9)
+        one.run(lambda: len(one.starter.started) == count)  # noqa: B023
+    lost, never_opened = (each for each in one.said if "control" in each)
+    assert "not acknowledged" in lost
+    assert "acknowledged" not in never_opened
+
+
 def test_nonsense_is_an_end_at_once_and_nothing_that_follows_it_counts(scene, port):
     """Also before READY, where a silence would be waited for longer."""
 
