@@ -140,6 +140,16 @@ def test_one_that_is_closing_already_gives_way_once(stand: Any, deliver: Any) ->
     assert sorted(far.ended for _, far in others) == ["", "", "closed"]
 
 
+def test_half_a_request_keeps_its_place_until_its_own_time_is_over(stand: Any, deliver: Any) -> None:
+    made = stand(partial_s=60.0)
+    ends = [made.connect(FAR) for _ in range(4)]
+    made.wait(GIVES_WAY_S + 1.0)
+    for connection, far in ends:
+        deliver(connection, far, framed(READ)[:7])
+    assert made.connect(FAR)[1].ended == "aborted"
+    assert [far.ended for _, far in ends] == [""] * 4
+
+
 def test_who_is_not_allowed_takes_nobody_s_place(stand: Any) -> None:
     made = stand(connections=2, allow=(ip_network("192.0.2.0/24"),))
     made.shared.peers = Peers(made.settings, guarded=True)
