@@ -30,7 +30,8 @@ class Scene:
         monkeypatch.setattr(rtu_server.asyncio, "get_running_loop", lambda: self)
         monkeypatch.setattr(rtu_server, "monotonic_s", lambda: self.now_s)
         settings = RtuSettings("/dev/serial/none", LINE, unit=3, peer=Peer("serial:1"))
-        self.server = ModbusRtuServer(NotingBank(), settings, on_peer_closed=lambda _: None, log=lambda *_: None)
+        self.bank = NotingBank()
+        self.server = ModbusRtuServer(self.bank, settings, on_peer_closed=lambda _: None, log=lambda *_: None)
         execute = self.server._execute
 
         def note(request: RtuRequest) -> None:
@@ -92,3 +93,12 @@ def test_who_asked_before_a_standstill_is_not_answered_behind_it(
     assert (len(scene.executed), len(scene.sent)) == (1, answers)
     scene.hear(encode_adu(3, READ))
     assert len(scene.sent) == answers + 1
+
+
+def test_what_waited_through_a_standstill_is_executed_for_a_stop_may_be_in_it(scene: Scene) -> None:
+    stop = P.write_registers_request(0, bytes(2))
+    scene.server._on_bytes(encode_adu(3, stop), scene.now_s)
+    scene.server.note_standstill()
+    scene.run(scene.now_s + 0.1)
+    assert [(address, data) for address, data, _ in scene.bank.writes] == [(0, bytes(2))]
+    assert scene.sent == []

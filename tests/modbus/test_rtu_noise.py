@@ -7,7 +7,7 @@ import pytest
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.crc import crc16
 from gateway.modbus.rtu import encode_adu
-from gateway.modbus.rtu_receiver import RtuReceiver
+from gateway.modbus.rtu_receiver import MOST_BYTES, RtuReceiver, RtuRequest
 from tests.modbus.rtu_bus import SILENCE_S, Bus
 from tests.modbus.test_rtu_receiver import COMMAND, OURS, READ, WRITE, answered, registers_answer
 from tests.modbus.test_rtu_receiver_limits import known
@@ -96,3 +96,12 @@ def test_a_row_of_frames_between_two_bits_of_noise_is_walked_once(
     looks = 0
     assert bus.send(burst).requests() == []
     assert looks < 3 * len(burst)
+
+
+def test_a_request_that_had_to_make_room_for_another_s_frame_is_executed_and_not_answered() -> None:
+    """Its master went on without a silence: an answer would go into what another one is saying."""
+    bus = known(7)
+    begun = encode_adu(7, P.write_registers_request(0, bytes(40)))[:20]
+    flood = encode_adu(7, READ) * (MOST_BYTES // len(OURS) - 1)
+    assert len(flood + OURS + begun) > MOST_BYTES
+    assert bus.send(flood + OURS + begun).requests() == [RtuRequest(1, READ, False)]

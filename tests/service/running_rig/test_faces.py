@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from gateway.fieldbus import ModbusRtuServer
+from gateway.fieldbus.rtu_server import STANDSTILL_S
 from gateway.modbus import Peer, Role
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.rtu import encode_adu
@@ -91,6 +93,20 @@ def test_two_serial_masters_have_one_owner_and_may_take_over() -> None:
             assert [peer.host for peer in served.closed] == ["serial:2"]
             assert [peer.host for peer in served.faces.peers] == ["serial:1"]
         lines[0].close()
+
+    play(scene())
+
+
+def test_each_serial_face_is_told_of_a_standstill_and_of_no_shorter_pause(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(ModbusRtuServer, "note_standstill", lambda face: told.append(face.settings.peer.host))
+
+    async def scene() -> None:
+        async with Served(serial(None, None)).running() as served:
+            served.faces.note_tick(STANDSTILL_S)
+            assert told == []
+            served.faces.note_tick(STANDSTILL_S + 0.01)
+            assert told == ["serial:1", "serial:2"]
 
     play(scene())
 
