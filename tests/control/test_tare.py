@@ -90,7 +90,7 @@ def test_behind_a_death_a_pull_is_no_zero_and_a_payload_that_hangs_is_none_of_it
     bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + reads_n)
     bench.run(0.1)
     bench.write(payload_kg=payload_kg, control_word=ControlBit.TARE)
-    assert ("may have been pressed before this start" in (bench.refused.text if bench.refused else "")) is is_refused
+    assert ("may be left of what was pressed" in (bench.refused.text if bench.refused else "")) is is_refused
 
 
 def test_behind_a_death_a_reading_of_nothing_is_a_zero_at_once_and_any_once_all_has_left():
