@@ -1,15 +1,22 @@
-"""The Modbus/TCP Security face: the rules of plain Modbus TCP behind mutual TLS, the role out of the certificate."""
+"""The Modbus/TCP Security face: the rules of plain Modbus TCP behind mutual TLS, the role out of the certificate.
+
+That its own certificate or its CA's is about to end a start tells; a gateway that runs for longer tells it on that day.
+"""
 
 import asyncio
-from collections.abc import Callable
-from datetime import UTC, datetime
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
 
 from gateway.fieldbus.connection import Clock, ServerState
 from gateway.fieldbus.tcp_server import ModbusTcpServer
 from gateway.fieldbus.tls_settings import TlsSettings, context_maker
 from gateway.fieldbus.tls_stream import Handshakes, TlsStream
+from gateway.modbus.certificate import read_certificates
+from gateway.modbus.expiry import CURES, end_of, expiry_sentence, told_from, utc_now
 from gateway.modbus.peer import Peer
 from gateway.modbus.server import DataBank
+from gateway.plain_file import read_plain
 
 
 class ModbusTlsServer(ModbusTcpServer):
@@ -25,7 +32,9 @@ class ModbusTlsServer(ModbusTcpServer):
         clock: Clock | None = None,
     ) -> None:
         super().__init__(bank, settings.server, on_peer_closed=on_peer_closed, log=log, clock=clock)
-        self._handshakes = Handshakes(context_maker(settings), settings.revoked, _utc_now)
+        self._handshakes = Handshakes(context_maker(settings), settings.revoked, utc_now)
+        now = utc_now()
+        self._to_tell = [(moment, told) for moment, told in _ends(settings) if moment > now]
 
     @property
     def pending(self) -> int:
@@ -37,6 +46,10 @@ class ModbusTlsServer(ModbusTcpServer):
 
     def _sweep_handshakes(self, now_s: float) -> None:
         self._handshakes.sweep(now_s)
+        now = utc_now() if self._to_tell else ""
+        for due in [each for each in self._to_tell if each[0] <= now]:
+            self._to_tell.remove(due)
+            self._log(due[1], due[1], now_s)  # each is a cause of its own
 
     async def close(self) -> None:
         """Stop listening, cut the handshakes and end every connection."""
@@ -45,5 +58,10 @@ class ModbusTlsServer(ModbusTcpServer):
         await super().close()
 
 
-def _utc_now() -> str:
-    return f"{datetime.now(UTC):%Y%m%d%H%M%S}Z"
+def _ends(settings: TlsSettings) -> Iterator[tuple[str, str]]:
+    """Return from when on what is told of the end of each of these files; nothing of one that OpenSSL alone can read."""
+    for name in CURES:
+        file: str = getattr(settings, name)
+        with suppress(ValueError):
+            if ends := end_of(name, read_certificates(read_plain(Path(file)))):
+                yield told_from(ends), expiry_sentence(name, file, ends)

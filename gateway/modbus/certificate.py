@@ -6,6 +6,7 @@ Own code, because the control process must stay small: cryptography's x509 adds 
 """
 
 from collections.abc import Iterator
+from ssl import PEM_cert_to_DER_cert
 from typing import Final, NamedTuple
 
 from gateway.modbus.peer import Role
@@ -15,6 +16,7 @@ ROLES: Final = {role.name.lower(): role for role in Role}
 """What the extension may say."""
 KEY_MISMATCH: Final = "KEY_VALUES_MISMATCH"
 """What OpenSSL says of a private key that is another certificate's."""
+_BEGIN, _END = "-----BEGIN CERTIFICATE-----", "-----END CERTIFICATE-----"
 _ROLE_OID_BYTES: Final = bytes.fromhex("2b060104018389 0c8622 01".replace(" ", ""))
 _COMMON_NAME_BYTES: Final = bytes.fromhex("550403")
 _UTF8, _UTC_TIME, _BMP = 0x0C, 0x17, 0x1E
@@ -38,6 +40,12 @@ def read_certificate(der: bytes) -> PeerCertificate:
         return _read_certificate(der)
     except (IndexError, ValueError) as error:
         raise ValueError(f"not a certificate ({error})") from None
+
+
+def read_certificates(pem: bytes) -> list[PeerCertificate]:
+    """Return what each certificate of a PEM text says, in order. ValueError where one cannot be read."""
+    _, *found = pem.decode("ascii").split(_BEGIN)
+    return [read_certificate(PEM_cert_to_DER_cert(_BEGIN + each.split(_END, 1)[0] + _END)) for each in found]
 
 
 def encode_role(role: Role) -> bytes:

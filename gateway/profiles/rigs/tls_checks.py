@@ -8,27 +8,22 @@ import errno
 import ssl
 import stat
 from collections.abc import Iterator
-from datetime import UTC, datetime, timedelta
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
 
-from gateway.modbus.certificate import KEY_MISMATCH, PeerCertificate, read_certificate
+from gateway.modbus.certificate import KEY_MISMATCH, PeerCertificate, read_certificates
+from gateway.modbus.expiry import CURES, day_of, end_of, expiry_sentence, told_from, utc_now
 from gateway.plain_file import read_plain
 from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.profiles.rigs.faces import TlsFace
 from gateway.profiles.rigs.network_checks import is_loopback
 from gateway.profiles.rigs.rig_file import Network
 
-SOON_DAYS: Final = 30
 _PURPOSE: Final = 26  # X509_V_ERR_INVALID_PURPOSE
 _NO_ROOT: Final = 2  # X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT: of one that is trusted
 _FLIGHTS: Final = 3  # of a handshake: hello, certificate, end
 _MAKE: Final = "`force-gateway certs DIR` makes a CA, a server and clients"
-_NEW_ONES: Final = {
-    "certificate": "make a new one before that day, from then on no client connects",
-    "ca": "from then on no certificate that it has signed counts: make a CA in another folder, and all anew",
-}
 _NOT_YET, _EXPIRED = 9, 10  # X509_V_ERR_CERT_NOT_YET_VALID, X509_V_ERR_CERT_HAS_EXPIRED
 _REFUSALS: Final = {
     _NO_ROOT: "is of a CA that another one has signed, which the file of `ca` lacks (add it there)",
@@ -87,11 +82,11 @@ def check_tls_files(parts: Parts) -> Found:
 def check_tls_days(parts: Parts) -> Found:
     """Yield a warning for a server's certificate that is about to expire, and for its CA's: with that all go."""
     for path, face in tls_faces(parts):
-        for name, cure in _NEW_ONES.items():
-            file, now = str(getattr(face, name)), datetime.now(UTC)
-            ends = max((shown.ends for shown in _certificates(file)[: None if name == "ca" else 1]), default="")
-            if _text(now) <= ends <= _text(now + timedelta(days=SOON_DAYS)):
-                yield f"{path}.{name}", f"W246 {file} expires on {_day(ends)}: {cure}"
+        for name in CURES:
+            file = str(getattr(face, name))
+            ends = end_of(name, _certificates(file))
+            if ends and told_from(ends) <= utc_now() <= ends:
+                yield f"{path}.{name}", expiry_sentence(name, file, ends)
 
 
 def _unreadable(path: str, face: TlsFace) -> Found:
@@ -134,13 +129,13 @@ def _unfit(path: str, face: TlsFace) -> Found:
     except (ssl.SSLError, OSError) as error:
         yield f"{path}.ca", f"E174 {face.ca} cannot be used: {_reason(error)}; {_MAKE}"
         return
-    shown, now = next(iter(_certificates(face.certificate)), None), _text(datetime.now(UTC))
+    shown, now = next(iter(_certificates(face.certificate)), None), utc_now()
     if shown and now > shown.ends:
         cure = f"no client would connect; {_MAKE}"
-        yield f"{path}.certificate", f"E173 {face.certificate} expired on {_day(shown.ends)}: {cure}"
+        yield f"{path}.certificate", f"E173 {face.certificate} expired on {day_of(shown.ends)}: {cure}"
     elif shown and now < shown.begins:
         cure = "look at this machine's clock, or wait"
-        yield f"{path}.certificate", f"E173 {face.certificate} is not valid before {_day(shown.begins)}: {cure}"
+        yield f"{path}.certificate", f"E173 {face.certificate} is not valid before {day_of(shown.begins)}: {cure}"
     elif why := _refusal(server, client):
         cure = f"no client that trusts {face.ca} would connect; {_MAKE}"
         yield f"{path}.certificate", f"E175 {face.certificate} {why}: {cure}"
@@ -172,10 +167,8 @@ def _refusal(server: ssl.SSLContext, client: ssl.SSLContext) -> str:
 
 def _certificates(file: str) -> list[PeerCertificate]:
     """Return the certificates of a PEM file, in order; none where one cannot be read."""
-    begin, end = "-----BEGIN CERTIFICATE-----", "-----END CERTIFICATE-----"
     try:
-        _, *found = read_plain(file).decode("ascii").split(begin)
-        return [read_certificate(ssl.PEM_cert_to_DER_cert(begin + each.split(end, 1)[0] + end)) for each in found]
+        return read_certificates(read_plain(file))
     except (OSError, ValueError):
         return []
 
@@ -184,14 +177,6 @@ def _reason(error: Exception) -> str:
     if isinstance(error, ssl.SSLError) and error.reason:
         return error.reason.lower().replace("_", " ")
     return f"{error}"
-
-
-def _text(moment: datetime) -> str:
-    return f"{moment:%Y%m%d%H%M%S}Z"
-
-
-def _day(text: str) -> str:
-    return f"{text[:4]}-{text[4:6]}-{text[6:8]}"
 
 
 FAULTS: Final[tuple[Check, ...]] = (check_tls_exposure, check_tls_files)

@@ -5,14 +5,18 @@ import contextlib
 import shutil
 import ssl
 import subprocess
+from datetime import datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 import pytest
 from pymodbus.client import AsyncModbusTlsClient
 
-from gateway.fieldbus import ModbusTlsServer, ServerSettings, TlsSettings
+from gateway.fieldbus import ModbusTlsServer, ServerSettings, TlsSettings, tls_server
 from gateway.fieldbus.tls_settings import HANDSHAKE_S
 from gateway.modbus import Peer
+from gateway.modbus.certificate import read_certificates
+from gateway.modbus.expiry import CURES, day_of, told_from
 from tests.certificates import Folder
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
 from tests.fieldbus.conftest import HandClock, NotingBank
@@ -102,3 +106,31 @@ async def ask_with_openssl(folder: Folder, port: int) -> None:
     process.stdin.close()
     process.kill()
     await process.wait()
+
+
+def test_a_gateway_that_runs_for_years_tells_when_its_certificate_is_about_to_end(
+    folder: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A start tells it of what ends soon; nobody had been told where it ran on into the last month."""
+    certificate, authority = folder.crt("gateway"), folder.crt("ca")
+    ends = read_certificates(Path(certificate).read_bytes())[0].ends
+    soon = told_from(ends)
+    day_before = (datetime.strptime(soon, "%Y%m%d%H%M%S%z") - timedelta(days=1)).strftime("%Y%m%d%H%M%SZ")
+
+    async def main(*moments: str) -> list[str]:
+        clock, log, now = HandClock(), list[str](), [moments[0]]
+        files = TlsSettings(ServerSettings(), certificate, folder.key("gateway"), authority)
+        monkeypatch.setattr(tls_server, "utc_now", lambda: now[0])
+        server = ModbusTlsServer(
+            NotingBank(), files, on_peer_closed=list[Peer]().append, log=lambda _, told: log.append(told), clock=clock
+        )
+        await server.start("127.0.0.1", 0)
+        for now[0] in moments:
+            clock.advance(3600.0)
+        await server.close()
+        return log
+
+    told = asyncio.run(main(day_before, day_before, soon, ends))
+    named = (("certificate", certificate), ("ca", authority))
+    assert told == [f"W246 {file} expires on {day_of(ends)}: {CURES[name]}" for name, file in named]
+    assert asyncio.run(main(soon, ends)) == [], "its start has told it"
