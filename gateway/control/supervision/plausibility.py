@@ -131,7 +131,7 @@ class RiseCheck:
         """smooth_n: the cell force behind a low-pass, for sentences, and to hold the target back at once. A fault is judged
         from the same with only a part of a reading that leaps alone: of a cell of 10 Hz one was a wrong sign or gain."""
         self._threshold_n, self._leaps = contact_threshold_n, LeapLimit()
-        self.smooth_n = self._calm_n = self._behind_n = 0.0
+        self.smooth_n = self._calm_n = self._behind_n = self._weight_n = 0.0
         self._readings = 0
         self.start()
 
@@ -140,6 +140,7 @@ class RiseCheck:
         reading alone that leapt counts as none: it would make the whole rise too high, or too low."""
         self._at_rest_n = self._lowest_n = self._calm_n
         self._base_n = min(self._calm_n, self._threshold_n)
+        self._weight_at_rest_n: float | None = None  # of the payload, as the next reading has it
         self._wrong_sign_s = self._wrong_gain_s = self._right_gain_s = self._near_s = 0.0
         self._proven = False
         self.is_too_high = False
@@ -167,6 +168,9 @@ class RiseCheck:
     def smooth(self, reading: Reading) -> None:
         """Smooth a new sample, enabled or not. The first ones are averaged: an enable right after the start has a rest too."""
         if reading.is_usable:
+            self._weight_n = reading.contact_n - reading.cell_n
+            if self._weight_at_rest_n is None:
+                self._weight_at_rest_n = self._weight_n
             self._readings += 1
             weight = max(1.0 / self._readings, reading.interval_s / (_SMOOTHING_S + reading.interval_s))
             self.smooth_n += (reading.cell_n - self.smooth_n) * weight
@@ -187,7 +191,8 @@ class RiseCheck:
     def judge(self, response: "ExpectedForce", branch_share: float, touching: bool, interval_s: float) -> FaultCode:
         """Judge one new sample against the rise that the model expects at this branch share."""
         expected_n = response.rise_n(branch_share)
-        rise_n = self.measured_rise_n
+        weight_n = self._weight_at_rest_n or 0.0
+        rise_n = self.measured_rise_n + max(0.0, self._weight_n - weight_n)  # in the air a tilt lets the payload pull
         wrong_sign = expected_n >= _LEAST_RISE_N and rise_n <= -max(self._threshold_n, _LOWEST_SHARE * expected_n)
         self._wrong_sign_s = self._wrong_sign_s + interval_s if wrong_sign else 0.0
         if self._wrong_sign_s >= _LASTING_S:
@@ -198,9 +203,14 @@ class RiseCheck:
         return _RIGHT
 
     def _judge_gain(self, expected_n: float, response: "ExpectedForce", interval_s: float) -> FaultCode:
-        """What is known to come from outside may show in the reading, or have been there at the last tare."""
-        slack_n, outside_n = response.width_n + _SLACK_N, response.outside_n
-        least_n, highest_n = expected_n + min(0.0, outside_n), expected_n + max(0.0, outside_n)
+        """What is known to come from outside may show in the reading, or have been there at the last tare. A payload that hung
+        on the cell in the air is carried by the workpiece: the reading rises by its weight without any thrust."""
+        slack_n, outside_n, hung_n = (
+            response.width_n + _SLACK_N,
+            response.outside_n,
+            max(0.0, self._weight_at_rest_n or 0.0),
+        )
+        least_n, highest_n = expected_n + min(0.0, outside_n), expected_n + max(0.0, outside_n) + hung_n
         most_n = max(highest_n + slack_n + response.kept_n, _HIGHEST_SHARE * highest_n)
         self.is_too_high = self.smooth_n - max(self._base_n, self._lowest_n) > most_n
         coming_n = max(0.0, self._calm_n - self._behind_n) * _UNKNOWN_LAG_S / _TREND_S
