@@ -566,4 +566,8 @@ DEFECTS = (
     Defect("a time that reads back ends a trip", "service/running_rig/lines/device_checks.py",
            "        elif self.is_tripped:\n            pass  # until it is cleared: its time reads back as before\n", "",
            ("service/running_rig/lines/test_device_checks.py",)),
+    Defect("a change of the plant that fails takes away the one that waits", "service/running_rig/rig_plants.py",
+           "        doing, self._doing = self._doing, \"\"\n",
+           "        doing, self._doing, self._waiting = self._doing, \"\", None\n",
+           ("service/running_rig/test_rig_plants.py",)),
 )  # fmt: skip
