@@ -570,4 +570,7 @@ DEFECTS = (
            "        doing, self._doing = self._doing, \"\"\n",
            "        doing, self._doing, self._waiting = self._doing, \"\", None\n",
            ("service/running_rig/test_rig_plants.py",)),
+    Defect("a loop that stood still does not tell its serial faces", "service/running_rig/running_rig.py",
+           "self._faces.note_tick(expirations / self._rig.loop_hz + late_s)", "self._faces.note_tick(late_s)",
+           ("service/running_rig/ends/test_ways_to_the_end.py",)),
 )  # fmt: skip
