@@ -203,6 +203,8 @@ def test_the_number_of_a_deleted_recording_is_not_used_again(tmp_path: Path) -> 
         assert delete_recording(path, "") == ""
     assert record(tmp_path).stem == "0004"
     assert sorted(path.name for path in (tmp_path / "recordings").iterdir()) == ["0003.gone", "0004.fgr"]
+    assert delete_recording(tmp_path / "recordings" / "0004.fgr", "") == ""
+    assert record(tmp_path).stem == "0005"
 
 
 def test_what_is_said_to_be_deleted_is_gone_after_a_power_cut_too(

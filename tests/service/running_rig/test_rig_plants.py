@@ -60,3 +60,13 @@ def test_a_change_that_came_to_nothing_is_told_as_failed_and_the_plant_stays(
     assert status["failed"] and status["said"].startswith(words) and status["said"].endswith("stays in use")
     assert edges.taken == [] and status["since_s"] == 10.0
     assert edges.failed == [("", status["said"])]
+
+
+def test_a_change_that_came_to_nothing_takes_away_none_that_waits(edges: Edges) -> None:
+    """It is on the disk: a restart would find it, and until then control would know another plant than the disk."""
+    edges.is_free = False
+    edges.plants._on_selected(waits := demo())
+    edges.plants._on_selected(OSError(28, "No space left on device"))
+    edges.is_free = True
+    edges.plants.take_waiting()
+    assert edges.taken == [waits]

@@ -3,12 +3,15 @@
 import asyncio
 import socket
 import time
+from types import SimpleNamespace
 
 import pytest
 
 from gateway.audit.rig_audit import RigAudit
+from gateway.fieldbus.rtu_server import STANDSTILL_S
 from gateway.processes import message_link
 from gateway.service.guardian_line import GuardianLine
+from gateway.service.live_answers import AlarmTimes
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.recording.recordings import Recordings
@@ -133,6 +136,7 @@ def test_each_tick_beats_and_hands_on_what_waits_for_a_disk(
         (RigPlants, "take_waiting"),
         (RigAudit, "flush"),
         (GuardianLine, "heartbeat"),
+        (AlarmTimes, "follow"),
     )
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
@@ -143,3 +147,21 @@ def test_each_tick_beats_and_hands_on_what_waits_for_a_disk(
 
     with_running_rig(devices, scene)
     assert called == {f"{owner.__name__}.{method}" for owner, method in handed_on}
+
+
+@pytest.mark.parametrize(("periods_s", "late_s"), [(STANDSTILL_S + 0.1, 0.0), (0.0, STANDSTILL_S + 0.1)])
+def test_a_tick_behind_a_standstill_tells_the_serial_faces(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch, periods_s: float, late_s: float
+) -> None:
+    """On a bus an answer that comes late is taken for that to the next question."""
+    told: list[str] = []
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(rig._faces, "_serial", [SimpleNamespace(note_standstill=lambda: told.append("stood still"))])
+            rig._on_tick(1, 0.0)
+            assert told == []
+            rig._on_tick(1 + round(periods_s * rig._rig.loop_hz), late_s)
+
+    with_running_rig(devices, scene)
+    assert told == ["stood still"]

@@ -169,6 +169,8 @@ def test_a_trip_is_not_armed_not_done_and_ends_whatever_waited() -> None:
     arm(checks)
     checks.trip()
     assert (checks.level, checks.is_done) == (DeviceLevel(has_one=True, is_tripped=True), False)
+    checks.take(DeviceAnswer(VERIFY, is_right=True))
+    assert checks.fault is FaultCode.WATCHDOG_TRIPPED, "its time reads back as before"
     checks.begin()
     checks.take(DeviceAnswer(IDENTITY, is_right=True))
     checks.take(DeviceAnswer(STATUS, is_right=False, text="off"))

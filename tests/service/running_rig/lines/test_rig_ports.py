@@ -109,8 +109,13 @@ class Scene:
         self.guarded: list[tuple[str, list[str]]] = []
         self.refusals: list[OSError] = []
         self.paths = {name: self.plug(name, name) for name in far_ends}
+        self.taken_back = 0  # how often the guardian was told to close the output
         self.ports = RigPorts(
-            load_rig("paper-pull"), self.paths, self._hand_over, lambda _, text: self.said.append(text)
+            load_rig("paper-pull"),
+            self.paths,
+            self._hand_over,
+            lambda _, text: self.said.append(text),
+            self._take_back,
         )
         self.ports.loop = self.ear  # type: ignore[assignment]
 
@@ -122,6 +127,9 @@ class Scene:
     def unplug(self, line: str) -> None:
         (self.folder / line).unlink()
         self.far_ends[line].close()
+
+    def _take_back(self) -> None:
+        self.taken_back += 1
 
     def _hand_over(self, descriptor: int) -> None:
         if self.refusals:
@@ -158,6 +166,7 @@ def test_a_lost_port_is_told_to_the_loop_and_to_people_and_is_opened_where_it_ha
         await one.ear.hears(f"{name} lost" if name == "cell" else f"{name} closed")
         assert one.paths[line] in one.said[0] and len(one.said) == 1
         assert one.ports.is_guarded is (line != "output"), "of a port that is gone nobody writes the last voltage"
+        assert one.taken_back == (line == "output"), "kept open, its name is not given to the adapter that comes back"
         far_ends[line] = Pty()
         one.ports.move(one.paths | {line: one.plug(line, "moved")})
         await one.ear.hears(f"{name} opened")
