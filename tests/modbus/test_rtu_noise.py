@@ -105,3 +105,12 @@ def test_a_request_that_had_to_make_room_for_another_s_frame_is_executed_and_not
     flood = encode_adu(7, READ) * (MOST_BYTES // len(OURS) - 1)
     assert len(flood + OURS + begun) > MOST_BYTES
     assert bus.send(flood + OURS + begun).requests() == [RtuRequest(1, READ, False)]
+
+
+def test_a_frame_that_has_to_make_room_is_measured_anew_and_not_as_long_as_one_that_stood_there_before() -> None:
+    """What is inside of it, from where that one ended, would be a request."""
+    bus = known(7)
+    bus.send(OURS).requests()
+    inside = encode_adu(7, P.write_registers_request(0, b"\x00" + COMMAND + bytes(9)))
+    assert inside.index(COMMAND) == len(OURS)
+    assert bus.send(inside + encode_adu(7, READ) * (MOST_BYTES // len(OURS))).requests() == []

@@ -3,11 +3,12 @@
 import errno
 import os
 import shutil
+from math import inf, nan
 from pathlib import Path
 
 import pytest
 
-from gateway.recording import Recorder, RecordingError, find_recording, list_recordings
+from gateway.recording import Recorder, RecordingError, find_recording, list_recordings, read_recording
 from gateway.recording.care.summaries import list_summaries
 from gateway.recording.reader import recording_paths
 from gateway.service.fitting.ladder_source import rig_of_state
@@ -129,3 +130,14 @@ def test_who_looks_every_few_seconds_reads_no_recording_that_grows(
         assert list_summaries(tmp_path, reads_growing=False)[1]["growing"]
     recorder.close()
     assert list_summaries(tmp_path, reads_growing=False)[1]["rows"] == 2
+
+
+@pytest.mark.parametrize("number", [nan, inf, -inf])
+@pytest.mark.parametrize("place", ["zero_n", "ladder.step_v"])
+def test_a_header_s_number_that_is_none_is_not_counted_with(number: float, place: str, tmp_path: Path) -> None:
+    """JSON as Python reads it has such numbers."""
+    header = {"zero_n": number} if place == "zero_n" else {"ladder": {"step_v": number}}
+    recorder = Recorder(tmp_path, header, ("time_s", "force_n"))
+    recorder.close()
+    with pytest.raises(RecordingError, match=f"whose {place} is no number"):
+        read_recording(recorder.path)

@@ -100,6 +100,16 @@ def test_the_largest_setpoint_of_a_pull_is_told_while_it_is_asked_for_and_taken(
     stage.close()
 
 
+def test_the_largest_setpoint_of_a_pull_is_never_told_as_more_than_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stage = Stage(tmp_path, Wired(load_rig("paper-pull")).ready())
+    send(stage, f"060000{ControlBit.VALVE_PULL:04x}")
+    monkeypatch.setattr(stage.wired.controller, "most_pull_n", lambda: 12.349)
+    assert LiveState.from_json(ask(stage, {"do": "state"})).limits.force_max_n == 12.34
+    stage.close()
+
+
 def test_the_page_has_the_role_of_every_plain_face(stage: Stage) -> None:
     stage_order_2 = "0603e80002"
     assert send(stage, stage_order_2) == stage_order_2, "this rig allows uploads without a certificate"

@@ -123,19 +123,20 @@ def test_another_calibration_than_before_the_restart_is_told_by_name_and_kept_fo
     assert any(f"W250 calibration 7 was in use before the restart, now it is {number}: " in line for line in lines)
 
 
-def test_the_port_of_a_tls_face_is_left_to_the_next_process(devices: OwnDevices) -> None:
+def test_the_port_of_each_tls_face_is_left_to_the_next_process(devices: OwnDevices) -> None:
     files = store_all(devices.directory)
     face = f"{{type: tls, port: 0, certificate: {files.crt('gateway')}, key: {files.key('gateway')}, ca: {files.crt('ca')}}}"
-    devices.rig.write_text(f"{devices.rig.read_text()}fieldbus: [{face}]\n")
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    devices.rig.write_text(f"{devices.rig.read_text()}fieldbus: [{face}, {face}]\n")
+    with socket.create_server(("127.0.0.1", 0)) as one, socket.create_server(("127.0.0.1", 0)) as another:
+        ports = {"1": one.getsockname()[1], "2": another.getsockname()[1]}
     kept: dict[str, Any] = {}
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         while "tls_ports" not in kept and (message := message_link.receive(guardian)) is not None:
             kept.update(message.body if message.tag == message_link.KEEP else {})
             message.drop_descriptors()
-        socket.create_connection(("127.0.0.1", port)).close()
+        for port in ports.values():
+            socket.create_connection(("127.0.0.1", port)).close()
 
-    with_running_rig(devices, scene, Ending(EndCause.DIED, "control process died"), {"tls_ports": {"1": port}})
-    assert kept["tls_ports"] == {"1": port}
+    with_running_rig(devices, scene, Ending(EndCause.DIED, "control process died"), {"tls_ports": ports})
+    assert kept["tls_ports"] == ports

@@ -7,6 +7,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -20,7 +21,9 @@ from gateway.ports.opening import open_descriptor
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.service.guardian_line import GuardianLine
+from gateway.service.running_rig import running_rig
 from gateway.service.running_rig.faces.faces import Faces
+from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.end_to_end.own_devices import OwnDevices
@@ -54,6 +57,21 @@ def test_the_port_drops_what_it_has_not_sent_of_each_question_that_is_given_up(
 
     with_running_rig(devices, scene)
     assert set(dropped) == {str(devices.output.link)}
+
+
+def test_a_pause_that_the_rig_allows_makes_no_reading_old(devices: OwnDevices, monkeypatch: pytest.MonkeyPatch) -> None:
+    bounds_s: list[float] = []
+
+    def note(*parts: Any) -> CellExchange:
+        bounds_s.append(parts[-1])
+        return CellExchange(*parts)
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        assert bounds_s == [0.3]
+
+    monkeypatch.setattr(running_rig, "CellExchange", note)
+    devices.rig.write_text(devices.rig.read_text().replace("stall_s: 0.1", "stall_s: 0.3"))
+    with_running_rig(devices, scene)
 
 
 def test_masters_do_not_wait_after_a_restart_for_a_device_that_is_silent(devices: OwnDevices) -> None:
