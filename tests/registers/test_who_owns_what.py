@@ -5,6 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from gateway.registers import Status
+from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import ControlBit, State, StatusBit
 from gateway.registers.writes.ownership import (
     LARGEST_SERIAL_PLACE,
@@ -175,3 +176,12 @@ def test_the_owner_s_address_is_that_of_its_last_command(make_bank, register_map
         master.write(0, 1, 1200)
         shown.append(bank.read_registers(address, 2)[-1])
     assert shown == [1, 2, 1] and bank.owner == "certificate plc"
+
+
+def test_who_ends_another_s_run_takes_no_owner_s_address_away(make_bank, register_map) -> None:
+    """A certificate's name says no address: the last write of the owner itself does."""
+    bank = make_bank(supported_bits=BASIC_BITS | ControlBit.START_CALIBRATION)
+    Master(bank, "10.0.0.1", name="plc").write(0, ControlBit.ENABLE | ControlBit.START_CALIBRATION, 1200)
+    Master(bank, "10.0.0.2").write(0, 1)
+    assert bank.owner == "certificate plc" and bank.command.control_word == ControlBit.ENABLE
+    assert bank.read_registers(register_map.find("owner_ip").address, 2) == bytes([10, 0, 0, 1])

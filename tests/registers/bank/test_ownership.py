@@ -229,6 +229,7 @@ def test_a_number_that_is_not_the_echo_proves_no_byte_order(make_bank, master_of
     echo = register_map.find("byte_order_echo").address
     master.refusal(master.write_float, echo, 1234.0)
     assert master.refusal(master.write, 0, 1).reason is RefusalReason.BYTE_ORDER_UNPROVEN
+    assert master.refusal(master.write_float, 200, 1.0).reason is RefusalReason.BYTE_ORDER_UNPROVEN
     master.write_float(echo, 1234.5)
     master.write(0, 1)
 
