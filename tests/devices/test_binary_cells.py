@@ -164,3 +164,13 @@ def test_an_amplifier_that_says_no_unit_is_rehearsed_in_that_of_the_rig() -> Non
     (sample,) = cell_host(profile, unit="kg").receive(in_kg, 0.0)
     assert isinstance(sample, ForceSample) and (sample.raw, sample.force_n) == (1.0, pytest.approx(9.80665))
     assert in_n != in_kg
+
+
+def test_an_amplifier_in_motion_at_its_converters_end_is_overloaded() -> None:
+    registers = WeightRegisters(function=4, first=0, last=1, weight=0, unstable=(RegisterBit(register=1, bit=0),))
+    reading = ForceReading(modbus=registers, newton_per_count=0.01, end_count=32767)
+    host = cell_host(replace(load_device("laumas-tlb"), read_force=reading))
+    samples = [
+        one for words in ("7FFF0001", "7FFE0001") for one in host.receive(rtu_frame(1, f"0404{words}".encode()), 0.0)
+    ]
+    assert [getattr(one, "quality", None) for one in samples] == [Quality.OVERLOAD, Quality.UNSTABLE]

@@ -59,6 +59,17 @@ def test_a_modbus_relay_that_answers_otherwise_is_quoted_and_its_late_answers_ar
 
 
 @pytest.mark.parametrize("name", VALVES)
+def test_an_answer_that_comes_twice_or_behind_a_lost_port_answers_nothing(name: str) -> None:
+    host, device = ValveHost(load_device(name)), ValveDevice(load_device(name))
+    answer = device.reply(None, PULL)
+    host.request(None)
+    assert [PULL in host.receive(answer) for _ in range(2)] == [True, False]
+    host.request(None)
+    host.forget()
+    assert PULL not in host.receive(answer)
+
+
+@pytest.mark.parametrize("name", VALVES)
 def test_what_was_left_of_an_answer_before_is_no_part_of_the_next(name: str) -> None:
     host, device = ValveHost(load_device(name)), ValveDevice(load_device(name))
     answer = device.reply(None, PULL)

@@ -170,6 +170,12 @@ def test_a_calibration_narrows_what_may_be_set_at_both_ends(make_bank, master_of
         assert "calibration 7" in refusal.sentence
 
 
+def test_a_calibration_that_only_pulls_lowers_no_setpoint_below_0(make_bank, master_of) -> None:
+    master_of(bank := make_bank(), "10.0.0.1").write(0, 1, 0)
+    assert bank.set_active_model(calibration(force_limits_n=(-20.0, -5.0))) == ""
+    assert bank.command.force_setpoint_n == 0.0
+
+
 def test_a_setpoint_that_is_the_largest_allowed_is_not_told_as_lowered(make_bank, master_of) -> None:
     bank = make_bank()
     master_of(bank, "10.0.0.1").write(0, 1, 4000)

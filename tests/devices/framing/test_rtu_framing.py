@@ -42,7 +42,7 @@ def test_frames_are_found_however_they_are_cut_and_whatever_is_between(seed: int
 
 
 def test_a_frame_with_one_wrong_bit_costs_itself() -> None:
-    good = rtu_frame(1, b"0302138 8".replace(b" ", b""))
+    good = rtu_frame(1, b"03021388")
     for index in range(len(good)):
         for bit in range(8):
             bad = bytearray(good)
@@ -90,3 +90,8 @@ def test_a_frame_of_another_unit_is_none_of_ours() -> None:
     lines = answers(1).feed(other + ours)
     assert [line.is_whole for line in lines] == [False, True]
     assert [line.data for line in lines] == [other, ours]
+
+
+def test_a_frame_to_everybody_is_no_answer_of_the_device() -> None:
+    (line,) = answers(1).feed(rtu_frame(0, b"03021388"))
+    assert not line.is_whole
