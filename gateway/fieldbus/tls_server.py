@@ -6,6 +6,7 @@ That its own certificate or its CA's is about to end a start tells; a gateway th
 import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from gateway.fieldbus.connection import Clock, ServerState
@@ -13,7 +14,7 @@ from gateway.fieldbus.tcp_server import ModbusTcpServer
 from gateway.fieldbus.tls_settings import TlsSettings, context_maker
 from gateway.fieldbus.tls_stream import Handshakes, TlsStream
 from gateway.modbus.certificate import read_certificates
-from gateway.modbus.expiry import CURES, end_of, expiry_sentence, told_from, utc_now
+from gateway.modbus.expiry import CURES, SOON_DAYS, end_of, expiry_sentence
 from gateway.modbus.peer import Peer
 from gateway.modbus.server import DataBank
 from gateway.plain_file import read_plain
@@ -32,9 +33,9 @@ class ModbusTlsServer(ModbusTcpServer):
         clock: Clock | None = None,
     ) -> None:
         super().__init__(bank, settings.server, on_peer_closed=on_peer_closed, log=log, clock=clock)
-        self._handshakes = Handshakes(context_maker(settings), settings.revoked, utc_now)
-        now = utc_now()
-        self._to_tell = [(moment, told) for moment, told in _ends(settings) if moment > now]
+        self._handshakes = Handshakes(context_maker(settings), settings.revoked, _utc)
+        soon = _utc(SOON_DAYS)
+        self._to_tell = [(ends, told) for ends, told in _ends(settings) if ends > soon]
 
     @property
     def pending(self) -> int:
@@ -46,8 +47,8 @@ class ModbusTlsServer(ModbusTcpServer):
 
     def _sweep_handshakes(self, now_s: float) -> None:
         self._handshakes.sweep(now_s)
-        now = utc_now() if self._to_tell else ""
-        for due in [each for each in self._to_tell if each[0] <= now]:
+        soon = _utc(SOON_DAYS) if self._to_tell else ""
+        for due in [each for each in self._to_tell if each[0] <= soon]:
             self._to_tell.remove(due)
             self._log(due[1], due[1], now_s)  # each is a cause of its own
 
@@ -59,9 +60,14 @@ class ModbusTlsServer(ModbusTcpServer):
 
 
 def _ends(settings: TlsSettings) -> Iterator[tuple[str, str]]:
-    """Return from when on what is told of the end of each of these files; nothing of one that OpenSSL alone can read."""
+    """Return when each of these files ends and what is told of it; nothing of one that OpenSSL alone can read."""
     for name in CURES:
         file: str = getattr(settings, name)
         with suppress(ValueError):
             if ends := end_of(name, read_certificates(read_plain(Path(file)))):
-                yield told_from(ends), expiry_sentence(name, file, ends)
+                yield ends, expiry_sentence(name, file, ends)
+
+
+def _utc(days: int = 0) -> str:
+    """Return the moment so many days from now, as a certificate has it."""
+    return f"{datetime.now(UTC) + timedelta(days=days):%Y%m%d%H%M%S}Z"

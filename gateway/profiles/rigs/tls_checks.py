@@ -8,12 +8,13 @@ import errno
 import ssl
 import stat
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
 
 from gateway.modbus.certificate import KEY_MISMATCH, PeerCertificate, read_certificates
-from gateway.modbus.expiry import CURES, day_of, end_of, expiry_sentence, told_from, utc_now
+from gateway.modbus.expiry import CURES, SOON_DAYS, day_of, end_of, expiry_sentence
 from gateway.plain_file import read_plain
 from gateway.profiles.rigs.checks import Check, Found, Parts
 from gateway.profiles.rigs.faces import TlsFace
@@ -85,7 +86,7 @@ def check_tls_days(parts: Parts) -> Found:
         for name in CURES:
             file = str(getattr(face, name))
             ends = end_of(name, _certificates(file))
-            if ends and told_from(ends) <= utc_now() <= ends:
+            if _utc() <= ends <= _utc(SOON_DAYS):
                 yield f"{path}.{name}", expiry_sentence(name, file, ends)
 
 
@@ -129,7 +130,7 @@ def _unfit(path: str, face: TlsFace) -> Found:
     except (ssl.SSLError, OSError) as error:
         yield f"{path}.ca", f"E174 {face.ca} cannot be used: {_reason(error)}; {_MAKE}"
         return
-    shown, now = next(iter(_certificates(face.certificate)), None), utc_now()
+    shown, now = next(iter(_certificates(face.certificate)), None), _utc()
     if shown and now > shown.ends:
         cure = f"no client would connect; {_MAKE}"
         yield f"{path}.certificate", f"E173 {face.certificate} expired on {day_of(shown.ends)}: {cure}"
@@ -177,6 +178,10 @@ def _reason(error: Exception) -> str:
     if isinstance(error, ssl.SSLError) and error.reason:
         return error.reason.lower().replace("_", " ")
     return f"{error}"
+
+
+def _utc(days: int = 0) -> str:
+    return f"{datetime.now(UTC) + timedelta(days=days):%Y%m%d%H%M%S}Z"
 
 
 FAULTS: Final[tuple[Check, ...]] = (check_tls_exposure, check_tls_files)

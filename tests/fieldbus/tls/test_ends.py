@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from gateway.fieldbus.tls_server import _utc
 from gateway.fieldbus.tls_settings import HANDSHAKE_S
-from gateway.modbus.expiry import utc_now
 from tests.certificates import Folder
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
 from tests.fieldbus.tls.by_hand import VERSIONS, Face, Line, SocketInHand, client, face
@@ -155,5 +155,5 @@ def far_east(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 @pytest.mark.usefixtures("far_east")
 def test_certificates_are_judged_by_utc_wherever_the_machine_stands() -> None:
     # without an argument gmtime asks a clock that is a kernel's tick behind
-    before, now, after = time.gmtime(time.time()), utc_now(), time.gmtime(time.time())
+    before, now, after = time.gmtime(time.time()), _utc(), time.gmtime(time.time())
     assert f"{time.strftime('%Y%m%d%H%M%S', before)}Z" <= now <= f"{time.strftime('%Y%m%d%H%M%S', after)}Z"

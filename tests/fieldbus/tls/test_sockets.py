@@ -16,7 +16,7 @@ from gateway.fieldbus import ModbusTlsServer, ServerSettings, TlsSettings, tls_s
 from gateway.fieldbus.tls_settings import HANDSHAKE_S
 from gateway.modbus import Peer
 from gateway.modbus.certificate import read_certificates
-from gateway.modbus.expiry import CURES, day_of, told_from
+from gateway.modbus.expiry import CURES, day_of
 from tests.certificates import Folder
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
 from tests.fieldbus.conftest import HandClock, NotingBank
@@ -114,13 +114,13 @@ def test_a_gateway_that_runs_for_years_tells_when_its_certificate_is_about_to_en
     """A start tells it of what ends soon; nobody had been told where it ran on into the last month."""
     certificate, authority = folder.crt("gateway"), folder.crt("ca")
     ends = read_certificates(Path(certificate).read_bytes())[0].ends
-    soon = told_from(ends)
-    day_before = (datetime.strptime(soon, "%Y%m%d%H%M%S%z") - timedelta(days=1)).strftime("%Y%m%d%H%M%SZ")
+    day_before = (datetime.strptime(ends, "%Y%m%d%H%M%S%z") - timedelta(days=1)).strftime("%Y%m%d%H%M%SZ")
 
     async def main(*moments: str) -> list[str]:
+        """What is told at these moments, each given by what it is 30 days later."""
         clock, log, now = HandClock(), list[str](), [moments[0]]
         files = TlsSettings(ServerSettings(), certificate, folder.key("gateway"), authority)
-        monkeypatch.setattr(tls_server, "utc_now", lambda: now[0])
+        monkeypatch.setattr(tls_server, "_utc", lambda days=0: now[0])
         server = ModbusTlsServer(
             NotingBank(), files, on_peer_closed=list[Peer]().append, log=lambda _, told: log.append(told), clock=clock
         )
@@ -130,7 +130,7 @@ def test_a_gateway_that_runs_for_years_tells_when_its_certificate_is_about_to_en
         await server.close()
         return log
 
-    told = asyncio.run(main(day_before, day_before, soon, ends))
+    told = asyncio.run(main(day_before, day_before, ends))
     named = (("certificate", certificate), ("ca", authority))
     assert told == [f"W246 {file} expires on {day_of(ends)}: {CURES[name]}" for name, file in named]
-    assert asyncio.run(main(soon, ends)) == [], "its start has told it"
+    assert asyncio.run(main(ends, ends)) == [], "its start has told it"
