@@ -116,11 +116,11 @@ class Commands:
         self._begin_to_beat(viewer)
 
     async def reset(self, viewer: str) -> None:
-        """Reset a latched fault: with setpoint 0 and another heartbeat, all in one write. What stands in the control word
-        stays: in a fault nothing does, and where somebody presses again meanwhile this is refused, and stops nobody."""
+        """Reset a latched fault: with setpoint 0 and another heartbeat, all in one write. Where somebody presses again
+        meanwhile it is refused, and stops nobody."""
         first, beat = self._find("control_word").address, self._find("heartbeat").address
         words = (await self.words("command"))[: beat + 1 - first]
-        words[0], words[self._find("force_setpoint").address - first] = words[0] | int(ControlBit.RESET_FAULT), 0
+        words[0], words[self._find("force_setpoint").address - first] = int(ControlBit.RESET_FAULT), 0
         words[-1] = self._number = words[-1] % 65535 + 1
         await self._write_words("control_word", words)
         self._begin_to_beat(viewer)

@@ -308,8 +308,6 @@ DEFECTS = (
            "b\"\", b\"\"", ("web/test_guard.py",)),
     Defect("another site's origin is taken for ours", "web/security.py",
            "if not _is_own_origin(headers):", "if False:", ("web/test_guard.py",)),
-    Defect("a reset from the page stops who presses", "web/commands.py",
-           "words[0] | int(ControlBit.RESET_FAULT), 0", "int(ControlBit.RESET_FAULT), 0", ("web/test_commands.py",)),
     Defect("0.7 in control_word enables over MQTT", "telemetry/register_commands.py",
            "        register.check_meant(value)\n", "", ("telemetry/test_json_topics.py",)),
     Defect("the page answers to any name", "web/security.py",
