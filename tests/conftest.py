@@ -5,7 +5,7 @@ import gc
 import os
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from multiprocessing import resource_tracker
 from pathlib import Path
@@ -50,14 +50,12 @@ parsed: dict[tuple[bytes, str], Any] = {}
 
 
 def keep_parsed_profiles() -> None:
-    """Parse each file that is read again and again once, and make a register map of it once: a rig is assembled two thousand
-    times in the gate, of the same few files. What tells a file's faults is not kept."""
+    """Parse each file that is read again and again once, and read what it says once: a rig is assembled two thousand times in
+    the gate, of the same few files. What tells the faults of a file's text is not kept."""
+    from gateway.profiles import load
     from gateway.profiles.kinds import registers
+    from gateway.profiles.rigs import assembly
     from gateway.profiles.strict_yaml.text import Document, parse
-    from gateway.registers.map.register_map import RegisterMap
-
-    maps: dict[int, tuple[Any, RegisterMap]] = {}  # by their values' identity, which stays as long as they are held
-    read_map = registers.read_map
 
     def parse_once(data: bytes, file: str) -> Document:
         document = parsed.pop((data, file), None) or parse(data, file)
@@ -66,16 +64,27 @@ def keep_parsed_profiles() -> None:
             del parsed[next(iter(parsed))]
         return document
 
-    def read_map_once(value: Any) -> RegisterMap:
-        known = maps.pop(id(value), None) or (value, read_map(value))
-        maps[id(value)] = known
-        if len(maps) > KEPT_PROFILES:
-            del maps[next(iter(maps))]
-        return known[1]
-
     for name in READERS:
         import_module(name).parse = parse_once  # type: ignore[attr-defined]
-    registers.read_map = read_map_once
+    for reader in ("read_device", "read_plant", "read_calibration"):
+        read = done_once(getattr(load, reader))
+        for module in (load, assembly):
+            setattr(module, reader, read)
+    registers.read_map = done_once(registers.read_map)
+
+
+def done_once(read: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """The same for the same argument, which stays as long as its result is kept; nobody may change what comes."""
+    known: dict[int, tuple[Any, Any]] = {}
+
+    def read_once(given: Any) -> Any:
+        entry = known.pop(id(given), None) or (given, read(given))
+        known[id(given)] = entry
+        if len(known) > KEPT_PROFILES:
+            del known[next(iter(known))]
+        return entry[1]
+
+    return read_once
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -98,7 +98,7 @@ class ExpectedForce:
 
 class LeftForce:
     """Force that still leaves, at most, by what may stand on the output. A device that hears nothing may keep its voltage:
-    what is wanted of it meanwhile takes no force away. rise_n: above the force at rest, N."""
+    what is wanted of it meanwhile takes no force away."""
 
     def __init__(self, model: Bsfm, lag_s: float, rest_v: float) -> None:
         self._rest_v = self._may_stand_v = self._lagged_v = rest_v
@@ -108,7 +108,12 @@ class LeftForce:
         """Expect by another model and its lag, s, from now on; the lagged voltage stays."""
         self._model, self._lag_s = model, lag_s
         self._rest_n, _ = model.branch_forces_n(self._rest_v)
-        self._evaluate()
+
+    @property
+    def rise_n(self) -> float:
+        """Force above that at rest, N."""
+        rising_n, _ = self._model.branch_forces_n(self._lagged_v)
+        return rising_n - self._rest_n
 
     def advance(self, wanted_v: float, line: LineStatus, dt_s: float) -> None:
         """Advance the model by dt_s. Of a line that tells nothing of its settings what is wanted stands."""
@@ -117,11 +122,6 @@ class LeftForce:
         self._may_stand_v = max(self._may_stand_v, wanted_v) if stands_v is None else stands_v
         if self._may_stand_v != self._lagged_v:
             self._lagged_v += (self._may_stand_v - self._lagged_v) * dt_s / (self._lag_s + dt_s)
-            self._evaluate()
-
-    def _evaluate(self) -> None:
-        rising_n, _ = self._model.branch_forces_n(self._lagged_v)
-        self.rise_n = rising_n - self._rest_n
 
 
 class RiseCheck:
