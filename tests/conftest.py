@@ -52,8 +52,7 @@ parsed: dict[tuple[bytes, str], Any] = {}
 def keep_parsed_profiles() -> None:
     """Parse each file that is read again and again once, and read what it says once: a rig is assembled two thousand times in
     the gate, of the same few files. What tells the faults of a file's text is not kept."""
-    from gateway.profiles import load
-    from gateway.profiles.kinds import registers
+    from gateway.profiles.kinds import calibrations, devices, plants, registers
     from gateway.profiles.rigs import assembly
     from gateway.profiles.strict_yaml.text import Document, parse
 
@@ -66,9 +65,9 @@ def keep_parsed_profiles() -> None:
 
     for name in READERS:
         import_module(name).parse = parse_once  # type: ignore[attr-defined]
-    for reader in ("read_device", "read_plant", "read_calibration"):
-        read = done_once(getattr(load, reader))
-        for module in (load, assembly):
+    for room, reader in ((devices, "read_device"), (plants, "read_plant"), (calibrations, "read_calibration")):
+        read = done_once(getattr(room, reader))
+        for module in (room, assembly):
             setattr(module, reader, read)
     registers.read_map = done_once(registers.read_map)
 

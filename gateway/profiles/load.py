@@ -1,26 +1,25 @@
 """Reading profiles by name or path: a rig, and every file that it names.
 
 A fault in one file does not keep the others from being read: all are told together. Every text that was read goes into
-`Findings.texts`, and so into the rig's fingerprint.
+`Findings.texts`, and so into the rig's fingerprint. What one kind needs is imported with the first file of it.
 """
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from gateway.bsfm.model import Calibration
-from gateway.devices import DeviceProfile
 from gateway.file_signature import JSON, SIGNATURE_BYTES, describe_signature
 from gateway.profiles.find import display, locate
-from gateway.profiles.kinds.calibrations import read_calibration
-from gateway.profiles.kinds.devices import read_device
-from gateway.profiles.kinds.file_kind import CALLED, is_foreign, kind_of
-from gateway.profiles.kinds.plants import PlantProfile, read_plant
-from gateway.profiles.kinds.registers import read_registers
+from gateway.profiles.kinds.file_kind import CALLED, has_no_other_key, is_foreign, kind_of
 from gateway.profiles.strict_yaml.faults import Findings, ProfileError, ProfileFault, one_of
 from gateway.profiles.strict_yaml.text import Document, parse
-from gateway.registers.map.register_map import RegisterMap
+
+if TYPE_CHECKING:
+    from gateway.bsfm.model import Calibration
+    from gateway.devices import DeviceProfile
+    from gateway.profiles.kinds.plants import PlantProfile
+    from gateway.registers.map.register_map import RegisterMap
 
 T = TypeVar("T")
 Read = Callable[[Document], tuple[T | None, list[ProfileFault]]]
@@ -54,6 +53,8 @@ def refer_at(
 def open_profile(kind: str, reference: ProfileReference, findings: Findings) -> tuple[Document, Path] | None:
     """Find, read and parse one file of a kind; None with the faults noted."""
     opened = open_file(kind, reference, findings)
+    if opened and has_no_other_key(opened[0].value, kind):
+        return opened
     actual_kind = kind_of(opened[0].value, kind) if opened else None
     if opened and actual_kind and actual_kind != kind:
         command = f"`force-gateway check {display(opened[1])}` takes it as one"
@@ -121,21 +122,29 @@ def _load(kind: str, name: str | Path, read: Read[T]) -> T:
     return value
 
 
-def load_plant(name: str | Path) -> PlantProfile:
+def load_plant(name: str | Path) -> "PlantProfile":
     """Return a plant profile by shipped name or path; ProfileError with every fault. So the three below."""
+    from gateway.profiles.kinds.plants import read_plant
+
     return _load("plant", name, read_plant)
 
 
-def load_device(name: str | Path) -> DeviceProfile:
+def load_device(name: str | Path) -> "DeviceProfile":
     """Return the device profile of a name or path. ProfileError with every fault of the file."""
+    from gateway.profiles.kinds.devices import read_device
+
     return _load("device", name, read_device)
 
 
-def load_calibration(name: str | Path) -> Calibration:
+def load_calibration(name: str | Path) -> "Calibration":
     """Return the calibration of a name or path. ProfileError with every fault of the file."""
+    from gateway.profiles.kinds.calibrations import read_calibration
+
     return _load("calibration", name, read_calibration)
 
 
-def load_register_map(name: str | Path) -> RegisterMap:
+def load_register_map(name: str | Path) -> "RegisterMap":
     """Return the register map of a name or path. ProfileError with every fault of the file."""
+    from gateway.profiles.kinds.registers import read_registers
+
     return _load("registers", name, read_registers)

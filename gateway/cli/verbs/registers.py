@@ -10,6 +10,7 @@ from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.errors import CliError
 
 if TYPE_CHECKING:
+    from gateway.profiles import Rig
     from gateway.registers import RegisterMap
 
 TABLES: Final = ("markdown", "csv", "json")
@@ -35,10 +36,10 @@ def command(*, name: str | None, form: str | None, map_name: str | None, rig: st
     rapid: ABB IRC5 over sockets. scl: S7-1200/1500, MB_CLIENT. st: TwinCAT 3 and CODESYS V3. urscript: Universal Robots. c: C99
     and POSIX sockets. python: standard library only. Each begins with how to load it and what it does when things fail.
     """
-    from gateway.profiles import load_register_map, load_rig
+    from gateway.profiles import load_register_map
     from gateway.registers import render_registers
 
-    chosen = load_rig(rig) if rig else None
+    chosen = _load_rig(rig) if rig else None
     register_map = (
         chosen.register_map if chosen and not map_name else load_register_map(map_name or defaults.REGISTER_MAP)
     )
@@ -55,6 +56,13 @@ def command(*, name: str | None, form: str | None, map_name: str | None, rig: st
         click.echo(render_client(register_map, form, endpoint_of(chosen)), nl=False)
     except MissingRegisterError as error:
         raise CliError(f"E185 {error}: a {form} client needs them; copy them from {defaults.REGISTER_MAP}") from None
+
+
+def _load_rig(name: str) -> "Rig":
+    """Import what a rig needs only for who names one."""
+    from gateway.profiles import load_rig
+
+    return load_rig(name)
 
 
 def _show_card(register_map: "RegisterMap", name: str, form: str | None) -> None:

@@ -1,6 +1,7 @@
 """Start-up: light, the same by every door, and one clear message when something is wrong."""
 
 import json
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -36,6 +37,15 @@ def test_check_never_imports_scipy() -> None:
     assert loaded_modules("check", "demo").isdisjoint(HEAVY)
     done = subprocess.run([sys.executable, "-m", "gateway", "check", "demo"], capture_output=True, check=False)
     assert done.returncode == 0  # so the modules above are those of a whole check
+
+
+def test_who_needs_the_register_map_alone_waits_for_no_mathematics() -> None:
+    """A third of a second for each `read`, and for each Tab behind it."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    for words in (("registers",), ("read", "force_measured", "--gateway", f"127.0.0.1:{port}")):
+        assert "numpy" not in loaded_modules(*words), words
+    assert "numpy" in loaded_modules("registers", "--format", "csv", "--rig", "demo")
 
 
 def test_the_guardian_is_reached_without_numpy() -> None:
