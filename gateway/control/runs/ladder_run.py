@@ -7,7 +7,7 @@ never settles is left after MOST_DWELL_S and counted. Where the check's stairs r
 (stair_approach), but for the steps that tell the response. The voltage changes with a reading only: the recording's rows say
 when.
 Supervision is not here: the controller watches as always. Only what a ladder alone can see is judged: each settled stair
-of the check against the model, for sign and scale.
+of the check against the model, for sign and scale, and each later one, whether any force answers it at all.
 """
 
 from collections import deque
@@ -40,6 +40,7 @@ SETTLED_SIGMA: Final = 2.0  # of the difference between the means of the halves:
 SMALLEST_DRIFT_N: Final = 0.03  # less is no drift, however quiet the cell: a third of a usual count (0.1 N)
 LEAST_EXPECTED_N: Final = 3.0  # smaller stairs of the check are not judged: friction may hold as much
 UNKNOWN_FRICTION_N: Final = 5.0  # of a rise that a machine's friction may keep, which is not the calibration's
+LEAST_LATER_N: Final = 15.0  # behind the check: a machine that passed it by little gives twice what is silent there
 LOWEST_SHARE, HIGHEST_SHARE, SILENT_SHARE = (
     0.3,
     3.0,
@@ -277,12 +278,14 @@ class LadderRun:
         return row
 
     def _check_against_model(self, row: LadderRow) -> None:
-        """Sign and scale of a rising stair of the check (A302, A303), or no answer at all (A301)."""
-        if row.stair.phase is not CalibrationPhase.CHECK or row.stair.direction < 0:
-            return
+        """Sign and scale of a rising stair of the check (A302, A303), or no answer at all (A301), as of any later one."""
         volts = row.stair.voltage_v
         expected_n = self.model.force_n(volts, 1.0) - self.model.force_n(self._rest_v, 1.0)
         rise_n = row.force_n - self.rest_n
+        if row.stair.phase is not CalibrationPhase.CHECK or row.stair.direction < 0:
+            if expected_n > LEAST_LATER_N and rise_n < SILENT_SHARE * expected_n:
+                self._stop_silent(volts, rise_n, expected_n)
+            return
         least_n = LOWEST_SHARE * max(0.0, expected_n - UNKNOWN_FRICTION_N)
         if expected_n < LEAST_EXPECTED_N or least_n < rise_n <= HIGHEST_SHARE * expected_n:
             return
@@ -291,11 +294,14 @@ class LadderRun:
         if rise_n <= -LOWEST_SHARE * expected_n:
             self.stop_cause = StopCause(FaultCode.SIGN_INVERTED, sign_sentence(rise_n, expected_n))
         elif rise_n < SILENT_SHARE * expected_n:
-            is_constant = self.noise_n == 0.0 and rise_n == 0.0
-            sentence = ladder_silent_sentence(volts, rise_n, expected_n, is_constant=is_constant)
-            self.stop_cause = StopCause(FaultCode.NONE, sentence)
+            self._stop_silent(volts, rise_n, expected_n)
         else:
             self.stop_cause = StopCause(FaultCode.GAIN_WRONG, gain_sentence(rise_n, expected_n))
+
+    def _stop_silent(self, volts: float, rise_n: float, expected_n: float) -> None:
+        is_constant = self.noise_n == 0.0 and rise_n == 0.0
+        sentence = ladder_silent_sentence(volts, rise_n, expected_n, is_constant=is_constant)
+        self.stop_cause = StopCause(FaultCode.NONE, sentence)
 
     def _answer(self, row: LadderRow | None) -> RunStep:
         said, self._said = self._said, ""
