@@ -3,6 +3,4 @@
 The rooms, and the ways through them, are in gateway/README.md.
 """
 
-from typing import Final
-
-VERSION: Final = "0.1.0"
+VERSION = "0.1.0"

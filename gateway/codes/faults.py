@@ -84,7 +84,7 @@ class FaultCode(IntEnum):
             "force has the wrong size",
             "The first rise in contact is less than 30 % or more than 300 % of what the model expects.",
             "Kilograms read as newtons (a factor of 9.81), another cell, or another cylinder than the calibrated one.",
-            "Check the unit on the amplifier's display against the rig file; else calibrate this rig.",
+            "Check unit and span of the amplifier against the rig file and the cell with a known weight, then calibrate.",
         ),
     )
     OUTPUT_SILENT = (

@@ -62,7 +62,7 @@ class Situation:
     voltage_v: float
     is_lowest: bool
     applied_n: float
-    expected_n: float
+    leaving_n: float
     repeats: str
     ramps_down: bool
 
@@ -95,7 +95,7 @@ class Readiness:
             voltage_v=loop.voltage_v,
             is_lowest=loop.is_lowest,
             applied_n=loop.applied_n,
-            expected_n=max(loop.compute_expected_rise(), loop.left.rise_n),
+            leaving_n=max(loop.expected.leaving_n(loop.branch_share), loop.left.rise_n),
             repeats=self._parts.faults.repeats,
             ramps_down=machine.is_ramping_down or machine.is_stopping,
         )
@@ -246,8 +246,8 @@ class EdgeCheck:
             return "no fresh load-cell sample"
         if at.repeats:
             return f"{at.reading.cell_n:.2f} N {at.repeats}: amplifier or cell is dead, its reading is no zero"
-        if at.expected_n > self._conditioner.zero_spread_n:
-            return f"about {at.expected_n:.1f} N are still on their way to 0: wait a moment"
+        if at.leaving_n > self._conditioner.zero_spread_n:
+            return f"about {at.leaving_n:.1f} N are still on their way to 0: wait a moment"
         return self._conditioner.why_no_zero(self._commands.demand_by(command).gravity_n)
 
     def _forbids_run(self, plan: AnyPlan, at: Situation) -> str:

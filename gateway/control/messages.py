@@ -85,6 +85,14 @@ def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float, *
     )
 
 
+def restless_sentence(waited_s: float, rest_n: float, drift_n: float) -> str:
+    """Return what a run says that begins although the load cell has not come to rest before."""
+    return (
+        f"the load cell has not come to rest in {waited_s:.1f} s: {rest_n:.1f} N, moved by {drift_n:.2f} N in the last 0.3 s, "
+        "counts as its rest; a force that is still leaving, or a cell that drifts, makes the run wrong"
+    )
+
+
 def stuck_sentence(measured_n: float, limit_n: float) -> str:
     """Return W304: a force where none is commanded. Whether the safe voltage stands is not said: the port may be away."""
     return (

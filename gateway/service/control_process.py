@@ -93,10 +93,10 @@ def describe_change(rig: Rig, options: dict[str, Any]) -> str:
     try:
         if load_rig(options["rig"], simulated=options["simulate"]).fingerprint == rig.fingerprint:
             return ""
-        now = "have changed"
+        now, later = "have changed", "a new start takes them"
     except ProfileError as error:
-        now = f"have faults now ({error.faults[0]})"
-    return f"W247 the files of rig {rig.name} {now}: it goes on as it was started, a new start takes them"
+        now, later = f"have faults now ({error.faults[0]})", "a new start would be refused"
+    return f"W247 the files of rig {rig.name} {now}: it goes on as it was started, {later}"
 
 
 def sample_ring(descriptor: int | None, log: Log) -> SampleRing | None:

@@ -4,6 +4,7 @@ A rig with a lease wants a heartbeat. The browser that commands says once a seco
 changes the heartbeat register four times in a lease. When the browser goes (closed, asleep, off the network), the beat ends
 within GRACE_S (RELOAD_S where its connection has closed) and the lease does its work: no force is held for nobody. A reload
 within that time loses nothing. A command that was refused makes nobody the commander, and who is overtaken ceases to be it.
+While the output is off no lease counts: a beat that finds it so is the last one, or the next master's would meet it (W210).
 
 Disabling is granted to every master, whoever owns the setpoint, and to nobody else's harm: that is what `stop` is. It ends an
 enable that is on its way, too: that one asks before it writes, and whoever pressed Esc meanwhile wants no force after it.
@@ -20,7 +21,7 @@ from typing import Any, Final
 from gateway.live.control_link import ANSWER_S
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.map.register_map import Register
-from gateway.registers.words import ControlBit, Mode
+from gateway.registers.words import ControlBit, Mode, StatusBit
 from gateway.web.context import WebContext
 
 GRACE_S: Final = 2.5
@@ -53,7 +54,7 @@ class Commands:
         self._present: set[str] = set()
         self._beat: asyncio.Task[None] | None = None
         self._number = 0
-        self._stops = 0  # told so far
+        self._stops = self._commanded = 0  # told so far
 
     # -- who is there
 
@@ -115,7 +116,7 @@ class Commands:
         await self._set_bit(ControlBit.TAKE_OWNERSHIP)
         self._begin_to_beat(viewer)
 
-    async def reset(self, viewer: str) -> None:
+    async def reset(self) -> None:
         """Reset a latched fault: with setpoint 0 and another heartbeat, all in one write. Where somebody presses again
         meanwhile it is refused, and stops nobody."""
         first, beat = self._find("control_word").address, self._find("heartbeat").address
@@ -123,16 +124,18 @@ class Commands:
         words[0], words[self._find("force_setpoint").address - first] = int(ControlBit.RESET_FAULT), 0
         words[-1] = self._number = words[-1] % 65535 + 1
         await self._write_words("control_word", words)
-        self._begin_to_beat(viewer)
 
     async def tare(self) -> None:
         """Take the force that rests on the cell now as 0."""
         await self._set_bit(ControlBit.TARE)
 
-    async def beat_once(self) -> None:
-        """Change the heartbeat register."""
+    async def beat_once(self) -> bool:
+        """Change the heartbeat register; return whether the output is enabled behind it."""
         self._number = self._number % 65535 + 1
-        await self._write("heartbeat", self._number)
+        beat, status = self._find("heartbeat"), self._find("status_word")
+        data = self._encode(beat, self._number)
+        answer = await self._send(P.read_write_request(status.address, 1, beat.address, data))
+        return bool(int.from_bytes(answer[2:4], "big") & StatusBit.ENABLED)
 
     async def words(self, block: str) -> list[int]:
         """Return the registers of a block as they are now."""
@@ -208,6 +211,7 @@ class Commands:
 
     def _begin_to_beat(self, viewer: str) -> None:
         self.commander = viewer
+        self._commanded += 1
         self._seen_s = self._clock()
         lease_s = self._context.profile.control.supervision.lease_s
         if lease_s is not None and (self._beat is None or self._beat.done()):
@@ -221,8 +225,10 @@ class Commands:
     async def _keep_beating(self, every_s: float) -> None:
         refused = 0
         while self.is_attended and refused < _REFUSED_BEATS:
+            commanded = self._commanded
             try:
-                await self.beat_once()
+                if not await self.beat_once() and commanded == self._commanded:
+                    return
                 refused = 0
             except RefusedCommand:
                 refused += 1

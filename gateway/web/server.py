@@ -150,7 +150,7 @@ def _command(context: WebContext, commands: Commands) -> Callable[[Request], Awa
         "enable": lambda viewer, body: commands.enable(viewer, _number(body, "force_n")),
         "setpoint": lambda viewer, body: commands.set_force(viewer, _number(body, "force_n")),
         "take-ownership": lambda viewer, body: commands.take_ownership(viewer),
-        "reset": lambda viewer, body: commands.reset(viewer),
+        "reset": lambda viewer, body: commands.reset(),
         "tare": lambda viewer, body: commands.tare(),
         "record": lambda viewer, body: context.control.ask({"do": "record", "on": _switch(body, "on")}),
     }

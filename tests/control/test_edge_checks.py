@@ -21,7 +21,7 @@ TARE, ENABLE = ControlBit.TARE, ControlBit.ENABLE
 REST = Situation(
     now_s=1.0, state=State.OFF, faulted_s=-inf, reading=Reading(0.0, 0.0, 0.0, 0.01, True, True, True),
     block=RefusalReason.NONE, excuse="", line_fault="", is_output_known=True, is_output_heard=True, voltage_v=0.0,
-    is_lowest=True, applied_n=0.0, expected_n=0.0, repeats="", ramps_down=False,
+    is_lowest=True, applied_n=0.0, leaving_n=0.0, repeats="", ramps_down=False,
 )  # fmt: skip
 
 
@@ -43,7 +43,7 @@ def refusal(at: Situation, word: ControlBit, rest_n: float = 0.0, **command: flo
 def test_a_tare_waits_until_what_still_presses_is_within_what_a_zero_may_spread(
     expected_n: float, is_taken: bool
 ) -> None:
-    assert (refusal(replace(REST, expected_n=expected_n), TARE) is None) is is_taken
+    assert (refusal(replace(REST, leaving_n=expected_n), TARE) is None) is is_taken
 
 
 @pytest.mark.parametrize(("state", "is_taken"), [(State.OFF, True), (State.READY, False)])
@@ -58,7 +58,7 @@ def test_a_zero_is_judged_with_the_payload_of_its_own_write() -> None:
 
 
 def test_a_run_that_tares_first_is_refused_where_the_tare_would_be() -> None:
-    cold = replace(REST, expected_n=3.0)
+    cold = replace(REST, leaving_n=3.0)
     assert check().of_run(CalibrationPlan(), cold) is None
     refused = check().of_run(CalibrationPlan(tare=True), cold)
     assert refused and refused.reason is RefusalReason.TARE_REFUSED

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
+from gateway.codes.refusals import RefusalReason
 from gateway.registers import Status
 from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import ControlBit, State, StatusBit
@@ -21,6 +22,7 @@ COMMANDS, COMMANDS_NOTHING = (
     {"takes_over": False, "stops": False, "asks": True},
     {"takes_over": False, "stops": False, "asks": False},
 )
+TEST, TAKE = int(ControlBit.START_SELF_TEST), int(ControlBit.TAKE_OWNERSHIP)
 TAKES_OVER = {"takes_over": True, "stops": False, "asks": True}
 
 
@@ -185,3 +187,33 @@ def test_who_ends_another_s_run_takes_no_owner_s_address_away(make_bank, registe
     Master(bank, "10.0.0.2").write(0, 1)
     assert bank.owner == "certificate plc" and bank.command.control_word == ControlBit.ENABLE
     assert bank.read_registers(register_map.find("owner_ip").address, 2) == bytes([10, 0, 0, 1])
+
+
+@pytest.mark.parametrize("how", ["a 0 that changes nothing", "a stop of the owner", "a takeover", "by its coil"])
+def test_who_wrote_its_held_bit_as_0_while_another_owned_is_asked_for_no_other_0(make_bank, master_of, how) -> None:
+    bank = make_bank(supported_bits=ControlBit(127))
+    holder, owner = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
+    for _ in range(2):
+        holder.write(0, TEST)
+    bank.clear_command()  # the run has ended
+    owner.write(0, int(how == "a stop of the owner"), 500)
+    assert bank.owner == "10.0.0.2"
+    if how == "by its coil":
+        bank.write_bits(6, [False], holder.peer)
+    else:
+        holder.write(0, TAKE if how == "a takeover" else 0)
+    bank.release_owner()
+    holder.write(0, TEST)
+    assert bank.command.control_word == TEST
+
+
+def test_a_0_that_is_refused_lets_no_held_bit_go(make_bank, master_of) -> None:
+    bank = make_bank(supported_bits=ControlBit(127))
+    holder, owner = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
+    for _ in range(2):
+        holder.write(0, TEST)
+    bank.clear_command()
+    owner.write(0, 0, 500)
+    assert holder.refusal(holder.write, 0, 0, 600).reason is RefusalReason.NOT_OWNER
+    bank.release_owner()
+    assert holder.refusal(holder.write, 0, TEST).reason is RefusalReason.CALIBRATION_HELD

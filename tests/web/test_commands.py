@@ -100,7 +100,7 @@ def test_stop_ends_the_force_of_another_master_and_nothing_else_does(tmp_path: P
         with pytest.raises(RefusedCommand, match=r"10\.0\.0\.5"):
             await commands.set_force("me", 20.0)
         with pytest.raises(RefusedCommand, match=r"10\.0\.0\.5"):
-            await commands.reset("me")  # of a fault that another browser has reset, and the robot has enabled again
+            await commands.reset()  # of a fault that another browser has reset, and the robot has enabled again
         with pytest.raises(RefusedCommand, match=r"10\.0\.0\.5"):
             await commands.tare()
         wired.run(0.3)
@@ -207,7 +207,7 @@ def test_a_lease_is_kept_while_the_browser_is_there_and_not_a_second_longer_than
             if wired.now_s == before_s:  # nobody beats any more: time goes on without
                 wired.run(0.05)
         assert wired.fault_code is FaultCode.MASTER_LOST
-        await commands.reset("me")
+        await commands.reset()
         wired.run(0.1)
         assert wired.state is State.OFF
 

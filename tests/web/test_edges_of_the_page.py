@@ -40,7 +40,7 @@ def test_a_reset_takes_a_setpoint_back_that_somebody_has_left(tmp_path: Path) ->
         wired.is_cell_plugged = True
         await commands.set_force("me", 5.0)
         wired.run(1.0)
-        await commands.reset("me")
+        await commands.reset()
         wired.run(0.1)
         assert wired.state is State.OFF and wired.word("force_setpoint") == 0
 
@@ -62,10 +62,11 @@ def test_a_beat_that_is_refused_now_and_then_ends_nothing() -> None:
     class Moody:
         async def ask(self, request: dict[str, Any]) -> dict[str, Any]:
             pdu = bytes.fromhex(request["pdu"])
-            is_beat = pdu[0] == P.WRITE_REGISTERS and pdu[1:3] == bytes((0, 4))
+            is_beat = pdu[0] == P.READ_WRITE and pdu[5:7] == bytes((0, 4))
             beats[0] += is_beat
-            if is_beat and beats[0] % 3:
-                return {"pdu": bytes((pdu[0] | 0x80, 6)).hex()}
+            if is_beat:
+                refused = bytes((pdu[0] | 0x80, 6))
+                return {"pdu": (refused if beats[0] % 3 else bytes((pdu[0], 2, 0, 1))).hex()}
             is_read = pdu[0] == P.READ_HOLDING_REGISTERS
             return {"pdu": (bytes((3, 2 * pdu[4], *bytes(2 * pdu[4]))) if is_read else pdu[:5]).hex()}
 

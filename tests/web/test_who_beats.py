@@ -3,12 +3,21 @@
 import asyncio
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.words import State
 from gateway.web.commands import Commands
+from gateway.web.context import WebContext
 from tests.service.requests.test_hostile_requests import Stage
 from tests.service.rigs import demo
 from tests.web.test_commands import leased, play
+
+
+async def until_done(commands: Commands) -> None:
+    """Until nobody beats."""
+    while commands._beat and not commands._beat.done():
+        await asyncio.sleep(0)
 
 
 def test_taking_over_leaves_the_page_the_owner_and_the_one_that_beats(tmp_path: Path) -> None:
@@ -39,13 +48,59 @@ def test_where_the_byte_order_must_be_proven_the_page_proves_it(tmp_path: Path) 
     play(tmp_path, scene, rig)
 
 
-def test_who_resets_a_fault_is_the_one_that_beats_for_what_comes_next(tmp_path: Path) -> None:
+def test_behind_a_fault_nobody_beats_and_the_robot_that_enables_meets_no_page(tmp_path: Path) -> None:
+    """Not even behind a reset of the page's own: the robot had eight refusals of a beat in its registers, and in the log."""
+
     async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
         commands.join("me")
-        await commands.reset("me")
-        assert commands.commander == "me" and commands.is_attended
+        await commands.enable("me", 12.0)
+        wired.is_cell_plugged = False
+        wired.until(lambda: wired.state is State.FAULT, 1.0)
+        wired.is_cell_plugged = True
+        await until_done(commands)
+        wired.run(1.0)
+        await commands.reset()
+        wired.run(0.1)
+        assert wired.state is State.OFF
+        wired.write(0, 1, 1000, 0, 0, 78)
+        for beat in range(40):
+            commands.note_alive("me")
+            wired.write(4, 100 + beat)
+            wired.run(0.05)
+            await asyncio.sleep(0)
+        assert wired.bank.owner == "10.0.0.5" and wired.bank.refusals == 0
+        assert wired.state in (State.RAMPING, State.HOLDING)
 
     play(tmp_path, scene, leased())
+
+
+def test_a_beat_that_finds_the_output_off_ends_none_that_an_enable_has_begun_meanwhile() -> None:
+    """Its answer was on its way."""
+    beats: list[bytes] = []
+
+    class Slow:
+        async def ask(self, request: dict[str, Any]) -> dict[str, Any]:
+            pdu = bytes.fromhex(request["pdu"])
+            if pdu[0] != P.READ_WRITE:
+                is_read = pdu[0] == P.READ_HOLDING_REGISTERS
+                return {"pdu": (bytes((3, 2 * pdu[4], *bytes(2 * pdu[4]))) if is_read else pdu[:5]).hex()}
+            beats.append(pdu)
+            if len(beats) == 1:
+                await commands.enable("me", 12.0)
+            return {"pdu": bytes((P.READ_WRITE, 2, 0, len(beats) > 1)).hex()}
+
+    async def run() -> None:
+        await commands.set_force("me", 12.0)
+        while len(beats) < 10:
+            await asyncio.sleep(0)
+        assert commands.commander == "me"
+        await commands.close()
+
+    context = WebContext(Path(), "demo", True, Slow())  # type: ignore[arg-type]
+    context.__dict__["profile"] = leased()
+    commands = Commands(context, lambda: 0.0, lambda seconds: asyncio.sleep(0))
+    asyncio.run(asyncio.wait_for(run(), 5.0))
 
 
 def test_who_changes_the_force_is_who_must_be_there_from_then_on(tmp_path: Path) -> None:
@@ -83,11 +138,10 @@ def test_behind_an_absence_that_ended_the_beat_the_next_command_begins_it_again(
         await commands.enable("me", 12.0)
         while commands.is_attended:
             await asyncio.sleep(0)
-        while commands._beat and not commands._beat.done():
-            await asyncio.sleep(0)
+        await until_done(commands)
         wired.run(1.0)
         assert wired.state is State.FAULT
-        await commands.reset("me")
+        await commands.reset()
         await commands.enable("me", 12.0)
         for _ in range(20):
             await asyncio.sleep(0)

@@ -26,6 +26,7 @@ SHORTEST_DWELL_S: Final = 0.1  # shorter stretches are the slew between two stai
 LINE_NUMBERS: Final = 2  # of a straight line
 FEWEST_READINGS: Final = 20  # beyond the lines' own numbers: the noise is known to a sixth then
 KNOCKED: Final = 25.0  # times the usual variance, median: noise alone makes so much of a single difference once in 1000
+LOST: Final = 1.5  # times the usual time between rows: some are missing
 FEWEST_DWELL_ROWS: Final = 2  # the same where readings are as far apart: one on the way is not settled
 
 
@@ -76,6 +77,7 @@ def _starts_of_stairs(command_v: Floats, stair: Integers) -> Integers:
 
 def _dwells(time_s: Floats, command_v: Floats, force_n: Floats, starts: Integers) -> Points:
     ends = np.append(starts[1:], len(time_s) - 1)  # the row of the next command still reads this one's force
+    ends[:-1] -= _is_late(time_s, ends[:-1])
     dwells, tails = [], []
     for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
         if time_s[end] - time_s[start] < SHORTEST_DWELL_S or end - start < FEWEST_DWELL_ROWS:
@@ -89,6 +91,13 @@ def _dwells(time_s: Floats, command_v: Floats, force_n: Floats, starts: Integers
         raise ValueError(f"no command is held for {SHORTEST_DWELL_S:g} s: this is a ramp, not a ladder of stairs")
     voltage_v, mean_n, row, drift = (np.array(column) for column in zip(*dwells, strict=True))
     return Points(voltage_v, mean_n, row.astype(np.int64), drift, _noise_n(tails))
+
+
+def _is_late(time_s: Floats, ends: Integers) -> NDArray[np.bool_]:
+    """Return which of the rows at which a next command begins are not its first: rows are missing before it, and its force is
+    on its way already."""
+    apart_s = np.diff(time_s)
+    return np.asarray(apart_s[ends - 1] > LOST * np.median(apart_s)) if len(apart_s) else np.zeros(len(ends), bool)
 
 
 def _noise_n(tails: Sequence[Floats]) -> float:

@@ -157,7 +157,7 @@ class ActiveRun:
             return StopCause(FaultCode.NONE, self._stop_asked)
         step = run.step(now_s, reading)
         self.phase, self.progress, self.eta_s = step.phase, step.progress, step.eta_s
-        self.last_row = step.row or self.last_row
+        self.last_row, self.message = step.row or self.last_row, step.said or self.message
         if run.stop_cause:
             return run.stop_cause
         if run.is_done:

@@ -7,7 +7,7 @@ never settles is left after MOST_DWELL_S and counted. Where the check's stairs r
 (stair_approach), but for the steps that tell the response. The voltage changes with a reading only: the recording's rows say
 when.
 Supervision is not here: the controller watches as always. Only what a ladder alone can see is judged: each settled stair
-of the check against the model, for sign and scale.
+of the check against the model, for sign and scale, and each later one, whether any force answers it at all.
 """
 
 from collections import deque
@@ -20,7 +20,7 @@ from gateway.bsfm import Bsfm
 from gateway.bsfm.ladder.lone_reading import without_lone_reading
 from gateway.bsfm.ladder.plan import RESPONSE_GROUP
 from gateway.codes.faults import FaultCode
-from gateway.control.messages import gain_sentence, ladder_silent_sentence, sign_sentence
+from gateway.control.messages import gain_sentence, ladder_silent_sentence, restless_sentence, sign_sentence
 from gateway.control.runs.blind_time import BlindTime, Trace
 from gateway.control.runs.ladder_stairs import CalibrationPlan, PlannedStair, stairs_of
 from gateway.control.runs.stair_approach import StairApproach
@@ -33,11 +33,14 @@ ZERO_S: Final = 0.6  # for rest force and noise: 60 readings of a 100 Hz cell kn
 WINDOW_S: Final = 0.2  # whose two halves are compared
 FEWEST_READINGS: Final = 6  # in a window: three in each half
 MOST_DWELL_S: Final = 3.5  # then a stair is left, settled or not
+REST_LAGS: Final = 8.0  # response lags, until 3000 times less is left of what was pressed before
+LONGEST_REST_S: Final = 20.0
 GUESSED_DWELL_S: Final = 0.65  # for the time left, until a stair has been timed
 SETTLED_SIGMA: Final = 2.0  # of the difference between the means of the halves: noise alone exceeds it once in twenty
 SMALLEST_DRIFT_N: Final = 0.03  # less is no drift, however quiet the cell: a third of a usual count (0.1 N)
 LEAST_EXPECTED_N: Final = 3.0  # smaller stairs of the check are not judged: friction may hold as much
 UNKNOWN_FRICTION_N: Final = 5.0  # of a rise that a machine's friction may keep, which is not the calibration's
+LEAST_LATER_N: Final = 15.0  # behind the check: a machine that passed it by little gives twice what is silent there
 LOWEST_SHARE, HIGHEST_SHARE, SILENT_SHARE = (
     0.3,
     3.0,
@@ -57,7 +60,8 @@ class LadderRow(NamedTuple):
 
 
 class RunStep(NamedTuple):
-    """What one step answers. progress: 0 .. 1; row: of a stair that has just ended; stair_v: where a ramp leads, V."""
+    """What one step answers. progress: 0 .. 1; row: of a stair that has just ended; stair_v: where a ramp leads, V;
+    said: a sentence for the log."""
 
     voltage_v: float
     phase: CalibrationPhase
@@ -65,6 +69,7 @@ class RunStep(NamedTuple):
     eta_s: float
     row: LadderRow | None = None
     stair_v: float | None = None
+    said: str = ""
 
     @property
     def highest_v(self) -> float:
@@ -92,6 +97,9 @@ class LadderRun:
         self.done = 0
         self.model = model
         self._rest_v = settings.limits.safe_voltage_v
+        left_s = REST_LAGS * settings.supervision.response_lag_s
+        self._most_rest_s = min(LONGEST_REST_S, max(MOST_DWELL_S, left_s))
+        self._said = ""
         self._began_s: float | None = None
         self._stair_s: float | None = None
         self._window: deque[tuple[float, float]] = deque()
@@ -206,10 +214,14 @@ class LadderRun:
         window, waited_s = self._window, now_s - self._began_s
         while len(window) > FEWEST_READINGS and window[0][0] < now_s - ZERO_S:
             window.popleft()
-        if waited_s >= ZERO_S and len(window) >= FEWEST_READINGS and (self._is_still() or waited_s >= MOST_DWELL_S):
+        if waited_s < ZERO_S or len(window) < FEWEST_READINGS:
+            return
+        if (is_still := self._is_still()) or waited_s >= self._most_rest_s:
             forces = self._forces_n()
             self.rest_n = sum(forces) / len(forces)
             self.noise_n = sqrt(sum((force - self.rest_n) ** 2 for force in forces) / (len(forces) - 1))
+            if not is_still:
+                self._said = restless_sentence(waited_s, self.rest_n, self._drift_n())
             self._begin_next(now_s, self.rest_n)
 
     def _is_still(self) -> bool:
@@ -266,12 +278,14 @@ class LadderRun:
         return row
 
     def _check_against_model(self, row: LadderRow) -> None:
-        """Sign and scale of a rising stair of the check (A302, A303), or no answer at all (A301)."""
-        if row.stair.phase is not CalibrationPhase.CHECK or row.stair.direction < 0:
-            return
+        """Sign and scale of a rising stair of the check (A302, A303), or no answer at all (A301), as of any later one."""
         volts = row.stair.voltage_v
         expected_n = self.model.force_n(volts, 1.0) - self.model.force_n(self._rest_v, 1.0)
         rise_n = row.force_n - self.rest_n
+        if row.stair.phase is not CalibrationPhase.CHECK or row.stair.direction < 0:
+            if expected_n > LEAST_LATER_N and rise_n < SILENT_SHARE * expected_n:
+                self._stop_silent(volts, rise_n, expected_n)
+            return
         least_n = LOWEST_SHARE * max(0.0, expected_n - UNKNOWN_FRICTION_N)
         if expected_n < LEAST_EXPECTED_N or least_n < rise_n <= HIGHEST_SHARE * expected_n:
             return
@@ -280,15 +294,19 @@ class LadderRun:
         if rise_n <= -LOWEST_SHARE * expected_n:
             self.stop_cause = StopCause(FaultCode.SIGN_INVERTED, sign_sentence(rise_n, expected_n))
         elif rise_n < SILENT_SHARE * expected_n:
-            is_constant = self.noise_n == 0.0 and rise_n == 0.0
-            sentence = ladder_silent_sentence(volts, rise_n, expected_n, is_constant=is_constant)
-            self.stop_cause = StopCause(FaultCode.NONE, sentence)
+            self._stop_silent(volts, rise_n, expected_n)
         else:
             self.stop_cause = StopCause(FaultCode.GAIN_WRONG, gain_sentence(rise_n, expected_n))
 
+    def _stop_silent(self, volts: float, rise_n: float, expected_n: float) -> None:
+        is_constant = self.noise_n == 0.0 and rise_n == 0.0
+        sentence = ladder_silent_sentence(volts, rise_n, expected_n, is_constant=is_constant)
+        self.stop_cause = StopCause(FaultCode.NONE, sentence)
+
     def _answer(self, row: LadderRow | None) -> RunStep:
+        said, self._said = self._said, ""
         if self._stair_s is None or not self.stairs:
             return RunStep(self._rest_v, CalibrationPhase.ZERO, 0.0, self.eta_s)
         progress = self.done / len(self.stairs)
         stair_v = self._rest_v if self.is_done else self._stair.voltage_v
-        return RunStep(self._out_v, self._stair.phase, progress, self.eta_s, row, stair_v)
+        return RunStep(self._out_v, self._stair.phase, progress, self.eta_s, row, stair_v, said)

@@ -79,6 +79,10 @@ class ExpectedForce:
         """Return the same above the force at rest."""
         return self.force_n(branch_share) - self._rest_n
 
+    def leaving_n(self, branch_share: float) -> float:
+        """Return what of the expected force is still leaving at rest, N: what friction keeps there stays."""
+        return self.force_n(branch_share) - self._model.force_n(self._rest_v, branch_share)
+
     def bounds_n(self) -> tuple[float, float]:
         """Return the least and the most cell force, N, of a machine that follows at once, by the lag or in between: a dead
         time is in the lag, behind which a machine arrives sooner than a lag of that length."""

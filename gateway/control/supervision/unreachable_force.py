@@ -25,6 +25,7 @@ _SILENT_SHARE: Final = 0.25
 _LITTLE, _ENOUGH = 0.5, 0.7  # of the pressure that was seen at this voltage while the force was right
 _VERY_LITTLE, _PLENTY = 0.2, 0.5  # of what the ranges of the device say
 _LEAST_EXPECTED_PA: Final = 5.0e3
+_OFF: Final = "trim at its limit, calibration or the load cell's span off"  # a calibration takes a wrong span for right
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,8 +116,8 @@ def unreachable_words(evidence: Evidence) -> str:
         return _silent_words(evidence, pressure)
     clause = f"{pressure}; " if pressure else ""
     if evidence.factor < 0.5 and not pressure:
-        return "no air or too little of it, valve closed, trim at its limit or calibration off"
-    return f"{clause}target not reached: supply pressure too low, trim at its limit or calibration off"
+        return f"no air or too little of it, valve closed, {_OFF}"
+    return f"{clause}target not reached: supply pressure too low, {_OFF}"
 
 
 def _too_much_words(evidence: Evidence) -> str:
@@ -128,7 +129,7 @@ def _too_much_words(evidence: Evidence) -> str:
             f"{above}, and no lower voltage is possible: friction, the payload's weight or something else keeps so much "
             f"pressed; command more, or lift the tool before{unit}"
         )
-    return f"{above}: trim at its limit or calibration off, or something else presses on the tool"
+    return f"{above}: {_OFF}, or something else presses on the tool"
 
 
 def _pressure(evidence: Evidence) -> str:

@@ -130,7 +130,7 @@ def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
     findings.faults += faults
     named = refer_at(document, ("registers",), path.parent, defaults.REGISTER_MAP)
     register_map = read_named("registers", named, read_served_registers, findings)
-    parts = _parts(document, path.parent, findings)
+    parts = replace(_parts(document, path.parent, findings), register_map=register_map)
     findings.faults += _first_of_each_path(_run_checks(document, FAULTS, parts))
     findings.hardware += _first_of_each_path(_run_checks(document, HARDWARE, parts))
     findings.warnings += _run_checks(document, WARNINGS, parts)

@@ -28,6 +28,7 @@ from gateway.profiles.rigs.faces import Face
 from gateway.profiles.rigs.rig import is_own
 from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, ValveFile
 from gateway.profiles.strict_yaml.fault_sentences import newton, number, second, volt
+from gateway.registers.map.register_map import RegisterMap
 
 Found = Iterator[tuple[str, str]]
 """(dotted path of the file, sentence)."""
@@ -63,6 +64,7 @@ class Parts:
     extended: PlantProfile | None = None
     compensation: Compensation | None = None
     web: Web | None = None
+    register_map: RegisterMap | None = None
 
 
 Check = Callable[[Parts], Found]

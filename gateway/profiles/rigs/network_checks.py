@@ -1,4 +1,4 @@
-"""Checks of who may reach the Modbus server of a rig: addresses, allow-list, unit ids, port."""
+"""Checks of who may reach the Modbus server of a rig (addresses, allow-list, unit ids, port), and of what its map carries."""
 
 from ipaddress import ip_address
 from typing import Final
@@ -7,6 +7,7 @@ from gateway import defaults
 from gateway.profiles.http_sections import split_listen
 from gateway.profiles.rigs.addresses import is_certificate
 from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.profiles.strict_yaml.fault_sentences import newton
 from gateway.registers.writes.ownership import serial_place
 
 
@@ -49,6 +50,21 @@ def check_network_exposure(parts: Parts) -> Found:
         yield "network.allow", "lets every address in the world connect"
 
 
+def check_map_carries_force(parts: Parts) -> Found:
+    """Yield a warning for a largest force that no master could command, or that none would read, by a map of one's own."""
+    if parts.register_map is None or parts.limits is None:
+        return
+    most_n = parts.limits.force_max_n
+    for name, what in (("force_setpoint", "no master commands more"), ("force_measured", "more is shown as that")):
+        end_n = parts.register_map.find(name).maximum
+        if end_n is not None and end_n < most_n:
+            cure = "give it a coarser scale"
+            yield (
+                "limits.force_max_n",
+                f"{newton(most_n)}, but {name} of map {parts.register_map.name} ends at {newton(end_n)}: {what}; {cure}",
+            )
+
+
 def check_web(parts: Parts) -> Found:
     """Yield a fault for a page that other machines can reach and that asks for no token."""
     if parts.web and parts.web.token is None and not is_loopback(split_listen(parts.web.listen)[0]):
@@ -60,4 +76,4 @@ NEEDS_TOKEN: Final = (
     f"or stay on {defaults.HOST}"
 )
 FAULTS: Final[tuple[Check, ...]] = (check_allow_list, check_unit_ids, check_web)
-WARNINGS: Final[tuple[Check, ...]] = (check_network_exposure,)
+WARNINGS: Final[tuple[Check, ...]] = (check_network_exposure, check_map_carries_force)

@@ -110,8 +110,10 @@ class Admission:
             command = commands.command(values, word, number, now_s, write.host)
             self._ask(command, values, write)
             return AdmittedWrite(values, word, command, False, False, 0)
+        asked = int(values[CONTROL_WORD])
         permitted = self._permit(write, values)
         if permitted is None:
+            self._keep_held(write.host, self._held_by(write, asked, asked))
             return None
         values, written, is_stop = permitted
         if is_stop:
@@ -127,17 +129,21 @@ class Admission:
         if rises & STARTS:
             self._check_starts(write.host, rises, written, word_at)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
-        return AdmittedWrite(values, edges_kept, command, is_stop, bool(written & TAKE), self._held_by(write, written))
+        return AdmittedWrite(
+            values, edges_kept, command, is_stop, bool(written & TAKE), self._held_by(write, written, asked)
+        )
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered."""
-        host = admitted.command.peer
+        self._keep_held(admitted.command.peer, admitted.held)
+        self.lowered_from_n = admitted.command.lowered_from_n
+
+    def _keep_held(self, host: str, held: int) -> None:
         self._held.pop(host, None)
-        if admitted.held:
-            self._held[host] = admitted.held
+        if held:
+            self._held[host] = held
             if len(self._held) > _MOST_HOLDERS:
                 del self._held[next(iter(self._held))]
-        self.lowered_from_n = admitted.command.lowered_from_n
 
     def _is_plain(self, host: str, word: int) -> bool:
         """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, it held none, nothing
@@ -181,15 +187,18 @@ class Admission:
         """Return which words of the command block are written whole."""
         return self._commands.offsets(write.block, write.address, len(write.data) // 2)
 
-    def _held_by(self, write: Write, written: int) -> int:
+    def _held_by(self, write: Write, written: int, asked: int) -> int:
         """Return the bits of a run that a master that writes in cycles holds at 1: only its own 0 lets the next 1 count.
 
-        By another master's 0 behind the run, a Stop from the page say, the holder's next cycle would begin another run."""
+        By another master's 0 behind the run, a Stop from the page say, the holder's next cycle would begin another run. Its
+        own 0 counts, too, while another owns. asked: the control word as it came."""
         held = self._held.get(write.host, 0)
         if not held and not written & RUN_BITS:
             return 0
-        if CONTROL_WORD not in self._offsets(write) or not self._ownership.admits(write.host):
+        if CONTROL_WORD not in self._offsets(write):
             return held
+        if not self._ownership.admits(write.host):
+            return held & (asked | ~write.touched)
         stands = held | int(self._commands.values[CONTROL_WORD])
         return held & ~write.touched | stands & written & write.touched & RUN_BITS
 

@@ -44,3 +44,15 @@ def test_two_readings_to_a_stair_show_the_noise_as_well() -> None:
     force_n = np.roll(8.0 * volts, 1) + rng.normal(0.0, 0.1, 400)
     points = find_settled_points(np.arange(400) / 10.0, volts, force_n)
     assert points.noise_n == pytest.approx(0.1, rel=0.2)
+
+
+@pytest.mark.parametrize("lost", [1, 2, 4])
+def test_rows_that_are_lost_at_a_stairs_beginning_leave_the_one_before_as_it_was(lost: int) -> None:
+    """The first row of a stair reads the force of the one before; behind a gap it is on its way: 0.5 N in a mean of five."""
+    stair = np.repeat(np.arange(10), 20)
+    within = np.tile(np.arange(20), 10)
+    before_n = np.where(within == 0, 2.0 * np.maximum(stair - 1, 0), 0.0)
+    force_n = np.where(within == 0, before_n, 2.0 * stair)
+    kept = (within == 0) & (stair == 0) | (within >= lost)
+    points = find_settled_points(np.arange(200)[kept] / 20.0, 0.5 * stair[kept], force_n[kept])
+    assert points.force_n.tolist() == pytest.approx(list(range(0, 20, 2)))

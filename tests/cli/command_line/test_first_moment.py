@@ -1,7 +1,9 @@
 """The first moment of a command, before click can answer for it, and the terminal that it prints to."""
 
 import io
+import subprocess
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -34,3 +36,14 @@ def test_what_a_terminal_cannot_print_ends_no_verb(
     monkeypatch.setattr(gateway.cli.main, "command", lambda **_: Console().print("rig · Süd"))
     gateway.cli.main.main()
     assert terminal.getvalue().decode(encoding).strip() == printed
+
+
+def test_before_it_is_caught_next_to_nothing_is_read() -> None:
+    """The package itself read `typing` outside of what catches: for ten of the first milliseconds a traceback was shown."""
+    folder = str(Path(gateway.cli.main.__file__).parents[2])
+    program = (
+        f"import sys; sys.path.insert(0, {folder!r}); before = set(sys.modules); import gateway.__main__; "
+        "print(sorted(set(sys.modules) - before))"
+    )
+    read = subprocess.run([sys.executable, "-I", "-S", "-c", program], capture_output=True, text=True, check=True)
+    assert read.stdout.strip() == "['gateway', 'gateway.__main__']"

@@ -89,13 +89,23 @@ EXPECTED_N = bsfm().force_n(4.0, 1.0) - bsfm().force_n(0.0, 1.0)
 def test_a_stair_of_the_check_is_judged_by_its_rise_from_rest(
     rest_n: float, rise_n: float, fault: FaultCode | None
 ) -> None:
-    """Of a rising stair of the check, and of no other."""
+    """Of a rising stair of the check; of any other only that nothing answers it."""
     for judged in (stair(4.0, CHECK), stair(4.0, LADDER), stair(4.0, CHECK, -1)):
         run = run_of(judged)
         run.rest_n = rest_n
         run._check_against_model(LadderRow(judged, rest_n + rise_n, 1.0, True))
         cause = run.stop_cause
-        assert (cause.fault if cause else None) == (fault if judged == stair(4.0, CHECK) else None)
+        later = FaultCode.NONE if rise_n < 0.1 * EXPECTED_N else None
+        assert (cause.fault if cause else None) == (fault if judged == stair(4.0, CHECK) else later)
+
+
+@pytest.mark.parametrize(("expected_n", "is_judged"), [(14.9, False), (15.1, True)])
+def test_behind_the_check_a_stair_of_little_force_is_not_judged(expected_n: float, is_judged: bool) -> None:
+    """A machine of much friction, which has passed the check, gives next to nothing there."""
+    volts, _ = bsfm().voltage_v(expected_n, 1.0)
+    run = run_of(stair(volts))
+    run._check_against_model(LadderRow(stair(volts), 0.0, 1.0, True))
+    assert (run.stop_cause is not None) is is_judged
 
 
 @pytest.mark.parametrize(("was_there", "left_v"), [(True, [2.0]), (False, [2.0, 5.0])])

@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.bsfm import Bsfm
+from gateway.control import CalibrationInUse, Controller
 from gateway.control.runs.active_run import RecordedPlan
 from gateway.control.runs.experiment_plan import Move, MoveKind
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.registers.words import CalibrationPhase, ControlBit, State
-from tests.control.bench import Bench, settings
+from tests.control.bench import Bench, bsfm, settings
 from tests.control.runs.test_experiment import begun, plan
+from tests.control.test_slip import slip
 
 SAFE_V = 0.55
 LOW = plan(Move(do=MoveKind.STEP, to_v=4.0, hold_s=0.3), check=True)
@@ -49,11 +52,16 @@ def test_the_highest_level_of_a_plan_leaves_room_for_the_payload(payload_kg: flo
     assert ("of which the payload presses 5.9 N" in refused) is bool(payload_kg)
 
 
+@pytest.mark.parametrize("model", [bsfm(), slip()], ids=["blend", "slip"])
 @pytest.mark.parametrize(("safe_v", "is_told"), [(0.0, False), (2.0, True)])
-def test_a_zero_that_may_be_what_presses_at_the_safe_voltage_is_told_as_such(safe_v: float, is_told: bool) -> None:
-    """Each force behind it would be so much more, with a word from nobody."""
+def test_a_zero_that_may_be_what_presses_at_the_safe_voltage_is_told_as_such(
+    safe_v: float, is_told: bool, model: Bsfm
+) -> None:
+    """Each force behind it would be so much more, with a word from nobody; by a model with slip stops it was refused for ever,
+    because what friction keeps was on its way to 0."""
     rig = settings(stuck_n=30.0)
     bench = Bench(replace(rig, limits=replace(rig.limits, safe_voltage_v=safe_v)), seed=6)
+    bench.controller = Controller(bench.settings, CalibrationInUse(model, 1))
     bench.voltage_v = safe_v
     bench.run(1.5)
     bench.write(control_word=ControlBit.TARE)

@@ -178,6 +178,7 @@ def test_without_a_pressure_less_than_half_of_the_force_may_be_no_air_and_half_o
     words = [unreachable_words(Evidence(voltage_v=3.0, measured_n=n, expected_n=10.0)) for n in (2.4, 4.9, 5.0)]
     assert words[0] == "no air, valve closed or no contact" and words[2].startswith("target not reached")
     assert words[1].startswith("no air or too little of it") and "contact" not in words[1], "what is felt is touched"
+    assert all("the load cell's span" in each for each in words[1:]), "else who reads it calibrates with a wrong cell"
 
 
 def test_a_force_that_weight_keeps_above_the_target_is_not_missing_air() -> None:
@@ -197,7 +198,7 @@ def test_a_machine_that_is_stronger_than_its_calibration_is_not_missing_air() ->
     bench.run(0.3)
     bench.enable(30.0)
     said = told(bench)
-    assert "more than the 30.0 N that are wanted: trim at its limit or calibration off" in said
+    assert "more than the 30.0 N that are wanted: trim at its limit, calibration or the load cell's span off" in said
     assert "supply" not in said
 
 

@@ -116,3 +116,21 @@ def test_a_map_that_no_gateway_can_serve_is_told_before_it_starts(
     (fault,) = check_report(tmp_path / "rig.yaml", simulated=True).faults
     assert "own.yaml:" in str(fault) and "a gateway cannot serve it: " in str(fault) and sentence in str(fault)
     assert "force-v1 has all that it needs" in str(fault)
+
+
+def test_a_map_too_fine_for_the_rigs_largest_force_is_told(tmp_path: Path) -> None:
+    """0.001 N in 16 bits ends at 32.767 N: of a rig of 60 N half could not be commanded, and nobody said so before."""
+    text = (SHIPPED / "registers" / "force-v1.yaml").read_text(encoding="utf-8")
+    for name in ("force_setpoint", "force_measured"):
+        (line,) = [line for line in text.splitlines() if f"name: {name}," in line]
+        text = text.replace(line, line.replace("scale: 0.01", "scale: 0.001").replace("max: 327.67", "max: 32.767"))
+    (tmp_path / "own.yaml").write_text(text, encoding="utf-8")
+    rig = (SHIPPED / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+    (tmp_path / "rig.yaml").write_text(rig.replace("registers: force-v1", "registers: own.yaml"), encoding="utf-8")
+    report = check_report(tmp_path / "rig.yaml", simulated=True)
+    assert not report.faults
+    assert [str(each).partition("limits.force_max_n: ")[2] for each in report.warnings if "32.767" in str(each)] == [
+        "60 N, but force_setpoint of map force-v1 ends at 32.767 N: no master commands more; give it a coarser scale",
+        "60 N, but force_measured of map force-v1 ends at 32.767 N: more is shown as that; give it a coarser scale",
+    ]
+    assert not any("of map force-v1" in str(each) for each in check_report("demo", simulated=True).warnings)

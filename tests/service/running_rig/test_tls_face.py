@@ -1,8 +1,10 @@
 """A TLS face of a running rig: on the same bank as the plain one, the owner known by its certificate, told when ready."""
 
 import asyncio
+import errno
 import re
 import struct
+import threading
 from dataclasses import replace
 from ipaddress import ip_network
 from pathlib import Path
@@ -10,7 +12,10 @@ from typing import Any
 
 import pytest
 
+from gateway.fieldbus import tls_settings
 from gateway.modbus import pdu
+from gateway.plain_file import read_plain
+from gateway.processes.disk_worker import DiskWorker
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
 from gateway.service.running_rig.faces import faces, faces_to_come
 from gateway.service.running_rig.starting import StartError
@@ -190,3 +195,42 @@ def test_a_face_holds_to_the_certificates_and_networks_of_its_own_section(
     (settings,) = made
     assert settings.revoked == {"1A2B"}
     assert settings.server.allow == face.allow
+
+
+def test_a_disk_that_keeps_a_face_s_files_waiting_does_not_stop_the_loop(
+    folder: Folder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is tried every five seconds, while a force may be held: the guardian killed control for each attempt."""
+    goes_on = threading.Event()
+
+    def hang(file: str) -> bytes:
+        assert goes_on.wait(10.0), "the loop stood still with it"
+        return read_plain(file)
+
+    async def scene() -> None:
+        monkeypatch.setattr(faces_to_come, "AGAIN_S", 0.001)
+        rig, key, is_served = rig_with(folder), tmp_path / "gateway.key", asyncio.Event()
+        key.write_text("half a k")
+        served = Served(replace(rig, fieldbus=(replace(rig.fieldbus[0], key=key),)))
+        served.faces.on_served = is_served.set
+        async with served.running(is_restart=True):
+            key.write_bytes(Path(folder.key("gateway")).read_bytes())
+            monkeypatch.setattr(tls_settings, "read_plain", hang)
+            asyncio.get_running_loop().call_later(0.05, goes_on.set)
+            await is_served.wait()
+            assert served.log[-1].endswith("is served again")
+
+    asyncio.run(asyncio.wait_for(scene(), 20.0))
+
+
+def test_a_machine_without_a_thread_for_the_files_says_so(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(worker: DiskWorker, work: Any) -> None:
+        raise OSError(errno.EAGAIN, "no thread for the disk")
+
+    async def scene() -> None:
+        monkeypatch.setattr(DiskWorker, "_submit", refuse)
+        async with Served(rig_with(folder)).running():
+            pass
+
+    with pytest.raises(StartError, match=r"E174 .*cannot be used: .*no thread for the disk"):
+        asyncio.run(scene())

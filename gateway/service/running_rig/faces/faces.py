@@ -3,6 +3,7 @@
 All serve the same bank, so that a command counts whichever face it comes through, and ownership holds across them.
 """
 
+import asyncio
 import os
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,6 +15,7 @@ from gateway.fieldbus.rtu_server import STANDSTILL_S
 from gateway.modbus import Peer, Role
 from gateway.ports import PortError, SerialPort
 from gateway.processes import exit_codes
+from gateway.processes.disk_worker import DiskWorker
 from gateway.profiles import Rig
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
 from gateway.registers import RegisterBank
@@ -130,11 +132,31 @@ class Faces:
         return tcp_face(*self.modbus, network.units)
 
     async def _serve_tls(self, place: str, face: TlsFace) -> ServedFace:
-        server, port = self._make_tls(face), face.port or self.tls_ports.get(place, 0)
+        server, port = await self._make_beside(face), face.port or self.tls_ports.get(place, 0)
         host, port = await listen(server, face.bind, port, "`port:` of the tls face, such as 8802")
         self.tls_ports[place] = port
         self._tls.append(server)
         return tls_face(host, port, self._rig.network.units)
+
+    async def _make_beside(self, face: TlsFace) -> ModbusTlsServer:
+        """In a thread: a disk may keep its files waiting, and what is tried again while a force is held must not stall it."""
+        loop, worker = asyncio.get_running_loop(), DiskWorker()
+        made: asyncio.Future[ModbusTlsServer] = loop.create_future()
+
+        def take(result: ModbusTlsServer | Exception) -> None:
+            if made.done():  # nobody waits for it any more
+                return
+            if isinstance(result, Exception):
+                made.set_exception(result)
+            else:
+                made.set_result(result)
+
+        worker(partial(self._make_tls, face), take)
+        worker.close()
+        try:
+            return await made
+        except OSError as error:
+            raise _unusable(self._rig, face, error) from error
 
     async def _start_serial(self, face: ModbusRtuServer, *, is_restart: bool) -> None:
         host = face.settings.peer.host
@@ -170,8 +192,12 @@ def make_tls_server(
     try:
         return ModbusTlsServer(bank, settings, on_peer_closed=on_peer_closed, log=log)
     except OSError as error:
-        what = f"E174 {face.certificate}, {face.key} or {face.ca} cannot be used: {error}"
-        raise StartError(f"{what}; force-gateway check {rig.file} says more", exit_codes.CONFIGURATION) from error
+        raise _unusable(rig, face, error) from error
+
+
+def _unusable(rig: Rig, face: TlsFace, error: OSError) -> StartError:
+    what = f"E174 {face.certificate}, {face.key} or {face.ca} cannot be used: {error}"
+    return StartError(f"{what}; force-gateway check {rig.file} says more", exit_codes.CONFIGURATION)
 
 
 def _rtu_settings(rig: Rig, face: RtuFace, place: int) -> RtuSettings:
