@@ -200,15 +200,23 @@ def _rtu_wire(path: str, unit: int, line: dict[str, Any]) -> "Wire":
 
 @dataclass(frozen=True, slots=True)
 class StateChoice:
-    """Which state directory is meant. path: as --state says, None: the rig's own; rig: that of --rig, or the one that runs."""
+    """Which state directory is meant. path: as --state says, None: the rig's own; named: the rig of --rig, or the one that
+    runs; None where --state stands alone."""
 
     path: Path | None
-    rig: str
+    named: str | None
+
+    @property
+    def rig(self) -> str:
+        """The rig that is meant: whose directory it is, where none was named. Asked for only by who needs its files."""
+        from gateway.cli.command_line.known_rigs import choose_rig
+
+        return self.named or choose_rig(None, self.path)
 
     @property
     def directory(self) -> Path:
         """The directory that `run` would use."""
-        return state_directory(self.path, self.rig)
+        return state_directory(self.path, self.named)
 
 
 def state_options(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -218,7 +226,7 @@ def state_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(function)
     def with_choice(*, state: Path | None, rig: str | None, **options: Any) -> Any:
-        choice = StateChoice(state, choose_rig(rig, state))
+        choice = StateChoice(state, rig if state else choose_rig(rig, None))
         if rig is None and state is None:
             tell_rig(choice.rig, choice.directory)
         return function(state=choice, **options)

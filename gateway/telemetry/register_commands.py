@@ -38,6 +38,8 @@ class RegisterCommands:
             registers = _registers(payload)
             stops = _does_stop(registers)
             for name, value in _in_order(registers):
+                if stops:  # what else is wrong must not be its end
+                    _check_number(name, value)
                 if stops and value and _is(name, *_SETPOINTS):
                     raise ValueError(
                         f"{name}: {value:g} is not written beside control_word 0, which stops and clears it"
@@ -68,9 +70,9 @@ def is_stop(payload: bytes) -> bool:
     return _does_stop(registers)
 
 
-def _does_stop(registers: dict[str, float]) -> bool:
+def _does_stop(registers: dict[str, Any]) -> bool:
     words = [value for name, value in registers.items() if _is(name, "control_word")]
-    return bool(words) and not any(words)
+    return bool(words) and all(_is_number(value) and not value for value in words)
 
 
 def _is(name: str, *registers: str) -> bool:
@@ -86,6 +88,7 @@ def _in_order(registers: dict[str, float]) -> list[tuple[str, float]]:
 
 
 def _registers(payload: bytes) -> dict[str, float]:
+    """Return what a command names. ValueError for no command, and, unless it stops, for one with anything but numbers in it."""
     if len(payload) > _LONGEST:
         raise ValueError(f"{len(payload)} bytes: a command has {_LONGEST} at most")
     try:
@@ -94,12 +97,21 @@ def _registers(payload: bytes) -> dict[str, float]:
         raise ValueError("nested too deeply for a command") from None
     if not isinstance(content, dict) or not content:
         raise ValueError('a command is JSON such as {"force_setpoint": 12.0, "control_word": 1}')
-    for name, value in content.items():
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ValueError(f"{name} is no number")
-        if not _is_finite(value):
-            raise ValueError(f"{name}: a finite number is wanted")
+    if not _does_stop(content):
+        for name, value in content.items():
+            _check_number(name, value)
     return content
+
+
+def _check_number(name: str, value: Any) -> None:
+    if not _is_number(value):
+        raise ValueError(f"{name} is no number")
+    if not _is_finite(value):
+        raise ValueError(f"{name}: a finite number is wanted")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _is_finite(value: float) -> bool:

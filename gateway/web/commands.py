@@ -95,11 +95,13 @@ class Commands:
             self._begin_to_beat(viewer)
 
     async def set_force(self, viewer: str, force_n: float) -> None:
-        """Change the setpoint, N. A stop told meanwhile is the end of it: the page would own a force that nobody wants."""
+        """Change the setpoint, N, of an output that is enabled. A stop told meanwhile, or by another master, is the end of it:
+        the page would own a force that nobody wants, and keep other masters out."""
         stops = self._stops
         words = await self._words_of_force(force_n)
-        if stops != self._stops:
-            raise RefusedCommand("stopped meanwhile: nothing was set")
+        if stops != self._stops or not words[0] & ControlBit.ENABLE:
+            why = "stopped meanwhile" if stops != self._stops else "the output is not enabled"
+            raise RefusedCommand(f"{why}: nothing was set")
         await self._write_words("force_setpoint", words[1:])
         if stops == self._stops:
             self._begin_to_beat(viewer)

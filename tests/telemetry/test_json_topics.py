@@ -168,6 +168,18 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
             },
             ["100000000102" + "0000"],
         ),
+        (
+            b'{"by": "panel 3", "control_word": 0}',
+            {"ok": False, "written": ["control_word"], "error": "by is no number"},
+            ["100000000102" + "0000"],  # it stopped nothing
+        ),
+        (
+            b'{"tilt_angle": NaN, "control_word": 0.0}',
+            {"ok": False, "written": ["control_word"], "error": "tilt_angle: a finite number is wanted"},
+            ["100000000102" + "0000"],
+        ),
+        (b'{"heartbeat": 7, "control_word": false}', None, []),
+        (b'{"control_word": 0, "control_word@float_abcd": null}', None, []),
         (b'{"control_word": 0.7}', None, []),
         (b'{"control_word": 1.5}', None, []),
         (b'{"heartbeat": 0.5}', None, []),

@@ -5,9 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from gateway.modbus import Peer
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.words import State
-from gateway.web.commands import Commands
+from gateway.web.commands import Commands, RefusedCommand
 from gateway.web.context import WebContext
 from tests.service.requests.test_hostile_requests import Stage
 from tests.service.rigs import demo
@@ -38,11 +41,27 @@ def test_a_reset_takes_a_setpoint_back_that_somebody_has_left(tmp_path: Path) ->
         wired.is_cell_plugged = False
         wired.until(lambda: wired.state is State.FAULT, 1.0)
         wired.is_cell_plugged = True
-        await commands.set_force("me", 5.0)
+        wired.bank.write_registers(1, (500).to_bytes(2, "big"), Peer("web"))
         wired.run(1.0)
         await commands.reset()
         wired.run(0.1)
         assert wired.state is State.OFF and wired.word("force_setpoint") == 0
+
+    play(tmp_path, scene)
+
+
+def test_a_force_is_not_set_where_the_output_has_gone_off_meanwhile(tmp_path: Path) -> None:
+    """A page knows the state of half a second ago. It owned what it set, and the robot could not enable any more."""
+
+    async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
+        await commands.enable("me", 12.0)
+        wired.run(0.5)
+        wired.bank.write_registers(0, bytes(2), Peer("10.0.0.9"))
+        wired.run(0.1)
+        with pytest.raises(RefusedCommand, match="not enabled: nothing was set"):
+            await commands.set_force("me", 5.0)
+        assert (wired.word("force_setpoint"), wired.bank.owner) == (0, None)
 
     play(tmp_path, scene)
 

@@ -1,6 +1,8 @@
 """Which rigs there are, and which is meant: a shipped name, a rig file, or one that has run here.
 
-Without a name it is the one whose gateway runs on this machine, where that is one; else demo.
+Without a name it is the one whose gateway runs on this machine, where that is one; else demo. Of a state directory that was
+given alone it is the one whose gateway runs on it, else the one whose recordings lie there: by the files of demo its own
+calibration, limits and retention would be another rig's.
 """
 
 from pathlib import Path
@@ -65,13 +67,20 @@ def choose_rig(given: str | None, state: Path | None) -> str:
             check_rig(given)
         return given
     if state is not None:
-        return defaults.RIG
+        return _rig_on(state) or defaults.RIG
     running = running_rigs()
     return running[0] if len(running) == 1 else defaults.RIG
+
+
+def _rig_on(state: Path) -> str | None:
+    from gateway.cli.master.local_gateways import rig_running_on
+    from gateway.service.fitting.ladder_source import rig_of_state
+
+    return rig_running_on(state) or rig_of_state(state)
 
 
 def directory_of(state: Path | None, rig: str | None) -> Path:
     """Return the state directory that `run` would use."""
     from gateway.service.supervisor.run_options import RunOptions
 
-    return RunOptions(rig=rig or choose_rig(None, state), state=state).state_directory
+    return RunOptions(rig=rig or choose_rig(None, None)).state_directory if state is None else state

@@ -40,6 +40,11 @@ def _ask_what_runs(directory: Path) -> dict[str, Any]:
         return {}
 
 
+def rig_running_on(directory: Path) -> str | None:
+    """Return the name of the rig whose gateway runs on this state directory now; None where nobody says."""
+    return _ask_what_runs(directory).get("rig")
+
+
 def is_answering(directory: Path) -> bool:
     """Decide whether a gateway of this user runs on this state directory now."""
     return bool(_ask_what_runs(directory))

@@ -12,14 +12,17 @@ from gateway.service.replayed_control import ReplaySetup
 
 
 def own_setup(recording: Recording, state: StateChoice) -> tuple[ReplaySetup, list[str]]:
-    """Return the set-up that a recording was made with, as far as it is here, and what differs. CliError (65) where its rig is
-    not known."""
+    """Return the set-up that a recording was made with, as far as it is here, and what differs. A rig that is no shipped one is
+    found by the file that --rig names. CliError (65) where its rig is not known."""
     from gateway.service.fitting.recorded_rig import rig_of
 
+    named = recording.header.get("rig")
     rig = rig_of(recording)
+    if rig is None and named and state.named and Path(state.named).expanduser().is_file():
+        given = load_rig(state.named)
+        rig = given if given.name == named else None
     if rig is None:
-        named = recording.header.get("rig")
-        what = f"its rig {named} is not known here" if named else "it names no rig"
+        what = f"its rig {named} is not known here: give that rig's file by --rig" if named else "it names no rig"
         raise CliError(f"E403 {recording.path} cannot be replayed: {what}", exit_codes.DATA)
     notes = []
     if recording.header.get("rig_fingerprint") not in (None, rig.fingerprint):

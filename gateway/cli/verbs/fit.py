@@ -170,9 +170,8 @@ def _rig_to_store_for(state: Path | None) -> str:
     """Return the rig of a table that names none: as `calibration use` takes it, or its number would be another one there."""
     from gateway.cli.command_line.known_rigs import choose_rig
     from gateway.cli.command_line.rig_choice import tell_rig
-    from gateway.service.fitting.ladder_source import rig_of_state
 
-    rig = rig_of_state(state) or choose_rig(None, state)
+    rig = choose_rig(None, state)
     tell_rig(rig, state_directory(state, rig))
     return rig
 

@@ -45,7 +45,7 @@ def command(*, wire: "Wire", unit: int, map_name: str, as_json: bool) -> None:
         _run_to_its_end(run, shows=sys.stderr.isatty() and not as_json)
         with explain_refusals(client):
             answer = run.answer(wire)
-            why = run.tell_fault() if answer["result"] == "stopped" else ""
+            why = run.tell_fault() if answer["result"] in ("stopped", "failed") else ""
     _tell(answer, as_json=as_json)
     if why:
         click.echo(why, err=True)

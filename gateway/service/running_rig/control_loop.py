@@ -36,6 +36,7 @@ from gateway.service.running_rig.published_status import BackgroundStatus, LoopH
 from gateway.service.running_rig.rate_warnings import LineNoise, SlowLoop
 from gateway.service.running_rig.recording.recorded_row import is_pull, row_of
 from gateway.service.running_rig.recording.recordings import Recordings
+from gateway.service.running_rig.run_descriptions import cause_of
 
 _FRESH_PERIODS: Final = 1.05  # a tick decides nothing so soon after a sample or a command; more than 1: a cell's jitter
 _ENDING: Final = int(WarningBit.SERIAL_NOISE | WarningBit.SLOW_LOOP)
@@ -302,7 +303,7 @@ class ControlLoop:
         if self.controller.active_run.self_test is not self._shown_self_test:
             self._show_self_test()
         for event in decision.events:
-            self._log("control", event)
+            self._log(cause_of(event), event)
 
     def _status(self) -> Status:
         """What the registers show of the last decision, put together by the read that asks for it."""

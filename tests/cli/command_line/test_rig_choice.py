@@ -1,11 +1,14 @@
 """--rig means one thing: a shipped name, a file, or a rig that ran here; an unknown one is answered with those that exist."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from gateway.cli import control_socket
 from gateway.cli.command_line import known_rigs, rig_choice
 from gateway.cli.options import state_directory
+from gateway.recording import Recorder
 
 
 @pytest.fixture
@@ -58,6 +61,25 @@ def test_without_one_it_is_the_rig_that_runs_here(root: Path, monkeypatch: pytes
     monkeypatch.setattr(known_rigs, "running_rigs", lambda: ["demo", "my-cell"])
     assert state_directory(None, None) == root / "demo", "of two nobody knows which is meant"
     assert state_directory(root, None) == root
+
+
+def test_a_directory_alone_is_of_the_rig_that_runs_on_it_or_was_recorded_there(
+    root: Path, call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the files of demo `report` packed another rig's, and `calibration list` showed another one's own."""
+    assert "(the rig's own)" in call("calibration", "list", "--state", str(root)).output
+    recorder = Recorder(root / "recordings", {"rig": "my-cell"}, ("time_s",))
+    recorder.append((0.0,))
+    recorder.close()
+    assert "not in it: my-cell: is neither a shipped rig" in call("report", "--show", "--state", str(root)).output
+    assert "give the rig's file by --rig" in call("calibration", "list", "--state", str(root)).output
+    asked: list[dict[str, Any]] = []
+    monkeypatch.setattr(control_socket, "ask", lambda state, request: asked.append(request) or {"rig": "irc5-cell"})
+    packed = call("report", "--show", "--state", str(root)).output
+    assert "profiles/rigs/irc5-cell.yaml" in packed and "profiles/rigs/demo.yaml" not in packed
+    assert {"do": "running"} in asked
+    asked.clear()
+    assert call("recordings", "list", "--state", str(root)).exit_code == 0 and {"do": "running"} not in asked
 
 
 def test_on_a_terminal_it_is_said_which_was_taken(root: Path, call, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gateway.calibrations.store import CalibrationStore
-from gateway.profiles import load_calibration
+from gateway.profiles import load_calibration, shipped_profiles_folder
 from gateway.recording import read_recording
 from gateway.recording.export import export_csv
 from tests.service.test_replayed_control import record_work, scaled
@@ -66,6 +66,21 @@ def test_an_exported_table_is_replayed_with_the_calibration_that_it_was_made_wit
     assert answer.exit_code == 0, answer.output
     assert f"calibration {number} " in answer.stdout
     assert "plant 3 was in use" in answer.stderr
+
+
+def test_a_rig_of_a_file_is_the_one_that_is_given(state: Path, call, tmp_path: Path) -> None:
+    """`its rig my-cell is not known here` was the answer to --rig my-cell.yaml, from any folder but the file's own."""
+    text = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+    for name in ("my-cell", "another"):
+        (tmp_path / f"{name}.yaml").write_text(text.replace("name: demo", f"name: {name}"), encoding="utf-8")
+    recording = read_recording(state / "recordings" / "0001.fgr")
+    export_csv(replace(recording, header=recording.header | {"rig": "my-cell"}), tmp_path / "mine.csv")
+    words = ("replay", tmp_path / "mine.csv", "--state", state)
+    answer = call(*words, "--rig", tmp_path / "my-cell.yaml")
+    assert answer.exit_code == 0 and "replayed with rig my-cell, calibration 1 " in answer.stdout
+    for rig in ((), ("--rig", "demo"), ("--rig", tmp_path / "another.yaml")):
+        refused = call(*words, *rig)
+        assert refused.exit_code == 65 and "my-cell is not known here: give that rig's file by --rig" in refused.stderr
 
 
 @pytest.mark.parametrize(("words", "code", "why"), [(("7",), 65, "E403"), (("1", "--against", "nothing-such"), 78, "")])

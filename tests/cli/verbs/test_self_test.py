@@ -76,6 +76,14 @@ def test_json_has_every_item(tested) -> None:
     assert list(facts["items"]) == list(ITEMS) and facts["items"]["sign"]["verdict"] == "not tested"
 
 
+def test_a_fault_that_is_about_no_item_is_told_where_nothing_else_says_why_it_failed(tested) -> None:
+    """Of a valve that was silent: nine items passed or not tested, and `self-test 1 failed`."""
+    _, answer = tested(SelfTestResult.FAILED, fault=FaultCode.VALVE_SILENT)
+    assert answer.exit_code == 1 and answer.stderr.startswith("A355 ")
+    _, answer = tested(SelfTestResult.FAILED, leak=FAILED)
+    assert answer.exit_code == 1 and answer.stderr == ""
+
+
 @pytest.mark.parametrize("options", [(), ("--json",)])
 def test_a_fault_that_has_stopped_it_is_told(tested, options: tuple[str, ...]) -> None:
     """`self-test 1 stopped` was all that was said."""

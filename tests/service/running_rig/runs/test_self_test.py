@@ -6,6 +6,7 @@ import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.control.settings import SelfTestSettings
+from gateway.processes.event_log import EventLog
 from gateway.registers.words import SelfTestResult, SelfTestVerdict, State
 from tests.control.bench import settings
 from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, MAP, OTHER, SELF_TEST, SmallRig
@@ -36,6 +37,27 @@ def test_a_robot_writes_bit_6_and_polls_one_block() -> None:
     assert one.word("control_word") == 0 and one.wire.voltage_v == 0.0
     assert max(force_n for _, _, force_n in one.trace) < 25.0
     assert [line for line in one.log if line.startswith("self-test noise passed: ")]
+
+
+def test_the_log_has_room_for_all_that_a_self_test_says_and_what_comes_right_behind_it() -> None:
+    """Its result and its end were left out of each, and so was the fault of an enable in the same second."""
+    told: list[str] = []
+
+    class LoggedRig(SmallRig):
+        def note(self, cause: str, sentence: str) -> None:
+            super().note(cause, sentence)
+            log(cause, sentence)
+
+    with EventLog(told.append, clock=lambda: one.now()) as log:
+        one = LoggedRig(replace(settings(), self_test=SelfTestSettings(force_n=25.0)))
+        one.write(0, SELF_TEST)
+        one.until(State.OFF, 20.0)
+        one.write(0, ENABLE, 1000)
+        one.run(0.2)
+        one.is_cell_silent = True
+        one.until(State.FAULT, 1.0)
+    lost = [line for line in one.log if not any(line in shown for shown in told)]
+    assert lost == [] and any("self-test 1 passed: " in line for line in told)
 
 
 def test_a_failed_item_is_a_number_in_its_register_and_a_line_with_a_code() -> None:
