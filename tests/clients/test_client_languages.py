@@ -107,6 +107,7 @@ def test_every_rapid_routine_runs_and_declares_what_it_uses() -> None:
         ("rapid", "MODULE M\n VAR num a:=1\nENDMODULE"),
         ("rapid", "MODULE M\n PROC p()\n IF a THEN\n ENDPROC\nENDMODULE"),
         ("rapid", "MODULE M\n PROC p()\n a=1;\n ENDPROC\nENDMODULE"),
+        ("rapid", "MODULE M\n PROC p()\n IF a AND NOT b RETURN;\n ENDPROC\nENDMODULE"),
         ("scl", 'FUNCTION "F" : Int\nVERSION : 0.1\nBEGIN\n IF TRUE THEN\nEND_FUNCTION'),
         ("st", "FUNCTION F : INT\nVAR\n a : INT;\n A : INT;\nEND_VAR\nEND_FUNCTION"),
         ("urscript", "def f():\n  if True:\n    x = 1\nend\n"),
