@@ -73,18 +73,6 @@ def test_the_page_of_a_rig_of_one_s_own_has_its_own_numbers(own_rig: Path) -> No
     assert "16#449A, 16#5000 to address 416 (40417)" in text
 
 
-def test_an_electrician_is_told_which_output_counts_and_what_nobody_knows_of_a_device(tmp_path: Path) -> None:
-    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
-    text = text.replace("device: smc-itv-rc", "device: icpdas-7024\n  channel: 2\n  watchdog_s: 0.5")
-    amplifier = (PROFILES / "devices" / "stream-st-gs.yaml").read_text().replace("name: stream-st-gs", "name: usb-cell")
-    (tmp_path / "usb-cell.yaml").write_text(amplifier)
-    (tmp_path / "own.yaml").write_text(text.replace("device: stream-st-gs", "device: usb-cell"))
-    page = page_of(tmp_path / "own.yaml")
-    assert rows_of(page, "Serial line: output")["line"] == ["9600 8N1, address 1, channel 2"]
-    (interface,) = rows_of(page, "Serial line: load cell")["interface"]
-    assert "not known here" in interface and "USB" in interface
-
-
 def test_a_face_with_certificates_is_told_from_what_the_clients_speak() -> None:
     face = TlsFace(type="tls", port=802, certificate="gateway.crt", key="gateway.key", ca="ca.crt")
     rig = replace(load_rig("demo"), fieldbus=(face,))
