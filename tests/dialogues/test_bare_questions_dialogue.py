@@ -13,7 +13,7 @@ from gateway.devices.rehearsal import rehearse
 from tests.dialogues.test_overload_dialogue import cell
 
 SAUTER = replace(
-    cell(terminator="\r", read_force=ForceReading(ask="9", frame="{force:.2f}", unit="N")), question_terminator=""
+    cell(terminator="\r", read_force=ForceReading(ask="9", frame="{force:8.2f}", unit="N")), question_terminator=""
 )
 
 
@@ -24,12 +24,15 @@ def test_a_question_without_an_end_goes_out_bare() -> None:
 
 
 def test_it_costs_no_answer_its_first_digit() -> None:
-    host, device = cell_host(SAUTER), cell_device(SAUTER)
+    host = cell_host(SAUTER)
     host.poll()
-    assert host.receive(device.frame(98.1) + b"9.50\r", 0.0) == [
-        ForceSample(98.1, 98.1, Quality.OK, 0.0),
-        ForceSample(9.5, 9.5, Quality.OK, 0.0),
-    ]
+    assert host.receive(b"90000.25\r", 0.0) == [ForceSample(90000.25, 90000.25, Quality.OK, 0.0)]
+
+
+def test_a_number_that_an_echo_would_lengthen_needs_a_width() -> None:
+    (found,) = rehearse(replace(SAUTER, read_force=replace(SAUTER.reading, frame="{force:.2f}")))
+    assert found[0] == ("read_force", "frame") and "'90.00\\r', through an adapter that hears itself" in found[1]
+    assert not list(rehearse(replace(SAUTER, read_force=replace(SAUTER.reading, ask="W", frame="{force:.2f}"))))
 
 
 @pytest.mark.parametrize(
