@@ -22,6 +22,14 @@ def test_an_electrician_is_told_which_output_counts_and_what_nobody_knows_of_a_d
     assert "not known here" in interface and "USB" in interface
 
 
+def test_of_eight_outputs_the_one_that_is_driven_is_named(tmp_path: Path) -> None:
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("device: smc-itv-rc", "device: waveshare-ao8b")
+    (tmp_path / "own.yaml").write_text(text)
+    (section,) = [one for one in page_of(tmp_path / "own.yaml")["sections"] if one["title"] == "Serial line: output"]
+    wires = " ".join(row[1] for row in section["rows"] if row[0] == "wires")
+    assert "AO1, the first of its eight, against AGND" in wires and "AO8" not in wires
+
+
 @pytest.mark.parametrize(
     ("lease_s", "why", "pace"),
     [(0.1, "keeps no heartbeat", " --rig 'cell 3.yaml' "), (0.2, "keeps no heartbeat", ""), (None, "1234.5", "")],

@@ -104,7 +104,7 @@ _BY_NAME: Final[dict[str, Wires]] = {
     ),
     "waveshare-ao8b": Wires(
         RS485,
-        ("A to A, B to B. AO1 .. AO8 against AGND; a supply of 15 V or more for 10 V out.",),
+        ("A to A, B to B. AO1, the first of its eight, against AGND; a supply of 15 V or more for 10 V out.",),
         ("Baud and address are set by Modbus registers; 9600 8N1, address 1 as delivered.",),
         "waveshare.com/wiki/Modbus_RTU_Analog_Output_8CH_(B)",
     ),
