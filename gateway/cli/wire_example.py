@@ -11,12 +11,12 @@ from gateway.devices.template import quote
 from gateway.devices.valve import ValveDevice, ValveHost
 from gateway.devices.valve_profile import ValveDirection
 
-_SHOWN_N: Final = -20.0  # a pull, so that the place of the minus is seen
+_SHOWN_N: Final = -20.0  # a pull, so that the place of the minus is seen; counts, where only a rig says what one is
 
 
 def example(profile: DeviceProfile) -> str:
-    """Return one exchange: half the range of an output, a reading of -20 N, a valve that pulls. Empty where only a rig could
-    say it. The profile is one without faults."""
+    """Return one exchange: half the range of an output, a reading of -20 N, a valve that pulls. The profile is one without
+    faults."""
     talk = {DeviceRole.OUTPUT: _output, DeviceRole.LOAD_CELL: _cell, DeviceRole.VALVE: _valve}
     return talk[profile.role](profile)
 
@@ -40,14 +40,14 @@ def _output(profile: DeviceProfile) -> str:
 
 def _cell(profile: DeviceProfile) -> str:
     reading = profile.reading
-    if not (reading.newton_per_unit or reading.template.field(UNIT)):
-        return ""  # counts, or a unit that the rig says
-    host = cell_host(profile)
+    is_known = reading.newton_per_unit or reading.template.field(UNIT)
+    unit, name = (None, "N") if is_known else ("N", "counts")  # 1 N for a count, for want of a rig
+    host = cell_host(profile, unit=unit)
     asked = host.poll() or host.start
     most_n = reading.largest_shown * host.resolution_n / reading.step
     shown_n = _SHOWN_N if most_n > -_SHOWN_N else -float(f"{0.5 * most_n:.1g}")
     question = f"{_shown(profile, asked)} -> " if asked else ""
-    return f"{shown_n:g} N: {question}{_shown(profile, cell_device(profile).frame(shown_n))}"
+    return f"{shown_n:g} {name}: {question}{_shown(profile, cell_device(profile, unit).frame(shown_n))}"
 
 
 def _valve(profile: DeviceProfile) -> str:

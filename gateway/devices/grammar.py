@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from gateway.devices.binary.raw_bytes import ByteSplitter
+from gateway.devices.binary.raw_bytes import ByteSplitter, TextSplitter
 from gateway.devices.binary.rtu_framing import RtuSplitter, answers, requests, rtu_frame
 from gateway.devices.checksum import add_checksum, strip_checksum
 from gateway.devices.exchange import Exchange, VoltageExchange
@@ -61,6 +61,9 @@ class Grammar:
         profile = self.profile
         if profile.is_raw:
             return ByteSplitter(profile.question_bytes)
+        if profile.question_terminator == "":
+            sentence = self.words(profile.reading.ask or profile.reading.start)
+            return TextSplitter(len(self.question_line(sentence.encode("ascii"))))
         return requests(profile.unit_id) if profile.is_modbus else LineSplitter(profile.question_terminator_bytes)
 
     def line(self, body: bytes) -> bytes:
@@ -88,6 +91,8 @@ class Grammar:
         if self.profile.is_modbus or self.profile.is_raw:
             return frozenset((asked,))
         end = self.profile.question_terminator_bytes
+        if not end:
+            return frozenset()
         return frozenset((asked, *(line + end for line in asked.split(end)[:-1])))
 
     def expect_own_words(self, lines: Splitter, asked: bytes) -> None:
@@ -98,8 +103,9 @@ class Grammar:
     def body(self, line: Line, asked: bytes = b"") -> bytes | None:
         """Return the sentence in a line that arrived, None when it is overlong or its checksum is wrong.
         asked: our own words, which an adapter that hears itself puts ahead of an answer; where they end as an answer does,
-        they are a line of their own."""
-        return strip_checksum(line.body.removeprefix(asked), self.profile.checksum) if line.is_whole else None
+        they are a line of their own, and bare characters may be the first of the answer's number."""
+        own = asked if self.profile.question_terminator != "" else b""
+        return strip_checksum(line.body.removeprefix(own), self.profile.checksum) if line.is_whole else None
 
     def number_body(self, template: str, number: float) -> bytes:
         """Return the sentence with this number in it, nearest on the template's own grid; others in it are 0."""

@@ -77,7 +77,9 @@ class DeviceProfile:
     codec: str = TEMPLATE  # template, modbus-rtu, or the name of a Python codec in gateway/devices/codecs.py
     serial: SerialSettings  # the line as the device comes; a rig may set another baud
     terminator: Terminator = ""  # end of every line, both ways; a Modbus device has none
-    question_terminator: Terminator = ""  # end of what the gateway says, where another
+    question_terminator: Terminator | None = (
+        None  # end of what the gateway says, where another; "": none, of a load cell
+    )
     checksum: ChecksumName = "none"  # appended before the terminator
     constants: Mapping[str, int | str] = field(
         default_factory=dict
@@ -138,8 +140,8 @@ class DeviceProfile:
 
     @property
     def question_terminator_bytes(self) -> bytes:
-        """The bytes that end a line to the device."""
-        return (self.question_terminator or self.terminator).encode("ascii")
+        """The bytes that end a line to the device; none of a load cell that is asked with bare characters."""
+        return (self.terminator if self.question_terminator is None else self.question_terminator).encode("ascii")
 
     @property
     def is_modbus(self) -> bool:
@@ -208,7 +210,7 @@ def _check_codec(profile: DeviceProfile) -> None:
     if not (profile.is_modbus or profile.is_raw):
         if not profile.terminator:
             raise ValueError('terminator is missing: what ends a line, such as "\\r\\n"')
-        if not f"{profile.terminator}{profile.question_terminator}".isascii():
+        if not f"{profile.terminator}{profile.question_terminator or ''}".isascii():
             raise ValueError("terminator and question_terminator are ASCII text")
         return
     if profile.terminator or profile.question_terminator or profile.checksum != "none":

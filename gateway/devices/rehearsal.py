@@ -165,6 +165,9 @@ def _cell(profile: DeviceProfile) -> Found:
             yield place, complaint
         elif reading.end is not None and not _tells_its_end(host, device):
             yield (*place, "end_count"), f"{reading.end_count:g} does not fit into {_shown_by(reading)}"
+        elif profile.question_terminator == "" and _is_sample(echoed := question + device.frame(0.0), host):
+            told = f"{_line(echoed)}, through an adapter that hears itself, is read as another number: give it a width"
+            yield (*place, "frame"), told
     except (ValueRefused, UnicodeEncodeError) as error:
         yield place, str(error)
 
@@ -203,6 +206,10 @@ def _tells_its_end(host: CellHost, device: CellDevice) -> bool:
     except ValueRefused:
         return False
     return [isinstance(one, ForceSample) and one.quality is Quality.OVERLOAD for one in samples] == [True]
+
+
+def _is_sample(data: bytes, host: CellHost) -> bool:
+    return any(isinstance(one, ForceSample) for one in host.receive(data, _NOW_S))
 
 
 def _read_over(profile: DeviceProfile) -> str:

@@ -4,14 +4,11 @@ from dataclasses import dataclass, field
 from ipaddress import ip_address
 from math import isfinite
 from shlex import quote
-from typing import Any, Final
+from typing import Any
 
 from gateway import VERSION, defaults
 from gateway.fieldbus.peers import is_loopback
 from gateway.profiles import Rig
-
-_SHORTEST_KEPT_LEASE_S: Final = round(0.75 * defaults.LEASE_S, 3)
-"""`hold` keeps it without knowing the lease: it beats four times in the usual one, so three times in this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +144,9 @@ def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
         return (f"force-gateway monitor{where}        ({rig.network.owner} alone may command)",)
     force_n, lease_s = rig.force_to_try_n, rig.control.supervision.lease_s
     if lease_s is not None or rig.network.require_byte_order_echo:
-        pace = "" if lease_s is None or lease_s >= _SHORTEST_KEPT_LEASE_S else f" --rig {quote(str(rig.file))}"
+        pace = (
+            "" if lease_s is None or lease_s >= defaults.SHORTEST_UNTOLD_LEASE_S else f" --rig {quote(str(rig.file))}"
+        )
         return (f"force-gateway hold {force_n:g}{where}{pace}        (enable, heartbeat; Ctrl-C ramps to 0)",)
     polled = f"{'' if unit == defaults.UNIT_ID else f' -a {unit}'} -p {port} {_polled(rig, host)}"
     return (

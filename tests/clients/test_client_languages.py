@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
+from pathlib import Path
 
 import pytest
 
@@ -107,6 +110,7 @@ def test_every_rapid_routine_runs_and_declares_what_it_uses() -> None:
         ("rapid", "MODULE M\n VAR num a:=1\nENDMODULE"),
         ("rapid", "MODULE M\n PROC p()\n IF a THEN\n ENDPROC\nENDMODULE"),
         ("rapid", "MODULE M\n PROC p()\n a=1;\n ENDPROC\nENDMODULE"),
+        ("rapid", "MODULE M\n PROC p()\n IF a AND NOT b RETURN;\n ENDPROC\nENDMODULE"),
         ("scl", 'FUNCTION "F" : Int\nVERSION : 0.1\nBEGIN\n IF TRUE THEN\nEND_FUNCTION'),
         ("st", "FUNCTION F : INT\nVAR\n a : INT;\n A : INT;\nEND_VAR\nEND_FUNCTION"),
         ("urscript", "def f():\n  if True:\n    x = 1\nend\n"),
@@ -117,6 +121,20 @@ def test_every_rapid_routine_runs_and_declares_what_it_uses() -> None:
 def test_the_parsers_refuse_what_the_languages_do(language: str, wrong: str) -> None:
     with pytest.raises(SyntaxError):
         parse(wrong, language)
+
+
+@pytest.mark.skipif(not (shutil.which("gcc") and shutil.which("g++")), reason="no gcc or no g++")
+@pytest.mark.parametrize("implementation", ["client.c", "client.cpp"])
+def test_a_program_of_cpp_uses_the_client_of_c_compiled_as_either(implementation: str, tmp_path: Path) -> None:
+    (tmp_path / "force_gateway.h").write_text(TEXTS["c"])
+    (tmp_path / implementation).write_text('#define FORCE_GATEWAY_IMPLEMENTATION\n#include "force_gateway.h"\n')
+    program = '#include "force_gateway.h"\n#include <cstdio>\nint main() { std::puts(fg_state_text(3)); }\n'
+    (tmp_path / "main.cpp").write_text(program)
+    compiler = "gcc" if implementation.endswith(".c") else "g++"
+    subprocess.run([compiler, "-Wall", "-Werror", "-c", implementation, "-o", "client.o"], cwd=tmp_path, check=True)
+    subprocess.run(["g++", "-Wall", "-Werror", "main.cpp", "client.o", "-o", "it"], cwd=tmp_path, check=True)
+    said = subprocess.run([tmp_path / "it"], capture_output=True, text=True, check=True)
+    assert said.stdout == "holding\n"
 
 
 def test_the_interpreter_finds_a_name_that_nobody_declared() -> None:

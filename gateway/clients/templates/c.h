@@ -113,6 +113,10 @@ typedef struct fg_client {
     char message[160];          /* the last refusal or loss in words */
 } fg_client;
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 void fg_init(fg_client *client, const char *host, uint16_t port, uint8_t unit);
 int fg_exchange(fg_client *client);
 int fg_enable(fg_client *client, float force_n);      /* FG_RANGE where the map does not allow it */
@@ -147,6 +151,10 @@ size_t fg_frame_write(uint8_t *frame, uint16_t transaction, uint8_t unit, uint16
                       const uint16_t *words);
 size_t fg_frame_exchange(uint8_t *frame, uint16_t transaction, uint8_t unit, uint16_t first, uint16_t count,
                          const uint16_t *words);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
 

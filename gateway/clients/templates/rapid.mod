@@ -294,7 +294,7 @@ ${crc_table}];
       fgTake:=FALSE;
     ENDIF
     ! A reset needs force 0: an enable beside it waits for its answer
-    IF fgEnable AND NOT FgHasBit(nOnce,FG_RESET_FAULT) THEN
+    IF fgEnable AND (NOT FgHasBit(nOnce,FG_RESET_FAULT)) THEN
       IF NOT FgIsOn() fgText:="";
       nWant{FG_C_CONTROL_WORD}:=FG_ENABLE;
       IF fgPull nWant{FG_C_CONTROL_WORD}:=FG_ENABLE+FG_VALVE_PULL;
@@ -342,10 +342,10 @@ ${crc_table}];
 
   LOCAL FUNC bool FgHasChanged()
     IF bOffPending OR nOnce<>0 RETURN TRUE;
-    IF nWant{FG_C_CONTROL_WORD}=0 AND NOT FgIsOn() THEN
+    IF nWant{FG_C_CONTROL_WORD}=0 AND (NOT FgIsOn()) THEN
       ! Another master presses: this write, enable 0 in it, would be its
       ! stop. The other words wait
-      IF fgEnabled OR NOT bSeen RETURN FALSE;
+      IF fgEnabled OR (NOT bSeen) RETURN FALSE;
     ENDIF
     FOR i FROM 1 TO COMMAND_WORDS DO
       IF nWant{i}<>nGood{i} RETURN TRUE;
@@ -396,7 +396,7 @@ ${crc_table}];
     bAsking:=FALSE;
     nStored:=nWant{FG_C_FORCE_SETPOINT};
     FgFollow;
-    IF nFrom>1 AND nFrom<nTo AND NOT FgIsOn() THEN
+    IF nFrom>1 AND nFrom<nTo AND (NOT FgIsOn()) THEN
       ! Behind a stop: the gateway keeps the force, and who set it owns
       ! it; the next write takes it back
       nGood{FG_C_FORCE_SETPOINT}:=nStored;
@@ -461,7 +461,7 @@ ${crc_table}];
   LOCAL PROC FgFollow()
     FgDecode;
     bSeen:=TRUE;
-    IF FgIsOn() AND NOT fgEnabled THEN
+    IF FgIsOn() AND (NOT fgEnabled) THEN
       IF fgFault fgText:=FgFaultText(fgStatus{FG_S_FAULT_CODE});
       IF NOT fgFault fgText:="disabled by the gateway or another master";
       FgForget;
@@ -721,7 +721,7 @@ ${status_decoding}
 
   ! A request per cycle, so that the heartbeat goes on meanwhile
   LOCAL PROC FgUploadPart()
-    IF nUploadStep<4 AND NOT FgSetFits() THEN
+    IF nUploadStep<4 AND (NOT FgSetFits()) THEN
       FgUploadEnd FALSE;
       RETURN;
     ENDIF

@@ -11,6 +11,7 @@ RS485: Final = "RS-485, two wires"
 RS485_4: Final = "RS-485, four wires"
 EITHER: Final = "RS-232 or RS-485, as ordered"
 CHIP: Final = "USB or the UART of a microcontroller"
+UNKNOWN: Final = "not known here (RS-232, RS-485 or a USB plug of its own): see the device's manual"
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ GENERAL: Final[dict[str, tuple[str, ...]]] = {
     RS485_4: (_RS485_FOUR,),
     EITHER: (f"RS-232: {_RS232_RULE}", f"RS-485: {_RS485_PAIR}", _RS485_ENDS),
     CHIP: (_CHIP,),
+    UNKNOWN: (f"RS-232: {_RS232_RULE}", f"RS-485: {_RS485_PAIR}", _RS485_ENDS),
 }
 """What holds for every device with this interface."""
 
@@ -102,7 +104,7 @@ _BY_NAME: Final[dict[str, Wires]] = {
     ),
     "waveshare-ao8b": Wires(
         RS485,
-        ("A to A, B to B. AO1 .. AO8 against AGND; a supply of 15 V or more for 10 V out.",),
+        ("A to A, B to B. AO1, the first of its eight, against AGND; a supply of 15 V or more for 10 V out.",),
         ("Baud and address are set by Modbus registers; 9600 8N1, address 1 as delivered.",),
         "waveshare.com/wiki/Modbus_RTU_Analog_Output_8CH_(B)",
     ),
@@ -119,4 +121,4 @@ _BY_NAME: Final[dict[str, Wires]] = {
 
 def wires_of(device_name: str, *, is_modbus: bool) -> Wires:
     """Return how a device is wired; for an unknown one what its protocol tells: Modbus RTU is usually RS-485."""
-    return _BY_NAME.get(device_name) or Wires(RS485 if is_modbus else EITHER)
+    return _BY_NAME.get(device_name) or Wires(RS485 if is_modbus else UNKNOWN)

@@ -44,7 +44,7 @@ def network_sections(rig: Rig, called: str) -> Iterator[Section]:
         yield replace(describe(rig, table), commands=(make,))
         if describe is _s7:
             yield _s7_requests(table)
-    yield _mbpoll(rig, table)
+    yield _mbpoll(rig, table, quote(called))
 
 
 def _reachable(rig: Rig) -> Endpoint:
@@ -259,8 +259,8 @@ def _universal_robot(rig: Rig, table: ExchangeTable) -> Section:
     return Section("Universal Robots", tuple(sentences), tuple(rows))
 
 
-def _mbpoll(rig: Rig, table: ExchangeTable) -> Section:
-    where, network = table.where, rig.network
+def _mbpoll(rig: Rig, table: ExchangeTable, called: str) -> Section:
+    where, network, lease_s = table.where, rig.network, rig.control.supervision.lease_s
     unit = "" if where.unit == defaults.UNIT_ID else f" -a {where.unit}"
     base = f"mbpoll -1 -p {where.shown_port}{unit}"
     (command, _), (status, words) = table.command_span, table.status_span
@@ -278,11 +278,14 @@ def _mbpoll(rig: Rig, table: ExchangeTable) -> Section:
         sentences.append(f"Only {network.owner} may command here (network.owner): others read, and disable.")
     if is_no_address(network.owner):
         pass  # nobody on plain Modbus TCP
-    elif rig.control.supervision.lease_s is not None or network.require_byte_order_echo:
-        sentences.append("mbpoll keeps no heartbeat, so it cannot hold a force here: `hold` does.")
-        lines.append(
-            f"force-gateway hold {force_n:g} --gateway {endpoint}{rig.map_option}    # enable, heartbeat; Ctrl-C ramps to 0"
+    elif lease_s is not None or network.require_byte_order_echo:
+        why = (
+            "keeps no heartbeat" if lease_s is not None else "writes 1234.5 to byte_order_echo only where it is told to"
         )
+        sentences.append(f"mbpoll {why}, so it cannot hold a force here: `hold` does.")
+        hold = f"force-gateway hold {force_n:g} --gateway {endpoint}{rig.map_option}"
+        pace = f" --rig {called}" if lease_s is not None and lease_s < defaults.SHORTEST_UNTOLD_LEASE_S else ""
+        lines.append(f"{hold}{pace}    # enable, heartbeat; Ctrl-C ramps to 0")
     else:
         lines.append(f"{base} -r {command + 1} {where.host} 1 {counts}    # enable, {force_n:.2f} N, and it lasts")
     lines.append(f"{base} -r {command + 1} {where.host} 0    # disable: safe voltage")

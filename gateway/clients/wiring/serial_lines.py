@@ -9,7 +9,9 @@ from gateway.clients.exchange import ExchangeTable
 from gateway.clients.rendering import endpoint_of
 from gateway.clients.wiring.device_wires import GENERAL, RS485, wires_of
 from gateway.clients.wiring.section import Section
+from gateway.devices.profile import ADDRESS
 from gateway.profiles import Rig
+from gateway.profiles.rigs.device_settings import CHANNEL
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
 
 
@@ -35,12 +37,12 @@ def _lines(rig: Rig) -> Iterator[tuple[str, object]]:
 def _device_section(name: str, line: object) -> Section:
     device, settings, port = getattr(line, "device"), getattr(line, "settings"), getattr(line, "port")  # noqa: B009
     wires = wires_of(device.name, is_modbus=device.is_modbus)
-    address = device.constants.get("address")
+    constants = "".join(f", {name} {device.constants[name]}" for name in (ADDRESS, CHANNEL) if name in device.constants)
     rows = [
         ("what", "value"),
         ("device", f"{device.name}: {device.description}"),
         ("port", port or "simulated: no wire"),
-        ("line", f"{settings}" + (f", address {address}" if address is not None else "")),
+        ("line", f"{settings}{constants}"),
         ("interface", wires.interface),
         *(("wires", text) for text in (*GENERAL[wires.interface], *wires.terminals)),
         *(("switches", text) for text in wires.switches or ("none documented here: see the device's manual",)),

@@ -47,5 +47,15 @@ class ByteSplitter:
         lines = []
         while len(self._buffer) >= self.length:
             data, self._buffer = self._buffer[: self.length], self._buffer[self.length :]
-            lines.append(Line(data, data.hex().upper().encode("ascii"), True))
+            lines.append(Line(data, self._body(data), True))
         return lines
+
+    def _body(self, data: bytes) -> bytes:
+        return data.hex().upper().encode("ascii")
+
+
+class TextSplitter(ByteSplitter):
+    """The same of a question without an end, which is text: `9`, `W`, `$`."""
+
+    def _body(self, data: bytes) -> bytes:
+        return data

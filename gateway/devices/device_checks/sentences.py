@@ -6,7 +6,7 @@ from typing import Final
 
 from gateway.devices.fields import Choice, Field, HexNumber, RegisterNumber
 from gateway.devices.framing import no_terminator
-from gateway.devices.profile import ADDRESS, DeviceProfile
+from gateway.devices.profile import ADDRESS, DeviceProfile, DeviceRole
 from gateway.devices.template import compile_template, quote
 from gateway.modbus.crc import checksum_end
 
@@ -30,16 +30,24 @@ def misspelt(profile: DeviceProfile) -> Found:
 
 def _terminators(profile: DeviceProfile) -> Found:
     for name in ("terminator", "question_terminator"):
-        if why := no_terminator(getattr(profile, name)):
+        if why := no_terminator(getattr(profile, name) or ""):
             yield (name,), why
+    if profile.question_terminator == "" and not _hears_one_sentence(profile):  # nothing would part two
+        yield ("question_terminator",), 'is "", none: that is for a load cell that hears one sentence, and no other'
+
+
+def _hears_one_sentence(profile: DeviceProfile) -> bool:
+    if profile.role is not DeviceRole.LOAD_CELL or profile.own_identity:
+        return False
+    return bool(profile.reading.ask or profile.reading.start) and not profile.reading.before
 
 
 def _cut_sentences(profile: DeviceProfile) -> Found:
     """Sentences with the end of a line in their middle."""
     for place, text in () if profile.is_modbus or profile.is_raw else _all_texts(profile):
         ours = place[-1] in _SAID_BY_US
-        terminator = (profile.question_terminator if ours else "") or profile.terminator
-        if terminator in text:
+        terminator = (profile.question_terminator_bytes if ours else profile.terminator_bytes).decode("ascii")
+        if terminator and terminator in text:
             yield place, f"{quote(text)} has the terminator in its middle: the line would end there"
 
 

@@ -41,7 +41,7 @@ _MEANINGS: Final = tuple(
         ),
         ("sequence entries are not allowed", "a list item `- ` cannot stand here: begin it on a line of its own"),
         ("unknown escape character", "an unknown `\\` escape within double quotes: use single quotes"),
-        ("undefined tag handle", "tags (`!...`) are not used here"),
+        ("undefined tag handle", "tags (`!...`) are not used here; quote the text"),
         ("control characters are not allowed", "a control character that no text editor shows: delete it"),
         ("special characters are not allowed", "a control character that no text editor shows: delete it"),
         ("that cannot start any token", "a value cannot begin with this character: quote the text"),

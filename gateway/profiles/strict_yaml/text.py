@@ -22,6 +22,7 @@ _PARSER: Final[Any] = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _LARGEST_BYTES: Final = 1 << 20
 _DEEPEST: Final = 32
 _NO_KEY: Final = "a key must be a word or a whole number"
+_BLOCKS: Final = (">", "|")
 _TEXT_TAG: Final = "tag:yaml.org,2002:str"
 
 
@@ -133,15 +134,16 @@ class _Reader:
         start, key_start = event.start_mark, (key or event).start_mark
         self.marks[path] = Mark(start.line + 1, start.column + 1, key_start.line + 1, key_start.column + 1)
         if isinstance(event, yaml.AliasEvent):
-            return self._fault(event, path, f"`*{event.anchor}`: aliases are not used here; write the value again")
-        if event.anchor is not None:
-            self._fault(
-                event, path, f"`&{event.anchor}`: anchors are not used here; write the value where it is needed"
+            return self._fault(
+                event, path, f"`*{event.anchor}`: aliases are not used here; write the value again, or quote the text"
             )
+        if event.anchor is not None:
+            sentence = "anchors are not used here; write the value where it is needed, or quote the text"
+            self._fault(event, path, f"`&{event.anchor}`: {sentence}")
         if isinstance(event, yaml.ScalarEvent):
             return self._scalar(event, path)
         if event.tag is not None:
-            self._fault(event, path, f"tag `{event.tag}`: tags are not used here")
+            self._fault(event, path, f"tag `{event.tag}`: tags are not used here; quote the text")
         if len(path) >= _DEEPEST:
             raise TooDeepError(problem=f"{_DEEPEST} levels deep", problem_mark=start)
         if isinstance(event, yaml.MappingStartEvent):
@@ -150,7 +152,10 @@ class _Reader:
 
     def _scalar(self, event: Any, path: Path) -> Any:
         if event.tag not in (None, "!", _TEXT_TAG):
-            return self._fault(event, path, f"tag `{event.tag}`: tags are not used here")
+            return self._fault(event, path, f"tag `{event.tag}`: tags are not used here; quote the text")
+        if event.style in _BLOCKS and not event.value:
+            sentence = "begins text on the lines below it, and none is there: quote it where it is meant itself"
+            return self._fault(event, path, f"`{event.style}` {sentence}")
         if not event.implicit[0]:  # quoted, a block, or `!!str`; both parsers say it here, not in `style`
             return event.value
         try:

@@ -203,10 +203,18 @@ def test_what_a_small_display_has_no_digits_for_is_shown_smaller() -> None:
     assert example(profile) == r"-0.05 N: 'SI\r\n' -> 'S -5.099 g\r\n'"
 
 
-def test_a_reading_whose_size_only_a_rig_knows_is_not_shown(call) -> None:
-    answer = call("check", str(shipped_profiles_folder() / "devices" / "hx711-line.yaml"))
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("hx711-line", r"'-20\r\n'"),
+        ("hbm-aed", r"'MSV?;' -> '-0000020\r\n'"),
+        ("hbm-aed-binary", "'MSV?;' -> FF FF EC 00 0D 0A"),
+    ],
+)
+def test_a_reading_whose_size_only_a_rig_knows_is_shown_in_counts(name: str, told: str, call) -> None:
+    answer = call("check", str(shipped_profiles_folder() / "devices" / f"{name}.yaml"))
     assert answer.exit_code == 0
-    assert "on the wire" not in answer.output
+    assert f"on the wire  -20 counts: {told}" in answer.output.splitlines()
     assert "read over" not in answer.output
 
 

@@ -412,8 +412,13 @@ class Rapid(Parser):
         **dict.fromkeys(["+", "-"], 40),
         **dict.fromkeys(["*", "/", "DIV", "MOD"], 50),
     }
-    UNARY: ClassVar[dict[str, int]] = {"NOT": 25}  # tests see to it that no AND stands behind one without brackets
+    UNARY: ClassVar[dict[str, int]] = {"NOT": 15}  # of all that AND joins behind it
     KINDS = ("PROC", "FUNC", "TRAP")
+
+    def expression(self, least: int = 0) -> Node:
+        if least and self.word.upper() == "NOT":
+            raise self.fail("brackets around NOT behind an operator")
+        return super().expression(least)
 
     def module(self) -> Unit:
         self.take("MODULE")

@@ -92,8 +92,12 @@ def test_a_word_means_what_yaml_1_2_says(parse: Parse, written: str, meant: obje
         (b"a: \x07\n", "rig.yaml:1:4: a control character that no text editor shows: delete it"),
         (b"a: @x\n", "rig.yaml:1:4: a value cannot begin with this character: quote the text"),
         (b"a: !!python/object:os.system x\n",
-         "rig.yaml:1:4 a: tag `tag:yaml.org,2002:python/object:os.system`: tags are not used here"),
-        (b"a: !secret x\n", "rig.yaml:1:4 a: tag `!secret`: tags are not used here"),
+         "rig.yaml:1:4 a: tag `tag:yaml.org,2002:python/object:os.system`: tags are not used here; quote the text"),
+        (b"a: !secret x\n", "rig.yaml:1:4 a: tag `!secret`: tags are not used here; quote the text"),
+        (b"a: >\nb: 1\n",
+         "rig.yaml:1:4 a: `>` begins text on the lines below it, and none is there: quote it where it is meant itself"),
+        (b"a:\n  b: |\n  c: 1\n",
+         "rig.yaml:2:6 a.b: `|` begins text on the lines below it, and none is there: quote it where it is meant itself"),
         (b"true: 1\n", "rig.yaml:1:1: a key must be a word or a whole number"),
         (b"? [a, b]\n: 1\n", "rig.yaml:1:3: a key must be a word or a whole number"),
         (b"\xff\xfea\x00", "rig.yaml:1:1: the file is UTF-16: save it as UTF-8"),
@@ -114,8 +118,11 @@ def test_wrong_indent_and_second_colon_are_told_in_words(parse: Parse) -> None:
 def test_anchors_cannot_make_a_document_grow(parse: Parse) -> None:
     bomb = b"a: &a [x, x]\nb: &b [*a, *a]\nc: &c [*b, *b]\n"
     told = fault_of(parse, bomb).splitlines()
-    assert told[0] == "rig.yaml:1:4 a: `&a`: anchors are not used here; write the value where it is needed"
-    assert told[2] == "rig.yaml:2:8 b[0]: `*a`: aliases are not used here; write the value again"
+    assert (
+        told[0]
+        == "rig.yaml:1:4 a: `&a`: anchors are not used here; write the value where it is needed, or quote the text"
+    )
+    assert told[2] == "rig.yaml:2:8 b[0]: `*a`: aliases are not used here; write the value again, or quote the text"
     assert len(told) == 7
 
 

@@ -1,0 +1,47 @@
+"""What the wiring page tells of a device and of a rig that are nobody's but the integrator's own."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from gateway.clients.wiring import wiring_page
+from gateway.profiles import load_rig
+from tests.clients.test_wiring import PROFILES, page_of, rows_of
+
+
+def test_an_electrician_is_told_which_output_counts_and_what_nobody_knows_of_a_device(tmp_path: Path) -> None:
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    text = text.replace("device: smc-itv-rc", "device: icpdas-7024\n  channel: 2\n  watchdog_s: 0.5")
+    amplifier = (PROFILES / "devices" / "stream-st-gs.yaml").read_text().replace("name: stream-st-gs", "name: usb-cell")
+    (tmp_path / "usb-cell.yaml").write_text(amplifier)
+    (tmp_path / "own.yaml").write_text(text.replace("device: stream-st-gs", "device: usb-cell"))
+    page = page_of(tmp_path / "own.yaml")
+    assert rows_of(page, "Serial line: output")["line"] == ["9600 8N1, address 1, channel 2"]
+    (interface,) = rows_of(page, "Serial line: load cell")["interface"]
+    assert "not known here" in interface and "USB" in interface
+
+
+def test_of_eight_outputs_the_one_that_is_driven_is_named(tmp_path: Path) -> None:
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("device: smc-itv-rc", "device: waveshare-ao8b")
+    (tmp_path / "own.yaml").write_text(text)
+    (section,) = [one for one in page_of(tmp_path / "own.yaml")["sections"] if one["title"] == "Serial line: output"]
+    wires = " ".join(row[1] for row in section["rows"] if row[0] == "wires")
+    assert "AO1, the first of its eight, against AGND" in wires and "AO8" not in wires
+
+
+@pytest.mark.parametrize(
+    ("lease_s", "why", "pace"),
+    [(0.1, "keeps no heartbeat", " --rig 'cell 3.yaml' "), (0.2, "keeps no heartbeat", ""), (None, "1234.5", "")],
+)
+def test_why_mbpoll_holds_no_force_and_what_does(lease_s: float | None, why: str, pace: str) -> None:
+    """Without a lease a rig that wants the proof of byte order blamed the heartbeat; `hold` on another machine lost a short
+    lease."""
+    rig = load_rig("irc5-cell")
+    network = replace(rig.network, require_byte_order_echo=True)
+    supervision = replace(rig.control.supervision, lease_s=lease_s)
+    rig = replace(rig, network=network, control=replace(rig.control, supervision=supervision))
+    section = wiring_page(rig, "cell 3.yaml")[1][-1]
+    (told,) = [each for each in section.sentences if "cannot hold" in each]
+    (hold,) = [line for line in section.commands if line.startswith("force-gateway hold")]
+    assert why in told and ("--rig" in hold) is bool(pace) and pace in hold
