@@ -91,7 +91,7 @@ def test_a_beat_that_finds_the_output_off_ends_none_that_an_enable_has_begun_mea
             return {"pdu": bytes((P.READ_WRITE, 2, 0, len(beats) > 1)).hex()}
 
     async def run() -> None:
-        await commands.set_force("me", 12.0)
+        await commands.take_ownership("me")
         while len(beats) < 10:
             await asyncio.sleep(0)
         assert commands.commander == "me"
