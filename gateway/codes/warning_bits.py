@@ -44,7 +44,7 @@ class WarningBit(IntFlag):
             "0.1 N instead of 17.9 N).",
             "No air, a closed valve, no contact; an output whose supply dipped; a tenth is kgf read as N; a wrong span of the "
             "cell; too much is friction or weight.",
-            "Open the air, look at its gauge; bring the tool into contact; compare units, and the cell with a known weight; "
+            "Open the air supply and look at its gauge; bring the tool into contact; compare units; try a known weight; "
             "disable and enable: the voltage is said anew.",
             is_warning=True,
         ),
