@@ -13,11 +13,11 @@ import contextlib
 import fcntl
 import os
 import select
-import struct
 import termios
 from typing import Any, Final
 
 from gateway.devices import SerialSettings
+from gateway.ports.closing import Closing, queued_bytes
 from gateway.ports.errors import SERIAL_FAILURES, PortError, explain_changed_settings, explain_loss, is_shortage
 from gateway.ports.identity import PtyIdentity
 from gateway.ports.latency import set_low_latency
@@ -58,7 +58,7 @@ class SerialPort:
         self._on_restored = events.on_restored
         self._set_to: TerminalSettings = []
         self._look: asyncio.TimerHandle | None = None
-        self._descriptor = -1
+        self._descriptor, self._closing = -1, Closing()
         self._is_wanted = False  # from `open` to `close`
         self._identity = PtyIdentity(is_kept=is_simulated)
         self._unsent = b""
@@ -80,7 +80,7 @@ class SerialPort:
     @property
     def unsent_bytes(self) -> int:
         """Bytes that are not on the wire yet: ours and the driver's."""
-        return len(self._unsent) + _queued_bytes(self._descriptor) if self._descriptor >= 0 else 0
+        return len(self._unsent) + queued_bytes(self._descriptor) if self._descriptor >= 0 else 0
 
     async def open(self) -> None:
         """Open the port and keep it open from now on. PortError when it cannot be opened."""
@@ -261,8 +261,7 @@ class SerialPort:
             self._look.cancel()
         with contextlib.suppress(OSError):  # the guardian has the same open file, and with it the lock: give it back
             fcntl.flock(self._descriptor, fcntl.LOCK_UN)
-        with contextlib.suppress(OSError):
-            os.close(self._descriptor)
+        self._closing.close(self._descriptor)
         self._descriptor, self._unsent = -1, b""
 
     def _reopen_after(self, delay_s: float) -> None:
@@ -276,6 +275,9 @@ class SerialPort:
     def _reopen(self) -> None:
         self._reopening = None
         if self._identity.is_gone:
+            return
+        if self._closing.is_pending:
+            self._reopen_after(self._backoff_s)
             return
         try:
             self._open(explain_in_brief)
@@ -313,13 +315,7 @@ class SerialPort:
         while self._unsent and (left_s := end_s - monotonic_s()) > 0:
             if select.select([], [self._descriptor], [], left_s)[1]:
                 self._unsent = self._unsent[os.write(self._descriptor, self._unsent) :]
-        while _queued_bytes(self._descriptor) and (left_s := end_s - monotonic_s()) > 0:
+        while queued_bytes(self._descriptor) and (left_s := end_s - monotonic_s()) > 0:
             select.select([], [], [], min(left_s, 1e-3))
-        if not _queued_bytes(self._descriptor):
+        if not queued_bytes(self._descriptor):
             termios.tcdrain(self._descriptor)
-
-
-def _queued_bytes(descriptor: int) -> int:
-    """Return the number of bytes in the driver's output queue."""
-    (count,) = struct.unpack("i", fcntl.ioctl(descriptor, termios.TIOCOUTQ, bytes(4)))
-    return int(count)

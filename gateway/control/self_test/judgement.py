@@ -150,7 +150,8 @@ def judge_zero(rest_n: float, known: Known) -> Finding:
     rising_n, falling_n = known.model.branch_forces_n(known.rest_v)
     kept_n = _KEPT * max(falling_n, 0.0)
     off_n = max(min(rising_n, 0.0) - rest_n, rest_n - kept_n)
-    kept = f" beyond the {kept_n:.1f} N that friction may keep" if kept_n > 0.05 else ""
+    what = "the safe voltage and friction" if known.rest_v > 0.0 else "friction"
+    kept = f" beyond the {kept_n:.1f} N that {what} may keep" if kept_n > 0.05 else ""
     text = f"{rest_n:+.2f} N at rest, {_bounds(0.5 * fails_n, fails_n, 'N', 2)}{kept}"
     cure = "; lift the tool and tare" if off_n > 0.5 * fails_n else ""
     return Finding(Item.ZERO, _above(off_n, 0.5 * fails_n, fails_n), text + cure)

@@ -189,3 +189,9 @@ def test_what_friction_may_keep_at_rest_is_told_beside_the_bound_of_a_zero() -> 
     keeping = Bsfm(Branches(CURVE, RationalBezier(0.0, 8.0, [4.0, 34.0, 57.0], [1.0, 1.0, 1.0])), LinearBlend(6.0))
     assert "that friction may keep" in judge_zero(0.1, replace(RIG, model=keeping)).text
     assert "friction" not in judge_zero(0.1, RIG).text
+
+
+def test_what_the_safe_voltage_presses_is_not_told_as_friction_alone() -> None:
+    limits = replace(RIG.settings.limits, safe_voltage_v=2.0)
+    pressing = replace(RIG, settings=replace(RIG.settings, limits=limits))
+    assert "N that the safe voltage and friction may keep" in judge_zero(14.0, pressing).text
