@@ -51,6 +51,13 @@ class _Finite(click.FloatRange):
 EXAMPLES = ("diagnose press.csv --report why.html", "diagnose press.csv --rig demo --extend creeping.yaml")
 
 
+def _not_an_option(context: click.Context, parameter: click.Parameter, value: Path | None) -> Path | None:
+    """Of every other verb --json is a flag: `--json --state DIR` took --state for its file, and DIR for a recording."""
+    if value is not None and str(value).startswith("--"):
+        raise click.BadParameter(f"{value} is no file: OUT is missing; - is stdout")
+    return value
+
+
 @click.command()
 @click.argument("recordings", metavar="RECORDING...", nargs=-1, shell_complete=complete_recordings)
 @rig_option("The rig whose plant is the start  [default: the recording's own]")
@@ -73,7 +80,12 @@ EXAMPLES = ("diagnose press.csv --report why.html", "diagnose press.csv --rig de
     help="RMS noise of the readings, N, if known.",
 )
 @click.option(
-    "--json", "json_file", type=click.Path(path_type=Path, allow_dash=True), metavar="OUT", help="- is stdout."
+    "--json",
+    "json_file",
+    type=click.Path(path_type=Path, allow_dash=True),
+    callback=_not_an_option,
+    metavar="OUT",
+    help="- is stdout.",
 )
 @click.option("--report", type=_OUTPUT, metavar="OUT.html", help="Write the report with all plots.")
 @click.option("--extend", type=_OUTPUT, metavar="PLANT.yaml", help="Write the extended plant.")

@@ -198,6 +198,12 @@ def test_a_recording_that_is_not_there_is_bad_input(tmp_path: Path, call: Call) 
     assert call("diagnose", "7", "--state", str(tmp_path)).exit_code == 65
 
 
+def test_json_takes_no_option_for_its_file(tmp_path: Path, call: Call, engine: Engine) -> None:
+    """Of `diagnose 1 --json --state DIR` it was said that demo has no recording 1."""
+    answer = call("diagnose", "1", "--json", "--state", str(tmp_path))
+    assert answer.exit_code == 2 and "--state is no file: OUT is missing; - is stdout" in answer.stderr
+
+
 @pytest.mark.parametrize("floor", ["nan", "inf", "0", "-1", "x"])
 def test_a_noise_floor_is_a_positive_number(tmp_path: Path, call: Call, engine: Engine, floor: str) -> None:
     answer = call("diagnose", str(table(tmp_path / "a.csv")), "--noise-floor-n", floor)
