@@ -5,6 +5,8 @@ Decisions
 - No restart behind an exit that says that another start would end the same way: command line, data, permission,
   configuration. Any other failure starts again every ten seconds, without end: a device whose cabinet is switched on an hour
   after this machine, or whose adapter comes late, must not leave the gateway off until somebody logs in.
+- A stop is told to every process. With `KillMode=mixed` whoever is left when the guardian is gone is killed at once, and
+  control must write the safe voltage then; each process minds what else it is told here.
 - An address of its own is there only once the network is up: a start before it would be in vain.
 - A user of its own that owns nothing but the state directory, and the serial ports by their group. Nothing else of the machine
   can be written, most of it not even seen; only the devices named here are there at all.
@@ -107,7 +109,7 @@ def unit_text(options: UnitOptions) -> str:
         f"WatchdogSec={WATCHDOG_S}",
         "TimeoutStartSec=90",
         f"TimeoutStopSec={STOP_S}",
-        "KillMode=mixed",
+        "KillMode=control-group",
         "Restart=on-failure",
         "RestartSec=10",
         f"RestartPreventExitStatus={' '.join(map(str, _NO_RESTART))}",
