@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.processes import exit_codes
+from gateway.processes.priority import LOOP_NICE
 
 NAME: Final = "force-gateway"
 USER: Final = "force-gateway"
@@ -118,7 +119,9 @@ def unit_text(options: UnitOptions) -> str:
         "StateDirectoryMode=0700",
         f"CacheDirectory={NAME}",
         "WorkingDirectory=%S/" + NAME,
-        "Nice=-10",  # as the gateway asks for itself, where it may; its other processes step back
+        f"Nice={LOOP_NICE}",  # as the gateway asks for itself, where it may; its other processes step back
+        f"LimitNICE={LOOP_NICE}",  # for control, which is forked from one that has stepped back
+        "OOMPolicy=continue",  # of a child that control can do without: the guardian starts it again
         "",
         _HARDENING.rstrip(),
         *_of_the_rig(options),
