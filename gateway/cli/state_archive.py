@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway import VERSION
+from gateway.audit.audit_file import HEAD
 from gateway.plain_file import check_plain, open_plain_stream, replaced_by
 from gateway.processes.durable_file import sync_path
 
@@ -74,8 +75,10 @@ def names_in(source: Path) -> list[str]:
 
 
 def unpack(source: Path, state: Path) -> Path | None:
-    """Put the archive's content where `state` is, at once; where the previous content is kept, None if there was none."""
+    """Put the archive's content where `state` is, or leads, at once; where the previous content is kept, None if there was
+    none."""
     names_in(source)
+    state = state.resolve()  # by a link it is on another disk, and stays there
     state.parent.mkdir(parents=True, exist_ok=True)
     beside = Path(tempfile.mkdtemp(dir=state.parent, prefix=f".{state.name}."))
     try:
@@ -156,9 +159,10 @@ def _read_to_the_end(source: Path) -> None:
 
 
 def _files(state: Path) -> Iterator[Path]:
-    """Directories and plain files, parents first; links and sockets stay behind. OSError for a directory that may not be read:
+    """Directories and plain files, parents first; links and sockets stay behind. The audit's head goes before its lines: those
+    that come meanwhile are beyond it, else it would name some that are not there. OSError for a directory that may not be read:
     a backup without it would be taken for a whole one."""
-    for path in sorted(state.iterdir()):
+    for path in sorted(state.iterdir(), key=lambda path: (path.name != HEAD, path)):
         if path.is_symlink() or not (path.is_dir() or path.is_file()):
             continue
         yield path

@@ -44,9 +44,11 @@ def main(arguments: list[str]) -> int:
     link.setblocking(False)
     options = json.loads(arguments[1])
     priority.set_nice(priority.LOOP_NICE)
-    # A machine that shuts down, or `pkill`, tells every process: the guardian answers, and asks us to ramp. A handler, for
-    # what is ignored stays so in a child.
-    signal.signal(signal.SIGTERM, lambda *_: None)
+    # A machine that shuts down, systemd, or `pkill` tells every process: the guardian answers, and asks us to ramp. SIGABRT is
+    # systemd's where its watchdog has missed the guardian, whose end we then see. A handler, for what is ignored stays so in a
+    # child.
+    for number in (signal.SIGTERM, signal.SIGABRT):
+        signal.signal(number, lambda *_: None)
     with contextlib.suppress(
         OSError
     ):  # what cleans up a disk takes it from a gateway that runs: then it is there again

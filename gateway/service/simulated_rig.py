@@ -171,10 +171,10 @@ async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog
 
 
 async def _serve_process(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog) -> None:
-    """The same as a process of its own, which the guardian asks to end by SIGTERM."""
-    ended = asyncio.Event()
-    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
-    await serve(rig, link, kept, log, ended)
+    """The same as a process of its own. Who stops the gateway may tell every process so (systemd, `pkill`): the force is ramped
+    down on us then, and the guardian ends our line behind that."""
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, lambda: None)
+    await serve(rig, link, kept, log, asyncio.Event())
 
 
 def main(arguments: list[str]) -> int:

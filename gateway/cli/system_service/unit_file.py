@@ -5,6 +5,8 @@ Decisions
 - No restart behind an exit that says that another start would end the same way: command line, data, permission,
   configuration. Any other failure starts again every ten seconds, without end: a device whose cabinet is switched on an hour
   after this machine, or whose adapter comes late, must not leave the gateway off until somebody logs in.
+- A stop is told to every process. With `KillMode=mixed` whoever is left when the guardian is gone is killed at once, and
+  control must write the safe voltage then; each process minds what else it is told here.
 - An address of its own is there only once the network is up: a start before it would be in vain.
 - A user of its own that owns nothing but the state directory, and the serial ports by their group. Nothing else of the machine
   can be written, most of it not even seen; only the devices named here are there at all.
@@ -20,6 +22,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.processes import exit_codes
+from gateway.processes.priority import LOOP_NICE
 
 NAME: Final = "force-gateway"
 USER: Final = "force-gateway"
@@ -107,7 +110,7 @@ def unit_text(options: UnitOptions) -> str:
         f"WatchdogSec={WATCHDOG_S}",
         "TimeoutStartSec=90",
         f"TimeoutStopSec={STOP_S}",
-        "KillMode=mixed",
+        "KillMode=control-group",
         "Restart=on-failure",
         "RestartSec=10",
         f"RestartPreventExitStatus={' '.join(map(str, _NO_RESTART))}",
@@ -116,7 +119,9 @@ def unit_text(options: UnitOptions) -> str:
         "StateDirectoryMode=0700",
         f"CacheDirectory={NAME}",
         "WorkingDirectory=%S/" + NAME,
-        "Nice=-10",  # as the gateway asks for itself, where it may; its other processes step back
+        f"Nice={LOOP_NICE}",  # as the gateway asks for itself, where it may; its other processes step back
+        f"LimitNICE={LOOP_NICE}",  # for control, which is forked from one that has stepped back
+        "OOMPolicy=continue",  # of a child that control can do without: the guardian starts it again
         "",
         _HARDENING.rstrip(),
         *_of_the_rig(options),

@@ -3,6 +3,7 @@
 import asyncio
 import errno
 import time
+from collections.abc import Awaitable, Callable
 from typing import Final
 
 from gateway import defaults
@@ -15,7 +16,9 @@ from gateway.processes.exit_cause import EndCause, Ending
 from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.service.running_rig.lines.baud_probe import explain_silent_device
 
-_HELD_BOUND_S: Final = 0.5  # how long a restart waits for a port that somebody holds who is about to end
+_HELD_BOUND_S: Final = 0.5
+"""How long a restart waits for a port that somebody holds who is about to end, and any start for a permission: udev gives it a
+moment after the name, and behind an exit for the want of it nobody starts the service again."""
 _RETRY_S: Final = 0.05  # between two attempts within that time
 _FIRST_WORDS_S: Final = 3.0  # how long READY waits for both devices' first words before it says that one is silent
 _WORDS_AGAIN_S: Final = 0.5  # the same after a restart: what is silent now was not a moment ago, and masters wait
@@ -57,11 +60,25 @@ def warning_notes(rig: Rig) -> tuple[str, ...]:
     return (f"A343 {held}; the rig accepts that; an air dump valve on the E-stop circuit helps",)
 
 
+async def open_first(begin: Callable[[], Awaitable[None]]) -> None:
+    """Open a port at a first start. begin: opens it, PortError where it does not open."""
+    deadline_s = time.monotonic() + _HELD_BOUND_S
+    while True:
+        try:
+            await begin()
+        except PortError as error:
+            if error.code != "E101" or time.monotonic() >= deadline_s:
+                raise
+        else:
+            return
+        await asyncio.sleep(_RETRY_S)
+
+
 async def open_again(port: SerialPort) -> PortError | None:
     """Open a port after a restart; the reason where it did not open, None where it did.
 
     One that is held or away is a lost one, as it would be without the restart: a fault, and tried again for as long as it
-    takes. Ending over it would use up the restarts within seconds (A402). PortError where the permission is missing.
+    takes. Ending over it would use up the restarts within seconds (A402). PortError where the permission stays missing.
     """
     deadline_s = time.monotonic() + _HELD_BOUND_S
     while True:
@@ -69,9 +86,10 @@ async def open_again(port: SerialPort) -> PortError | None:
             await port.open()
             return None
         except PortError as error:
-            if error.code == "E101":  # waiting does not change a permission
+            is_over = time.monotonic() >= deadline_s
+            if error.code == "E101" and is_over:
                 raise
-            if error.code != "E103" or time.monotonic() >= deadline_s:
+            if is_over or error.code not in ("E101", "E103"):
                 port.begin_lost(error)
                 return error
         await asyncio.sleep(_RETRY_S)

@@ -60,8 +60,10 @@ class Child:
         return LOST if self._code is None else self._code
 
     def end(self) -> None:
-        """Ask, then insist; leaves nothing behind."""
+        """Ask, by the end of its line and by a signal, then insist; leaves nothing behind."""
         if self.pid and self._code is None:
+            with contextlib.suppress(OSError):  # it is gone
+                self.link.shutdown(socket.SHUT_RDWR)
             with contextlib.suppress(OSError):
                 os.kill(self.pid, signal.SIGTERM)
             if self.wait(_END_BOUND_S) == LOST:

@@ -114,7 +114,7 @@ class Guardian:
 
     def _step(self) -> int | None:
         readable = self.wait(self._sources(), self._patience_s())
-        if self.signals.descriptor in readable and (count := self.signals.take()):
+        if count := self.signals.take():  # also one that came behind the look: who was told with us may be in it, dead
             self._on_signal(count)
         control = self.control
         if control.has_spoken(readable):

@@ -162,6 +162,25 @@ def test_a_permission_taken_away_costs_a_restart_the_serial_face_only(monkeypatc
     play(scene())
 
 
+def test_a_permission_that_comes_a_moment_behind_the_name_does_not_end_a_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    opens, tries = SerialPort.open, list[str]()
+
+    async def forbid_once(port: SerialPort) -> None:
+        tries.append(port.path)
+        if len(tries) == 1:
+            raise PortError("E101", f"{port.path}: permission denied")
+        await opens(port)
+
+    async def scene() -> None:
+        line = Pty()
+        monkeypatch.setattr(SerialPort, "open", forbid_once)
+        async with Served(serial(line.path)).running() as served:
+            assert ([face.type for face in served.told], tries) == (["rtu"], [line.path] * 2)
+        line.close()
+
+    play(scene())
+
+
 def test_an_address_that_is_gone_or_held_costs_a_restart_its_face_only_until_it_is_back(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

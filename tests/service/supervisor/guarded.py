@@ -162,13 +162,16 @@ class FakeStarter:
 class FakeSignals:
     def __init__(self) -> None:
         self._reader, self._writer = socket.socketpair()
+        self._reader.setblocking(False)
         self.descriptor = self._reader.fileno()
 
     def send(self) -> None:
         self._writer.send(b"\x02")
 
     def take(self) -> int:
-        return len(self._reader.recv(64))
+        with contextlib.suppress(BlockingIOError):
+            return len(self._reader.recv(64))
+        return 0
 
     def close(self) -> None:
         self._reader.close()

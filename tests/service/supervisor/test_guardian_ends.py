@@ -218,8 +218,10 @@ def test_whatever_ends_the_guardian_the_safe_voltage_goes_first(scene, port, mon
     assert port.wrote() == SAFE_FRAME
 
 
-def test_who_is_told_to_end_with_the_guardian_is_not_said_to_be_started_again(scene, port):
-    """A machine that shuts down tells every process. It said that control went on, and when there would be another page."""
+@pytest.mark.parametrize("is_late", [False, True], ids=["at-once", "behind-the-look"])
+def test_who_is_told_to_end_with_the_guardian_is_not_said_to_be_started_again(scene, port, monkeypatch, is_late):
+    """A machine that shuts down tells every process. It said that control went on, and when there would be another page: on a
+    busy machine a child that was told behind us has died of it before we have looked for the signal."""
     ready = READY | {"optional": {"watch": {}}}
 
     def script(child):
@@ -228,7 +230,17 @@ def test_who_is_told_to_end_with_the_guardian_is_not_said_to_be_started_again(sc
 
     one = scene(script)
     assert_comes_up(one)
-    one.signals.send()
+    looked = one.guardian.wait
+
+    def signal_comes_behind(descriptors: list[int], timeout_s: float) -> set[int]:
+        found = looked(descriptors, timeout_s)
+        if found and is_late and not one.guardian.stops:
+            one.signals.send()
+        return found
+
+    monkeypatch.setattr(one.guardian, "wait", signal_comes_behind)
+    if not is_late:
+        one.signals.send()
     one.starter.optionals_started[0].dies(-15)
     one.run(lambda: one.guardian.stops == 1)
     one.child.dies(0)

@@ -24,7 +24,7 @@ from gateway.service.banner import ServedFace, tcp_face, tls_face
 from gateway.service.running_rig.bank_rules import plain_role, server_settings
 from gateway.service.running_rig.control_loop import Log
 from gateway.service.running_rig.faces.faces_to_come import FacesToCome, Serve
-from gateway.service.running_rig.starting import StartError, listen, open_again
+from gateway.service.running_rig.starting import StartError, listen, open_again, open_first
 
 
 def with_rtu_face(rig: Rig, port: str) -> Rig:
@@ -168,7 +168,7 @@ class Faces:
                 await _open_again(face.port)
             return
         try:
-            await face.start()
+            await open_first(face.start)
         except PortError as error:
             raise StartError(f"{error} (the port of Modbus RTU face {host})", error.exit_code) from error
 

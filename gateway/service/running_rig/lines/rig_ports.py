@@ -10,7 +10,7 @@ from collections.abc import Callable
 from gateway.ports import PortError, PortEvents, SerialPort
 from gateway.profiles import Rig
 from gateway.service.running_rig.control_loop import ControlLoop, Log
-from gateway.service.running_rig.starting import open_again
+from gateway.service.running_rig.starting import open_again, open_first
 
 
 class RigPorts:
@@ -71,7 +71,7 @@ class RigPorts:
         """Open the ports. PortError where one cannot be opened; after a restart such a port is a lost one."""
         for port in self._all:
             if not is_restart:
-                await port.open()
+                await open_first(port.open)
             elif error := await open_again(port):
                 self.not_opened[port.path] = error
 

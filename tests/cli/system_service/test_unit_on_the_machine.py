@@ -1,0 +1,42 @@
+"""What the unit asks of the kernel for all processes of a gateway: their turns, and what follows where memory runs out."""
+
+import os
+import re
+import resource
+from pathlib import Path
+
+import pytest
+
+from gateway.cli.system_service.unit_file import UnitOptions, unit_text
+from gateway.processes import priority
+
+UNIT = unit_text(UnitOptions(command=Path("/usr/bin/true"), rig="irc5-cell", stem="irc5-cell"))
+
+
+def setting(name: str, default: str) -> str:
+    found = re.findall(rf"^{name}=(.*)$", UNIT, re.M)
+    return str(found[-1]) if found else default
+
+
+def test_control_comes_before_other_programs_though_the_process_that_forks_it_does_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The unit's Nice is that of the guardian; the kernel lets nobody take it again who has given it up, without privileges and
+    without a limit that says so: the loop of a service had the turns of any program."""
+    has, lowest = [int(setting("Nice", "0"))], int(setting("LimitNICE", "20"))
+
+    def set_to(which: int, who: int, nice: int) -> None:
+        if nice < has[0] and nice < lowest:
+            raise PermissionError
+        has[0] = nice
+
+    monkeypatch.setattr(os, "setpriority", set_to)
+    monkeypatch.setattr(os, "getpriority", lambda which, who: has[0])
+    monkeypatch.setattr(resource, "getrlimit", lambda which: (20 - lowest,) * 2)
+    assert priority.set_nice(0) == 0, "the fork server"
+    assert priority.set_nice(priority.LOOP_NICE) == priority.LOOP_NICE, "control"
+
+
+def test_a_helper_that_the_kernel_ends_for_want_of_memory_does_not_end_the_gateway() -> None:
+    """systemd stops a unit of which it ends anybody unless it is told not to: the force went with the residual watch."""
+    assert setting("OOMPolicy", "stop") == "continue"
