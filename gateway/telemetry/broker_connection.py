@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from gateway.extras import import_library
 from gateway.live.standstill import Standstill
-from gateway.plain_file import check_plain
+from gateway.plain_file import check_plain, read_plain
 from gateway.telemetry.broker_session import BrokerMessage, BrokerSession
 from gateway.telemetry.command_queue import CommandQueue
 
@@ -47,7 +47,7 @@ async def keep_connected(
             async with _client(aiomqtt, broker, session.name, will) as client:
                 news.note_connected()
                 await _carry(client, session)
-        except* (aiomqtt.MqttError, OSError) as lost:
+        except* (aiomqtt.MqttError, OSError, UnicodeError) as lost:
             news.note_lost(_reason(lost))
         finally:
             session.lose()
@@ -107,6 +107,8 @@ def _name_at_broker(name: str) -> str:
 def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage) -> Any:
     for file in filter(None, (broker.ca, broker.certificate, broker.key)):
         check_plain(file)
+    if broker.key and b"ENCRYPTED" in read_plain(broker.key):  # OpenSSL asks for it at the terminal, and waits there
+        raise OSError(f"{broker.key} has a password: openssl pkey -in {broker.key} -out NEW.key takes it off")
     return aiomqtt.Client(
         broker.host,
         broker.port,
@@ -177,4 +179,6 @@ def _reason(lost: BaseExceptionGroup[BaseException]) -> str:
     first: BaseException = lost
     while isinstance(first, BaseExceptionGroup):
         first = first.exceptions[0]
-    return str(first)
+    return (
+        "no such host name" if isinstance(first, UnicodeError) else str(first)
+    )  # `a..b`, or a part of over 63 characters

@@ -87,24 +87,52 @@ def test_any_other_forgotten_exception_is_told_as_ever(caplog: pytest.LogCapture
     assert "Task was destroyed" in caplog.text
 
 
+def first_word(broker: Broker) -> str:
+    """What is said first of this broker."""
+
+    async def meet() -> str:
+        said: asyncio.Queue[str] = asyncio.Queue()
+        keeping = asyncio.create_task(keep_connected(broker, Session(), said.put_nowait, again_s=60.0))  # type: ignore[arg-type]
+        saying = asyncio.create_task(said.get())
+        try:
+            async with asyncio.timeout(10):
+                await asyncio.wait((keeping, saying), return_when=asyncio.FIRST_COMPLETED)
+            return saying.result() if saying.done() else str(keeping.result())
+        finally:
+            keeping.cancel()
+            saying.cancel()
+            await asyncio.gather(keeping, saying, return_exceptions=True)
+
+    return asyncio.run(meet())
+
+
 @pytest.mark.parametrize("kind", ["a pipe", "a device"])
 def test_a_certificate_that_is_no_file_is_told_and_not_waited_for(kind: str, tmp_path: Any) -> None:
     from tests.other_kinds import put
 
     put(kind, tmp_path / "ca.crt")
 
-    async def meet() -> str:
-        said: asyncio.Queue[str] = asyncio.Queue()
-        broker = Broker("127.0.0.1", 1, ca=str(tmp_path / "ca.crt"))
-        keeping = asyncio.create_task(keep_connected(broker, Session(), said.put_nowait, again_s=60.0))  # type: ignore[arg-type]
-        async with asyncio.timeout(10):
-            sentence = await said.get()
-        keeping.cancel()
-        await asyncio.gather(keeping, return_exceptions=True)
-        return sentence
-
-    sentence = asyncio.run(meet())
+    sentence = first_word(Broker("127.0.0.1", 1, ca=str(tmp_path / "ca.crt")))
     assert sentence.startswith("E181") and f"it is {kind}" in sentence
+
+
+@pytest.mark.parametrize("host", ["broker..plant", f"{'x' * 64}.plant"])
+def test_a_name_that_no_host_can_have_is_told_and_does_not_end_the_process(host: str) -> None:
+    assert first_word(Broker(host, 1)).startswith(f"E181 the MQTT broker {host}:1 is away (no such host name)")
+
+
+def test_nobody_is_asked_for_the_password_of_a_key(tmp_path: Any) -> None:
+    """OpenSSL asks at the terminal that the gateway was started in, and the client waits for the answer for ever."""
+    key = tmp_path / "cell.key"
+    key.write_text(
+        "-----BEGIN ENCRYPTED PRIVATE KEY-----\nMA==\n-----END ENCRYPTED PRIVATE KEY-----\n", encoding="ascii"
+    )
+    for name in ("ca.crt", "cell.crt"):
+        (tmp_path / name).touch()
+    sentence = first_word(
+        Broker("127.0.0.1", 1, None, None, *(f"{tmp_path}/{n}" for n in ("ca.crt", "cell.crt", "cell.key")))
+    )
+    assert sentence.startswith("E181") and f"{key} has a password: openssl pkey -in {key}" in sentence
 
 
 def test_a_broker_that_ends_each_connection_at_once_is_not_away_and_is_told_once() -> None:

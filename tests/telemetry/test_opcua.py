@@ -53,12 +53,15 @@ def endpoint(tmp_path: Path) -> Iterator[str]:
     stop(gateway)
 
 
-async def connected(endpoint: str) -> Any:
+async def connected(endpoint: str, user: str) -> Any:
     from asyncua import Client
 
     async with asyncio.timeout(30):
         while True:
             client = Client(endpoint)
+            if user:
+                client.set_user(user)
+                client.set_password("any")
             with contextlib.suppress(OSError):
                 await client.connect()
                 return client
@@ -66,11 +69,12 @@ async def connected(endpoint: str) -> Any:
 
 
 @pytest.mark.long
-def test_a_client_reads_every_figure_and_can_write_none(endpoint: str) -> None:
+@pytest.mark.parametrize("user", ["", "admin"])
+def test_a_client_reads_every_figure_and_can_write_none(endpoint: str, user: str) -> None:
     from asyncua import ua
 
     async def scene() -> None:
-        client = await connected(endpoint)
+        client = await connected(endpoint, user)
         try:
             place = await client.get_namespace_index(NAMESPACE)
             nodes = {one.name: client.get_node(f"ns={place};s=demo/{one.name}") for one in NODE_METRICS}
@@ -87,6 +91,9 @@ def test_a_client_reads_every_figure_and_can_write_none(endpoint: str) -> None:
                     await nodes[name].write_value(values[name])
             with pytest.raises(ua.UaStatusCodeError):
                 await client.nodes.objects.add_object(place, "mine")
+            with pytest.raises(ua.UaStatusCodeError):
+                await client.delete_nodes([nodes["State"]])
+            assert await nodes["State"].read_value() == "off"
         finally:
             await client.disconnect()
 

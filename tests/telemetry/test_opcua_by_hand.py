@@ -86,6 +86,9 @@ def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(m
         def set_security_policy(self, policies: list[Any]) -> None:
             did.append([policy.name for policy in policies])
 
+        def allow_remote_admin(self, allow: bool) -> None:
+            did.append(("admin", allow))
+
         async def __aenter__(self) -> None:
             did.append("serves")
             raise OSError(98, "Address already in use")
@@ -107,8 +110,8 @@ def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(m
     log: Any = lambda cause, sentence: did.append((cause, sentence))  # noqa: E731
     asyncio.run(opcua_process.serve(options, log))
     assert did == [
-        "asyncua.server.binary_server_asyncio", "opc.tcp://127.0.0.1:4840/", ["NoSecurity"], "demo", None, "serves",
-        ("start", "E127 opcua.listen: Address already in use"),
+        "asyncua.server.binary_server_asyncio", "opc.tcp://127.0.0.1:4840/", ["NoSecurity"], ("admin", False), "demo", None,
+        "serves", ("start", "E127 opcua.listen: Address already in use"),
     ]  # fmt: skip
 
 
