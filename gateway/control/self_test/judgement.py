@@ -252,21 +252,23 @@ def judge_output_line(counts: WireCounts | None, slowest_s: float, known: Known)
 
 
 def judge_cell_line(intervals: Intervals, counts: WireCounts | None, known: Known, heard_for_s: float) -> Finding:
-    """Judge how regularly the cell was heard. counts: of this test, which has listened for heard_for_s."""
+    """Judge how regularly the cell was heard. counts: of this test, which has listened for heard_for_s. One that is asked
+    misses what it did not answer: its readings come as often as somebody asks."""
     bound_s = known.settings.supervision.sample_timeout_s
     if intervals.median_s <= 0.0:
         if heard_for_s <= bound_s:
             return Finding(Item.CELL_LINE, NOT_TESTED, "it ended before a second reading was due")
         return Finding(Item.CELL_LINE, FAILED, "no reading came")
-    garbled, heard = (counts.garbled, counts.heard) if counts else (0, 0)
-    total = heard + garbled if heard else round(1.0 / intervals.median_s)
+    asked, heard, garbled = (counts.asked, counts.heard, counts.garbled) if counts else (0, 0, 0)
+    missing = max(0, asked - heard - 1) if asked else intervals.missing  # one may be out
+    total = asked or (heard + garbled if heard else round(1.0 / intervals.median_s))
     late = intervals.longest_s - intervals.median_s
     verdict = max(
-        _of_lost(max(garbled, intervals.missing), max(total, 1)),
+        _of_lost(max(garbled, missing), max(total, 1)),
         _above(late, _SLOW_SHARE * bound_s + intervals.median_s, bound_s),
     )
     text = (
-        f"{1.0 / intervals.median_s:.0f} readings per second, {intervals.missing} missing, {garbled} unreadable, longest gap "
+        f"{1.0 / intervals.median_s:.0f} readings per second, {missing} missing, {garbled} unreadable, longest gap "
         f"{1e3 * intervals.longest_s:.0f} ms of {1e3 * bound_s:.0f} ms, {_LOST_BOUNDS}"
     )
     return Finding(Item.CELL_LINE, verdict, text)
