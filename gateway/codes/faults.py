@@ -73,8 +73,10 @@ class FaultCode(IntEnum):
             "A302",
             "force has the wrong sign",
             "The voltage rose in contact and the measured force fell.",
-            "The load cell's signal wires are exchanged, or it is mounted the other way round.",
-            "Exchange SIG+ and SIG-, or set `sign: -1` under load_cell in the rig file.",
+            "The load cell's signal wires are exchanged, or it is mounted the other way round; only pushing, or only "
+            "pulling: the valve has not moved.",
+            "Exchange SIG+ and SIG-, or set `sign: -1` under load_cell in the rig file; look at the valve's "
+            "coil and pilot air.",
         ),
     )
     GAIN_WRONG = (

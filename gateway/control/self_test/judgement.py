@@ -94,14 +94,14 @@ class Known:
         return self.settings.supervision.response_lag_s
 
 
-def judge_rest(rest: Trace, known: Known) -> tuple[Finding, ...]:
-    """Judge the readings without a force: noise, resolution, zero."""
+def judge_rest(rest: Trace, known: Known, weight_n: float = 0.0) -> tuple[Finding, ...]:
+    """Judge the readings without a force: noise, resolution, zero. weight_n: as of `judge_zero`."""
     is_silent = is_constant(rest)
     noise = Finding(Item.NOISE, NOT_TESTED, "all readings are the same")
     return (
         noise if is_silent else judge_noise(noise_n(rest), known),
         judge_resolution(count_n(rest), len(rest), known),
-        judge_zero(mean_n(rest), known),
+        judge_zero(mean_n(rest), known, weight_n),
     )
 
 
@@ -143,15 +143,17 @@ def _judge_constant(readings: int, known: Known) -> Finding:
     return Finding(Item.RESOLUTION, NOT_TESTED, f"{text}: this cell is too quiet, only a force could tell")
 
 
-def judge_zero(rest_n: float, known: Known) -> Finding:
-    """Judge the force at rest: not more than what friction may keep pressed, and the bound of the rig."""
+def judge_zero(rest_n: float, known: Known, weight_n: float = 0.0) -> Finding:
+    """Judge the force at rest: not more than what friction may keep pressed, and the bound of the rig. weight_n: of the
+    payload along the tool, negative where it points up: in the air the cell feels it, on a workpiece it does not."""
     assert known.settings.self_test
     fails_n = known.settings.self_test.zero_n
     rising_n, falling_n = known.model.branch_forces_n(known.rest_v)
     kept_n = _KEPT * max(falling_n, 0.0)
-    off_n = max(min(rising_n, 0.0) - rest_n, rest_n - kept_n)
+    off_n = max(min(rising_n, 0.0) - max(weight_n, 0.0) - rest_n, rest_n - kept_n - max(-weight_n, 0.0))
     what = "the safe voltage and friction" if known.rest_v > 0.0 else "friction"
     kept = f" beyond the {kept_n:.1f} N that {what} may keep" if kept_n > 0.05 else ""
+    kept += f" and the payload's {abs(weight_n):.1f} N" if abs(weight_n) > 0.05 else ""
     text = f"{rest_n:+.2f} N at rest, {_bounds(0.5 * fails_n, fails_n, 'N', 2)}{kept}"
     cure = "; lift the tool and tare" if off_n > 0.5 * fails_n else ""
     return Finding(Item.ZERO, _above(off_n, 0.5 * fails_n, fails_n), text + cure)
@@ -251,21 +253,23 @@ def judge_output_line(counts: WireCounts | None, slowest_s: float, known: Known)
 
 
 def judge_cell_line(intervals: Intervals, counts: WireCounts | None, known: Known, heard_for_s: float) -> Finding:
-    """Judge how regularly the cell was heard. counts: of this test, which has listened for heard_for_s."""
+    """Judge how regularly the cell was heard. counts: of this test, which has listened for heard_for_s. One that is asked
+    misses what it did not answer: its readings come as often as somebody asks."""
     bound_s = known.settings.supervision.sample_timeout_s
     if intervals.median_s <= 0.0:
         if heard_for_s <= bound_s:
             return Finding(Item.CELL_LINE, NOT_TESTED, "it ended before a second reading was due")
         return Finding(Item.CELL_LINE, FAILED, "no reading came")
-    garbled, heard = (counts.garbled, counts.heard) if counts else (0, 0)
-    total = heard + garbled if heard else round(1.0 / intervals.median_s)
+    asked, heard, garbled = (counts.asked, counts.heard, counts.garbled) if counts else (0, 0, 0)
+    missing = max(0, asked - heard - 1) if asked else intervals.missing  # one may be out
+    total = asked or (heard + garbled if heard else round(1.0 / intervals.median_s))
     late = intervals.longest_s - intervals.median_s
     verdict = max(
-        _of_lost(max(garbled, intervals.missing), max(total, 1)),
+        _of_lost(max(garbled, missing), max(total, 1)),
         _above(late, _SLOW_SHARE * bound_s + intervals.median_s, bound_s),
     )
     text = (
-        f"{1.0 / intervals.median_s:.0f} readings per second, {intervals.missing} missing, {garbled} unreadable, longest gap "
+        f"{1.0 / intervals.median_s:.0f} readings per second, {missing} missing, {garbled} unreadable, longest gap "
         f"{1e3 * intervals.longest_s:.0f} ms of {1e3 * bound_s:.0f} ms, {_LOST_BOUNDS}"
     )
     return Finding(Item.CELL_LINE, verdict, text)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import ceil, sqrt
+from math import ceil, inf, sqrt
 from statistics import fmean, median
 from typing import Final, NamedTuple
 
@@ -97,9 +97,9 @@ def still_rises(trace: Trace, noise_n: float) -> bool:
     return mean_n(now) - mean_n(before) > max(_STILL_N, 3.0 * error_n)
 
 
-def rate_n_per_s(trace: Trace) -> float:
-    """Return how fast the force rises at the end of the trace, N/s; 0 where it does not, or nobody knows."""
-    now, before = _neighbours(trace, _RATE_S)
+def rate_n_per_s(trace: Trace, floor_n: float = -inf) -> float:
+    """Return how fast the force rises above floor_n at the end of the trace, N/s; 0 where it does not, or nobody knows."""
+    now, before = ([(at_s, max(force_n, floor_n)) for at_s, force_n in part] for part in _neighbours(trace, _RATE_S))
     return max(0.0, mean_n(now) - mean_n(before)) / _RATE_S if now and before else 0.0
 
 

@@ -82,7 +82,7 @@ class SelfTestRun:
         self._trace: list[tuple[float, float]] = []
         self._all: list[tuple[float, float]] = []
         self._volts = known.rest_v
-        self._rest_n = self._first_n = self._second_n = 0.0
+        self._rest_n = self._first_n = self._second_n = self._weight_n = 0.0
         self._first_count = 0
         self.noise_n = 0.0
         self._lines, self._leaps = LineWatch(), LeapLimit()
@@ -136,6 +136,7 @@ class SelfTestRun:
         if reading.is_new and reading.is_usable:
             at_s = now_s - reading.age_s
             believed_n = self._leaps.take(reading.cell_n)
+            self._weight_n = reading.contact_n - reading.cell_n
             self._trace.append((at_s - self._stage_s, believed_n))
             self._all.append((at_s, believed_n))
             self._lines.note_reading(at_s)
@@ -193,7 +194,7 @@ class SelfTestRun:
             self._end()
             return
         self.noise_n, self._rest_n = noise_n(rest), mean_n(rest)
-        for finding in judgement.judge_rest(rest, known):
+        for finding in judgement.judge_rest(rest, known, self._weight_n):
             self._set(finding)
         if self._force_n <= 0.0:
             self._leave_force("self_test.force_n is 0: nothing moves")
@@ -260,7 +261,8 @@ class SelfTestRun:
         expected_n = self._levels.expected_n(self._volts) - self._levels.base_n
         least_fall_n = max(_LEAST_FALL_N, _SURE_SIGMAS * self.noise_n / sqrt(count))
         if self._stage is _Stage.FIRST:  # whose scale nobody knows yet
-            force_n += rate_n_per_s(self._trace) * self._known.response_s  # what dead time and lags still hold back
+            # what dead time and lags still hold back; of a payload that is set down there is no more to come
+            force_n += rate_n_per_s(self._trace, self._levels.base_n) * self._known.response_s
         if force_n >= (1.0 - NEAR_SHARE) * self._force_n:
             self._stop_below(force_n)
         elif expected_n >= _LEAST_EXPECTED_N and self._rest_n - force_n >= least_fall_n:

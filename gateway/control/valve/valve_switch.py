@@ -5,6 +5,7 @@ is held at 0. Where the valve is told to go: while the output is enabled by cont
 else where the rig says (`valve.safe`), so that a disable, a fault and a restart lead there.
 """
 
+from dataclasses import replace
 from math import inf
 from typing import Final
 
@@ -82,10 +83,14 @@ class ValveSwitch:
     def blame(self, now_s: float, cause: StopCause | None) -> StopCause | None:
         """Return the first cause, where the valve counts as well. cause: what others have found goes before, but for a force
         that went the wrong way while the valve stands elsewhere: who then turns the cell round has two faults."""
-        if cause and cause.fault is FaultCode.SIGN_INVERTED and self._differs_s < inf:
-            observation = f"the valve reads back {self._status.stands} and was told {self.commanded}"
+        if cause is None or cause.fault is not FaultCode.SIGN_INVERTED:
+            return cause or self.first_cause(now_s)
+        stands = self._status.stands
+        if self._differs_s < inf:
+            observation = f"the valve reads back {stands} and was told {self.commanded}"
             return stop_cause(FaultCode.VALVE_ALTERED, f"{observation}: the force has turned with it")
-        return cause or self.first_cause(now_s)
+        doubt = f"or the valve stands elsewhere than its relay reads back ({stands}): coil, spool or pilot air"
+        return replace(cause, sentence=f"{cause.sentence}; {doubt}")
 
     def first_cause(self, now_s: float) -> StopCause | None:
         """Return the fault of the valve, None where there is none."""
@@ -101,7 +106,8 @@ class ValveSwitch:
         if now_s - self._differs_s > bound_s:
             observation = f"the valve reads back {status.stands} and was told {self.commanded}"
             said = f": {suspects}" if (suspects := _suspects(status)) else ""
-            return stop_cause(FaultCode.VALVE_ALTERED, f"{observation} {1e3 * bound_s:.0f} ms ago{said}")
+            lasts = f"for {1e3 * (now_s - self._differs_s):.0f} ms, allowed {1e3 * bound_s:.0f} ms"
+            return stop_cause(FaultCode.VALVE_ALTERED, f"{observation}, {lasts}{said}")
         return None
 
 

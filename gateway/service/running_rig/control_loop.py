@@ -126,10 +126,11 @@ class ControlLoop:
             if isinstance(message, ForceSample):
                 self.sample, fresh = message, True
                 self.samples += 1
-                self.cell_counts.heard += 1
-            elif isinstance(message, Garbage):
+            if isinstance(message, Garbage):
                 self.cell_counts.garbled += 1
                 self.cell_garbage_bytes += len(message.data)
+            else:
+                self.cell_counts.heard += 1
         if fresh:
             self._heard_s = now_s
             self._step(now_s)

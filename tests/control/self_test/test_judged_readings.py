@@ -45,6 +45,11 @@ REGULAR = Intervals(0.01, 0.012, 0)
         (REGULAR._replace(longest_s=0.0449), None, PASSED),  # half of 50 ms, and an interval beside the usual one
         (REGULAR._replace(longest_s=0.0451), None, WARNED),
         (REGULAR._replace(longest_s=0.0601), None, FAILED),
+        (REGULAR._replace(missing=70), WireCounts(1000, 999, 0), PASSED),  # asked a tick later: nothing was lost
+        (REGULAR, WireCounts(100, 97, 0), PASSED),  # one may be out
+        (REGULAR, WireCounts(100, 96, 0), WARNED),
+        (REGULAR, WireCounts(100, 88, 0), FAILED),
+        (REGULAR, WireCounts(100, 99, 11), FAILED),
         (Intervals(0.0, 0.0, 0), None, FAILED),
         (Intervals(3.0, 3.0, 3), None, FAILED),
     ],

@@ -83,10 +83,10 @@ def test_a_fault_of_the_valve_is_one_behind_its_bound_and_not_at_it(status: Valv
 @pytest.mark.parametrize(
     ("status", "words"),
     [
-        (ValveStatus(PULL), "told push 500 ms ago"),
+        (ValveStatus(PULL), "told push, for 562 ms, allowed 500 ms"),
         (
             ValveStatus(PULL, said="exception 2"),
-            "told push 500 ms ago: it says exception 2; address, channel or profile",
+            "told push, for 562 ms, allowed 500 ms: it says exception 2; address, channel or profile",
         ),
         (ValveStatus(PUSH, 0.0), "allowed 500 ms: power or wires"),
         (
@@ -109,3 +109,23 @@ def test_what_others_have_found_goes_before_a_fault_of_the_valve() -> None:
     alone, lost = switch.blame(0.0, None), stop_cause(FaultCode.CELL_LOST, "its plug")
     assert alone and alone.fault is FaultCode.VALVE_SILENT
     assert switch.blame(0.0, lost) == lost
+
+
+@pytest.mark.parametrize("stands", [PUSH, PULL])
+def test_a_force_that_goes_the_wrong_way_may_be_a_valve_whose_relay_alone_has_moved(stands: ValveDirection) -> None:
+    """Who exchanged the cell's wires for a coil without power had two faults, and a push that was wrong, too."""
+    switch = ValveSwitch(SETTINGS)
+    for k in range(9):
+        switch.step(0.0625 * k, stands, ValveStatus(stands), is_vented=True)
+    cause = switch.blame(0.5, stop_cause(FaultCode.SIGN_INVERTED, "swap the wires"))
+    assert cause and cause.fault is FaultCode.SIGN_INVERTED
+    assert f"swap the wires; or the valve stands elsewhere than its relay reads back ({stands})" in cause.sentence
+
+
+def test_how_long_it_stands_elsewhere_is_told_as_it_is() -> None:
+    """An hour later it was still told to have been told half a second ago."""
+    switch = ValveSwitch(SETTINGS)
+    for k in range(9):
+        switch.step(0.0625 * k, PUSH, ValveStatus(PULL), is_vented=True)
+    cause = switch.first_cause(3600.0)
+    assert cause and "told push, for 3600000 ms, allowed 500 ms" in cause.sentence
