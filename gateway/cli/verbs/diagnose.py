@@ -53,7 +53,7 @@ EXAMPLES = ("diagnose press.csv --report why.html", "diagnose press.csv --rig de
 
 def _not_an_option(context: click.Context, parameter: click.Parameter, value: Path | None) -> Path | None:
     """Of every other verb --json is a flag: `--json --state DIR` took --state for its file, and DIR for a recording."""
-    if value is not None and str(value).startswith("--"):
+    if value is not None and value.name[:2] == "--":
         raise click.BadParameter(f"{value} is no file: OUT is missing; - is stdout")
     return value
 

@@ -303,7 +303,7 @@ class ControlLoop:
         if self.controller.active_run.self_test is not self._shown_self_test:
             self._show_self_test()
         for event in decision.events:
-            self._log(cause_of(event), event)
+            self._log(cause_of(event, self.controller.active_run.self_test), event)
 
     def _status(self) -> Status:
         """What the registers show of the last decision, put together by the read that asks for it."""

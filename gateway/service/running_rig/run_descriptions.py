@@ -2,16 +2,16 @@
 the lines of a self-test are told apart in the log."""
 
 from dataclasses import asdict
-from typing import Any, Final
+from typing import Any
 
 from gateway.control.runs.active_run import RecordedPlan, RecordedRun
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.experiment_run import ExperimentRun
+from gateway.control.self_test.items import SelfTestReport
 from gateway.profiles.kinds.plans import plan_document
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
 
 Answer = dict[str, Any]
-_REPORT_BEGINS: Final = len("A354 self-test ")
 
 
 def describe_experiment(plan: RecordedPlan) -> Answer:
@@ -49,8 +49,7 @@ def header_of_plan(run: RecordedRun) -> Answer:
     return {"ladder": asdict(run.plan) | {"stairs": len(run.stairs), "top_v": top_v}}
 
 
-def cause_of(event: str) -> str:
+def cause_of(event: str, report: SelfTestReport) -> str:
     """Return the cause by which the lines of what control has said are limited. A self-test's report is as many as are told in
     a second: with it all that comes then was left out, its result, its end and a fault right behind it."""
-    is_report = "self-test " in event[:_REPORT_BEGINS] and ": " in event
-    return "control self-test" if is_report else "control"
+    return "control self-test" if event in report.sentences else "control"
