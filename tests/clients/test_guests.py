@@ -138,3 +138,35 @@ def test_a_force_that_another_master_has_taken_over_is_asked_to_be_taken_back_no
     cycles(client, 9)
     assert len(gateway.exceptions) <= max(2, refused) and client.ended
     assert gateway.bank.owner == OTHER.host
+
+
+@pytest.mark.parametrize("asked", ["pull", "tare"])
+def test_a_pull_or_a_tare_does_not_undo_a_stop_of_since_the_last_cycle(
+    client: Any, gateway: GatewayAtHand, asked: str
+) -> None:
+    """It goes out in a whole command, enable in it. A PLC has a status that is no older than its last request."""
+    if isinstance(client, Plc):
+        pytest.skip("asks without a pause")
+    client.enable(12.0)
+    cycles(client)
+    gateway.stop_from_elsewhere()
+    client.pull(pulls=True) if asked == "pull" else client.tare()
+    cycles(client)
+    assert not any(words[0] & 1 for words in gateway.words[-4:] if words[0] not in (0, 1)), "no enable beside it"
+    assert gateway.bank.command.control_word & 1 == 0 and client.ended and not client.enabled
+    client.enable(12.0)
+    cycles(client)
+    assert gateway.bank.command.control_word == (17 if asked == "pull" else 1)
+
+
+def test_a_pull_and_a_tare_go_out_while_the_force_stands(client: Any, gateway: GatewayAtHand) -> None:
+    client.enable(12.0)
+    cycles(client)
+    client.pull(pulls=True)
+    cycles(client)
+    assert gateway.bank.command.control_word == 17 and client.enabled
+    client.tare()
+    client.force(13.0)
+    cycles(client)
+    assert 21 in [words[0] for words in gateway.words] and gateway.bank.command.force_setpoint_n == 13.0
+    assert client.enabled and not client.ended and not gateway.exceptions

@@ -532,7 +532,13 @@ int fg_exchange(fg_client *client) {
     if (result != FG_OK) return result;
     if (!changed && client->want[FG_CONTROL_WORD] == 0) return fg_refresh(client);
     if ((result = fg_prove_byte_order(client)) != FG_OK) return result;
-    if (!client->seen && (result = fg_refresh(client)) != FG_OK) return result;
+    /* Enable goes out beside a pull or an edge: behind a stop of since the last exchange it would be a new rise. */
+    if (!client->seen || (client->good[FG_CONTROL_WORD] & client->want[FG_CONTROL_WORD] & FG_ENABLE && changed &&
+                          !client->off_pending && !fg_first_to_write(client))) {
+        if ((result = fg_refresh(client)) != FG_OK) return result;
+        changed = fg_has_changed(client);
+        if (!changed && client->want[FG_CONTROL_WORD] == 0) return FG_OK;
+    }
     /* Behind a loss OFF goes alone: what is asked for since then waits, for its refusal would be that of OFF. */
     memcpy(sent, client->off_pending ? client->good : client->want, sizeof sent);
     if (client->once & FG_RESET_FAULT) sent[FG_CONTROL_WORD] = sent[FG_FORCE_SETPOINT] = 0; /* an enable behind it waits */

@@ -241,6 +241,11 @@ ${crc_table}];
       IF NOT fgConnected RETURN;
     ENDIF
     FgCollect;
+    IF FgRepeatsEnable() THEN
+      ! Behind a stop of since the last cycle it would be a new rise
+      FgReadStatus;
+      FgCollect;
+    ENDIF
     IF FgHasChanged() THEN
       FgWriteAndRead FgFirstToWrite(),COMMAND_WORDS;
     ELSEIF nWant{FG_C_CONTROL_WORD}<>0 THEN
@@ -351,6 +356,13 @@ ${crc_table}];
       IF nWant{i}<>nGood{i} RETURN TRUE;
     ENDFOR
     RETURN FALSE;
+  ENDFUNC
+
+  ! Does enable go out beside a pull or an edge, while it stands?
+  LOCAL FUNC bool FgRepeatsEnable()
+    IF bOffPending OR (NOT FgIsOn()) RETURN FALSE;
+    IF NOT FgHasBit(nWant{FG_C_CONTROL_WORD},FG_ENABLE) RETURN FALSE;
+    RETURN FgHasChanged() AND FgFirstToWrite()=1;
   ENDFUNC
 
   ! Where the words begin that go out, from 1. Enable only where it
