@@ -31,6 +31,11 @@ _STEM: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _NOT_OF_PROGRAMS: Final = frozenset("'\"\\$*?[")  # what systemd takes in no path of a program
 _NAMED_NETWORKS: Final = ("any", "localhost", "link-local", "multicast")
 
+_FOR_EVER: Final = (
+    "nothing deletes recordings here, and one that is left on takes 1 GB a day; a rig's "
+    "recordings: {retention: {bytes: 20000000000, days: 90}} does"
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Installation:
@@ -80,7 +85,8 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
             ("systemctl", "daemon-reload"),
             ("systemctl", "enable", "--now", options.name),
         ),
-        () if networks else _faces_cut_off(rig, options.networks),
+        (() if networks else _faces_cut_off(rig, options.networks))
+        + ((_FOR_EVER,) if rig.retention.is_unlimited else ()),
     )
 
 
