@@ -182,7 +182,7 @@ class AuditFile:
                 found.append({"what": BROKEN, "text": text})
                 self._end = ChainEnd(first_number(path) + count - 1, NO_HASH)
         elif first_number(path) > 1:  # begun, and killed before its first line: the end is in the file before
-            before = audit_files(self._folder)[:-1]
+            before = [each for each in audit_files(self._folder) if first_number(each) < first_number(path)]
             return (self._continue(before[-1]) if before else []) + found
         return found
 

@@ -37,6 +37,12 @@ _SECRET_WORD: Final = re.compile(
     r"(?!\(left out)[^\s\"',;}\]]+",
     re.I,
 )
+_SECRET_COMMENT: Final = re.compile(
+    r"((?:^|(?<=\s))#[^\n]*?(?:passwor[dt]|passwd|pwd|token|secret|passphrase|credential|api[_-]?key|\bpsk\b|\bpw\b))"
+    r"[^\n]*",
+    re.I | re.M,
+)
+"""A comment may tell one in a sentence: `the old token was ...`. What follows the word goes, whatever it is."""
 _IN_SECTION: Final = re.compile(r'(\b(?:web|mqtt)[\w.]*: \\?")[^"\\\n]+(?=\\?")')
 """What a fault quotes of the sections that hold secrets: `web: "TOKEN" is not a group of keys`."""
 _KNOWN_KEY: Final = (
@@ -88,7 +94,7 @@ def collect(state: Path, rig_texts: Callable[[], Iterable[tuple[str, str]]]) -> 
     redact = Redaction()
     parts: dict[str, Callable[[], str]] = {
         "versions.json": lambda: json.dumps(_versions(), indent=2),
-        "rig.txt": lambda: "\n".join(f"# {name}\n{text}" for name, text in rig_texts()),
+        "rig.txt": lambda: "\n".join(f"# {name}\n{_without_told_secrets(text)}" for name, text in rig_texts()),
         "events.jsonl": lambda: _newest_events(state),
         "live.json": lambda: json.dumps(_ask(state, "state"), indent=2),
         "health.json": lambda: json.dumps(_ask(state, "health"), indent=2),
@@ -116,6 +122,10 @@ def pack_bundle(parts: dict[str, str], target: Path) -> None:
         beside.replace(target)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def _without_told_secrets(text: str) -> str:
+    return _SECRET_COMMENT.sub(r"\1 (left out)", text)
 
 
 def _as_text(said: str) -> str:

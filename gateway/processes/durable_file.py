@@ -162,6 +162,27 @@ def give_to_owner(made: int, name: str, folder: int) -> None:
             os.fchown(made, owner.st_uid, owner.st_gid)
 
 
+def give_all_to_owner(directory: Path) -> None:
+    """Have all that root has made in the directory of somebody belong to that one; it itself to whose folder it is in."""
+    if os.geteuid():
+        return
+    with contextlib.suppress(OSError):
+        _give_by_name(directory.name, os.open(directory.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC))
+        for _, folders, files, descriptor in os.fwalk(directory) if directory.stat().st_uid else ():
+            for name in (*folders, *files):
+                _give_by_name(name, os.dup(descriptor))
+
+
+def _give_by_name(name: str, folder: int) -> None:
+    """folder: a descriptor, closed behind it. A link, a pipe or a device is not opened."""
+    flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    with closing_descriptor(folder), contextlib.suppress(OSError):
+        facts = os.stat(name, dir_fd=folder, follow_symlinks=False)
+        if not facts.st_uid and (stat.S_ISREG(facts.st_mode) or stat.S_ISDIR(facts.st_mode)):
+            with closing_descriptor(os.open(name, flags, dir_fd=folder)) as made:
+                give_to_owner(made, name, folder)
+
+
 def add_checksum(text: str) -> bytes:
     """Return the text with the CRC-32 of its bytes in a line before it."""
     data = text.encode()

@@ -142,3 +142,19 @@ def test_a_next_file_that_the_disk_refuses_costs_no_line_and_doubles_none(
     assert [record["old"] for record in read_audit(tmp_path)] == list(range(1, LINES + 3))
     assert not verify_audit(tmp_path).broken
     assert [len(path.read_bytes()) > FILE_BYTES for path in audit_files(tmp_path / "audit")] == [True, False]
+
+
+def test_a_start_behind_files_that_a_broken_disk_has_emptied_goes_on_behind_the_last_line_that_is_left(
+    state: Path,
+) -> None:
+    """Two empty ones, and no start found the end of the chain: nothing was kept any more."""
+    *whole, last, newest = audit_files(state / "audit")
+    end = [json.loads(line)["n"] for path in whole for line in path.read_bytes().splitlines()][-1]
+    for path in (last, newest):
+        path.write_bytes(b"")
+    file = AuditFile(state, 1 << 20)
+    assert [text[:4] for text in file.append([{"what": "start"}])] == ["A352"]
+    file.close()
+    told = [fields for fields in read_audit(state) if fields["n"] > end]
+    assert [each["what"] for each in told] == ["chain broken", "start"]
+    assert verify_audit(state).broken

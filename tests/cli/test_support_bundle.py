@@ -59,6 +59,23 @@ def test_a_secret_in_a_comment_or_in_the_middle_of_a_sentence_does_not_go_in_eit
     assert "@broker failed" in text
 
 
+@pytest.mark.parametrize(
+    "comment",
+    [
+        "# the old token was s3cr3t-abc",
+        "limits: 3  # password of the router is s3cr3t-abc, ask Anna",
+        "#PSK s3cr3t-abc",
+        "  # Passwort für den Broker: >>s3cr3t abc<<",
+        "# wifi passphrase 's3cr3t one two'",
+    ],
+)
+def test_a_secret_that_a_comment_of_a_rig_tells_in_a_sentence_does_not_go_in(comment: str, tmp_path: Path) -> None:
+    text = f"name: cell  # token ring, pinned, of hall 3\n{comment}\nforce_max_n: 50  # of the tool, pin 3\n"
+    told = collect(with_events(tmp_path / "state"), lambda: [("cell.yaml", text)])["rig.txt"]
+    assert "s3cr3t" not in told and "one two" not in told and "(left out)" in told
+    assert "name: cell  # token (left out)" in told and "force_max_n: 50  # of the tool, pin 3" in told
+
+
 def test_what_a_fault_quotes_of_a_section_with_secrets_does_not_go_in(tmp_path: Path) -> None:
     """A token that stands where its section should be was in the sentence that says so."""
     rig = tmp_path / "cell.yaml"

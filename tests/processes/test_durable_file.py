@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gateway.processes import durable_file
-from gateway.processes.durable_file import lock_directory, make_directory, read_object, write_durably
+from gateway.processes.durable_file import give_all_to_owner, lock_directory, make_directory, read_object, write_durably
 
 
 def mode_of(path: Path) -> int:
@@ -160,3 +160,25 @@ def test_a_folder_that_root_makes_is_that_of_whose_state_it_is_in(tmp_path: Path
         write_durably(descriptor, "reference.json", b"{}")
     for path in (tmp_path / "reference", tmp_path / "reference" / "reference.json"):
         assert (path.stat().st_uid, path.stat().st_gid) == (501, 502)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+def test_all_that_root_has_left_in_a_folder_of_somebody_is_theirs_and_nothing_else_is(tmp_path: Path) -> None:
+    state, elsewhere = tmp_path / "state", tmp_path / "elsewhere"
+    (state / "recordings").mkdir(parents=True)
+    for path in (elsewhere, state / "events.jsonl", state / "recordings" / "0001.fgr", state / "second-name"):
+        path.write_bytes(b"")
+    (state / "link").symlink_to(elsewhere)
+    (state / "second-name").unlink()
+    (state / "second-name").hardlink_to(elsewhere)
+    give_all_to_owner(state)
+    assert state.stat().st_uid == (state / "events.jsonl").stat().st_uid == 0, "root's own stays root's"
+    os.chown(state, 501, 502)
+    give_all_to_owner(state)
+    given = [path for path in state.rglob("*") if (path.lstat().st_uid, path.lstat().st_gid) == (501, 502)]
+    assert sorted(path.name for path in given) == ["0001.fgr", "events.jsonl", "recordings"]
+    assert elsewhere.stat().st_uid == 0
+    (state / "of another rig").mkdir()
+    give_all_to_owner(state / "of another rig")
+    assert (state / "of another rig").stat().st_uid == 501
+    give_all_to_owner(tmp_path / "none" / "none")

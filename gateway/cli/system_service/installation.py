@@ -31,14 +31,20 @@ _STEM: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _NOT_OF_PROGRAMS: Final = frozenset("'\"\\$*?[")  # what systemd takes in no path of a program
 _NAMED_NETWORKS: Final = ("any", "localhost", "link-local", "multicast")
 
+_FOR_EVER: Final = (
+    "nothing deletes recordings here, and one that is left on takes 1 GB a day; a rig's "
+    "recordings: {retention: {bytes: 20000000000, days: 90}} does"
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Installation:
-    """files: path below the root -> text; commands: what is run behind them, in order."""
+    """files: path below the root -> text; commands: what is run behind them, in order; notes: what to know of it besides."""
 
     unit: str
     files: dict[str, str]
     commands: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
 
 
 def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], command: Path | None) -> Installation:
@@ -54,8 +60,7 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
         raise CliError(f"E107 {named}: its name names the unit: letters, digits, _ . - only", exit_codes.CONFIGURATION)
     _refuse_no_networks(networks)
     lines = (rig.output, rig.load_cell, *([rig.valve] if rig.valve else []))
-    faces = [face.port for face in rig.fieldbus if isinstance(face, RtuFace)]
-    ports = [line.port for line in lines] + faces
+    ports = [line.port for line in lines] + [face.port for face in rig.fieldbus if isinstance(face, RtuFace)]
     options = unit_file.UnitOptions(
         command=program,
         rig=named,
@@ -80,6 +85,8 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
             ("systemctl", "daemon-reload"),
             ("systemctl", "enable", "--now", options.name),
         ),
+        (() if networks else _faces_cut_off(rig, options.networks))
+        + ((_FOR_EVER,) if rig.retention.is_unlimited else ()),
     )
 
 
@@ -194,6 +201,17 @@ def _addresses_of(rig: "Rig") -> list[str]:
     secure = [face.bind for face in rig.fieldbus if isinstance(face, TlsFace)]
     for_people = [split_listen(face.listen)[0] for face in (rig.web, rig.metrics, rig.opcua) if face]
     return [*([rig.network.bind] if rig.network.plain else []), *secure, *for_people]
+
+
+def _faces_cut_off(rig: "Rig", networks: Sequence[str]) -> tuple[str, ...]:
+    """Return a sentence for each face of people's that listens for others: its users are named nowhere in the rig."""
+    where = ", ".join(networks)
+    faces = {"the page": rig.web, "the metrics": rig.metrics, "the OPC UA server": rig.opcua}
+    return tuple(
+        f"{name} ({face.listen}) is reached from {where} alone: --allow NETWORK, once for each, says otherwise"
+        for name, face in faces.items()
+        if face and not ip_address(split_listen(face.listen)[0]).is_loopback
+    )
 
 
 def _is_own_address(address: str) -> bool:

@@ -39,7 +39,7 @@ def show_command(*, after: str, peer: str | None, as_json: bool, state: StateCho
     _directory_of(state)
     left_out: list[None] = []
     for record in read_audit(state.directory, lambda: left_out.append(None)):
-        if record.get("time", "") >= after and (peer is None or peer in str(record.get("peer", ""))):
+        if str(record.get("time", "")) >= after and (peer is None or peer in str(record.get("peer", ""))):
             click.echo(json.dumps(record) if as_json else format_record(record))
     if left_out:
         lines = "1 line was" if len(left_out) == 1 else f"{len(left_out)} lines were"
@@ -75,7 +75,14 @@ def verify_command(*, as_json: bool, state: StateChoice) -> None:
 
 
 def format_record(record: dict[str, Any]) -> str:
-    """Return one record for people."""
+    """Return one record for people; as JSON where it is none of ours, though its hash fits."""
+    try:
+        return _in_words(record)
+    except (TypeError, ValueError, KeyError):
+        return json.dumps(record)
+
+
+def _in_words(record: dict[str, Any]) -> str:
     who = f"{record.get('peer', '')} {record.get('role', '')}".strip()
     words = [str(record.get("n", "")).rjust(6), record.get("time", ""), f"{record.get('result', '-'):<8}", who]
     words.append(str(record.get("what", "")))

@@ -58,6 +58,8 @@ def install_command(*, rig: str, dry_run: bool, networks: tuple[str, ...], progr
     written, ran = install(plan, root)
     for path in written:
         click.echo(f"wrote {path}")
+    for note in plan.notes:
+        click.echo(note)
     if ran:
         click.echo(
             f"{plan.unit} ran already and goes on as it was: systemctl restart {plan.unit} takes what is new (the force is "

@@ -30,7 +30,6 @@ _REFUSALS: Final = {
     _NO_ROOT: "is of a CA that another one has signed, which the file of `ca` lacks (add it there)",
     _PURPOSE: "is not one for a server (a client's?)",
     _EXPIRED: "is of a CA that has expired, as all that it has signed",
-    _NOT_YET: "is of a CA that is not valid yet (this machine's clock?)",
 }
 _CURES: Final[dict[type[OSError], str]] = {
     FileNotFoundError: _MAKE,
@@ -81,12 +80,17 @@ def check_tls_files(parts: Parts) -> Found:
 
 
 def check_tls_days(parts: Parts) -> Found:
-    """Yield a warning for a server's certificate that is about to expire, and for its CA's: with that all go."""
+    """Yield a warning for a server's certificate that is about to expire, and for its CA's: with that all go. And for one whose
+    days have not begun: as a rule nobody has set the clock yet, and behind a fault nobody would start a service again."""
     for path, face in tls_faces(parts):
         for name in CURES:
             file = str(getattr(face, name))
-            ends = end_of(name, _certificates(file))
-            if _utc() <= ends <= _utc(SOON_DAYS):
+            shown = _certificates(file)
+            begins = min((each.begins for each in shown[: None if name == "ca" else 1]), default="")
+            if _utc() < begins:
+                cure = "look at this machine's clock, or wait; until then no client connects"
+                yield f"{path}.{name}", f"E173 {file} is not valid before {day_of(begins)}: {cure}"
+            elif _utc() <= (ends := end_of(name, shown)) <= _utc(SOON_DAYS):
                 yield f"{path}.{name}", expiry_sentence(name, file, ends)
 
 
@@ -134,10 +138,7 @@ def _unfit(path: str, face: TlsFace) -> Found:
     if shown and now > shown.ends:
         cure = f"no client would connect; {_MAKE}"
         yield f"{path}.certificate", f"E173 {face.certificate} expired on {day_of(shown.ends)}: {cure}"
-    elif shown and now < shown.begins:
-        cure = "look at this machine's clock, or wait"
-        yield f"{path}.certificate", f"E173 {face.certificate} is not valid before {day_of(shown.begins)}: {cure}"
-    elif why := _refusal(server, client):
+    elif not (shown and now < shown.begins) and (why := _refusal(server, client)):
         cure = f"no client that trusts {face.ca} would connect; {_MAKE}"
         yield f"{path}.certificate", f"E175 {face.certificate} {why}: {cure}"
 
@@ -160,6 +161,8 @@ def _refusal(server: ssl.SSLContext, client: ssl.SSLContext) -> str:
         except ssl.SSLWantReadError:
             continue
         except ssl.SSLCertVerificationError as error:
+            if error.verify_code == _NOT_YET:  # of its CA: told as its days are
+                return ""
             return _REFUSALS.get(error.verify_code, "is not signed by the CA of this face")
         except ssl.SSLError:  # nothing that the files are to blame for
             break

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.processes import exit_codes, message_link, priority
+from gateway.processes.durable_file import give_all_to_owner
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
@@ -54,11 +55,18 @@ def run(options: RunOptions) -> int:
             return exit_codes.DEVICE
         priority.set_nice(priority.LOOP_NICE)
         too_few = raise_descriptor_limit()
-        with EventLog(source="guardian", file=EventFile(state)) as log, SignalPipe() as signals:
-            if too_few:
-                log("limit", too_few)
-            starter = ChildStarter(options.rig, simulate=options.simulate, state=state, say=partial(log, "children"))
-            return Guardian(options, state, starter, signals, log, manager=service_manager()).watch()
+        try:
+            with EventLog(source="guardian", file=EventFile(state)) as log, SignalPipe() as signals:
+                if too_few:
+                    log("limit", too_few)
+                starter = ChildStarter(
+                    options.rig, simulate=options.simulate, state=state, say=partial(log, "children")
+                )
+                return Guardian(options, state, starter, signals, log, manager=service_manager()).watch()
+        finally:
+            give_all_to_owner(
+                state
+            )  # a service could store nothing any more behind root, who has tried its rig by hand
 
 
 @dataclass

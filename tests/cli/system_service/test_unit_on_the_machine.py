@@ -3,12 +3,19 @@
 import os
 import re
 import resource
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from gateway import profiles
+from gateway.cli.main import command
 from gateway.cli.system_service.unit_file import UnitOptions, unit_text
 from gateway.processes import priority
+from gateway.profiles import load_rig
+from gateway.profiles.http_sections import Web
+from gateway.profiles.recordings_section import Retention
 
 UNIT = unit_text(UnitOptions(command=Path("/usr/bin/true"), rig="irc5-cell", stem="irc5-cell"))
 
@@ -40,3 +47,40 @@ def test_control_comes_before_other_programs_though_the_process_that_forks_it_do
 def test_a_helper_that_the_kernel_ends_for_want_of_memory_does_not_end_the_gateway() -> None:
     """systemd stops a unit of which it ends anybody unless it is told not to: the force went with the residual watch."""
     assert setting("OOMPolicy", "stop") == "continue"
+
+
+@pytest.mark.parametrize(
+    ("listen", "allow", "told"),
+    [
+        (
+            "0.0.0.0:8080",
+            (),
+            "the page (0.0.0.0:8080) is reached from localhost, 192.168.125.0/24 alone: --allow NETWORK",
+        ),
+        ("127.0.0.1:8080", (), ""),
+        ("192.168.1.5:8080", ("--allow", "10.0.0.0/8"), ""),
+    ],
+)
+def test_who_installs_a_page_for_others_is_told_whom_the_kernel_lets_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, listen: str, allow: tuple[str, ...], told: str
+) -> None:
+    """By `run` the page was there, by the service it was not, and nothing said why."""
+    rig = replace(load_rig("irc5-cell"), web=Web(listen=listen, token="x" * 16))
+    monkeypatch.setattr(profiles, "load_rig", lambda name: rig)
+    words = ["service", "install", "irc5-cell", "--root", str(tmp_path), "--command", "/opt/force-gateway", *allow]
+    done = CliRunner().invoke(command, words)
+    assert done.exit_code == 0, done.output
+    said = [line for line in done.output.splitlines() if "reached from" in line]
+    assert [line.startswith(told) for line in said] == ([True] if told else [])
+
+
+@pytest.mark.parametrize("days", [None, 90.0])
+def test_who_installs_a_service_whose_recordings_nothing_deletes_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, days: float | None
+) -> None:
+    """A recording that somebody has left on fills the disk within weeks; recordings were said to be bounded."""
+    rig = replace(load_rig("irc5-cell"), retention=Retention(days=days))
+    monkeypatch.setattr(profiles, "load_rig", lambda name: rig)
+    words = ["service", "install", "irc5-cell", "--root", str(tmp_path), "--command", "/opt/force-gateway"]
+    said = CliRunner().invoke(command, words).output
+    assert ("nothing deletes recordings" in said) is (days is None), said

@@ -92,3 +92,22 @@ def test_a_summary_without_values_before_and_after_names_none(what: str, value: 
 def test_of_an_owner_that_came_or_went_nobody_is_told() -> None:
     assert format_record({"what": "owner", "old": None, "new": "10.0.0.5"}).endswith("owner  nobody -> 10.0.0.5")
     assert format_record({"what": "owner", "old": "10.0.0.5", "new": None}).endswith("owner  10.0.0.5 -> nobody")
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"time": 5, "what": "a"},
+        {"time": "2026", "what": "b", "result": None},
+        {"time": "2026", "count": 3, "seconds": "long"},
+        {"time": "2026", "count": 3, "seconds": 3.0, "min": "a"},
+    ],
+)
+def test_a_line_that_somebody_has_written_who_knows_how_hides_none_behind_it(tmp_path: Path, call, fields) -> None:
+    """`audit show` ended at it with an internal error."""
+    file = AuditFile(tmp_path)
+    file.append([fields, {"time": "2027-01-01T00:00:00.000Z", "what": "enable"}])
+    file.close()
+    for words in ((), ("--since", "2000-01-01"), ("--json",)):
+        shown = call("audit", "show", *words, "--state", tmp_path)
+        assert shown.exit_code == 0 and "enable" in shown.output.splitlines()[-1], shown.output

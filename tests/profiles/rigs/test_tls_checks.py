@@ -14,6 +14,7 @@ from gateway.fieldbus.peers import address_of
 from gateway.modbus import Peer
 from gateway.modbus.certificate import read_certificate
 from gateway.profiles import Report, check_report
+from gateway.profiles.rigs import tls_checks
 from gateway.profiles.rigs.faces import TlsFace
 from tests.certificates import serial_of, store_all
 from tests.other_kinds import never_waiting, put
@@ -199,6 +200,22 @@ def test_a_certificate_that_is_about_to_expire_is_a_warning_and_told_at_the_star
     warnings = found.warnings
     assert found.rig is not None and found.rig.notes[0].startswith("W246 ")
     assert any("W246 " in str(each) and "expires on 20" in str(each) for each in warnings)
+
+
+def test_a_clock_that_nobody_has_set_yet_is_told_and_ends_no_start(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A machine without a clock of its own has the time seconds after its boot. By then the service had ended with 78, and
+    systemd does not start again what ends so."""
+    monkeypatch.setattr(tls_checks, "_utc", lambda days=0: "19700101000012Z")
+    found = report(folder, files())
+    told = [str(each).split(" ", 1)[1] for each in found.warnings if "E173" in str(each)]
+    assert found.rig is not None and not found.faults
+    assert [each.split(" is not valid before 20")[0] for each in told] == [
+        f"fieldbus[0].certificate: E173 {folder}/gateway.crt",
+        f"fieldbus[0].ca: E173 {folder}/ca.crt",
+    ]
+    assert [note for note in found.rig.notes if "this machine's clock" in note]
 
 
 def test_an_owner_may_be_named_by_its_certificate(folder: Path) -> None:

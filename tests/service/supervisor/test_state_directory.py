@@ -64,3 +64,16 @@ def test_a_rig_without_a_given_directory_has_one_of_its_own_name(
     monkeypatch.delenv("XDG_STATE_HOME")
     monkeypatch.setenv("HOME", str(tmp_path))
     assert RunOptions(rig="left").state_directory == tmp_path / ".local" / "state" / "force-gateway" / "left"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+def test_a_state_that_root_has_run_on_is_its_owner_s_again(tmp_path: Path) -> None:
+    """`sudo force-gateway run` on the state of a service, to look at something: from then on that kept no event, no audit and
+    no recording, for want of a permission."""
+    (tmp_path / "of-service").mkdir()
+    os.chown(tmp_path / "of-service", 501, 502)
+    state = tmp_path / "of-service" / "cell"
+    (state / "recordings").mkdir(parents=True)
+    assert guardian.run(RunOptions(rig=str(tmp_path / "no-such-rig.yaml"), state=state)) == exit_codes.CONFIGURATION
+    assert {"events.jsonl", "recordings"} <= {path.name for path in state.iterdir()}
+    assert {(path.stat().st_uid, path.stat().st_gid) for path in (state, *state.rglob("*"))} == {(501, 502)}
