@@ -44,7 +44,8 @@ def read_certificate(der: bytes) -> PeerCertificate:
 
 def read_certificates(pem: bytes) -> list[PeerCertificate]:
     """Return what each certificate of a PEM text says, in order. ValueError where one cannot be read."""
-    _, *found = pem.decode("ascii").split(_BEGIN)
+    text = pem.decode("latin-1")  # notes between them may be in any encoding, OpenSSL passes over them
+    _, *found = text.split(_BEGIN)
     return [read_certificate(PEM_cert_to_DER_cert(_BEGIN + each.split(_END, 1)[0] + _END)) for each in found]
 
 

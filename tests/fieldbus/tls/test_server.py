@@ -11,7 +11,7 @@ from gateway.fieldbus import ServerSettings
 from gateway.fieldbus.peers import Peers
 from gateway.fieldbus.tls_settings import certificate_refusal, handshake_failure
 from gateway.modbus import Role, pdu
-from gateway.modbus.certificate import ROLES, PeerCertificate, read_certificate
+from gateway.modbus.certificate import ROLES, PeerCertificate, read_certificate, read_certificates
 from tests.certificates import Folder, serial_of
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
 from tests.fieldbus.tls.by_hand import NOW, REFUSED, VERSIONS, Face, client, face
@@ -161,6 +161,13 @@ def test_our_reading_of_a_certificate_is_that_of_openssl(folder: Folder) -> None
         "roleless": None,
         "gateway": None,
     }
+
+
+def test_notes_in_a_file_of_certificates_hide_none_of_them(folder: Folder) -> None:
+    """As `openssl pkcs12` writes them. Nobody was told that such a certificate is about to end."""
+    pem = Path(folder.crt("gateway")).read_bytes()
+    noted = "Bag Attributes\n    friendlyName: Zelle Süd\n".encode() + pem
+    assert read_certificates(noted + noted) == read_certificates(pem) * 2
 
 
 def role_of(folder: Folder, name: str) -> str | None:
