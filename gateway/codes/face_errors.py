@@ -61,8 +61,8 @@ FACE_ERRORS: Final = (
         "E181",
         "the MQTT broker is away",
         "No connection to the broker of the rig's section `mqtt`, or it broke. Control goes on; data is kept and sent later.",
-        "The broker is down, mqtt.host or mqtt.port is another, it refuses user or password, or a second gateway of this name "
-        "takes our place there.",
+        "The broker is down, mqtt.host or mqtt.port is another, it refuses user, password or the topic of commands, or a "
+        "second gateway takes our name there.",
         "mosquitto_sub -h HOST -p PORT -u USER -P PASSWORD -t '#' from this machine shows which. Give each cell a rig name of "
         "its own.",
     ),

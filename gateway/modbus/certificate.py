@@ -19,7 +19,9 @@ KEY_MISMATCH: Final = "KEY_VALUES_MISMATCH"
 _BEGIN, _END = "-----BEGIN CERTIFICATE-----", "-----END CERTIFICATE-----"
 _ROLE_OID_BYTES: Final = bytes.fromhex("2b060104018389 0c8622 01".replace(" ", ""))
 _COMMON_NAME_BYTES: Final = bytes.fromhex("550403")
-_UTF8, _UTC_TIME, _BMP = 0x0C, 0x17, 0x1E
+_UTF8, _UTC_TIME = 0x0C, 0x17
+_ENCODINGS: Final = {0x14: "latin-1", 0x1C: "utf-32-be", 0x1E: "utf-16-be"}
+"""Of a name, by its tag: TeletexString, in which old tools wrote Latin-1, UniversalString, BMPString; of all others UTF-8."""
 _VERSION, _EXTENSIONS = 0xA0, 0xA3
 
 
@@ -44,7 +46,8 @@ def read_certificate(der: bytes) -> PeerCertificate:
 
 def read_certificates(pem: bytes) -> list[PeerCertificate]:
     """Return what each certificate of a PEM text says, in order. ValueError where one cannot be read."""
-    _, *found = pem.decode("ascii").split(_BEGIN)
+    text = pem.decode("latin-1")  # notes between them may be in any encoding, OpenSSL passes over them
+    _, *found = text.split(_BEGIN)
     return [read_certificate(PEM_cert_to_DER_cert(_BEGIN + each.split(_END, 1)[0] + _END)) for each in found]
 
 
@@ -95,7 +98,7 @@ def _common_name(subject: bytes) -> str:
         for _, pair in _parts(relative):
             (_, kind), (tag, value) = _parts(pair)
             if kind == _COMMON_NAME_BYTES:
-                name = value.decode("utf-16-be" if tag == _BMP else "utf-8")
+                name = value.decode(_ENCODINGS.get(tag, "utf-8"))
     return name
 
 

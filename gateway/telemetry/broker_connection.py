@@ -46,6 +46,7 @@ async def keep_connected(
         try:
             async with _client(aiomqtt, broker, session.name, will) as client:
                 news.note_connected()
+                news.note_unheard(await _subscribe(client, session))
                 await _carry(client, session)
         except* (aiomqtt.MqttError, OSError, UnicodeError) as lost:
             news.note_lost(_reason(lost))
@@ -62,6 +63,7 @@ class BrokerNews:
     def __init__(self, broker: str, name: str, say: Callable[[str], None], clock: Callable[[], float]) -> None:
         self._broker, self._name, self._say, self._clock = broker, name, say, clock
         self._is_away = False
+        self._unheard: list[str] = []
         self._connected_s: float | None = None
         self._short = 0
 
@@ -71,6 +73,15 @@ class BrokerNews:
         if self._is_away:
             self._say(f"{self._broker} is back")
         self._is_away = False
+
+    def note_unheard(self, topics: list[str]) -> None:
+        """Note which topics the broker does not let us listen to; told once, for each connection says it again."""
+        if topics and topics != self._unheard:
+            self._say(
+                f"E181 {self._broker} does not let this gateway listen to {' and '.join(topics)}: what is asked there is not "
+                "heard. Allow its user to read there"
+            )
+        self._unheard = topics
 
     def note_lost(self, reason: str) -> None:
         """Note that it is lost, or that there was none to be had."""
@@ -122,11 +133,15 @@ def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage) -> Any
     )
 
 
+async def _subscribe(client: Any, session: BrokerSession) -> list[str]:
+    """Listen to the session's topics; return those that the broker refuses. The library takes its no for an answer as well."""
+    answers = [(topic, await client.subscribe(topic, qos=1)) for topic in session.subscriptions]
+    return [topic for topic, codes in answers if any(code.is_failure for code in codes)]
+
+
 async def _carry(client: Any, session: BrokerSession) -> None:
     """Say what the session has, and have it answer, until the connection is lost."""
     turn = asyncio.Lock()  # messages carry numbers in order: nobody speaks between the making of one and its sending
-    for topic in session.subscriptions:
-        await client.subscribe(topic, qos=1)
     for message in session.greet():
         await _publish(client, message)
     standstill = Standstill(asyncio.get_running_loop().time)

@@ -72,7 +72,8 @@ class Library:
 
     async def __aexit__(self, *_: object) -> None: ...
 
-    async def subscribe(self, topic: str, qos: int) -> None: ...
+    async def subscribe(self, topic: str, qos: int) -> tuple[()]:
+        return ()
 
     async def publish(self, topic: str, payload: bytes, qos: int, retain: bool) -> None:
         await self._publish(payload)

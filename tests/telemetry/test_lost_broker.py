@@ -21,8 +21,8 @@ MOMENTS = {
 """What the broker answers to each packet, before it closes."""
 
 
-async def meet_once(answers: list[bytes]) -> list[str]:
-    """Let a session meet a broker that goes away like this; return what is said until the loss is told."""
+async def meet_once(answers: list[bytes], *, goes_away: bool = True) -> list[str]:
+    """Let a session meet a broker that goes away like this, or stays; return what is said until the first is told."""
     said: list[str] = []
     told = asyncio.Event()
 
@@ -30,6 +30,8 @@ async def meet_once(answers: list[bytes]) -> list[str]:
         for answer in answers:
             await reader.read(1024)
             writer.write(answer)
+        while not goes_away and await reader.read(1024):
+            pass
         writer.close()
 
     def say(sentence: str) -> None:
@@ -85,6 +87,14 @@ def test_any_other_forgotten_exception_is_told_as_ever(caplog: pytest.LogCapture
         gc.collect()
     assert "Future exception was never retrieved" in caplog.text and "ours" in caplog.text
     assert "Task was destroyed" in caplog.text
+
+
+def test_a_topic_that_the_broker_does_not_let_us_hear_is_told() -> None:
+    """By its access list, say. The gateway went on as if it listened, and commands came to nothing without a word."""
+    (sentence,) = asyncio.run(meet_once([CONNACK, b"\x90\x03\x00\x01\x80"], goes_away=False))
+    assert (
+        sentence.startswith("E181 the MQTT broker") and "does not let this gateway listen to cell/command" in sentence
+    )
 
 
 def first_word(broker: Broker) -> str:
@@ -160,3 +170,11 @@ def test_a_broker_that_ends_each_connection_at_once_is_not_away_and_is_told_once
     ]
     news.note_lost("nobody listens")
     assert len(said) == 8, "it is away still"
+
+
+def test_what_the_broker_lets_nobody_hear_is_told_once_and_again_where_it_was_allowed_between() -> None:
+    said = list[str]()
+    news = BrokerNews("the MQTT broker b:1883", "force-gateway cell", said.append, lambda: 0.0)
+    for topics in (["cell/command"], ["cell/command"], [], ["cell/command"]):
+        news.note_unheard(topics)
+    assert len(said) == 2

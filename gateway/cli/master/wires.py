@@ -10,6 +10,7 @@ from ipaddress import ip_address
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from gateway.cli.errors import CliError
+from gateway.modbus.pdu import READ_HOLDING_REGISTERS
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -28,6 +29,10 @@ _PARITY: Final = {"none": "N", "even": "E", "odd": "O"}
 
 class SilentLineError(CliError):
     """A serial line stayed silent, or noise took the answer: what may be asked twice can be asked again."""
+
+
+class StrangeAnswerError(OSError):
+    """What came is the answer to another request than ours."""
 
 
 class Wire(Protocol):
@@ -154,8 +159,6 @@ class RtuWire:
 
     def connect(self) -> "ModbusSerialClient":
         """Return a client on the opened port; CliError (E101 to E103) where it does not open."""
-        from pymodbus.client import ModbusSerialClient
-
         from gateway.ports import PortError
         from gateway.ports.opening import open_serial
 
@@ -164,7 +167,7 @@ class RtuWire:
             port = open_serial(self.path, self.settings, timeout_s)
         except PortError as error:
             raise CliError(str(error), error.exit_code) from None
-        client = ModbusSerialClient(
+        client = _strict_client()(
             self.path,
             baudrate=self.settings.baud,
             parity=_PARITY[self.settings.parity],
@@ -179,6 +182,9 @@ class RtuWire:
         """Return E123: a line is silent for one of few reasons, others where it spoke before; E102 where the port is gone."""
         from pymodbus.exceptions import ConnectionException
 
+        if isinstance(error, StrangeAnswerError):
+            text = f"E123 {self.path}: what came is the answer to another request: do two masters speak at once?"
+            return SilentLineError(text, exit_codes.DEVICE)
         if isinstance(error, (OSError, ConnectionException)):
             return CliError(f"E102 {self.path} disconnected: is the adapter still plugged in?", exit_codes.DEVICE)
         silence = f"E123 {self.path}: no answer within {self._timeout_s:.2g} s"
@@ -192,3 +198,22 @@ class RtuWire:
             "`modbus rtu` say the same (--baud, --parity, --stop-bits, --unit)? Are A and B swapped?",
             exit_codes.DEVICE,
         )
+
+
+def _strict_client() -> "type[ModbusSerialClient]":
+    """Return pymodbus' client that takes no answer to another request for its own: a line has no numbers that would tell them
+    apart, and a stop that was lost to a second master counted as written by the answer that this one was given."""
+    from pymodbus.client import ModbusSerialClient
+
+    class StrictClient(ModbusSerialClient):
+        def execute(self, no_response_expected: bool, request: Any) -> Any:
+            answer: Any = super().execute(no_response_expected, request)
+            is_ours = answer.function_code & 0x7F == request.function_code
+            if is_ours and not answer.isError():
+                is_read = request.function_code == READ_HOLDING_REGISTERS
+                is_ours = len(answer.registers) == request.count if is_read else answer.address == request.address
+            if not is_ours:
+                raise StrangeAnswerError
+            return answer
+
+    return StrictClient

@@ -1,13 +1,18 @@
 """The client verbs over Modbus RTU: the same answers, the options of a line, and what is told when it stays silent."""
 
+import os
+import select
+import threading
+
 import pytest
 
 from gateway.cli.master import wires
-from gateway.cli.master.client import GatewayClient
+from gateway.cli.master.client import Frame, GatewayClient, RefusedError
 from gateway.cli.master.wires import RtuWire
 from gateway.codes.refusals import RefusalReason
 from gateway.devices import SerialSettings
 from gateway.devices.line_settings import Parity
+from gateway.modbus.rtu import encode_adu
 from gateway.ports import Pty
 
 
@@ -69,6 +74,48 @@ def test_a_port_that_is_pulled_out_is_told(register_map) -> None:
         line.close()
         with pytest.raises(wires.CliError, match=r"^E102 "):
             client.read_words(0, 1)
+
+
+READ_ONE, WRITE_BEAT, WRITE_OURS = bytes.fromhex("0302 0007"), bytes.fromhex("1000040001"), bytes.fromhex("1000000001")
+
+
+@pytest.mark.parametrize(
+    ("is_write", "pdu"),
+    [(True, READ_ONE), (True, WRITE_BEAT), (False, WRITE_OURS), (False, READ_ONE), (False, b"\x90\x03")],
+)
+def test_an_answer_to_another_request_is_none(register_map, is_write: bool, pdu: bytes) -> None:
+    """A second master's, or one that came late. A stop that nobody had heard was told as written."""
+    line = Pty()
+    with GatewayClient(RtuWire(line.path, SerialSettings(baud=115200)), 1, register_map) as client:
+        other = threading.Thread(target=answer_once, args=(line.fd, pdu))
+        other.start()
+        with pytest.raises(wires.SilentLineError, match=r"^E123 .* the answer to another request: do two masters"):
+            client.write(Frame(0, (0,))) if is_write else client.read_words(0, 2)
+        assert client.is_unanswered
+        other.join(10)
+    line.close()
+
+
+@pytest.mark.parametrize(("pdu", "code"), [(WRITE_OURS, 0), (b"\x90\x06", 6)])
+def test_the_answer_to_ours_is_one(register_map, pdu: bytes, code: int) -> None:
+    line = Pty()
+    with GatewayClient(RtuWire(line.path, SerialSettings(baud=115200)), 1, register_map) as client:
+        other = threading.Thread(target=answer_once, args=(line.fd, pdu))
+        other.start()
+        if code:
+            with pytest.raises(RefusedError, match="exception 06"):
+                client.write(Frame(0, (0,)))
+        else:
+            client.write(Frame(0, (0,)))
+        assert not client.is_unanswered
+        other.join(10)
+    line.close()
+
+
+def answer_once(line: int, pdu: bytes) -> None:
+    """Answer what comes first on a line with this, as unit 1."""
+    if select.select([line], [], [], 10.0)[0]:
+        os.write(line, encode_adu(1, pdu))
 
 
 @pytest.mark.parametrize(

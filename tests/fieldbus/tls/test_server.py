@@ -11,7 +11,7 @@ from gateway.fieldbus import ServerSettings
 from gateway.fieldbus.peers import Peers
 from gateway.fieldbus.tls_settings import certificate_refusal, handshake_failure
 from gateway.modbus import Role, pdu
-from gateway.modbus.certificate import ROLES, PeerCertificate, read_certificate
+from gateway.modbus.certificate import ROLES, PeerCertificate, read_certificate, read_certificates
 from tests.certificates import Folder, serial_of
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
 from tests.fieldbus.tls.by_hand import NOW, REFUSED, VERSIONS, Face, client, face
@@ -161,6 +161,26 @@ def test_our_reading_of_a_certificate_is_that_of_openssl(folder: Folder) -> None
         "roleless": None,
         "gateway": None,
     }
+
+
+@pytest.mark.parametrize(
+    ("kind", "written"),
+    [(b"\x14", b"M\xfcnchen7"), (b"\x1c", "Mü".encode("utf-32-be")), (b"\x1e", "Münc".encode("utf-16-be"))],
+)
+def test_a_name_is_read_as_its_kind_of_text_is_written(folder: Folder, kind: bytes, written: bytes) -> None:
+    """One of an old tool, in Latin-1, was turned away as no certificate at all."""
+    der = ssl.PEM_cert_to_DER_cert(Path(folder.crt("setpoint")).read_text())
+    name = b"\x55\x04\x03\x0c\x08setpoint"
+    assert der.count(name) == 1
+    shown = read_certificate(der.replace(name, name[:3] + kind + b"\x08" + written))
+    assert "München7".startswith(shown.name) and len(shown.name) > 1 and shown.role == "setpoint"
+
+
+def test_notes_in_a_file_of_certificates_hide_none_of_them(folder: Folder) -> None:
+    """As `openssl pkcs12` writes them. Nobody was told that such a certificate is about to end."""
+    pem = Path(folder.crt("gateway")).read_bytes()
+    noted = "Bag Attributes\n    friendlyName: Zelle Süd\n".encode() + pem
+    assert read_certificates(noted + noted) == read_certificates(pem) * 2
 
 
 def role_of(folder: Folder, name: str) -> str | None:
