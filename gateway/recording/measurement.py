@@ -18,7 +18,13 @@ from gateway.recording.tables.column_mapping import EXAMPLE, join_names
 from gateway.recording.tables.column_names import SENT
 from gateway.recording.tables.covariates import extract_covariates, interpolate_missing, is_constant, is_own_recording
 from gateway.recording.tables.even_rows import resample_evenly
-from gateway.recording.tables.row_validity import flag_dropouts, flag_repeated, pulled_rows, valid_by_quality
+from gateway.recording.tables.row_validity import (
+    flag_dropouts,
+    flag_repeated,
+    pulled_rows,
+    rows_about_pulls,
+    valid_by_quality,
+)
 from gateway.recording.tables.time_axis import TimeAxis, check_time_axis
 from gateway.units import linear_conversion
 
@@ -127,9 +133,11 @@ def _usable_rows(columns: Mapping[str, Floats], axis: TimeAxis) -> tuple[Flags, 
     read = np.isfinite(columns["force_n"])
     notes = [] if read.all() else [f"{int((~read).sum())} rows without a force are not judged"]
     usable = read & ~axis.after_gap
-    if (pulled := pulled_rows(columns)).any():
-        notes.append(f"{int(pulled.sum())} rows in which the tool pulled are not judged: the plant pushes")
-        usable &= ~pulled
+    if (about := rows_about_pulls(columns)).any():
+        pulled = int(pulled_rows(columns).sum())
+        beside = f"{pulled} rows in which the tool pulled, and {int(about.sum()) - pulled} right before or behind"
+        notes.append(f"{beside}, are not judged: the plant pushes")
+        usable &= ~about
     if "quality" in columns:
         valid, quality_note = valid_by_quality(columns["quality"], is_own_recording(columns))
         return usable & valid, notes + quality_note

@@ -21,6 +21,7 @@ from gateway.diagnosis.force_error import (
     error_blocks,
 )
 from gateway.plants.force_reference import ForceReference, read_reference
+from gateway.watch.pushed_rows import pushed_rows
 
 _LONGEST_S: Final = 300.0
 """Newest rows that are looked at: a machine that gets worse later is soon seen."""
@@ -60,12 +61,12 @@ class ForceWatch:
         """Look at the newest rows of the ring; `sentence` says what is worse, empty where nothing is."""
         if self._reference is None or not data:
             return
-        table = np.frombuffer(data, dtype="<f8").reshape(-1, len(columns))
-        time_s = table[:, columns.index("time_s")]
-        fresh = table[time_s >= max(self._plant.since_s, float(time_s[-1]) - _LONGEST_S)]
-        if fresh.shape[0] < 2:
+        rows = pushed_rows(data, columns)
+        time_s = rows["time_s"]
+        fresh = time_s >= max(self._plant.since_s, float(time_s[-1]) - _LONGEST_S) if time_s.size else np.zeros(0, bool)
+        if fresh.sum() < 2:
             return
-        rows = {name: fresh[:, index] for index, name in enumerate(columns)}
+        rows = {name: values[fresh] for name, values in rows.items()}
         self._judge(self._reference, compare_runs(self._reference.blocks, error_blocks(commanded_force(rows))))
 
     def _judge(self, reference: ForceReference, change: ForceChange) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from gateway.diagnosis.measurement import Flags, Floats, Measurement
 from gateway.recording import Recording, RecordingError
 from gateway.recording.measurement import measurement_of
+from gateway.watch.pushed_rows import pushed_rows
 
 LEAD_S: Final = 12.0
 """How far before the window a replay may begin; the search takes its blocks from all rows, so that more costs certainty."""
@@ -41,9 +42,7 @@ class Window:
 
 def window_of(data: bytes, columns: tuple[str, ...], window_s: float) -> Window | str:
     """Return the window that ends with the newest row; a sentence where there is nothing to judge."""
-    table = np.frombuffer(data, dtype="<f8").reshape(-1, len(columns))
-    rows = {name: table[:, index] for index, name in enumerate(columns)}
-    rows = _after_last_gap(rows)
+    rows = _after_last_gap(pushed_rows(data, columns))
     time_s = rows["time_s"]
     if time_s.size < 2 or time_s[-1] - time_s[0] < window_s * _ALMOST + _SETTLED_S:
         return "the run is younger than the window"

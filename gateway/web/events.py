@@ -33,6 +33,7 @@ SHOWN: Final = (
     "trim_v",
     "state",
     "model_residual_n",
+    "pulling",
 )
 """Columns of the ring that the page draws."""
 _SAMPLES_S: Final = 1.0 / 15.0

@@ -268,6 +268,8 @@ class SelfTestRun:
         elif expected_n >= _LEAST_EXPECTED_N and self._rest_n - force_n >= least_fall_n:
             text = f"{force_n - self._rest_n:+.1f} N where {expected_n:+.1f} N are expected"
             text += ": turn load_cell.sign in the rig file, or the cell's wires"
+            if self._known.settings.valve:
+                text += "; or the valve stands at pull, whatever its relay reads back"
             if force_n > -least_fall_n:  # what was there at rest is gone, and no more
                 text += "; or what it pressed on at rest was taken away"
             self._set(Finding(Item.SIGN, FAILED, text))

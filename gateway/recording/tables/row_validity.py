@@ -23,6 +23,8 @@ _ENOUGH: Final = 10
 _FINE_STEPS: Final = 5.0
 _ENDS: Final = (0.05, 0.95)
 _BEYOND: Final = 5.0  # times as far away as nine tenths of all readings lie apart, or from 0
+_OFF_V: Final = 0.01
+_FORGOTTEN_S: Final = 12.0  # behind a pull; what comes higher later is not waited for
 _REMEMBERED_S: Final = 1.0  # that a force still follows what drove it
 
 
@@ -31,6 +33,25 @@ def pulled_rows(columns: Mapping[str, Floats]) -> Flags:
     if PULLING in columns and set(DERIVED) <= set(columns):
         return np.asarray(columns[PULLING] == 1.0)
     return np.zeros(len(columns["time_s"]), dtype=bool)
+
+
+def rows_about_pulls(columns: Mapping[str, Floats]) -> Flags:
+    """Return the rows of which a plant that only pushes can say nothing: those of a pull; those at rest right before it, in
+    which the valve turns; and what follows it up to the highest command, where all friction has forgotten it."""
+    pulled, command_v = pulled_rows(columns), columns.get("command_v")
+    if command_v is None or not pulled.any():
+        return pulled
+    about, time_s = pulled.copy(), columns["time_s"]
+    edges = np.flatnonzero(np.diff(pulled.astype(np.int8), prepend=0, append=0))
+    pushes = np.append(0, np.append(edges, pulled.size)).reshape(-1, 2)
+    for first, stop in pushes:
+        if first > 0 and stop > first:
+            lead = first + int(np.searchsorted(time_s[first:stop], time_s[first] + _FORGOTTEN_S))
+            about[first : first + int(np.argmax(np.nan_to_num(command_v[first:lead]))) + 1] = True
+        if stop < pulled.size:
+            pressing = np.flatnonzero(command_v[first:stop] > _OFF_V)
+            about[first + (int(pressing[-1]) + 1 if pressing.size else 0) : stop] = True
+    return about
 
 
 def valid_by_quality(quality: Floats, is_ours: bool) -> tuple[Flags, list[str]]:

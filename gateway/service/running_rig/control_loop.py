@@ -34,7 +34,7 @@ from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
 from gateway.service.running_rig.rate_warnings import LineNoise, SlowLoop
-from gateway.service.running_rig.recording.recorded_row import is_pull, row_of
+from gateway.service.running_rig.recording.recorded_row import row_of
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.run_descriptions import cause_of
 
@@ -326,5 +326,5 @@ class ControlLoop:
             for taker in (self.recordings, self.calibration_runs):
                 if taker:
                     taker.append(sample, decision, line)
-            if self.ring and not is_pull(decision):  # its plant pushes
+            if self.ring:
                 self.ring.append(row_of(sample.time_s, sample, decision, line))

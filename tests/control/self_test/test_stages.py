@@ -12,7 +12,7 @@ from gateway.control.sample_conditioning import Reading
 from gateway.control.self_test.items import FAILED, FORCE_ITEMS, NOT_TESTED, PASSED, Item, SelfTestPlan
 from gateway.control.self_test.judgement import Known
 from gateway.control.self_test.self_test_run import HOLD_S, REST_S, RISE_S, SelfTestRun
-from gateway.control.settings import SelfTestSettings
+from gateway.control.settings import SelfTestSettings, ValveControl
 from gateway.registers.words import CalibrationPhase
 from tests.control.bench import bsfm, settings
 from tests.control.self_test.test_levels import known
@@ -164,3 +164,13 @@ def test_a_cell_that_tells_no_force_apart_is_pressed_with_none_and_is_told_why(n
     found = Played(of=noisy_once, noise_n=noise_n).to_the_end().run.findings
     assert found[Item.RESOLUTION].verdict is FAILED
     assert all(found[item].verdict is NOT_TESTED and words in found[item].text for item in FORCE_ITEMS)
+
+
+@pytest.mark.parametrize("has_valve", [False, True])
+def test_a_valve_that_stands_at_pull_is_thought_of_before_the_cell_is_turned_round(has_valve: bool) -> None:
+    of = known()
+    valve = ValveControl(pull_area_share=0.75) if has_valve else None
+    of = replace(of, settings=replace(of.settings, valve=valve))
+    found = Played(lambda volts: -bsfm().force_n(volts, 1.0), of).to_the_end().run.findings[Item.SIGN]
+    assert found.verdict is FAILED and "turn load_cell.sign" in found.text
+    assert ("or the valve stands at pull, whatever its relay reads back" in found.text) is has_valve

@@ -85,15 +85,16 @@ def test_a_valve_whose_port_goes_is_lost_at_once_and_found_again_with_it() -> No
     assert not valve.status.lost
 
 
-def test_rows_of_a_pull_are_none_of_the_ring_whose_plant_pushes() -> None:
-    wired, rows = Wired().ready(), list[object]()
+def test_rows_of_a_pull_are_in_the_ring_and_marked() -> None:
+    """The page draws them; the watch, whose plant pushes, leaves them out."""
+    wired, rows = Wired().ready(), list[tuple[float, ...]]()
     wired.loop.ring = SimpleNamespace(append=rows.append)  # type: ignore[assignment]
     decision = wired.loop.decision
     assert decision
-    for status, count in ((StatusBit.PULLING, 0), (StatusBit.ENABLED, 1)):
+    for status in (StatusBit.PULLING, StatusBit.ENABLED):
         wired.loop.decision = decision._replace(status=status)
         wired.loop._record()
-        assert len(rows) == count
+    assert [row[COLUMNS.index("pulling")] for row in rows] == [1.0, 0.0]
 
 
 def test_a_row_says_whether_the_tool_pulled() -> None:

@@ -43,7 +43,7 @@ SILENCE = """async () => {
 def test_the_force_is_that_of_now_and_the_error_of_a_pull_is_that_of_a_push(
     page, chromium, status: tuple[str, ...], measured_n: float | None, force: str, error: str
 ) -> None:
-    """The ring holds no sample of a pull, nor of a cell that is silent: the last one is old."""
+    """Of a cell that is silent the ring holds no sample: the last one is old."""
     force_state = LiveForce(requested_n=12.0, measured_n=measured_n, voltage_v=1.5)
     base = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="holding")
     window: Any = open_tab(chromium, page.address, "wiring")

@@ -36,10 +36,5 @@ def row_of(time_s: float, sample: ForceSample, decision: Output, line: LineState
         decision.model_residual_n,
         line.sent_v,
         sample.time_s - line.sent_s,
-        float(is_pull(decision)),
+        float(bool(int(decision.status) & _PULLING)),
     )
-
-
-def is_pull(decision: Output) -> bool:
-    """Decide whether the tool pulls."""
-    return bool(int(decision.status) & _PULLING)

@@ -38,7 +38,7 @@ export function makeError(samples) {
 
   function collect() {
     points = { rising: [[], []], falling: [[], []] };
-    const { applied_n = [], force_n = [], state = [], time_s = [] } = samples.columns;
+    const { applied_n = [], force_n = [], state = [], time_s = [], pulling = [] } = samples.columns;
     let direction = "rising";
     let turned_n = applied_n[0] ?? 0;
     let settled_s = -Infinity;
@@ -52,7 +52,7 @@ export function makeError(samples) {
       if (time_s[place] < settled_s) continue;
       if ((state[place] !== HELD && state[place] !== RAMPING) || !(applied_n[place] > 0)) continue;
       points[direction][0].push(applied_n[place]);
-      points[direction][1].push(force_n[place] - applied_n[place]);
+      points[direction][1].push((pulling[place] ? -force_n[place] : force_n[place]) - applied_n[place]);
     }
   }
 

@@ -2,19 +2,22 @@
 
 import { Plot, axis, colour, dots, figure } from "./plots.js";
 
+const STEP_N = 5;
+
 export function makeLoop(samples, api) {
   const element = figure("Voltage and force", [
     ["rising", "model, rising"], ["falling", "model, falling"], ["measured dot", "measured"], ["walk dot", "now"],
   ]);
   let model = { voltage_v: [0, 1], rising_n: [0, 0], falling_n: [0, 0], number: null };
   let shown = null;
+  let lowest_n = 0;
 
   const plot = new Plot(element, () => ({
     data: [model.voltage_v, model.rising_n, model.falling_n],
     options: {
       scales: {
         x: { time: false },
-        y: { range: (chart, low, high) => [Math.min(-1, low ?? 0), Math.max(5, (high ?? 5) * 1.05)] },
+        y: { range: (chart, low, high) => [Math.min(-1, low ?? 0, lowest_n), Math.max(5, (high ?? 5) * 1.05)] },
       },
       axes: [axis("V"), axis("N", { upright: true })],
       series: [
@@ -25,6 +28,12 @@ export function makeLoop(samples, api) {
       hooks: { draw: [drawMeasured] },
     },
   }));
+
+  /** In whole steps: a pull is measured negative, where no branch of the model reaches, which is that of a push. */
+  function findLowest() {
+    const least_n = (samples.columns.force_n ?? []).reduce((least, value) => Math.min(least, value ?? 0), 0);
+    return least_n < -1 ? STEP_N * Math.floor(least_n / STEP_N) : 0;
+  }
 
   function drawMeasured(chart) {
     const { command_v = [], force_n = [] } = samples.columns;
@@ -58,7 +67,11 @@ export function makeLoop(samples, api) {
     element,
     draw() {
       plot.fit();
-      if (plot.isShown) plot.chart.redraw(false);
+      if (!plot.isShown) return;
+      const least_n = findLowest();
+      if (least_n === lowest_n) return plot.chart.redraw(false);
+      lowest_n = least_n;
+      plot.chart.setData(plot.chart.data);
     },
     state(state) {
       const key = `${state.calibration.number} ${state.calibration.name} ${state.plant.number}`;

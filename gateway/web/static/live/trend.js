@@ -70,8 +70,8 @@ export function makeTrend(samples) {
     draw() {
       plot.fit();
       if (!plot.isShown) return;
-      const { time_s = [], force_n = [], setpoint_n = [] } = samples.columns;
-      const wanted = setpoint_n.map((value) => (value > 0 ? value : null));
+      const { time_s = [], force_n = [], setpoint_n = [], pulling = [] } = samples.columns;
+      const wanted = setpoint_n.map((value, place) => (value > 0 ? (pulling[place] ? -value : value) : null));
       const high = wanted.map((value) => (value === null ? null : value + tolerance_n));
       const low = wanted.map((value) => (value === null ? null : value - tolerance_n));
       plot.chart.setData([time_s, low, high, wanted, force_n]);

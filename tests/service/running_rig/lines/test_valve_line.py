@@ -1,6 +1,7 @@
 """The valve's line in virtual time: one question is out, the readback decides, an order goes out once, silence has an age."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -160,18 +161,17 @@ def test_unplugged_and_replugged_between_two_ticks_is_a_fault_all_the_same() -> 
     assert rig.word("fault_code") == FaultCode.VALVE_SILENT
 
 
-def test_what_is_pulled_is_not_shown_to_the_watch_whose_plant_pushes() -> None:
-    rig, rows = ValveRig(), ["not empty"]
-    rig.loop.ring = rows  # type: ignore[assignment]
+def test_what_is_pulled_is_in_the_ring_marked_for_the_watch_whose_plant_pushes() -> None:
+    rig, rows = ValveRig(), list[tuple[float, ...]]()
+    rig.loop.ring = SimpleNamespace(append=rows.append)  # type: ignore[assignment]
     rig.run(1.0)
-    assert len(rows) == 101
+    assert [row[-1] for row in rows] == [0.0] * 100
     rig.write(0, 1 | VALVE)
     rig.run(2.0)
     assert rig.relay.stands is PULL
     rows.clear()
-    rows.append("not empty")
     rig.run(1.0)
-    assert rows == ["not empty"]
+    assert [row[-1] for row in rows] == [1.0] * 100
 
 
 def test_silence_has_an_age_until_an_answer_ends_it() -> None:

@@ -1,0 +1,42 @@
+"""What the page draws of a tool that pulls: forces as the cell reads them, and the setpoint and the error beside them."""
+
+from typing import Any
+
+from tests.web.tabs.test_tabs_in_chromium import open_tab
+
+DRAWN = """async () => {
+  const { Plot } = await import("/static/live/plots.js");
+  const { makeTrend } = await import("/static/live/trend.js");
+  const { makeError } = await import("/static/live/error.js");
+  const { makeLoop } = await import("/static/live/loop.js");
+  const time_s = Array.from({ length: 200 }, (_, place) => 100 + place / 20);
+  const column = (push, pull) => time_s.map((at_s) => (at_s < 105 ? push : pull));
+  const columns = {
+    time_s, force_n: column(12.1, -11.8), setpoint_n: column(12, 12), applied_n: column(12, 12),
+    command_v: column(1.5, 2.0), state: column(3, 3), pulling: column(0, 1),
+  };
+  const samples = { columns, now_s: 110, isFresh: true, offset_s: null, marks: [] };
+  const plots = [];
+  const fit = Plot.prototype.fit;
+  Plot.prototype.fit = function () { fit.call(this); if (!plots.includes(this)) plots.push(this); };
+  const made = [makeTrend(samples), makeError(samples), makeLoop(samples, {})];
+  for (const one of made) { document.body.append(one.element); one.draw(); }
+  await new Promise(requestAnimationFrame);
+  made[1].state();
+  const [, low, high, wanted, force] = plots[0].chart.data.map((values) => values.at(-1));
+  const error = made[1].element.querySelector("p.small").textContent;
+  return { low, high, wanted, force, pushed: plots[0].chart.data[3][0], error, least: plots[2].chart.scales.y.min };
+}"""
+
+
+def test_setpoint_error_and_range_go_with_the_pull(page, chromium) -> None:
+    """Its trend stood still while a tool pulled, for the ring held no row of it."""
+    browser = chromium.new_context()
+    browser.route("**/events?*", lambda route: route.abort())
+    window: Any = open_tab(browser, page.address, "wiring")
+    drawn = window.evaluate(DRAWN)
+    assert (drawn["low"], drawn["wanted"], drawn["high"]) == (-13.0, -12.0, -11.0)
+    assert (drawn["force"], drawn["pushed"]) == (-11.8, 12.0)
+    assert drawn["error"] == "RMS 0.16 N rising, last minute."
+    assert drawn["least"] == -15.0
+    browser.close()
