@@ -85,9 +85,14 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
             ("systemctl", "daemon-reload"),
             ("systemctl", "enable", "--now", options.name),
         ),
-        (() if networks else _faces_cut_off(rig, options.networks))
-        + ((_FOR_EVER,) if rig.retention.is_unlimited else ()),
+        _notes_of(rig, () if networks else options.networks),
     )
+
+
+def _notes_of(rig: "Rig", reached_from: Sequence[str]) -> tuple[str, ...]:
+    """Return what to tell besides. reached_from: networks that follow from the rig; none where they were chosen."""
+    cut_off = _faces_cut_off(rig, reached_from) if reached_from else ()
+    return (*cut_off, _FOR_EVER) if rig.retention.is_unlimited else cut_off
 
 
 def install(plan: Installation, root: Path) -> tuple[list[Path], bool]:
