@@ -173,6 +173,7 @@ class TemplateCellDevice:
         )
         nothing = {field.name: _nothing(field) for field in self._reading.template.fields}
         self._around: dict[str, Value] = {**nothing, **profile.constants, UNIT: self._reading.unit_word(self._unit)}
+        self._beside: dict[tuple[Quality, bool], tuple[dict[str, Value], bool]] = {}
         self._largest, self._decimals = self._reading.largest_shown, self._reading.decimals
         self._lines = self._grammar.questions()
         self._checks, self._answers = CheckSpelling(self._grammar), b""
@@ -207,17 +208,22 @@ class TemplateCellDevice:
 
     def _encode_frame(self, raw: float, quality: Quality) -> bytes:
         number = round(raw, self._decimals) if isfinite(raw) else raw
-        values = {**self._around, FORCE: number}
-        if sign := self._reading.sign_word(number):
-            values |= {SIGN: sign, FORCE: abs(number)}
-        if self._reading.negative:
-            values[FORCE] = abs(number)
-        word = self._reading.word(quality, is_negative=number < 0.0)
-        if word is not None:
-            values[STATUS] = word
+        words, has_sign = self._words_beside(quality, is_negative=number < 0.0)
+        values = {**self._around, **words, FORCE: abs(number) if has_sign else number}
         if self._reading.modbus:
             self._tell_registers(values, quality)
         return self._grammar.line(self._reading.template.encode(values, self._reading.may_be_blank))
+
+    def _words_beside(self, quality: Quality, *, is_negative: bool) -> tuple[dict[str, Value], bool]:
+        """Return the words for sign and status beside a number, and whether the minus is in them; looked for once for each."""
+        if (quality, is_negative) not in self._beside:
+            sign = self._reading.sign_word(-1.0 if is_negative else 1.0)
+            status = self._reading.word(quality, is_negative=is_negative)
+            words: dict[str, Value] = {
+                name: word for name, word in ((SIGN, sign), (STATUS, status)) if word is not None
+            }
+            self._beside[quality, is_negative] = words, bool(sign or self._reading.negative)
+        return self._beside[quality, is_negative]
 
     def _tell_registers(self, values: dict[str, Value], quality: Quality) -> None:
         """Put sign, decimals and health of a Modbus device into its registers: see ModbusCellDevice."""
