@@ -42,19 +42,25 @@ from gateway.control.self_test.measurements import (
     rate_n_per_s,
     readings_to_know,
     still_rises,
+    without_lone_reading,
 )
 from gateway.control.supervision.fault_detection import StopCause
 from gateway.control.supervision.leaping_readings import LeapLimit
 from gateway.registers.words import CalibrationPhase
 
-REST_S: Final = 3.0  # the first of which lets a force from before leave
+REST_S: Final = 3.0  # the first of which lets a force from before leave, or as many response lags as it needs
 _LEAVES_S: Final = 1.0
+_LEAVING_LAGS: Final = 5.0  # then 150 times less is left of it
+_LONGEST_LEAVING_S: Final = 4.0  # with both settlings the whole takes less than 20 s, whatever the lag is
 RISE_S: Final = 1.0  # to the first level: less than half of the stated force: a second is slow
 HOLD_S: Final = 4.0  # in which a leak of 1 % per second is 4 % of the force
-_LONGEST_SETTLING_S: Final = 3.0
+_LONGEST_SETTLING_S: Final = 3.0  # or as many response lags as leave 3000 times less
+_SETTLING_LAGS: Final = 8.0
+_MOST_SETTLING_S: Final = 4.4
 _SHORTEST_SETTLING_S: Final = 0.8
 _SETTLED: Final = 4.0  # times the response: 2 % are left of one lag
 _FEWEST: Final = 3  # readings whose mean is compared with the stated force
+_RECENT: Final = 30  # readings, of which one that is alone tells no fall
 _SURE_SIGMAS: Final = 4.0
 _LEAST_FALL_N: Final = 0.4  # of a force that goes the wrong way, below the supervision's 0.5 N that would be a fault
 _LEAST_EXPECTED_N: Final = 0.5
@@ -114,7 +120,12 @@ class SelfTestRun:
     @property
     def _planned_s(self) -> float:
         moves_s = RISE_S + 2.0 * self._settling_s + HOLD_S if self._force_n > 0.0 else 0.0
-        return REST_S + moves_s
+        return self._standing_s + moves_s
+
+    @property
+    def _standing_s(self) -> float:
+        """How long nothing moves at the beginning."""
+        return REST_S + max(0.0, min(_LONGEST_LEAVING_S, _LEAVING_LAGS * self._known.response_s) - _LEAVES_S)
 
     @property
     def _elapsed_s(self) -> float:
@@ -122,7 +133,11 @@ class SelfTestRun:
 
     @property
     def _settling_s(self) -> float:
-        return min(_LONGEST_SETTLING_S, max(_SHORTEST_SETTLING_S, _SETTLED * self._known.response_s))
+        return min(self._longest_settling_s, max(_SHORTEST_SETTLING_S, _SETTLED * self._known.response_s))
+
+    @property
+    def _longest_settling_s(self) -> float:
+        return max(_LONGEST_SETTLING_S, min(_MOST_SETTLING_S, _SETTLING_LAGS * self._known.response_s))
 
     def observe_line(self, line: LineStatus) -> None:
         """Take in what the lines have counted; before each step."""
@@ -159,7 +174,7 @@ class SelfTestRun:
 
     def _advance(self) -> None:
         stage_s, levels = self._now_s - self._stage_s, self._levels
-        if self._stage is _Stage.REST and stage_s >= REST_S:
+        if self._stage is _Stage.REST and stage_s >= self._standing_s:
             self._end_rest()
         elif self._stage is _Stage.FIRST and levels:
             share = min(1.0, stage_s / RISE_S)
@@ -184,11 +199,11 @@ class SelfTestRun:
         waited_s = self._now_s - self._stage_s - after_s
         if waited_s < self._settling_s or len(self._trace) < _FEWEST:
             return False
-        return waited_s >= _LONGEST_SETTLING_S or not still_rises(self._trace, self.noise_n)
+        return waited_s >= self._longest_settling_s or not still_rises(self._trace, self.noise_n)
 
     def _end_rest(self) -> None:
         known = self._known
-        rest = last(self._trace, REST_S - _LEAVES_S)
+        rest = without_lone_reading(last(self._trace, REST_S - _LEAVES_S))
         if not rest:
             self._set(Finding(Item.CELL_LINE, FAILED, "no reading came"))
             self._end()
@@ -236,7 +251,7 @@ class SelfTestRun:
         seen = f"{rise_n:+.1f} N at {levels.second_v:.2f} V, {expected_n:+.1f} N expected"
         self._set(Finding(Item.SIGN, PASSED, seen))
         if still_rises(self._trace, self.noise_n):
-            self._set(judgement.still_rising(_LONGEST_SETTLING_S))
+            self._set(judgement.still_rising(self._longest_settling_s))
             self._leave_force("the force does not settle")
             return
         change_n, friction_n = self._second_n - self._first_n, levels.friction_n(levels.first_v)
@@ -257,20 +272,22 @@ class SelfTestRun:
         count = readings_to_know(self.noise_n, 0.5 * (1.0 - FORCE_SHARE) * self._force_n)
         if len(self._trace) < count or self.is_done or not self._levels:
             return
-        force_n = mean_n(self._trace[-count:])
+        recent = self._trace[-max(count, _RECENT) :]
+        force_n, fallen_n = mean_n(recent[-count:]), mean_n(without_lone_reading(recent)[-count:])
         expected_n = self._levels.expected_n(self._volts) - self._levels.base_n
         least_fall_n = max(_LEAST_FALL_N, _SURE_SIGMAS * self.noise_n / sqrt(count))
         if self._stage is _Stage.FIRST:  # whose scale nobody knows yet
             # what dead time and lags still hold back; of a payload that is set down there is no more to come
-            force_n += rate_n_per_s(self._trace, self._levels.base_n) * self._known.response_s
+            coming_n = rate_n_per_s(self._trace, self._levels.base_n) * self._known.response_s
+            force_n, fallen_n = force_n + coming_n, fallen_n + coming_n
         if force_n >= (1.0 - NEAR_SHARE) * self._force_n:
             self._stop_below(force_n)
-        elif expected_n >= _LEAST_EXPECTED_N and self._rest_n - force_n >= least_fall_n:
-            text = f"{force_n - self._rest_n:+.1f} N where {expected_n:+.1f} N are expected"
+        elif expected_n >= _LEAST_EXPECTED_N and self._rest_n - fallen_n >= least_fall_n:
+            text = f"{fallen_n - self._rest_n:+.1f} N where {expected_n:+.1f} N are expected"
             text += ": turn load_cell.sign in the rig file, or the cell's wires"
             if self._known.settings.valve:
                 text += "; or the valve stands at pull, whatever its relay reads back"
-            if force_n > -least_fall_n:  # what was there at rest is gone, and no more
+            if fallen_n > -least_fall_n:  # what was there at rest is gone, and no more
                 text += "; or what it pressed on at rest was taken away"
             self._set(Finding(Item.SIGN, FAILED, text))
             self._set(Finding(Item.ZERO, NOT_TESTED, "a force at rest has the wrong sign, too"))

@@ -162,7 +162,7 @@ def test_a_second_self_test_has_the_next_number() -> None:
 
 
 @pytest.mark.parametrize("said_n", [-20.0, 60.0])
-@pytest.mark.parametrize("at_s", [3.5, 3.9, 5.0, 7.0])
+@pytest.mark.parametrize("at_s", [1.5, 2.8, 3.3, 3.5, 3.9, 4.1, 5.0, 7.0])
 def test_one_reading_that_was_disturbed_on_its_wire_fails_no_machine(at_s: float, said_n: float) -> None:
     """It was a sign to be turned, or a span that is wrong, by a force that nobody had pressed."""
     rig = SelfTestRig(5, FORCE_N)
