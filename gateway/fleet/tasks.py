@@ -41,10 +41,11 @@ class Task:
 
 
 def find_tasks(patterns: Iterable[str]) -> list[Task]:
-    """Return a task for each file that a pattern finds, in the order of their paths, nothing twice."""
+    """Return a task for each file that a pattern finds, in the order of their paths, nothing twice. A link that leads nowhere,
+    as to a store that is not mounted, is one that cannot be read: left out, its day would be missing without a word."""
     # a pattern may be absolute, which Path.glob refuses
     found = {path for pattern in patterns for path in glob.glob(pattern, recursive=True)}  # noqa: PTH207
-    return [_task_of(path) for path in sorted(found) if Path(path).is_file()]
+    return [_task_of(path) for path in sorted(found) if Path(path).is_file() or not Path(path).exists()]
 
 
 def _task_of(path: str) -> Task:

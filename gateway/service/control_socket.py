@@ -47,7 +47,7 @@ class RunningParts:
     peers: Callable[[], tuple[Peer, ...]]
     calibration_date: Callable[[], str]
     running: dict[str, Any] = field(default_factory=dict)
-    """What does not change while it runs: rig, port of Modbus TCP, lease_s (null: none), lease_action."""
+    """What does not change while it runs: rig and its file, port of Modbus TCP, lease_s (null: none), lease_action."""
 
 
 class ControlSocket(JsonLineServer):

@@ -33,6 +33,17 @@ def test_cell_and_date_are_those_of_the_folders_and_the_order_is_that_of_the_pat
     assert len({task.sha256 for task in tasks}) == 4
 
 
+def test_a_link_that_leads_nowhere_is_a_recording_that_cannot_be_read(tmp_path: Path) -> None:
+    """It was left out: of a store that was not mounted nothing was told."""
+    tasks = folder_of(tmp_path, "a")
+    (tmp_path / "cell=0" / "date=2026-11-01" / "away.csv").symlink_to(tmp_path / "not-mounted.csv")
+    (tmp_path / "cell=0" / "date=2026-11-01" / "folder.csv").mkdir()
+    (away, there) = find_tasks([f"{tmp_path}/cell=*/date=*/*.csv"])
+    assert there == tasks[0] and (Path(away.path).name, away.sha256) == ("away.csv", "")
+    (row,) = rows_of(run_serially, count_bytes, [away])
+    assert row["error_code"] == "E403" and "away.csv" in row["error"]
+
+
 def test_processes_give_the_rows_of_one_and_a_death_costs_none(tmp_path: Path) -> None:
     tasks = folder_of(tmp_path, "one", "two two", "unreadable", "once upon a time", "deadly", "six")
     told = rows_of(processes(2), die_at_some, tasks)

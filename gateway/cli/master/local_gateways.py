@@ -41,8 +41,13 @@ def _ask_what_runs(directory: Path) -> dict[str, Any]:
 
 
 def rig_running_on(directory: Path) -> str | None:
-    """Return the name of the rig whose gateway runs on this state directory now; None where nobody says."""
-    return _ask_what_runs(directory).get("rig")
+    """Return the rig whose gateway runs on this state directory now: the file of one that is not shipped, where that is here,
+    else its name; None where nobody says."""
+    from gateway.profiles import list_shipped
+
+    said = _ask_what_runs(directory)
+    name, file = said.get("rig"), str(said.get("file", ""))
+    return file if name not in list_shipped("rig") and Path(file).is_file() else name
 
 
 def is_answering(directory: Path) -> bool:

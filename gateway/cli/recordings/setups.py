@@ -13,13 +13,14 @@ from gateway.service.replayed_control import ReplaySetup
 
 def own_setup(recording: Recording, state: StateChoice) -> tuple[ReplaySetup, list[str]]:
     """Return the set-up that a recording was made with, as far as it is here, and what differs. A rig that is no shipped one is
-    found by the file that --rig names. CliError (65) where its rig is not known."""
+    found by the file that --rig names, or that the gateway which runs on this state directory was started with. CliError (65)
+    where its rig is not known."""
     from gateway.service.fitting.recorded_rig import rig_of
 
     named = recording.header.get("rig")
     rig = rig_of(recording)
-    if rig is None and named and state.named and Path(state.named).expanduser().is_file():
-        given = load_rig(state.named)
+    if rig is None and named and Path(meant := state.rig).expanduser().is_file():
+        given = load_rig(meant)
         rig = given if given.name == named else None
     if rig is None:
         what = f"its rig {named} is not known here: give that rig's file by --rig" if named else "it names no rig"

@@ -73,11 +73,11 @@ class RunningRig:
         self._log = log
         self._shutdown_marker = CleanShutdownMarker(state)
         self._spoke = asyncio.Event()
-        supervision = rig.control.supervision
         self._running: dict[str, Any] = {
             "rig": rig.name,
-            "lease_s": supervision.lease_s,
-            "lease_action": supervision.lease_action.value,
+            "file": str(rig.file.absolute()),
+            "lease_s": rig.control.supervision.lease_s,
+            "lease_action": rig.control.supervision.lease_action.value,
         }
         self.ring: SampleRing | None = None
         self.failed = asyncio.Event()

@@ -8,6 +8,7 @@ import pytest
 from gateway.cli import control_socket
 from gateway.cli.command_line import known_rigs, rig_choice
 from gateway.cli.options import state_directory
+from gateway.profiles import shipped_profiles_folder
 from gateway.recording import Recorder
 
 
@@ -78,6 +79,13 @@ def test_a_directory_alone_is_of_the_rig_that_runs_on_it_or_was_recorded_there(
     packed = call("report", "--show", "--state", str(root)).output
     assert "profiles/rigs/irc5-cell.yaml" in packed and "profiles/rigs/demo.yaml" not in packed
     assert {"do": "running"} in asked
+    asked.clear()
+    file = root / "my-cell.yaml"
+    text = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+    file.write_text(text.replace("name: demo", "name: my-cell"), encoding="utf-8")
+    said = {"rig": "my-cell", "file": str(file)}
+    monkeypatch.setattr(control_socket, "ask", lambda state, request: asked.append(request) or said)
+    assert "\nname: my-cell\n" in call("report", "--show", "--state", str(root)).output
     asked.clear()
     assert call("recordings", "list", "--state", str(root)).exit_code == 0 and {"do": "running"} not in asked
 
