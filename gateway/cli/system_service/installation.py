@@ -8,7 +8,7 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from ipaddress import ip_address, ip_network
 from pathlib import Path
@@ -80,7 +80,7 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
             ("systemctl", "daemon-reload"),
             ("systemctl", "enable", "--now", options.name),
         ),
-        () if networks else _faces_cut_off(rig, options.networks),
+        (*_faces_cut_off(rig, () if networks else options.networks), *_unbounded(rig)),
     )
 
 
@@ -197,15 +197,22 @@ def _addresses_of(rig: "Rig") -> list[str]:
     return [*([rig.network.bind] if rig.network.plain else []), *secure, *for_people]
 
 
-def _faces_cut_off(rig: "Rig", networks: Sequence[str]) -> tuple[str, ...]:
-    """Return a sentence for each face of people's that listens for others: its users are named nowhere in the rig."""
-    where = ", ".join(networks)
+def _faces_cut_off(rig: "Rig", networks: Sequence[str]) -> Iterator[str]:
+    """Yield a sentence for each face of people's that listens for others: its users are named nowhere in the rig. networks: who
+    may connect by the rig, empty where others are given."""
     faces = {"the page": rig.web, "the metrics": rig.metrics, "the OPC UA server": rig.opcua}
-    return tuple(
-        f"{name} ({face.listen}) is reached from {where} alone: --allow NETWORK, once for each, says otherwise"
-        for name, face in faces.items()
-        if face and not ip_address(split_listen(face.listen)[0]).is_loopback
-    )
+    for name, face in faces.items() if networks else ():
+        if face and not ip_address(split_listen(face.listen)[0]).is_loopback:
+            where = f"is reached from {', '.join(networks)} alone"
+            yield f"{name} ({face.listen}) {where}: --allow NETWORK, once for each, says otherwise"
+
+
+def _unbounded(rig: "Rig") -> Iterator[str]:
+    if rig.retention.is_unlimited:
+        yield (
+            "nothing deletes recordings here, and one that is left on takes 1 GB a day; a rig's "
+            "recordings: {retention: {bytes: 20000000000, days: 90}} does"
+        )
 
 
 def _is_own_address(address: str) -> bool:

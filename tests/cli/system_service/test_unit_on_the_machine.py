@@ -15,6 +15,7 @@ from gateway.cli.system_service.unit_file import UnitOptions, unit_text
 from gateway.processes import priority
 from gateway.profiles import load_rig
 from gateway.profiles.http_sections import Web
+from gateway.profiles.recordings_section import Retention
 
 UNIT = unit_text(UnitOptions(command=Path("/usr/bin/true"), rig="irc5-cell", stem="irc5-cell"))
 
@@ -71,3 +72,15 @@ def test_who_installs_a_page_for_others_is_told_whom_the_kernel_lets_in(
     assert done.exit_code == 0, done.output
     said = [line for line in done.output.splitlines() if "reached from" in line]
     assert [line.startswith(told) for line in said] == ([True] if told else [])
+
+
+@pytest.mark.parametrize("days", [None, 90.0])
+def test_who_installs_a_service_whose_recordings_nothing_deletes_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, days: float | None
+) -> None:
+    """A recording that somebody has left on fills the disk within weeks; recordings were said to be bounded."""
+    rig = replace(load_rig("irc5-cell"), retention=Retention(days=days))
+    monkeypatch.setattr(profiles, "load_rig", lambda name: rig)
+    words = ["service", "install", "irc5-cell", "--root", str(tmp_path), "--command", "/opt/force-gateway"]
+    said = CliRunner().invoke(command, words).output
+    assert ("nothing deletes recordings" in said) is (days is None), said
