@@ -188,7 +188,8 @@ def _others(root: Path) -> str:
 
 def _ports_of(rig: "Rig") -> tuple[int, ...]:
     secure = [face.port for face in rig.fieldbus if isinstance(face, TlsFace)]
-    return (*([rig.network.port] if rig.network.plain else []), *secure)
+    for_people = [split_listen(face.listen)[1] for face in (rig.web, rig.metrics, rig.opcua) if face]
+    return (*([rig.network.port] if rig.network.plain else []), *secure, *for_people)
 
 
 def _addresses_of(rig: "Rig") -> list[str]:

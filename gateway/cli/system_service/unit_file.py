@@ -68,10 +68,10 @@ DevicePolicy=closed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnitOptions:
-    """rig: a shipped name or an absolute path; stem: what its state directory and unit are called; ports: of Modbus, for
-    the one privilege that a port below 1024 needs; devices: serial ports, as /dev/serial/by-id/...; networks: who may reach it
-    (CIDR), empty for everybody; compiles: the residual watch runs, or there is a page; waits_for_network: it listens on an
-    address of its own."""
+    """rig: a shipped name or an absolute path; stem: what its state directory and unit are called; ports: of all its
+    listeners, for the one privilege that one below 1024 needs; devices: serial ports, as /dev/serial/by-id/...; networks: who
+    may reach it (CIDR), empty for everybody; compiles: the residual watch runs, or there is a page; waits_for_network: it
+    listens on an address of its own."""
 
     command: Path
     rig: str
