@@ -103,3 +103,10 @@ def test_a_page_below_1024_has_the_privilege_that_it_needs(face: dict[str, Any])
         plan = plan_installation("demo", each, networks=(), command=Path("/opt/force-gateway"))
         unit = plan.files[f"etc/systemd/system/{plan.unit}"]
         assert ("AmbientCapabilities=CAP_NET_BIND_SERVICE\n" in unit) is needs
+
+
+def test_who_makes_an_image_is_told_that_nothing_begins_at_its_boot_yet(tmp_path: Path) -> None:
+    """The unit was there, and nobody had enabled it."""
+    words = ["service", "install", "demo", "--root", str(tmp_path), "--command", "/opt/force-gateway"]
+    last = CliRunner().invoke(command, words).output.splitlines()[-1]
+    assert last == f"not enabled yet: systemctl --root {tmp_path} enable force-gateway-demo.service"
