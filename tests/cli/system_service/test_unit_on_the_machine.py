@@ -14,7 +14,7 @@ from gateway import profiles
 from gateway.cli.main import command
 from gateway.cli.system_service.installation import plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, unit_text
-from gateway.processes import priority
+from gateway.processes import exit_codes, priority
 from gateway.profiles import load_rig
 from gateway.profiles.http_sections import Metrics, OpcUa, Web
 from gateway.profiles.recordings_section import Retention
@@ -110,3 +110,10 @@ def test_who_makes_an_image_is_told_that_nothing_begins_at_its_boot_yet(tmp_path
     words = ["service", "install", "demo", "--root", str(tmp_path), "--command", "/opt/force-gateway"]
     last = CliRunner().invoke(command, words).output.splitlines()[-1]
     assert last == f"not enabled yet: systemctl --root {tmp_path} enable force-gateway-demo.service"
+
+
+def test_an_end_that_nobody_has_asked_systemd_for_starts_it_again() -> None:
+    """`systemctl kill -s HUP`, or a `pkill` that meant another program: the gateway ramps down and ends with 0, which is no
+    failure, and stayed off for good. What `systemctl stop` ends stays off with any setting."""
+    assert setting("Restart", "no") == "always"
+    assert str(exit_codes.OK) not in setting("RestartPreventExitStatus", "").split()
