@@ -5,6 +5,7 @@ import contextlib
 import json
 import logging
 import os
+import signal
 import socket
 import threading
 from collections.abc import Callable, Coroutine
@@ -43,7 +44,9 @@ def yield_to_others() -> None:
 
 
 def exit_with_guardian(link: socket.socket) -> None:
-    """Start a thread that waits for the guardian's end and takes the process with it, in the middle of whatever it does."""
+    """Start a thread that waits for the guardian's end and takes the process with it, in the middle of whatever it does. A stop
+    that every process is told (systemd, `pkill`) is the guardian's to answer: until then the ramp is shown."""
+    signal.signal(signal.SIGTERM, lambda *_: None)
 
     def wait() -> None:
         with contextlib.suppress(OSError):

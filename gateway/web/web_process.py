@@ -28,7 +28,7 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
     from gateway.web.server import make_app
 
     class QuietServer(uvicorn.Server):
-        """A signal ends the process at once: open streams never end by themselves."""
+        """Answers no signal: it ends with the guardian, at once, for open streams never end by themselves."""
 
         @contextlib.contextmanager
         def capture_signals(self) -> Iterator[None]:

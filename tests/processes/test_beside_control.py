@@ -94,3 +94,15 @@ def test_it_ends_with_its_guardian_whatever_it_is_at(tmp_path: Path) -> None:
             assert served.wait(10.0) == 0
         finally:
             served.kill()
+
+
+def test_a_stop_that_every_process_is_told_leaves_it_there_until_the_guardian_ends(tmp_path: Path) -> None:
+    """As systemd tells: page and telemetry show the force that is ramped to 0, and that it is."""
+    guardian, link = socket.socketpair()
+    command = [sys.executable, "-c", SERVES_FOR_EVER, str(link.fileno()), json.dumps({"state": str(tmp_path)})]
+    with subprocess.Popen(command, pass_fds=[link.fileno()], stdout=subprocess.PIPE) as served:
+        link.close()
+        assert served.stdout and served.stdout.readline() == b"serves\n"
+        served.terminate()
+        guardian.close()
+        assert served.wait(10.0) == 0, "not by the signal"

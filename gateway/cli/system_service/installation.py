@@ -8,7 +8,7 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from ipaddress import ip_address, ip_network
 from pathlib import Path
@@ -30,11 +30,6 @@ _HIDDEN: Final = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")
 _STEM: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _NOT_OF_PROGRAMS: Final = frozenset("'\"\\$*?[")  # what systemd takes in no path of a program
 _NAMED_NETWORKS: Final = ("any", "localhost", "link-local", "multicast")
-
-_FOR_EVER: Final = (
-    "nothing deletes recordings here, and one that is left on takes 1 GB a day; a rig's "
-    "recordings: {retention: {bytes: 20000000000, days: 90}} does"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,14 +80,8 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
             ("systemctl", "daemon-reload"),
             ("systemctl", "enable", "--now", options.name),
         ),
-        _notes_of(rig, () if networks else options.networks),
+        (*_faces_cut_off(rig, () if networks else options.networks), *_unbounded(rig)),
     )
-
-
-def _notes_of(rig: "Rig", reached_from: Sequence[str]) -> tuple[str, ...]:
-    """Return what to tell besides. reached_from: networks that follow from the rig; none where they were chosen."""
-    cut_off = _faces_cut_off(rig, reached_from) if reached_from else ()
-    return (*cut_off, _FOR_EVER) if rig.retention.is_unlimited else cut_off
 
 
 def install(plan: Installation, root: Path) -> tuple[list[Path], bool]:
@@ -199,7 +188,8 @@ def _others(root: Path) -> str:
 
 def _ports_of(rig: "Rig") -> tuple[int, ...]:
     secure = [face.port for face in rig.fieldbus if isinstance(face, TlsFace)]
-    return (*([rig.network.port] if rig.network.plain else []), *secure)
+    for_people = [split_listen(face.listen)[1] for face in (rig.web, rig.metrics, rig.opcua) if face]
+    return (*([rig.network.port] if rig.network.plain else []), *secure, *for_people)
 
 
 def _addresses_of(rig: "Rig") -> list[str]:
@@ -208,15 +198,22 @@ def _addresses_of(rig: "Rig") -> list[str]:
     return [*([rig.network.bind] if rig.network.plain else []), *secure, *for_people]
 
 
-def _faces_cut_off(rig: "Rig", networks: Sequence[str]) -> tuple[str, ...]:
-    """Return a sentence for each face of people's that listens for others: its users are named nowhere in the rig."""
-    where = ", ".join(networks)
+def _faces_cut_off(rig: "Rig", networks: Sequence[str]) -> Iterator[str]:
+    """Yield a sentence for each face of people's that listens for others: its users are named nowhere in the rig. networks: who
+    may connect by the rig, empty where others are given."""
     faces = {"the page": rig.web, "the metrics": rig.metrics, "the OPC UA server": rig.opcua}
-    return tuple(
-        f"{name} ({face.listen}) is reached from {where} alone: --allow NETWORK, once for each, says otherwise"
-        for name, face in faces.items()
-        if face and not ip_address(split_listen(face.listen)[0]).is_loopback
-    )
+    for name, face in faces.items() if networks else ():
+        if face and not ip_address(split_listen(face.listen)[0]).is_loopback:
+            where = f"is reached from {', '.join(networks)} alone"
+            yield f"{name} ({face.listen}) {where}: --allow NETWORK, once for each, says otherwise"
+
+
+def _unbounded(rig: "Rig") -> Iterator[str]:
+    if rig.retention.is_unlimited:
+        yield (
+            "nothing deletes recordings here, and one that is left on takes 1 GB a day; a rig's "
+            "recordings: {retention: {bytes: 20000000000, days: 90}} does"
+        )
 
 
 def _is_own_address(address: str) -> bool:

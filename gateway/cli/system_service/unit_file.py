@@ -3,8 +3,9 @@
 Decisions
 - `Type=notify` and a watchdog that the control loop feeds through the guardian: a loop that stands restarts the service.
 - No restart behind an exit that says that another start would end the same way: command line, data, permission,
-  configuration. Any other failure starts again every ten seconds, without end: a device whose cabinet is switched on an hour
-  after this machine, or whose adapter comes late, must not leave the gateway off until somebody logs in.
+  configuration. Any other end starts again every ten seconds, without end: a device whose cabinet is switched on an hour after
+  this machine, or whose adapter comes late, must not leave the gateway off until somebody logs in, nor must a signal that was
+  meant for another program. Only `systemctl stop` ends it.
 - A stop is told to every process. With `KillMode=mixed` whoever is left when the guardian is gone is killed at once, and
   control must write the safe voltage then; each process minds what else it is told here.
 - An address of its own is there only once the network is up: a start before it would be in vain.
@@ -68,10 +69,10 @@ DevicePolicy=closed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnitOptions:
-    """rig: a shipped name or an absolute path; stem: what its state directory and unit are called; ports: of Modbus, for
-    the one privilege that a port below 1024 needs; devices: serial ports, as /dev/serial/by-id/...; networks: who may reach it
-    (CIDR), empty for everybody; compiles: the residual watch runs, or there is a page; waits_for_network: it listens on an
-    address of its own."""
+    """rig: a shipped name or an absolute path; stem: what its state directory and unit are called; ports: of all its
+    listeners, for the one privilege that one below 1024 needs; devices: serial ports, as /dev/serial/by-id/...; networks: who
+    may reach it (CIDR), empty for everybody; compiles: the residual watch runs, or there is a page; waits_for_network: it
+    listens on an address of its own."""
 
     command: Path
     rig: str
@@ -111,7 +112,7 @@ def unit_text(options: UnitOptions) -> str:
         "TimeoutStartSec=90",
         f"TimeoutStopSec={STOP_S}",
         "KillMode=control-group",
-        "Restart=on-failure",
+        "Restart=always",
         "RestartSec=10",
         f"RestartPreventExitStatus={' '.join(map(str, _NO_RESTART))}",
         f"User={USER}",

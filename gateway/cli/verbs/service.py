@@ -1,6 +1,7 @@
 """`service`: a gateway that systemd keeps: install, uninstall, status, logs."""
 
 import os
+import shlex
 from pathlib import Path
 from typing import Any, Final
 
@@ -68,6 +69,8 @@ def install_command(*, rig: str, dry_run: bool, networks: tuple[str, ...], progr
     elif root == Path("/"):
         click.echo(f"{plan.unit} runs; force-gateway service status, force-gateway service logs")
         click.echo(f"for other verbs: --state /var/lib/force-gateway/{stem_of(rig)}, as root")
+    else:
+        click.echo(f"not enabled yet: systemctl --root {shlex.quote(str(root.absolute()))} enable {plan.unit}")
 
 
 @command.command(name="uninstall")

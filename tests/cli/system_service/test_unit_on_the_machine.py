@@ -5,16 +5,18 @@ import re
 import resource
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
 from gateway import profiles
 from gateway.cli.main import command
+from gateway.cli.system_service.installation import plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, unit_text
-from gateway.processes import priority
+from gateway.processes import exit_codes, priority
 from gateway.profiles import load_rig
-from gateway.profiles.http_sections import Web
+from gateway.profiles.http_sections import Metrics, OpcUa, Web
 from gateway.profiles.recordings_section import Retention
 
 UNIT = unit_text(UnitOptions(command=Path("/usr/bin/true"), rig="irc5-cell", stem="irc5-cell"))
@@ -84,3 +86,34 @@ def test_who_installs_a_service_whose_recordings_nothing_deletes_is_told(
     words = ["service", "install", "irc5-cell", "--root", str(tmp_path), "--command", "/opt/force-gateway"]
     said = CliRunner().invoke(command, words).output
     assert ("nothing deletes recordings" in said) is (days is None), said
+
+
+@pytest.mark.parametrize(
+    "face",
+    [
+        {"web": Web(listen="0.0.0.0:80", token="x" * 16)},
+        {"metrics": Metrics(listen="127.0.0.1:900")},
+        {"opcua": OpcUa(listen="127.0.0.1:484")},
+    ],
+)
+def test_a_page_below_1024_has_the_privilege_that_it_needs(face: dict[str, Any]) -> None:
+    """The service ended with 77 at its first start, and stayed off."""
+    rig = load_rig("demo")
+    for each, needs in ((rig, False), (replace(rig, **face), True)):
+        plan = plan_installation("demo", each, networks=(), command=Path("/opt/force-gateway"))
+        unit = plan.files[f"etc/systemd/system/{plan.unit}"]
+        assert ("AmbientCapabilities=CAP_NET_BIND_SERVICE\n" in unit) is needs
+
+
+def test_who_makes_an_image_is_told_that_nothing_begins_at_its_boot_yet(tmp_path: Path) -> None:
+    """The unit was there, and nobody had enabled it."""
+    words = ["service", "install", "demo", "--root", str(tmp_path), "--command", "/opt/force-gateway"]
+    last = CliRunner().invoke(command, words).output.splitlines()[-1]
+    assert last == f"not enabled yet: systemctl --root {tmp_path} enable force-gateway-demo.service"
+
+
+def test_an_end_that_nobody_has_asked_systemd_for_starts_it_again() -> None:
+    """`systemctl kill -s HUP`, or a `pkill` that meant another program: the gateway ramps down and ends with 0, which is no
+    failure, and stayed off for good. What `systemctl stop` ends stays off with any setting."""
+    assert setting("Restart", "no") == "always"
+    assert str(exit_codes.OK) not in setting("RestartPreventExitStatus", "").split()

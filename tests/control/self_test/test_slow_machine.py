@@ -14,7 +14,7 @@ LONGEST_S = 20.0
 """What a robot waits for the verdict, at most."""
 
 
-def tested_behind_a_force(lag_s: float) -> dict[Item, SelfTestVerdict]:
+def verdicts_behind_a_force(lag_s: float) -> dict[Item, SelfTestVerdict]:
     """The verdicts of a self-test that is asked for right behind 40 N."""
     control = roomy()
     slow = replace(control.supervision, response_lag_s=lag_s)
@@ -33,10 +33,10 @@ def tested_behind_a_force(lag_s: float) -> dict[Item, SelfTestVerdict]:
 @pytest.mark.parametrize("lag_s", [0.4, 0.7])
 def test_right_behind_a_force_a_slow_machine_passes(lag_s: float) -> None:
     """What was left of 40 N was a zero that is off, with the advice to tare; and three seconds behind a step it still rose."""
-    found = tested_behind_a_force(lag_s)
+    found = verdicts_behind_a_force(lag_s)
     judged = (Item.ZERO, Item.SIGN, Item.SCALE, Item.RESPONSE, Item.LEAK)
     assert {item: found[item] for item in judged} == dict.fromkeys(judged, SelfTestVerdict.PASSED)
 
 
 def test_however_slow_a_machine_is_a_robot_has_its_verdict_in_time() -> None:
-    assert tested_behind_a_force(1.5)[Item.ZERO] is SelfTestVerdict.FAILED, "of 40 N some is left"
+    assert verdicts_behind_a_force(1.5)[Item.ZERO] is SelfTestVerdict.FAILED, "of 40 N some is left"
