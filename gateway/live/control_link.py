@@ -22,13 +22,14 @@ class ControlLink:
         self._path = state_directory / "control.sock"
         self._turn = asyncio.Lock()
         self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
+        self._is_sent = False  # the question that is asked now
 
     async def ask(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return the answer, without its "ok". OSError where nobody answers, ValueError with the reason of a refusal."""
         async with self._turn:
             try:
                 async with asyncio.timeout(ANSWER_S):
-                    answer = await self._exchange(json.dumps(request).encode() + b"\n")
+                    answer = await self._exchange(json.dumps(request).encode() + b"\n", presses="until_s" in request)
             except BaseException as error:
                 await self._drop()  # a late answer must not be taken for that of the next question
                 if isinstance(error, TimeoutError):
@@ -43,13 +44,13 @@ class ControlLink:
         async with self._turn:
             await self._drop()
 
-    async def _exchange(self, line: bytes) -> dict[str, Any]:
-        was_open = self._streams is not None
+    async def _exchange(self, line: bytes, *, presses: bool) -> dict[str, Any]:
+        was_open, self._is_sent = self._streams is not None, False
         try:
             return await self._say(line)
         except (ConnectionError, EOFError):
             await self._drop()
-            if not was_open:
+            if not was_open or (presses and self._is_sent):  # it may have obeyed before it died
                 raise ConnectionError(f"no gateway answers on {self._path}") from None
         return await self._say(line)  # control closes what has been idle, and a restarted one knows nobody
 
@@ -59,6 +60,7 @@ class ControlLink:
         reader, writer = self._streams
         writer.write(line)
         await writer.drain()
+        self._is_sent = True
         answer = await reader.readline()
         if not answer.endswith(b"\n"):
             raise EOFError

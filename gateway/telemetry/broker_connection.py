@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from gateway.extras import import_library
 from gateway.live.standstill import Standstill
-from gateway.plain_file import check_plain, read_plain
+from gateway.plain_file import read_plain, tell_refusal
 from gateway.telemetry.broker_session import BrokerMessage, BrokerSession
 from gateway.telemetry.command_queue import CommandQueue
 
@@ -117,9 +117,7 @@ def _name_at_broker(name: str) -> str:
 
 def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage) -> Any:
     for file in filter(None, (broker.ca, broker.certificate, broker.key)):
-        check_plain(file)
-    if broker.key and b"ENCRYPTED" in read_plain(broker.key):  # OpenSSL asks for it at the terminal, and waits there
-        raise OSError(f"{broker.key} has a password: openssl pkey -in {broker.key} -out NEW.key takes it off")
+        _check_readable(file)
     return aiomqtt.Client(
         broker.host,
         broker.port,
@@ -131,6 +129,16 @@ def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage) -> Any
         clean_session=True,
         will=aiomqtt.Will(will.topic, will.payload, qos=will.qos, retain=will.retain),
     )
+
+
+def _check_readable(file: str) -> None:
+    """Read a PEM file, as OpenSSL will, which does not say which of them it was. OSError with a sentence."""
+    try:
+        text = read_plain(file)
+    except OSError as error:
+        raise OSError(f"{file}: {tell_refusal(error)}") from None
+    if b"ENCRYPTED" in text:  # OpenSSL asks for it at the terminal, and waits there
+        raise OSError(f"{file} has a password: openssl pkey -in {file} -out NEW.key takes it off")
 
 
 async def _subscribe(client: Any, session: BrokerSession) -> list[str]:

@@ -117,6 +117,37 @@ def test_a_control_that_ends_over_a_question_is_asked_no_second_time(tmp_path: P
     asyncio.run(scene())
 
 
+@pytest.mark.parametrize("said", [b"", b'{"ok": true, "n": 1'], ids=["nothing", "half an answer"])
+def test_nor_is_it_on_a_connection_that_is_kept_but_for_a_stop(tmp_path: Path, said: bytes) -> None:
+    """An enable by MQTT or the page, in flight while control died, was sent to the new one again, and pressed."""
+    asked = list[bytes]()
+
+    async def ask_second(link: ControlLink, request: Answer) -> Answer:
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            connections.append(asyncio.current_task())
+            answers = (b'{"ok": true}\n', said) if len(connections) == 1 else (b'{"ok": true, "n": 2}\n',)
+            for answer in answers:
+                asked.append(await reader.readline())
+                writer.write(answer)
+            writer.close()
+
+        connections = list[asyncio.Task[None] | None]()
+        async with await asyncio.start_unix_server(serve, tmp_path / "control.sock"):
+            try:
+                await link.ask({})
+                return await link.ask(request)
+            finally:
+                await link.close()
+                await asyncio.gather(*(connection for connection in connections if connection))
+
+    with pytest.raises(ConnectionError, match="no gateway answers"):
+        asyncio.run(ask_second(ControlLink(tmp_path), {"do": "modbus", "until_s": 5.0}))
+    assert asked == [b"{}\n", b'{"do": "modbus", "until_s": 5.0}\n']
+    asked.clear()
+    assert asyncio.run(ask_second(ControlLink(tmp_path), {"do": "modbus"})) == {"n": 2}
+    assert asked == [b"{}\n", b'{"do": "modbus"}\n', b'{"do": "modbus"}\n']
+
+
 def test_a_connection_that_was_idle_for_too_long_costs_nobody_a_question(tmp_path: Path) -> None:
     """Control says why it closes; that is no answer to what is asked next."""
 

@@ -248,7 +248,6 @@ def connected(monkeypatch: pytest.MonkeyPatch, broker: Broker, library: Told) ->
     """What is said while the library goes through its ends."""
     said = list[str]()
     monkeypatch.setattr(broker_connection, "import_library", lambda name: library)
-    monkeypatch.setattr(broker_connection, "check_plain", lambda file: None)
     monkeypatch.setattr(broker_connection, "read_plain", lambda file: b"a key")
     with pytest.raises(asyncio.CancelledError):
         asyncio.run(keep_connected(broker, Session(), said.append, again_s=0.0))

@@ -131,6 +131,20 @@ def test_a_name_that_no_host_can_have_is_told_and_does_not_end_the_process(host:
     assert first_word(Broker(host, 1)).startswith(f"E181 the MQTT broker {host}:1 is away (no such host name)")
 
 
+@pytest.mark.parametrize("place", range(3))
+def test_a_file_that_cannot_be_read_is_named(place: int, tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """OpenSSL does not say which: of a key that belongs to root a service said `Permission denied` and no more."""
+    files = [str(tmp_path / name) for name in ("ca.crt", "cell.crt", "cell.key")]
+
+    def read(file: str) -> bytes:
+        if file == files[place]:
+            raise PermissionError(13, "Permission denied", file)
+        return b"of PEM"
+
+    monkeypatch.setattr(broker_connection, "read_plain", read)
+    assert f"is away ({files[place]}: Permission denied" in first_word(Broker("127.0.0.1", 1, None, None, *files))
+
+
 def test_nobody_is_asked_for_the_password_of_a_key(tmp_path: Any) -> None:
     """OpenSSL asks at the terminal that the gateway was started in, and the client waits for the answer for ever."""
     key = tmp_path / "cell.key"
