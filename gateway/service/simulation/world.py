@@ -102,7 +102,8 @@ class SimulatedRig:
     def _swap_chambers(self) -> None:
         """The other chamber gets the regulator's pressure, and the one that had it is vented."""
         self._seed += 1
-        self.twin = Twin(self._plant, self._seed)
+        before, self.twin = self.twin, Twin(self._plant, self._seed)
+        self.twin.go_on_from(before)
         self._set_twin_faults()
         self.twin.command(self._setting_v)
 
