@@ -85,7 +85,7 @@ def _chart(recording: Recording, title: str, label: str, names: Iterable[tuple[s
     """Return the curves of a panel; None where no value is known."""
     time_s = recording.columns["time_s"]
     known: Sequence[tuple[tuple[list[float], list[float]], str, str]] = [
-        (_thinned(time_s, recording.columns[name]), style, words)
+        (_thinned(time_s, _drawn(recording, name)), style, words)
         for name, style, words in names
         if name in recording.columns
     ]
@@ -98,6 +98,16 @@ def _chart(recording: Recording, title: str, label: str, names: Iterable[tuple[s
         if xs:
             chart.line(xs, ys, style, words)
     return chart
+
+
+def _drawn(recording: Recording, name: str) -> "NDArray[np.float64]":
+    """Return the values of a column: the setpoint of a pull, which is told without a sign, beside the force of it."""
+    import numpy as np
+
+    from gateway.recording.tables.row_validity import pulled_rows
+
+    values = recording.columns[name]
+    return np.where(pulled_rows(recording.columns), -values, values) if name == "setpoint_n" else values
 
 
 def _thinned(time_s: "NDArray[np.float64]", values: "NDArray[np.float64]") -> tuple[list[float], list[float]]:

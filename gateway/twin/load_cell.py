@@ -25,11 +25,11 @@ def shown_time_s(cell: LoadCell, time_s: Real) -> Real:
 
 
 class History:
-    """The force of past steps, as far back as the reading looks."""
+    """The force of past steps, as far back as the reading looks. first: number of the step that it begins with."""
 
-    def __init__(self, step_s: float, force_n: float = 0.0) -> None:
+    def __init__(self, step_s: float, force_n: float = 0.0, first: int = 0) -> None:
         self._values = [force_n]
-        self._step_s, self._first = step_s, 0
+        self._step_s, self._first = step_s, first
 
     def put(self, value: float) -> None:
         """Append the force of one more step, N."""
@@ -71,6 +71,11 @@ class LoadCellState:
         if self._shares is None:
             self._force_n = self.filtered_n
         self._take(cell, begins=begins)
+
+    def begin_at(self, step: int) -> None:
+        """Begin with this step of its time, before the first one."""
+        if self._history is not None:
+            self._history = History(self._step_s, self.filtered_n, step)
 
     def select_active_effects(self, conditions: TwinConditions) -> None:
         """Choose the effects that act, from what is known of the surroundings now."""

@@ -74,6 +74,13 @@ class Twin:
         self._slide.hold_friction()
         self._reading = None
 
+    def go_on_from(self, before: "Twin") -> None:
+        """Take over, at the start, the cell's time of the twin whose place this one takes: its drift and warm-up go on."""
+        passed = before._steps - before._began
+        self._began = self._steps - passed
+        self._conditions.time_s = passed * STEP_S
+        self._cell.begin_at(passed)
+
     def command(self, voltage_v: float) -> None:
         """Apply a command voltage, V; it holds until the next one. ValueError when it is not finite."""
         if not math.isfinite(voltage_v):

@@ -11,6 +11,17 @@ from gateway.twin.plant import with_value
 
 _VALVE_MOVES_S: Final = 0.03  # of a small solenoid valve with its relay
 _FROM_OUTSIDE: Final = ("tilt_n", "feed_drag_n_s_per_mm", "feed_drag_n", "feed_drag_abs_n_s_per_mm")
+_OF_THE_CELL: Final = (
+    "zero_n",
+    "zero_n_per_k",
+    "warm_up_n",
+    "drift_n_per_s",
+    "quadratic_per_n",
+    "hum_n",
+    "crosstalk_n_per_v",
+    "outlier_n",
+)
+"""What adds to a reading, or bends it, whichever way the tool acts; `sign` turns the whole reading round."""
 
 
 class SimulatedValve:
@@ -29,13 +40,15 @@ class SimulatedValve:
         return -1.0 if self._stands is ValveDirection.PULL else 1.0
 
     def plant_of(self, plant: Plant) -> Plant:
-        """Return the plant with the chamber that has the pressure: the rod takes a part of the other one's area, and what
-        presses from outside is against a pull."""
+        """Return the plant with the chamber that has the pressure: the rod takes a part of the other one's area, what presses
+        from outside is against a pull, and the cell's own defects stay as they are."""
         if self._stands is ValveDirection.PUSH:
             return plant
         pulling = with_value(plant, "cylinder", "area_m2", plant.cylinder.area_m2 * self._share)
         for name in _FROM_OUTSIDE:
             pulling = with_value(pulling, "contact", name, -getattr(plant.contact, name))
+        for name in _OF_THE_CELL:
+            pulling = with_value(pulling, "cell", name, -getattr(plant.cell, name))
         return with_value(pulling, "contact", "tilt_deg", 180.0 - plant.contact.tilt_deg)
 
     def receive(self, chunk: bytes, now_s: float) -> bytes:

@@ -102,7 +102,8 @@ class SimulatedRig:
     def _swap_chambers(self) -> None:
         """The other chamber gets the regulator's pressure, and the one that had it is vented."""
         self._seed += 1
-        self.twin = Twin(self._plant, self._seed)
+        before, self.twin = self.twin, Twin(self._plant, self._seed)
+        self.twin.go_on_from(before)
         self._set_twin_faults()
         self.twin.command(self._setting_v)
 
@@ -125,7 +126,7 @@ class SimulatedRig:
         if self.settings.is_on("cell.silent"):
             return
         if not self.settings.is_on("cell.frozen"):
-            self._shown_n = self._in_unit(self._wiring * self.valve.sign * float(self.twin.measured_n))
+            self._shown_n = self._in_unit(self._wiring * float(self.twin.measured_n))
         overload = abs(self._shown_n) >= self._range_n
         frame = self._cell.frame(self._shown_n, Quality.OVERLOAD if overload else Quality.OK)
         self._send_cell(self._through_noise(frame))
@@ -212,7 +213,7 @@ class SimulatedRig:
         settings = self.settings
         self.twin.set_air(not settings.is_on("air.off"))
         self.twin.set_contact(not settings.is_on("contact.off"))
-        self.twin.set_sign(-1 if settings.is_on("cell.inverted") else 1)
+        self.twin.set_sign(int(-self.valve.sign if settings.is_on("cell.inverted") else self.valve.sign))
         self.twin.set_surroundings(settings.surroundings())
         self.valve.is_cut, self.valve.is_stuck = settings.is_on("valve.silent"), settings.is_on("valve.stuck")
 
