@@ -117,6 +117,8 @@ def _touch_line(simulation: "Simulation", event: Event) -> None:
         simulation.around.pull(event.whom)
     elif event.what == "push":
         simulation.around.push(event.whom)
+    elif event.what == "deaf":
+        simulation.around.deafen(on=bool(event.numbers[0]))
     elif event.what == "say":
         CABLES[event.whom].say(event.data)
     elif event.what == "power":

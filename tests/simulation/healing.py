@@ -66,6 +66,7 @@ def _repair(simulation: "Simulation") -> None:
     simulation.around.simulate({"do": "sim", "clear_all": True})
     simulation.around.cell_pace = 1.0
     CABLES["load_cell"].reworded = (b"", b"")
+    simulation.around.deafen(on=False)
     for line, cable in CABLES.items():
         simulation.around.push(line)
         cable.spoil()

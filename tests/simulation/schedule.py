@@ -5,24 +5,23 @@ import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import inf, nan
+from math import nan
 from pathlib import Path
 from random import Random
 from typing import Any
 
-from gateway.control import LeaseAction
-from gateway.profiles import Rig
 from tests.simulation.draws.event import Event
-from tests.simulation.draws.rigs import DEMO_CELL, LEASE_S, draw_badges, draw_rig, store_plants
+from tests.simulation.draws.rigs import DEMO_CELL, draw_badges, draw_rig, store_documents
 from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, RATE_S, count_answers, heal
 from tests.simulation.judges.audit_judge import judge_audit
 from tests.simulation.judges.explained_force import ExplainedForce
 from tests.simulation.judges.held_force import HeldForce
-from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS, Bounds
+from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS
 from tests.simulation.judges.reason_judge import MACHINE, ReasonJudge
 from tests.simulation.judges.recording_judge import judge_recordings
 from tests.simulation.judges.status_witness import StatusWitness
+from tests.simulation.judges.zero_witness import ZeroWitness
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_edges
 from tests.simulation.kernel.fits import SimulatedFit
@@ -33,17 +32,21 @@ from tests.simulation.kernel.virtual_time import BEGIN_S, VirtualClock, VirtualL
 from tests.simulation.masters.bus_master import make_master
 from tests.simulation.masters.integrator import Integrator, Sets
 from tests.simulation.masters.socket_user import SocketUser
-from tests.simulation.masters.spelling import BITS, DISABLED_BY_BIT, ENABLE, control_of, hangs_payload, read_pdu
+from tests.simulation.masters.spelling import (
+    BITS,
+    DISABLED_BY_BIT,
+    ENABLE,
+    control_of,
+    hangs_payload,
+    read_pdu,
+    tells_weight,
+)
 from tests.simulation.masters.tcp_master import BEATS_S, RESET, RUNS, TARE, Master
 from tests.simulation.surroundings import Surroundings
 
 RUN_BIT, SELF_TEST = RUNS.values()
-PLANTS_EVERY = 8
-"""Of so many rigs one has numbered plants stored, which somebody may take into use."""
 RECORDED_EVERY, RECORDED = 8, 1
 """Of so many gateways one records from its start."""
-POLL_S = 0.1
-"""Until an output device is asked something where nothing changes."""
 LOOK_S, READ_S = 0.02, 0.1
 
 
@@ -71,7 +74,7 @@ class Simulation:
         self.period_s = 1.0 / rig.loop_hz
         self.rates: dict[str, int] = {}
         self.clock, self.chance = VirtualClock(), Random(~seed)
-        self.observer = drawn.observer(self._bounds_of(rig))
+        self.observer = drawn.observer()
         self.observer.history.is_plain = rig.load_cell.device.name == DEMO_CELL
         self.observer.history.has_valve = rig.valve is not None
         self.outside = VirtualLoop(self.clock)
@@ -82,8 +85,7 @@ class Simulation:
         SimulatedDisk.fails = ""
         SimulatedDisk.folder = folder
         SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(*DISK_S))
-        if seed % PLANTS_EVERY == 0:
-            store_plants(rig, folder)
+        self.sets = Sets(store_documents(seed, rig, folder))
         SimulatedFit.outside, SimulatedFit.chance, SimulatedFit.built_in = (
             self.outside,
             Random(f"fit {seed}"),
@@ -94,6 +96,8 @@ class Simulation:
         self.reasons = ReasonJudge(self.observer)
         self.explained = ExplainedForce(self.observer)
         self.held_force = HeldForce(self.observer, BEGIN_S + 2.0)
+        self.zeros = ZeroWitness(self.observer, self.around.pressing_n, lambda: CABLES["output"].falsified_s)
+        self.log.on_zero = self.zeros.note_zero  # type: ignore[method-assign]
         self.service = SimulatedService(
             rig, folder, self.outside, self.log, self.clock, records=seed % RECORDED_EVERY == RECORDED
         )
@@ -109,7 +113,6 @@ class Simulation:
             for place, name in enumerate(("worker", "rival", "fool", "villain", "healer"), start=1)
         }
         self.reader = Master("10.0.0.9", self.outside, lambda: self.service.inside, lambda *_: None)
-        self.sets = Sets()
         self.integrators = {
             name: Integrator(f"10.0.0.{place}", self.outside, lambda: self.service.inside, lambda *_: None)
             for place, name in ((8, "integrator"), (7, "designer"))
@@ -129,21 +132,6 @@ class Simulation:
         self.outside.call_later(LOOK_S, self._look)
         self.outside.call_later(READ_S, self._read_status)
         self.outside.call_later(READ_S, self.integrator.watch)
-
-    def _bounds_of(self, rig: Rig) -> Bounds:
-        supervision, limits = rig.control.supervision, rig.control.limits
-        return Bounds(
-            limits.voltage_max_v,
-            limits.voltage_slew_v_per_s,
-            supervision.sample_timeout_s,
-            supervision.stall_s,
-            LEASE_S if supervision.lease_s and supervision.lease_action is not LeaseAction.HOLD else inf,
-            self.period_s,
-            DOWN_S if supervision.lease_action is LeaseAction.RAMP else 0.0,
-            supervision.output_timeout_s + rig.output.device.reply_timeout_s + POLL_S,
-            rig.output.device.reply_timeout_s,
-            limits.over_force_n,
-        )
 
     def run(self, events: Iterable[Event], duration_s: float) -> Outcome:
         """Run the events, then heal everything, reset, and see the force come back."""
@@ -192,6 +180,7 @@ class Simulation:
 
     def _expect_any_model(self) -> None:
         self.sets.expect_any()
+        self.explained.note_change(self.clock.now_s)
         for one in self.integrators.values():
             one.forget()
 
@@ -202,6 +191,11 @@ class Simulation:
         self.explained.note_write(host, self.clock.now_s)
         if (control := control_of(pdu)) is not None and control & TARE:
             self._note_tare()
+        if tells_weight(pdu):
+            self._note_weight(pdu)
+
+    def _note_weight(self, pdu: bytes) -> None:
+        self.explained.note_change(self.clock.now_s)
         if hangs_payload(pdu):
             self.observer.history.weighed_s = min(self.observer.history.weighed_s, self.clock.now_s)
             self.reasons.has_payload = True
@@ -258,6 +252,7 @@ class Simulation:
             self.observer.note_serving(self.clock.now_s)
         self.around.look()
         self.around.tell_reasons(self.reasons)
+        self.zeros.note_settings(self.around.world.settings.values, self.clock.now_s)
         if self.service.is_standing:
             self.reasons.note(MACHINE, self.clock.now_s)
         self.observer.look(self.clock.now_s)

@@ -45,6 +45,7 @@ class Surroundings:
         self._move_valve, self.world.valve.move = self.world.valve.move, self._judge_valve  # type: ignore[method-assign]
         lay_cables(outside, rig, self._on_output, self.world.on_cell_bytes, self._on_valve)
         CABLES["load_cell"].on_host = observer.hear_cell
+        CABLES["output"].on_unheard = observer.history.cuts.append
         if cell_s:
             outside.call_later(0.3 * cell_s, self._stream)
 
@@ -91,10 +92,24 @@ class Surroundings:
             self._observer.output_lost_s, self._back_s = now_s, 0.0
         self._judge()
 
+    def deafen(self, *, on: bool) -> None:
+        """Break the wire on which the output hears, or mend it: it stays where it is, and answers nothing."""
+        cable, now_s = CABLES["output"], self._outside.time()
+        if on and not cable.is_deaf:
+            cable.cut()
+            self._observer.note_cut(now_s)
+            self._observer.output_lost_s, self._back_s = now_s, 0.0
+        cable.is_deaf = on
+
     def push(self, line: str) -> None:
         """Put it back."""
         CABLES[line].push()
         self._judge()
+
+    def pressing_n(self) -> float:
+        """What the air presses with, in whichever chamber."""
+        twin = self.world.twin
+        return twin.plant.cylinder.area_m2 * twin.pressure_pa
 
     # -- what the observer is told
 

@@ -38,6 +38,18 @@ def test_masters_who_take_the_force_from_each_other_between_two_looks_explain_it
     assert len(observer.broken) == 1
 
 
+def test_another_weight_or_model_explains_the_force_until_it_has_come() -> None:
+    observer = Observer(BOUNDS)
+    judge = ExplainedForce(observer)
+    block = struct.pack(f">{STATUS_WORDS}h", 0, HOLDING, 1700, 2000, 0, 2000, *[0] * (STATUS_WORDS - 6))
+    for number in range(50):
+        judge.note_write("one", 10.0 + 0.1 * number)
+        if number == 20:
+            judge.note_change(12.0)
+        judge.note(block, 10.0 + 0.1 * number, 0.0)
+    assert [round(float(line.split()[3].rstrip(":")), 1) for line in observer.broken] == [14.6]
+
+
 @pytest.mark.parametrize(
     ("changes", "count"),
     [

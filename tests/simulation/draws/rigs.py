@@ -4,10 +4,12 @@ another rate, a directional valve, or other devices on the wires.
 
 from dataclasses import dataclass, replace
 from functools import cache
+from math import inf
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 
+from gateway.calibrations.store import CalibrationStore
 from gateway.control import LeadSettings, LeaseAction
 from gateway.control.settings import ResponseSource, SafeDirection
 from gateway.plants.store import NumberedPlant, PlantStore, Provenance
@@ -18,10 +20,14 @@ from gateway.profiles.rigs.faces import RtuFace
 from gateway.profiles.rigs.rig import ValveLine
 from gateway.twin.plant import with_value
 from tests.service.rigs import demo, with_supervision
+from tests.simulation.draws.sequences import has_recipes
 from tests.simulation.judges.heard import OUTPUTS, RTU_OUTPUT, SENTENCES, LineObserver, RtuObserver
-from tests.simulation.judges.observer import Bounds, Observer
+from tests.simulation.judges.observer import DOWN_S, Bounds, Observer
+from tests.simulation.kernel.fits import marked
 
 LEASE_S, STALL_S = 0.2, 0.1
+POLL_S = 0.1
+"""Until an output device is asked something where nothing changes."""
 LEASES = ((LEASE_S, LeaseAction.FAULT),) * 20 + (
     (LEASE_S, LeaseAction.RAMP),
     (LEASE_S, LeaseAction.RAMP),
@@ -68,6 +74,10 @@ self_test: {{force_n: 15}}
 network: {{allow_plain_upload: true}}
 accept_no_device_watchdog: {unwatched}
 """
+PLANTS_EVERY = 8
+"""Of so many rigs one has numbered plants stored."""
+RECIPES = -1500, -4000
+"""Marks of calibrations that expect less force of a voltage than the one in use, as of another pad."""
 WATCHED = frozenset(("icpdas-702x", "icpdas-7024", "adam-4024", "mcu-line"))
 
 
@@ -80,11 +90,29 @@ class Drawn:
     cell_s: float | None
     output: str = DEMO_OUTPUT
 
-    def observer(self, bounds: Bounds) -> Observer:
+    def observer(self) -> Observer:
         """Who hears what this output is told."""
+        bounds = bounds_of(self.rig)
         if self.output == RTU_OUTPUT:
             return RtuObserver(bounds)
         return LineObserver(bounds, sentences=SENTENCES[self.output]) if self.output in SENTENCES else Observer(bounds)
+
+
+def bounds_of(rig: Rig) -> Bounds:
+    """What the rig's file says."""
+    supervision, limits = rig.control.supervision, rig.control.limits
+    return Bounds(
+        limits.voltage_max_v,
+        limits.voltage_slew_v_per_s,
+        supervision.sample_timeout_s,
+        supervision.stall_s,
+        LEASE_S if supervision.lease_s and supervision.lease_action is not LeaseAction.HOLD else inf,
+        1.0 / rig.loop_hz,
+        DOWN_S if supervision.lease_action is LeaseAction.RAMP else 0.0,
+        supervision.output_timeout_s + rig.output.device.reply_timeout_s + POLL_S,
+        rig.output.device.reply_timeout_s,
+        limits.over_force_n,
+    )
 
 
 def draw_rig(seed: int) -> Drawn:
@@ -176,7 +204,18 @@ def with_devices(output: str, cell: str) -> Rig:
     return report.rig
 
 
-def store_plants(rig: Rig, state: Path) -> None:
+def store_documents(seed: int, rig: Rig, state: Path) -> tuple[int, ...]:
+    """Store what somebody may take into use, in few rigs; return the marks of the calibrations."""
+    if seed % PLANTS_EVERY == 0:
+        _store_plants(rig, state)
+    if not has_recipes(seed):
+        return ()
+    for mark in RECIPES:
+        CalibrationStore(state, rig.calibration).add(marked(rig.calibration, mark))
+    return RECIPES
+
+
+def _store_plants(rig: Rig, state: Path) -> None:
     """Two numbered plants: the shipped one, and one whose command is bent a little, for which control compensates."""
     plain = load_plant("paper-slide")
     told = Provenance(made_utc="2026-11-22T17:30:00Z", version="0.1.0", rig=rig.name, start=plain.name)

@@ -26,7 +26,12 @@ class ExplainedForce:
     def note_write(self, writer: str, at_s: float) -> None:
         """Note whose write was taken at at_s."""
         if writer != self._writer:
-            self._writer, self._quiet_s = writer, max(self._quiet_s, at_s)
+            self._writer = writer
+            self.note_change(at_s)
+
+    def note_change(self, at_s: float) -> None:
+        """Another weight, tilt or model counts from at_s on: the force must follow."""
+        self._quiet_s = max(self._quiet_s, at_s)
 
     def note(self, block: bytes, at_s: float, disturbed_s: float) -> None:
         """Judge the status block as it was at at_s. disturbed_s: when something was disturbed last."""

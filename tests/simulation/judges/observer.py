@@ -218,7 +218,8 @@ class Observer:
         standing_s = now_s - self.setting_s
         down_s = DOWN_S if self.is_run or now_s - self.run_ended_s < DOWN_S else 0.0
         grace_s = self._grace_s
-        if now_s - self.answer_spoiled_s <= self.bounds.reply_timeout_s + grace_s:
+        is_unanswered = self.answers_lost_s is not None
+        if is_unanswered or now_s - self.answer_spoiled_s <= self.bounds.reply_timeout_s + grace_s:
             grace_s += self.bounds.reply_timeout_s  # for nothing: it was lost, or late
         limits = (
             ("I3 cell", self.cell_lost_s, self.bounds.sample_timeout_s),

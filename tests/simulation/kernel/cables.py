@@ -43,6 +43,10 @@ class Cable:
         self._outside, self.on_device = outside, on_device
         self.port: SimulatedPort | None = None
         self.is_plugged = True
+        self.is_deaf = False  # one of its wires is broken: the device hears nothing
+        self.on_unheard: Callable[[float], None] = lambda now_s: (
+            None
+        )  # a host has told it something, which it has not heard
         self._spoils: deque[Spoil] = deque()
         self.strange_s = 0.0  # when something strange was said last
         self.spoiled_s = -inf  # when an answer of the device was spoiled last
@@ -82,14 +86,27 @@ class Cable:
         return max(self._outside.time(), self._to_device.through_s + 2e-9)
 
     @property
+    def falsified_s(self) -> float:
+        """When its host has heard last what the device has not said, or not so."""
+        return max(self.strange_s, self.spoiled_s)
+
+    @property
     def is_disturbed(self) -> bool:
         """Whether what its device says does not arrive as it says it, or has not a moment ago."""
-        is_strange = self._outside.time() - max(self.strange_s, self.spoiled_s) < STRANGE_S
-        return is_strange or bool(self._spoils) or not self.is_plugged or self.reworded[0] != self.reworded[1]
+        is_strange = self._outside.time() - self.falsified_s < STRANGE_S
+        return (
+            is_strange
+            or bool(self._spoils)
+            or not self.is_plugged
+            or self.is_deaf
+            or self.reworded[0] != self.reworded[1]
+        )
 
     def send_to_device(self, data: bytes) -> None:
         """Put a host's bytes on the wire."""
-        if self.is_plugged:  # a host that stood still meanwhile has not noticed yet
+        if self.is_deaf:
+            self.on_unheard(self._outside.time())
+        elif self.is_plugged:  # a host that stood still meanwhile has not noticed yet
             self._put(self._to_device, data, self._arrive)
 
     def send_to_host(self, data: bytes) -> None:

@@ -170,7 +170,9 @@ class SimulatedSafeLine:
 
 class Log:
     """Stands for `EventLog`: keeps what was said last, every internal error, and each cause whose lines are limited by
-    nothing (I12)."""
+    nothing (I12). on_zero(now): control has said that it took a zero."""
+
+    on_zero: Callable[[float], None] = staticmethod(lambda now_s: None)
 
     def __init__(self, clock: VirtualClock) -> None:
         self._clock = clock
@@ -186,6 +188,8 @@ class Log:
                 self.internal_errors.append(
                     f"I12 at {self._clock.now_s:.4f}: {cause!r} is a cause of its own: {sentence}"
                 )
+        if sentence.startswith("tare: zero at"):
+            self.on_zero(self._clock.now_s)
         if "A499" in sentence:
             self.internal_errors.append(f"internal: {sentence}")
 

@@ -19,9 +19,10 @@ from gateway.numbered_documents.store import StoreError
 from gateway.registers.upload.coefficients import CoefficientSet
 from tests.simulation.kernel.edges import SimulatedDisk
 from tests.simulation.kernel.virtual_time import VirtualLoop
+from tests.simulation.masters.integrator import LESS_N, STEP_N
 
 FIT_S = (0.2, 3.0)
-FIRST_MARK, STEP_N = 60, 0.001
+FIRST_MARK = 60
 
 
 class SimulatedFit:
@@ -74,15 +75,18 @@ class SimulatedFit:
         return {"rejected": number, "refused": f"E435 {rejected}"} | report if rejected else {"stored": number} | report
 
     def _store(self, mark: int, rejected: str) -> int:
-        own = self.built_in
-        limits = CoefficientSet.of_calibration(own)
-        *others, top_n = own.rising_handles_n
-        top_n = struct.unpack(">f", struct.pack(">f", top_n))[0] + mark * STEP_N
-        fitted = replace(
-            own,
-            rising_handles_n=(*others, top_n),
-            force_limits_n=(limits.force_low_n, limits.force_high_n),
-            rejected=rejected,
-            data_sha256=f"{mark:064x}",
-        )
-        return CalibrationStore(self._state, own).add(fitted)
+        return CalibrationStore(self._state, self.built_in).add(marked(self.built_in, mark, rejected))
+
+
+def marked(own: Calibration, mark: int, rejected: str = "") -> Calibration:
+    """Return a rig's own calibration with a mark, as `with_mark` makes its words."""
+    limits = CoefficientSet.of_calibration(own)
+    *others, top_n = own.rising_handles_n
+    top_n = struct.unpack(">f", struct.pack(">f", top_n))[0] + mark * STEP_N
+    return replace(
+        own,
+        rising_handles_n=(*others, top_n),
+        force_limits_n=(limits.force_low_n, LESS_N if mark < 0 else limits.force_high_n),
+        rejected=rejected,
+        data_sha256=f"{abs(mark):064x}",
+    )

@@ -15,6 +15,8 @@ STAGING, ACTIVE = 1000, 1500
 HEAD_WORDS, TAIL_FROM = 140, 150
 COMMIT, STATUS = 1145, 1146
 HANDLES_AT = 6  # of the rising branch, two words each, behind order, an unused word and the range
+MOST_AT = 2 * 136  # the largest force that may be asked for
+LESS_N = 40.0
 COMMITTED, FAILED = 3, 4
 STEP_N = 0.001
 MARKS = 50  # a plant has so many recipes, and not another one each time
@@ -24,15 +26,25 @@ _HALVES = (read_pdu(ACTIVE, 100), read_pdu(ACTIVE + 100, 100))
 
 class Sets:
     """What everybody who uploads knows together. allowed: sets one of which must be in use; known: all that were ever sent;
-    first: what was in use in the beginning; under_way: who uploads what now, with all that it may be mixed up with."""
+    first: what was in use in the beginning; stored_before: marks of what was stored by then; under_way: who uploads what now,
+    with all that it may be mixed up with."""
 
-    def __init__(self) -> None:
+    def __init__(self, stored_before: tuple[int, ...] = ()) -> None:
         self.allowed: set[bytes] = set()
         self.known: set[bytes] = set()
         self.first: bytes | None = None
         self.mark = 0
+        self.stored_before = stored_before
         self._is_any = False
         self._under_way: dict[str, set[bytes]] = {}
+
+    def begin_with(self, words: bytes) -> None:
+        """Look for the first time at what is in use."""
+        self.first = words
+        self.allowed.add(words)
+        self.known.add(words)
+        for mark in self.stored_before:
+            self.expect_mark(mark)
 
     def next_set(self) -> bytes:
         """A set that differs in one number from the MARKS - 1 before."""
@@ -148,9 +160,7 @@ class Integrator(Master):
     def _judge(self, block: bytes) -> None:
         words, sets = block[: 2 * HEAD_WORDS] + block[2 * TAIL_FROM :], self.sets
         if sets.first is None:
-            sets.first = words
-            sets.allowed.add(words)
-            sets.known.add(words)
+            sets.begin_with(words)
         elif words not in sets.allowed:
             which = f"the set with the CRC-32 {crc32(words):08x}"
             self.complaints.append(f"I9 at {self._outside.time():.4f}: {which} is in use, which nobody committed")
@@ -166,7 +176,8 @@ class Integrator(Master):
 
 
 def with_mark(words: bytes, mark: float) -> bytes:
-    """The same set, its highest force on the rising branch a little higher."""
+    """The same set, its highest force on the rising branch a little higher; with a mark below 0 one for less force."""
     place = 2 * (HANDLES_AT + 2 * words[1])
     top_n = struct.unpack_from(">f", words, place)[0] + mark * STEP_N
-    return words[:place] + struct.pack(">f", top_n) + words[place + 4 :]
+    words = words[:place] + struct.pack(">f", top_n) + words[place + 4 :]
+    return words if mark >= 0 else words[:MOST_AT] + struct.pack(">f", LESS_N) + words[MOST_AT + 4 :]

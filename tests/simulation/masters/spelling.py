@@ -4,7 +4,7 @@ A way gives the requests that begin a command, in their order, and the one that 
 """
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import isfinite, nan
 
@@ -127,14 +127,25 @@ def setpoints_of(pdu: bytes) -> tuple[float, ...]:
 
 
 PAYLOAD = (9, 1), (218, 2), (318, 2)
-"""Where it stands, and in how many words."""
+TILT = (6, 1), (212, 2), (312, 2)
+"""Where they stand, and in how many words."""
 
 
 def hangs_payload(pdu: bytes) -> bool:
     """Decide whether a write may set another payload than 0, whose weight then counts as the cell's zero."""
+    return any(map(any, _told_at(PAYLOAD, pdu)))
+
+
+def tells_weight(pdu: bytes) -> bool:
+    """Decide whether a write tells a payload or a tilt, 0 as well."""
+    return any(_told_at(PAYLOAD + TILT, pdu))
+
+
+def _told_at(places: tuple[tuple[int, int], ...], pdu: bytes) -> Iterator[bytes]:
+    """What a write tells of each of these places, and how it is masked; nothing of those that it leaves alone."""
     data = {6: pdu[3:5], 16: pdu[6:], 22: pdu[3:7], 23: pdu[10:]}.get(pdu[0], b"")
-    at = [(2 * (first - written_address(pdu)), 2 * count) for first, count in PAYLOAD] if data else []
-    return any(begin >= 0 and any(data[begin : begin + count]) for begin, count in at)
+    at = [(2 * (first - written_address(pdu)), 2 * count) for first, count in places] if data else []
+    return (data[begin : begin + count] for begin, count in at if begin >= 0)
 
 
 def control_of(pdu: bytes) -> int | None:
