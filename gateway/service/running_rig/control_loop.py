@@ -36,7 +36,6 @@ from gateway.service.running_rig.published_status import BackgroundStatus, LoopH
 from gateway.service.running_rig.rate_warnings import LineNoise, SlowLoop
 from gateway.service.running_rig.recording.recorded_row import row_of
 from gateway.service.running_rig.recording.recordings import Recordings
-from gateway.service.running_rig.run_descriptions import cause_of
 
 _FRESH_PERIODS: Final = 1.05  # a tick decides nothing so soon after a sample or a command; more than 1: a cell's jitter
 _ENDING: Final = int(WarningBit.SERIAL_NOISE | WarningBit.SLOW_LOOP)
@@ -301,10 +300,10 @@ class ControlLoop:
             self._cell.clear_faults()
         self.health.loop_time_s = self.clock() - now_s
         self.bank.publish_when_read(decision.state, self._status)
-        if self.controller.active_run.self_test is not self._shown_self_test:
-            self._show_self_test()
+        is_new = self.controller.active_run.self_test is not self._shown_self_test
+        report = self._show_self_test() if is_new else ()  # as many lines as a second has room for
         for event in decision.events:
-            self._log(cause_of(event, self.controller.active_run.self_test), event)
+            self._log("control self-test" if event in report else "control", event)
 
     def _status(self) -> Status:
         """What the registers show of the last decision, put together by the read that asks for it."""
@@ -315,10 +314,11 @@ class ControlLoop:
         is_restart = int(decision.warnings) & _RESTARTED and not decision.fault
         return status._replace(fault_code=self.restart_cause) if is_restart else status
 
-    def _show_self_test(self) -> None:
+    def _show_self_test(self) -> tuple[str, ...]:
         self._shown_self_test = report = self.controller.active_run.self_test
         verdicts = {str(found.item): found.verdict for found in report.findings}
         self.bank.self_test.show(report.number, report.result, verdicts)
+        return report.sentences
 
     def _record(self) -> None:
         sample, decision, line = self.sample, self.decision, self.output.line

@@ -1,5 +1,4 @@
-"""What is told of a calibration or an experiment: before it begins, while it runs, and in the header of its recording; and how
-the lines of a self-test are told apart in the log."""
+"""What is told of a calibration or an experiment: before it begins, while it runs, and in the header of its recording."""
 
 from dataclasses import asdict
 from typing import Any
@@ -7,7 +6,6 @@ from typing import Any
 from gateway.control.runs.active_run import RecordedPlan, RecordedRun
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.experiment_run import ExperimentRun
-from gateway.control.self_test.items import SelfTestReport
 from gateway.profiles.kinds.plans import plan_document
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
 
@@ -47,9 +45,3 @@ def header_of_plan(run: RecordedRun) -> Answer:
         return {"experiment": plan_document(run.plan)}
     top_v = max(stair.voltage_v for stair in run.stairs)
     return {"ladder": asdict(run.plan) | {"stairs": len(run.stairs), "top_v": top_v}}
-
-
-def cause_of(event: str, report: SelfTestReport) -> str:
-    """Return the cause by which the lines of what control has said are limited. The items of a self-test's report are as many
-    as are told in a second: with them all that comes then was left out, the result, its end and a fault right behind it."""
-    return "control self-test" if any(event == found.sentence for found in report.findings) else "control"
