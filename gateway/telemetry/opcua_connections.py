@@ -86,3 +86,15 @@ def bound_connections(wire: Any, log: Log, settings: ServerSettings | None = Non
             super().data_received(data)
 
     wire.OPCUAProtocol = BoundedProtocol
+
+
+def bound_publishing(service: Any, least_s: float) -> None:
+    """Have no client be told more often than there is something new: by an interval of a microsecond one took a whole core.
+    service: the library's, for subscriptions."""
+    create = service.create_subscription
+
+    async def create_bounded(params: Any, *more: Any, **options: Any) -> Any:
+        params.RequestedPublishingInterval = max(1000.0 * least_s, params.RequestedPublishingInterval)
+        return await create(params, *more, **options)
+
+    service.create_subscription = create_bounded

@@ -19,7 +19,7 @@ from gateway.live.control_link import ControlLink
 from gateway.live.live_state import LiveState
 from gateway.processes.beside_control import serve_until_guardian_ends
 from gateway.processes.event_log import EventLog
-from gateway.telemetry.opcua_connections import bound_connections
+from gateway.telemetry.opcua_connections import bound_connections, bound_publishing
 from gateway.telemetry.sparkplug_metrics import NODE_METRICS, values_of
 from gateway.telemetry.sparkplug_payload import DataType, Value
 
@@ -84,6 +84,7 @@ async def serve(options: dict[str, Any], log: EventLog) -> None:
     bound_connections(import_module("asyncua.server.binary_server_asyncio"), log)
     server = asyncua.Server()
     await server.init()
+    bound_publishing(server.iserver.subscription_service, LOOK_S)
     settings = options["settings"]
     server.set_endpoint(f"opc.tcp://{settings['listen']}/")
     server.set_server_name("force-gateway")

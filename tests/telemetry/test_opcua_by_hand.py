@@ -8,7 +8,7 @@ import pytest
 
 from gateway.fieldbus.settings import ServerSettings
 from gateway.telemetry import opcua_process
-from gateway.telemetry.opcua_connections import _judge, bound_connections
+from gateway.telemetry.opcua_connections import _judge, bound_connections, bound_publishing
 from gateway.telemetry.opcua_process import GatewayNodes
 from gateway.telemetry.sparkplug_metrics import ANSWERS, NODE_METRICS
 from gateway.telemetry.sparkplug_payload import DataType
@@ -78,6 +78,8 @@ def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(m
     did = list[Any]()
 
     class Server:
+        iserver = SimpleNamespace(subscription_service="subscriptions")
+
         async def init(self) -> None: ...
         def set_endpoint(self, place: str) -> None:
             did.append(place)
@@ -105,14 +107,34 @@ def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(m
 
     monkeypatch.setattr(opcua_process, "import_library", lambda _name: SimpleNamespace(ua=ua, Server=Server))
     monkeypatch.setattr(opcua_process, "bound_connections", lambda wire, log: did.append(wire.__name__))
+    monkeypatch.setattr(opcua_process, "bound_publishing", lambda service, least_s: did.append((service, least_s)))
     monkeypatch.setattr(opcua_process, "GatewayNodes", Nodes)
     options = {"settings": {"name": "demo", "listen": "127.0.0.1:4840"}, "state": "/nowhere"}
     log: Any = lambda cause, sentence: did.append((cause, sentence))  # noqa: E731
     asyncio.run(opcua_process.serve(options, log))
     assert did == [
-        "asyncua.server.binary_server_asyncio", "opc.tcp://127.0.0.1:4840/", ["NoSecurity"], ("admin", False), "demo", None,
-        "serves", ("start", "E127 opcua.listen: Address already in use"),
+        "asyncua.server.binary_server_asyncio", ("subscriptions", 0.2), "opc.tcp://127.0.0.1:4840/", ["NoSecurity"],
+        ("admin", False), "demo", None, "serves", ("start", "E127 opcua.listen: Address already in use"),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("wanted_ms", "given_ms"), [(1e-3, 200.0), (0.0, 200.0), (float("nan"), 200.0), (500.0, 500.0)]
+)
+def test_nobody_is_told_more_often_than_there_is_something_new(wanted_ms: float, given_ms: float) -> None:
+    """By an interval of a microsecond a client without any right took a whole core."""
+    from asyncua.server.subscription_service import SubscriptionService
+
+    async def scene() -> float:
+        service: Any = SubscriptionService(None)  # type: ignore[arg-type]
+        bound_publishing(service, opcua_process.LOOK_S)
+        wanted = ua.CreateSubscriptionParameters()
+        wanted.RequestedPublishingInterval = wanted_ms
+        made = await service.create_subscription(wanted, None, session_id=ua.NodeId())
+        await service.delete_subscriptions([made.SubscriptionId])
+        return float(made.RevisedPublishingInterval)
+
+    assert asyncio.run(scene()) == given_ms
 
 
 def test_who_was_refused_is_heard_no_more_and_who_has_gone_is_waited_for_no_more() -> None:
