@@ -20,6 +20,8 @@ from gateway.registers.map.register_map import Register, RegisterMap
 _SETPOINTS: Final = ("force_setpoint", "voltage_setpoint")
 _LONGEST: Final = 16_384
 """Bytes of a command: far beyond one that names every register, and too few to nest deeply."""
+_TWICE: Final = object()
+"""Stands for the value of a name that stands twice."""
 
 
 class RegisterCommands:
@@ -92,7 +94,7 @@ def _registers(payload: bytes) -> dict[str, float]:
     if len(payload) > _LONGEST:
         raise ValueError(f"{len(payload)} bytes: a command has {_LONGEST} at most")
     try:
-        content = json.loads(payload)
+        content = json.loads(payload, object_pairs_hook=_each_once)
     except RecursionError:
         raise ValueError("nested too deeply for a command") from None
     if not isinstance(content, dict) or not content:
@@ -103,7 +105,20 @@ def _registers(payload: bytes) -> dict[str, float]:
     return content
 
 
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object of JSON, whose last value of a name would count without a word. A control word that is 0 once stops."""
+    content: dict[str, Any] = {}
+    for name, value in pairs:
+        if name not in content:
+            content[name] = value
+        else:
+            content[name] = 0 if _is(name, "control_word") and 0 in (content[name], value) else _TWICE
+    return content
+
+
 def _check_number(name: str, value: Any) -> None:
+    if value is _TWICE:
+        raise ValueError(f"{name} stands twice")
     if not _is_number(value):
         raise ValueError(f"{name} is no number")
     if not _is_finite(value):

@@ -178,6 +178,11 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
             {"ok": False, "written": ["control_word"], "error": "tilt_angle: a finite number is wanted"},
             ["100000000102" + "0000"],
         ),
+        (
+            b'{"control_word": 1, "force_setpoint": 5, "force_setpoint": 30, "control_word": 0}',
+            {"ok": False, "written": ["control_word"], "error": "force_setpoint stands twice"},
+            ["100000000102" + "0000"],  # the last of a name counted: with the words in another order it enabled
+        ),
         (b'{"heartbeat": 7, "control_word": false}', None, []),
         (b'{"control_word": 0, "control_word@float_abcd": null}', None, []),
         (b'{"control_word": 0.7}', None, []),

@@ -29,6 +29,7 @@ def at(force_n: float) -> LiveState:
         (b"[1]", "a command is JSON such as"),
         (b'{"force_setpoint": "12"}', "force_setpoint is no number"),
         (b'{"force_setpoint": null}', "force_setpoint is no number"),
+        (b'{"force_setpoint": 5, "force_setpoint": 30}', "force_setpoint stands twice"),
         (b'{"control_word": true}', "control_word is no number"),
         (b'{"force_setpoint": NaN}', "a finite number"),
     ],
