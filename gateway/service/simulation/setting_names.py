@@ -51,7 +51,7 @@ FAULTS: Final = (
     Setting("output.unplug", "its port disappears; back, it is another one"),
     Setting("air.off", "no air supply"),
     Setting("contact.off", "no workpiece under the tool"),
-    Setting("wire.noise", "share of the bytes of all device lines that arrive with a wrong bit", "1", 0.0, 1.0),
+    Setting("wire.noise", "share of the bytes of all answers of devices that arrive with a wrong bit", "1", 0.0, 1.0),
     Setting("valve.silent", "the valve's relay answers nothing"),
     Setting("valve.stuck", "the relay answers and the valve does not move"),
 )
