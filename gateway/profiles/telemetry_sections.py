@@ -31,6 +31,10 @@ class BrokerTls:
     certificate: AbsolutePath | None = None  # the gateway's own, where the broker asks for one
     key: AbsolutePath | None = None  # of that certificate
 
+    def __post_init__(self) -> None:
+        if self.key and not self.certificate:
+            raise ValueError("key without certificate: nothing would be shown to the broker; name both, or neither")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mqtt:

@@ -112,6 +112,14 @@ def test_a_fault_of_a_secret_does_not_quote_it(tmp_path: Path, section: str, tol
     assert "quokka" not in str(raised.value) and "7700" not in str(raised.value)
 
 
+def test_a_key_of_mqtt_without_its_certificate_is_a_fault(tmp_path: Path) -> None:
+    """It was passed over: the broker that asks for a certificate was shown none."""
+    with pytest.raises(ProfileError, match=r"mqtt\.tls: key without certificate"):
+        load_rig(rig_with(tmp_path, "mqtt: {host: broker, tls: {ca: /ca.pem, key: /key.pem}}\n"))
+    whole = load_rig(rig_with(tmp_path, "mqtt: {host: broker, tls: {ca: /ca.pem, certificate: /both.pem}}\n"))
+    assert whole.mqtt and whole.mqtt.tls and whole.mqtt.tls.key is None
+
+
 @pytest.mark.parametrize(
     ("text", "copy"),
     [
