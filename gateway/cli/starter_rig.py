@@ -13,7 +13,7 @@ description: a constant-force cell # EDIT: one line that your colleagues underst
 loop_hz: 100 # tick of the watchdogs and the trim; a setpoint acts when it arrives, not at the next tick
 
 registers: @REGISTER_MAP@ # the Modbus map; `force-gateway registers` prints it
-plant: @PLANT@ # what `run --sim` simulates; the real rig does not use it
+plant: @PLANT@ # what `run --sim` simulates; what the residual watch and `diagnose` compare with
 calibration: demo # EDIT: the simulated rig's. Enough to move, not to be exact: calibrate your own
 
 output: # the line to the DAC or pressure regulator

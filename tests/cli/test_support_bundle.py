@@ -188,3 +188,9 @@ def test_a_file_whose_name_is_no_text_is_listed_all_the_same(tmp_path: Path) -> 
     done = gateway("report", target, "--state", state, "--rig", "demo")
     assert done.exit_code == 0, done.stderr
     assert "odd-\\udcff" in collect(state, list)["state.txt"]
+
+
+def test_who_has_packed_a_bundle_is_told_how_to_see_what_is_in_it_not_what_would_go_in_now(tmp_path: Path) -> None:
+    state, target = with_events(tmp_path / "state", "A310 master lost"), tmp_path / "b.tar.gz"
+    done = gateway("report", target, "--state", state, "--rig", "demo")
+    assert f"`tar -xzOf {target}` prints what is in it" in done.stdout

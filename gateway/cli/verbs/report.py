@@ -1,5 +1,6 @@
 """`report`: what somebody who helps from afar needs, in one file without secrets."""
 
+import shlex
 from pathlib import Path
 
 import click
@@ -32,6 +33,9 @@ def command(*, file: Path, force: bool, show: bool, state: StateChoice) -> None:
         click.echo("\n".join(f"== {name}\n{text}" for name, text in parts.items()))
         return
     pack_bundle(parts, file)
-    click.echo(f"packed {', '.join(parts)} into {file}, {file.stat().st_size / 1e3:.1f} kB; look at it with --show")
+    size = f"{file.stat().st_size / 1e3:.1f} kB"
+    click.echo(
+        f"packed {', '.join(parts)} into {file}, {size}; `tar -xzOf {shlex.quote(str(file))}` prints what is in it"
+    )
     for name in parts_missing(parts):
         click.echo(f"{name} {parts[name].splitlines()[0]}", err=True)
