@@ -32,7 +32,12 @@ def test_of_eight_outputs_the_one_that_is_driven_is_named(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(
     ("lease_s", "why", "pace"),
-    [(0.1, "keeps no heartbeat", " --rig 'cell 3.yaml' "), (0.2, "keeps no heartbeat", ""), (None, "1234.5", "")],
+    [
+        (0.1, "keeps no heartbeat", " --rig 'cell 3.yaml' "),
+        (0.15, "keeps no heartbeat", ""),
+        (0.2, "keeps no heartbeat", ""),
+        (None, "1234.5", ""),
+    ],
 )
 def test_why_mbpoll_holds_no_force_and_what_does(lease_s: float | None, why: str, pace: str) -> None:
     """Without a lease a rig that wants the proof of byte order blamed the heartbeat; `hold` on another machine lost a short

@@ -8,6 +8,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse, Controller, LineStatus
 from gateway.control.settings import Supervision
+from gateway.control.supervision.plausibility import ExpectedForce, LeftForce
 from gateway.control.tare import Zero
 from gateway.registers.words import ControlBit, LimitedBy, State
 from tests.control.bench import Bench, bsfm, settings
@@ -120,6 +121,18 @@ def test_a_tare_of_a_decaying_force_is_refused():
     bench.run(0.15)
     bench.write(control_word=ControlBit.TARE)
     assert bench.refused and "still on their way to 0" in bench.refused.text
+
+
+@pytest.mark.parametrize(
+    ("where", "name", "leaves"),
+    [(LeftForce, "rise_n", property(lambda _: 3.0)), (ExpectedForce, "leaving_n", lambda *_: 3.0)],
+)
+def test_a_tare_waits_for_what_is_expected_and_for_what_may_stand_on_the_output(where, name, leaves, monkeypatch):
+    bench = Bench()
+    bench.run(1.0)
+    monkeypatch.setattr(where, name, leaves)
+    bench.write(control_word=ControlBit.TARE)
+    assert bench.refused and "about 3.0 N are still on their way to 0" in bench.refused.text
 
 
 @pytest.mark.parametrize("every_ms", [1, 10, 40])

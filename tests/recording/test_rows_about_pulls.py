@@ -36,8 +36,10 @@ REST, PULLED = (1.0, 0.0, False), (3.0, 2.0, True)
         ((PULLED, REST, (20.0, 1.0, False), (2.0, 3.0, False)), [(0.0, 4.1)]),  # for twelve seconds at most
         (((5.0, 2.0, False), REST, PULLED, REST, (5.0, 2.0, False), REST, PULLED), [(5.0, 10.1), (15.0, 19.0)]),
         ((PULLED,), [(0.0, 3.0)]),
+        (((5.0, 2.0, False), REST, PULLED, REST, (5.0, 1.0, False), (5.0, 3.0, False)), [(5.0, 15.1)]),
+        ((PULLED, REST, (5.0, 2.0, False), REST), [(0.0, 4.1)]),
     ],
-    ids=["none", "at the end", "at the start", "higher much later", "twice", "alone"],
+    ids=["none", "at the end", "at the start", "higher much later", "twice", "alone", "higher soon", "rest at the end"],
 )
 def test_a_pull_takes_the_rest_before_and_the_rise_behind_with_it(
     parts: tuple[tuple[float, float, bool], ...], left_out: list[tuple[float, float]]

@@ -217,3 +217,29 @@ def test_a_0_that_is_refused_lets_no_held_bit_go(make_bank, master_of) -> None:
     assert holder.refusal(holder.write, 0, 0, 600).reason is RefusalReason.NOT_OWNER
     bank.release_owner()
     assert holder.refusal(holder.write, 0, TEST).reason is RefusalReason.CALIBRATION_HELD
+
+
+def test_a_coil_beside_the_held_bit_lets_it_not_go_while_another_owns(make_bank, master_of) -> None:
+    """Its own 0 alone does: the coil of the valve says nothing of the run."""
+    bank = make_bank(supported_bits=ControlBit(127))
+    holder, owner = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
+    for _ in range(2):
+        holder.write(0, TEST)
+    bank.clear_command()
+    owner.write(0, 0, 500)
+    bank.write_bits(0, [False], holder.peer)
+    bank.release_owner()
+    assert holder.refusal(holder.write, 0, TEST).reason is RefusalReason.CALIBRATION_HELD
+
+
+def test_a_held_bit_that_stops_another_s_run_begins_none_in_the_next_cycle(make_bank, master_of) -> None:
+    """The 1 beside the enable that it cleared was no 0 of its own."""
+    bank, run = make_bank(supported_bits=ControlBit(127)), int(ControlBit.START_CALIBRATION)
+    holder, owner = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
+    for _ in range(2):
+        holder.write(0, run)
+    bank.clear_command()
+    owner.write(0, run | ControlBit.ENABLE, 1200)
+    holder.write(0, run)
+    assert bank.command.stops
+    assert holder.refusal(holder.write, 0, run).reason is RefusalReason.CALIBRATION_HELD

@@ -184,6 +184,15 @@ def test_a_permission_that_is_missing_is_an_end_at_each_start(opens: Opens, monk
     assert port.lost == [] and port.tries < 1000
 
 
+def test_a_port_that_stays_held_is_lost_behind_a_restart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rig goes on without it; who waited for ever told its masters nothing."""
+    monkeypatch.setattr(starting, "_HELD_BOUND_S", 0.02)
+    monkeypatch.setattr(starting, "_RETRY_S", 0.005)
+    port = HeldPort(*["E103"] * 1000)
+    error = asyncio.run(open_again(port))  # type: ignore[arg-type]
+    assert (error and error.code, port.lost) == ("E103", ["E103"]) and port.tries < 1000
+
+
 @pytest.mark.parametrize("code", ["E102", "E103"])
 def test_a_port_that_is_away_or_held_ends_the_first_start_at_once(code: str) -> None:
     port = HeldPort(code)

@@ -7,6 +7,8 @@ import pytest
 
 from gateway.diagnosis.force_error import commanded_force, error_blocks
 from gateway.plants.force_reference import ForceReference, keep_reference
+from gateway.recording.tables.column_names import DERIVED, PULLING
+from gateway.registers.words import State
 from gateway.watch.force_watch import ForceWatch, PlantSince
 
 COLUMNS = ("time_s", "setpoint_n", "force_n")
@@ -87,3 +89,24 @@ def test_a_quarter_of_the_rigs_band_is_what_matters(tmp_path: Path, share: float
 def test_a_ring_without_a_row_says_nothing(watch: ForceWatch) -> None:
     watch.look(b"", COLUMNS)
     assert looked(watch, held(100.0, 0.04, 5.0)) == ""
+
+
+def test_a_pull_is_no_witness_of_a_plant_that_pushes(watch: ForceWatch) -> None:
+    """Neither beside what was pushed, nor where the ring holds pulls alone."""
+    columns = tuple(dict.fromkeys((*COLUMNS, *DERIVED, PULLING)))
+
+    def look(*parts: tuple[np.ndarray, bool]) -> str:
+        rows = np.zeros((sum(len(values) for values, _ in parts), len(columns)))
+        rows[:, : len(COLUMNS)] = np.vstack([values for values, _ in parts])
+        rows[:, columns.index("state")] = State.HOLDING
+        rows[:, columns.index(PULLING)] = np.concatenate([np.full(len(values), pulls) for values, pulls in parts])
+        watch.look(rows.tobytes(), columns)
+        return watch.sentence
+
+    pushed, pulled, worse = held(100.0, 60.0, 0.2), held(160.0, 60.0, -44.0), held(100.0, 60.0, 0.9)
+    for _ in range(2):
+        assert look((pulled, True)) == ""
+        assert look((pushed, False), (pulled, True)) == ""
+    look((worse, False), (pulled, True))
+    assert "0.90 N (rms)" in look((worse, False), (pulled, True))
+    assert look((pulled, True)) != "", "pulls alone say nothing, nor that it is well again"

@@ -58,7 +58,10 @@ def test_behind_a_fault_nobody_beats_and_the_robot_that_enables_meets_no_page(tm
         wired.is_cell_plugged = False
         wired.until(lambda: wired.state is State.FAULT, 1.0)
         wired.is_cell_plugged = True
-        await until_done(commands)
+        for _ in range(50):  # its browser stays
+            commands.note_alive("me")
+            await asyncio.sleep(0)
+        assert commands._beat and commands._beat.done()
         wired.run(1.0)
         await commands.reset()
         wired.run(0.1)

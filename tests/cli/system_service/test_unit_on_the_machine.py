@@ -46,6 +46,11 @@ def test_control_comes_before_other_programs_though_the_process_that_forks_it_do
     assert priority.set_nice(priority.LOOP_NICE) == priority.LOOP_NICE, "control"
 
 
+def test_a_stop_leaves_control_its_last_write() -> None:
+    """By any other way systemd kills whoever is left as soon as the guardian is gone."""
+    assert setting("KillMode", "control-group") == "control-group"
+
+
 def test_a_helper_that_the_kernel_ends_for_want_of_memory_does_not_end_the_gateway() -> None:
     """systemd stops a unit of which it ends anybody unless it is told not to: the force went with the residual watch."""
     assert setting("OOMPolicy", "stop") == "continue"

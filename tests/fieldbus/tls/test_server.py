@@ -176,10 +176,11 @@ def test_a_name_is_read_as_its_kind_of_text_is_written(folder: Folder, kind: byt
     assert "München7".startswith(shown.name) and len(shown.name) > 1 and shown.role == "setpoint"
 
 
-def test_notes_in_a_file_of_certificates_hide_none_of_them(folder: Folder) -> None:
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_notes_in_a_file_of_certificates_hide_none_of_them(folder: Folder, encoding: str) -> None:
     """As `openssl pkcs12` writes them. Nobody was told that such a certificate is about to end."""
     pem = Path(folder.crt("gateway")).read_bytes()
-    noted = "Bag Attributes\n    friendlyName: Zelle Süd\n".encode() + pem
+    noted = "Bag Attributes\n    friendlyName: Zelle Süd\n".encode(encoding) + pem
     assert read_certificates(noted + noted) == read_certificates(pem) * 2
 
 

@@ -134,3 +134,9 @@ def test_a_map_too_fine_for_the_rigs_largest_force_is_told(tmp_path: Path) -> No
         "60 N, but force_measured of map force-v1 ends at 32.767 N: more is shown as that; give it a coarser scale",
     ]
     assert not any("of map force-v1" in str(each) for each in check_report("demo", simulated=True).warnings)
+    (tmp_path / "own.yaml").write_text(
+        text.replace("scale: 0.001", "scale: 0.01").replace("32.767", "60"), encoding="utf-8"
+    )
+    assert not any(
+        "of map force-v1" in str(each) for each in check_report(tmp_path / "rig.yaml", simulated=True).warnings
+    )

@@ -250,15 +250,15 @@ def test_a_ca_that_another_has_signed_wants_that_one_in_its_file(tmp_path: Path)
     assert not report(tmp_path, files()).faults
 
 
-def ending(ca: Signed, days: int, **constraints: int | None) -> Signed:
-    """The same CA with another end."""
+def ending(ca: Signed, days: int, begins: int = -3, **constraints: int | None) -> Signed:
+    """The same CA with other days."""
     old, now = ca.certificate, datetime.now(UTC)
     builder = x509.CertificateBuilder(old.issuer, old.subject, ca.key.public_key(), old.serial_number)
     for extension in old.extensions:
         is_other = constraints and isinstance(extension.value, x509.BasicConstraints)
         value = x509.BasicConstraints(ca=True, **constraints) if is_other else extension.value
         builder = builder.add_extension(value, extension.critical)
-    builder = builder.not_valid_before(now - timedelta(days=3)).not_valid_after(now + timedelta(days=days))
+    builder = builder.not_valid_before(now + timedelta(days=begins)).not_valid_after(now + timedelta(days=days))
     return Signed(builder.sign(ca.key, hashes.SHA256()), ca.key)
 
 
@@ -274,3 +274,23 @@ def test_the_ca_s_end_is_told_as_its_own(tmp_path: Path, days: int) -> None:
     too_late = f"fieldbus[0].certificate: E175 {tmp_path}/gateway.crt is of a CA that has expired, as all"
     expected = {-1: [too_late, own], 5: [own, its_ca], 40: [own]}[days]
     assert [each[: len(start)] for each, start in zip(told, expected, strict=True)] == expected
+
+
+def test_the_days_of_the_first_certificate_and_of_any_ca_must_have_begun(tmp_path: Path) -> None:
+    ca = make_ca(90)
+    later, server = ending(ca, 90, begins=2), make_server(ca, ("127.0.0.1",), 60)
+
+    def told(more_in: str, **signed: Signed) -> list[str]:
+        folder = tmp_path / more_in
+        folder.mkdir()
+        store(signed, folder)
+        with (folder / more_in).open("ab") as file:
+            file.write(ca.certificate.public_bytes(serialization.Encoding.PEM))
+        found = report(folder, files())
+        assert not found.faults
+        warnings = [str(each) for each in found.warnings if "not valid before" in str(each)]
+        return [each.split("fieldbus[0].")[1].split(":")[0] for each in warnings]
+
+    assert told("none", gateway=server, ca=later) == ["ca"]
+    assert told("ca.crt", gateway=server, ca=later) == []
+    assert told("gateway.crt", gateway=ending(server, 60, begins=2), ca=ca) == ["certificate"]

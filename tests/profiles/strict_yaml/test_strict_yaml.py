@@ -156,6 +156,11 @@ def test_a_file_beyond_any_profile_is_not_read(parse: Parse) -> None:
     assert "a profile has at most" in fault_of(parse, b"#" * (2 << 20))
 
 
+@pytest.mark.parametrize("begin", ["|", ">"])
+def test_text_on_the_lines_below_is_text(begin: str) -> None:
+    assert text.parse(f"description: {begin}\n  12.5\n".encode(), "rig.yaml").value == {"description": "12.5\n"}
+
+
 @STEADY
 @given(st.binary(max_size=200) | st.text(max_size=200).map(str.encode))
 def test_no_bytes_whatever_end_in_anything_but_a_document_or_faults(data: bytes) -> None:

@@ -3,12 +3,14 @@
 from math import isnan, nan
 from types import SimpleNamespace
 
+import pytest
+
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.control.inputs import Output
 from gateway.devices import ValveHost
-from gateway.devices.messages import ForceSample
+from gateway.devices.messages import ForceSample, RepeatedSample
 from gateway.profiles import load_device
 from gateway.registers.words import LimitedBy, State, StatusBit
 from gateway.service.running_rig.lines.valve_line import ValveExchange
@@ -145,6 +147,15 @@ def test_what_a_cell_says_is_counted_by_whether_it_could_be_read() -> None:
     wired.run(1.0)
     assert loop.cell_counts.heard - before == loop.samples - samples > 10
     assert (loop.cell_counts.garbled, loop.cell_garbage_bytes) == (garbled, size)
+
+
+def test_an_answer_that_repeats_the_reading_before_is_heard_and_is_no_sample(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else a self-test would tell a healthy cell, asked more often than it measures, that it leaves questions unanswered."""
+    loop = Wired().ready().loop
+    heard, samples = loop.cell_counts.heard, loop.samples
+    monkeypatch.setattr(loop._cell, "receive", lambda chunk, now_s: [RepeatedSample()])
+    loop.on_cell_bytes(b"again", loop.clock())
+    assert (loop.cell_counts.heard, loop.samples) == (heard + 1, samples)
 
 
 def test_control_is_told_what_surely_stands_and_not_what_was_confirmed_last() -> None:

@@ -62,7 +62,8 @@ def test_a_stop_that_every_process_is_told_leaves_it_to_the_ramp_and_the_end_of_
 
     async def until_ended(*given: Any) -> None:
         os.kill(os.getpid(), signal.SIGTERM)
-        await asyncio.sleep(0)  # the loop has answered it
+        for _ in range(10):  # it answers some turns later
+            await asyncio.sleep(0)
         told.append(given[-1].is_set())
 
     monkeypatch.setattr(simulated_rig, "serve", until_ended)

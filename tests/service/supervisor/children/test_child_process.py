@@ -82,6 +82,14 @@ def test_a_child_is_asked_before_it_is_killed(start: Start, monkeypatch) -> None
     assert child.wait() == 7
 
 
+def test_a_child_that_leaves_the_signal_to_others_ends_by_the_end_of_its_line(start: Start, monkeypatch) -> None:
+    """The simulated rig does: a stop of the gateway, which every process may be told, is not yet its own."""
+    monkeypatch.setattr(child_process, "_END_BOUND_S", 10.0)
+    child = start("os.read(line, 1); os._exit(7)", before=STUBBORN)
+    child.end()
+    assert child.wait() == 7
+
+
 def test_a_child_that_does_not_do_as_it_is_asked_is_killed_and_leaves_nothing(start: Start, monkeypatch) -> None:
     monkeypatch.setattr(child_process, "_END_BOUND_S", 0.02)
     before = open_descriptors()
