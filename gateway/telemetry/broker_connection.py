@@ -202,6 +202,5 @@ def _reason(lost: BaseExceptionGroup[BaseException]) -> str:
     first: BaseException = lost
     while isinstance(first, BaseExceptionGroup):
         first = first.exceptions[0]
-    return (
-        "no such host name" if isinstance(first, UnicodeError) else str(first)
-    )  # `a..b`, or a part of over 63 characters
+    is_no_name = isinstance(first, UnicodeError)  # `a..b`, or a part of over 63 characters
+    return "no such host name" if is_no_name else str(first)

@@ -89,9 +89,7 @@ async def serve(options: dict[str, Any], log: EventLog) -> None:
     server.set_endpoint(f"opc.tcp://{settings['listen']}/")
     server.set_server_name("force-gateway")
     server.set_security_policy([asyncua.ua.SecurityPolicyType.NoSecurity])
-    server.allow_remote_admin(
-        False
-    )  # by itself the library lets whoever calls himself admin write and delete every node
+    server.allow_remote_admin(False)  # else whoever calls himself admin may write and delete every node
     nodes = GatewayNodes(asyncua.ua, server)
     await nodes.add(settings["name"])
     link = ControlLink(Path(options["state"]))

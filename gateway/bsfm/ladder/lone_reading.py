@@ -13,14 +13,19 @@ _ALONE: Final = 2.0  # times as far off as any other one: of much noise none is 
 _FEWEST: Final = 3
 
 
+def find_lone_reading(forces_n: Sequence[float], lone_n: float = LONE_N) -> int | None:
+    """Return the place of the reading, N, that alone is more than lone_n off the median; None where there is none."""
+    if len(forces_n) < _FEWEST:
+        return None
+    middle_n = median(forces_n)
+    away_n = [abs(force_n - middle_n) for force_n in forces_n]
+    next_n, farthest_n = sorted(away_n)[-2:]
+    return away_n.index(farthest_n) if farthest_n > lone_n and farthest_n > _ALONE * next_n else None
+
+
 def without_lone_reading(forces_n: Sequence[float]) -> list[float]:
     """Return the readings, N, in their order, without the one that alone is far off, if there is one."""
-    kept = list(forces_n)
-    if len(kept) < _FEWEST:
-        return kept
-    middle_n = median(kept)
-    away_n = [abs(force_n - middle_n) for force_n in kept]
-    next_n, farthest_n = sorted(away_n)[-2:]
-    if farthest_n > LONE_N and farthest_n > _ALONE * next_n:
-        del kept[away_n.index(farthest_n)]
+    kept, lone = list(forces_n), find_lone_reading(forces_n)
+    if lone is not None:
+        del kept[lone]
     return kept

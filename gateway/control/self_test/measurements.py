@@ -6,6 +6,8 @@ from math import ceil, inf, sqrt
 from statistics import fmean, median
 from typing import Final, NamedTuple
 
+from gateway.bsfm.ladder.lone_reading import find_lone_reading
+
 Trace = Sequence[tuple[float, float]]
 
 MEAN_S: Final = 0.3  # of readings for the force of a level
@@ -16,7 +18,6 @@ _MOST_SMOOTHED: Final = 30
 _SMOOTHED: Final = 3  # readings whose mean is compared with a level: one spike is no crossing
 _SAME_N: Final = 1.0e-9  # two readings nearer than this are equal but for arithmetic
 _LONE_N: Final = 1.5  # off the median: of one false reading LeapLimit believes 3 N
-_ALONE: Final = 2.0  # times as far off as any other one: of much noise none is alone
 _MISSED: Final = 1.75  # median intervals from which on a message is missing
 
 
@@ -37,15 +38,8 @@ class Intervals(NamedTuple):
 
 def without_lone_reading(trace: Trace) -> Trace:
     """Return the readings without the one that alone is far off, if there is one: in a noise or a fall it would count whole."""
-    if len(trace) < _SMOOTHED:
-        return trace
-    middle_n = median(force_n for _, force_n in trace)
-    away_n = [abs(force_n - middle_n) for _, force_n in trace]
-    next_n, farthest_n = sorted(away_n)[-2:]
-    if farthest_n <= _LONE_N or farthest_n <= _ALONE * next_n:
-        return trace
-    lone = away_n.index(farthest_n)
-    return [*trace[:lone], *trace[lone + 1 :]]
+    lone = find_lone_reading([force_n for _, force_n in trace], _LONE_N)
+    return trace if lone is None else [*trace[:lone], *trace[lone + 1 :]]
 
 
 def mean_n(trace: Trace) -> float:

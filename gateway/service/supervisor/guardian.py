@@ -64,9 +64,8 @@ def run(options: RunOptions) -> int:
                 )
                 return Guardian(options, state, starter, signals, log, manager=service_manager()).watch()
         finally:
-            give_all_to_owner(
-                state
-            )  # a service could store nothing any more behind root, who has tried its rig by hand
+            # behind root, who has tried its rig by hand, a service could store nothing any more
+            give_all_to_owner(state)
 
 
 @dataclass
