@@ -7,7 +7,7 @@ import pytest
 
 from gateway.audit.audit_file import AuditFile
 from gateway.audit.write_series import WriteSeries
-from gateway.cli.verbs.audit import format_record
+from gateway.cli.verbs.history.audit import format_record
 
 
 @pytest.fixture

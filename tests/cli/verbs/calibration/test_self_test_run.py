@@ -8,7 +8,7 @@ import pytest
 
 from gateway import defaults
 from gateway.cli.errors import CliError
-from gateway.cli.verbs import self_test
+from gateway.cli.verbs.calibration import self_test
 from gateway.processes import exit_codes
 from gateway.profiles import load_register_map
 from gateway.registers.words import ControlBit, SelfTestResult

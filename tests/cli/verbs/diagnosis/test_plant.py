@@ -19,7 +19,7 @@ from gateway.processes.state_lock import hold_state_lock
 from gateway.profiles.kinds.plant_writer import plant_text
 from gateway.recording import Recorder
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
-from tests.cli.verbs.test_diagnose import table
+from tests.cli.verbs.diagnosis.test_diagnose import table
 from tests.plants.test_plant_store import bowed
 from tests.reports.fake_diagnosis import diagnosis
 

@@ -8,7 +8,7 @@ import click
 from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.cli.errors import CliError, no_state_directory
 from gateway.cli.options import StateChoice, json_option, state_options
-from gateway.cli.verbs.events import parse_since
+from gateway.cli.verbs.history.events import parse_since
 from gateway.processes import exit_codes
 
 EXAMPLES = ("audit show --since 1h", "audit verify")

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from gateway import defaults
-from gateway.cli.verbs import self_test
+from gateway.cli.verbs.calibration import self_test
 from gateway.registers import RegisterMap
 from gateway.registers.words import SelfTestResult
 from tests.cli.conftest import PlainBank

@@ -24,7 +24,7 @@ from gateway.profiles import load_plant, load_rig, shipped_profiles_folder
 from gateway.recording import Recorder, export_csv, read_recording
 from gateway.service.closed_loop.study import ClosedLoopGain
 from gateway.twin import Plant
-from tests.cli.verbs.answered_engine import Engine, engine, rows, table
+from tests.cli.verbs.diagnosis.answered_engine import Engine, engine, rows, table
 from tests.reports.fake_diagnosis import FRICTION, WARMTH, diagnosis
 
 __all__ = ["engine"]

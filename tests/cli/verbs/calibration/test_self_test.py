@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from gateway.cli.errors import CliError
-from gateway.cli.verbs import self_test
+from gateway.cli.verbs.calibration import self_test
 from gateway.codes.faults import FaultCode
 from gateway.processes import exit_codes
 from gateway.registers import BankRules, RegisterBank, RegisterMap

@@ -54,7 +54,7 @@ class ScriptedGateway:
 def gateway(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ScriptedGateway:
     gateway = ScriptedGateway(tmp_path)
     monkeypatch.setattr("gateway.cli.control_socket.ask", gateway.ask)
-    monkeypatch.setattr("gateway.cli.verbs.record._LOOK_S", 0.0)
+    monkeypatch.setattr("gateway.cli.verbs.diagnosis.record._LOOK_S", 0.0)
     return gateway
 
 
@@ -91,7 +91,7 @@ def test_ctrl_c_ends_it_and_keeps_it(
     def press(seconds: float) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gateway.cli.verbs.record.time.sleep", press)
+    monkeypatch.setattr("gateway.cli.verbs.diagnosis.record.time.sleep", press)
     answer = call("record", "--for", "1h", "--json", "--state", tmp_path)
     assert gateway.asked[-1] == {"do": "record", "on": False}
     said = json.loads(answer.stdout)

@@ -214,7 +214,7 @@ def _minutes(seconds: float) -> str:
 
 def _tell(end: dict[str, Any], as_json: bool, *, resumes: bool) -> None:
     """The table and the number, or why there is none."""
-    from gateway.cli.verbs.fit import show
+    from gateway.cli.verbs.calibration.fit import show
 
     document = _document(end)
     if as_json:

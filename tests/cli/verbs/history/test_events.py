@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.cli.verbs import events as verb
+from gateway.cli.verbs.history import events as verb
 from gateway.processes.event import encode_event, make_event, utc_text
 from gateway.processes.event_file import EventFile
 
