@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""From a fault to the safe voltage on the wire, in virtual time: `tools/bench/bounds.py`. A quarter of a minute.
+"""From a fault to the safe voltage on the wire, in virtual time: `tools/bench/faults/bounds.py`. A quarter of a minute.
 
 The whole gateway with the twin and its two wires, which take their baud rates' time; an observer reads the wire to the device
 and notes when the last byte of `SET 0` has passed. Each fault comes at 20 moments, a millisecond apart, since where it falls
@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from tests.service.rigs import strict, with_supervision
 from tests.service.wired import ENABLE, Wired

@@ -1,6 +1,6 @@
 """How fast a setpoint reaches the wire, and how steady the loop stays under load.
 
-    .venv/bin/python tools/bench/loop.py
+    .venv/bin/python tools/bench/speed/loop.py
 
 Runs the whole gateway (guardian, control process) on two ptys whose far ends a process of this program serves, so that the
 wire costs nothing. Prints
@@ -34,10 +34,12 @@ from functools import partial
 from pathlib import Path
 
 import psutil
-from harness.running_gateway import RunningGateway, running_gateway
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.progress import report
+from tools.bench.harness.running_gateway import RunningGateway, running_gateway
 
 GOAL_ABOVE_HOP_S = 250e-6
 GOAL_MISSED = 0.005
@@ -46,7 +48,7 @@ GOAL_IDLE_BYTES = 60e6
 
 RIG = """\
 name: bench
-description: both devices served by tools/bench/loop.py on ptys, no wire time
+description: both devices served by tools/bench/speed/loop.py on ptys, no wire time
 simulated: false
 loop_hz: {loop_hz}
 registers: force-v1
@@ -125,7 +127,7 @@ def gateway_on_devices(loop_hz: int) -> Iterator[tuple[Devices, RunningGateway]]
     with contextlib.closing(Devices()) as devices, tempfile.TemporaryDirectory() as folder:
         rig = Path(folder) / "bench.yaml"
         rig.write_text(RIG.format(loop_hz=loop_hz, output=devices.paths[0], cell=devices.paths[1]))
-        with running_gateway(str(rig), quiet=True) as gateway:
+        with running_gateway(str(rig), told=subprocess.DEVNULL) as gateway:
             yield devices, gateway
 
 
@@ -141,7 +143,7 @@ class EmptyLoop:
 @contextlib.contextmanager
 def empty_loop(loop_hz: int) -> Iterator[EmptyLoop]:
     """Run one until the block ends."""
-    script = Path(__file__).parent / "harness" / "empty_loop.py"
+    script = Path(__file__).parents[1] / "harness" / "empty_loop.py"
     with contextlib.closing(Devices()) as devices:
         process = subprocess.Popen(
             [sys.executable, str(script), *devices.paths, str(loop_hz)], stdout=subprocess.PIPE, text=True
@@ -239,7 +241,7 @@ def bench_latency(loop_hz: int, count: int) -> None:
         empty_loop(loop_hz) as empty,
         contextlib.closing(Devices()) as bare,
     ):
-        seconds, empties, hops = latencies(devices, empty, bare, (gateway.host, gateway.port), count)
+        seconds, empties, hops = latencies(devices, empty, bare, gateway.modbus, count)
     p50, p99 = quantile(seconds, 0.5), quantile(seconds, 0.99)
     goal_s = quantile(hops, 0.99) + GOAL_ABOVE_HOP_S
     verdict = "reached" if p99 <= goal_s else "MISSED"
@@ -254,7 +256,7 @@ def bench_load(loop_hz: int, seconds: float) -> None:
     """Print how late the loop is while masters read."""
     with gateway_on_devices(loop_hz) as (_, gateway):
         before = health(gateway.state)
-        answered = load((gateway.host, gateway.port), seconds, 2000)
+        answered = load(gateway.modbus, seconds, 2000)
         after = health(gateway.state)
     ticks, missed = after["ticks"] - before["ticks"], after["missed_ticks"] - before["missed_ticks"]
     verdict = "reached" if missed <= GOAL_MISSED * ticks else "MISSED"
@@ -274,7 +276,7 @@ def used_s(process: psutil.Process) -> float:
 def bench_idle(loop_hz: int, seconds: float) -> None:
     """Print what the control process takes while nobody asks anything."""
     with gateway_on_devices(loop_hz) as (_, gateway), empty_loop(loop_hz) as empty:
-        process, peer = psutil.Process(gateway.control_pid), psutil.Process(empty.pid)
+        process, peer = psutil.Process(gateway.ready["pids"]["control"]), psutil.Process(empty.pid)
         time.sleep(2.0)  # the start is over
         before_s, began_s = (used_s(process), used_s(peer)), time.perf_counter()
         time.sleep(seconds)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What is on the wire when a process dies, stands still, or a plug is pulled: `tools/bench/process_faults.py [--rounds 50]`.
+"""What is on the wire when a process dies or stands still, or a plug is pulled: `tools/bench/faults/process_faults.py`.
 
 A gateway on a real rig's file presses with 4 V; both devices are a program at the far ends of two ptys, which shares no code
 with it and notes when the last byte of each setting has come. Each round does one thing to it (harness/pressing_gateway.py):
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from tools.bench.harness.pressing_gateway import (
     Scene,

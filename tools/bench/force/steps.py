@@ -1,7 +1,7 @@
 """How a setpoint settles: the whole gateway on the simulated rig, with the trim and by feedforward alone, side by side.
 
-    .venv/bin/python tools/bench/steps.py            # the table in README
-    .venv/bin/python tools/bench/steps.py --json
+    .venv/bin/python tools/bench/force/steps.py            # the table in README
+    .venv/bin/python tools/bench/force/steps.py --json
 
 Commands 5, 10, ..., 40 N and back down, then partial reversals, by Modbus; reads the measured force by Modbus. "settled" is
 the time from the write until the measured force has come within 1 N for good; "error" is the mean of the last half second.
@@ -13,17 +13,21 @@ import contextlib
 import json
 import re
 import statistics
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from harness.running_gateway import running_gateway
 from pymodbus.client import ModbusTcpClient
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.progress import reported
+from tools.bench.harness.running_gateway import running_gateway
 
 STEPS_N = (5, 10, 15, 20, 25, 30, 35, 40, 35, 30, 25, 20, 15, 10, 5, 20, 12, 26, 16, 30, 8)
 DWELL_S = 2.0
@@ -42,8 +46,9 @@ class Settling:
 @contextlib.contextmanager
 def connect(rig: Path) -> Iterator[ModbusTcpClient]:
     """Run a gateway on a rig and connect to it."""
-    with running_gateway(str(rig), quiet=True) as gateway:
-        client = ModbusTcpClient(gateway.host, port=gateway.port, timeout=1, retries=0)
+    with running_gateway(str(rig), told=subprocess.DEVNULL) as gateway:
+        host, port = gateway.modbus
+        client = ModbusTcpClient(host, port=port, timeout=1, retries=0)
         client.connect()
         yield client
         client.close()
@@ -71,7 +76,7 @@ def settle(client: ModbusTcpClient, setpoint_n: float) -> Settling:
 
 def demo_rig(directory: Path, gain: float) -> Path:
     """Write the shipped demo rig with another trim gain; 0 is feedforward alone."""
-    text = (Path(__file__).parents[2] / "profiles" / "rigs" / "demo.yaml").read_text()
+    text = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text()
     text, count = re.subn(r"gain_v_per_n_s: [0-9.]+", f"gain_v_per_n_s: {gain:g}", text)
     assert count == 1
     path = directory / f"steps-{'trim' if gain else 'feedforward'}.yaml"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What onlookers cost the control loop: `tools/bench/missed_ticks.py [--viewers 20] [--seconds 30]`.
+"""What onlookers cost the control loop: `tools/bench/speed/missed_ticks.py [--viewers 20] [--seconds 30]`.
 
 A demo gateway holds 12 N and publishes over MQTT: first with nobody at its page, then with so many open streams of events that
 are read as a browser reads them, then with the MQTT broker (mosquitto, where it is installed) killed and started again besides.
@@ -9,7 +9,6 @@ carry. On a busy machine ticks are missed in all of them; what counts is the dif
 
 import argparse
 import contextlib
-import json
 import selectors
 import shutil
 import socket
@@ -20,12 +19,14 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import psutil
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+
 from gateway.cli.control_socket import ask
 from gateway.profiles import shipped_profiles_folder
+from tools.bench.harness.running_gateway import RunningGateway, running_gateway
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
 BROKER_LIVES_S = 3.0  # and is away as long: both ends of an outage several times in a stretch of 30 s
@@ -52,13 +53,13 @@ def watch(address: tuple[str, int], viewers: int, seconds: float) -> int:
     return received
 
 
-def measure(ready: dict[str, Any], state: Path, viewers: int, seconds: float) -> dict[str, float]:
+def measure(gateway: RunningGateway, viewers: int, seconds: float) -> dict[str, float]:
     """Return what one stretch of time has cost; share: in percent of one core."""
-    processes = {name: psutil.Process(ready["pids"][name]) for name in ("control", "web")}
+    processes = {name: psutil.Process(gateway.ready["pids"][name]) for name in ("control", "web")}
     before = {name: sum(one.cpu_times()[:2]) for name, one in processes.items()}
-    loop = ask(state, {"do": "state"})["loop"]
-    received = watch(tuple(ready["web"]), viewers, seconds)
-    after = ask(state, {"do": "state"})["loop"]
+    loop = ask(gateway.state, {"do": "state"})["loop"]
+    received = watch(tuple(gateway.ready["web"]), viewers, seconds)
+    after = ask(gateway.state, {"do": "state"})["loop"]
     ticks, missed = after["ticks"] - loop["ticks"], after["missed"] - loop["missed"]
     used = {name: 100.0 * (sum(one.cpu_times()[:2]) - before[name]) / seconds for name, one in processes.items()}
     return {"missed_percent": 100.0 * missed / ticks, "kB_per_s": received / seconds / 1000.0} | {
@@ -99,15 +100,15 @@ def rig_with_broker(folder: Path, port: int) -> Path:
     return rig
 
 
-def measure_each(ready: dict[str, Any], folder: Path, port: int, asked: argparse.Namespace) -> Iterator[str]:
+def measure_each(gateway: RunningGateway, folder: Path, port: int, asked: argparse.Namespace) -> Iterator[str]:
     """Yield a line for each stretch."""
     for count in (0, asked.viewers):
-        yield line(f"{count} viewers", measure(ready, folder / "state", count, asked.seconds))
+        yield line(f"{count} viewers", measure(gateway, count, asked.seconds))
     if MOSQUITTO is None:
         yield "no mosquitto here (apt-get install mosquitto): the broker that dies was not tried"
         return
     with dying_broker(folder, port) as died:
-        figures = measure(ready, folder / "state", asked.viewers, asked.seconds)
+        figures = measure(gateway, asked.viewers, asked.seconds)
     yield line(f"{asked.viewers} viewers, the broker died {len(died)} times", figures)
 
 
@@ -123,19 +124,9 @@ def run(asked: argparse.Namespace) -> Iterator[str]:
         free.bind(("127.0.0.1", 0))  # nobody listens: the broker is away at first
         port = free.getsockname()[1]
         free.close()
-        where = ["--json", "--bind", "127.0.0.1:0", "--web", "127.0.0.1:0", "--state", str(folder / "state")]
-        command = [sys.executable, "-m", "gateway", "run", str(rig_with_broker(folder, port)), "--sim", *where]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        assert process.stdout
-        try:
-            ready = json.loads(process.stdout.readline())
-            ask(folder / "state", {"do": "modbus", "via": "web", "pdu": "1000000002040001" + "04b0"})
-            time.sleep(3.0)  # the page's process has imported what it needs, the force is held
-            yield from measure_each(ready, folder, port, asked)
-        finally:
-            process.terminate()
-            process.wait()
-            process.stdout.close()
+        with running_gateway(str(rig_with_broker(folder, port)), "--sim", "--web", "127.0.0.1:0") as gateway:
+            gateway.hold()
+            yield from measure_each(gateway, folder, port, asked)
 
 
 def main() -> None:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a client that sends garbage costs the others: `tools/bench/wire_fuzz.py [--seconds 20] [--attackers 2]`.
+"""What a client that sends garbage costs the others: `tools/bench/faults/wire_fuzz.py [--seconds 20] [--attackers 2]`.
 
 A demo gateway holds 12 N. A probing client reads 13 registers every 5 ms, first alone, then while processes of their own send
 whatever they can: noise, frames with wrong lengths, half frames, floods of refused writes, storms of connections. Printed for
@@ -9,12 +9,10 @@ Loopback is exempt from the limits of connections and requests: it is the worst 
 """
 
 import argparse
-import json
 import multiprocessing
 import random
 import socket
 import struct
-import subprocess
 import sys
 import tempfile
 import time
@@ -23,7 +21,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+
 from gateway.cli.control_socket import ask
+from tools.bench.harness.running_gateway import running_gateway
 
 P99_MS, LOG_BYTES_PER_MIN = 20.0, 1e6
 HOLDING = 3
@@ -138,26 +139,10 @@ class Stage:
 
 def run(seconds: float, attackers: int) -> dict[str, dict[str, float]]:
     """Return the figures alone and under attack."""
-    with tempfile.TemporaryDirectory() as folder, (Path(folder) / "told.log").open("wb") as told:
-        state = Path(folder) / "state"
-        where = ["--json", "--bind", "127.0.0.1:0", "--state", str(state)]
-        process = subprocess.Popen(
-            [sys.executable, "-m", "gateway", "run", "demo", "--sim", *where],
-            stdout=subprocess.PIPE,
-            stderr=told,
-            text=True,
-        )
-        assert process.stdout
-        try:
-            ready = json.loads(process.stdout.readline())
-            ask(state, {"do": "modbus", "via": "web", "pdu": "1000000002040001" + "04b0"})
-            time.sleep(3.0)
-            stage = Stage(state, Path(told.name), tuple(ready["modbus"]))
-            return {f"{count} attackers": stage.measure(seconds, count) for count in (0, attackers)}
-        finally:
-            process.terminate()
-            process.wait()
-            process.stdout.close()
+    with tempfile.NamedTemporaryFile() as told, running_gateway("demo", "--sim", told=told) as gateway:
+        gateway.hold()
+        stage = Stage(gateway.state, Path(told.name), gateway.modbus)
+        return {f"{count} attackers": stage.measure(seconds, count) for count in (0, attackers)}
 
 
 def main() -> int:

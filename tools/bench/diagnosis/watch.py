@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the residual watch takes of the machine: `tools/bench/watch.py [--hours 1] [--reference] [--live SECONDS]`.
+"""What the residual watch takes of the machine: `tools/bench/diagnosis/watch.py [--hours 1] [--reference] [--live SECONDS]`.
 
 Without --live: the watch with its real search, in virtual time, beside a healthy demo machine that moves between random
 settings, 100 rows a second; processor and memory are those of this process, libraries included. With --reference: compared
@@ -22,7 +22,8 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from harness.running_gateway import running_gateway
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 import gateway.diagnosis  # noqa: F401  # all steps, before the first loop is compiled
 from gateway.cli.diagnosis.progress_line import show_progress
@@ -37,6 +38,7 @@ from gateway.watch.memory import resident_mb
 from gateway.watch.processor_budget import ProcessorBudget
 from gateway.watch.reference_recording import keep_reference_recording
 from gateway.watch.watch_process import make_watch, work_gently
+from tools.bench.harness.running_gateway import running_gateway
 
 SEED = 5
 ROW_S = 0.01
@@ -119,8 +121,8 @@ def run_virtual(hours: float, state: str, *, with_reference: bool) -> None:
 def run_live(lasts_s: float) -> None:
     """Watch the watch of a running gateway."""
     draw = random.Random(SEED)
-    with running_gateway("demo", quiet=True) as gateway:
-        where = ["--gateway", f"{gateway.host}:{gateway.port}"]
+    with running_gateway("demo", told=subprocess.DEVNULL) as gateway:
+        where = ["--gateway", ":".join(map(str, gateway.modbus))]
         began_s, told_s = time.monotonic(), 0.0
         while (now_s := time.monotonic() - began_s) < lasts_s:
             words = [f"force_setpoint={draw.uniform(4, 40):.1f}", "control_word=1"]
