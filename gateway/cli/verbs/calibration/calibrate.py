@@ -214,13 +214,13 @@ def _minutes(seconds: float) -> str:
 
 def _tell(end: dict[str, Any], as_json: bool, *, resumes: bool) -> None:
     """The table and the number, or why there is none."""
-    from gateway.cli.verbs.calibration.fit import show
+    from gateway.cli.calibration.fit_table import print_fit
 
     document = _document(end)
     if as_json:
         click.echo(json.dumps(end | {"fit": document}))
     elif document:
-        show(document)
+        print_fit(document)
     elif end["phase"] == "stored":
         click.echo(
             f"calibration {end['stored']} is stored, not active; force-gateway calibration use {end['stored']} there"

@@ -11,7 +11,7 @@ from gateway.cli.command_line.completion_words import complete_recordings
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.errors import CliError, no_such_recording
-from gateway.cli.options import json_option, name_option, state_directory
+from gateway.cli.options import json_option, name_option, state_directory, state_option
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -69,9 +69,7 @@ EXAMPLES = ("fit ladder.csv --models bsfm --orders 1-3", "fit ladder.csv --model
 @click.option("--no-report", is_flag=True, help="Write no report.")
 @click.option("--store", is_flag=True, help="Store the chosen fit as a numbered calibration (it is not activated).")
 @name_option
-@click.option(
-    "--state", type=click.Path(path_type=Path, file_okay=False, readable=False), help="State directory of the gateway."
-)
+@state_option("State directory of the gateway.")
 @rig_option("The rig it must be from  [default: the recording's own]")
 @json_option
 def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> None:
@@ -95,7 +93,9 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
     if as_json:
         click.echo(json.dumps(fit.document, indent=2))
     else:
-        show(fit.document)
+        from gateway.cli.calibration.fit_table import print_fit
+
+        print_fit(fit.document)
     if store and fit.verdict.rejected:
         from gateway.service.fitting.fit_process import rejected_sentence
 
@@ -193,15 +193,3 @@ def _store(fit: "LadderFit", options: dict[str, Any]) -> int:
     except LadderError as error:
         raise CliError(f"E421 {fit.recording.path}: {error}", exit_codes.DATA) from None
     return CalibrationStore(state, rig.calibration).add(calibration)
-
-
-def show(document: dict[str, Any]) -> None:
-    """Print the fits as a table, and sentences on them."""
-    from rich.console import Console
-
-    from gateway.cli.calibration.fit_table import fit_table, summary
-
-    console = Console()
-    console.print(fit_table(document, console.width))
-    for line in summary(document):
-        console.print(line, highlight=False, soft_wrap=True)

@@ -16,6 +16,7 @@ import click
 from gateway.cli.command_line.completion_words import complete_calibrations, complete_effects, complete_recordings
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
+from gateway.cli.options import state_directory, state_option
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -95,9 +96,7 @@ def _not_an_option(context: click.Context, parameter: click.Parameter, value: Pa
 )
 @table_options
 @click.option("--fail-on", type=click.Choice(list(_FAILS)), help="Exit 1 on this verdict or a worse one.")
-@click.option(
-    "--state", type=click.Path(path_type=Path, file_okay=False, readable=False), help="State directory, for numbers."
-)
+@state_option("State directory, for numbers.")
 @click.option(
     "--against",
     metavar="OLD",
@@ -227,7 +226,6 @@ def _read_old(options: dict[str, Any], rig: str) -> "Sources | None":
     """The recordings that the new ones are compared with; None where --against names none. rig: of the new ones, whose
     reference is meant."""
     from gateway.cli.diagnosis.inputs import REFERENCE, read_sources, reference_file, refuse_still
-    from gateway.cli.options import state_directory
 
     if not options["against"]:
         return None

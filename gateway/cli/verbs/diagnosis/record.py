@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import click
 
-from gateway.cli.duration import parse_duration_s
+from gateway.cli.command_line.duration import parse_duration_s
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice, calibration_name, json_option, state_options
 from gateway.processes import exit_codes

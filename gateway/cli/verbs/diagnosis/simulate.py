@@ -9,7 +9,7 @@ import click
 from gateway.cli.command_line.completion_words import complete_plant_files, complete_recordings
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
-from gateway.cli.options import json_option
+from gateway.cli.options import json_option, state_option
 
 if TYPE_CHECKING:
     from gateway.cli.diagnosis.inputs import Sources
@@ -32,9 +32,7 @@ EXAMPLES = ("simulate press.csv --rig demo", "simulate press.csv --plant paper-s
 )
 @table_options
 @click.option("--csv", "csv_file", type=click.Path(path_type=Path, dir_okay=False), help="Write the simulated series.")
-@click.option(
-    "--state", type=click.Path(path_type=Path, file_okay=False, readable=False), help="State directory, for numbers."
-)
+@state_option("State directory, for numbers.")
 @json_option
 def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str | None, **options: Any) -> None:
     """Run a plant over a recording, and compare the forces.

@@ -6,9 +6,9 @@ from typing import Any
 import click
 
 from gateway.audit.audit_reader import read_audit, verify_audit
+from gateway.cli.command_line.since_option import since_option
 from gateway.cli.errors import CliError, no_state_directory
 from gateway.cli.options import StateChoice, json_option, state_options
-from gateway.cli.verbs.history.events import parse_since
 from gateway.processes import exit_codes
 
 EXAMPLES = ("audit show --since 1h", "audit verify")
@@ -20,13 +20,7 @@ def command() -> None:
 
 
 @command.command(name="show")
-@click.option(
-    "--since",
-    "after",
-    callback=parse_since,
-    metavar="10m|TIME",
-    help="Only what is younger: 90s, 10m, 2h, 1d, or a time (UTC unless it says otherwise).",
-)
+@since_option
 @click.option("--peer", metavar="TEXT", help="Only of peers with this in their address or certificate's name.")
 @json_option
 @state_options

@@ -3,49 +3,25 @@
 import json
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime
 from typing import Any, Final
 
 import click
 
 from gateway.cli.command_line.completion_words import complete_codes
-from gateway.cli.duration import parse_duration_s
+from gateway.cli.command_line.since_option import since_option
 from gateway.cli.errors import no_state_directory
 from gateway.cli.options import StateChoice, json_option, state_options
-from gateway.processes.event import SEVERITIES, EventRecord, format_event, utc_text
+from gateway.processes.event import SEVERITIES, EventRecord, format_event
 from gateway.processes.event_file import EventReader
 
 _POLL_S: Final = 0.25  # how often --follow reads the event file
-
-
-def parse_since(context: click.Context, parameter: click.Parameter, value: str | None) -> str:
-    """Return the time that the option means, as events write it; empty where it is not given.
-
-    value: a duration before now, such as 10m, 2h or 1.5d, or an ISO 8601 time (without a zone: UTC).
-    """
-    if value is None:
-        return ""
-    if not value.strip().isdecimal() and (ago_s := parse_duration_s(value)) is not None:  # a bare number may be a date
-        return utc_text(max(0.0, time.time() - ago_s))
-    try:
-        moment = datetime.fromisoformat(value.strip())
-        moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
-        return utc_text(moment.timestamp())
-    except (ValueError, OverflowError):
-        raise click.BadParameter(f"{value} is neither 90s, 10m, 2h, 1d nor a time such as 2026-11-22T10:30") from None
 
 
 EXAMPLES = ("events --since 10m", "events --severity warning --code W204")
 
 
 @click.command()
-@click.option(
-    "--since",
-    "after",
-    callback=parse_since,
-    metavar="10m|TIME",
-    help="Only what is younger: 90s, 10m, 2h, 1d, or a time (UTC unless it says otherwise).",
-)
+@since_option
 @click.option("--severity", type=click.Choice(SEVERITIES), default="info", help="This severity and worse.")
 @click.option(
     "--code",

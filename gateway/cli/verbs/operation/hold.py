@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from gateway import defaults
+from gateway.cli.command_line.duration import parse_duration_s
 from gateway.cli.command_line.rig_choice import rig_option
-from gateway.cli.duration import parse_duration_s
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, json_option
 from gateway.units import format_ms

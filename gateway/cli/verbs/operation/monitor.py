@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from gateway.cli.errors import CliError
-from gateway.cli.options import gateway_options
+from gateway.cli.options import gateway_options, state_option
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -27,11 +27,7 @@ EXAMPLES = ("monitor", "monitor --svg monitor.svg --seconds 1")
 @click.option(
     "--seconds", type=click.FloatRange(min=0.0), help="End after this time; with --once or --svg, watch first."
 )
-@click.option(
-    "--state",
-    type=click.Path(path_type=Path, file_okay=False, readable=False),
-    help="State directory, for last writers, where it is not the usual one.",
-)
+@state_option("State directory, for last writers, where it is not the usual one.")
 @gateway_options
 def command(*, svg: Path | None, seconds: float | None, wire: "Wire", **options: Any) -> None:
     """Show a gateway live: state, force, alarms.

@@ -1,13 +1,12 @@
 """`run`: the gateway itself. Hands over to the guardian, which is why nothing else may be imported here."""
 
-from pathlib import Path
 from typing import Any
 
 import click
 
 from gateway import defaults
 from gateway.cli.command_line.completion_words import complete_rigs
-from gateway.cli.options import bind_endpoint, http_endpoint, serial_port
+from gateway.cli.options import bind_endpoint, http_endpoint, serial_port, state_option
 
 EXAMPLES = ("run demo --sim", "run irc5-cell --sim --bind 127.0.0.1:0 --record")
 
@@ -43,11 +42,7 @@ EXAMPLES = ("run demo --sim", "run irc5-cell --sim --bind 127.0.0.1:0 --record")
     metavar="HOST:PORT",
     help="Serve figures for Prometheus here; port 0: any free one.",
 )
-@click.option(
-    "--state",
-    type=click.Path(path_type=Path, file_okay=False, readable=False),
-    help="State directory (default: $XDG_STATE_HOME/force-gateway/RIG).",
-)
+@state_option("State directory (default: $XDG_STATE_HOME/force-gateway/RIG).")
 @click.option("--record", is_flag=True, help="Record from the start.")
 @click.option("--realtime", is_flag=True, help="SCHED_FIFO and locked memory for the control process.")
 @click.option("--json", is_flag=True, help="At READY, print one JSON line: ports, ptys and process ids.")

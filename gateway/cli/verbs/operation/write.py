@@ -3,14 +3,13 @@
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from gateway.cli.command_line.completion_words import complete_assignments
 from gateway.cli.errors import CliError
-from gateway.cli.options import gateway_options, json_option
+from gateway.cli.options import gateway_options, json_option, state_option
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -25,11 +24,7 @@ EXAMPLES = ("write force_setpoint=12 control_word=enable", "write mode=force --d
 @click.command()
 @click.argument("assignments", metavar="NAME=VALUE...", nargs=-1, required=True, shell_complete=complete_assignments)
 @click.option("--dry-run", is_flag=True, help="Say what would be sent, and send nothing that writes.")
-@click.option(
-    "--state",
-    type=click.Path(path_type=Path, file_okay=False, readable=False),
-    help="State directory: tells why in numbers.",
-)
+@state_option("State directory: tells why in numbers.")
 @gateway_options
 @json_option
 def command(*, assignments: tuple[str, ...], dry_run: bool, wire: "Wire", as_json: bool, **options: Any) -> None:

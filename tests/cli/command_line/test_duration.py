@@ -2,7 +2,7 @@
 
 import pytest
 
-from gateway.cli.duration import parse_duration_s
+from gateway.cli.command_line.duration import parse_duration_s
 
 
 @pytest.mark.parametrize(
