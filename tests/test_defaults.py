@@ -59,7 +59,7 @@ ELSEWHERE = {
     "HOST": {
         "profiles/rigs/rig_file.py",
         "profiles/rigs/addresses.py",
-        "cli/verbs/certs.py",  # these three: what `localhost` means
+        "cli/verbs/setup/certs.py",  # these three: what `localhost` means
         "codes/face_errors.py",
         "codes/errors.py",  # these two: advice to take any free port
     },

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterable
 from difflib import get_close_matches
 from importlib import import_module
+from types import ModuleType
 from typing import Any, Final
 
 import click
@@ -15,29 +16,30 @@ from gateway import VERSION
 from gateway.cli.errors import translate_error
 
 SECTIONS: Final = {
-    "Run it and command a force": ("run", "monitor", "hold", "read", "write", "sim"),
-    "Set up a cell": ("init", "ports", "check", "wiring", "registers", "certs", "schema"),
-    "Calibrate and test": ("calibrate", "self-test", "fit", "upload", "calibration"),
-    "Record, and say why the force is off": (
-        "record",
-        "recordings",
-        "replay",
-        "diagnose",
-        "effects",
-        "plant",
-        "simulate",
-        "fleet",
+    "operation": ("Run it and command a force", ("run", "monitor", "hold", "read", "write", "sim")),
+    "setup": ("Set up a cell", ("init", "ports", "check", "wiring", "registers", "certs", "schema")),
+    "calibration": ("Calibrate and test", ("calibrate", "self-test", "fit", "upload", "calibration")),
+    "diagnosis": (
+        "Record, and say why the force is off",
+        ("record", "recordings", "replay", "diagnose", "effects", "plant", "simulate", "fleet"),
     ),
-    "See what happened": ("explain", "events", "audit", "metrics", "report"),
-    "Keep it running": ("service", "backup", "restore", "completion", "version"),
+    "history": ("See what happened", ("explain", "events", "audit", "metrics", "report")),
+    "maintenance": ("Keep it running", ("service", "backup", "restore", "completion", "version")),
 }
-"""The verbs in the order in which a newcomer meets them; each is a module of gateway.cli.verbs with its `command`."""
-VERBS: Final = tuple(verb for verbs in SECTIONS.values() for verb in verbs)
+"""Folder of gateway.cli.verbs -> its title in the help, and its verbs, in the order in which a newcomer meets them. Each verb
+is a module of that folder with its `command`."""
+_FOLDERS: Final = {verb: folder for folder, (_, verbs) in SECTIONS.items() for verb in verbs}
+VERBS: Final = tuple(_FOLDERS)
 ALIASES: Final = {"install-service": ("service", "install")}
 """Other names of subcommands, on which programs rely; the help does not list them."""
 HELP: Final = """Modbus gateway that holds a constant contact force, and says why the force is off.
 
 Begin with: force-gateway run demo --sim"""
+
+
+def import_verb(verb: str) -> ModuleType:
+    """Return a verb's module, and import it only now."""
+    return import_module(f"gateway.cli.verbs.{_FOLDERS[verb]}.{verb.replace('-', '_')}")
 
 
 def format_examples(examples: Iterable[str]) -> str | None:
@@ -56,9 +58,9 @@ class VerbGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the verbs by what they are for; all sections have one column of names."""
         width = max(map(len, VERBS))
-        for section, verbs in SECTIONS.items():
+        for title, verbs in SECTIONS.values():
             commands = [(verb, self.get_command(ctx, verb)) for verb in verbs]
-            with formatter.section(section):
+            with formatter.section(title):
                 limit = formatter.width - 6 - width
                 formatter.write_dl(
                     [(verb.ljust(width), one.get_short_help_str(limit)) for verb, one in commands if one]
@@ -71,7 +73,7 @@ class VerbGroup(click.Group):
             return group.get_command(ctx, alias[1]) if isinstance(group, click.Group) else None
         if cmd_name not in VERBS:
             return None
-        module = import_module(f"gateway.cli.verbs.{cmd_name.replace('-', '_')}")
+        module = import_verb(cmd_name)
         command: click.Command = module.command
         command.epilog = format_examples(getattr(module, "EXAMPLES", ()))
         return command

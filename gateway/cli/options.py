@@ -219,6 +219,11 @@ class StateChoice:
         return state_directory(self.path, self.named)
 
 
+def state_option(text: str) -> Callable[[Function], Function]:
+    """Return --state with this help. One that cannot be read is told by E105, which ends with 77."""
+    return click.option("--state", type=click.Path(path_type=Path, file_okay=False, readable=False), help=text)
+
+
 def state_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add --state and --rig; the function receives both as one argument, `state`, a StateChoice."""
     from gateway.cli.command_line.known_rigs import choose_rig
@@ -233,11 +238,7 @@ def state_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
     for option in (
         rig_option(f"The rig that is meant  [default: the one that runs here, else {defaults.RIG}]", checks=False),
-        click.option(
-            "--state",
-            type=click.Path(path_type=Path, file_okay=False, readable=False),  # E105 tells it, and ends with 77
-            help="State directory of the gateway  [default: the rig's]",
-        ),
+        state_option("State directory of the gateway  [default: the rig's]"),
     ):
         option(with_choice)
     return with_choice

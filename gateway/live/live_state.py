@@ -6,10 +6,7 @@ here are the contract. None or an empty text stands where there is nothing to sa
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any, Self
-
-from gateway.live.control_link import ask_once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,15 +204,3 @@ _PARTS: dict[str, type] = {
     "residual": LiveResidual,
 }
 _LISTS: dict[str, type] = {"faults": LiveAlarm, "warnings": LiveAlarm, "peers": LivePeer}
-
-
-async def read_state(state_directory: Path) -> LiveState:
-    """Return the state of the gateway that runs on this directory. OSError where none answers, ValueError where it refuses."""
-    return LiveState.from_json(await ask_once(state_directory, {"do": "state"}))
-
-
-async def send_pdu(state_directory: Path, via: str, pdu: bytes, unit: int = 1) -> bytes:
-    """Have the gateway answer one Modbus request as if it had come by `via` (web, mqtt or opcua); OSError where none answers,
-    ValueError where it refuses to look at it. An exception of Modbus is an answer."""
-    answer = await ask_once(state_directory, {"do": "modbus", "via": via, "unit": unit, "pdu": pdu.hex()})
-    return bytes.fromhex(answer["pdu"])

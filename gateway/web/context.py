@@ -15,16 +15,14 @@ from gateway.profiles.kept_rig import unchanged_rig
 @dataclass
 class WebContext:
     """state: directory; rig: name or file, as `run` was given it; simulated: its devices are; control: the way to control's
-    socket, for questions and commands; fingerprint: of the rig that runs, None: whatever it is. jobs: long work that a tab has
-    begun, by a name of its own; it outlives a reload, and `tasks` keeps what must not be collected while it runs. viewers: how
-    many pages are open, whatever tab they show."""
+    socket, for questions and commands; fingerprint: of the rig that runs, None: whatever it is. tasks: work that a tab has
+    begun, kept from being collected while it runs. viewers: how many pages are open, whatever tab they show."""
 
     state: Path
     rig: str
     simulated: bool
     control: ControlLink
     fingerprint: str | None = None
-    jobs: dict[str, Any] = field(default_factory=dict)
     tasks: set["asyncio.Task[Any]"] = field(default_factory=set)
     viewers: Callable[[], int] = lambda: 0
 

@@ -29,7 +29,8 @@ made_up = Effect(
 )
 sensing.SENSING = (*sensing.SENSING, made_up)
 
-from gateway.cli.verbs import effects, registers
+from gateway.cli.verbs.diagnosis import effects
+from gateway.cli.verbs.setup import registers
 from gateway.diagnosis.experiments.experiments import plan_for
 from gateway.profiles import load_plant, load_register_map
 from gateway.profiles.rigs.compensated_effects import compensation_of, compensation_words

@@ -10,7 +10,7 @@ import pytest
 from gateway import extras
 from gateway.recording import Recorder, read_recording, read_table
 from tests.cli.lean import call_lean
-from tests.cli.verbs.test_fit import ORDERS, ladder_rows, written
+from tests.cli.verbs.calibration.test_fit import ORDERS, ladder_rows, written
 
 NEEDS = "E160 this needs more than is installed: {} is not installed; pip install 'force-gateway[analysis]' brings it"
 

@@ -6,7 +6,6 @@ What lasts (a whole ladder, a self-test, diagnoses) runs with the bigger budget;
 import io
 import shlex
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 
 import click
@@ -16,7 +15,7 @@ from click.testing import CliRunner
 
 from gateway.calibrations.store import CalibrationStore
 from gateway.cli.control_socket import ask
-from gateway.cli.main import VERBS, command
+from gateway.cli.main import VERBS, command, import_verb
 from gateway.profiles import load_calibration
 from gateway.service.supervisor.guardian import RunOptions
 from tests.end_to_end.conftest import RunningGateway, start, stop
@@ -25,7 +24,7 @@ LASTING = ("calibrate", "self-test", "diagnose", "simulate", "fleet")
 
 
 def examples_of(verb: str) -> tuple[str, ...]:
-    return getattr(import_module(f"gateway.cli.verbs.{verb.replace('-', '_')}"), "EXAMPLES", ())
+    return getattr(import_verb(verb), "EXAMPLES", ())
 
 
 EXAMPLES = [(verb, example) for verb in VERBS for example in examples_of(verb)]

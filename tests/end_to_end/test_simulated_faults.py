@@ -13,7 +13,6 @@ from gateway.cli.main import command
 from gateway.registers.words import State
 from tests.end_to_end.conftest import RunningGateway
 
-FAULT_CODE = 110
 ENABLE, RESET = 1, 2
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-BENCH = runpy.run_path(str(Path(__file__).parents[2] / "tools/bench/bounds.py"))
+BENCH = runpy.run_path(str(Path(__file__).parents[2] / "tools/bench/faults/bounds.py"))
 ROWS: tuple[tuple[str, float, Callable[[int], float]], ...] = BENCH["ROWS"]
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 

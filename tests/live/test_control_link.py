@@ -10,7 +10,6 @@ import pytest
 
 from gateway.live import control_link
 from gateway.live.control_link import ControlLink, ask_once
-from gateway.live.live_state import send_pdu
 from gateway.processes.json_socket.connection import SocketLimits
 from gateway.processes.json_socket.messages import Answer
 from gateway.processes.json_socket.server import JsonLineServer
@@ -185,19 +184,5 @@ def test_a_long_answer_is_taken_whole(tmp_path: Path) -> None:
         text = "x" * 500_000
         async with saying(tmp_path, json.dumps({"ok": True, "n": text}).encode() + b"\n"):
             assert await ask_once(tmp_path, {}) == {"n": text}
-
-    asyncio.run(scene())
-
-
-def test_a_modbus_request_goes_with_its_way_and_its_unit(tmp_path: Path) -> None:
-    async def scene() -> None:
-        asked: list[Answer] = []
-        control = JsonLineServer(
-            tmp_path / "control.sock", {"modbus": lambda request: asked.append(request) or {"pdu": "83"}}
-        )
-        await control.start()
-        assert await send_pdu(tmp_path, "opcua", b"\x03\x00", unit=7) == b"\x83"
-        assert asked == [{"do": "modbus", "via": "opcua", "unit": 7, "pdu": "0300"}]
-        await control.close()
 
     asyncio.run(scene())

@@ -84,7 +84,7 @@ def wire_of(line: OutputLine | CellLine) -> PacedWire:
 class Wired:
     """One simulated rig with its gateway. Times are virtual seconds since the start."""
 
-    def __init__(self, rig: Rig | None = None, *, seed: int = 7, calibration_scale: float = 1.0) -> None:
+    def __init__(self, rig: Rig | None = None, *, seed: int = 7) -> None:
         self.rig = rig = replace(rig or demo(), seed=seed)
         self.now_s = 0.0
         self.log: list[tuple[float, str]] = []

@@ -3,6 +3,7 @@
 from typing import Any, Final
 
 from rich import box
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -13,6 +14,14 @@ _LEAST_WIDTH: Final = 90  # below it headings stand in two lines, and a held-out
 _CLOSE_WIDTH: Final = 76  # below it cells stand close together, too
 _COLUMNS: Final = ("order", "coeffs", "RMS N", "max N", "held-out RMS N")
 _NARROW_COLUMNS: Final = ("order", "coeffs", "RMS\nN", "max\nN", "held-out\nRMS N")
+
+
+def print_fit(document: dict[str, Any]) -> None:
+    """Print the fits as a table, and sentences on them."""
+    console = Console()
+    console.print(fit_table(document, console.width))
+    for line in summary(document):
+        console.print(line, highlight=False, soft_wrap=True)
 
 
 def fit_table(document: dict[str, Any], width: int = _LEAST_WIDTH) -> Table:

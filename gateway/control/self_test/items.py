@@ -73,10 +73,6 @@ class SelfTestReport:
     result: SelfTestResult = SelfTestResult.NONE
     findings: tuple[Finding, ...] = ()
 
-    def verdict_on(self, item: Item) -> SelfTestVerdict:
-        """Return the verdict on an item; NOT_TESTED before there is one."""
-        return next((found.verdict for found in self.findings if found.item is item), NOT_TESTED)
-
     @property
     def _is_stopped(self) -> bool:
         return self.result is SelfTestResult.STOPPED

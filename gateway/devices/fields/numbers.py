@@ -123,9 +123,7 @@ class Decimals:
 
     def encode(self, value: Value) -> str:
         """Return the rounded number, never as -0.00. ValueRefused for one that is not finite or does not fit."""
-        number = finite(self.name, value)
-        if abs(number) >= 10.0**LONGEST_NUMBER:
-            raise refuse(self.name, value, "too large")
+        number = _bounded(self.name, value)
         text = format(number, f"{self.sign}z{self.zero}{self.width or ''}.{self.decimals}f")  # z: no minus before 0.00
         return of_width(self.name, text.replace(".", self.point), self.width)
 
@@ -164,15 +162,12 @@ class Scientific:
 
     def encode(self, value: Value) -> str:
         """Return mantissa and exponent of two digits, never as -0. ValueRefused for one that is not finite, or no reading."""
-        number = finite(self.name, value)
-        if abs(number) >= 10.0**LONGEST_NUMBER:
-            raise refuse(self.name, value, "too large")
+        number = _bounded(self.name, value)
         return format(number, f"{self.sign}z.{self.decimals}{self.letter}")
 
     def decode(self, text: str) -> Value | None:
         """Return the number, None for one that no double holds."""
-        number = float(text)
-        return number if isfinite(number) else None
+        return _finite_or_none(float(text))
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,13 +191,22 @@ class Plain:
 
     def encode(self, value: Value) -> str:
         """Return the rounded number without zeros at its end. ValueRefused for one that is not finite, or no reading."""
-        number = finite(self.name, value)
-        if abs(number) >= 10.0**LONGEST_NUMBER:
-            raise refuse(self.name, value, "too large")
+        number = _bounded(self.name, value)
         text = format(number, f"{self.sign}z.{self.decimals}f").rstrip("0")
         return f"{text}0" if text.endswith(".") else text
 
     def decode(self, text: str) -> Value | None:
         """Return the number, None for one that no double holds."""
-        number = float(text)
-        return number if isfinite(number) else None
+        return _finite_or_none(float(text))
+
+
+def _bounded(name: str, value: Value) -> float:
+    """Return a finite number of at most LONGEST_NUMBER digits. ValueRefused for another one."""
+    number = finite(name, value)
+    if abs(number) >= 10.0**LONGEST_NUMBER:
+        raise refuse(name, value, "too large")
+    return number
+
+
+def _finite_or_none(number: float) -> float | None:
+    return number if isfinite(number) else None

@@ -80,7 +80,7 @@ class ControlLoop:
         self.health = LoopHealth()
         self.decision: Output | None = None
         self.sample: ForceSample | None = None
-        self.samples = self.cell_garbage_bytes = 0
+        self.samples = 0
         self.cell_counts = cell.counts
         self.pressure_pa_per_v = self._pressure_pa = nan  # of the output device: by its profile; at the last decision
         self.output_lost = FaultCode.NONE
@@ -127,7 +127,6 @@ class ControlLoop:
                 self.samples += 1
             if isinstance(message, Garbage):
                 self.cell_counts.garbled += 1
-                self.cell_garbage_bytes += len(message.data)
             else:
                 self.cell_counts.heard += 1
         if fresh:

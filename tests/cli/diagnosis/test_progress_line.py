@@ -22,7 +22,7 @@ from gateway.cli.diagnosis import progress_line
 from gateway.cli.diagnosis.outputs import write_all
 from gateway.cli.diagnosis.progress_line import ProgressLine, show_progress
 from gateway.progress import Progress
-from tests.cli.verbs.test_diagnose import table
+from tests.cli.verbs.diagnosis.test_diagnose import table
 from tests.reports.fake_diagnosis import diagnosis
 
 

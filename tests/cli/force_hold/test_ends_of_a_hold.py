@@ -13,7 +13,7 @@ import pytest
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, StatusReading, status_reading_of
 from gateway.cli.master.byte_order_proof import prove_byte_order
-from gateway.cli.verbs.hold import _handle_signals, _report_end
+from gateway.cli.verbs.operation.hold import _handle_signals, _report_end
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit

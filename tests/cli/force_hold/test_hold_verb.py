@@ -15,7 +15,7 @@ from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, HoldWrite, StatusR
 from gateway.cli.force_hold.state_line import StateLine, describe_state, document
 from gateway.cli.master.client import GatewayClient
 from gateway.cli.master.wires import TcpWire
-from gateway.cli.verbs import hold
+from gateway.cli.verbs.operation import hold
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers import RegisterMap
 from gateway.registers.words import State, StatusBit

@@ -8,7 +8,7 @@ import pytest
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.heartbeat import KnownLease
 from gateway.cli.master.wires import TcpWire
-from gateway.cli.verbs import hold
+from gateway.cli.verbs.operation import hold
 
 HERE = {"rig": "own", "port": 5020, "lease_s": 0.08, "lease_action": "ramp"}
 

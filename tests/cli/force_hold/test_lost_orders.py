@@ -10,7 +10,7 @@ from gateway.cli.force_hold.heartbeat import HeartbeatThread, KnownLease
 from gateway.cli.force_hold.sequence import HoldEnd, HoldRun, HoldWrite, StatusReading
 from gateway.cli.master.client import GatewayClient
 from gateway.cli.master.wires import TcpWire
-from gateway.cli.verbs.hold import _report_end
+from gateway.cli.verbs.operation.hold import _report_end
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.modbus.peer import NOBODY

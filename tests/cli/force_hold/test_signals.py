@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gateway.cli.verbs.hold import _handle_signals
+from gateway.cli.verbs.operation.hold import _handle_signals
 
 
 @pytest.mark.parametrize(("is_ignored", "stops"), [(False, True), (True, False)])

@@ -15,7 +15,7 @@ from gateway.cli.live_monitor.poll import Poller, WriterSource
 from gateway.cli.live_monitor.register_table import View, Writer
 from gateway.cli.master.client import GatewayClient, RegisterReading
 from gateway.cli.master.wires import TcpWire
-from gateway.cli.verbs import monitor
+from gateway.cli.verbs.operation import monitor
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.modbus import Peer

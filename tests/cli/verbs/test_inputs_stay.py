@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from gateway.profiles import shipped_profiles_folder
-from tests.cli.verbs.test_fit import ladder_rows, written
+from tests.cli.verbs.calibration.test_fit import ladder_rows, written
 
 
 @pytest.fixture

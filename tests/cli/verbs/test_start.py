@@ -50,7 +50,8 @@ def test_who_needs_the_register_map_alone_waits_for_no_mathematics() -> None:
 
 def test_the_guardian_is_reached_without_numpy() -> None:
     assert loaded_modules("run", "--help", "--json").isdisjoint({"numpy", "yaml", "pydantic"})
-    code = "import sys, gateway.cli.verbs.run, gateway.service.supervisor.guardian; sys.exit('numpy' in sys.modules)"
+    imported = "sys, gateway.cli.verbs.operation.run, gateway.service.supervisor.guardian"
+    code = f"import {imported}; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -8,11 +8,11 @@ from typing import Any
 
 from gateway.control import CalibrationInUse, Controller, ControlSettings
 from gateway.control.inputs import LineStatus, Output, WireCounts
-from gateway.control.self_test.items import SelfTestReport
+from gateway.control.self_test.items import Item, SelfTestReport
 from gateway.control.settings import SelfTestSettings
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit, State
+from gateway.registers.words import ControlBit, SelfTestVerdict, State
 from tests.control.foreign.kept_calibrations import kept
 from tests.control.foreign.machine import COUNT_V, Machine, Slide
 from tests.control.foreign.stand import settings
@@ -145,3 +145,8 @@ class SelfTestRig:
         else:
             self._unanswered_s = None
             self.output_counts.heard += 1
+
+
+def verdict_on(report: SelfTestReport, item: Item) -> SelfTestVerdict:
+    """Return the verdict on an item; NOT_TESTED before there is one."""
+    return next((found.verdict for found in report.findings if found.item is item), SelfTestVerdict.NOT_TESTED)

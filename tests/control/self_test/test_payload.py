@@ -7,7 +7,7 @@ import pytest
 from gateway.control.self_test.items import Item
 from gateway.registers.words import SelfTestResult, SelfTestVerdict
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
-from tests.control.self_test.rig import SelfTestRig
+from tests.control.self_test.rig import SelfTestRig, verdict_on
 
 FORCE_N = 34.0
 _TOUCHES_N = 0.8  # of thrust, from which on the tool stands on the workpiece
@@ -37,7 +37,7 @@ def test_a_healthy_machine_passes_with_it_in_the_air(payload_kg: float, tilt_deg
 @pytest.mark.parametrize(("tilt_deg", "off_n"), [(0.0, -3.0), (180.0, 8.0)])
 def test_a_zero_that_is_off_by_more_is_found_all_the_same(tilt_deg: float, off_n: float) -> None:
     report = hanging(0.3, tilt_deg, off_n).tested()
-    assert report.verdict_on(Item.ZERO) is SelfTestVerdict.FAILED
+    assert verdict_on(report, Item.ZERO) is SelfTestVerdict.FAILED
     (said,) = (one for one in report.sentences if "self-test zero failed" in one)
     assert "and the payload's 2.9 N" in said
 
@@ -45,5 +45,5 @@ def test_a_zero_that_is_off_by_more_is_found_all_the_same(tilt_deg: float, off_n
 @pytest.mark.parametrize(("unit", "item"), [(-1.0, Item.SIGN), (4.0, Item.SCALE)])
 def test_a_cell_that_is_wrong_is_found_with_it_all_the_same(unit: float, item: Item) -> None:
     rig = hanging(1.0, 90.0, unit=unit)
-    assert rig.tested().verdict_on(item) is SelfTestVerdict.FAILED
+    assert verdict_on(rig.tested(), item) is SelfTestVerdict.FAILED
     assert rig.peak_n < FORCE_N

@@ -12,7 +12,7 @@ from gateway.codes.faults import FaultCode
 from gateway.control.self_test.items import Item
 from gateway.registers.words import CalibrationPhase, ControlBit, SelfTestResult, SelfTestVerdict, State
 from tests.control.foreign.machine import Machine
-from tests.control.self_test.rig import KEPT, SelfTestRig
+from tests.control.self_test.rig import KEPT, SelfTestRig, verdict_on
 
 FORCE_N = 34.0
 LONGEST_S = 20.0
@@ -95,7 +95,8 @@ def test_a_machine_that_is_stronger_than_its_calibration_stays_below_the_stated_
     report = rig.tested()
     assert rig.peak_n < FORCE_N
     assert (
-        report.verdict_on(Item.SCALE) in (WARNED, FAILED) or report.verdict_on(Item.SCALE) is SelfTestVerdict.NOT_TESTED
+        verdict_on(report, Item.SCALE) in (WARNED, FAILED)
+        or verdict_on(report, Item.SCALE) is SelfTestVerdict.NOT_TESTED
     )
     assert report.result in (SelfTestResult.WARNED, SelfTestResult.FAILED)
 
@@ -138,8 +139,8 @@ def test_clearing_bit_6_ends_it_and_nothing_is_claimed() -> None:
     rig.run(1.0)
     report = rig.controller.active_run.self_test
     assert rig.controller.state is State.OFF and report.result is SelfTestResult.STOPPED
-    assert report.verdict_on(Item.LEAK) is SelfTestVerdict.NOT_TESTED
-    assert report.verdict_on(Item.NOISE) is PASSED
+    assert verdict_on(report, Item.LEAK) is SelfTestVerdict.NOT_TESTED
+    assert verdict_on(report, Item.NOISE) is PASSED
     assert "self-test stopped by m" in rig.events
 
 

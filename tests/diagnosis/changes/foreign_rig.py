@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from gateway.diagnosis.measurement import Measurement
 
 Floats = NDArray[np.float64]
-DT_S: Final = 1.0e-4
 ROW_S: Final = 5.0e-3
 NOISE_N: Final = 0.1
 EFFECTS: Final = (

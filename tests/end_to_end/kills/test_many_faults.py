@@ -6,7 +6,7 @@ each once, in the files beside this one.
 
 import pytest
 
-from tools.bench.process_faults import Fault, faults, p99, run
+from tools.bench.faults.process_faults import Fault, faults, p99, run
 
 ROUNDS = 200
 FAULTS = faults()

@@ -13,7 +13,6 @@ DECOYS = ("humidity_pct", "air_flow_l_min", "current_a", "aux_1", "aux_2")
 COLUMNS = KNOWN + DECOYS
 GAUGE = "pressure_kpa"
 """Where an effect needs it only: with a gauge most causes are told apart by it."""
-MOVES = ("feed_mm_s", "position_mm", "distance_m")
 
 
 def covariates(rng: RNG, time_s: Floats, wanted: tuple[str, ...]) -> dict[str, Floats]:

@@ -37,11 +37,11 @@ def rig_with(profile: DeviceProfile) -> Rig:
 def test_a_device_presses_and_measures_in_a_whole_rig(name: str) -> None:
     wired = Wired(rig_with(PROFILES[name]))
     wired.until(lambda: bool(wired.word("status_word") & 2), 3.0)
-    opened_bytes = wired.loop.cell_garbage_bytes  # of bare numbers the first may be the rest of one
+    opened = wired.loop.cell_counts.garbled  # of bare numbers the first may be the rest of one
     wired.write(0, ENABLE, 1200)
     wired.until(lambda: wired.state is State.HOLDING, 5.0)
     wired.run(0.5)
     assert wired.force_n == pytest.approx(12.0, abs=1.0)
-    assert (wired.exchange.garbage_bytes, wired.loop.cell_garbage_bytes) == (0, opened_bytes)
-    assert opened_bytes < 10
+    assert (wired.exchange.counts.garbled, wired.loop.cell_counts.garbled) == (0, opened)
+    assert opened <= 1
     assert wired.exchange.checks.is_armed is bool(wired.rig.output.device.own_watchdog)

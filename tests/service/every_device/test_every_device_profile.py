@@ -98,7 +98,7 @@ def test_an_output_follows_a_moving_setpoint_for_five_seconds_at_its_own_speed(n
             moving_s = min(now_s, DURATION_S - 0.3)  # it stands at the end, so that the last answer is here
             line.set_voltage(low_v + (high_v - low_v) * 0.9 * abs((moving_s / 2.0) % 2.0 - 1.0), now_s)
         assert line.fault is FaultCode.NONE
-    assert line.garbage_bytes == device.garbage == 0
+    assert line.counts.garbled == device.garbage == 0
     assert line.acknowledged_v == pytest.approx(device.setting_v, abs=line._host.resolution_v)
     assert line.round_trip_s < profile.reply_timeout_s
 

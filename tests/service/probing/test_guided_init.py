@@ -100,7 +100,7 @@ def test_a_port_that_is_none_or_the_other_device_s_is_asked_for_again(monkeypatc
 def test_a_folder_that_takes_no_file_is_told_before_anything_is_asked(
     guided: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gateway.cli.verbs.init.os.access", lambda path, mode: False)
+    monkeypatch.setattr("gateway.cli.verbs.setup.init.os.access", lambda path, mode: False)
     result = CliRunner().invoke(command, ["init", "own", guided], input="later\n")
     assert result.exit_code == 77 and result.output == "E105 own.yaml: Permission denied: this user may not\n"
     assert not any(folder.iterdir())

@@ -64,7 +64,7 @@ def test_a_cell_that_says_its_overload_without_a_number_trips_over_force(key, in
     assert wired.fault_code is FaultCode.OVER_FORCE, wired.log
     assert took_s < 0.2, "long before the sample would be too old"
     assert "cell saturated" in wired.log[-1][1]
-    assert wired.loop.cell_garbage_bytes == 0
+    assert wired.loop.cell_counts.garbled == 0
 
 
 @pytest.mark.parametrize("output", OUTPUTS, ids=lambda output: output.name)
@@ -74,7 +74,7 @@ def test_every_output_refuses_in_a_way_that_is_understood(output) -> None:
     wired.write(0, ENABLE, 1500)
     wired.until(lambda: wired.state is State.FAULT, 2.0)
     assert wired.fault_code is FaultCode.OUTPUT_REFUSED
-    assert wired.exchange.garbage_bytes == 0
+    assert wired.exchange.counts.garbled == 0
 
 
 def test_without_air_the_force_is_gone_and_comes_back_with_it() -> None:
@@ -95,7 +95,7 @@ def test_noise_on_the_wires_costs_sentences_and_not_the_force() -> None:
     wired = Wired().pressing(20.0)
     simulate(wired, wire__noise=0.002)
     wired.run(2.0)
-    assert wired.loop.cell_garbage_bytes > 0
+    assert wired.loop.cell_counts.garbled > 0
     assert wired.state is State.HOLDING, wired.log
     assert wired.force_n == pytest.approx(20.0, abs=1.5)
 

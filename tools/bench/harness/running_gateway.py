@@ -5,36 +5,50 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO, Any
+
+from gateway.cli.control_socket import ask
+
+ENABLE_12_N = "1000000002040001" + "04b0"
 
 
 @dataclass(frozen=True)
 class RunningGateway:
-    """Where a running gateway is reached, its state directory, and the process of its control loop."""
+    """A running gateway: what it said when it was ready (addresses, process numbers), and its state directory."""
 
-    host: str
-    port: int
+    ready: Mapping[str, Any]
     state: Path
-    control_pid: int
+
+    @property
+    def modbus(self) -> tuple[str, int]:
+        """Address for masters."""
+        host, port = self.ready["modbus"]
+        return host, port
+
+    def hold(self) -> None:
+        """Hold 12 N; return when they are held, and all processes have imported what they need."""
+        ask(self.state, {"do": "modbus", "via": "web", "pdu": ENABLE_12_N})
+        time.sleep(3.0)
 
 
 @contextlib.contextmanager
-def running_gateway(rig: str, *, quiet: bool = False) -> Iterator[RunningGateway]:
-    """Run a gateway on a rig (name or file) until the block ends. quiet: what it says on stderr is dropped."""
+def running_gateway(rig: str, *options: str, told: IO[bytes] | int | None = None) -> Iterator[RunningGateway]:
+    """Run a gateway on a rig (name or file) until the block ends. options: of `run`; told: where its stderr goes."""
     with tempfile.TemporaryDirectory() as state:
         where = ["--json", "--bind", "127.0.0.1:0", "--state", state]
         process = subprocess.Popen(
-            [sys.executable, "-m", "gateway", "run", rig, *where],
+            [sys.executable, "-m", "gateway", "run", rig, *where, *options],
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL if quiet else None,
+            stderr=told,
             text=True,
         )
         assert process.stdout
         try:
-            ready = json.loads(process.stdout.readline())
-            yield RunningGateway(*ready["modbus"], Path(state), ready["pids"]["control"])
+            yield RunningGateway(json.loads(process.stdout.readline()), Path(state))
         finally:
             process.terminate()
             process.wait()

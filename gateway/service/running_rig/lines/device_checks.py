@@ -6,7 +6,6 @@ Pure: answers in, the next question out.
 """
 
 from collections import deque
-from dataclasses import dataclass
 
 from gateway.codes.faults import FaultCode
 from gateway.devices import OutputHost
@@ -18,15 +17,6 @@ _WAITS_S = 0.5  # of a look for an idle wire: on a slow one a setpoint that neve
 _TRIES = 3  # of arming; then it does not arm
 _READS_OTHERWISE = "it reads back otherwise"
 _MISSES = 5  # of one question in a row, while settings are answered: the device has no words for it
-
-
-@dataclass(frozen=True, slots=True)
-class DeviceLevel:
-    """State of the device's own watchdog, the second level: has_one; is_armed: read back; is_tripped: latched."""
-
-    has_one: bool = False
-    is_armed: bool = False
-    is_tripped: bool = False
 
 
 class DeviceChecks:
@@ -61,11 +51,6 @@ class DeviceChecks:
 
     def _known_of(self, *steps: DeviceStep) -> tuple[DeviceStep, ...]:
         return tuple(step for step in steps if step in self._known)
-
-    @property
-    def level(self) -> DeviceLevel:
-        """State of the device's watchdog."""
-        return DeviceLevel(self.has_watchdog, self.is_armed, self.is_tripped)
 
     def next_step(self, now_s: float) -> DeviceStep | None:
         """Return the question that is due, None where there is none."""

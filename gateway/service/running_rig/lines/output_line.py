@@ -85,7 +85,7 @@ class OutputExchange:
         self.checks = checks or DeviceChecks(host, is_waived=False)
         self._write, self._reply_timeout_s = write, reply_timeout_s
         self._given_up = GivenUpQuestions(reply_timeout_s)
-        self.garbage_bytes, self.counts, self.round_trip_s = 0, WireCounts(), nan
+        self.counts, self.round_trip_s = WireCounts(), nan
         self.reset()
 
     def reset(self) -> None:
@@ -235,7 +235,6 @@ class OutputExchange:
 
     def _on_reply(self, reply: OutputReply, now_s: float) -> None:
         if isinstance(reply, Garbage):
-            self.garbage_bytes += len(reply.data)
             self.counts.garbled += 1
             self._unread = explain_answer(reply.data, self._frame)
             if self._in_flight is None:  # unasked: that was it

@@ -16,11 +16,10 @@ _POLL_PERIOD_S: Final = 0.1
 
 
 class ValveExchange:
-    """Asks the device through `write`. status: what control is told; lost: its port is away; garbage_bytes: not understood."""
+    """Asks the device through `write`. status: what control is told; lost: its port is away."""
 
     def __init__(self, host: ValveHost, write: Callable[[bytes], None], reply_timeout_s: float) -> None:
         self._host, self._write, self._reply_timeout_s = host, write, reply_timeout_s
-        self.garbage_bytes = 0
         self.lost = False
         self._order: ValveDirection | None = None
         self.reset()
@@ -54,7 +53,6 @@ class ValveExchange:
         replies = self._host.receive(chunk)
         for reply in replies:
             if isinstance(reply, Garbage):
-                self.garbage_bytes += len(reply.data)
                 continue
             if self._asked is None:
                 self._stands = reply

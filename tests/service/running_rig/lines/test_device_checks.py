@@ -7,7 +7,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.devices import output_host
 from gateway.devices.messages import DeviceAnswer, DeviceStep
-from gateway.service.running_rig.lines.device_checks import DeviceChecks, DeviceLevel
+from gateway.service.running_rig.lines.device_checks import DeviceChecks
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from tests.profile_files import load_device
 
@@ -168,7 +168,7 @@ def test_a_trip_is_not_armed_not_done_and_ends_whatever_waited() -> None:
     checks = checks_of("icpdas-702x")
     arm(checks)
     checks.trip()
-    assert (checks.level, checks.is_done) == (DeviceLevel(has_one=True, is_tripped=True), False)
+    assert (checks.is_armed, checks.is_tripped, checks.is_done) == (False, True, False)
     checks.take(DeviceAnswer(VERIFY, is_right=True))
     assert checks.fault is FaultCode.WATCHDOG_TRIPPED, "its time reads back as before"
     checks.begin()
@@ -282,7 +282,7 @@ def test_a_trip_does_not_end_by_one_reading_that_says_armed() -> None:
     checks = known_by_its_state()
     checks.trip()
     assert state(checks, "armed", 10.0) is FaultCode.WATCHDOG_TRIPPED
-    assert checks.level == DeviceLevel(has_one=True, is_tripped=True)
+    assert (checks.is_armed, checks.is_tripped) == (False, True)
 
 
 def test_of_a_device_before_the_port_was_opened_again_nothing_counts_against_the_next() -> None:

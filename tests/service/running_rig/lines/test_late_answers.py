@@ -225,7 +225,7 @@ def test_behind_an_answer_that_repeats_nothing_a_rise_waits_and_a_fall_does_not_
 def test_garbage_leaves_an_answer_that_repeats_nothing_as_doubtful_as_it_was(wire: Wire) -> None:
     given_up(wire).answer("#?#")
     wire.answer("#", after_s=0.001)
-    assert wire.exchange.garbage_bytes == 8
+    assert wire.exchange.counts.garbled == 2
     wire.answer("333", after_s=0.001)
     assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
 

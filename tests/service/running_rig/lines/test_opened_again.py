@@ -14,9 +14,7 @@ from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 
-KEPT = frozenset(
-    "garbage_bytes counts round_trip_s _write _host checks identity lost _order _grammar _spelling".split()
-)
+KEPT = frozenset("counts round_trip_s _write _host checks identity lost _order _grammar _spelling".split())
 """Counts since the start, and what is no state of the line. What a valve is to do is told anew at each step."""
 PROFILES = {name: load_device(name) for name in list_shipped("device")}
 

@@ -9,7 +9,7 @@ from gateway.codes.faults import FaultCode
 from gateway.devices import output_device, output_host
 from gateway.devices.exchange import VoltageExchange, VoltageRange
 from gateway.devices.messages import Accepted, AskDevice, DeviceAnswer, DeviceStep
-from gateway.service.running_rig.lines.device_checks import DeviceChecks, DeviceLevel
+from gateway.service.running_rig.lines.device_checks import DeviceChecks
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from tests.profile_files import load_device
 from tests.service.rigs import demo
@@ -135,7 +135,7 @@ def test_a_trip_stays_until_a_reset_where_a_device_tells_of_its_watchdog_no_more
         if step := checks.next_step(float(now_s)):
             checks.take(DeviceAnswer(step, is_right=True)) if is_told else checks.refuse(step, "TRIPPED")
         assert (checks.fault, checks.is_done) == (FaultCode.WATCHDOG_TRIPPED, False)
-        assert checks.level == DeviceLevel(has_one=True, is_armed=False, is_tripped=True)
+        assert (checks.is_armed, checks.is_tripped) == (False, True)
     checks.clear()
     arm(checks)
     assert checks.is_armed and checks.is_done

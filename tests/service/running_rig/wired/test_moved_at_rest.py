@@ -11,7 +11,6 @@ from tests.service.wired import RESET, Wired
 
 __all__ = ["wire"]
 
-FOUR_V = 4.0
 REPEATED_S = 0.5
 
 

@@ -1,0 +1,1 @@
+"""Record, and say why the force is off."""

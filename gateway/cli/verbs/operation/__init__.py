@@ -1,0 +1,1 @@
+"""Run a gateway and command a force."""

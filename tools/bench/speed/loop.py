@@ -1,0 +1,318 @@
+"""How fast a setpoint reaches the wire, and how steady the loop stays under load.
+
+    .venv/bin/python tools/bench/speed/loop.py
+
+Runs the whole gateway (guardian, control process) on two ptys whose far ends a process of this program serves, so that the
+wire costs nothing. Prints
+
+- setpoint-to-first-byte: from before the FC16 is sent on loopback TCP until the first byte of `SET n` is readable on the pty;
+- what the control process takes of a core and of memory at 100 Hz while nobody asks;
+- loop lateness and missed ticks at 250 Hz while masters ask 2000 times a second.
+
+Beside latency and idle cost stands an empty loop of the same wake-ups (`harness/empty_loop.py`): what is left above it is the
+gateway's own work, what it takes itself no Python program on this machine gets below.
+
+Goals: p99 at most 250 us above that of a bare pty hop into the same process in the same run; missed ticks at most 0.5 %.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import pty
+import select
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import tty
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import psutil
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+
+from gateway.cli.diagnosis.progress_line import show_progress
+from gateway.progress import report
+from tools.bench.harness.running_gateway import RunningGateway, running_gateway
+
+GOAL_ABOVE_HOP_S = 250e-6
+GOAL_MISSED = 0.005
+GOAL_IDLE_SHARE = 0.03
+GOAL_IDLE_BYTES = 60e6
+
+RIG = """\
+name: bench
+description: both devices served by tools/bench/speed/loop.py on ptys, no wire time
+simulated: false
+loop_hz: {loop_hz}
+registers: force-v1
+calibration: demo
+output: {{device: smc-itv-rc, port: {output}, baud: 9600}}
+load_cell: {{device: stream-st-gs, port: {cell}, baud: 115200}}
+limits: {{force_max_n: 60, over_force_n: 75, voltage_max_v: 8}}
+accept_no_device_watchdog: true
+"""
+
+
+class Devices:
+    """Both devices in a process of their own, so that nothing here waits for our own interpreter: it answers at once, and
+    tells when the first byte of each setting arrived (the monotonic clock is the machine's, so both processes share it).
+    """
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen([sys.executable, __file__, "--far-end"], stdout=subprocess.PIPE, bufsize=0)
+        assert self._process.stdout
+        self._told = self._process.stdout
+        self.paths: list[str] = json.loads(self._told.readline())
+
+    def forget(self) -> None:
+        """Drop what was told so far."""
+        while self._is_told(0.0):
+            os.read(self._told.fileno(), 4096)
+
+    def next_setting_s(self, timeout_s: float) -> float | None:
+        """Return when the first byte of the next setting arrived, s; None where none comes in time."""
+        return struct.unpack("=d", self._told.read(8))[0] if self._is_told(timeout_s) else None
+
+    def _is_told(self, timeout_s: float) -> bool:
+        return bool(select.select([self._told], [], [], timeout_s)[0])
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.wait()
+        self._told.close()
+
+
+def serve_far_end() -> None:
+    """Serve both devices until the process is ended: paths as JSON, then eight bytes for each setting."""
+    (output, output_end), (cell, cell_end) = pty.openpty(), pty.openpty()
+    for end in (output, output_end, cell, cell_end):
+        tty.setraw(end)
+    for end in (output, cell):
+        os.set_blocking(end, False)
+    os.write(1, json.dumps([os.ttyname(output_end), os.ttyname(cell_end)]).encode() + b"\n")
+    due_s, line, first_s = time.perf_counter(), b"", 0.0
+    while True:
+        readable, _, _ = select.select([output], [], [], max(0.0, due_s - time.perf_counter()))
+        if readable:
+            first_s = first_s if line else time.perf_counter()
+            line += os.read(output, 4096)
+            while b"\r\n" in line:
+                request, line = line.split(b"\r\n", 1)
+                word, _, number = request.partition(b" ")
+                say(output, (number if word == b"SET" else b"0") + b"\r\n")
+                if word == b"SET":
+                    os.write(1, struct.pack("=d", first_s))
+        if time.perf_counter() >= due_s:
+            due_s += 0.01
+            say(cell, b"ST,GS,+0000.00kg\r\n")
+
+
+def say(end: int, sentence: bytes) -> None:
+    """Put a sentence on a line; lost where nobody reads it, as on a wire: a bare line must not stop us once it is full."""
+    with contextlib.suppress(BlockingIOError):
+        os.write(end, sentence)
+
+
+@contextlib.contextmanager
+def gateway_on_devices(loop_hz: int) -> Iterator[tuple[Devices, RunningGateway]]:
+    """Run a gateway whose devices this program serves, at this rate."""
+    with contextlib.closing(Devices()) as devices, tempfile.TemporaryDirectory() as folder:
+        rig = Path(folder) / "bench.yaml"
+        rig.write_text(RIG.format(loop_hz=loop_hz, output=devices.paths[0], cell=devices.paths[1]))
+        with running_gateway(str(rig), told=subprocess.DEVNULL) as gateway:
+            yield devices, gateway
+
+
+@dataclass(frozen=True)
+class EmptyLoop:
+    """A loop of the gateway's wake-ups with nothing in them: its devices, where it listens, its process."""
+
+    devices: Devices
+    address: tuple[str, int]
+    pid: int
+
+
+@contextlib.contextmanager
+def empty_loop(loop_hz: int) -> Iterator[EmptyLoop]:
+    """Run one until the block ends."""
+    script = Path(__file__).parents[1] / "harness" / "empty_loop.py"
+    with contextlib.closing(Devices()) as devices:
+        process = subprocess.Popen(
+            [sys.executable, str(script), *devices.paths, str(loop_hz)], stdout=subprocess.PIPE, text=True
+        )
+        assert process.stdout
+        try:
+            yield EmptyLoop(devices, ("127.0.0.1", int(process.stdout.readline())), process.pid)
+        finally:
+            process.kill()
+            process.wait()
+            process.stdout.close()
+
+
+def write_request(address: int, *words: int) -> bytes:
+    """Return one FC16 as it goes over TCP."""
+    pdu = struct.pack(f">BHHB{len(words)}H", 16, address, len(words), 2 * len(words), *words)
+    return struct.pack(">HHHB", 1, 0, len(pdu) + 1, 1) + pdu
+
+
+def ask(master: socket.socket, request: bytes) -> bytes:
+    """Send a request and return the bytes of its answer."""
+    master.sendall(request)
+    return master.recv(512)
+
+
+def latencies(
+    devices: Devices, empty: EmptyLoop, bare: Devices, address: tuple[str, int], count: int
+) -> tuple[list[float], list[float], list[float]]:
+    """Return the seconds to the wire of voltage mode steps up and down, one every 50 ms: each moves the output by many
+    counts at once; and, in turn with them, those of an empty loop, and of bare hops: from a write on a pty until its far end
+    sees it, what the machine itself takes at this moment.
+    """
+    seconds, empties, hops = [], [], []
+    line = os.open(bare.paths[0], os.O_RDWR | os.O_NOCTTY)
+    with socket.create_connection(address) as master, socket.create_connection(empty.address) as other:
+        for connection in (master, other):
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        ask(master, write_request(0, 1, 0, 0, 1, 0, 2000))
+        for number in range(count):
+            time.sleep(0.05)  # idle line: the last setting has been answered long ago
+            request = write_request(0, 1, 0, 0, 1, 0, 3000 if number % 2 else 2000)
+            seconds += first_byte_after(devices, partial(master.sendall, request))
+            master.recv(512)
+            hops += first_byte_after(bare, partial(os.write, line, b"SET 512\r\n"))
+            time.sleep(0.05)
+            empties += first_byte_after(empty.devices, partial(other.sendall, request))
+            other.recv(512)
+        ask(master, write_request(0, 0, 0))
+    os.close(line)
+    return seconds, empties, hops
+
+
+def first_byte_after(devices: Devices, send: Callable[[], object]) -> list[float]:
+    """Return the seconds from before `send` until the first byte of a setting; nothing where none arrives."""
+    devices.forget()
+    sent_s = time.perf_counter()
+    send()
+    seen_s = devices.next_setting_s(1.0)
+    return [] if seen_s is None else [seen_s - sent_s]
+
+
+def load(address: tuple[str, int], seconds: float, per_second: int, connections: int = 4) -> int:
+    """Send per_second reads of the status block, evenly spread over the connections; return the number answered."""
+    request = struct.pack(">HHHBBHH", 1, 0, 6, 1, 3, 100, 26)
+    with contextlib.ExitStack() as stack:
+        masters = [stack.enter_context(socket.create_connection(address)) for _ in range(connections)]
+        began_s = time.perf_counter()
+        done = 0
+        while (now_s := time.perf_counter()) < began_s + seconds:
+            while done < (now_s - began_s) * per_second:
+                ask(masters[done % connections], request)
+                done += 1
+            time.sleep(0.001)
+    return done
+
+
+def health(state: Path) -> dict[str, float]:
+    """Return the running gateway's own figures."""
+    with socket.socket(socket.AF_UNIX) as control:
+        control.connect(str(state / "control.sock"))
+        control.sendall(b'{"do": "health"}\n')
+        answer: dict[str, float] = json.loads(control.recv(65536))
+        return answer
+
+
+def quantile(values: list[float], share: float) -> float:
+    """Return the value below which about this share of all lies."""
+    return sorted(values)[min(len(values) - 1, int(share * len(values)))]
+
+
+def bench_latency(loop_hz: int, count: int) -> None:
+    """Print how long a setpoint takes to the wire."""
+    with (
+        gateway_on_devices(loop_hz) as (devices, gateway),
+        empty_loop(loop_hz) as empty,
+        contextlib.closing(Devices()) as bare,
+    ):
+        seconds, empties, hops = latencies(devices, empty, bare, gateway.modbus, count)
+    p50, p99 = quantile(seconds, 0.5), quantile(seconds, 0.99)
+    goal_s = quantile(hops, 0.99) + GOAL_ABOVE_HOP_S
+    verdict = "reached" if p99 <= goal_s else "MISSED"
+    print(f"setpoint to first byte, idle unpaced pty, {len(seconds)} of {count} setpoints:")
+    print(f"  p50 {p50 * 1e6:.0f} us, p99 {p99 * 1e6:.0f} us, max {max(seconds) * 1e6:.0f} us")
+    for name, peer in (("an empty loop, beside it", empties), ("a bare pty hop, beside it", hops)):
+        print(f"  {name}: p50 {quantile(peer, 0.5) * 1e6:.0f} us, p99 {quantile(peer, 0.99) * 1e6:.0f} us")
+    print(f"  goal p99 <= hop's p99 + 250 us = {goal_s * 1e6:.0f} us: {verdict}; ratio to the goal {p99 / goal_s:.2f}")
+
+
+def bench_load(loop_hz: int, seconds: float) -> None:
+    """Print how late the loop is while masters read."""
+    with gateway_on_devices(loop_hz) as (_, gateway):
+        before = health(gateway.state)
+        answered = load(gateway.modbus, seconds, 2000)
+        after = health(gateway.state)
+    ticks, missed = after["ticks"] - before["ticks"], after["missed_ticks"] - before["missed_ticks"]
+    verdict = "reached" if missed <= GOAL_MISSED * ticks else "MISSED"
+    print(f"loop {loop_hz} Hz under {answered / seconds:.0f} requests/s for {seconds:g} s:")
+    print(f"  lateness p50 < {after['late_p50_us']} us, p99 < {after['late_p99_us']} us")
+    print(
+        f"  missed ticks {missed:g} of {ticks:g} ({100 * missed / ticks:.2f} %); goal <= {100 * GOAL_MISSED:g} %: {verdict}"
+    )
+
+
+def used_s(process: psutil.Process) -> float:
+    """Return the processor time that a process has had, s."""
+    times = process.cpu_times()
+    return float(times.user + times.system)
+
+
+def bench_idle(loop_hz: int, seconds: float) -> None:
+    """Print what the control process takes while nobody asks anything."""
+    with gateway_on_devices(loop_hz) as (_, gateway), empty_loop(loop_hz) as empty:
+        process, peer = psutil.Process(gateway.ready["pids"]["control"]), psutil.Process(empty.pid)
+        time.sleep(2.0)  # the start is over
+        before_s, began_s = (used_s(process), used_s(peer)), time.perf_counter()
+        time.sleep(seconds)
+        after_s, lasted_s = (used_s(process), used_s(peer)), time.perf_counter() - began_s
+        share, empty_share = ((after - before) / lasted_s for before, after in zip(before_s, after_s, strict=True))
+        used_bytes = process.memory_full_info().uss
+    verdict = "reached" if share <= GOAL_IDLE_SHARE and used_bytes <= GOAL_IDLE_BYTES else "MISSED"
+    print(
+        f"control process, {loop_hz} Hz, idle for {seconds:g} s: {100 * share:.1f} % of a core, "
+        f"{used_bytes / 1e6:.0f} MB of its own"
+    )
+    print(f"  an empty loop of the same wake-ups, beside it: {100 * empty_share:.1f} %")
+    print(f"  goal <= {100 * GOAL_IDLE_SHARE:g} % and {GOAL_IDLE_BYTES / 1e6:.0f} MB: {verdict}")
+
+
+def main() -> None:
+    """Print both benchmarks."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--setpoints", type=int, default=600)
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--far-end", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.far_end:
+        serve_far_end()
+    with show_progress("loop benchmark"):
+        report(f"setpoint to the wire, {options.setpoints} setpoints (1 of 3)")
+        bench_latency(100, options.setpoints)
+        report(f"idle for {options.seconds:g} s (2 of 3)")
+        bench_idle(100, options.seconds)
+        report(f"under load for {options.seconds:g} s (3 of 3)")
+        bench_load(250, options.seconds)
+    wire_s = 9 * 10 / 9600
+    print(
+        f"on a real wire at 9600 baud the nine bytes of `SET 512` alone take {wire_s * 1e3:.1f} ms more to arrive whole"
+    )
+
+
+if __name__ == "__main__":
+    main()
