@@ -7,13 +7,14 @@ import json
 import os
 import time
 from dataclasses import replace
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from gateway.cli.command_line.completion_words import complete_calibrations, complete_effects, complete_recordings
+from gateway.cli.command_line.given_path import GivenPath
+from gateway.cli.command_line.numbers import Finite
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.options import state_directory, state_option
@@ -38,15 +39,7 @@ _OF_A_DIAGNOSIS: Final = (
     "closed_loop",
 )
 """Options that a comparison of two runs has no use for."""
-_OUTPUT: Final = click.Path(path_type=Path, dir_okay=False)
-
-
-class _Finite(click.FloatRange):
-    """NaN is in every range for click, and infinite is no noise."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        number = float(super().convert(value, param, ctx))
-        return number if isfinite(number) else self.fail(f"{value} is no finite number.", param, ctx)
+_OUTPUT: Final = GivenPath(dir_okay=False)
 
 
 EXAMPLES = ("diagnose press.csv --report why.html", "diagnose press.csv --rig demo --extend creeping.yaml")
@@ -76,14 +69,14 @@ def _not_an_option(context: click.Context, parameter: click.Parameter, value: Pa
 )
 @click.option(
     "--noise-floor-n",
-    type=_Finite(min=0.0, min_open=True),
+    type=Finite(min=0.0, min_open=True),
     metavar="X",
     help="RMS noise of the readings, N, if known.",
 )
 @click.option(
     "--json",
     "json_file",
-    type=click.Path(path_type=Path, allow_dash=True),
+    type=GivenPath(allow_dash=True),
     callback=_not_an_option,
     metavar="OUT",
     help="- is stdout.",
