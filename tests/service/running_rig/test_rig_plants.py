@@ -78,7 +78,9 @@ def test_a_rollback_does_not_go_to_a_plant_that_waited_and_was_never_in_use(edge
     """Behind 2, which took the place of 1 while both waited, it went to 1, which nobody had seen at work."""
     provenance = Provenance(made_utc="2026-11-22T17:30:00Z", version="1", rig="demo", start="demo", file="bench.yaml")
     for _ in range(2):
-        PlantStore(tmp_path).add(NumberedPlant(number=0, profile=load_shipped_plant("paper-slide"), provenance=provenance))
+        PlantStore(tmp_path).add(
+            NumberedPlant(number=0, profile=load_shipped_plant("paper-slide"), provenance=provenance)
+        )
     edges.plants.run_in_background = lambda work, done: done(work())
     edges.is_free = False
     for number in (1, 2):
