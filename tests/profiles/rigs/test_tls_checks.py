@@ -12,7 +12,7 @@ from cryptography.x509.oid import NameOID
 from gateway.cli.certificates import Signed, make_ca, make_server, store
 from gateway.fieldbus.peers import address_of
 from gateway.modbus import Peer
-from gateway.modbus.certificate import read_certificate
+from gateway.modbus.certificate import read_certificate, read_certificates
 from gateway.profiles import Report, check_report
 from gateway.profiles.rigs import tls_checks
 from gateway.profiles.rigs.faces import TlsFace
