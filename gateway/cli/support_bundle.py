@@ -33,13 +33,14 @@ _SECRET_KEY: Final = re.compile(
     re.I | re.M,
 )
 _SECRET_WORD: Final = re.compile(
-    r"(\b[\w.-]*(?:password|passwort|passwd|pwd|token|secret|passphrase|credential|api[_-]?key)\b[\"']?\s*[:=]\s*[\"']?)"
-    r"(?!\(left out)[^\s\"',;}\]]+",
+    r"((?:\b[\w.-]*(?:password|passwort|kennwort|passwd|passcode|pwd|token|secret|passphrase|credential|api[_-]?key)"
+    r"|(?<![\w-])(?:\w+[_-])?pass)\b[\"']?\s*[:=]\s*[\"']?|[?&](?:key|sig|auth|code)=|\bpin\b[^\w\n]{0,3}(?=\d{4}))"
+    r"(?!\(left out)[^\s\"',;}\]&]+",
     re.I,
 )
 _SECRET_COMMENT: Final = re.compile(
-    r"((?:^|(?<=\s))#[^\n]*?(?:passwor[dt]|passwd|pwd|token|secret|passphrase|credential|api[_-]?key|\bpsk\b|\bpw\b))"
-    r"[^\n]*",
+    r"((?:^|(?<=\s))#[^\n]*?(?:passwor[dt]|kennwort|passwd|passcode|pwd|token|secret|passphrase|credential|api[_-]?key"
+    r"|\bpsk\b|\bpw\b|\bpass(?=\s*[:=])|[?&]key=|\bpin\b(?=[^\d\n]{0,8}\d{4})))[^\n]*",
     re.I | re.M,
 )
 """A comment may tell one in a sentence: `the old token was ...`. What follows the word goes, whatever it is."""

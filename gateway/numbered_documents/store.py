@@ -134,14 +134,15 @@ class NumberedStore(ABC, Generic[Document]):
             notes = (*notes, f"{fault}; the one before it is used instead of {self.noun} {selection.number}")
         return SelectedDocument(self.built_in, BUILT_IN, pointer, notes)
 
-    def use(self, number: int | None, slot: int | None = None) -> SelectionState:
-        """Put this document in use, None: the built-in one; a slot given is filled with it. StoreError, and nothing has
-        changed, for one that cannot be loaded or when the disk refuses."""
+    def use(self, number: int | None, slot: int | None = None, *, last_one_waits: bool = False) -> SelectionState:
+        """Put this document in use, None: the built-in one; a slot given is filled with it. last_one_waits: the one before was
+        never in use, and is nothing to go back to. StoreError, and nothing has changed, for one that cannot be loaded or when
+        the disk refuses."""
         if number is not None and self.load(number) is self.built_in:
             number = None
         if slot is not None and not 0 <= slot < SLOTS:
             raise StoreError("E433", f"slot {slot}: there are 0 .. {SLOTS - 1}")
-        return self._change(Selection(number, slot))
+        return self._change(Selection(number, slot), last_one_waits=last_one_waits)
 
     def previous(self) -> Selection:
         """Return what a rollback brings back. StoreError where nothing was ever changed, or it cannot be known now."""
@@ -152,12 +153,13 @@ class NumberedStore(ABC, Generic[Document]):
         is_in_slot = previous.slot is not None and pointer.in_slot(previous.slot) == previous
         return previous if is_in_slot else Selection(previous.number)
 
-    def _change(self, selection: Selection) -> SelectionState:
+    def _change(self, selection: Selection, *, last_one_waits: bool) -> SelectionState:
         try:
             make_directory(self.directory)
             with lock_directory(self.directory) as descriptor:
                 pointer, _ = read_selection(self.directory, self.noun, is_to_change=True)
-                changed = pointer.with_active(selection, self._to_go_back_to(pointer, selection))
+                previous = pointer.previous if last_one_waits else self._to_go_back_to(pointer, selection)
+                changed = pointer.with_active(selection, previous)
                 return write_selection(self.directory, descriptor, changed)
         except OSError as error:
             raise self._disk_error(error) from error

@@ -32,7 +32,7 @@ from gateway.service.simulation.kept_settings import KeptSettings
 from gateway.service.simulation.settings import SimulationSettings
 from gateway.service.simulation.world import SimulatedRig
 
-_UNPLUGS: Final = {"output": "output.unplug", "load_cell": "cell.unplug"}
+_UNPLUGS: Final = {"output": "output.unplug", "load_cell": "cell.unplug", "valve": "valve.unplug"}
 
 
 class SimulatedLines:
@@ -77,8 +77,8 @@ class SimulatedLines:
     def plug(self, settings: SimulationSettings) -> bool:
         """Pull and put back plugs as the settings say; return whether there are other ports now."""
         has_moved = False
-        for name, setting in _UNPLUGS.items():
-            pty, is_wanted = self._ptys[name], not settings.is_on(setting)
+        for name, pty in self._ptys.items():
+            is_wanted = not settings.is_on(_UNPLUGS[name])
             if pty.is_open and not is_wanted:
                 pty.close()
             elif is_wanted and not pty.is_open:

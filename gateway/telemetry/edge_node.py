@@ -35,12 +35,19 @@ class KeptChange:
 
 class EdgeNode:
     """group, node: as Sparkplug's topics name it; next_bd_seq: gives each connection its number, 0 .. 255; room: sets of
-    changes that are kept."""
+    changes that are kept; on_connected: told when a connection has come about."""
 
-    def __init__(self, group: str, node: str, next_bd_seq: Callable[[], int], room: int = ROOM) -> None:
+    def __init__(
+        self,
+        group: str,
+        node: str,
+        next_bd_seq: Callable[[], int],
+        room: int = ROOM,
+        on_connected: Callable[[], object] = lambda: None,
+    ) -> None:
         self.ready = asyncio.Event()
         self._group, self._node = group, node
-        self._next_bd_seq, self._bd_seq = next_bd_seq, 0
+        self._next_bd_seq, self._bd_seq, self._on_connected = next_bd_seq, 0, on_connected
         self._kept: deque[KeptChange] = deque(maxlen=room)
         self._values: dict[str, Value] = values_of(None)
         self._time_ms = int(time.time() * 1000)
@@ -73,6 +80,7 @@ class EdgeNode:
     def greet(self) -> Sequence[BrokerMessage]:
         """Return the birth: every metric that there will ever be, as it is now."""
         self._current = self._connections
+        self._on_connected()
         return (self._birth(),)
 
     def offer(self, state: LiveState | None, time_unix_s: float) -> None:

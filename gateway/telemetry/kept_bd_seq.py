@@ -22,19 +22,33 @@ class KeptBdSeq:
 
     def __init__(self, state: Path) -> None:
         self._path = state / _FILE
-        self._last = self._read()
+        self._last = self._kept = self._read()
+        self._is_tried = False
 
     def next(self) -> int:
-        """Return the number of a new connection, 0 .. 255 and round; it counts also where the disk does not take it.
-
-        Without a lock: the state directory's is the guardian's for as long as it runs, and nobody else writes this file."""
+        """Return the number of a new connection, 0 .. 255 and round; it counts also where the disk does not take it. It is kept
+        before it is told. Of those that follow without a connection, every two seconds while a broker is away for weeks, the
+        broker has heard none, and the disk is spared them."""
         self._last = (self._last + 1) % _ROUND
+        if not self._is_tried:
+            self._is_tried = True
+            self._keep()
+        return self._last
+
+    def note_connected(self) -> None:
+        """Keep the number with which there is a connection now: the next process goes on behind it."""
+        self._is_tried = False
+        if self._kept != self._last:
+            self._keep()
+
+    def _keep(self) -> None:
+        """Without a lock: the state directory's is the guardian's for as long as it runs, and nobody else writes this file."""
         with (
             contextlib.suppress(OSError),
             closing_descriptor(os.open(self._path.parent, os.O_RDONLY | os.O_DIRECTORY)) as descriptor,
         ):
             replace_durably(descriptor, _FILE, json.dumps({"bdSeq": self._last}).encode())
-        return self._last
+            self._kept = self._last
 
     def _read(self) -> int:
         try:

@@ -36,7 +36,9 @@ def make_sessions(rig: "Rig", link: ControlLink, state: Path) -> list[BrokerSess
     command = RegisterCommands(rig.register_map, link, rig.network.units[0]).carry_out if mqtt.commands else None
     sessions: list[BrokerSession] = [JsonTopics(mqtt.base_topic or f"force-gateway/{rig.name}", command)]
     if mqtt.sparkplug:
-        sessions.append(EdgeNode(mqtt.sparkplug.group, mqtt.sparkplug.node or rig.name, KeptBdSeq(state).next))
+        kept = KeptBdSeq(state)
+        node = mqtt.sparkplug.node or rig.name
+        sessions.append(EdgeNode(mqtt.sparkplug.group, node, kept.next, on_connected=kept.note_connected))
     return sessions
 
 

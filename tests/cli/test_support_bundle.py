@@ -53,10 +53,13 @@ def test_a_secret_in_a_comment_or_in_the_middle_of_a_sentence_does_not_go_in_eit
         "# was: passwd=s3cr3t-1, Passwort: s3cr3t-2 (api_key 'x')\n"
         '{"text": "mqtt://robot:s3cr3t-3@broker failed; Authorization: Bearer s3cr3t-4; token=s3cr3t-5;", "time": "10:31:47"}\n'
         'api-key: "s3cr3t-6"\n'
+        '{"text": "http://broker/?key=s3cr3t-7&x=1 failed; Kennwort: s3cr3t-8, db_pass=s3cr3t-9, PIN: 4711s3cr3t"}\n'
     )
     assert "s3cr3t" not in text
     assert json.loads(text.splitlines()[1])["time"] == "10:31:47"
-    assert "@broker failed" in text
+    assert "@broker failed" in text and "&x=1 failed" in text
+    harmless = "pin 3 is ground, compass: N, key=3, 4 pins 1000 mm, bypass: open"
+    assert Redaction()(harmless) == harmless
 
 
 @pytest.mark.parametrize(
@@ -67,6 +70,10 @@ def test_a_secret_in_a_comment_or_in_the_middle_of_a_sentence_does_not_go_in_eit
         "#PSK s3cr3t-abc",
         "  # Passwort für den Broker: >>s3cr3t abc<<",
         "# wifi passphrase 's3cr3t one two'",
+        "# pass: s3cr3t one two",
+        "# Kennwort s3cr3t",
+        "# see http://grafana/?key=s3cr3t of hall 3",
+        "# the PIN is 4711, s3cr3t",
     ],
 )
 def test_a_secret_that_a_comment_of_a_rig_tells_in_a_sentence_does_not_go_in(comment: str, tmp_path: Path) -> None:

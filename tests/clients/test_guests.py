@@ -159,6 +159,20 @@ def test_a_pull_or_a_tare_does_not_undo_a_stop_of_since_the_last_cycle(
     assert gateway.bank.command.control_word == (17 if asked == "pull" else 1)
 
 
+def test_a_pull_that_is_asked_for_behind_a_stop_writes_nothing(client: Any, gateway: GatewayAtHand) -> None:
+    """Not even a heartbeat: who presses by then would refuse it, and its word would stand for the stop."""
+    if isinstance(client, Plc):
+        pytest.skip("its request may be on its way")
+    client.enable(12.0)
+    cycles(client)
+    gateway.stop_from_elsewhere()
+    written = len(gateway.writes)
+    client.pull(pulls=True)
+    cycles(client)
+    assert client.ended and not client.enabled
+    assert gateway.bank.owner is None and len(gateway.writes) == written
+
+
 def test_a_pull_and_a_tare_go_out_while_the_force_stands(client: Any, gateway: GatewayAtHand) -> None:
     client.enable(12.0)
     cycles(client)

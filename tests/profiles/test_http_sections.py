@@ -7,6 +7,7 @@ import pytest
 
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.profiles.http_sections import split_listen, without_secrets
+from gateway.profiles.rigs.assembly import check_report
 
 TOKEN = "6f1c6a51d9b04c0e"
 
@@ -144,3 +145,48 @@ def test_a_key_of_mqtt_without_its_certificate_is_a_fault(tmp_path: Path) -> Non
 def test_a_token_in_a_comment_does_not_travel_either_and_what_is_no_comment_stays(text: str, copy: str) -> None:
     """The token of before is kept there, in case the new one fails."""
     assert without_secrets(text) == copy
+
+
+@pytest.mark.parametrize(
+    ("mqtt", "place", "sentence"),
+    [
+        (
+            "password_file: {folder}/gone",
+            "mqtt.password_file",
+            "{folder}/gone: No such file or directory; name the right",
+        ),
+        ("tls: {{ca: {folder}/gone}}", "mqtt.tls.ca", "{folder}/gone: No such file or directory"),
+        ("tls: {{ca: {folder}/text}}", "mqtt.tls.ca", "{folder}/text holds no certificate in PEM form"),
+        ("tls: {{ca: {folder}/ca, certificate: {folder}}}", "mqtt.tls.certificate", "{folder}: it is a directory"),
+        (
+            "tls: {{ca: {folder}/ca, certificate: {folder}/ca, key: {folder}/ca}}",
+            "mqtt.tls.key",
+            "{folder}/ca holds no private key in PEM form",
+        ),
+        (
+            "tls: {{ca: {folder}/ca, certificate: {folder}/ca, key: {folder}/locked}}",
+            "mqtt.tls.key",
+            "{folder}/locked has a password: openssl pkey -in {folder}/locked",
+        ),
+    ],
+)
+def test_a_file_of_the_broker_that_is_not_there_or_no_such_file_is_told_by_check(
+    mqtt: str, place: str, sentence: str, tmp_path: Path
+) -> None:
+    """It was told at run only. No fault: everything but MQTT works without it."""
+    (tmp_path / "text").write_text("secret\n")
+    (tmp_path / "ca").write_text("-----BEGIN CERTIFICATE-----\n")
+    (tmp_path / "locked").write_text("-----BEGIN ENCRYPTED PRIVATE KEY-----\n")
+    report = check_report(rig_with(tmp_path, f"mqtt: {{host: broker, {mqtt.format(folder=tmp_path)}}}\n"))
+    assert not report.faults
+    (warning,) = [one for one in report.warnings if one.path.startswith("mqtt")]
+    assert f"{place}: E181 {sentence.format(folder=tmp_path)}" in str(warning)
+    assert str(warning).endswith("until then there is no MQTT")
+
+
+def test_files_of_the_broker_that_are_there_are_no_matter(tmp_path: Path) -> None:
+    (tmp_path / "secret").write_text("secret\n")
+    (tmp_path / "both").write_text("-----BEGIN CERTIFICATE-----\n-----BEGIN PRIVATE KEY-----\n")
+    named = f"password_file: {tmp_path}/secret, tls: {{ca: {tmp_path}/both, certificate: {tmp_path}/both}}"
+    report = check_report(rig_with(tmp_path, f"mqtt: {{host: broker, {named}}}\n"))
+    assert not report.faults and not [one for one in report.warnings if one.path.startswith("mqtt")]

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from gateway.live.live_state import LiveState
 from gateway.processes.state_lock import hold_state_lock
+from gateway.telemetry import kept_bd_seq
 from gateway.telemetry.broker_session import BrokerMessage
 from gateway.telemetry.edge_node import REBIRTH, EdgeNode
 from gateway.telemetry.kept_bd_seq import KeptBdSeq
@@ -175,11 +176,33 @@ def test_bytes_of_strangers_are_read_or_refused(payload: bytes) -> None:
 def test_bd_seq_goes_on_where_the_process_before_has_ended(tmp_path: Path) -> None:
     first = KeptBdSeq(tmp_path)
     assert [first.next() for _ in range(300)] == [*range(256), *range(44)]
+    first.note_connected()
     assert KeptBdSeq(tmp_path).next() == 44
     for damage in ("", "[", "[" * 100_000, '{"bdSeq": null}', '{"bdSeq": 1e999}', '{"other": 1}'):
         (tmp_path / "sparkplug.json").write_text(damage)
         assert KeptBdSeq(tmp_path).next() == 0
     assert [KeptBdSeq(tmp_path / "nowhere").next() for _ in range(2)] == [0, 0], "no disk: counts in memory only"
+
+
+def test_a_broker_that_is_away_costs_the_disk_one_write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One for each attempt, every two seconds, was 43 200 a day and their syncs: a memory card that wears out."""
+    writes = []
+    replace_durably = kept_bd_seq.replace_durably
+    monkeypatch.setattr(kept_bd_seq, "replace_durably", lambda *told: (writes.append(told[2]), replace_durably(*told)))
+    kept = KeptBdSeq(tmp_path)
+    node = EdgeNode("plant", NODE_NAME, kept.next, on_connected=kept.note_connected)
+    for bd_seq in range(100):
+        assert values(node.begin().payload) == {"bdSeq": bd_seq}
+        node.lose()
+    assert len(writes) == 1
+    node.begin()
+    node.greet()
+    assert KeptBdSeq(tmp_path).next() == 101, "behind the one with which it was connected"
+    for _ in range(2):
+        node.lose()
+        node.begin()
+        node.greet()
+    assert KeptBdSeq(tmp_path).next() == 103 and len(writes) == 1 + 1 + 1 + 2 + 1
 
 
 def test_bd_seq_is_kept_while_a_gateway_has_the_state_directory(

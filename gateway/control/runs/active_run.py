@@ -152,6 +152,8 @@ class ActiveRun:
         assert run
         if isinstance(run, SelfTestRun):
             run.observe_line(line)
+            if reading.is_usable:
+                run.outside_n = self._given_n() - (reading.contact_n - reading.cell_n)
         self.cell_n = reading.cell_n
         if self._stop_asked:
             return StopCause(FaultCode.NONE, self._stop_asked)

@@ -67,11 +67,13 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SelfTestReport:
-    """A self-test that has ended, or runs. number: of this one since the start; findings: by item, in its order."""
+    """A self-test that has ended, or runs. number: of this one since the start; findings: by item, in its order; fault: that
+    ended it, which may belong to no item."""
 
     number: int = 0
     result: SelfTestResult = SelfTestResult.NONE
     findings: tuple[Finding, ...] = ()
+    fault: FaultCode = FaultCode.NONE
 
     @property
     def _is_stopped(self) -> bool:
@@ -83,7 +85,8 @@ class SelfTestReport:
         counts = {verdict: sum(found.verdict is verdict for found in self.findings) for verdict in _WORDS}
         listed = ", ".join(f"{count} {_WORDS[verdict]}" for verdict, count in counts.items() if count)
         told = [found.sentence for found in self.findings if not self._is_stopped or found.verdict is not NOT_TESTED]
-        whole = f"self-test {self.number} {self.result.name.lower()}: {listed}"
+        ended = f"; ended by {self.fault.code} {self.fault.explanation.title}" if self.fault else ""
+        whole = f"self-test {self.number} {self.result.name.lower()}: {listed}{ended}"
         return (*told, whole)
 
 
@@ -106,8 +109,9 @@ def report_of(number: int, findings: dict[Item, Finding], ending: RunEnding) -> 
             text = f"the supervision stopped the test with {fault.code} {fault.explanation.title}"
             found[item] = Finding(item, FAILED, text)
     why = "the test did not come to it" if ending.is_done else "the test was stopped before"
+    why = f"{fault.code} {fault.explanation.title} ended the test before" if fault else why
     whole = tuple(found.get(item, Finding(item, NOT_TESTED, why)) for item in Item)
-    return SelfTestReport(number, _result(whole, ending), whole)
+    return SelfTestReport(number, _result(whole, ending), whole, fault)
 
 
 def verdict_of(findings: dict[Item, Finding], item: Item) -> SelfTestVerdict:

@@ -94,14 +94,14 @@ class Known:
         return self.settings.supervision.response_lag_s
 
 
-def judge_rest(rest: Trace, known: Known, weight_n: float = 0.0) -> tuple[Finding, ...]:
-    """Judge the readings without a force: noise, resolution, zero. weight_n: as of `judge_zero`."""
+def judge_rest(rest: Trace, known: Known, weight_n: float = 0.0, outside_n: float = 0.0) -> tuple[Finding, ...]:
+    """Judge the readings without a force: noise, resolution, zero. weight_n, outside_n: as of `judge_zero`."""
     is_silent = is_constant(rest)
     noise = Finding(Item.NOISE, NOT_TESTED, "all readings are the same")
     return (
         noise if is_silent else judge_noise(noise_n(rest), known),
         judge_resolution(count_n(rest), len(rest), known),
-        judge_zero(mean_n(rest), known, weight_n),
+        judge_zero(mean_n(rest), known, weight_n, outside_n),
     )
 
 
@@ -143,17 +143,21 @@ def _judge_constant(readings: int, known: Known) -> Finding:
     return Finding(Item.RESOLUTION, NOT_TESTED, f"{text}: this cell is too quiet, only a force could tell")
 
 
-def judge_zero(rest_n: float, known: Known, weight_n: float = 0.0) -> Finding:
+def judge_zero(rest_n: float, known: Known, weight_n: float = 0.0, outside_n: float = 0.0) -> Finding:
     """Judge the force at rest: not more than what friction may keep pressed, and the bound of the rig. weight_n: of the
-    payload along the tool, negative where it points up: in the air the cell feels it, on a workpiece it does not."""
+    payload along the tool, negative where it points up: in the air the cell feels it, on a workpiece it does not. outside_n:
+    what the plant in use knows of tilt and feed, which may have been there at the last tare."""
     assert known.settings.self_test
     fails_n = known.settings.self_test.zero_n
     rising_n, falling_n = known.model.branch_forces_n(known.rest_v)
     kept_n = _KEPT * max(falling_n, 0.0)
-    off_n = max(min(rising_n, 0.0) - max(weight_n, 0.0) - rest_n, rest_n - kept_n - max(-weight_n, 0.0))
+    least_n = min(rising_n, 0.0) - max(weight_n, 0.0) + min(outside_n, 0.0)
+    most_n = kept_n + max(-weight_n, 0.0) + max(outside_n, 0.0)
+    off_n = max(least_n - rest_n, rest_n - most_n)
     what = "the safe voltage and friction" if known.rest_v > 0.0 else "friction"
     kept = f" beyond the {kept_n:.1f} N that {what} may keep" if kept_n > 0.05 else ""
     kept += f" and the payload's {abs(weight_n):.1f} N" if abs(weight_n) > 0.05 else ""
+    kept += f" and the {abs(outside_n):.1f} N that tilt and feed bring" if abs(outside_n) > 0.05 else ""
     text = f"{rest_n:+.2f} N at rest, {_bounds(0.5 * fails_n, fails_n, 'N', 2)}{kept}"
     cure = "; lift the tool and tare" if off_n > 0.5 * fails_n else ""
     return Finding(Item.ZERO, _above(off_n, 0.5 * fails_n, fails_n), text + cure)

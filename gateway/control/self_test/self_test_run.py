@@ -70,7 +70,8 @@ _Stage = Enum("_Stage", ("REST", "FIRST", "SECOND", "HOLD", "DONE"))
 
 
 class SelfTestRun:
-    """One self-test, asked as a LadderRun is. ValueError for a rig that offers none."""
+    """One self-test, asked as a LadderRun is. ValueError for a rig that offers none. outside_n: known force of now that neither
+    slide nor payload gives, N."""
 
     end_phase: Final = CalibrationPhase.TESTED
     stop_cause: StopCause | None = None
@@ -90,6 +91,7 @@ class SelfTestRun:
         self._volts = known.rest_v
         self._rest_n = self._first_n = self._second_n = self._weight_n = 0.0
         self._first_count = 0
+        self.outside_n = 0.0
         self.noise_n = 0.0
         self._lines, self._leaps = LineWatch(), LeapLimit()
         self._levels: Levels | None = None
@@ -209,7 +211,7 @@ class SelfTestRun:
             self._end()
             return
         self.noise_n, self._rest_n = noise_n(rest), mean_n(rest)
-        for finding in judgement.judge_rest(rest, known, self._weight_n):
+        for finding in judgement.judge_rest(rest, known, self._weight_n, self.outside_n):
             self._set(finding)
         if self._force_n <= 0.0:
             self._leave_force("self_test.force_n is 0: nothing moves")

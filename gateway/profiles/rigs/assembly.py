@@ -52,6 +52,7 @@ from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, RigFil
 from gateway.profiles.strict_yaml.faults import Findings, ProfileError, ProfileFault
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build, build_known
+from gateway.profiles.telemetry_sections import Mqtt
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.words import ControlBit
 
@@ -203,6 +204,7 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
         self_test=_optional_part(document, "self_test", SelfTestSettings),
         network=_part(document, "network", Network),
         web=_optional_part(document, "web", Web),
+        mqtt=_optional_part(document, "mqtt", Mqtt),
         fieldbus=_faces(document, folder),
         calibration=read_part("calibration", ("calibration",), read_calibration),
         output_device=_as_set(output_device, output),

@@ -28,6 +28,7 @@ from gateway.profiles.rigs.faces import Face
 from gateway.profiles.rigs.rig import is_own
 from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, ValveFile
 from gateway.profiles.strict_yaml.fault_sentences import newton, number, second, volt
+from gateway.profiles.telemetry_sections import Mqtt
 from gateway.registers.map.register_map import RegisterMap
 
 Found = Iterator[tuple[str, str]]
@@ -64,6 +65,7 @@ class Parts:
     extended: PlantProfile | None = None
     compensation: Compensation | None = None
     web: Web | None = None
+    mqtt: Mqtt | None = None
     register_map: RegisterMap | None = None
 
 
@@ -140,10 +142,8 @@ def check_self_test(parts: Parts) -> Found:
         return
     if self_test.force_n > limits.force_max_n:
         most = f"limits.force_max_n = {newton(limits.force_max_n)}"
-        yield (
-            "self_test.force_n",
-            f"{newton(self_test.force_n)} is above {most}: a self-test never presses harder than work",
-        )
+        why = f"{newton(self_test.force_n)} is above {most}: a self-test never presses harder than work"
+        yield "self_test.force_n", why
 
 
 def check_calibration_range(parts: Parts) -> Found:

@@ -1,4 +1,5 @@
-"""Checks of the TLS faces of a rig: who may reach them, and whether their files can be used, today and next month.
+"""Checks of the TLS faces of a rig: who may reach them, and whether their files can be used, today and next month. And of the
+files by which its MQTT broker is known: without them there is no MQTT, and everything else.
 
 The files are looked at as the gateway will load them: a key that does not fit its certificate, a certificate that has
 expired, a key that others may read. All of it is told before the gateway starts.
@@ -92,6 +93,32 @@ def check_tls_days(parts: Parts) -> Found:
                 yield f"{path}.{name}", f"E173 {file} is not valid before {day_of(begins)}: {cure}"
             elif _utc() <= (ends := end_of(name, shown)) <= _utc(SOON_DAYS):
                 yield f"{path}.{name}", expiry_sentence(name, file, ends)
+
+
+def check_broker_files(parts: Parts) -> Found:
+    """Yield a warning for each file of `mqtt` that is missing or is not what it should be."""
+    mqtt = parts.mqtt
+    if mqtt is None:
+        return
+    named = {"password_file": mqtt.password_file}
+    if tls := mqtt.tls:
+        named |= {"tls.ca": tls.ca, "tls.certificate": tls.certificate, "tls.key": tls.key}
+    for name, file in named.items():
+        if file is not None and (why := _why_no_broker_file(name, file)):
+            yield f"mqtt.{name}", f"E181 {file}{why}; until then there is no MQTT"
+
+
+def _why_no_broker_file(name: str, file: str) -> str:
+    try:
+        text = read_plain(file)
+    except OSError as error:
+        return f": {error.strerror or error}; name the right one, or let the gateway's user read it"
+    kind = {"tls.key": b"PRIVATE KEY-----", "password_file": b""}.get(name, b"-----BEGIN CERTIFICATE-----")
+    if kind not in text:
+        return f" holds no {'private key' if name == 'tls.key' else 'certificate'} in PEM form: name the right one"
+    if name == "tls.key" and b"ENCRYPTED" in text:
+        return f" has a password: openssl pkey -in {file} -out NEW.key takes it off"
+    return ""
 
 
 def _unreadable(path: str, face: TlsFace) -> Found:
@@ -188,4 +215,4 @@ def _utc(days: int = 0) -> str:
 
 
 FAULTS: Final[tuple[Check, ...]] = (check_tls_exposure, check_tls_files)
-WARNINGS: Final[tuple[Check, ...]] = (check_tls_days, check_tls_allow)
+WARNINGS: Final[tuple[Check, ...]] = (check_tls_days, check_tls_allow, check_broker_files)

@@ -93,7 +93,7 @@ class RigPlants:
     def _select(self, query: PlantRequest) -> Rig:
         number = self._store.previous().number if query.rollback else query.use
         plant = self._store.load(number) if number else None
-        self._store.use(number or None)
+        self._store.use(number or None, last_one_waits=self._waiting is not None)
         return with_plant_in_use(self._own, plant)
 
     def _on_selected(self, result: Any) -> None:

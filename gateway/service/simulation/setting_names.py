@@ -54,6 +54,7 @@ FAULTS: Final = (
     Setting("wire.noise", "share of the bytes of all answers of devices that arrive with a wrong bit", "1", 0.0, 1.0),
     Setting("valve.silent", "the valve's relay answers nothing"),
     Setting("valve.stuck", "the relay answers and the valve does not move"),
+    Setting("valve.unplug", "its port disappears; back, it is another one"),
 )
 SURROUNDINGS: Final = (
     Setting("around.temperature_c", "temperature of the load cell", "degC", -40.0, 150.0),

@@ -127,3 +127,12 @@ def test_a_cell_that_says_nothing_usable_fails_its_line_and_nothing_is_pressed()
         volts.add(run.step(0.01 * k, Reading(is_new=True)).voltage_v)
     assert run.is_done and volts == {0.0}
     assert run.findings[Item.CELL_LINE].verdict is FAILED and "no reading" in run.findings[Item.CELL_LINE].text
+
+
+def test_a_fault_that_belongs_to_no_item_is_named_by_the_whole_and_by_what_was_not_tested() -> None:
+    """`self-test 1 failed: 9 not tested` said not a word of why."""
+    report = report_of(1, {}, RunEnding(FaultCode.MACHINE_BUSY, is_done=False, wants_force=True))
+    assert report.result is SelfTestResult.FAILED
+    title = FaultCode.MACHINE_BUSY.explanation.title
+    assert report.sentences[-1] == f"self-test 1 failed: 9 not tested; ended by A403 {title}"
+    assert {found.text for found in report.findings} == {f"A403 {title} ended the test before"}

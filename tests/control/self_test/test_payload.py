@@ -1,9 +1,11 @@
-"""A payload that hangs on the load cell in the air, and is carried by the workpiece in contact, is no fault of any item."""
+"""A payload that hangs on the load cell in the air, and is carried by the workpiece in contact, is no fault of any item; nor is
+a force that the plant in use knows of tilt and feed."""
 
 from math import cos, radians
 
 import pytest
 
+from gateway.control.compensation.compensation import Compensation, OutsideForce
 from gateway.control.self_test.items import Item
 from gateway.registers.words import SelfTestResult, SelfTestVerdict
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
@@ -47,3 +49,29 @@ def test_a_cell_that_is_wrong_is_found_with_it_all_the_same(unit: float, item: I
     rig = hanging(1.0, 90.0, unit=unit)
     assert verdict_on(rig.tested(), item) is SelfTestVerdict.FAILED
     assert rig.peak_n < FORCE_N
+
+
+def pushed(outside_n: float, shows_n: float) -> SelfTestRig:
+    """The plant in use knows that tilt brings outside_n; the cell shows shows_n of it."""
+    rig = SelfTestRig(5, FORCE_N)
+    control = rig.controller
+    known = Compensation(outside=OutsideForce(tilt_n=outside_n))
+    control.compensate(control._rig_settings, known, control._calibration)
+    rig.reading = lambda force_n: force_n + shows_n
+    rig.run(0.5)
+    return rig
+
+
+@pytest.mark.parametrize("shows", [1.0, 0.0], ids=["shows", "was there at the tare"])
+@pytest.mark.parametrize("outside_n", [9.0, -9.0])
+def test_a_force_that_the_plant_knows_from_outside_is_no_wrong_zero(outside_n: float, shows: float) -> None:
+    """`lift the tool and tare` was the answer to what is compensated while it works."""
+    report = pushed(outside_n, shows * outside_n).tested()
+    assert report.verdict_on(Item.ZERO) is SelfTestVerdict.PASSED, report.sentences
+
+
+def test_a_zero_that_is_off_beyond_it_is_found_and_told_with_it() -> None:
+    report = pushed(9.0, 18.0).tested()
+    assert report.verdict_on(Item.ZERO) is SelfTestVerdict.FAILED
+    (said,) = (one for one in report.sentences if "self-test zero failed" in one)
+    assert "and the 9.0 N that tilt and feed bring; lift the tool and tare" in said

@@ -4,7 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from gateway.plants.store import NumberedPlant, PlantStore, Provenance
 from gateway.profiles import Rig
+from gateway.profiles.kinds.plants import load_shipped_plant
 from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
 from tests.service.rigs import demo
 
@@ -70,3 +72,23 @@ def test_a_change_that_came_to_nothing_takes_away_none_that_waits(edges: Edges) 
     edges.is_free = True
     edges.plants.take_waiting()
     assert edges.taken == [waits]
+
+
+def test_a_rollback_does_not_go_to_a_plant_that_waited_and_was_never_in_use(edges: Edges, tmp_path: Path) -> None:
+    """Behind 2, which took the place of 1 while both waited, it went to 1, which nobody had seen at work."""
+    provenance = Provenance(made_utc="2026-11-22T17:30:00Z", version="1", rig="demo", start="demo", file="bench.yaml")
+    for _ in range(2):
+        PlantStore(tmp_path).add(
+            NumberedPlant(number=0, profile=load_shipped_plant("paper-slide"), provenance=provenance)
+        )
+    edges.plants.run_in_background = lambda work, done: done(work())
+    edges.is_free = False
+    for number in (1, 2):
+        edges.plants.answer({"use": number})
+    edges.is_free = True
+    edges.plants.take_waiting()
+    assert edges.plants.status()["active"] == 2
+    edges.plants.answer({"rollback": True})
+    assert edges.plants.status()["active"] == 0, "the rig's own, as before"
+    edges.plants.answer({"rollback": True})
+    assert edges.plants.status()["active"] == 2

@@ -67,7 +67,7 @@ def test_a_rig_with_a_valve_has_a_port_for_it_that_answers() -> None:
 def test_a_plug_that_is_pulled_is_out_and_put_back_is_another_port() -> None:
     async def scene(lines: SimulatedLines) -> None:
         before = lines.paths()
-        for name, setting in (("output", "output.unplug"), ("load_cell", "cell.unplug")):
+        for name, setting in (("output", "output.unplug"), ("load_cell", "cell.unplug"), ("valve", "valve.unplug")):
             lines.world.simulate({"do": "sim", "set": {setting: True}})
             assert lines.plug(lines.world.settings) is False, "there is no other port yet"
             assert {key for key, pty in lines._ptys.items() if not pty.is_open} == {name}
@@ -80,7 +80,7 @@ def test_a_plug_that_is_pulled_is_out_and_put_back_is_another_port() -> None:
             assert all(pty.is_open for pty in lines._ptys.values())
             before = lines.paths()
 
-    on_lines(demo(), scene)
+    on_lines(load_rig("paper-pull", simulated=True), scene)
 
 
 def test_what_a_slow_wire_has_no_time_for_is_left_out() -> None:
