@@ -49,6 +49,12 @@ LARGEST_CELL_N: Final = 5000.0
 LOOP_HZ: Final = 100.0
 TICK_S: Final = 1.0 / LOOP_HZ
 """Nominal tick of the control loop."""
+RING_ROWS: Final = 1 << 16
+"""Newest readings that are kept for the processes beside control: eleven minutes at 100 Hz, one at 1 kHz."""
+WATCHED_SHARE: Final = 0.9
+"""Of the residual watch's window, that must be there, and usable; and before it:"""
+WATCH_SETTLED_S: Final = 1.0
+"""From the first reading that is kept until one may be judged."""
 STALL_S: Final = 0.1
 """Silence of the control loop after which the guardian replaces it."""
 COMMIT_PATIENCE_S: Final = 10.0

@@ -146,9 +146,10 @@ class FaultCode(IntEnum):
             "A319",
             "control loop stalled",
             "The loop came round later than the bound; commands that waited meanwhile were dropped.",
-            "It was stopped or suspended, or an internal error; where the kernel does not count waiting, an "
-            "overloaded machine.",
-            "The line says how long it waited for a processor, if the kernel counts that; look for other load (top).",
+            "It was stopped, or the whole machine was suspended, or an internal error; where the kernel does not count "
+            "waiting, an overloaded machine.",
+            "The line says which, if the kernel counts it; look for other load (top). One that goes to sleep: "
+            "`systemctl mask sleep.target`.",
         ),
     )
     NOT_FINITE = (

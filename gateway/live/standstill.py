@@ -2,10 +2,12 @@
 
 What has come meanwhile waits in sockets and comes now, all at once. It belongs to a situation that is over: whoever asked has
 given it up, and may stand beside the tool. Control drops what its own loop came late to; the processes beside it that pass
-commands on look here. A stop is passed on all the same.
+commands on look here. A stop is passed on all the same. The kernel's monotonic clock stands still while a machine sleeps, so
+that is asked for apart.
 """
 
 import asyncio
+import time
 from collections.abc import Callable
 from typing import Final
 
@@ -14,10 +16,23 @@ AFTERMATH_S: Final = 0.5  # what the kernel has kept comes in several pieces
 _BEAT_S: Final = 0.1
 
 
+def suspended_s() -> float:
+    """Return for how long this machine has been suspended since its start, s, while `time.monotonic` stood still; 0 where the
+    system does not tell. Too little by what passes between the reading of two clocks, never too much."""
+    if not hasattr(time, "CLOCK_BOOTTIME"):  # not Linux
+        return 0.0
+    return max(0.0, time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC))
+
+
+def awake_or_not_s() -> float:
+    """Return monotonic seconds that go on while the machine is suspended."""
+    return time.monotonic() + suspended_s()
+
+
 class Standstill:
     """clock: in seconds. Nothing is a standstill before `keep_time` runs."""
 
-    def __init__(self, clock: Callable[[], float]) -> None:
+    def __init__(self, clock: Callable[[], float] = awake_or_not_s) -> None:
         self._clock = clock
         self._beat_s: float | None = None
         self._over_s: float | None = None

@@ -17,9 +17,11 @@ import os
 import struct
 from typing import Final
 
+from gateway import defaults
+
 MAGIC: Final = b"FGRING1\n"
-CAPACITY: Final = 1 << 16
-"""Rows: eleven minutes at 100 Hz, one at 1 kHz, in 7.9 MB for 15 columns."""
+CAPACITY: Final = defaults.RING_ROWS
+"""Rows: 7.9 MB for 15 columns."""
 _FIXED: Final = struct.Struct("<8sII")
 _WRITTEN: Final = struct.Struct("=Q")
 _WRITTEN_AT: Final = _FIXED.size

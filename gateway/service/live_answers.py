@@ -19,6 +19,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.control.inputs import Output
 from gateway.live import live_state as live
+from gateway.live.standstill import awake_or_not_s
 from gateway.modbus import Peer
 from gateway.modbus.pdu import is_exception
 from gateway.modbus.server import answer, refuse_unit
@@ -31,24 +32,34 @@ from gateway.service.socket_requests import EmptyRequest, ModbusRequest, parse_r
 from gateway.units import kilopascal_from_pascal
 
 _LONGEST_PDU: Final = 253
+_SET_S: Final = 0.5  # from one tick to the next a clock that is only adjusted goes on by less
 Answer = dict[str, Any]
 
 
 class AlarmTimes:
-    """When the fault and each warning rose, seconds since 1970; to be followed at each tick."""
+    """When the fault and each warning rose, seconds since 1970; to be followed at each tick. A clock that is set, as by a time
+    server minutes after a start, takes them along: else an alarm would have stood for years, or not yet. steady: seconds that
+    nobody sets."""
 
-    def __init__(self, clock: Callable[[], float] = time.time) -> None:
-        self._clock = clock
+    def __init__(self, clock: Callable[[], float] = time.time, steady: Callable[[], float] = awake_or_not_s) -> None:
+        self._clock, self._steady = clock, steady
+        self._ahead_s = clock() - steady()
         self._fault, self._warnings = FaultCode.NONE, WarningBit(0)
         self._since: dict[FaultCode | WarningBit, float] = {}
 
     def follow(self, decision: Output | None) -> None:
         """Note what is new and forget what is over."""
+        self._follow_clock()
         if decision is None or (decision.fault is self._fault and decision.warnings == self._warnings):
             return
         standing = _standing(decision)
         self._since = {alarm: self._since.get(alarm, self._clock()) for alarm in standing}
         self._fault, self._warnings = decision.fault, decision.warnings
+
+    def _follow_clock(self) -> None:
+        before_s, self._ahead_s = self._ahead_s, self._clock() - self._steady()
+        if abs(set_s := self._ahead_s - before_s) > _SET_S:
+            self._since = {alarm: since_s + set_s for alarm, since_s in self._since.items()}
 
     def since(self, alarm: FaultCode | WarningBit) -> float:
         """Return when it rose; now for one that nobody has followed yet."""

@@ -152,7 +152,7 @@ async def _carry(client: Any, session: BrokerSession) -> None:
     turn = asyncio.Lock()  # messages carry numbers in order: nobody speaks between the making of one and its sending
     for message in session.greet():
         await _publish(client, message)
-    standstill = Standstill(asyncio.get_running_loop().time)
+    standstill = Standstill()
     queue = CommandQueue(session.is_stop, standstill)
     async with asyncio.TaskGroup() as group:
         group.create_task(_speak(client, session, turn))

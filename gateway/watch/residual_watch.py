@@ -20,6 +20,9 @@ _FRESH_SHARE: Final = 0.6
 """Share of a window that must be younger than the last healthy one: half old and half new has a wrong name."""
 _ALL_ROWS: Final = 1 << 30
 _LONGEST_PAUSE_S: Final = 600.0  # between searches: a cause that has stood for long is looked at every ten minutes
+_MOST_DOUBLINGS: Final = (
+    16  # far beyond the longest pause of any interval; a week's windows are more than a float can carry
+)
 _WINDOWS_BEFORE_PAUSES: Final = 2
 """Windows in a row that show the same cause, from which on the search pauses longer and longer: more add nothing."""
 TOLERANCE_SHARE: Final = 0.25
@@ -122,5 +125,6 @@ class Watch:
             self._healthy_s = window.end_s
         self._filter.add(finding)
         if self._filter.agreeing_windows > _WINDOWS_BEFORE_PAUSES:
-            pause_s = self._setup.every_s * 2.0 ** (self._filter.agreeing_windows - _WINDOWS_BEFORE_PAUSES)
+            doubled = min(_MOST_DOUBLINGS, self._filter.agreeing_windows - _WINDOWS_BEFORE_PAUSES)
+            pause_s = self._setup.every_s * 2.0**doubled
             self._search_s = self._clock() + min(_LONGEST_PAUSE_S, pause_s)

@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from gateway.defaults import WATCH_SETTLED_S, WATCHED_SHARE
 from gateway.diagnosis.measurement import Flags, Floats, Measurement
 from gateway.recording import Recording, RecordingError
 from gateway.recording.measurement import measurement_of
@@ -22,10 +23,8 @@ from gateway.watch.pushed_rows import pushed_rows
 
 LEAD_S: Final = 12.0
 """How far before the window a replay may begin; the search takes its blocks from all rows, so that more costs certainty."""
-_SETTLED_S: Final = 1.0  # from the first row of a replay until it may be judged
 _GAP_S: Final = 0.5
 _AFTER_FAULT_S: Final = 2.0
-_ALMOST: Final = 0.9  # of the window must be there, and usable
 _OFF_V: Final = 0.01
 
 
@@ -44,13 +43,13 @@ def window_of(data: bytes, columns: tuple[str, ...], window_s: float) -> Window 
     """Return the window that ends with the newest row; a sentence where there is nothing to judge."""
     rows = _after_last_gap(pushed_rows(data, columns))
     time_s = rows["time_s"]
-    if time_s.size < 2 or time_s[-1] - time_s[0] < window_s * _ALMOST + _SETTLED_S:
+    if time_s.size < 2 or time_s[-1] - time_s[0] < window_s * WATCHED_SHARE + WATCH_SETTLED_S:
         return "the run is younger than the window"
     first = _first_replayed_row(rows["command_v"], time_s, window_s)
     rows = {name: values[first:].copy() for name, values in rows.items()}
-    window = rows["time_s"] >= max(time_s[-1] - window_s, rows["time_s"][0] + _SETTLED_S)
+    window = rows["time_s"] >= max(time_s[-1] - window_s, rows["time_s"][0] + WATCH_SETTLED_S)
     usable = window & ~_faulty(rows)
-    if usable.sum() < _ALMOST * window.sum():
+    if usable.sum() < WATCHED_SHARE * window.sum():
         return "a fault stood"
     command_v = rows["command_v"][usable]
     if not np.any(command_v > _OFF_V):
@@ -87,9 +86,9 @@ def _after_last_gap(rows: dict[str, Floats]) -> dict[str, Floats]:
 def _first_replayed_row(command_v: Floats, time_s: Floats, window_s: float) -> int:
     """Return the row where the replay begins."""
     begin_s = time_s[-1] - window_s
-    stop = max(1, int(np.searchsorted(time_s, begin_s - _SETTLED_S)))
+    stop = max(1, int(np.searchsorted(time_s, begin_s - WATCH_SETTLED_S)))
     start = int(np.searchsorted(time_s, begin_s - LEAD_S))
-    rows_held = max(1, int(np.searchsorted(time_s, time_s[0] + _SETTLED_S)))
+    rows_held = max(1, int(np.searchsorted(time_s, time_s[0] + WATCH_SETTLED_S)))
     resting = np.flatnonzero(
         _moving_sum(command_v[start:stop] <= _OFF_V, rows_held) >= rows_held
     )  # a dip of the command is no rest

@@ -6,7 +6,6 @@ module each, and the style is the reports' own (gateway.reports.style.css) with 
 
 import asyncio
 import json
-import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from importlib import import_module
@@ -49,7 +48,7 @@ def make_app(context: WebContext, door: Door, rows: RingRows | None) -> Starlett
     commands = Commands(context)
     events = EventSource(context, rows, commands)
     context.viewers = lambda: events.viewers
-    standstill = Standstill(time.monotonic)
+    standstill = Standstill()
 
     @asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:

@@ -1,8 +1,11 @@
 """Standing still: known by whoever wakes first, over soon, and nothing that runs slowly is one."""
 
 import asyncio
+import time
 
-from gateway.live.standstill import AFTERMATH_S, STANDSTILL_S, Standstill
+import pytest
+
+from gateway.live.standstill import AFTERMATH_S, STANDSTILL_S, Standstill, suspended_s
 
 
 def kept(*times_s: float) -> list[bool]:
@@ -40,3 +43,20 @@ def test_nobody_who_keeps_no_time_stands_still() -> None:
     standstill = Standstill(lambda: now_s)
     now_s = 100.0
     assert not standstill.is_aftermath()
+
+
+def test_a_machine_that_slept_stood_still_although_its_monotonic_clock_did(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def run() -> tuple[bool, float, bool]:
+        standstill, read, before_s = Standstill(), time.clock_gettime, suspended_s()
+        keeping = asyncio.create_task(standstill.keep_time())
+        await asyncio.sleep(0.0)
+        is_before = standstill.is_aftermath()
+        ahead_s = 3600.0
+        monkeypatch.setattr(time, "clock_gettime", lambda clock: read(clock) + ahead_s * (clock == time.CLOCK_BOOTTIME))
+        slept_s, is_behind = suspended_s() - before_s, standstill.is_aftermath()
+        keeping.cancel()
+        return is_before, slept_s, is_behind
+
+    is_before, slept_s, is_behind = asyncio.run(run())
+    assert (is_before, is_behind) == (False, True)
+    assert slept_s == pytest.approx(3600.0, abs=1.0)

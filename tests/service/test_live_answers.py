@@ -117,7 +117,7 @@ def test_the_page_has_the_role_of_every_plain_face(stage: Stage) -> None:
 
 def test_an_alarm_keeps_the_time_at_which_it_rose(stage: Stage) -> None:
     now_s = [1000.0]
-    times = AlarmTimes(lambda: now_s[0])
+    times = AlarmTimes(lambda: now_s[0], lambda: now_s[0])
     decision = stage.wired.loop.decision
     assert decision is not None
     times.follow(decision._replace(warnings=WarningBit.SLOW_LOOP))
@@ -131,12 +131,28 @@ def test_an_alarm_keeps_the_time_at_which_it_rose(stage: Stage) -> None:
 
 def test_a_fault_that_rises_alone_keeps_its_time_too(stage: Stage) -> None:
     now_s = [1000.0]
-    times, decision = AlarmTimes(lambda: now_s[0]), stage.wired.loop.decision
+    times, decision = AlarmTimes(lambda: now_s[0], lambda: now_s[0]), stage.wired.loop.decision
     assert decision is not None
     for fault in (FaultCode.SAMPLE_STALE, FaultCode.SAMPLE_STALE, FaultCode.OVER_FORCE):
         times.follow(decision._replace(fault=fault))
         now_s[0] += 60.0
     assert (times.since(FaultCode.SAMPLE_STALE), times.since(FaultCode.OVER_FORCE)) == (now_s[0], 1120.0)
+
+
+@pytest.mark.parametrize("set_s", [10 * 365 * 86400.0, -3600.0], ids=["ten years ahead", "an hour back"])
+def test_an_alarm_has_stood_for_as_long_when_the_clock_is_set(stage: Stage, set_s: float) -> None:
+    steady_s, ahead_s = [50.0], [1.7e9]
+    times, decision = AlarmTimes(lambda: steady_s[0] + ahead_s[0], lambda: steady_s[0]), stage.wired.loop.decision
+    assert decision is not None
+    warns = decision._replace(warnings=WarningBit.SLOW_LOOP)
+    times.follow(warns)
+    for _ in range(60):
+        steady_s[0] += 1.0
+        ahead_s[0] += 5e-4  # as a clock is slewed
+        times.follow(warns)
+    ahead_s[0] += set_s
+    times.follow(warns)
+    assert steady_s[0] + ahead_s[0] - times.since(WarningBit.SLOW_LOOP) == pytest.approx(60.0, abs=0.1)
 
 
 def test_a_taken_address_ends_the_start_unless_any_will_do() -> None:

@@ -93,6 +93,8 @@ class Wired:
         self.is_cell_plugged = True
         self.lateness: Callable[[int], tuple[int, float]] = lambda tick: (1, 0.0)
         """Of each tick: periods since the one before, and how late it is, as the clock would say."""
+        self.suspended_s = 0.0
+        """For how long the machine has been suspended, while this clock stood still."""
         self._steps = 0
         self._down = wire_of(rig.output)
         self._stream, self._asks = wire_of(rig.load_cell), wire_of(rig.load_cell)
@@ -128,7 +130,11 @@ class Wired:
                 self._ask_cell,
                 rig.load_cell.device,
             ),
-            LoopProcess(clock, lambda cause, sentence: self.log.append((self.now_s, sentence))),
+            LoopProcess(
+                clock,
+                lambda cause, sentence: self.log.append((self.now_s, sentence)),
+                suspended_s=lambda: self.suspended_s,
+            ),
         )
         self.loop.pressure_pa_per_v = rig.output.device.pressure_pa_per_v
 

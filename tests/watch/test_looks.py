@@ -79,6 +79,16 @@ def test_a_cause_that_stands_is_searched_for_less_and_less_and_never_given_up() 
     assert gaps_s[0] == EVERY_S and gaps_s[-1] == 600.0
 
 
+def test_a_cause_that_stands_for_a_month_is_still_searched_for_every_ten_minutes() -> None:
+    """From the 1026th window on, a week later, the pause could not be calculated, and the watch died of it."""
+    bench = Bench()
+    bench.is_off = True
+    for _ in range(30 * 24 * 6):
+        bench.look_again(600.0)
+    assert len(bench.searched) > 30 * 24 * 6 - 5
+    assert bench.published.cause is ResidualCause.COULOMB_FRICTION
+
+
 def window(excitation_v: float) -> Window:
     return Window(None, 0.0, excitation_v, 9)  # type: ignore[arg-type]
 

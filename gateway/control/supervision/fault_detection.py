@@ -44,6 +44,7 @@ _LINE_WORDS: Final = {
     FaultCode.WATCHDOG_NOT_ARMED: "the output device's watchdog does not arm: check its profile, or accept it in the rig",
 }
 _NOT_OBEYED: Final = (FaultCode.OUTPUT_REFUSED, FaultCode.OUTPUT_ALTERED, FaultCode.OUTPUT_LOST)
+_AWAKE: Final = "keep it awake while it works (systemctl mask sleep.target)"
 _MAY_PRESS: Final = "the safe voltage is not confirmed, so what pressed may press still"
 
 
@@ -66,6 +67,9 @@ def _lateness(line: LineStatus, allowed_s: float) -> StopCause:
     """Return the cause of a late loop: internal error or machine load, whichever made the larger part of the lateness."""
     observation = f"the loop came by {line.late_s * 1e3:.0f} ms late, allowed {allowed_s * 1e3:.0f} ms (stall_s)"
     dropped = "nothing that arrived meanwhile moves it"
+    if line.suspended_s >= 0.5 * line.late_s:
+        slept = f"this machine was suspended for {line.suspended_s:.1f} s of them"
+        return stop_cause(FaultCode.LOOP_STALLED, f"{observation}: {slept}; {_AWAKE}; {dropped}")
     if line.waited_s is None:
         return stop_cause(FaultCode.LOOP_STALLED, f"{observation}: the machine is overloaded; {dropped}")
     waited = f"{line.waited_s * 1e3:.0f} ms of them it waited for a processor"

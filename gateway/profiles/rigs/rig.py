@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from ipaddress import ip_address
+from math import floor, inf
 from pathlib import Path
 from shlex import quote
 from typing import Any, Final, Self
@@ -168,8 +169,20 @@ class Rig:
 
     @property
     def why_unwatched(self) -> str:
-        """Tell why the residual watch that the rig wants is off: its libraries are not installed. Empty where it runs."""
-        return missing_note("numba", "the residual watch") if self.is_watched and not is_installed("numba") else ""
+        """Tell why the residual watch that the rig wants is off: its libraries are not installed, or its window is longer than
+        what is kept of readings that come so often. Empty where it runs."""
+        if not self.is_watched:
+            return ""
+        return self._why_never_full() if is_installed("numba") else missing_note("numba", "the residual watch")
+
+    def _why_never_full(self) -> str:
+        rate_hz, window_s = self.load_cell.device.reading.rate_hz, self.residual_watch.window_s
+        kept_s = defaults.RING_ROWS / rate_hz if rate_hz else inf
+        if kept_s >= defaults.WATCHED_SHARE * window_s + defaults.WATCH_SETTLED_S:
+            return ""
+        most_s = floor((kept_s - defaults.WATCH_SETTLED_S) / defaults.WATCHED_SHARE)
+        kept = f"of {rate_hz:g} readings/s those of {kept_s:.0f} s are kept"
+        return f"the residual watch is off: {kept}, residual_watch.window_s = {window_s:g} s: at most {most_s} s"
 
     @property
     def lacks_device_watchdog(self) -> bool:

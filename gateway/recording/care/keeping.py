@@ -82,7 +82,7 @@ def choose_prunable(
 ) -> list[Prunable]:
     """Return the recordings that the limits have no room for, the oldest first. now_s: of the epoch; needed: names of those
     that somebody will read again, such as a calibration's ladder."""
-    ended = sorted(_with_ends(paths, now_s), key=lambda one: (one[0], one[2].name))
+    ended = sorted(_with_ends(paths, now_s), key=lambda one: one[0])  # of the same time by number, as they come
     total, chosen = sum(status.st_size for _, status, _ in ended), []
     for _, status, path in ended:
         age_s = now_s - status.st_mtime if status.st_mtime >= CLOCK_SET_S else None

@@ -28,6 +28,7 @@ from gateway.registers.command import Command, Status
 from gateway.registers.residual_cause import ResidualCause
 from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
+from gateway.service.running_rig.last_tick import LastTick
 from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from gateway.service.running_rig.lines.output_line import OutputExchange
@@ -50,13 +51,15 @@ Log = Callable[[str, str], None]
 @dataclass(frozen=True, slots=True)
 class LoopProcess:
     """Process that the loop runs in. clock: monotonic seconds; period_s: of the tick; processor_time: what the process has had
-    of a processor until now, None where the machine does not count that; lateness: None where nobody counts it."""
+    of a processor until now, None where the machine does not count that; lateness: None where nobody counts it; suspended_s:
+    how long the machine has been suspended until now, while its clock stood still."""
 
     clock: Callable[[], float]
     log: Log
     period_s: float = 1.0 / defaults.LOOP_HZ
     processor_time: Callable[[], ProcessorTime | None] = lambda: None
     lateness: Lateness | None = None
+    suspended_s: Callable[[], float] = lambda: 0.0
 
 
 class ControlLoop:
@@ -94,10 +97,9 @@ class ControlLoop:
         self._shown_self_test = controller.active_run.self_test
         self.clock, self._log = process.clock, process.log
         self.processor_time, self._lateness = process.processor_time, process.lateness
-        self._last_tick_s: float | None = None
+        self.last_tick = LastTick(process.suspended_s)
         self._heard_s = -inf
         self._fresh_s = _FRESH_PERIODS * process.period_s
-        self._last_processor_time: ProcessorTime | None = None
         self._slow_loop = SlowLoop(process.period_s)
         self._cell_noise, self._output_noise = LineNoise("load cell's", cell.unread.explain), LineNoise("output's")
         bank.on_command = self._on_command
@@ -164,15 +166,15 @@ class ControlLoop:
         now_s = self.clock()
         self._begin(WarningBit.SLOW_LOOP, self._slow_loop.tick(now_s, expirations, late_s, self._used_since_tick))
         self._end_warnings(now_s)
-        if now_s - self._heard_s > self._fresh_s:
+        if now_s - self._heard_s > self._fresh_s or self.last_tick.suspended_s():
             self._step(now_s)
         self.output.tick(now_s)  # behind the decision: an idle question would hold up its voltage
         self._cell.tick(now_s)
         if self.valve:
             self.valve.tick(now_s)
-        self._last_tick_s, self._last_processor_time = now_s, self.processor_time()
+        self.last_tick.note(now_s, self.processor_time())
         if self._lateness:
-            self._lateness.tick(now_s, waited_s_of(self._last_processor_time))
+            self._lateness.tick(now_s, waited_s_of(self.last_tick.processor_time))
 
     @property
     def streamed_s(self) -> float | None:
@@ -215,13 +217,9 @@ class ControlLoop:
         self._cell_noise.forget()
         self.cell_lost = False
 
-    def _late_s(self, now_s: float) -> float:
-        """Return the time since the last tick, s: what arrived during a stall is executed late, and control judges by it."""
-        return 0.0 if self._last_tick_s is None else now_s - self._last_tick_s
-
     def _used_since_tick(self) -> ProcessorTime | None:
         """Return what this process has had of a processor since the last tick."""
-        last = self._last_processor_time
+        last = self.last_tick.processor_time
         return time_between(last, self.processor_time()) if last else None
 
     def _processor_held(self, since_s: float | None, now_s: float) -> Held:
@@ -235,7 +233,7 @@ class ControlLoop:
         return waited_s_of(self._used_since_tick()) if late_s >= _LONG_SILENCE_S else None
 
     def _line(self, now_s: float) -> LineStatus:
-        late_s, output = self._late_s(now_s), self.output
+        late_s, output = self.last_tick.late_s(now_s), self.output
         return LineStatus(
             acknowledged_v=output.confirmed_v if self.is_watched else None,  # then no enable is taken
             standing_v=output.standing_v,
@@ -248,6 +246,7 @@ class ControlLoop:
             owner_connected=self.owner_connected,
             late_s=late_s,
             waited_s=self._waited_since_tick(late_s),  # for which the machine is to blame
+            suspended_s=self.last_tick.suspended_s(),
             warnings=self.warnings,
             sent_v=output.sent_v,
             wire_s=output.round_trip_s,

@@ -16,6 +16,7 @@ from gateway.codes.faults import FaultCode
 from gateway.control import Controller
 from gateway.control.blame_for_silence import cause_of_silence
 from gateway.devices import ValveHost, cell_host, output_host
+from gateway.live.standstill import suspended_s
 from gateway.modbus import Peer
 from gateway.ports import SerialPort
 from gateway.processes.clock_tick import ClockTick
@@ -140,14 +141,14 @@ class RunningRig:
         )
 
     def _wire_loop(self, cause: FaultCode) -> None:
-        rig = self._rig
+        rig, log = self._rig, self._log
         self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=time.monotonic)
         self._watchdogs = WatchdogRegister(self._line, self.bank.show_watchdogs, self._log)
         self._audit.watch(self.bank)
-        self.bank.on_refusal = lambda refusal, peer: self._log(
+        self.bank.on_refusal = lambda refusal, peer: log(
             f"refusal {peer.host} {refusal.reason.name.lower()}", f"{refusal.sentence}   ({peer})"
         )
-        self.bank.on_accepted = lambda sentence, peer: self._log(f"accepted {peer.host}", f"{sentence}   ({peer})")
+        self.bank.on_accepted = lambda sentence, peer: log(f"accepted {peer.host}", f"{sentence}   ({peer})")
         self.controller = Controller(
             rig.control,
             rig.calibration_in_use(rig.calibration),
@@ -159,14 +160,13 @@ class RunningRig:
             self.controller,
             self._line,
             self._cell_line,
-            LoopProcess(time.monotonic, self._log, self._tick.period_s, self._counters.read, self._lateness),
+            LoopProcess(time.monotonic, log, self._tick.period_s, self._counters.read, self._lateness, suspended_s),
         )
         self.loop.is_watched = False  # until READY: before it the guardian knows of no heartbeat to miss
         self.loop.valve = self._valve_line
         self._ports.loop = self.loop
         self.loop.pressure_pa_per_v = self._rig.output.device.pressure_pa_per_v
-        self.loop.recordings = self._recordings
-        self.loop.ring = self.ring
+        self.loop.recordings, self.loop.ring = self._recordings, self.ring
         self.loop.restart_cause = cause
         self.loop.warnings = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
 
@@ -285,7 +285,7 @@ class RunningRig:
 
     def _on_tick(self, expirations: int, late_s: float) -> None:
         self.loop.on_tick(expirations, late_s)
-        self._faces.note_tick(expirations / self._rig.loop_hz + late_s)
+        self._faces.note_tick(expirations / self._rig.loop_hz + late_s + self.loop.last_tick.slept_s)
         self._watchdogs.follow(watchdog_word(self._rig, self._ports, self._line))
         now_s = time.monotonic()
         self._guardian.heartbeat(now_s)

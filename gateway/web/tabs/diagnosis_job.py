@@ -132,11 +132,11 @@ class DiagnosisJobs:
 
 def kept_diagnoses(state: Path) -> list[dict[str, Any]]:
     """Return the kept reports: recording, verdict and causes of each, the newest recording first."""
-    paths = sorted((state / FOLDER).glob("[0-9]*.json"), reverse=True)
+    numbered = ((int(path.stem), path) for path in (state / FOLDER).glob("[0-9]*.json") if path.stem.isdecimal())
     return [
-        {"recording": int(path.stem), "made_unix_s": path.stat().st_mtime} | _headline(path)
-        for path in paths
-        if path.stem.isdecimal() and path.with_suffix(".html").exists()
+        {"recording": number, "made_unix_s": path.stat().st_mtime} | _headline(path)
+        for number, path in sorted(numbered, reverse=True)
+        if path.with_suffix(".html").exists()
     ]
 
 

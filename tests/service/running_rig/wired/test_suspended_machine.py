@@ -1,0 +1,52 @@
+"""A machine that was suspended: its monotonic clock stood still, so that all that waited meanwhile seemed to come in time."""
+
+import pytest
+
+from gateway.codes.faults import FaultCode
+from gateway.registers.refusal import Refusal
+from gateway.registers.words import State
+from tests.service.wired import ENABLE, Wired
+
+HOUR_S = 3600.0
+
+
+def test_a_force_goes_when_the_machine_wakes_whatever_comes_first() -> None:
+    for moment_ms in range(20):  # before a tick, a sample, behind one
+        wired = Wired(seed=moment_ms).pressing(20.0)
+        wired.run(moment_ms / 1e3)
+        wired.suspended_s = HOUR_S
+        assert wired.voltage_reaches_safe(0.1) < 0.06
+        assert wired.fault_code is FaultCode.LOOP_STALLED
+        (sentence,) = wired.said("A319")
+        assert "suspended for 3600.0 s" in sentence and "sleep.target" in sentence
+
+
+def test_a_setpoint_that_the_network_kept_meanwhile_is_not_obeyed() -> None:
+    wired = Wired().pressing(20.0)
+    wired.suspended_s = HOUR_S
+    wired.write(1, 4000)
+    wired.run(1.0)
+    assert wired.state is State.FAULT and max(one.voltage_v for one in wired.settings_since(wired.now_s - 0.9)) == 0.0
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.05], ids=["at once", "behind ticks and samples"])
+def test_an_enable_that_the_network_kept_meanwhile_is_refused(later_s: float) -> None:
+    wired = Wired().ready()
+    wired.suspended_s = HOUR_S
+    wired.run(later_s)
+    with pytest.raises(Refusal, match=r"W213 .*stood still"):
+        wired.write(0, ENABLE, 1500)
+    wired.run(0.3)
+    wired.write(0, ENABLE, 1500)
+    wired.until(lambda: wired.state is State.HOLDING, 3.0)
+
+
+def test_a_machine_that_woke_long_ago_presses_as_ever() -> None:
+    wired = Wired().ready()
+    wired.suspended_s = HOUR_S
+    wired.run(1.0)
+    wired.pressing(20.0)
+    for k in range(400):
+        wired.suspended_s = HOUR_S - 1e-6 * (k % 3)  # two clocks are never read at one moment
+        wired.run(0.005)
+    assert wired.state is State.HOLDING
