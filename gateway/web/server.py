@@ -21,6 +21,7 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import BaseRoute, Route
 
 from gateway import VERSION
+from gateway.live.control_link import ask_once
 from gateway.live.ring_rows import RingRows
 from gateway.live.standstill import Standstill
 from gateway.processes.json_socket.messages import encode_answer
@@ -152,7 +153,8 @@ def _command(context: WebContext, commands: Commands) -> Callable[[Request], Awa
         "take-ownership": lambda viewer, body: commands.take_ownership(viewer),
         "reset": lambda viewer, body: commands.reset(),
         "tare": lambda viewer, body: commands.tare(),
-        "record": lambda viewer, body: context.control.ask({"do": "record", "on": _switch(body, "on")}),
+        # by a way of its own: its answer waits for the disk, and neither a Stop nor a heartbeat must wait with it
+        "record": lambda viewer, body: ask_once(context.state, {"do": "record", "on": _switch(body, "on")}),
     }
 
     async def command(request: Request) -> Response:
