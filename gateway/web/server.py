@@ -60,6 +60,7 @@ def make_app(context: WebContext, door: Door, rows: RingRows | None) -> Starlett
         await context.end_work()
         await commands.close()
         await context.control.close()
+        await context.questions.close()
 
     routes = [*_page_routes(), *_api_routes(context, commands, events)]
     routes += [route for module in _tab_modules() for route in module.routes(context)]
@@ -106,7 +107,7 @@ def _file(name: str) -> Response:
 
 def _api_routes(context: WebContext, commands: Commands, events: EventSource) -> list[BaseRoute]:
     async def state(request: Request) -> Response:
-        return _answer(await context.control.ask({"do": "state"}))
+        return _answer(await context.questions.ask({"do": "state"}))
 
     async def stream(request: Request) -> Response:
         viewer = request.query_params.get("viewer", "")[:64]
@@ -116,14 +117,13 @@ def _api_routes(context: WebContext, commands: Commands, events: EventSource) ->
         return JSONResponse({"ok": True, "version": VERSION})
 
     async def registers(request: Request) -> Response:
-        port = (await context.control.ask({"do": "running"}))["port"]
+        port = (await context.questions.ask({"do": "running"}))["port"]
         return JSONResponse(register_table(context.profile, port))
 
     async def words(request: Request) -> Response:
         block = request.path_params["block"]
-        return JSONResponse(
-            {"first": context.profile.register_map.block(block).first, "words": await commands.words(block)}
-        )
+        read = await commands.words(block, context.questions)
+        return JSONResponse({"first": context.profile.register_map.block(block).first, "words": read})
 
     async def model(request: Request) -> Response:
         # a store that somebody changes on a slow disk is waited for, and a Stop must not wait with it

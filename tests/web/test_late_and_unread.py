@@ -171,9 +171,20 @@ def test_all_but_a_stop_says_until_when_it_is_wanted(tmp_path: Path, monkeypatch
     play(tmp_path, scene)
 
 
-def test_a_stop_does_not_wait_for_a_recording_whose_disk_hangs(tmp_path: Path) -> None:
-    """Both went by one way, on which control answers one after the other: Esc, and each heartbeat, came two seconds late, which
-    is the end of a lease."""
+@pytest.mark.parametrize(
+    ("method", "path", "body"),
+    [
+        ("POST", "command/record", b'{"on": true}'),
+        ("GET", "state", None),
+        ("GET", "registers", None),
+        ("GET", "words/status", None),
+    ],
+)
+def test_a_stop_waits_neither_for_a_recording_whose_disk_hangs_nor_for_what_others_ask(
+    tmp_path: Path, method: str, path: str, body: bytes | None
+) -> None:
+    """All went by one way, on which control answers one after the other. Beside a recording Esc came two seconds late, beside
+    two hundred who asked for the state more than one, and so did each heartbeat, which is the end of a lease."""
 
     async def scene() -> bool:
         is_asked, served = asyncio.Event(), set[asyncio.Task[None] | None]()
@@ -181,22 +192,24 @@ def test_a_stop_does_not_wait_for_a_recording_whose_disk_hangs(tmp_path: Path) -
         async def control(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             served.add(asyncio.current_task())
             while line := await reader.readline():
-                if json.loads(line)["do"] == "record":  # its answer never comes
-                    is_asked.set()
-                else:
+                if json.loads(line).get("pdu", "").startswith("10"):
                     writer.write(b'{"ok": true, "pdu": "1000000001"}\n')
+                else:  # its answer never comes
+                    is_asked.set()
             writer.close()
 
         context = WebContext(tmp_path, "demo", True, ControlLink(tmp_path))
         app, headers = make_app(context, Door("127.0.0.1", 8080, TOKEN), None), {"authorization": f"Bearer {TOKEN}"}
         async with await asyncio.start_unix_server(control, tmp_path / "control.sock"):
-            recorded = asyncio.create_task(call(app, "POST", "/api/v1/command/record", headers, b'{"on": true}'))
+            other = asyncio.create_task(call(app, method, f"/api/v1/{path}", headers, body))
             await is_asked.wait()
             stopped = await call(app, "POST", "/api/v1/command/stop", headers)
-            is_first = stopped.status == 200 and not recorded.done()
-            recorded.cancel()
+            is_first = stopped.status == 200 and not other.done()
+            other.cancel()
+            await asyncio.gather(other, return_exceptions=True)
             await context.control.close()
-            await asyncio.gather(recorded, *filter(None, served), return_exceptions=True)
+            await context.questions.close()
+            await asyncio.gather(*filter(None, served), return_exceptions=True)
         return is_first
 
     assert asyncio.run(asyncio.wait_for(scene(), 10.0))
