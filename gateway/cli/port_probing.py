@@ -2,7 +2,7 @@
 
 import asyncio
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
@@ -10,7 +10,7 @@ from gateway.processes import exit_codes
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from gateway.devices import DeviceProfile
+    from gateway.devices import DeviceProfile, SerialSettings
     from gateway.ports import PortError
     from gateway.profiles import CellLine, OutputLine, Rig
     from gateway.profiles.rigs.rig import ValveLine
@@ -23,6 +23,11 @@ HARMLESS: Final = (
 )
 _SLOW_LATENCY_MS: Final = 16
 PATIENCE_S: Final = 0.5  # for a device that was named: a busy machine or a slow adapter is no wrong device
+_SLOW_BAUDS: Final = (1200, 2400, 4800)  # as many scales are delivered: heard, but too slow to be asked for
+_DATA_BITS: Final = 8  # with which a port is listened to
+_OF_TEXT: Final = frozenset(b"\r\n\x02\x03") | frozenset(range(0x20, 0x7F))
+_IN_A_PROFILE: Final = "a profile says so under serial"
+_MOST: Final = 0.95  # of what is heard: a character may be torn
 _LEAST_HZ: Final = 20.0  # what the pneumatics of a force loop need
 
 
@@ -134,6 +139,12 @@ def _tell_heard(report: "PortReport") -> str:
     if not heard:
         return f"not one byte at {', '.join(report.heard)}: power, crossed wires, another port?"
     settings, data = max(heard.items(), key=lambda one: len(one[1]))
+    if parity := next(filter(None, map(_parity_of, heard.values())), None):
+        settings, data = next(one for one in heard.items() if _parity_of(one[1]) == parity)
+        text = show_bytes(_seven_bits(data))
+        return (
+            f"{len(data)} bytes at {settings} that are text of 7 data bits and {parity} parity: {text}; {_IN_A_PROFILE}"
+        )
     return f"{len(data)} bytes at {settings} that no profile understands: {show_bytes(data)}"
 
 
@@ -193,30 +204,57 @@ def listen_at(path: str, seconds: float) -> Heard:
     from gateway.ports import PortError
     from gateway.service.probing.port_probe import BAUDS, listen_to_port, show_bytes
 
+    speeds = [SerialSettings(baud=baud) for baud in (*_SLOW_BAUDS, *BAUDS)]
     try:
-        report = asyncio.run(listen_to_port(path, [SerialSettings(baud=baud) for baud in BAUDS], seconds))
+        report = asyncio.run(listen_to_port(path, speeds, seconds))
     except PortError as error:
         raise port_failure(error) from None
-    readers = {settings: _readers(data) for settings, data in report.heard.items()}
+    heard = [_as_sent(settings, report.heard[str(settings)]) for settings in speeds]
+    readers = {settings: _readers(data) for settings, data in heard}
     lines = [
         f"{settings}: {len(data) / seconds:.0f} bytes/s {show_bytes(data)}" + _named(readers[settings], seconds)
-        for settings, data in report.heard.items()
+        for settings, data in heard
         if data
     ]
+    shown = ", ".join(str(settings.baud) for settings in speeds)
     if not lines:
-        lines = [
-            f"silent at {', '.join(map(str, BAUDS))} baud: it may wait to be asked (check RIG --probe), or is not powered"
-        ]
+        lines = [f"silent at {shown} baud: it may wait to be asked (check RIG --probe), or is not powered"]
     elif not any(readers.values()):
         lines.append("no shipped profile reads this; the speed whose bytes look like text is probably the right one")
+    lines += [
+        f"at {settings.baud} it sends 7 data bits and {settings.parity} parity: {_IN_A_PROFILE}"
+        for settings, _ in heard
+        if settings.data_bits < _DATA_BITS
+    ]
     fields = {
         "port": path,
         "heard": [
-            {"serial": settings, "bytes_per_s": round(len(data) / seconds, 1), "devices": readers[settings]}
-            for settings, data in report.heard.items()
+            {"serial": str(settings), "bytes_per_s": round(len(data) / seconds, 1), "devices": readers[settings]}
+            for settings, data in heard
         ],
     }
     return Heard((*lines, *_tell_latency(report)), fields)
+
+
+def _as_sent(settings: "SerialSettings", data: bytes) -> "tuple[SerialSettings, bytes]":
+    """Return what was heard with 8 data bits as the device sent it: perhaps with 7 and a parity bit."""
+    parity = _parity_of(data)
+    return (replace(settings, data_bits=7, parity=parity), _seven_bits(data)) if parity else (settings, data)
+
+
+def _parity_of(data: bytes) -> Literal["even", "odd"] | None:
+    """Return which parity the eighth bits of a text are, None where they are none: without it the right speed looks like
+    noise, too."""
+    text = _seven_bits(data)
+    if data.isascii() or sum(one in _OF_TEXT for one in text) < _MOST * len(text):
+        return None
+    odd = sum(one.bit_count() % 2 for one in data)
+    is_neither = (1.0 - _MOST) * len(data) < odd < _MOST * len(data)
+    return None if is_neither else "odd" if 2 * odd > len(data) else "even"
+
+
+def _seven_bits(data: bytes) -> bytes:
+    return bytes(one & 0x7F for one in data)
 
 
 def _readers(data: bytes) -> dict[str, int]:

@@ -22,6 +22,25 @@ def test_an_electrician_is_told_which_output_counts_and_what_nobody_knows_of_a_d
     assert "not known here" in interface and "USB" in interface
 
 
+def test_an_electrician_is_told_the_checksum_that_the_module_is_to_be_set_to(tmp_path: Path) -> None:
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    text = text.replace("device: smc-itv-rc", "device: icpdas-7024\n  watchdog_s: 0.5\n  checksum: dcon-sum")
+    (tmp_path / "own.yaml").write_text(text)
+    page = page_of(tmp_path / "own.yaml")
+    assert rows_of(page, "Serial line: output")["line"] == ["9600 8N1, address 1, channel 0, checksum dcon-sum"]
+
+
+def test_who_binds_ipv6_is_told_that_robots_and_plcs_know_ipv4_alone(tmp_path: Path) -> None:
+    """The clients said so; the page gave an S7 `fd00::5` for the four bytes of its TCON_IP_v4, and an IRC5 the same."""
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    own = text.replace("bind: 192.168.125.20", 'bind: "fd00::5"').replace("192.168.125.0/24", '"fd00::/8"')
+    (tmp_path / "own.yaml").write_text(own)
+    (told,) = [one["sentences"] for one in page_of(tmp_path / "own.yaml")["sections"] if "Network" in one["title"]]
+    assert any("fd00::5 is an IPv6 address" in one for one in told)
+    told = next(one["sentences"] for one in page_of("irc5-cell")["sections"] if "Network" in one["title"])
+    assert not any("IPv6" in one for one in told)
+
+
 def test_of_eight_outputs_the_one_that_is_driven_is_named(tmp_path: Path) -> None:
     text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("device: smc-itv-rc", "device: waveshare-ao8b")
     (tmp_path / "own.yaml").write_text(text)

@@ -23,6 +23,7 @@ _LOST: Final = {
 """What happens at the end of the lease."""
 _SHOWN: Final = ("status_word", "state", "force_measured", "fault_code", "refusal_reason")
 """What a robot wants to see that reads register by register."""
+_IPV4: Final = 4
 SHORTEST_TIMER_LEASE_S: Final = 0.3
 """Three periods of RAPID's shortest cyclic timer, 0.1 s: two lost ones are not a loss of the master."""
 SHORTEST_S7_LEASE_S: Final = 0.36
@@ -90,6 +91,11 @@ def _network_sentences(rig: Rig, table: ExchangeTable) -> tuple[str, ...]:
         sentences.append(
             f"This rig listens on {network.bind} only: no robot can reach it. Set network.bind to this machine's address on "
             "the cell's network, and network.allow to the networks that may connect."
+        )
+    if network.plain and ip_address(network.bind).version > _IPV4 and not ip_address(network.bind).is_loopback:
+        sentences.append(
+            f"{network.bind} is an IPv6 address, and what follows for robots and PLCs knows IPv4 alone: set network.bind and "
+            "network.allow to this machine's IPv4 address and network. Other programs may use IPv6."
         )
     if network.plain and not where.port:
         sentences.append(

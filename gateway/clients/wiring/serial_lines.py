@@ -38,6 +38,7 @@ def _device_section(name: str, line: object) -> Section:
     device, settings, port = getattr(line, "device"), getattr(line, "settings"), getattr(line, "port")  # noqa: B009
     wires = wires_of(device.name, is_modbus=device.is_modbus)
     constants = "".join(f", {name} {device.constants[name]}" for name in (ADDRESS, CHANNEL) if name in device.constants)
+    constants += "" if device.checksum == "none" else f", checksum {device.checksum}"
     rows = [
         ("what", "value"),
         ("device", f"{device.name}: {device.description}"),

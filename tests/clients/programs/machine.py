@@ -27,8 +27,11 @@ class Block:
         entries = routine.variables.items()
         self.fields = {machine.key(name): machine.fresh(kind, initial) for name, (kind, initial, _) in entries}
         self.frame = Frame(self.fields, machine.declared_by(routine))
+        self.passing = [(machine.key(name), kind) for name, (kind, _, section) in entries if section == "VAR_TEMP"]
 
     def call(self, given: dict[str, Any]) -> None:
+        for name, kind in self.passing:  # nothing of it lasts until the next call
+            self.fields[name] = self.machine.fresh(kind)
         for name, _, section in self.routine.parameters:
             if name in given:
                 self.fields[self.machine.key(name)] = given[name]  # a structure stays the caller's own: VAR_IN_OUT

@@ -97,6 +97,38 @@ def test_listening_says_what_comes_and_sends_nothing() -> None:
     assert module.heard == []
 
 
+class SevenDataBits(FarEnd):
+    """An indicator as many are delivered: 2400 7E1 or 7O1, the eighth bit of what comes being its parity."""
+
+    def __init__(self, baud: int, odd: int) -> None:
+        super().__init__(load_device("stream-st-gs"), baud)
+        self.odd = odd
+
+    def _stream(self) -> None:
+        text = self._cell.frame(5.0) if self._cell else b""
+        self.pty.send(bytes(one | (one.bit_count() % 2 ^ self.odd) << 7 for one in text))
+        self._timer = asyncio.get_running_loop().call_later(0.06, self._stream)
+
+
+@pytest.mark.parametrize(("baud", "odd", "frame"), [(9600, 0, "7E1"), (2400, 1, "7O1")])
+def test_listening_tells_seven_data_bits_and_a_slow_line_from_noise(baud: int, odd: int, frame: str) -> None:
+    """Of 7E1 nothing looked like text at any speed, and at 2400 baud nobody had listened."""
+    with behind_ptys(SevenDataBits(baud, odd)) as (path,):
+        result = CliRunner().invoke(command, ["ports", "--listen", "--seconds", "0.4", path])
+    (named,) = [line for line in result.output.splitlines() if "stream-st-gs" in line]
+    assert f"{baud} {frame}: " in named and "ST,GS," in named
+    parity = "odd" if odd else "even"
+    assert f"at {baud} it sends 7 data bits and {parity} parity: a profile says so under serial" in result.output
+    assert result.output.count("7 data bits") == 1
+
+
+def test_a_probe_tells_seven_data_bits_from_noise(tmp_path: Path) -> None:
+    with behind_ptys(FarEnd(load_device("icpdas-702x")), SevenDataBits(115200, 0)) as paths:
+        code, said = probe(tmp_path, paths)
+    assert code == exit_codes.DEVICE
+    assert "bytes at 115200 8N1 that are text of 7 data bits and even parity: " in said and "ST,GS," in said
+
+
 @pytest.mark.parametrize(
     ("data", "shown"),
     [

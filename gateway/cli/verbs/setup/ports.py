@@ -29,7 +29,7 @@ EXAMPLES = ("ports", "ports --json")
 def command(context: click.Context, *, paths: tuple[str, ...], listen: bool, seconds: float, as_json: bool) -> None:
     """List serial ports, by id as rig files want them.
 
-    With --listen: what each device says by itself (or only those at the PORTs named), at 9600 to 115200 baud, and which
+    With --listen: what each device says by itself (or only those at the PORTs named), at 1200 to 115200 baud, and which
     shipped profile reads it. Nothing is sent. A device that waits to be asked stays silent: `check RIG --probe` asks.
     """
     from gateway.ports import list_ports
