@@ -10,7 +10,8 @@ from gateway.control.compensation.compensation import Compensation, OutsideForce
 from gateway.control.inputs import CalibrationInUse
 from gateway.control.valve.pull_model import scale_forces
 from gateway.registers.words import ControlBit, LimitedBy, State
-from tests.control.bench import bsfm
+from gateway.units import STANDARD_GRAVITY_M_PER_S2
+from tests.control.bench import bsfm, settings
 from tests.control.valve.valve_bench import BIT_4, ENABLE, PULL, SHARE, ValveBench
 
 
@@ -52,6 +53,20 @@ def test_a_tare_while_the_tool_pulls_takes_the_same_zero_as_one_while_it_pushes(
     bench.write(control_word=ENABLE | BIT_4, force_setpoint_n=10.0)
     bench.run(3.0)
     assert bench.last.state is State.HOLDING and bench.plant.force_n == pytest.approx(14.9, abs=1.0)
+
+
+def test_a_heavy_tool_is_no_reason_against_a_tare_while_it_pulls() -> None:
+    """Weighed the wrong way round its weight counts twice, and was a force that stays."""
+    bench, weight_n = ValveBench(), 0.35 * settings().supervision.saturation_n
+    bench.alter_sample = lambda sample: replace(sample, force_n=min(sample.force_n, -weight_n))
+    payload_kg = weight_n / STANDARD_GRAVITY_M_PER_S2
+    bench.write(payload_kg=payload_kg)
+    bench.run(1.0)
+    bench.write(control_word=ENABLE | BIT_4, payload_kg=payload_kg)
+    bench.run(2.0)
+    bench.write(control_word=ENABLE | BIT_4 | ControlBit.TARE, payload_kg=payload_kg)
+    assert bench.refused is None and bench.stands is PULL
+    assert bench.controller.zero_n == pytest.approx(0.0, abs=0.2)
 
 
 def test_a_measured_model_of_pulling_counts_in_place_of_the_derived_one_whichever_set_it_came_with() -> None:
