@@ -5,7 +5,7 @@ import pytest
 
 from gateway.diagnosis import Measurement
 from tests.diagnosis.machine import measurement, times_s
-from tools.bench.diagnosis.cylinders import CylinderResult, columns_of, held_out_rms_n, table
+from tools.bench.cylinders import CylinderResult, columns_of, held_out_rms_n, table
 
 TIME_S = times_s(20.0, 100.0)
 NOISE_N = 0.05

@@ -14,7 +14,7 @@ from gateway.diagnosis import Diagnosis, Measurement, Options, diagnose
 from gateway.recording import read_table
 from gateway.recording.measurement import measurement_of
 from gateway.recording.tables.mapping_file import column_mapping
-from tools.bench.diagnosis.cylinders import columns_of, held_out_rms_n
+from tools.bench.cylinders import columns_of, held_out_rms_n
 
 FOLDER = Path(os.environ.get("FORCE_GATEWAY_DATA") or Path(__file__).parents[3] / "shared" / "data")
 DATA = FOLDER / "zillen-cylinder-friction"

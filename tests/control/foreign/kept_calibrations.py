@@ -1,6 +1,6 @@
 """Calibrations of foreign machines as the product made them, kept: a ladder and its fit take seconds for each.
 
-Written by `tools/bench/force/response.py --write`; a test with --long makes one again and compares.
+Written by `tools/bench/response.py --write`; a test with --long makes one again and compares.
 """
 
 import json

@@ -1,6 +1,6 @@
 """How fast a setpoint reaches the wire, and how steady the loop stays under load.
 
-    .venv/bin/python tools/bench/speed/loop.py
+    .venv/bin/python tools/bench/loop.py
 
 Runs the whole gateway (guardian, control process) on two ptys whose far ends a process of this program serves, so that the
 wire costs nothing. Prints
@@ -35,7 +35,7 @@ from pathlib import Path
 
 import psutil
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.progress import report
@@ -48,7 +48,7 @@ GOAL_IDLE_BYTES = 60e6
 
 RIG = """\
 name: bench
-description: both devices served by tools/bench/speed/loop.py on ptys, no wire time
+description: both devices served by tools/bench/loop.py on ptys, no wire time
 simulated: false
 loop_hz: {loop_hz}
 registers: force-v1
@@ -143,7 +143,7 @@ class EmptyLoop:
 @contextlib.contextmanager
 def empty_loop(loop_hz: int) -> Iterator[EmptyLoop]:
     """Run one until the block ends."""
-    script = Path(__file__).parents[1] / "harness" / "empty_loop.py"
+    script = Path(__file__).parent / "harness" / "empty_loop.py"
     with contextlib.closing(Devices()) as devices:
         process = subprocess.Popen(
             [sys.executable, str(script), *devices.paths, str(loop_hz)], stdout=subprocess.PIPE, text=True

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What onlookers cost the control loop: `tools/bench/speed/missed_ticks.py [--viewers 20] [--seconds 30]`.
+"""What onlookers cost the control loop: `tools/bench/missed_ticks.py [--viewers 20] [--seconds 30]`.
 
 A demo gateway holds 12 N and publishes over MQTT: first with nobody at its page, then with so many open streams of events that
 are read as a browser reads them, then with the MQTT broker (mosquitto, where it is installed) killed and started again besides.
@@ -22,7 +22,7 @@ from pathlib import Path
 
 import psutil
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from gateway.cli.control_socket import ask
 from gateway.profiles import shipped_profiles_folder

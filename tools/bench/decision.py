@@ -1,4 +1,4 @@
-"""What one decision costs, and how much of that is waiting for memory: `.venv/bin/python tools/bench/speed/decision.py`.
+"""What one decision costs, and how much of that is waiting for memory: `.venv/bin/python tools/bench/decision.py`.
 
     a setpoint    from the bank's write of a voltage until its bytes are handed to the port (`loop.py` has the rest of the way)
     a sample      from a cell's sentence to the decision with its reasons, while 2 V are out
@@ -18,7 +18,7 @@ from statistics import median
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.progress import report

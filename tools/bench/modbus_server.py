@@ -1,6 +1,6 @@
 """Requests per second and CPU per request of our Modbus TCP server, beside a libmodbus C server and stock pymodbus.
 
-    tools/bench/speed/modbus_server.py [--seconds 3] [--rounds 5] [--connections 16] [--bank real|simple] [--compiled] [--json]
+    python tools/bench/modbus_server.py [--seconds 3] [--rounds 5] [--connections 16] [--bank real|simple] [--compiled] [--json]
 
 Same load generator for all (harness/modbus_load.c: one outstanding request per connection, one epoll), same run, rounds
 interleaved so that a busy machine hurts all alike; rates are medians over rounds, CPU is the server process's user + system
@@ -28,8 +28,8 @@ from time import monotonic
 from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.progress import report, reported
 
-BENCH = Path(__file__).resolve().parents[1]
-ROOT = BENCH.parents[1]
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT)]
 LOOPS = ("uvloop", "asyncio")
 GOALS = {"read": {"uvloop": 1.0, "asyncio": 0.85}, "write": {"uvloop": 0.6}}
@@ -149,7 +149,7 @@ class Contender:
 def compile_c(source: str, into: Path, *libraries: str) -> Path | None:
     """Compile a C program with gcc; where that fails, say so and return None."""
     program = into / source.removesuffix(".c")
-    command = ["gcc", "-O2", "-o", str(program), str(BENCH / "harness" / source), *libraries]
+    command = ["gcc", "-O2", "-o", str(program), str(HERE / "harness" / source), *libraries]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         print(f"SKIPPED {source}: {done.stderr.strip().splitlines()[0]}", file=sys.stderr)

@@ -1,9 +1,9 @@
 # ruff: noqa: E402  tools/paper must be found before it is imported
 """What each reversal policy gets wrong on the twin: full loop, partial reversals, chatter, beside a first study of it.
 
-    .venv/bin/python tools/bench/force/reversal.py                # copies 0..4 of the paper's rig, virtual time, half a minute
-    .venv/bin/python tools/bench/force/reversal.py --seeds 0      # the rig itself
-    .venv/bin/python tools/bench/force/reversal.py --json
+    .venv/bin/python tools/bench/reversal.py                # copies 0..4 of the paper's rig, virtual time, half a minute
+    .venv/bin/python tools/bench/reversal.py --seeds 0      # the rig itself
+    .venv/bin/python tools/bench/reversal.py --json
 
 Each copy is calibrated with its cell's noise: ladder 0-5-0 V, ten groups, order 2, and a minor-loop walk of some 150
 points. Then every policy commands the same setpoints without any feedback, each until the twin has settled; errors are true
@@ -23,7 +23,7 @@ from typing import Final
 
 import numpy as np
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[3]), str(Path(__file__).resolve().parents[2])]
+sys.path[:0] = [str(Path(__file__).resolve().parents[2]), str(Path(__file__).resolve().parents[1])]
 from paper.experiments.calibration import (
     MINOR_READINGS,
     READ_ONCE,

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Diagnose every recording of a real cylinder in a folder, one line each: `tools/bench/diagnosis/cylinders.py FOLDER`.
+"""Diagnose every recording of a real cylinder in a folder, one line each: `tools/bench/cylinders.py FOLDER`.
 
 The recordings are not part of the project; `--columns` says how their tables are read (as `diagnose --columns`), the default
 is that of Zillen's data. The peer is plain least squares of the force on s, p, s p, z, z^2, z^3, s z and s z^2 (s: direction,

@@ -1,6 +1,6 @@
 """What one call of the model costs, against a cubic polynomial in plain Python, all in the same run.
 
-    python tools/bench/speed/model.py [--json] [--rounds 7]
+    python tools/bench/model.py [--json] [--rounds 7]
 
 Rows: plain Python (the control loop's way), numpy scalars, numpy arrays per element, numba and C where they can be had.
 Each figure is the lowest of several rounds: the lowest is the code, the rest the machine. More about the C code, beside a
@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import model_c
 
 from gateway.bsfm import RationalBezier

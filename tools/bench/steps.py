@@ -1,7 +1,7 @@
 """How a setpoint settles: the whole gateway on the simulated rig, with the trim and by feedforward alone, side by side.
 
-    .venv/bin/python tools/bench/force/steps.py            # the table in README
-    .venv/bin/python tools/bench/force/steps.py --json
+    .venv/bin/python tools/bench/steps.py            # the table in README
+    .venv/bin/python tools/bench/steps.py --json
 
 Commands 5, 10, ..., 40 N and back down, then partial reversals, by Modbus; reads the measured force by Modbus. "settled" is
 the time from the write until the measured force has come within 1 N for good; "error" is the mean of the last half second.
@@ -23,7 +23,7 @@ from pathlib import Path
 
 from pymodbus.client import ModbusTcpClient
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.progress import reported
@@ -76,7 +76,7 @@ def settle(client: ModbusTcpClient, setpoint_n: float) -> Settling:
 
 def demo_rig(directory: Path, gain: float) -> Path:
     """Write the shipped demo rig with another trim gain; 0 is feedforward alone."""
-    text = (Path(__file__).parents[3] / "profiles" / "rigs" / "demo.yaml").read_text()
+    text = (Path(__file__).parents[2] / "profiles" / "rigs" / "demo.yaml").read_text()
     text, count = re.subn(r"gain_v_per_n_s: [0-9.]+", f"gain_v_per_n_s: {gain:g}", text)
     assert count == 1
     path = directory / f"steps-{'trim' if gain else 'feedforward'}.yaml"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How long a diagnosis takes as a command, and its memory: `.venv/bin/python tools/bench/diagnosis/diagnose.py [RECORDING...]`.
+"""How long a diagnosis takes as a command, and its memory: `.venv/bin/python tools/bench/diagnose.py [RECORDING...]`.
 
 Each figure is `force-gateway diagnose` in a process of its own, imports included; what it compiles once is compiled before.
 Processor: of all its threads, what a busy machine stretches least. Without recordings of yours:
@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from gateway.cli.diagnosis.progress_line import show_progress  # noqa: E402

@@ -1,6 +1,6 @@
 """What a scan over orders 1 to 5 of a full ladder costs (1010 points), beside scipy.optimize.least_squares in the same run.
 
-    python tools/bench/speed/fit.py [--json] [--rounds 3]
+    python tools/bench/fit.py [--json] [--rounds 3]
 
 scipy fits the same residuals by its trust region with derivatives by differences, from one start, all handles and weights free;
 the fit here screens many starts and solves for the handles exactly. Processor time, the lowest of several rounds; and what
@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from scipy.optimize import least_squares
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from gateway.bsfm.fit.branch_fit import fit_orders
 from gateway.bsfm.fit.projected_problem import Floats, bernstein

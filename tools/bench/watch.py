@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the residual watch takes of the machine: `tools/bench/diagnosis/watch.py [--hours 1] [--reference] [--live SECONDS]`.
+"""What the residual watch takes of the machine: `tools/bench/watch.py [--hours 1] [--reference] [--live SECONDS]`.
 
 Without --live: the watch with its real search, in virtual time, beside a healthy demo machine that moves between random
 settings, 100 rows a second; processor and memory are those of this process, libraries included. With --reference: compared
@@ -23,7 +23,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import gateway.diagnosis  # noqa: F401  # all steps, before the first loop is compiled
 from gateway.cli.diagnosis.progress_line import show_progress

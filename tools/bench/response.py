@@ -1,9 +1,9 @@
 # ruff: noqa: E402  the tests must be found before they are imported
 """What a measured response is worth on machines that nobody here has built: hold, steps and tracking, with and without trim.
 
-    .venv/bin/python tools/bench/force/response.py                # 8 machines, virtual time, some minutes
-    .venv/bin/python tools/bench/force/response.py --seeds 20
-    .venv/bin/python tools/bench/force/response.py --write        # calibrate anew, and keep that for the tests
+    .venv/bin/python tools/bench/response.py                # 8 machines, virtual time, some minutes
+    .venv/bin/python tools/bench/response.py --seeds 20
+    .venv/bin/python tools/bench/response.py --write        # calibrate anew, and keep that for the tests
 
 Machines are drawn from a seed (tests/control/foreign/machine.py: dead time 20-150 ms, lags 30-300 ms, one or two, LuGre
 friction of 0.5-4 N, noise). Each is calibrated by the product's quick ladder, in virtual time, starting with the demo's
@@ -25,7 +25,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in the tests: another o
 
 import numpy as np
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[3])]
+sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 from gateway.bsfm import Bsfm
 from gateway.bsfm.ladder.ladder_error import LadderError
 from gateway.cli.diagnosis.progress_line import show_progress

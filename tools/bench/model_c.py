@@ -1,6 +1,6 @@
 """What the generated C costs per call, against a cubic polynomial in C in the same run.
 
-    .venv/bin/python tools/bench/speed/model_c.py [--json] [--compiler gcc]
+    .venv/bin/python tools/bench/model_c.py [--json] [--compiler gcc]
 
 Compiles the C of the shipped demo calibration and of made-up ones of order 1, 2, 3, 5 and 15 with -O2, each in a
 translation unit of its own (nothing can be inlined, as in a controller), and calls it with 1024 inputs spread over the
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from math import comb
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from gateway.bsfm.c_export.code import c_source
 from gateway.bsfm.model import Calibration
 from gateway.cli.diagnosis.progress_line import show_progress

@@ -1,6 +1,6 @@
 """How long a replay of a recording takes, against running the real-time twin, and how far coarse steps are from fine ones.
 
-    .venv/bin/python tools/bench/diagnosis/replay.py
+    .venv/bin/python tools/bench/replay.py
 
 The recording: a rich minute at 200 Hz (a command that steps, ramps and swings), 12000 rows. Lanes differ in the fields that
 are named; "jitter": the same recording with rows up to 1.5 ms too early or late. A new recording each time, so that nothing
