@@ -44,7 +44,7 @@ class OutputComposer:
     """Reads the parts of control and changes nothing of them."""
 
     def __init__(
-        self, parts: ControllerParts, machine: Transitions, readiness: Readiness, valve: ValveSwitch | None = None
+        self, parts: ControllerParts, machine: Transitions, readiness: Readiness, valve: ValveSwitch | None
     ) -> None:
         self._parts, self._machine, self._readiness, self._valve = parts, machine, readiness, valve
 

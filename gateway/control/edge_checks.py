@@ -70,7 +70,7 @@ class Situation:
 class Readiness:
     """Tells whether an enable would be accepted now, and where the controller stands; changes nothing of what it is given."""
 
-    def __init__(self, parts: ControllerParts, machine: Transitions, valve: ValveSwitch | None = None) -> None:
+    def __init__(self, parts: ControllerParts, machine: Transitions, valve: ValveSwitch | None) -> None:
         self._parts, self._machine, self._valve = parts, machine, valve
 
     def enable_block(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
