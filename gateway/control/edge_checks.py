@@ -45,10 +45,9 @@ class Situation:
     """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; excuse: the
     machine, where that is the cause of it, or what the valve does; line_fault: what the output line reports, with its code;
     is_output_known: that the output answers, so that its voltage is ours; is_output_heard: that it answers at all;
-    is_lowest: no less voltage can be out;
-    expected_n: force that the voltages of late still make, or one that the output may have kept, by the model;
-    repeats: that the load cell seems to be frozen;
-    ramps_down: the force goes to 0, and then the output off."""
+    is_lowest: no less voltage can be out; leaving_n: force that the voltages of late still make, or one that the output may
+    have kept, by the model; repeats: that the load cell seems to be frozen; ramps_down: the force goes to 0, and then the
+    output off."""
 
     now_s: float
     state: State
