@@ -14,7 +14,7 @@ from gateway.fieldbus.peers import address_of
 from gateway.modbus import Peer
 from gateway.modbus.certificate import read_certificate
 from gateway.profiles import Report, check_report
-from gateway.profiles.rigs import tls_checks
+from gateway.profiles.rigs.checks import tls as tls_checks
 from gateway.profiles.rigs.faces import TlsFace
 from tests.certificates import serial_of, store_all
 from tests.other_kinds import never_waiting, put
