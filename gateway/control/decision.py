@@ -7,9 +7,9 @@ from typing import Final
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
-from gateway.control.edge_checks import Readiness
 from gateway.control.inputs import LineStatus, Output
 from gateway.control.messages import fault_sentence
+from gateway.control.readiness import Readiness
 from gateway.control.sample_conditioning import Reading
 from gateway.control.transitions import ControllerParts, Transitions
 from gateway.control.valve.valve_switch import ValveSwitch
