@@ -8,7 +8,7 @@ from typing import Any
 
 from gateway.cli.state_archive import ArchiveError, pack, unpack
 from gateway.processes.durable_file import replace_text
-from gateway.telemetry.kept_bd_seq import KeptBdSeq
+from gateway.telemetry.mqtt.kept_bd_seq import KeptBdSeq
 from tests.disk.acts import Act, Say
 
 

@@ -308,7 +308,7 @@ DEFECTS = (
            "b\"\", b\"\"", ("web/test_guard.py",)),
     Defect("another site's origin is taken for ours", "web/security.py",
            "if not _is_own_origin(headers):", "if False:", ("web/test_guard.py",)),
-    Defect("0.7 in control_word enables over MQTT", "telemetry/register_commands.py",
+    Defect("0.7 in control_word enables over MQTT", "telemetry/mqtt/register_commands.py",
            "        register.check_meant(value)\n", "", ("telemetry/test_json_topics.py",)),
     Defect("the page answers to any name", "web/security.py",
            "if not door.admits_host(headers.get(\"host\", \"\")):", "if False:", ("web/test_guard.py",)),
