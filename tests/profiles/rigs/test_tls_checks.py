@@ -9,7 +9,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.x509.oid import NameOID
 
-from gateway.cli.certificates import Signed, make_ca, make_server, store
+from gateway.cli.setup.certificates import Signed, make_ca, make_server, store
 from gateway.fieldbus.peers import address_of
 from gateway.modbus import Peer
 from gateway.modbus.certificate import read_certificate

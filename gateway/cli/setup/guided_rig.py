@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from gateway.cli import port_probing as probing
+from gateway.cli.setup import port_probing as probing
 from gateway.cli.errors import CliError
-from gateway.cli.starter_rig import starter_rig
+from gateway.cli.setup.starter_rig import starter_rig
 
 if TYPE_CHECKING:
     from gateway.devices import DeviceProfile
