@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from gateway.cli.setup import port_probing as probing
 from gateway.cli.errors import CliError
+from gateway.cli.setup import port_probing as probing
 from gateway.cli.setup.starter_rig import starter_rig
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 from click.testing import CliRunner, Result
 
-from gateway.cli.setup.guided_rig import set_in
 from gateway.cli.main import command
+from gateway.cli.setup.guided_rig import set_in
 from gateway.cli.setup.port_probing import known_profiles
 from gateway.cli.setup.starter_rig import starter_rig
 from gateway.devices import DeviceProfile
