@@ -7,7 +7,7 @@ from typing import Any
 
 from cryptography import x509
 
-from gateway.cli import certificates as made
+from gateway.cli.setup import certificates as made
 from gateway.modbus import Role
 
 DAYS = 10

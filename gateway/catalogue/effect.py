@@ -51,7 +51,6 @@ class SearchHints:
     pressures_pa: tuple[float, ...]  # 50, 70, 85, 95 and 100 % quantiles of the simulated pressure
     forces_n: tuple[float, ...]  # the same of the simulated force
     pressure_rate_pa_per_s: float  # fastest change of the simulated pressure
-    coulomb_n: float
     positions_mm: tuple[float, ...] = ()  # 50, 70, 85 and 95 % quantiles
     lines_hz: tuple[float, ...] = ()  # strongest lines of the remainder
     mains_hz: tuple[float, ...] = ()  # 50 and 60 Hz, as far off as the remainder shows

@@ -41,7 +41,7 @@ _DAMAGE: Final = (tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError, Valu
 """What reading a damaged archive raises: numbers, times and names that cannot be are the last two."""
 
 
-def pack(state: Path, target: Path) -> list[str]:
+def pack_state(state: Path, target: Path) -> list[str]:
     """Write everything of `state` to `target`; the names packed. OSError when either cannot be used."""
     files: list[Path] = []
     target = replaced_by(target)
@@ -74,7 +74,7 @@ def names_in(source: Path) -> list[str]:
             return [member.name.removeprefix(f"{_TOP}/") for member in members if member.isfile()][1:]
 
 
-def unpack(source: Path, state: Path) -> Path | None:
+def unpack_state(source: Path, state: Path) -> Path | None:
     """Put the archive's content where `state` is, or leads, at once; where the previous content is kept, None if there was
     none."""
     names_in(source)

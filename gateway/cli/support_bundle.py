@@ -87,7 +87,7 @@ def _is_ipv6(text: str) -> bool:
         return False
 
 
-def collect(state: Path, rig_texts: Callable[[], Iterable[tuple[str, str]]]) -> dict[str, str]:
+def collect_parts(state: Path, rig_texts: Callable[[], Iterable[tuple[str, str]]]) -> dict[str, str]:
     """Return name -> text of what goes in, redacted. Whatever cannot be read is in it as a sentence: the rest helps too.
 
     rig_texts: name and content of each file that the rig was read from.

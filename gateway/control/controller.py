@@ -13,11 +13,12 @@ from gateway.control.command_edges import CommandTracker, Edges
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation
 from gateway.control.decision import OutputComposer, safe_output
 from gateway.control.demand import Demand, ramp_down_demand
-from gateway.control.edge_checks import EdgeCheck, Readiness, Situation
+from gateway.control.edge_checks import EdgeCheck
 from gateway.control.force_loop.force_loop import ForceLoop, Moved
 from gateway.control.force_loop.response_timing import timing_of
 from gateway.control.inputs import CalibrationInUse, LineStatus, LoopInputs, Output
 from gateway.control.messages import master_lost_sentence, tare_sentence
+from gateway.control.readiness import Readiness, Situation
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import NO_READING, SampleConditioner, at_time, turned
@@ -55,14 +56,12 @@ class Controller:
         self._valve = ValveSwitch(settings.valve) if settings.valve else None
         self._rig_settings = compensation.settings(settings)
         self._settings = settings = timing_of(calibration.response, self._rig_settings)
-        self.calibration_id = calibration.number
         self._commands = CommandTracker(settings)
         self._commands.use(model)
         self.active_run = ActiveRun(settings, model, lambda: self._given_n)
-        self._inform_runs(calibration)
         self._loop = ForceLoop(settings, model, compensation.timing)
         self._faults = FaultDetector(settings)
-        self._faults.expect_noise(calibration.noise_n)
+        self._take_measured(calibration)
         self._conditioner = SampleConditioner(settings.supervision, compensation.cell, is_behind_death=unclean_restart)
         self._turning = Turning(self._valve, self._commands, self._conditioner, settings, model)
         self._checks = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self.most_pull_n)
@@ -103,9 +102,7 @@ class Controller:
         set's limits is left by the ramp. What was measured with it sets the pace from now on."""
         self._calibration = calibration
         self._use_model()
-        self._inform_runs(calibration)
-        self._faults.expect_noise(calibration.noise_n)
-        self.calibration_id = calibration.number
+        self._take_measured(calibration)
 
     def _use_model(self) -> None:
         """Calculate with the calibration in use: its own model, or that of pulling."""
@@ -119,7 +116,10 @@ class Controller:
         """Return the largest setpoint of a pull, N."""
         return self._turning.most_pull_n(self._calibration)
 
-    def _inform_runs(self, calibration: CalibrationInUse) -> None:
+    def _take_measured(self, calibration: CalibrationInUse) -> None:
+        """What was measured with it beside its curves: noise and response."""
+        self.calibration_id = calibration.number
+        self._faults.expect_noise(calibration.noise_n)
         timed = timing_of(calibration.response, self._rig_settings)
         self.active_run.use(calibration.model, timed.timing, calibration.noise_n, timed.supervision.response_lag_s)
 

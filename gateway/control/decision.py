@@ -7,9 +7,9 @@ from typing import Final
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
-from gateway.control.edge_checks import Readiness
 from gateway.control.inputs import LineStatus, Output
 from gateway.control.messages import fault_sentence
+from gateway.control.readiness import Readiness
 from gateway.control.sample_conditioning import Reading
 from gateway.control.transitions import ControllerParts, Transitions
 from gateway.control.valve.valve_switch import ValveSwitch
@@ -44,7 +44,7 @@ class OutputComposer:
     """Reads the parts of control and changes nothing of them."""
 
     def __init__(
-        self, parts: ControllerParts, machine: Transitions, readiness: Readiness, valve: ValveSwitch | None = None
+        self, parts: ControllerParts, machine: Transitions, readiness: Readiness, valve: ValveSwitch | None
     ) -> None:
         self._parts, self._machine, self._readiness, self._valve = parts, machine, readiness, valve
 

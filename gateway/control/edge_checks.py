@@ -7,22 +7,19 @@ heartbeat, a takeover, and the end of the run.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from typing import Final
 
-from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandTracker, Edges
-from gateway.control.inputs import LineStatus
+from gateway.control.readiness import Situation
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.experiment_plan import ExperimentPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
-from gateway.control.sample_conditioning import Reading, SampleConditioner
+from gateway.control.sample_conditioning import SampleConditioner
 from gateway.control.self_test.items import SelfTestPlan
 from gateway.control.state_table import ENABLED_STATES
-from gateway.control.supervision.fault_detection import line_words
-from gateway.control.transitions import ControllerParts, Transitions
 from gateway.control.valve.valve_switch import ValveSwitch
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
@@ -33,88 +30,6 @@ _TAKE = int(ControlBit.TAKE_OWNERSHIP)
 _WHOLE: Final = ControlBit(0)
 _PUSHING: Final = "and a run is made pushing (bit 4 0, enable, wait until status bits 8, 9 are 0)"
 _UNKNOWN: Final = "whether air still presses is not known"
-_OFF, _LOST = State.OFF, FaultCode.OUTPUT_LOST
-_BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
-    State.FAULT: RefusalReason.FAULT_LATCHED,
-    State.CALIBRATING: RefusalReason.CALIBRATING,
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Situation:
-    """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; excuse: the
-    machine, where that is the cause of it, or what the valve does; line_fault: what the output line reports, with its code;
-    is_output_known: that the output answers, so that its voltage is ours; is_output_heard: that it answers at all;
-    is_lowest: no less voltage can be out;
-    expected_n: force that the voltages of late still make, or one that the output may have kept, by the model;
-    repeats: that the load cell seems to be frozen;
-    ramps_down: the force goes to 0, and then the output off."""
-
-    now_s: float
-    state: State
-    faulted_s: float
-    reading: Reading
-    block: RefusalReason
-    excuse: str
-    line_fault: str
-    is_output_known: bool
-    is_output_heard: bool
-    voltage_v: float
-    is_lowest: bool
-    applied_n: float
-    leaving_n: float
-    repeats: str
-    ramps_down: bool
-
-
-class Readiness:
-    """Tells whether an enable would be accepted now, and where the controller stands; changes nothing of what it is given."""
-
-    def __init__(self, parts: ControllerParts, machine: Transitions, valve: ValveSwitch | None = None) -> None:
-        self._parts, self._machine, self._valve = parts, machine, valve
-
-    def enable_block(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
-        """Return why an enable would be refused now; NONE where it would be accepted, or has been."""
-        state = self._machine.state
-        return self._block_in_off(now_s, reading, line) if state is _OFF else _BLOCKS[state]
-
-    def situation(self, now_s: float, reading: Reading, line: LineStatus) -> Situation:
-        """Return where the controller stands. reading: as old as it is now."""
-        loop, machine = self._parts.loop, self._machine
-        block = self._block_in_off(now_s, reading, line)
-        return Situation(
-            now_s=now_s,
-            state=machine.state,
-            faulted_s=machine.faulted_s,
-            reading=reading,
-            block=block,
-            excuse=self._excuse(block, now_s, reading, line),
-            line_fault=f"{line.fault.code} {line_words(line)}" if line.fault else "",
-            is_output_known=line.acknowledged_v is not None and block is not RefusalReason.OUTPUT_FAULT,
-            is_output_heard=line.fault is not _LOST and not self._parts.faults.is_silent(now_s, line),
-            voltage_v=loop.voltage_v,
-            is_lowest=loop.is_lowest,
-            applied_n=loop.applied_n,
-            leaving_n=max(loop.expected.leaving_n(loop.branch_share), loop.left.rise_n),
-            repeats=self._parts.faults.repeats,
-            ramps_down=machine.is_ramping_down or machine.is_stopping,
-        )
-
-    def _block_in_off(self, now_s: float, reading: Reading, line: LineStatus) -> RefusalReason:
-        if self._machine.is_stopping:
-            return RefusalReason.NOT_READY
-        block = self._parts.faults.enable_block(now_s, reading, line)
-        return block or (RefusalReason.VALVE_UNKNOWN if self._valve_words(now_s) else block)
-
-    def _excuse(self, block: RefusalReason, now_s: float, reading: Reading, line: LineStatus) -> str:
-        if block is RefusalReason.VALVE_UNKNOWN:
-            return self._valve_words(now_s)
-        return self._parts.faults.excuse(block, now_s, reading, line)
-
-    def _valve_words(self, now_s: float) -> str:
-        """What would be a fault of the valve right behind an enable; empty where nothing would."""
-        cause = self._valve.first_cause(now_s) if self._valve else None
-        return cause.sentence if cause else ""
 
 
 class EdgeCheck:

@@ -13,7 +13,7 @@ def fault_sentence(fault: FaultCode, detail: str) -> str:
     return f"{fault.code} {detail}"
 
 
-def unreachable_sentence(evidence: Evidence, direction: float = 1.0) -> str:
+def unreachable_sentence(evidence: Evidence, direction: float) -> str:
     """Return A301 in numbers, with what it probably is. direction: -1 where the tool pulls."""
     shown_n, model_n = direction * evidence.measured_n, direction * evidence.expected_n
     return (
@@ -76,7 +76,7 @@ def gain_sentence(rise_n: float, expected_n: float) -> str:
     )
 
 
-def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float, *, is_constant: bool = False) -> str:
+def ladder_silent_sentence(voltage_v: float, rise_n: float, expected_n: float, *, is_constant: bool) -> str:
     """Return A301 of a calibration run: no force answers the voltage. is_constant: nor has a reading ever changed."""
     cell = "all readings are the same: cell or amplifier dead, else " if is_constant else ""
     return (

@@ -79,9 +79,8 @@ class ResponseSource(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopTiming:
-    """What control derives from a measured response (gateway.control.force_loop.response_timing). Seconds, N;
-    integral_per_s: of the trim, N/s of
-    correction by N of error; zone_n: errors within it are stiction's and noise's."""
+    """What control derives from a measured response (gateway.control.force_loop.response_timing). integral_per_s: of the
+    trim, N/s of correction by N of error."""
 
     dead_time_s: float
     lags: SecondOrder

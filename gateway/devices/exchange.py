@@ -38,7 +38,7 @@ class Scale:
         """Return the number on the wire for a physical value, not rounded."""
         return self.device[0] + (value - self.physical[0]) / self.physical_per_number
 
-    def carries(self, number: float, slack: float = 0.0) -> bool:
+    def carries(self, number: float, slack: float) -> bool:
         """Decide whether the scale spans this number of the device.
         slack: in the device's numbers; half a step where the number was rounded before it was sent."""
         return self.device[0] - slack <= number <= self.device[1] + slack

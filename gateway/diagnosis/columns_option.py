@@ -19,7 +19,7 @@ _RANGE_MEANT: Final = re.compile(r"(.*\.\..*=\s*)([-+.\d]+)\.\.([-+]?[.\d]+)\s*(
 
 
 def name_options(
-    found: Sequence[Suspect], given: str | None = "", factors: Mapping[str, Factors] | None = None
+    found: Sequence[Suspect], given: str | None, factors: Mapping[str, Factors] | None = None
 ) -> tuple[Suspect, ...]:
     """Return the same with the option that corrects each, where there is one. given: what --columns said, None where that
     cannot be said in one line; factors: by recording and column, what numbers were multiplied by to be read."""

@@ -108,7 +108,7 @@ def _suspect(measurement: Measurement, plant: Plant, is_own: bool) -> Suspect | 
     row_s = float(np.median(np.diff(measurement.time_s)))
     if row_s >= _COARSE_S:
         return Suspect(UNIT, measurement.name, "time_s", row_s, "ms", is_sure=False)
-    if not _moves(measurement, plant):
+    if not _moves(measurement):
         return None
     as_is = _fit(measurement, plant)
     too_large = set(_beyond(measurement, plant))
@@ -129,7 +129,7 @@ def _explanations(
         yield 0.0, Suspect(TURNED, "", "force_n", 0.0, "-n")
     for column, other in _EXCHANGES:
         exchanged = _exchange_columns(measurement, column, other)
-        if exchanged is not None and _moves(exchanged, plant) and not _beyond(exchanged, plant):
+        if exchanged is not None and _moves(exchanged) and not _beyond(exchanged, plant):
             fit = _fit(exchanged, plant)
             is_better = fit.unexplained < _BETTER * as_is.unexplained or bool(_beyond(measurement, plant))
             if fit.alike > _ALIKE and is_better and fit.off() < _USUAL[is_own]:
@@ -139,7 +139,7 @@ def _explanations(
         for unit in _other_units(quantity, own):
             factor = LINEAR[quantity][unit][0] / LINEAR[quantity][own][0]
             converted = _convert_column(measurement, column, factor)
-            if converted is None or _beyond(converted, plant) or not _moves(converted, plant):
+            if converted is None or _beyond(converted, plant) or not _moves(converted):
                 continue
             fit = _fit(converted, plant)
             if fit.alike > _ALIKE and fit.off() < _NEAR[is_own]:
@@ -196,7 +196,7 @@ def _thin(measurement: Measurement) -> Measurement:
     )
 
 
-def _moves(measurement: Measurement, plant: Plant) -> bool:
+def _moves(measurement: Measurement) -> bool:
     """Does the drive move at all, by what its numbers say or by their own range where they say too little?"""
     drive = measurement.command_v if measurement.command_v is not None else measurement.pressure_pa
     if drive is None or measurement.usable.sum() < 50:

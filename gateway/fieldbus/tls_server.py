@@ -37,11 +37,6 @@ class ModbusTlsServer(ModbusTcpServer):
         soon = _utc(SOON_DAYS)
         self._to_tell = [(ends, told) for ends, told in _ends(settings) if ends > soon]
 
-    @property
-    def pending(self) -> int:
-        """Number of handshakes that are under way."""
-        return len(self._handshakes.pending)
-
     def _make_protocol(self, shared: ServerState) -> Callable[[], asyncio.BaseProtocol]:
         return lambda: TlsStream(shared, self._handshakes)
 

@@ -6,7 +6,7 @@ Hive and Parquet's own tools name them), and the hash of its bytes, by which a r
 
 import glob
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from hashlib import file_digest
 from pathlib import Path
@@ -58,10 +58,10 @@ def _task_of(path: str) -> Task:
     return Task(path, keys.get("cell", ""), keys.get("date", ""), own)
 
 
-def error_row(task: Task, error: BaseException | str, columns: Sequence[str] = ()) -> Row:
-    """Return the row of a recording that has no answer: every other column is there and empty."""
+def error_row(task: Task, error: BaseException | str) -> Row:
+    """Return the row of a recording that has no answer."""
     text = str(error) or type(error).__name__
     match = _CODED.match(text)
     known = isinstance(error, (OSError, ValueError, RecordingError, str))
     code, sentence = match.groups() if match else (UNREADABLE if known else INTERNAL, text)
-    return {**task.head, **dict.fromkeys(columns), "error_code": code, "error": sentence[:_LONGEST_ERROR]}
+    return {**task.head, "error_code": code, "error": sentence[:_LONGEST_ERROR]}

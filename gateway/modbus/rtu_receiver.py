@@ -1,4 +1,4 @@
-"""From the bytes on a serial line to the requests for one unit: a server's ear on an RTU bus. No port, no clock.
+"""From the bytes on a serial line to the requests for one unit on an RTU bus. No port, no clock.
 
 On the wire 3.5 characters of silence end a frame. A program cannot see that silence truly: USB adapters hand over what they
 have every 1 to 16 ms, so that a frame comes in two pieces with a pause between them, and two frames with their silence

@@ -33,7 +33,7 @@ def set_low_latency(descriptor: int, path: str, system: Path = Path("/sys")) -> 
     return f"{path} hands over received bytes only every {remaining_ms} ms: echo 1 | sudo tee {timer} (lasting by a udev rule)"
 
 
-def latency_timer(path: str, system: Path = Path("/sys")) -> Path:
+def latency_timer(path: str, system: Path) -> Path:
     """Return where the FTDI driver keeps its timer."""
     return system / "class" / "tty" / Path(os.path.realpath(path)).name / "device" / "latency_timer"
 

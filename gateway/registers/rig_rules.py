@@ -15,7 +15,6 @@ class BankRules:
 
     setpoint_min_n: smallest force_setpoint beside 0. force_source: who says these two, empty for the rig. owner: the one host
     that may command, None for the first that does.
-    cell_range_n bounds uploaded handles.
     """
 
     rig_name: str
@@ -24,7 +23,6 @@ class BankRules:
     force_source: str = ""
     voltage_min_v: float = 0.0
     voltage_max_v: float = defaults.VOLTAGE_MAX_V
-    cell_range_n: float = defaults.CELL_RANGE_N
     supported_bits: ControlBit = BASIC_BITS
     require_byte_order_echo: bool = False
     owner: str | None = None

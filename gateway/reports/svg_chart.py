@@ -49,7 +49,7 @@ class Chart:
         self._parts.append(f'<path class="dots {style}" d="{strokes}"/>')
         self._note(name, "dot", style)
 
-    def points(self, xs: Sequence[float], ys: Sequence[float], style: str, name: str = "") -> None:
+    def points(self, xs: Sequence[float], ys: Sequence[float], style: str, name: str) -> None:
         """Draw measured points so that they are seen on a line: as rings, as small dots where they are many."""
         if len(xs) > _MANY_POINTS:
             self.dots(xs, ys, f"{style} many", name)
@@ -62,7 +62,7 @@ class Chart:
         (px, bottom), (_, top) = self.at(x, low), self.at(x, high)
         self._parts.append(f'<path class="line thin {style}" d="M{px:.1f} {bottom:.1f}V{top:.1f}"/>')
 
-    def circle(self, x: float, y: float, style: str, radius: float = 8.0) -> None:
+    def circle(self, x: float, y: float, style: str, radius: float) -> None:
         """Draw a circle around a point, in front of all lines."""
         px, py = self.at(x, y)
         share = 100.0 * px / self.width

@@ -13,7 +13,7 @@ from gateway import defaults
 from gateway.processes import exit_codes
 from gateway.profiles import Rig
 from gateway.profiles.http_sections import split_listen
-from gateway.profiles.rigs.network_checks import NEEDS_TOKEN
+from gateway.profiles.rigs.checks.network import NEEDS_TOKEN
 from gateway.recording.ring import SampleRing
 from gateway.service.running_rig.starting import StartError
 

@@ -17,12 +17,12 @@ from gateway.live.live_state import LiveState
 from gateway.plain_file import read_plain, tell_refusal
 from gateway.processes.beside_control import serve_until_guardian_ends
 from gateway.processes.event_log import EventLog
-from gateway.telemetry.broker_connection import Broker, keep_connected
-from gateway.telemetry.broker_session import BrokerSession
-from gateway.telemetry.edge_node import EdgeNode
-from gateway.telemetry.json_topics import JsonTopics
-from gateway.telemetry.kept_bd_seq import KeptBdSeq
-from gateway.telemetry.register_commands import RegisterCommands
+from gateway.telemetry.mqtt.broker_connection import Broker, keep_connected
+from gateway.telemetry.mqtt.broker_session import BrokerSession
+from gateway.telemetry.mqtt.edge_node import EdgeNode
+from gateway.telemetry.mqtt.json_topics import JsonTopics
+from gateway.telemetry.mqtt.kept_bd_seq import KeptBdSeq
+from gateway.telemetry.mqtt.register_commands import RegisterCommands
 
 if TYPE_CHECKING:
     from gateway.profiles import Rig

@@ -80,7 +80,7 @@ class MovingSlide:
         self._surface_gap_m = self._contact_gap_m - height_m
         self._place()
 
-    def set_side_load(self, load_n: float, share: float = 0.0, more_out_n: float = 0.0) -> None:
+    def set_side_load(self, load_n: float, share: float, more_out_n: float) -> None:
         """Set by how much what is around the slide raises its friction, N, and this share of the thrust; 0 is null.
 
         more_out_n: by how much more moving out, and less moving in.

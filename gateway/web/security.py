@@ -51,7 +51,7 @@ HEADERS: Final = {
 
 
 @dataclass
-class Door:
+class PageAccess:
     """The rules of one page. host, port: where it listens; token: what a browser must know, None on loopback alone."""
 
     host: str
@@ -105,8 +105,8 @@ class Door:
 class Guard:
     """ASGI middleware: lets a request through to the routes, or answers why not."""
 
-    def __init__(self, app: ASGIApp, door: Door, standstill: Standstill) -> None:
-        self._app, self._door, self._standstill = app, door, standstill
+    def __init__(self, app: ASGIApp, access: PageAccess, standstill: Standstill) -> None:
+        self._app, self._access, self._standstill = app, access, standstill
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Check one request."""
@@ -133,15 +133,15 @@ class Guard:
 
     def _refusal(self, request: Request) -> Response | None:
         """Return why a request is not let through, None where it is."""
-        door, headers, path = self._door, request.headers, request.url.path
-        if not door.admits_host(headers.get("host", "")):
+        access, headers, path = self._access, request.headers, request.url.path
+        if not access.admits_host(headers.get("host", "")):
             return refuse(403, "this page answers to its address only, not to the name in the address bar")
         if headers.get("sec-fetch-site") == "cross-site" and path not in ("/", "/login"):
             return refuse(403, "another site asked for this")
-        is_bearer = door.is_token(headers.get("authorization", "").removeprefix("Bearer "))
-        session = request.cookies.get(door.cookie, "")
-        has_session = door.is_session(session)
-        if door.token is not None and not (is_bearer or has_session) and path not in _OPEN:
+        is_bearer = access.is_token(headers.get("authorization", "").removeprefix("Bearer "))
+        session = request.cookies.get(access.cookie, "")
+        has_session = access.is_session(session)
+        if access.token is not None and not (is_bearer or has_session) and path not in _OPEN:
             return RedirectResponse("/login", 303) if path == "/" else refuse(401, "log in first: /login", "login")
         if request.method in _SAFE_METHODS:
             return None
@@ -152,7 +152,7 @@ class Guard:
         if is_bearer or path == "/login":
             return None
         if has_session and hmac.compare_digest(
-            headers.get(CSRF_HEADER, "").encode(), door.csrf_token(session).encode()
+            headers.get(CSRF_HEADER, "").encode(), access.csrf_token(session).encode()
         ):
             return None
         return refuse(403, "the session is over: reload the page", "session")
@@ -160,26 +160,26 @@ class Guard:
 
 async def session(request: Request) -> Response:
     """Return the token that commands carry, and begin a session where there is none yet."""
-    door: Door = request.app.state.door
-    value = request.cookies.get(door.cookie, "")
-    is_new = not door.is_session(value)
-    value = door.new_session() if is_new else value
-    response = JSONResponse({"csrf": door.csrf_token(value)})
+    access: PageAccess = request.app.state.access
+    value = request.cookies.get(access.cookie, "")
+    is_new = not access.is_session(value)
+    value = access.new_session() if is_new else value
+    response = JSONResponse({"csrf": access.csrf_token(value)})
     if is_new:
-        _set_session(response, door, value)
+        _set_session(response, access, value)
     return response
 
 
 async def login(request: Request) -> Response:
     """Take the token of a form; begin a session where it is right."""
-    door: Door = request.app.state.door
+    access: PageAccess = request.app.state.access
     given = (await request.body()).decode("utf-8", "replace").strip()
-    if not door.is_token(given):
-        async with door.login_turn:
+    if not access.is_token(given):
+        async with access.login_turn:
             await asyncio.sleep(_FAILED_LOGIN_S)
         return refuse(401, "that is not the token; it stands in the rig file under web.token")
     response = JSONResponse({"ok": True})
-    _set_session(response, door, door.new_session())
+    _set_session(response, access, access.new_session())
     return response
 
 
@@ -188,8 +188,8 @@ def refuse(status: int, sentence: str, reason: str = "") -> JSONResponse:
     return JSONResponse({"error": sentence, "reason": reason}, status)
 
 
-def _set_session(response: Response, door: Door, value: str) -> None:
-    response.set_cookie(door.cookie, value, httponly=True, samesite="strict", path="/")
+def _set_session(response: Response, access: PageAccess, value: str) -> None:
+    response.set_cookie(access.cookie, value, httponly=True, samesite="strict", path="/")
 
 
 def _is_small(headers: Headers) -> bool:

@@ -31,7 +31,7 @@ from gateway.web.context import WebContext
 from gateway.web.events import EventSource
 from gateway.web.model_curves import model_curves
 from gateway.web.register_table import register_table
-from gateway.web.security import Door, Guard, login, refuse, session
+from gateway.web.security import Guard, PageAccess, login, refuse, session
 
 _TYPES: Final = {
     ".html": "text/html; charset=utf-8",
@@ -44,7 +44,7 @@ _STATIC: Final = files("gateway.web") / "static"
 Act = Callable[[str, dict[str, Any]], Awaitable[Any]]
 
 
-def make_app(context: WebContext, door: Door, rows: RingRows | None) -> Starlette:
+def make_app(context: WebContext, access: PageAccess, rows: RingRows | None) -> Starlette:
     """Return the application. rows: the sample ring, None where there is none."""
     commands = Commands(context)
     events = EventSource(context, rows, commands)
@@ -63,8 +63,10 @@ def make_app(context: WebContext, door: Door, rows: RingRows | None) -> Starlett
 
     routes = [*_page_routes(), *_api_routes(context, commands, events)]
     routes += [route for module in _tab_modules() for route in module.routes(context)]
-    app = Starlette(routes=routes, middleware=[Middleware(Guard, door=door, standstill=standstill)], lifespan=lifespan)
-    app.state.door = door
+    app = Starlette(
+        routes=routes, middleware=[Middleware(Guard, access=access, standstill=standstill)], lifespan=lifespan
+    )
+    app.state.access = access
     return app
 
 

@@ -24,7 +24,7 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
     from gateway.live.ring_rows import RingRows
     from gateway.web.context import WebContext
     from gateway.web.impatient_http import ImpatientProtocol
-    from gateway.web.security import Door
+    from gateway.web.security import PageAccess
     from gateway.web.server import make_app
 
     class QuietServer(uvicorn.Server):
@@ -37,10 +37,10 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
     state = Path(options["state"])
     context = WebContext(state, options["rig"], options["simulated"], ControlLink(state), options["fingerprint"])
     web = context.profile.web
-    door = Door(options["settings"]["host"], options["settings"]["port"], web.token if web else None)
+    access = PageAccess(options["settings"]["host"], options["settings"]["port"], web.token if web else None)
     rows = None if options["ring"] is None else RingRows(options["ring"])
     config = uvicorn.Config(
-        make_app(context, door, rows),
+        make_app(context, access, rows),
         http=ImpatientProtocol,
         log_config=None,
         access_log=False,

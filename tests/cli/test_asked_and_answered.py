@@ -122,7 +122,7 @@ def test_a_change_that_failed_is_an_error(
     with (tmp_path / "lock").open("a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         with pytest.raises(CliError, match="E431") as failed:
-            store_access.change(tmp_path, "demo", {"use": 2})
+            store_access.change_calibration(tmp_path, "demo", {"use": 2})
     assert failed.value.exit_code == code
 
 

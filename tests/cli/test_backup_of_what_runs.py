@@ -9,7 +9,7 @@ import pytest
 from gateway.audit.audit_file import AuditFile
 from gateway.audit.audit_reader import verify_audit
 from gateway.cli import state_archive
-from gateway.cli.state_archive import pack, unpack
+from gateway.cli.state_archive import pack_state, unpack_state
 
 
 def test_an_audit_that_grows_while_it_is_packed_is_not_taken_for_one_whose_end_was_removed(
@@ -25,9 +25,9 @@ def test_an_audit_that_grows_while_it_is_packed_is_not_taken_for_one_whose_end_w
         audit.append([{"what": "disable"}])
 
     monkeypatch.setattr(state_archive, "_add", grows)
-    pack(state, tmp_path / "b.tar.gz")
+    pack_state(state, tmp_path / "b.tar.gz")
     audit.close()
-    unpack(tmp_path / "b.tar.gz", tmp_path / "restored")
+    unpack_state(tmp_path / "b.tar.gz", tmp_path / "restored")
     verdict = verify_audit(tmp_path / "restored")
     assert verdict.broken is None and verdict.lines >= 1
     restarted = AuditFile(tmp_path / "restored")
@@ -42,9 +42,9 @@ def test_a_state_that_is_elsewhere_by_a_link_is_restored_there(tmp_path: Path) -
         folder.mkdir(parents=True)
     state.symlink_to(disk)
     (disk / "events.jsonl").write_text("before\n")
-    pack(state, tmp_path / "b.tar.gz")
+    pack_state(state, tmp_path / "b.tar.gz")
     (disk / "events.jsonl").write_text("after\n")
-    kept = unpack(tmp_path / "b.tar.gz", state)
+    kept = unpack_state(tmp_path / "b.tar.gz", state)
     assert state.is_symlink() and (disk / "events.jsonl").read_text() == "before\n"
     assert kept == disk.with_name("cell.before-restore-1") and (kept / "events.jsonl").read_text() == "after\n"
     assert [path.name for path in state.parent.iterdir()] == ["cell"], "nothing on the other disk"

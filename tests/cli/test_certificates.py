@@ -14,8 +14,8 @@ from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from gateway.cli.certificates import Signed, load_ca, make_ca, make_client, make_server, store
 from gateway.cli.main import command
+from gateway.cli.setup.certificates import Signed, load_ca, make_ca, make_client, make_server, store
 from gateway.modbus import Role
 from gateway.processes import exit_codes
 

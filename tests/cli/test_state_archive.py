@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gateway.cli import state_archive
-from gateway.cli.state_archive import ArchiveError, names_in, pack, unpack
+from gateway.cli.state_archive import ArchiveError, names_in, pack_state, unpack_state
 
 
 def archive_of(path: Path, manifest: bytes, *names: str) -> Path:
@@ -33,17 +33,17 @@ def test_a_backup_is_on_the_disk_before_it_has_its_name(
     target, synced = tmp_path / "b.tar.gz", list[tuple[str, bool]]()
     monkeypatch.setattr(state_archive.os, "fsync", lambda descriptor: synced.append(("file", target.exists())))
     monkeypatch.setattr(state_archive, "sync_path", lambda path: synced.append((path.name, target.exists())))
-    pack(state, target)
+    pack_state(state, target)
     assert synced == [("file", False), (tmp_path.name, True)]
 
 
 def test_what_is_restored_is_on_the_disk_before_it_is_the_state(
     state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pack(state, tmp_path / "b.tar.gz")
+    pack_state(state, tmp_path / "b.tar.gz")
     fresh, synced = tmp_path / "new", list[tuple[str, bool]]()
     monkeypatch.setattr(state_archive, "sync_path", lambda path: synced.append((path.name, fresh.exists())))
-    unpack(tmp_path / "b.tar.gz", fresh)
+    unpack_state(tmp_path / "b.tar.gz", fresh)
     names = ["calibrations", "0001.yaml", "state"]
     assert synced == [*((name, False) for name in names), (tmp_path.name, True)]
 
@@ -52,14 +52,14 @@ def test_what_is_restored_is_on_the_disk_before_it_is_the_state(
 def test_an_archive_of_another_form_is_not_guessed_at(tmp_path: Path, manifest: bytes) -> None:
     source = archive_of(tmp_path / "b.tar.gz", manifest, "state/0001.yaml")
     with pytest.raises(ArchiveError, match="this version reads 1"):
-        unpack(source, tmp_path / "new")
+        unpack_state(source, tmp_path / "new")
     assert os.listdir(tmp_path) == ["b.tar.gz"]  # noqa: PTH208
 
 
 def test_who_unpacks_need_not_have_looked_before(tmp_path: Path) -> None:
     source = archive_of(tmp_path / "b.tar.gz", b'{"format": 1}', "state/good", "state/../../evil")
     with pytest.raises(ArchiveError, match="which no backup does"):
-        unpack(source, tmp_path / "new")
+        unpack_state(source, tmp_path / "new")
     assert os.listdir(tmp_path) == ["b.tar.gz"]  # noqa: PTH208
 
 
@@ -71,7 +71,7 @@ def test_a_backup_that_fails_leaves_nothing_beside_its_name(
 
     monkeypatch.setattr(state_archive.os, "fsync", fail)
     with pytest.raises(OSError, match="No space"):
-        pack(state, tmp_path / "b.tar.gz")
+        pack_state(state, tmp_path / "b.tar.gz")
     assert os.listdir(tmp_path) == ["state"]  # noqa: PTH208
 
 
@@ -81,7 +81,7 @@ def test_a_file_that_goes_while_it_is_packed_costs_itself_alone(
     """Event files get their next names, and recordings are pruned, while a gateway runs."""
     files = state_archive._files
     monkeypatch.setattr(state_archive, "_files", lambda folder: [*files(folder), folder / "events-7.jsonl"])
-    assert pack(state, tmp_path / "b.tar.gz") == names_in(tmp_path / "b.tar.gz") == ["calibrations/0001.yaml"]
+    assert pack_state(state, tmp_path / "b.tar.gz") == names_in(tmp_path / "b.tar.gz") == ["calibrations/0001.yaml"]
 
 
 def test_a_link_stays_behind_or_the_backup_would_be_none(state: Path, tmp_path: Path) -> None:
@@ -89,7 +89,7 @@ def test_a_link_stays_behind_or_the_backup_would_be_none(state: Path, tmp_path: 
     (tmp_path / "elsewhere").write_text("x")
     (state / "link").symlink_to(tmp_path / "elsewhere")
     (state / "folder").symlink_to(tmp_path)
-    pack(state, tmp_path / "b.tar.gz")
+    pack_state(state, tmp_path / "b.tar.gz")
     assert names_in(tmp_path / "b.tar.gz") == ["calibrations/0001.yaml"]
 
 
@@ -97,23 +97,23 @@ def test_only_the_gateway_s_own_files_are_left_out(state: Path, tmp_path: Path) 
     for folder in (state, state / "calibrations"):
         (folder / "lock").touch()
         (folder / "running").touch()
-    assert pack(state, tmp_path / "b.tar.gz")[1:] == ["calibrations/lock", "calibrations/running"]
+    assert pack_state(state, tmp_path / "b.tar.gz")[1:] == ["calibrations/lock", "calibrations/running"]
 
 
 def test_an_empty_state_comes_back_empty(tmp_path: Path) -> None:
     (tmp_path / "state").mkdir()
     (tmp_path / "new").mkdir()
-    pack(tmp_path / "state", tmp_path / "b.tar.gz")
-    assert unpack(tmp_path / "b.tar.gz", tmp_path / "new") is None
+    pack_state(tmp_path / "state", tmp_path / "b.tar.gz")
+    assert unpack_state(tmp_path / "b.tar.gz", tmp_path / "new") is None
     assert sorted(os.listdir(tmp_path)) == ["b.tar.gz", "new", "state"]  # noqa: PTH208
 
 
 def test_each_restore_keeps_what_was_there(state: Path, tmp_path: Path) -> None:
-    pack(state, tmp_path / "b.tar.gz")
+    pack_state(state, tmp_path / "b.tar.gz")
     kept = []
     for text in ("one", "two", "three"):
         (state / "mine.txt").write_text(text)
-        kept.append(unpack(tmp_path / "b.tar.gz", state))
+        kept.append(unpack_state(tmp_path / "b.tar.gz", state))
     assert [(folder / "mine.txt").read_text() for folder in kept if folder] == ["one", "two", "three"]
 
 
@@ -127,11 +127,11 @@ def test_what_was_there_is_there_again_where_the_disk_refuses_the_last_step(
             raise OSError(5, "Input/output error", str(path))
         return rename(path, target)
 
-    pack(state, tmp_path / "b.tar.gz")
+    pack_state(state, tmp_path / "b.tar.gz")
     (state / "mine.txt").write_text("mine")
     monkeypatch.setattr(Path, "rename", refuse)
     with pytest.raises(OSError, match="Input/output"):
-        unpack(tmp_path / "b.tar.gz", state)
+        unpack_state(tmp_path / "b.tar.gz", state)
     assert (state / "mine.txt").read_text() == "mine"
     assert sorted(os.listdir(tmp_path)) == ["b.tar.gz", "state"]  # noqa: PTH208
 
@@ -143,7 +143,7 @@ def test_its_owner_may_read_what_is_restored_whatever_the_archive_says(tmp_path:
             info = tarfile.TarInfo(name)
             info.size, info.mode = len(data), mode
             archive.addfile(info, io.BytesIO(data))
-    unpack(source, tmp_path / "new")
+    unpack_state(source, tmp_path / "new")
     assert (tmp_path / "new" / "shut").stat().st_mode & 0o777 == 0o600
 
 
@@ -160,7 +160,7 @@ def test_what_root_restores_is_whose_it_was(
 ) -> None:
     """A service could not open its state behind a restore by its administrator, and did not start."""
     archive, given, real = tmp_path / "b.tar.gz", list[tuple[str, int, int]](), Path.stat
-    pack(state, archive)
+    pack_state(state, archive)
     theirs = state if was_there else tmp_path / "service"
 
     def stat(path: Path, **options: bool) -> os.stat_result:
@@ -171,7 +171,7 @@ def test_what_root_restores_is_whose_it_was(
     monkeypatch.setattr(os, "geteuid", lambda: 0)
     monkeypatch.setattr(os, "chown", lambda path, user, group, **_: given.append((path.name, user, group)))
     (tmp_path / "service").mkdir()
-    unpack(archive, state if was_there else theirs / "cell")
+    unpack_state(archive, state if was_there else theirs / "cell")
     assert given == [(name, 501, 502) for name in ("calibrations", "0001.yaml", "state")]
 
 
@@ -189,15 +189,15 @@ def test_a_file_that_is_replaced_while_it_is_packed_is_whole(
         return found
 
     monkeypatch.setattr(tarfile.TarFile, "gettarinfo", measure)
-    pack(state, tmp_path / "b.tar.gz")
-    unpack(tmp_path / "b.tar.gz", tmp_path / "again")
+    pack_state(state, tmp_path / "b.tar.gz")
+    unpack_state(tmp_path / "b.tar.gz", tmp_path / "again")
     assert (tmp_path / "again" / "calibrations" / "0001.yaml").read_text() == "name: one\n"
 
 
 def test_a_file_of_two_names_is_restored_as_both(state: Path, tmp_path: Path) -> None:
     """The archive had the second as a link, and was refused as a whole on the day that it was needed."""
     os.link(state / "calibrations" / "0001.yaml", state / "calibrations" / "copy.yaml")
-    pack(state, tmp_path / "b.tar.gz")
-    unpack(tmp_path / "b.tar.gz", tmp_path / "again")
+    pack_state(state, tmp_path / "b.tar.gz")
+    unpack_state(tmp_path / "b.tar.gz", tmp_path / "again")
     for name in ("0001.yaml", "copy.yaml"):
         assert (tmp_path / "again" / "calibrations" / name).read_text() == "name: one\n"

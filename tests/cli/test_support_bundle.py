@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from gateway.cli.main import command
-from gateway.cli.support_bundle import Redaction, collect
+from gateway.cli.support_bundle import Redaction, collect_parts
 from gateway.processes.event import encode_event, make_event
 from gateway.processes.event_file import EventFile
 from gateway.profiles.http_sections import Web
@@ -78,7 +78,7 @@ def test_a_secret_in_a_comment_or_in_the_middle_of_a_sentence_does_not_go_in_eit
 )
 def test_a_secret_that_a_comment_of_a_rig_tells_in_a_sentence_does_not_go_in(comment: str, tmp_path: Path) -> None:
     text = f"name: cell  # token ring, pinned, of hall 3\n{comment}\nforce_max_n: 50  # of the tool, pin 3\n"
-    told = collect(with_events(tmp_path / "state"), lambda: [("cell.yaml", text)])["rig.txt"]
+    told = collect_parts(with_events(tmp_path / "state"), lambda: [("cell.yaml", text)])["rig.txt"]
     assert "s3cr3t" not in told and "one two" not in told and "(left out)" in told
     assert "name: cell  # token (left out)" in told and "force_max_n: 50  # of the tool, pin 3" in told
 
@@ -134,7 +134,7 @@ def test_an_address_of_ipv6_is_one_too() -> None:
 
 def test_a_master_has_the_same_name_in_every_part_and_never_its_address(tmp_path: Path) -> None:
     state = with_events(tmp_path / "state", "W204 10.1.2.3 asked for 72 N", "W204 10.1.2.4", "W204 10.1.2.3 again")
-    parts = collect(state, lambda: [("rig.yaml", "allow: [10.1.2.4/32]\nbind: 127.0.0.1\n")])
+    parts = collect_parts(state, lambda: [("rig.yaml", "allow: [10.1.2.4/32]\nbind: 127.0.0.1\n")])
     told = [json.loads(line)["text"] for line in parts["events.jsonl"].splitlines()]
     owners = [text.split()[0] for text in told]
     assert owners[0] == owners[2] != owners[1]
@@ -168,7 +168,7 @@ def test_a_link_of_the_state_leads_nowhere_in_it_and_the_newest_events_are_there
     state = with_events(tmp_path / "state", *(f"W204 number {number}" for number in range(30)))
     (tmp_path / "other.txt").write_text("x")
     (state / "link").symlink_to(tmp_path / "other.txt")
-    parts = collect(state, list)
+    parts = collect_parts(state, list)
     assert "link" not in parts["state.txt"]
     assert len(parts["events.jsonl"].splitlines()) == 30
 
@@ -194,7 +194,7 @@ def test_a_file_whose_name_is_no_text_is_listed_all_the_same(tmp_path: Path) -> 
     (state / os.fsdecode(b"odd-\xff")).write_text("x")
     done = gateway("report", target, "--state", state, "--rig", "demo")
     assert done.exit_code == 0, done.stderr
-    assert "odd-\\udcff" in collect(state, list)["state.txt"]
+    assert "odd-\\udcff" in collect_parts(state, list)["state.txt"]
 
 
 def test_who_has_packed_a_bundle_is_told_how_to_see_what_is_in_it_not_what_would_go_in_now(tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandTracker
-from gateway.control.edge_checks import EdgeCheck, Situation
+from gateway.control.edge_checks import EdgeCheck
+from gateway.control.readiness import Situation
 from gateway.control.runs.active_run import ActiveRun
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import Reading, SampleConditioner

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from gateway.cli.state_archive import ArchiveError, pack, unpack
+from gateway.cli.state_archive import ArchiveError, pack_state, unpack_state
 from gateway.processes.durable_file import replace_text
-from gateway.telemetry.kept_bd_seq import KeptBdSeq
+from gateway.telemetry.mqtt.kept_bd_seq import KeptBdSeq
 from tests.disk.acts import Act, Say
 
 
@@ -78,16 +78,16 @@ class BackedUp(Archived):
 
     def prepare(self) -> None:
         self._fill("old")
-        pack(self._cell, self._archive)
+        pack_state(self._cell, self._archive)
         self._fill("new")
 
     def run(self, say: Say) -> None:
-        pack(self._cell, self._archive)
+        pack_state(self._cell, self._archive)
         say("packed")
 
     def check(self, said: Sequence[Any]) -> None:
         target = self.state / "elsewhere"
-        unpack(self._archive, target)
+        unpack_state(self._archive, target)
         assert self._words_in(target) in (({"new"},) if said else ({"old"}, {"new"}))
         shutil.rmtree(target)
         assert self._words_in(self._cell) == {"new"}
@@ -100,11 +100,11 @@ class Restored(Archived):
 
     def prepare(self) -> None:
         self._fill("new")
-        pack(self._cell, self._archive)
+        pack_state(self._cell, self._archive)
         self._fill("old")
 
     def run(self, say: Say) -> None:
-        unpack(self._archive, self._cell)
+        unpack_state(self._archive, self._cell)
         say("restored")
 
     def check(self, said: Sequence[Any]) -> None:

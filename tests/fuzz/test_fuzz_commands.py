@@ -12,7 +12,7 @@ from gateway.profiles import load_register_map
 from gateway.registers import Refusal
 from gateway.registers.upload.coefficients import CoefficientSet
 from gateway.registers.words import CommitStatus
-from gateway.telemetry.register_commands import RegisterCommands
+from gateway.telemetry.mqtt.register_commands import RegisterCommands
 from tests.calibrations.coefficients import calibration, requests_of, staged
 from tests.calibrations.upload_bench import PEER, Bench
 from tests.fuzz.conftest import Examples

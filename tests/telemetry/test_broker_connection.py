@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from gateway.telemetry import broker_connection
-from gateway.telemetry.broker_connection import Broker, keep_connected
-from gateway.telemetry.broker_session import BrokerMessage
+from gateway.telemetry.mqtt import broker_connection
+from gateway.telemetry.mqtt.broker_connection import Broker, keep_connected
+from gateway.telemetry.mqtt.broker_session import BrokerMessage
 
 
 class MqttError(Exception):

@@ -6,8 +6,8 @@ from collections.abc import Awaitable, Callable
 import pytest
 
 from gateway.live.standstill import Standstill
-from gateway.telemetry.command_queue import ROOM, CommandQueue
-from gateway.telemetry.register_commands import is_stop
+from gateway.telemetry.mqtt.command_queue import ROOM, CommandQueue
+from gateway.telemetry.mqtt.register_commands import is_stop
 
 
 class Clock:

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from gateway.live.live_state import LiveState
 from gateway.processes.state_lock import hold_state_lock
-from gateway.telemetry import kept_bd_seq
-from gateway.telemetry.broker_session import BrokerMessage
-from gateway.telemetry.edge_node import REBIRTH, EdgeNode
-from gateway.telemetry.kept_bd_seq import KeptBdSeq
+from gateway.telemetry.mqtt import kept_bd_seq
+from gateway.telemetry.mqtt.broker_session import BrokerMessage
+from gateway.telemetry.mqtt.edge_node import REBIRTH, EdgeNode
+from gateway.telemetry.mqtt.kept_bd_seq import KeptBdSeq
 from gateway.telemetry.sparkplug_metrics import TYPES, values_of
 from gateway.telemetry.sparkplug_payload import DataType, SparkplugMetric, decode_values, encode_payload
 from tests.telemetry.readings import holding

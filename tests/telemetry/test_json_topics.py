@@ -12,10 +12,10 @@ from gateway.live.control_link import ANSWER_S, ControlLink
 from gateway.live.live_state import LiveAlarm
 from gateway.processes.json_socket.server import JsonLineServer
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
-from gateway.telemetry.broker_session import BrokerMessage
-from gateway.telemetry.json_topics import JsonTopics
+from gateway.telemetry.mqtt.broker_session import BrokerMessage
+from gateway.telemetry.mqtt.json_topics import JsonTopics
+from gateway.telemetry.mqtt.register_commands import RegisterCommands, is_stop
 from gateway.telemetry.mqtt_process import Announcer
-from gateway.telemetry.register_commands import RegisterCommands, is_stop
 from tests.telemetry.readings import holding
 
 

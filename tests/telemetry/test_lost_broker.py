@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from gateway.telemetry import broker_connection
-from gateway.telemetry.broker_connection import Broker, BrokerNews, keep_connected
+from gateway.telemetry.mqtt import broker_connection
+from gateway.telemetry.mqtt.broker_connection import Broker, BrokerNews, keep_connected
 from tests.telemetry.test_broker_connection import Session
 
 aiomqtt = pytest.importorskip("aiomqtt")

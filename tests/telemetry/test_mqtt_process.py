@@ -11,9 +11,9 @@ import pytest
 from gateway.profiles import Rig
 from gateway.profiles.telemetry_sections import BrokerTls, Mqtt, SparkplugNode
 from gateway.telemetry import mqtt_process
-from gateway.telemetry.broker_connection import Broker
-from gateway.telemetry.edge_node import EdgeNode
-from gateway.telemetry.json_topics import JsonTopics
+from gateway.telemetry.mqtt.broker_connection import Broker
+from gateway.telemetry.mqtt.edge_node import EdgeNode
+from gateway.telemetry.mqtt.json_topics import JsonTopics
 from gateway.telemetry.mqtt_process import LOOK_S, Announcer, look_forever, make_sessions, publish
 from tests.service.rigs import demo
 from tests.telemetry.readings import holding

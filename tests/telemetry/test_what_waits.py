@@ -9,9 +9,9 @@ import pytest
 
 from gateway.live.live_state import LiveState
 from gateway.profiles import load_rig
-from gateway.telemetry.edge_node import EdgeNode
-from gateway.telemetry.json_topics import JsonTopics
-from gateway.telemetry.register_commands import RegisterCommands
+from gateway.telemetry.mqtt.edge_node import EdgeNode
+from gateway.telemetry.mqtt.json_topics import JsonTopics
+from gateway.telemetry.mqtt.register_commands import RegisterCommands
 from tests.telemetry.readings import holding
 from tests.telemetry.sparkplug_schema import decoded, values
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from gateway.live.control_link import ControlLink
 from gateway.web.context import WebContext
-from gateway.web.security import Door
+from gateway.web.security import PageAccess
 from gateway.web.server import make_app
 
 
@@ -67,4 +67,4 @@ async def call(
 def page(state: Path, token: str | None = None) -> Any:
     """The page of the demo rig, with nobody behind its control socket."""
     context = WebContext(state, "demo", True, ControlLink(state))
-    return make_app(context, Door("127.0.0.1", 8080, token), None)
+    return make_app(context, PageAccess("127.0.0.1", 8080, token), None)

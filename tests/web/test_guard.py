@@ -8,7 +8,7 @@ import pytest
 
 from gateway.live.standstill import Standstill
 from gateway.web import security
-from gateway.web.security import Door
+from gateway.web.security import PageAccess
 from gateway.web.server import _file
 from tests.web.asgi import Answer, call, page
 
@@ -240,9 +240,9 @@ def test_who_leaves_within_its_request_makes_no_error_of_ours(app: Any) -> None:
 
 def test_the_token_of_a_session_s_commands_makes_no_session() -> None:
     """The page's script may read it, and so may a report in a frame that gets out of it."""
-    door = Door("127.0.0.1", 8080)
-    assert door.is_session(door.new_session())
-    assert not door.is_session(f"name.{door.csrf_token('name')}")
+    access = PageAccess("127.0.0.1", 8080)
+    assert access.is_session(access.new_session())
+    assert not access.is_session(f"name.{access.csrf_token('name')}")
 
 
 @pytest.mark.parametrize("path", ["../static/page.css", "./page.css", "a/../page.css", "/page.css"])
@@ -254,7 +254,7 @@ def test_a_way_out_of_the_folder_is_no_file_though_it_comes_back(path: str) -> N
 def test_the_machines_own_name_is_one_only_where_a_token_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a token whoever controls the name, or the network's naming, would be let in."""
     monkeypatch.setattr(security, "gethostname", lambda: "Cell-PC")
-    asked, open_to_all = Door("0.0.0.0", 8080, TOKEN), Door("127.0.0.1", 8080)
+    asked, open_to_all = PageAccess("0.0.0.0", 8080, TOKEN), PageAccess("127.0.0.1", 8080)
     for host in ("cell-pc", "CELL-PC:8080"):
         assert asked.admits_host(host)
         assert not open_to_all.admits_host(host)

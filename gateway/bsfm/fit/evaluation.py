@@ -14,7 +14,7 @@ import numpy as np
 
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.fit.branch_fit import FitSettings
-from gateway.bsfm.fit.order_choice import Score, choose, score_orders
+from gateway.bsfm.fit.order_choice import Score, choose_fit, score_orders
 from gateway.bsfm.fit.result import ModelName, Ties
 from gateway.bsfm.fit.usable_fit import fit_usable, is_moderate
 from gateway.bsfm.ladder.check import CheckedLadder
@@ -68,7 +68,7 @@ def evaluate(checked: CheckedLadder, question: FitRequest) -> Evaluation:
     question = replace(question, orders=_possible(ladder, question.orders, notes))
     settings = _settings(ladder, question)
     scores = score_orders(ladder, question.models, question.orders, question.ties, settings)
-    chosen = choose(scores)
+    chosen = choose_fit(scores)
     if _is_poor(chosen, scores):
         chosen = _fit_constrained(ladder, question, settings, chosen, notes)
     reversal = choose_reversal(_to_move(chosen, scores), checked.ladder, checked.minor_v, checked.minor_n)

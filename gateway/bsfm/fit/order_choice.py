@@ -67,13 +67,12 @@ def score_orders(
     return [_score(used, result, fit_settings) for result in reported("holding groups out", results)]
 
 
-def choose(scores: Sequence[Score], usable_only: bool = True) -> Score:
-    """Return the fewest coefficients that are not certainly worse than the best; usable_only: of fits that may drive a plant.
+def choose_fit(scores: Sequence[Score]) -> Score:
+    """Return the fewest coefficients that are not certainly worse than the best, of fits that may drive a plant.
 
     If none is usable the choice is among all: its verdicts say why it must not be activated.
     """
-    candidates = [score for score in scores if score.result.verdicts.usable] if usable_only else list(scores)
-    candidates = candidates or list(scores)
+    candidates = [score for score in scores if score.result.verdicts.usable] or list(scores)
     best = min(candidates, key=lambda score: score.heldout_n2)
     near = [
         score

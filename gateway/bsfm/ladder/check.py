@@ -79,7 +79,7 @@ def check_ladder(
     slope_n_per_v = _slope(points)
     notes += [*rows.notes, *points.notes]
     _check_moves(points)
-    _check_sign(points, slope_n_per_v)
+    _check_sign(slope_n_per_v)
     walk = split_by_labels(points, labels, by_check=_is_only_walk(facts)) if labels else split_by_sweeps(points)
     ladder = _whole_groups(walk)
     notes += [*walk.left_out, *_check_scale(rows, slope_n_per_v, expected)]
@@ -159,7 +159,7 @@ def _check_moves(points: Points) -> None:
         )
 
 
-def _check_sign(points: Points, slope_n_per_v: float) -> None:
+def _check_sign(slope_n_per_v: float) -> None:
     if slope_n_per_v < 0.0:
         raise LadderError(
             LadderFlaw.SIGN,

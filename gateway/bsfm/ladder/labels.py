@@ -96,7 +96,7 @@ class LabelSplit:
     left_out: tuple[str, ...]
 
 
-def split_by_labels(points: Points, labels: Labels, *, by_check: bool = False) -> LabelSplit:
+def split_by_labels(points: Points, labels: Labels, *, by_check: bool) -> LabelSplit:
     """Return the points of a labelled recording. labels: of its rows; by_check: of a run that had only the reversal part
     left."""
     at = {int(labels.stair[row]): k for k, row in enumerate(points.row.tolist())}  # the last point of a stair counts

@@ -46,11 +46,6 @@ class Points:
     def __len__(self) -> int:
         return len(self.voltage_v)
 
-    def part(self, keep: NDArray[np.bool_] | Integers) -> "Points":
-        """Return the points to keep."""
-        voltage_v, force_n, row = self.voltage_v[keep], self.force_n[keep], self.row[keep]
-        return Points(voltage_v, force_n, row, self.drift_n[keep], self.noise_n, self.notes)
-
 
 def find_settled_points(time_s: Floats, command_v: Floats, force_n: Floats, stair: Integers | None = None) -> Points:
     """Find the settled points of finite columns whose time does not fall. stair: of each row, where it is known: two stairs of

@@ -38,7 +38,7 @@ class RestartedError(CliError):
     """The gateway is another one by now, which knows of no run."""
 
 
-def follow(run: Run) -> dict[str, Any]:
+def follow_run(run: Run) -> dict[str, Any]:
     """Begin the run and wait for its end; how it ended."""
     with signals_as_ctrl_c():
         if not watch_to_the_end(run.begin, lambda: _watch(run), run.stop):

@@ -43,7 +43,7 @@ def in_use(store: "CalibrationStore") -> "Calibration":
     return calibration
 
 
-def change(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str, Any]:
+def change_calibration(directory: Path, rig_name: str, request: dict[str, Any]) -> dict[str, Any]:
     """Use another calibration or roll back. request: {"use": N, "force": bool} or {"rollback": True}.
 
     Return the gateway's answer when it is through, or what was done here where none runs."""

@@ -108,7 +108,7 @@ def now_utc() -> str:
     return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
 
 
-def change(state: StateChoice, request: dict[str, Any], before: str | None) -> dict[str, Any]:
+def change_plant(state: StateChoice, request: dict[str, Any], before: str | None) -> dict[str, Any]:
     """Use another plant or roll back. request: {"use": N} or {"rollback": True}; before: the run that the watch compares
     with, None: the newest one. Return the gateway's answer, or what was done here where none runs, and the reference."""
     from gateway.plants.force_reference import keep_reference, kept_reference

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from gateway.recording.care.keeping import Prunable
 
 
-def delete(state: Path, number: int, *, asks: bool) -> Path:
+def delete_recording(state: Path, number: int, *, asks: bool) -> Path:
     """Delete one recording. CliError (65) where it must stay, or somebody says no."""
     from gateway.recording import find_recording
     from gateway.recording.care.keeping import delete_recording, why_protected
@@ -57,7 +57,7 @@ def retention_of(state: StateChoice, days: float | None, most_bytes: int | None)
     return retention
 
 
-def prune(state: Path, retention: "Retention", *, dry_run: bool, asks: bool) -> list["Prunable"]:
+def prune_recordings(state: Path, retention: "Retention", *, dry_run: bool, asks: bool) -> list["Prunable"]:
     """Delete what there is no room for, or only say what it would be; return it."""
     from gateway.calibrations.kept_ladders import kept_ladders
     from gateway.recording import recording_paths

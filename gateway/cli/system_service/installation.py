@@ -84,7 +84,7 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
     )
 
 
-def install(plan: Installation, root: Path) -> tuple[list[Path], bool]:
+def install_service(plan: Installation, root: Path) -> tuple[list[Path], bool]:
     """Write the plan's files below the root and, on a running machine, start the service. Return what was written, and whether
     the service ran before: it goes on as it was then, since a restart would drop the force. CliError where that is refused."""
     written, ran = [], False
@@ -110,7 +110,7 @@ def install(plan: Installation, root: Path) -> tuple[list[Path], bool]:
     return written, ran
 
 
-def uninstall(stem: str, root: Path) -> Path:
+def uninstall_service(stem: str, root: Path) -> Path:
     """Stop and remove the unit of a rig; its state directory, the user and the udev rule stay."""
     path = root / UNITS / unit_file.unit_name(stem)
     if not path.exists():

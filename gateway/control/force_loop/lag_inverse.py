@@ -237,11 +237,6 @@ class LinearizedLagInverse:
         """State of the second lag, V."""
         return self._map.volts(self._inverse.second_v)
 
-    @property
-    def n_per_v(self) -> float:
-        """Thrust per linearized volt, N/V."""
-        return self._map.n_per_v
-
     def away_n(self, wanted_v: float) -> float:
         """Return by how much the thrust of the model's lags is short of the wish's, N."""
         return (self._map.linear_v(wanted_v) - self._inverse.second_v) * self._map.n_per_v

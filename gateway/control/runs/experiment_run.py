@@ -24,7 +24,7 @@ class ExperimentRun:
 
     end_phase: Final = CalibrationPhase.RECORDED
 
-    def __init__(self, plan: ExperimentPlan, settings: ControlSettings, model: Bsfm, given_n: float = 0.0) -> None:
+    def __init__(self, plan: ExperimentPlan, settings: ControlSettings, model: Bsfm, given_n: float) -> None:
         self.plan, self.model = plan, model
         limits = settings.limits
         self.schedule = schedule_of(plan, limits, model, given_n)

@@ -157,7 +157,7 @@ class Schedule:
 
 
 @lru_cache(maxsize=4)
-def schedule_of(plan: ExperimentPlan, limits: Limits, model: Bsfm, given_n: float = 0.0) -> Schedule:
+def schedule_of(plan: ExperimentPlan, limits: Limits, model: Bsfm, given_n: float) -> Schedule:
     """Return the voltage over time of a plan on a rig. ValueError as `segments_of`. Kept: from the request to its begin a run
     is made four times, and all of them within one turn of the loop."""
     return Schedule(segments_of(plan, limits, model, given_n), limits.safe_voltage_v)

@@ -128,7 +128,3 @@ class Watchdog:
             most = (16 if isinstance(field, HexNumber) else 10) ** field.width - 1
             reason = f"{self.ticks} counts of {self.tick_s:g} s, and its sentence has room for {most}"
             raise ValueError(f"{self.time_s:g} s is {reason}: {most * self.tick_s:g} s at most") from None
-
-    def exchanges(self) -> tuple[WatchdogExchange, ...]:
-        """Return the exchanges, apart from the state's question."""
-        return tuple(one for one in (self.set_time, self.arm, self.disarm, self.verify, self.clear) if one)

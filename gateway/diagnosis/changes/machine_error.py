@@ -61,7 +61,7 @@ class ErrorModel:
         driving = series.pressure
         for sizes in self.added:
             driving = _drive_friction(
-                bench, series, driving, np.array(sizes) @ series.linear / (self.area_m2 * self.largest_pa)
+                bench, driving, np.array(sizes) @ series.linear / (self.area_m2 * self.largest_pa)
             )
         scale = np.array(self.scale)
         return np.asarray(series.with_stops(bench, driving)[scale > 0.0] * scale[scale > 0.0, None])
@@ -81,7 +81,7 @@ def fit_error(bench: Bench, fitted: FittedModel) -> ErrorModel:
     for _ in range(_ROUNDS):
         sizes = _fit_columns(fitted, series.with_stops(bench, driving), rows)[: series.linear.shape[0]]
         added.append(tuple(map(float, sizes)))
-        driving = _drive_friction(bench, series, driving, sizes @ series.linear / (area_m2 * largest_pa))
+        driving = _drive_friction(bench, driving, sizes @ series.linear / (area_m2 * largest_pa))
     columns = series.with_stops(bench, driving)
     spread = np.sqrt(np.mean(columns[:, bench.usable] ** 2, axis=1))
     is_column = spread > _LEAST_SPREAD
@@ -119,7 +119,7 @@ class _Series:
         return np.vstack([self.linear, self.curved, stops])
 
 
-def _drive_friction(bench: Bench, series: _Series, driving: list[Floats], added: Floats) -> list[Floats]:
+def _drive_friction(bench: Bench, driving: list[Floats], added: Floats) -> list[Floats]:
     """The pressure with what the delayed ones add to it, a share of the largest."""
     return [each + part for each, part in zip(driving, _split(bench, added), strict=True)]
 

@@ -34,12 +34,12 @@ def _dwells() -> Iterator[Move]:
         yield _step(level, 6.0)
 
 
-def _reversals(sizes: Sequence[float], over_s: float, times: int = 2) -> Iterator[Move]:
+def _reversals(sizes: Sequence[float], over_s: float) -> Iterator[Move]:
     """Of each size around each of three levels; the first swings come as evenly as all others."""
     for level in LEVELS:
         yield _ramp(level, 1.0)
         for size in sizes:
-            yield _swing(size, times, over_s * max(0.25, (size / max(sizes)) ** 0.5))
+            yield _swing(size, 2, over_s * max(0.25, (size / max(sizes)) ** 0.5))
 
 
 def _steps() -> Iterator[Move]:

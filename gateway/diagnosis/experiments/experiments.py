@@ -101,7 +101,7 @@ def plan_for(names: Iterable[str], *, besides: Iterable[str] = (), longest_s: fl
     )
 
 
-def plan_next(diagnosis: Diagnosis, *, longest_s: float = USUAL_LONGEST_S) -> Plan | None:
+def plan_next(diagnosis: Diagnosis) -> Plan | None:
     """Return what to record after this: what tells the groups apart, and shows what the recording could not; None for nothing.
 
     Groups come first and may take what time they need. Of the effects that the recording could not show, those are taken
@@ -113,7 +113,7 @@ def plan_next(diagnosis: Diagnosis, *, longest_s: float = USUAL_LONGEST_S) -> Pl
     names = [*groups, *alone] or unseen
     if not names:
         return None
-    plan = plan_for(groups or (alone or unseen)[:1], besides=names, longest_s=longest_s)
+    plan = plan_for(groups or (alone or unseen)[:1], besides=names, longest_s=USUAL_LONGEST_S)
     left = [(name, _describe_needs(EXPERIMENTS[name])) for name in unseen if name not in names]
     return Plan(experiment=plan.experiment, left_out=(*plan.left_out, *left), apart=plan.apart)
 

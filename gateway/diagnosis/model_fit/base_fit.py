@@ -78,7 +78,7 @@ def fit_base(bench: Bench, plant: Plant, free: tuple[Parameter, ...], whiten: Wh
     """
     start = ModelParameters(plant, tuple(0.0 for _ in bench.measurements))
     settled_bench = bench.without_rows(unsettled_rows(bench))
-    coarse = _grid_search(settled_bench, start, free, whiten)
+    coarse = _grid_search(settled_bench, start, free)
     if _gain_error(settled_bench, settled_bench.simulate([coarse])[0]) > _KNOWN_SHARE:
         free = tuple(each for each in free if each is not AREA)  # the noise would choose it
     starts = start_parameters(bench, plant)
@@ -105,9 +105,7 @@ def refit(bench: Bench, fitted: FittedModel, whiten: Whitener, waves: int = 3) -
     return refine(bench, [FitProblem(fitted.parameters, fitted.free)], whiten, waves)[0]
 
 
-def _grid_search(
-    bench: Bench, start: ModelParameters, free: tuple[Parameter, ...], whiten: Whitener
-) -> ModelParameters:
+def _grid_search(bench: Bench, start: ModelParameters, free: tuple[Parameter, ...]) -> ModelParameters:
     """The best of a grid, gain and offset by linear regression."""
     start = _scale_by_regression(bench, start, bench.simulate([start])[0])
     lags = {start.value(LAG), *_LAGS_S} if LAG in free else {start.value(LAG)}
@@ -116,7 +114,7 @@ def _grid_search(
         start.with_value(LAG, lag).with_value(COULOMB, friction) for lag, friction in product(lags, frictions)
     ]
     simulated = bench.simulate(parameter_sets)
-    costs = [_regression(bench, simulated[k], whiten)[2] for k in range(len(parameter_sets))]
+    costs = [_regression(bench, simulated[k])[2] for k in range(len(parameter_sets))]
     best = int(np.argmin(costs))
     return _scale_by_regression(bench, parameter_sets[best], simulated[best])
 
@@ -127,7 +125,7 @@ def _scale_by_regression(bench: Bench, parameters: ModelParameters, simulated_n:
     Where hardly anything was commanded, noise has a gain too: it once put the offset of a clean hold to -1700 N, from where no
     refinement came back. So a gain is believed where it is known.
     """
-    gain, offset, _ = _regression(bench, simulated_n, None)
+    gain, offset, _ = _regression(bench, simulated_n)
     known = _BELIEVED_GAINS[0] < gain < _BELIEVED_GAINS[1] and _gain_error(bench, simulated_n) < _KNOWN_SHARE * gain
     if not known:
         rows = bench.judged
@@ -139,12 +137,12 @@ def _scale_by_regression(bench: Bench, parameters: ModelParameters, simulated_n:
 def _gain_error(bench: Bench, simulated_n: Floats) -> float:
     """Return the standard error of the regression's gain, for noise that is independent from row to row."""
     rows = bench.judged
-    _, _, cost = _regression(bench, simulated_n, None)
+    _, _, cost = _regression(bench, simulated_n)
     power = float(np.sum((simulated_n[rows] - np.mean(simulated_n[rows])) ** 2))
     return float(np.sqrt(cost / max(int(rows.sum()) - 2, 1) / power)) if power > 0.0 else np.inf
 
 
-def _regression(bench: Bench, simulated_n: Floats, whiten: Whitener | None) -> tuple[float, float, float]:
+def _regression(bench: Bench, simulated_n: Floats) -> tuple[float, float, float]:
     """Gain, offset and cost of measured = gain x simulated + offset over the judged force rows."""
     rows = bench.judged
     x, y = simulated_n[rows], bench.measured_n[rows]

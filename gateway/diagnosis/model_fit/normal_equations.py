@@ -84,11 +84,10 @@ def orthonormal(rows: Floats) -> Floats:
     return np.asarray(vectors[sizes > 1.0e-9 * sizes[0]] @ long.T)
 
 
-def block_sums(bench: Bench, values: Floats, rows: Floats | None = None) -> Floats:
-    """Return the sum of values (rows,) in each block; `rows` restricts it."""
-    chosen = slice(None) if rows is None else rows
+def block_sums(bench: Bench, values: Floats) -> Floats:
+    """Return the sum of values (rows,) in each block."""
     blocks = int(bench.block_of_row.max()) + 1
-    sums: Floats = np.bincount(bench.block_of_row[chosen], weights=values[chosen], minlength=blocks).astype(np.float64)
+    sums: Floats = np.bincount(bench.block_of_row, weights=values, minlength=blocks).astype(np.float64)
     return sums
 
 

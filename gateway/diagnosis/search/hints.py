@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from gateway.catalogue.cylinder import AREA, COULOMB
+from gateway.catalogue.cylinder import AREA
 from gateway.catalogue.effect import SearchHints
 from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.measurement import Floats
@@ -33,7 +33,6 @@ def search_hints(bench: Bench, fitted: FittedModel, whiten: Whitener) -> SearchH
         pressures_pa=_quantiles(pressures),
         forces_n=_quantiles(forces),
         pressure_rate_pa_per_s=_fastest_n_per_s(bench, simulated) / area_m2,
-        coulomb_n=fitted.parameters.value(COULOMB),
         positions_mm=_quantiles(positions)[:4] if positions is not None else (),
         lines_hz=lines_hz(bench, white),
         mains_hz=_mains_hz(bench, white),

@@ -28,16 +28,9 @@ from gateway.profiles.kinds.plants import PlantProfile, read_plant
 from gateway.profiles.kinds.registers import read_served_registers
 from gateway.profiles.load import load_plant, open_profile, read_named, refer_at, refer_to
 from gateway.profiles.recordings_section import service_sections_of
-from gateway.profiles.rigs import (
-    checks,
-    face_checks,
-    line_checks,
-    network_checks,
-    tls_checks,
-    valve_checks,
-    wire_checks,
-)
-from gateway.profiles.rigs.checks import Check, Parts
+from gateway.profiles.rigs.checks.all_checks import FAULTS, HARDWARE, WARNINGS
+from gateway.profiles.rigs.checks.parts import Check, Parts
+from gateway.profiles.rigs.checks.tls import check_tls_days
 from gateway.profiles.rigs.compensated_effects import (
     compensation_of,
     compensation_words,
@@ -60,25 +53,6 @@ T = TypeVar("T")
 
 FALLBACK_PLANT: Final = defaults.PLANT
 """What `run --sim` simulates for a real rig that names no plant."""
-
-FAULTS: Final = (
-    *checks.FAULTS,
-    *line_checks.FAULTS,
-    *valve_checks.FAULTS,
-    *wire_checks.FAULTS,
-    *network_checks.FAULTS,
-    *face_checks.FAULTS,
-    *tls_checks.FAULTS,
-)
-WARNINGS: Final = (
-    *checks.WARNINGS,
-    *line_checks.WARNINGS,
-    *wire_checks.WARNINGS,
-    *network_checks.WARNINGS,
-    *face_checks.WARNINGS,
-    *tls_checks.WARNINGS,
-)
-HARDWARE: Final = (*line_checks.HARDWARE, *valve_checks.HARDWARE, *face_checks.HARDWARE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,7 +279,7 @@ def _texts(findings: Findings) -> dict[str, str]:
 
 
 def _notes(parts: Parts, compensation: Compensation) -> tuple[str, ...]:
-    days = (sentence for _, sentence in tls_checks.check_tls_days(parts))
+    days = (sentence for _, sentence in check_tls_days(parts))
     return (*(compensation_words(compensation) if parts.compensation else ()), *days)
 
 

@@ -89,7 +89,7 @@ def _place_findings(document: Document, path: Path, findings: list[Any]) -> list
 def _fault(kind: type, document: Document, path: Path, place: Path, finding: Mapping[str, Any]) -> ProfileFault:
     key = place[-1] if place else ""
     if finding["type"] == "missing":
-        missing = f"is missing{_what_it_is(kind, place[len(path) :])}"
+        missing = f"is missing{_what_it_is(place[len(path) :])}"
         return replace(document.fault(place, missing, at_key=True), kind=FaultKind.MISSING)
     if finding["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         known = names(kind_at(kind, place[len(path) : -1], document.at(*place[:-1])) or kind)
@@ -119,7 +119,7 @@ def _place(document: Document, path: Path, finding: Mapping[str, Any]) -> Path:
     return place
 
 
-def _what_it_is(kind: type, place: Path) -> str:
+def _what_it_is(place: Path) -> str:
     unit = unit_of(place[-1]) if place else ""
     return f" (a value in{unit})" if unit else ""
 

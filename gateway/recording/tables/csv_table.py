@@ -294,7 +294,7 @@ class _LineReader:
         return notes + ([f"columns of words, not numbers: {join_names(words)}"] if words else [])
 
 
-def shorten_notes(notes: Sequence[str], noun: str, most: int = _MOST_NOTES) -> list[str]:
+def shorten_notes(notes: Sequence[str], noun: str) -> list[str]:
     """Return the first few, and how many more there were."""
-    more = len(notes) - most
-    return [*notes[:most], f"and {more} more {noun}"] if more > 0 else list(notes)
+    more = len(notes) - _MOST_NOTES
+    return [*notes[:_MOST_NOTES], f"and {more} more {noun}"] if more > 0 else list(notes)

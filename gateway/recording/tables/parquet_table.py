@@ -34,7 +34,7 @@ _NOT_FACTS: Final = ("pandas", "ARROW:schema", "huggingface", "columns")
 _TICKS_PER_S: Final = {"s": 1.0, "ms": 1.0e3, "us": 1.0e6, "ns": 1.0e9}
 
 
-def read_parquet(path: Path, mapping: ColumnMapping | None = None) -> Recording:
+def read_parquet(path: Path, mapping: ColumnMapping | None) -> Recording:
     """Return the columns and facts of a Parquet file.
 
     RecordingError when the file is damaged or a contract column holds no numbers, MissingExtraError without pyarrow.

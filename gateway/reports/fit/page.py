@@ -16,7 +16,7 @@ from gateway.reports.frame import Head, notes, page, section, table, tiles
 _WORDS: Final = " class='words'"
 
 
-def fit_page(evaluation: Evaluation, document: Document, raw: RawLadder | None = None) -> str:
+def fit_page(evaluation: Evaluation, document: Document, raw: RawLadder | None) -> str:
     """Return the whole page. document: `fit_document` of the evaluation, with `calibration` where one was stored; raw: the
     rows of its recording."""
     parts = [

@@ -77,11 +77,6 @@ class SetpointSchedule:
     phase: float
     reference: ReferenceConditions
 
-    @property
-    def duration_s(self) -> float:
-        """Duration of the whole schedule, s."""
-        return self.wishes[-1].start_s + self.wishes[-1].hold_s
-
     def around(self, time_s: float) -> Surroundings:
         """Return the surroundings at this time.
         The rig was tared at the reference temperature, where the tool's weight does not press; both move from there."""

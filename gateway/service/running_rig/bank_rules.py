@@ -14,7 +14,6 @@ def bank_rules(rig: Rig) -> BankRules:
         force_max_n=limits.force_max_n,
         voltage_min_v=limits.voltage_min_v,
         voltage_max_v=limits.voltage_max_v,
-        cell_range_n=rig.load_cell.range_n,
         supported_bits=rig.supported_bits,
         require_byte_order_echo=rig.network.require_byte_order_echo,
         owner=rig.network.owner,

@@ -38,9 +38,9 @@ def numbers_at_once() -> int:
 class Cache:
     """Series by what they depend on."""
 
-    def __init__(self, room_bytes: int | None = None) -> None:
+    def __init__(self) -> None:
         self._kept: OrderedDict[Hashable, Floats] = OrderedDict()
-        self._room_bytes, self._bytes = room_bytes or room_bytes_now(), 0
+        self._room_bytes, self._bytes = room_bytes_now(), 0
 
     def get(self, key: Hashable) -> Floats | None:
         """Return the series of a key; None where it is not kept (any more)."""

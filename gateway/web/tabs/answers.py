@@ -90,9 +90,9 @@ async def read_body(request: Request, shape: type[Shape]) -> Shape:
     return shaped
 
 
-def number_in_path(request: Request, name: str = "number") -> int:
-    """Return a number of the address. TabRefusedError for anything but digits: files are named by numbers only."""
-    return number_of(request.path_params[name])
+def number_in_path(request: Request) -> int:
+    """Return the number of the address. TabRefusedError for anything but digits: files are named by numbers only."""
+    return number_of(request.path_params["number"])
 
 
 def number_in_query(request: Request, name: str) -> int:

@@ -7,7 +7,7 @@ import pytest
 
 from gateway.bsfm import RationalBezier
 from gateway.bsfm.fit.levenberg_marquardt import Effort
-from gateway.bsfm.fit.order_choice import FitSettings, Score, choose, score_orders
+from gateway.bsfm.fit.order_choice import FitSettings, Score, choose_fit, score_orders
 from gateway.bsfm.ladder.measured_ladder import Ladder
 
 QUICK = FitSettings(effort=Effort(screened=64, descending=8))
@@ -19,19 +19,19 @@ def test_polynomial_data_choose_their_own_order(loops):
     clean = np.where(ladder.direction > 0, rising.value(ladder.voltage_v), falling.value(ladder.voltage_v))
     noise = 0.2 * np.random.default_rng(5).standard_normal(len(ladder))
     cubic = Ladder(ladder.voltage_v, clean + noise, ladder.direction, ladder.group)
-    assert choose(score_orders(cubic, ["psfm"], range(1, 8))).result.order == 3
+    assert choose_fit(score_orders(cubic, ["psfm"], range(1, 8))).result.order == 3
 
 
 def test_residual_falls_for_ever_and_the_held_out_error_does_not(loops):
     scores = score_orders(loops["smooth"](3, noise_n=0.5), ["psfm"], range(1, 13))
     inside, outside = [s.result.rms_n for s in scores], [s.heldout_rms_n for s in scores]
     assert min(inside) == inside[-1] and outside[-1] > min(outside)
-    assert choose(scores).result.order < 8
+    assert choose_fit(scores).result.order < 8
 
 
 def test_the_loop_needs_two_branches_and_few_coefficients(loops):
     scores = score_orders(loops["smooth"](4), ["pfm", "psfm", "bfm", "bsfm"], range(1, 4), "tied", QUICK)
-    chosen = choose(scores)
+    chosen = choose_fit(scores)
     assert chosen.result.model.per_direction and chosen.result.verdicts.usable
     assert chosen.heldout_rms_n < 0.5 * min(s.heldout_rms_n for s in scores if not s.result.model.per_direction)
     assert all(s.coefficients >= chosen.coefficients for s in scores if s.heldout_n2 <= chosen.heldout_n2)
@@ -40,7 +40,7 @@ def test_the_loop_needs_two_branches_and_few_coefficients(loops):
 def test_what_cannot_drive_a_plant_is_chosen_only_if_nothing_else_is_there(loops):
     ladder = loops["smooth"](4)
     inverted = Ladder(ladder.voltage_v, -ladder.force_n, ladder.direction, ladder.group)
-    chosen = choose(score_orders(inverted, ["psfm"], range(1, 4)))
+    chosen = choose_fit(score_orders(inverted, ["psfm"], range(1, 4)))
     assert not chosen.result.verdicts.usable
     assert chosen.result.verdicts.sentences[0] == "the rising branch is not increasing"
 
@@ -56,9 +56,9 @@ def test_a_shaken_group_does_not_make_a_straight_line_as_good_as_the_best(loops)
     straight, bent = score_orders(loops["smooth"](6), ["bsfm"], (1, 2), "tied", QUICK)
     straight, bent = scored(straight, 0.28, 1.30), scored(bent, 0.01, 1.00)
     assert straight.heldout_n2 < bent.heldout_n2 + bent.error_n2, "within the error of the best one by itself"
-    assert choose([straight, bent]) is bent
+    assert choose_fit([straight, bent]) is bent
     doubtful = scored(straight, 0.28, 0.80)
-    assert choose([doubtful, bent]) is doubtful
+    assert choose_fit([doubtful, bent]) is doubtful
 
 
 def test_one_group_cannot_be_left_out(loops):

@@ -13,7 +13,7 @@ from rich.progress import BarColumn
 
 from gateway.cli.calibration import follow as following
 from gateway.cli.calibration import runs
-from gateway.cli.calibration.follow import NotBegunError, RestartedError, follow
+from gateway.cli.calibration.follow import NotBegunError, RestartedError, follow_run
 from gateway.cli.calibration.runs import ENDED, LocalRun, RunStatus
 from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
@@ -57,14 +57,14 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 def test_a_run_that_has_not_begun_within_two_seconds_is_told_as_such(clock: SimpleNamespace) -> None:
     """Nothing has moved, so nothing is said of what becomes of it."""
     with pytest.raises(NotBegunError, match="W305") as told:
-        follow(Played("idle"))
+        follow_run(Played("idle"))
     assert 2.0 <= clock.now_s <= 2.5 and Played.lost_words not in told.value.message
 
 
 @pytest.mark.parametrize("end", ENDED)
 def test_a_run_is_followed_to_any_end_however_long_it_takes(end: str) -> None:
     run = Played("idle", *["ladder"] * 100, end)
-    assert follow(run) == {"phase": end} and not run.stops and len(run.seen) == 102
+    assert follow_run(run) == {"phase": end} and not run.stops and len(run.seen) == 102
 
 
 def test_a_run_that_is_lost_keeps_its_exit_code_and_what_becomes_of_it_is_told() -> None:
@@ -73,7 +73,7 @@ def test_a_run_that_is_lost_keeps_its_exit_code_and_what_becomes_of_it_is_told()
             raise CliError("E131 no answer", exit_codes.DEVICE)
 
     with pytest.raises(CliError) as told:
-        follow(Lost())
+        follow_run(Lost())
     assert told.value.exit_code == exit_codes.DEVICE
     assert told.value.message == f"E131 no answer\n{Played.lost_words}"
 
@@ -81,7 +81,7 @@ def test_a_run_that_is_lost_keeps_its_exit_code_and_what_becomes_of_it_is_told()
 def test_a_run_whose_gateway_has_started_anew_is_none_that_was_not_begun(clock: SimpleNamespace) -> None:
     """A control that is killed is back before the next look: it knows of no run, and its log of no refusal."""
     with pytest.raises(RestartedError, match="A401 the gateway has started anew") as told:
-        follow(Played("idle", *["ladder"] * 20, "idle"))
+        follow_run(Played("idle", *["ladder"] * 20, "idle"))
     assert Played.lost_words not in told.value.message and clock.now_s < 5.0
 
 
@@ -94,7 +94,7 @@ def test_a_run_that_was_stopped_is_followed_until_it_has_come_to_rest() -> None:
             return super().look()
 
     run = Interrupted("ladder", "ladder", "stopped")
-    assert follow(run) == {"phase": "stopped"} and run.stops == 1
+    assert follow_run(run) == {"phase": "stopped"} and run.stops == 1
 
 
 def test_a_second_end_from_outside_waits_until_the_stop_is_said() -> None:
@@ -108,14 +108,14 @@ def test_a_second_end_from_outside_waits_until_the_stop_is_said() -> None:
 
     run = Impatient("ladder")
     with pytest.raises(KeyboardInterrupt):
-        follow(run)
+        follow_run(run)
     assert run.stops == 1
 
 
 def test_what_is_shown_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
     made, shown = [], following._progress
     monkeypatch.setattr(following, "_progress", lambda: made.append(shown()) or made[-1])
-    follow(Played("ladder", "stored"))
+    follow_run(Played("ladder", "stored"))
     (task,) = made[0].tasks
     assert (task.completed, task.total, task.description) == (0.25, 1.0, "stored")
     assert task.fields == {"force": "2.00 V 10.00 N", "eta": "2:05 left"}

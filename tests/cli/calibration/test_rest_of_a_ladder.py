@@ -145,7 +145,7 @@ def test_a_full_disk_is_a_failure_and_a_wrong_number_is_wrong_data(
     monkeypatch.setattr("gateway.calibrations.activation.Activation.roll_back", refuse)
     for request in ({"use": 2}, {"rollback": True}):
         with pytest.raises(CliError, match=f"{code} it says why") as ended:
-            store_access.change(tmp_path, "demo", request)
+            store_access.change_calibration(tmp_path, "demo", request)
         assert ended.value.exit_code == exit_code
 
 

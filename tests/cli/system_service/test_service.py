@@ -201,10 +201,10 @@ def test_a_service_that_runs_goes_on_and_it_is_said_what_takes_the_new_unit(monk
     monkeypatch.setattr(installation, "run_command", answer)
     plan = installation.Installation("force-gateway-x.service", {}, (("systemctl", "enable", "--now", "x"),))
     state = "inactive"
-    assert installation.install(plan, Path("/")) == ([], False)
+    assert installation.install_service(plan, Path("/")) == ([], False)
     state = "active"
     asked.clear()
-    assert installation.install(plan, Path("/")) == ([], True)
+    assert installation.install_service(plan, Path("/")) == ([], True)
     assert asked == ["systemctl is-active force-gateway-x.service", "systemctl enable --now x"]
     monkeypatch.setattr(installation, "plan_installation", lambda *_, **__: plan)
     assert "systemctl restart force-gateway-x.service takes what is new" in gateway("service", "install", "demo").stdout

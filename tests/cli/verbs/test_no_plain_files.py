@@ -83,7 +83,7 @@ def test_restore_says_that_a_backup_is_no_file(kind: str, state: Path, call: Cal
 
 @pytest.mark.parametrize("kind", ["a pipe", "a device"])
 def test_init_passes_over_what_is_no_file_in_its_folder(kind: str, state: Path) -> None:
-    from gateway.cli.guided_rig import own_files, own_profiles
+    from gateway.cli.setup.guided_rig import own_files, own_profiles
 
     put(kind, state.parent / "a.yaml")
     with never_waiting():

@@ -10,7 +10,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from gateway.cli.wire_example import example
+from gateway.cli.setup.wire_example import example
 from gateway.devices.force_reading import ForceReading
 from gateway.ports import PortInfo
 from gateway.processes import exit_codes

@@ -11,8 +11,12 @@ from gateway.control.settings import Defaults, Limits, SelfTestSettings, Supervi
 from gateway.devices import DeviceRole
 from gateway.devices.device_checks.watchdog import FEEDS_PER_TIME
 from gateway.profiles import load_rig
-from gateway.profiles.rigs import checks, face_checks, line_checks, network_checks, valve_checks
-from gateway.profiles.rigs.checks import Check, Parts
+from gateway.profiles.rigs.checks import faces as face_checks
+from gateway.profiles.rigs.checks import lines as line_checks
+from gateway.profiles.rigs.checks import network as network_checks
+from gateway.profiles.rigs.checks import values as checks
+from gateway.profiles.rigs.checks import valve as valve_checks
+from gateway.profiles.rigs.checks.parts import Check, Parts
 from gateway.profiles.rigs.rig_file import CellFile, Network, ValveFile
 
 LIMITS = Limits(force_max_n=50.0, over_force_n=60.0, smallest_force_n=0.2, voltage_max_v=9.0)

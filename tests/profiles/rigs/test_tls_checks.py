@@ -9,12 +9,12 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.x509.oid import NameOID
 
-from gateway.cli.certificates import Signed, make_ca, make_server, store
+from gateway.cli.setup.certificates import Signed, make_ca, make_server, store
 from gateway.fieldbus.peers import address_of
 from gateway.modbus import Peer
 from gateway.modbus.certificate import read_certificate, read_certificates
 from gateway.profiles import Report, check_report
-from gateway.profiles.rigs import tls_checks
+from gateway.profiles.rigs.checks import tls as tls_checks
 from gateway.profiles.rigs.faces import TlsFace
 from tests.certificates import serial_of, store_all
 from tests.other_kinds import never_waiting, put

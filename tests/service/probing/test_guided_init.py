@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import pytest
 from click.testing import CliRunner, Result
 
-from gateway.cli.guided_rig import set_in
 from gateway.cli.main import command
-from gateway.cli.port_probing import known_profiles
-from gateway.cli.starter_rig import starter_rig
+from gateway.cli.setup.guided_rig import set_in
+from gateway.cli.setup.port_probing import known_profiles
+from gateway.cli.setup.starter_rig import starter_rig
 from gateway.devices import DeviceProfile
 from gateway.devices.messages import SetVoltage
 from gateway.profiles import check_report, load_device

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from gateway.cli.main import command
-from gateway.cli.port_probing import tell_report
+from gateway.cli.setup.port_probing import tell_report
 from gateway.devices import SerialSettings, ValveDevice, cell_device
 from gateway.devices.messages import AskDevice, DeviceStep, Garbage, ReadPressure, ReadVoltage
 from gateway.devices.profile import DeviceRole

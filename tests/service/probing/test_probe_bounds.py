@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from gateway.cli.port_probing import tell_report
+from gateway.cli.setup.port_probing import tell_report
 from gateway.devices import DeviceProfile, ValveDevice, ValveDirection, cell_device, output_device
 from gateway.devices.binary.register_access import RegisterAccess
 from gateway.devices.device_checks.identity import Identity

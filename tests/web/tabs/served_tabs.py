@@ -17,7 +17,7 @@ import uvicorn
 
 from gateway.live.control_link import ControlLink
 from gateway.web.context import WebContext
-from gateway.web.security import CSRF_HEADER, Door
+from gateway.web.security import CSRF_HEADER, PageAccess
 from gateway.web.server import make_app
 
 
@@ -68,7 +68,9 @@ def serve(state: Path, rig: str = "demo") -> Iterator[ServedPage]:
 
     async def run() -> None:
         context = WebContext(state, rig, True, ControlLink(state))
-        config = uvicorn.Config(make_app(context, Door(host, port), None), log_config=None, timeout_graceful_shutdown=2)
+        config = uvicorn.Config(
+            make_app(context, PageAccess(host, port), None), log_config=None, timeout_graceful_shutdown=2
+        )
         servers.append(uvicorn.Server(config))
         await servers[0].serve([listener])
 

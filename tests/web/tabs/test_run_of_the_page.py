@@ -8,7 +8,7 @@ import pytest
 from gateway.live.control_link import ControlLink
 from gateway.web.context import WebContext
 from gateway.web.events import EventSource
-from gateway.web.security import Door
+from gateway.web.security import PageAccess
 from gateway.web.server import make_app
 from gateway.web.tabs.run_follower import ABANDONED_S, RunFollower
 from tests.web.tabs.scripted_control import IDLE
@@ -72,7 +72,7 @@ def test_a_run_goes_on_while_a_page_is_open_whatever_tab_it_shows(state, control
 def test_the_page_counts_who_looks(state, monkeypatch: pytest.MonkeyPatch) -> None:
     context = WebContext(state, "demo", True, ControlLink(state))
     assert context.viewers() == 0
-    make_app(context, Door("127.0.0.1", 8080), None)
+    make_app(context, PageAccess("127.0.0.1", 8080), None)
     monkeypatch.setattr(EventSource, "viewers", property(lambda events: 3))
     assert context.viewers() == 3
 

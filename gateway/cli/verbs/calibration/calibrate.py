@@ -78,7 +78,7 @@ def command(*, state: StateChoice, wire: "Wire | None", yes: bool, as_json: bool
     The calibration gets a number. An experiment is a --plan that `diagnose` wrote. Runs on the gateway of this
     machine. Ctrl-C takes the force to 0 and keeps the data. Nothing is activated: that is `calibration use N`.
     """
-    from gateway.cli.calibration.follow import follow
+    from gateway.cli.calibration.follow import follow_run
     from gateway.cli.calibration.plans import is_experiment
     from gateway.cli.calibration.remote_run import RemoteRun
     from gateway.cli.calibration.runs import LocalRun
@@ -103,7 +103,7 @@ def command(*, state: StateChoice, wire: "Wire | None", yes: bool, as_json: bool
         _warn_of_another_rig(run_request, preview)
     _ask(preview, yes)
     with closing(run):
-        end = follow(run)
+        end = follow_run(run)
     _tell(end, as_json, resumes=resumes)
 
 

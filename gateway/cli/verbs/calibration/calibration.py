@@ -96,9 +96,9 @@ def use_command(*, number: int, force: bool, state: StateChoice, as_json: bool) 
 
     A running gateway swaps it without a bump. `calibration rollback` goes back.
     """
-    from gateway.cli.calibration.store_access import change
+    from gateway.cli.calibration.store_access import change_calibration
 
-    _tell_change(change(state.directory, state.rig, {"use": number, "force": force}), as_json=as_json)
+    _tell_change(change_calibration(state.directory, state.rig, {"use": number, "force": force}), as_json=as_json)
 
 
 @command.command(name="rollback")
@@ -106,9 +106,9 @@ def use_command(*, number: int, force: bool, state: StateChoice, as_json: bool) 
 @json_option
 def rollback_command(*, state: StateChoice, as_json: bool) -> None:
     """Use again what was in use before the last change."""
-    from gateway.cli.calibration.store_access import change
+    from gateway.cli.calibration.store_access import change_calibration
 
-    _tell_change(change(state.directory, state.rig, {"rollback": True}), as_json=as_json)
+    _tell_change(change_calibration(state.directory, state.rig, {"rollback": True}), as_json=as_json)
 
 
 @command.command(name="compare")

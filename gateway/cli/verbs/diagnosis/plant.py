@@ -165,14 +165,14 @@ def use_command(*, number: int, before: str | None, dry_run: bool, state: StateC
     A running gateway takes it while its output is disabled. `plant rollback` goes back.
     """
     from gateway.cli.plants.descriptions import compensation_facts, describe_compensation
-    from gateway.cli.plants.store_access import change, load_rig_or_none, load_stored, open_store
+    from gateway.cli.plants.store_access import change_plant, load_rig_or_none, load_stored, open_store
 
     plant, rig = load_stored(open_store(state.directory), number) if number else None, load_rig_or_none(state)
     if not as_json and plant:
         click.echo("\n".join(describe_compensation(plant, rig)))
     answer: dict[str, Any] = {"number": number} | (compensation_facts(plant, rig) if plant else {})
     if not dry_run:
-        answer |= change(state, {"use": number}, before)
+        answer |= change_plant(state, {"use": number}, before)
     click.echo(json.dumps(answer)) if as_json else _tell(answer)
 
 
@@ -181,9 +181,9 @@ def use_command(*, number: int, before: str | None, dry_run: bool, state: StateC
 @json_option
 def rollback_command(*, state: StateChoice, as_json: bool) -> None:
     """Use again what was in use before the last change."""
-    from gateway.cli.plants.store_access import change
+    from gateway.cli.plants.store_access import change_plant
 
-    answer = change(state, {"rollback": True}, None)
+    answer = change_plant(state, {"rollback": True}, None)
     click.echo(json.dumps(answer)) if as_json else _tell(answer)
 
 

@@ -131,9 +131,9 @@ def keep_command(*, number: int, lets_go: bool, state: StateChoice) -> None:
 @state_options
 def delete_command(*, number: int, yes: bool, state: StateChoice) -> None:
     """Delete recording N; not one that is kept, the reference, or one that is being recorded."""
-    from gateway.cli.recordings.removal import delete
+    from gateway.cli.recordings.removal import delete_recording
 
-    click.echo(f"deleted {delete(state.directory, number, asks=not yes)}")
+    click.echo(f"deleted {delete_recording(state.directory, number, asks=not yes)}")
 
 
 @command.command(name="prune")
@@ -150,9 +150,9 @@ def delete_command(*, number: int, yes: bool, state: StateChoice) -> None:
 @state_options
 def prune_command(*, dry_run: bool, yes: bool, state: StateChoice, days: float | None, most_bytes: int | None) -> None:
     """Delete the oldest recordings, as the rig's `recordings: retention` says; the gateway does so every hour."""
-    from gateway.cli.recordings.removal import prune, retention_of
+    from gateway.cli.recordings.removal import prune_recordings, retention_of
 
-    gone = prune(state.directory, retention_of(state, days, most_bytes), dry_run=dry_run, asks=not yes)
+    gone = prune_recordings(state.directory, retention_of(state, days, most_bytes), dry_run=dry_run, asks=not yes)
     for one in gone:
         click.echo(f"{'would delete' if dry_run else 'deleted'} {one.path}: {one.why}")
     if not gone:

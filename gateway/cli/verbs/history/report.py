@@ -24,12 +24,12 @@ def command(*, file: Path, force: bool, show: bool, state: StateChoice) -> None:
     become master-1, master-2 ... Look at it before you send it: --show prints all of it. The gateway may be running
     or not.
     """
-    from gateway.cli.support_bundle import collect, pack_bundle, parts_missing
+    from gateway.cli.support_bundle import collect_parts, pack_bundle, parts_missing
     from gateway.profiles import load_rig
 
     if file.exists() and not (force or show):
         raise already_exists(file)
-    parts = collect(state.directory, lambda: load_rig(state.rig).texts.items())
+    parts = collect_parts(state.directory, lambda: load_rig(state.rig).texts.items())
     if show:
         click.echo("\n".join(f"== {name}\n{text}" for name, text in parts.items()))
         return

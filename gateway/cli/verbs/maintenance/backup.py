@@ -20,7 +20,7 @@ def command(*, file: Path, force: bool, state: StateChoice) -> None:
 
     Calibrations, recordings, events. The gateway may be running.
     """
-    from gateway.cli.state_archive import pack
+    from gateway.cli.state_archive import pack_state
 
     directory = state.directory
     if not directory.is_dir():
@@ -31,5 +31,5 @@ def command(*, file: Path, force: bool, state: StateChoice) -> None:
         )
     if file.exists() and not force:
         raise already_exists(file)
-    names = pack(directory, file)
+    names = pack_state(directory, file)
     click.echo(f"packed {count_of(names, 'file')} of {directory} into {file}, {file.stat().st_size / 1e3:.1f} kB")

@@ -24,7 +24,7 @@ def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> No
 
     Wholly or not at all. The gateway must not be running.
     """
-    from gateway.cli.state_archive import ArchiveError, names_in, unpack
+    from gateway.cli.state_archive import ArchiveError, names_in, unpack_state
 
     directory = state.directory
     try:
@@ -35,7 +35,7 @@ def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> No
             click.echo("\n".join([*names, f"{count_of(names, 'file')} would be restored to {directory}"]))
             return
         with _not_running(directory):
-            previous = unpack(file, directory)
+            previous = unpack_state(file, directory)
     except ArchiveError as error:
         raise CliError(f"E404 {error}; nothing was changed", exit_codes.DATA) from None
     click.echo(

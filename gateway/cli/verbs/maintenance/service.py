@@ -48,7 +48,7 @@ def install_command(*, rig: str, dry_run: bool, networks: tuple[str, ...], progr
     The rig is checked first. The unit is restarted when its control loop stands still, and not when its configuration is
     at fault (exit codes 2, 65, 77, 78). Recordings, calibrations and events are kept in /var/lib/force-gateway/RIG.
     """
-    from gateway.cli.system_service.installation import install, plan_installation
+    from gateway.cli.system_service.installation import install_service, plan_installation
     from gateway.profiles import load_rig
     from gateway.service.supervisor.run_options import stem_of
 
@@ -57,7 +57,7 @@ def install_command(*, rig: str, dry_run: bool, networks: tuple[str, ...], progr
         click.echo("\n".join(f"# /{name}\n{text}" for name, text in plan.files.items()))
         click.echo("\n".join(" ".join(words) for words in plan.commands))
         return
-    written, ran = install(plan, root)
+    written, ran = install_service(plan, root)
     for path in written:
         click.echo(f"wrote {path}")
     for note in plan.notes:
@@ -79,11 +79,11 @@ def install_command(*, rig: str, dry_run: bool, networks: tuple[str, ...], progr
 @_ROOT
 def uninstall_command(*, rig: str, root: Path) -> None:
     """Stop the service of RIG and remove its unit; what it has recorded stays."""
-    from gateway.cli.system_service.installation import uninstall
+    from gateway.cli.system_service.installation import uninstall_service
     from gateway.service.supervisor.run_options import stem_of
 
     try:
-        click.echo(f"removed {uninstall(stem_of(rig), root)}; /var/lib/force-gateway/{stem_of(rig)} stays")
+        click.echo(f"removed {uninstall_service(stem_of(rig), root)}; /var/lib/force-gateway/{stem_of(rig)} stays")
     except PermissionError as error:
         raise CliError(f"E107 {error.filename}: only root may remove it", exit_codes.PERMISSION) from None
 

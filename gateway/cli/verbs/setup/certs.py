@@ -108,7 +108,7 @@ def _refuse_to_overwrite(folder: Path, names: list[str]) -> None:
 
 
 def _make(folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: int) -> None:
-    from gateway.cli import certificates
+    from gateway.cli.setup import certificates
 
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     made: dict[str, certificates.Signed] = {}

@@ -54,7 +54,7 @@ def command(context: click.Context, *, file: str, probe: bool, port: str | None,
 
 def _probe(checked: "Checked", port: str | None, *, is_quiet: bool) -> tuple[int, dict[str, Any]]:
     """Ask what is behind the ports; the exit code, OK where each device is the one that was named, and the probes as JSON."""
-    from gateway.cli import port_probing as probing
+    from gateway.cli.setup import port_probing as probing
 
     if checked.kind != ("device" if port else "rig"):
         raise CliError(
@@ -89,7 +89,7 @@ def _tell(name: str, lines: "Iterator[str]", *, is_quiet: bool) -> None:
 
 def _print(file: str, checked: "Checked") -> None:
     """Faults and warnings as compilers print theirs, on stderr; what was read, on stdout."""
-    from gateway.cli.profile_facts import facts
+    from gateway.cli.setup.profile_facts import facts
     from gateway.profiles import CALLED
 
     for fault in checked.faults:
@@ -126,7 +126,7 @@ def _missing_extras(rig: "Rig") -> "Iterator[str]":
 
 def _document(checked: "Checked") -> dict[str, Any]:
     """Of a rig: its facts under `rig`; of anything else: one sentence under its kind."""
-    from gateway.cli.profile_facts import facts
+    from gateway.cli.setup.profile_facts import facts
 
     documents: dict[str, Any] = {"kind": checked.kind, "rig": None}
     if not checked.faults:

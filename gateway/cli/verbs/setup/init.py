@@ -27,7 +27,7 @@ def command(*, name: str, guided: bool | None) -> None:
     NAME.yaml, in the current directory (default: my-cell). At a terminal it asks first: which ports, which devices (they are
     asked, too, what changes nothing), which forces; the file is one that `check` accepts.
     """
-    from gateway.cli.starter_rig import starter_rig
+    from gateway.cli.setup.starter_rig import starter_rig
     from gateway.profiles import list_shipped
 
     target = Path(name if name.endswith((".yaml", ".yml")) else f"{name}.yaml")
@@ -62,6 +62,6 @@ def command(*, name: str, guided: bool | None) -> None:
 
 
 def _ask(name: str) -> str:
-    from gateway.cli.guided_rig import ask_rig
+    from gateway.cli.setup.guided_rig import ask_rig
 
     return ask_rig(name)

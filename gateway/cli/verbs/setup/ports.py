@@ -50,7 +50,7 @@ def command(context: click.Context, *, paths: tuple[str, ...], listen: bool, sec
 
 def _listen(paths: tuple[str, ...], seconds: float, *, as_json: bool) -> int:
     """Return the exit code: of the first port that did not open."""
-    from gateway.cli import port_probing as probing
+    from gateway.cli.setup import port_probing as probing
 
     found, failed = list[dict[str, Any]](), exit_codes.OK
     for path in paths:

@@ -5,8 +5,8 @@ import { Told, button, h, moment, number, prepare, report, showOnce, table, whil
 /** Builds the tab. api: get(path), post(path, body). */
 export function mount(element, api) {
   const told = new Told();
-  const calibrations = new Shelf(api, told, CALIBRATIONS);
-  const plants = new Shelf(api, told, PLANTS);
+  const calibrations = new DocumentList(api, told, CALIBRATIONS);
+  const plants = new DocumentList(api, told, PLANTS);
   prepare(
     element,
     h("h2", {}, "Calibrations"),
@@ -50,7 +50,7 @@ const PLANTS = {
   lookWords: "What it does",
 };
 
-class Shelf {
+class DocumentList {
   constructor(api, told, kind) {
     this.api = api;
     this.told = told;

@@ -6,7 +6,7 @@ from typing import Final
 from gateway import defaults
 from gateway.profiles.http_sections import split_listen
 from gateway.profiles.rigs.addresses import is_certificate
-from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.profiles.rigs.checks.parts import Check, Found, Parts
 from gateway.profiles.strict_yaml.fault_sentences import newton
 from gateway.registers.writes.ownership import serial_place
 

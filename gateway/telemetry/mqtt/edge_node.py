@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.live.live_state import LiveState
-from gateway.telemetry.broker_session import BrokerMessage
+from gateway.telemetry.mqtt.broker_session import BrokerMessage
 from gateway.telemetry.sparkplug_metrics import TYPES, values_of
 from gateway.telemetry.sparkplug_payload import DataType, SparkplugMetric, Value, decode_values, encode_payload
 

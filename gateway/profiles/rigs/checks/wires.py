@@ -1,41 +1,14 @@
-"""Whether the wires of a rig are fast enough, and their numbers fine enough, for what the rig asks of them.
+"""Whether the wires of a rig are fast enough, and their numbers fine enough, for what the rig asks of them."""
 
-Bytes and bits are counted, so each finding says what is possible at this speed; the time that the device itself takes to
-answer comes on top and is not known.
-"""
-
-from collections.abc import Iterator
-from dataclasses import dataclass
 from math import inf
 from typing import Final
 
 from gateway.control.supervision.repeat_law import counts_found_within
 from gateway.control.supervision.stuck_sensor import SLOW_S
-from gateway.devices import (
-    CellHost,
-    DeviceProfile,
-    DeviceRole,
-    SerialSettings,
-    cell_device,
-    cell_host,
-    output_device,
-    output_host,
-)
-from gateway.devices.force_reading import UNIT
-from gateway.devices.messages import (
-    Accepted,
-    AskDevice,
-    DeviceAnswer,
-    DeviceStep,
-    OutputReply,
-    OutputRequest,
-    Pressure,
-    ReadPressure,
-    ReadVoltage,
-    SetVoltage,
-)
-from gateway.profiles.rigs.checks import Check, Found, Parts
-from gateway.profiles.rigs.line_checks import of_role
+from gateway.devices import DeviceProfile, DeviceRole, output_host
+from gateway.profiles.rigs.checks.lines import of_role
+from gateway.profiles.rigs.checks.parts import Check, Found, Parts
+from gateway.profiles.rigs.checks.wire_times import output_cycle_s, readings_of, talks_of
 from gateway.profiles.strict_yaml.fault_sentences import newton, number, second
 
 _COUNTS_OF_NOISE: Final = 0.7  # a rate that needs more noise than this to find a frozen cell gets a warning
@@ -46,83 +19,13 @@ _LEAST_SAMPLES: Final = 2.0  # readings within sample_timeout_s, so that one tha
 _SLOWEST_HZ: Final = 20.0  # the pneumatics of the paper's rig settle in 0.27-0.49 s and need 20-50 Hz
 
 
-def _output_talks_s(device: DeviceProfile, character_s: float) -> dict[str, float]:
-    """Return what question and answer take on the wire, s, of every exchange that the gateway has with an output."""
-    high_v = device.voltage_range_v[1]
-    talks: dict[str, tuple[OutputRequest, OutputReply]] = {"set_voltage": (SetVoltage(high_v), Accepted(high_v))}
-    if device.read_voltage:
-        talks["read_voltage"] = ReadVoltage(), Accepted(high_v)
-    if device.read_pressure:
-        talks["read_pressure"] = ReadPressure(), Pressure(device.read_pressure.range.pressure_pa[1])
-    steps = (step for step in output_host(device).checks if step is not DeviceStep.DISARM)  # which nobody waits for
-    talks |= {step.value: (AskDevice(step), DeviceAnswer(step, is_right=True)) for step in steps}
-    return {name: character_s * _characters(device, *talk) for name, talk in talks.items()}
-
-
-def _characters(device: DeviceProfile, question: OutputRequest, answer: OutputReply) -> int:
-    frame, far = output_host(device).request(question), output_device(device)
-    understood = (one for one in far.receive(frame, 0.0) if isinstance(one, OutputRequest))
-    return len(frame) + sum(len(far.reply(answer, to=one)) for one in understood)
-
-
-def wire_cycle_s(device: DeviceProfile, settings: SerialSettings) -> float:
-    """Return what one cycle of a device takes on the wire alone, s: of an output a setting with the reading after it, of a
-    load cell a reading with its question."""
-    if device.role is DeviceRole.OUTPUT:
-        took_s = _output_talks_s(device, settings.character_s)
-        return took_s["set_voltage"] + took_s.get("read_pressure", took_s.get("read_voltage", 0.0))
-    unit = None if device.reading.newton_per_unit or device.reading.template.field(UNIT) else "N"
-    characters = len(cell_host(device, unit=unit).poll()) + len(cell_device(device, unit).frame(0.0))
-    return characters * settings.character_s
-
-
-@dataclass(frozen=True, slots=True)
-class _Readings:
-    """A load cell on its wire. period_s: between two readings; wire_s: what one takes, its question with it."""
-
-    device: DeviceProfile
-    host: CellHost
-    baud: int
-    wire_s: float
-
-    @property
-    def period_s(self) -> float:
-        rate_hz = self.device.reading.rate_hz
-        return max(self.wire_s, 1.0 / rate_hz if rate_hz else 0.0)
-
-    @property
-    def is_asked(self) -> bool:
-        return bool(self.device.read_force)
-
-
-def _readings(parts: Parts) -> Iterator[_Readings]:
-    """Yield the rig's load cell, where it can be read at all (else told by the_unit_is_known)."""
-    device, line = of_role(parts.cell_device, DeviceRole.LOAD_CELL), parts.load_cell
-    if not device or not line:
-        return
-    try:
-        host = cell_host(device, line.sign, line.unit)
-    except ValueError:
-        return
-    characters = len(host.poll()) + len(cell_device(device, line.unit).frame(0.0))
-    settings = device.serial.at(line.baud)
-    yield _Readings(device, host, settings.baud, characters * settings.character_s)
-
-
-def _talks(parts: Parts) -> Iterator[tuple[str, float]]:
-    """Yield (exchange, time on the wire in s) of the rig's output."""
-    device, line = of_role(parts.output_device, DeviceRole.OUTPUT), parts.output
-    if device and line:
-        yield from _output_talks_s(device, device.serial.at(line.baud).character_s).items()
-
-
 def check_reply_timeout(parts: Parts) -> Found:
     """Yield a fault for a device whose reply_timeout_s is over before its answer can be through the wire."""
     if parts.output_device and parts.output:
         baud = parts.output_device.serial.at(parts.output.baud).baud
-        for name, took_s in _talks(parts):
+        for name, took_s in talks_of(parts):
             yield from check_reply_time("output.baud", parts.output_device, baud, (name, took_s))
-    for reading in _readings(parts):
+    for reading in readings_of(parts):
         if reading.is_asked:
             yield from check_reply_time("load_cell.baud", reading.device, reading.baud, ("read_force", reading.wire_s))
 
@@ -138,7 +41,7 @@ def check_reply_time(path: str, device: DeviceProfile, baud: int, talk: tuple[st
 def check_output_timeout(parts: Parts) -> Found:
     """Yield a fault for a supervision.output_timeout_s that is shorter than one exchange with the output on the wire, and for
     a device that is waited for longer than that: behind an answer that is lost the safe voltage waits, too."""
-    took_s = max((took_s for _, took_s in _talks(parts)), default=0.0)
+    took_s = max((took_s for _, took_s in talks_of(parts)), default=0.0)
     device, bounds = of_role(parts.output_device, DeviceRole.OUTPUT), parts.supervision
     if bounds and device and device.reply_timeout_s > bounds.output_timeout_s:
         waits = f"{device.name} is waited for {second(device.reply_timeout_s)} (reply_timeout_s), and the safe voltage waits "
@@ -161,22 +64,16 @@ def check_wire_delay(parts: Parts) -> Found:
         return
     bound_s = parts.supervision.response_lag_s
     late = f"longer than supervision.response_lag_s = {second(bound_s)}: a force that is seen so late looks like a wrong gain"
-    if (cycle_s := _cycle_s(parts)) > bound_s:
-        yield "output.baud", f"a setting and a reading take {cycle_s:.2f} s on the wire, {late}"
-    for reading in _readings(parts):
+    if (took_s := output_cycle_s(parts)) > bound_s:
+        yield "output.baud", f"a setting and a reading take {took_s:.2f} s on the wire, {late}"
+    for reading in readings_of(parts):
         if reading.period_s > bound_s:
             yield "load_cell.baud", f"a reading of {reading.device.name} takes {reading.period_s:.2f} s, {late}"
 
 
-def _cycle_s(parts: Parts) -> float:
-    """Return a setting and the question that keeps the line alive; 0 without an output."""
-    took_s = dict(_talks(parts))
-    return took_s.get("set_voltage", 0.0) + took_s.get("read_pressure", took_s.get("read_voltage", 0.0))
-
-
 def check_sample_timeout(parts: Parts) -> Found:
     """Yield a fault for a supervision.sample_timeout_s that is shorter than two readings of the load cell."""
-    for reading in _readings(parts):
+    for reading in readings_of(parts):
         if parts.supervision and parts.supervision.sample_timeout_s < _LEAST_SAMPLES * reading.period_s:
             bound, rate = second(parts.supervision.sample_timeout_s), f"{1.0 / reading.period_s:.3g} readings/s"
             talk = f"{_LEAST_SAMPLES * reading.period_s:.3g} s ({rate} at {reading.baud} baud)"
@@ -190,7 +87,7 @@ def check_display_range(parts: Parts) -> Found:
     """Yield a fault for a display that ends below the bound on force: it would show its last number for ever."""
     if (limits := parts.limits) is None or parts.load_cell is None:
         return
-    for reading in _readings(parts):
+    for reading in readings_of(parts):
         message = reading.device.reading
         per_count = reading.host.resolution_n / message.step
         key = "force_max_n" if message.says_overload else "over_force_n"
@@ -205,7 +102,7 @@ def check_reading_resolution(parts: Parts) -> Found:
 
     sample_quantum_n decides when a reading counts as frozen, the band whether the force is held.
     """
-    for reading in _readings(parts):
+    for reading in readings_of(parts):
         count_n = reading.host.resolution_n
         one = f"one count of {reading.device.name}, {count_n:.3g} N"
         if parts.supervision and parts.supervision.sample_quantum_n < _LEAST_QUANTUM_COUNTS * count_n:
@@ -229,7 +126,7 @@ def check_frozen_detection(parts: Parts) -> Found:
     """
     if parts.supervision and parts.supervision.frozen_equal_samples is not None:
         return
-    for reading in _readings(parts):
+    for reading in readings_of(parts):
         rate_hz = 1.0 / reading.period_s
         counts = counts_found_within(SLOW_S, rate_hz)
         if counts > _COUNTS_OF_NOISE:
@@ -263,21 +160,21 @@ def check_output_resolution(parts: Parts) -> Found:
 
 def check_output_speed(parts: Parts) -> Found:
     """Yield a warning for an output wire that is too slow for the pneumatics, or for its timeout."""
-    cycle_s = _cycle_s(parts)
-    if cycle_s > 1.0 / _SLOWEST_HZ:
-        reason = f"a setting and a reading take {cycle_s * 1e3:.0f} ms on the wire, {1 / cycle_s:.0f} Hz"
+    took_s = output_cycle_s(parts)
+    if took_s > 1.0 / _SLOWEST_HZ:
+        reason = f"a setting and a reading take {took_s * 1e3:.0f} ms on the wire, {1 / took_s:.0f} Hz"
         yield "output.baud", f"{reason}; the pneumatics need {number(_SLOWEST_HZ)} Hz"
-    if parts.supervision and parts.supervision.output_timeout_s < _LEAST_CYCLES * cycle_s:
+    if parts.supervision and parts.supervision.output_timeout_s < _LEAST_CYCLES * took_s:
         timeout = second(parts.supervision.output_timeout_s)
         yield (
             "supervision.output_timeout_s",
-            f"{timeout} is less than three settings with readings on the wire: {_LEAST_CYCLES * cycle_s:.2f} s",
+            f"{timeout} is less than three settings with readings on the wire: {_LEAST_CYCLES * took_s:.2f} s",
         )
 
 
 def check_sample_rate(parts: Parts) -> Found:
     """Yield a warning for a load-cell wire that carries fewer readings than the device sends, or than the pneumatics need."""
-    for reading in _readings(parts):
+    for reading in readings_of(parts):
         rate_hz, possible_hz = reading.device.rate_hz, 1.0 / reading.wire_s
         if rate_hz > possible_hz:
             yield (
@@ -291,7 +188,7 @@ def check_sample_rate(parts: Parts) -> Found:
 
 def check_lost_answer(parts: Parts) -> Found:
     """Yield a warning for a supervision.sample_timeout_s that one lost answer of the load cell uses up."""
-    for reading in _readings(parts):
+    for reading in readings_of(parts):
         gap_s = reading.device.reply_timeout_s + reading.period_s
         if reading.is_asked and parts.supervision and parts.supervision.sample_timeout_s < gap_s:
             bound = second(parts.supervision.sample_timeout_s)
@@ -303,7 +200,7 @@ def check_lost_answer(parts: Parts) -> Found:
 
 def check_sample_quantum(parts: Parts) -> Found:
     """Yield a warning for a supervision.sample_quantum_n far above one count of the load cell."""
-    for reading in _readings(parts):
+    for reading in readings_of(parts):
         count_n = reading.host.resolution_n
         if parts.supervision and parts.supervision.sample_quantum_n > _MOST_QUANTUM_COUNTS * count_n:
             reason = f"is far from one count of {reading.device.name}, {count_n:.3g} N: write {count_n:.3g}"

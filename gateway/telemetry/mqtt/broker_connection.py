@@ -8,8 +8,8 @@ from typing import Any, Final
 from gateway.extras import import_library
 from gateway.live.standstill import Standstill
 from gateway.plain_file import read_plain, tell_refusal
-from gateway.telemetry.broker_session import BrokerMessage, BrokerSession
-from gateway.telemetry.command_queue import CommandQueue
+from gateway.telemetry.mqtt.broker_session import BrokerMessage, BrokerSession
+from gateway.telemetry.mqtt.command_queue import CommandQueue
 
 AGAIN_S: Final = 2.0
 _KEEPALIVE_S: Final = 10

@@ -5,10 +5,10 @@ from typing import Final
 from gateway.devices import DeviceRole, ValveDirection, ValveHost
 from gateway.devices.messages import Garbage
 from gateway.devices.valve import ValveDevice
-from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.profiles.rigs.checks.lines import is_same_port, of_role, why_no_path
+from gateway.profiles.rigs.checks.parts import Check, Found, Parts
+from gateway.profiles.rigs.checks.wires import check_reply_time
 from gateway.profiles.rigs.device_settings import find_unfit_settings
-from gateway.profiles.rigs.line_checks import is_same_port, of_role, why_no_path
-from gateway.profiles.rigs.wire_checks import check_reply_time
 from gateway.profiles.strict_yaml.fault_sentences import second, volt
 
 

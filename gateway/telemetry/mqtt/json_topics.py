@@ -12,8 +12,8 @@ from collections.abc import Awaitable, Callable, Iterator, Sequence
 from typing import Any, Final
 
 from gateway.live.live_state import LiveState
-from gateway.telemetry.broker_session import BrokerMessage
-from gateway.telemetry.register_commands import is_stop
+from gateway.telemetry.mqtt.broker_session import BrokerMessage
+from gateway.telemetry.mqtt.register_commands import is_stop
 
 Command = Callable[[bytes], Awaitable[dict[str, Any]]]
 _ROOM: Final = 1000

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from gateway.cli import port_probing as probing
 from gateway.cli.command_line.numbers import Finite
 from gateway.cli.errors import CliError
-from gateway.cli.starter_rig import starter_rig
+from gateway.cli.setup import port_probing as probing
+from gateway.cli.setup.starter_rig import starter_rig
 
 if TYPE_CHECKING:
     from gateway.devices import DeviceProfile
@@ -181,7 +181,7 @@ def _ask_unit(rig: GuidedRig, device: "DeviceProfile") -> None:
 
 def _fit_output(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None:
     """A bound on silence that this output can keep: it may take as long as its profile says, and one answer may be lost."""
-    from gateway.profiles.rigs.wire_checks import wire_cycle_s
+    from gateway.profiles.rigs.checks.wire_times import wire_cycle_s
 
     longest_s = max(device.reply_timeout_s, 3.0 * wire_cycle_s(device, device.serial.at(baud)))
     if longest_s > _OUTPUT_TIMEOUT_S:
@@ -190,7 +190,7 @@ def _fit_output(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None:
 
 def _fit_supervision(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None:
     """Bounds that this amplifier can keep: of a slow one a sample is older, of a coarse one a count is larger."""
-    from gateway.profiles.rigs.wire_checks import wire_cycle_s
+    from gateway.profiles.rigs.checks.wire_times import wire_cycle_s
     from gateway.units import NEWTON_PER_UNIT
 
     reading, said = device.reading, rig.settings

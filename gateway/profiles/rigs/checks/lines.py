@@ -1,4 +1,4 @@
-"""Whether the two serial lines of a rig fit: the right device at each end, and stable ports. How fast they are: wire_checks."""
+"""Whether the two serial lines of a rig fit: the right device at each end, and stable ports. How fast they are: wires."""
 
 import os
 from collections.abc import Iterator
@@ -6,7 +6,7 @@ from typing import Final
 
 from gateway.devices import DeviceProfile, DeviceRole, cell_host
 from gateway.devices.device_checks.watchdog import FEEDS_PER_TIME
-from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.profiles.rigs.checks.parts import Check, Found, Parts
 from gateway.profiles.rigs.device_settings import find_unfit_settings
 from gateway.profiles.rigs.edit_marks import PLACEHOLDER
 from gateway.profiles.rigs.rig_file import CellFile, OutputFile

@@ -101,7 +101,7 @@ def tell_report(report: "PortReport", line: "AnyLine | None" = None, *, is_own_f
 
 
 def _tell_answer(answer: "ProbeAnswer") -> "Iterator[str]":
-    from gateway.profiles.rigs.wire_checks import wire_cycle_s
+    from gateway.profiles.rigs.checks.wire_times import wire_cycle_s
     from gateway.service.probing.port_probe import show_bytes
 
     yield f"{answer.profile.name} answers at {answer.settings}: {answer.said}"

@@ -56,7 +56,7 @@ def _device(device: "DeviceProfile") -> str:
 
 def _sentences(device: "DeviceProfile") -> dict[str, str]:
     """What goes over the wire, to lay beside the manual, and what of a reading is not listened to."""
-    from gateway.cli.wire_example import example, read_over
+    from gateway.cli.setup.wire_example import example, read_over
 
     told = {"on the wire": example(device), "read over": ", ".join(read_over(device))}
     return {name: words for name, words in told.items() if words}

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from typing import Final
 
 from gateway.profiles.rigs.addresses import is_certificate
-from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.profiles.rigs.checks.lines import UNSTABLE, UNSTABLE_PATHS, lines_of
+from gateway.profiles.rigs.checks.parts import Check, Found, Parts
 from gateway.profiles.rigs.edit_marks import PLACEHOLDER
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
-from gateway.profiles.rigs.line_checks import UNSTABLE, UNSTABLE_PATHS, lines_of
 from gateway.registers.writes.ownership import LARGEST_SERIAL_PLACE, serial_place
 
 

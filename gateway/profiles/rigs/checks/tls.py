@@ -17,9 +17,9 @@ from typing import Final
 from gateway.modbus.certificate import KEY_MISMATCH, PeerCertificate, read_certificates
 from gateway.modbus.expiry import CURES, SOON_DAYS, day_of, end_of, expiry_sentence
 from gateway.plain_file import read_plain
-from gateway.profiles.rigs.checks import Check, Found, Parts
+from gateway.profiles.rigs.checks.network import is_loopback
+from gateway.profiles.rigs.checks.parts import Check, Found, Parts
 from gateway.profiles.rigs.faces import TlsFace
-from gateway.profiles.rigs.network_checks import is_loopback
 from gateway.profiles.rigs.rig_file import Network
 
 _PURPOSE: Final = 26  # X509_V_ERR_INVALID_PURPOSE
