@@ -27,13 +27,16 @@ _VERSION, _EXTENSIONS = 0xA0, 0xA3
 
 class PeerCertificate(NamedTuple):
     """name: the subject's common name; role: what the extension says, None without one; serial: in hex, as `openssl x509
-    -serial` has it; begins, ends: UTC as YYYYMMDDHHMMSSZ, which sort as the times do."""
+    -serial` has it; begins, ends: UTC as YYYYMMDDHHMMSSZ, which sort as the times do; subject, issuer: the whole names as the
+    bytes stand there, to see which of several has signed which."""
 
     name: str
     role: str | None
     serial: str
     begins: str
     ends: str
+    subject: bytes = b""
+    issuer: bytes = b""
 
 
 def read_certificate(der: bytes) -> PeerCertificate:
@@ -61,13 +64,12 @@ def _read_certificate(der: bytes) -> PeerCertificate:
     (_, whole), *_ = _parts(der)
     (_, signed), *_ = _parts(whole)
     fields = [part for part in _parts(signed) if part[0] != _VERSION]
-    serial, _, _, validity, subject = (body for _, body in fields[:5])
+    serial, _, issuer, validity, subject = (body for _, body in fields[:5])
     begins, ends = (_time(tag, body) for tag, body in _parts(validity))
     extensions = next((body for tag, body in fields[5:] if tag == _EXTENSIONS), b"")
     number = f"{int.from_bytes(serial, 'big'):X}"
-    return PeerCertificate(
-        _common_name(subject), _role(extensions), number.zfill(len(number) + len(number) % 2), begins, ends
-    )
+    number = number.zfill(len(number) + len(number) % 2)
+    return PeerCertificate(_common_name(subject), _role(extensions), number, begins, ends, subject, issuer)
 
 
 def _parts(der: bytes) -> Iterator[tuple[int, bytes]]:

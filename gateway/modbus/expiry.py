@@ -16,8 +16,23 @@ CURES: Final = {
 
 def end_of(name: str, certificates: Sequence[PeerCertificate]) -> str:
     """Return when what stands in this file ends, empty where nothing stands there: the first certificate, of a CA's the last
-    one to end."""
-    return max((shown.ends for shown in certificates[: None if name == "ca" else 1]), default="")
+    one to end. One that another of the file has signed ends with that one, too, and that one counts for nothing else."""
+    if name != "ca":
+        return certificates[0].ends if certificates else ""
+    signers = {each.issuer for each in certificates if each.issuer != each.subject}
+    last = [each for each in certificates if each.subject not in signers] or certificates
+    return max((_end_of_chain(each, certificates) for each in last), default="")
+
+
+def _end_of_chain(shown: PeerCertificate, certificates: Sequence[PeerCertificate]) -> str:
+    ends = shown.ends
+    for _ in certificates:  # a ring of names ends, too
+        above = [each for each in certificates if each.subject == shown.issuer != shown.subject]
+        if not above:
+            break
+        shown = max(above, key=lambda each: each.ends)
+        ends = min(ends, shown.ends)
+    return ends
 
 
 def expiry_sentence(name: str, file: str, ends: str) -> str:

@@ -12,7 +12,7 @@ from cryptography.x509.oid import NameOID
 from gateway.cli.certificates import Signed, make_ca, make_server, store
 from gateway.fieldbus.peers import address_of
 from gateway.modbus import Peer
-from gateway.modbus.certificate import read_certificate
+from gateway.modbus.certificate import read_certificate, read_certificates
 from gateway.profiles import Report, check_report
 from gateway.profiles.rigs import tls_checks
 from gateway.profiles.rigs.faces import TlsFace
@@ -248,6 +248,8 @@ def test_a_ca_that_another_has_signed_wants_that_one_in_its_file(tmp_path: Path)
     with (tmp_path / "ca.crt").open("ab") as file:
         file.write(root.certificate.public_bytes(serialization.Encoding.PEM))
     assert not report(tmp_path, files()).faults
+    shown = read_certificates((tmp_path / "ca.crt").read_bytes())
+    assert shown[0].issuer == shown[1].subject == shown[1].issuer != shown[0].subject
 
 
 def ending(ca: Signed, days: int, begins: int = -3, **constraints: int | None) -> Signed:

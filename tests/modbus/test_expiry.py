@@ -1,0 +1,35 @@
+"""When a file of certificates ends: a chain with the first of its links, several CAs with the last of them."""
+
+import pytest
+
+from gateway.modbus.certificate import PeerCertificate
+from gateway.modbus.expiry import end_of
+
+
+def shown(name: str, ends: str, signed_by: str = "") -> PeerCertificate:
+    return PeerCertificate(name, None, "01", "2020", ends, name.encode(), (signed_by or name).encode())
+
+
+@pytest.mark.parametrize(
+    ("ca", "ends"),
+    [
+        ([], ""),
+        ([shown("one", "2030")], "2030"),
+        ([shown("old", "2026"), shown("new", "2036")], "2036"),
+        ([shown("root", "2040"), shown("cells", "2026", "root")], "2026"),
+        ([shown("cells", "2036", "root"), shown("root", "2030")], "2030"),
+        ([shown("root", "2040"), shown("cells", "2026", "root"), shown("new cells", "2028", "root")], "2028"),
+        ([shown("root", "2040"), shown("middle", "2027", "root"), shown("cells", "2035", "middle")], "2027"),
+        ([shown("root", "2030"), shown("root", "2040"), shown("cells", "2036", "root")], "2036"),
+        ([shown("cells", "2030", "a root elsewhere")], "2030"),
+        ([shown("a", "2030", "b"), shown("b", "2029", "a")], "2029"),
+    ],
+)
+def test_a_ca_that_another_of_its_file_has_signed_ends_with_the_chain(ca: list[PeerCertificate], ends: str) -> None:
+    """Of a root of 2040 and the CA of the cells of 2026 nothing was told before 2040: in 2026 no client connected."""
+    assert end_of("ca", ca) == end_of("ca", ca[::-1]) == ends
+
+
+def test_of_the_gateway_s_own_the_first_counts() -> None:
+    assert end_of("certificate", [shown("gateway", "2027", "cells"), shown("cells", "2026")]) == "2027"
+    assert end_of("certificate", []) == ""
