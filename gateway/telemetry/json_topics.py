@@ -1,6 +1,7 @@
 """Plain JSON over MQTT, below one base topic: for people with mosquitto_sub, Node-RED, Home Assistant.
 
-`online` and `state` are retained, so that who comes later knows at once; `force` comes with every look while the broker is
+`online` and `state` are retained, so that who comes later knows at once, and told again every ten seconds: a broker may tell
+the will of the connection before behind the greeting of the next one. `force` comes with every look while the broker is
 there; `events` tell what changed, and wait for the broker when it is away. `command` is heard only where the rig allows it.
 """
 
@@ -72,14 +73,13 @@ class JsonTopics:
         """Keep what is to be told of it."""
         for event in _events(self._answered, state):
             self._keep(self._message("events", {"time_unix_s": time_unix_s} | event))
-        if (state is None) != (self._state is None):
-            self._state = state
-            self._keep(self._online())
+        is_due = abs(time_unix_s - self._told_s) >= _STATE_AGAIN_S  # either way: clocks are set back, too
+        has_turned = (state is None) != (self._state is None)
         self._state, self._answered = state, state or self._answered
+        if self._is_connected and (is_due or has_turned):
+            self._keep(self._online())
         told = _slow_part(state)
-        if (
-            told != self._told or abs(time_unix_s - self._told_s) >= _STATE_AGAIN_S
-        ):  # either way: clocks are set back, too
+        if told != self._told or is_due:
             self._told, self._told_s = told, time_unix_s
             if self._is_connected:
                 self._keep(self._message("state", told, retain=True))

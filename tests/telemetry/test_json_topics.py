@@ -42,7 +42,7 @@ def test_state_is_retained_and_force_comes_with_every_look() -> None:
     session.offer(replace(holding(), time_unix_s=5.0), 1.2)
     ((topic, force, retain),) = drain(session)
     assert (topic, force["measured_n"], force["time_unix_s"], retain) == ("force", 11.5, 1.2, False)
-    for time_s, topics in ((10.9, ["force"]), (11.0, ["state", "force"]), (20.9, ["force"])):
+    for time_s, topics in ((10.9, ["force"]), (11.0, ["online", "state", "force"]), (20.9, ["force"])):
         session.offer(holding(), time_s)  # unchanged, and told again: somebody may have cleared what is retained
         assert [name for name, _, _ in drain(session)] == topics
 
@@ -52,7 +52,7 @@ def test_a_clock_that_is_set_back_keeps_nobody_from_being_told() -> None:
     session = JsonTopics("cell", None)
     session.begin()
     session.greet()
-    for time_s, topics in ((1e6, ["online", "state", "force"]), (9.0, ["state", "force"]), (18.9, ["force"])):
+    for time_s, topics in ((1e6, ["online", "state", "force"]), (9.0, ["online", "state", "force"]), (18.9, ["force"])):
         session.offer(holding(), time_s)
         assert [name for name, _, _ in drain(session)] == topics
 
@@ -68,6 +68,21 @@ def test_events_wait_for_the_broker_and_forces_do_not() -> None:
         ("events", {"time_unix_s": 2.0, "event": "state", "value": "fault"}, False),
         ("events", {"time_unix_s": 2.0, "event": "cleared", "code": "W301"}, False),
     ]
+
+
+def test_that_control_was_away_while_the_broker_was_is_no_news_behind_the_greeting() -> None:
+    """`online` false of then was retained behind `online` true of now, until true came behind it."""
+    session = JsonTopics("cell", None)
+    session.begin()
+    session.greet()
+    session.offer(holding(), 1.0)
+    session.lose()
+    for time_s, state in ((2.0, None), (3.0, holding()), (4.0, None), (5.0, holding())):
+        session.offer(state, time_s)
+    session.begin()
+    online, _ = (told(message) for message in session.greet())
+    assert online == ("online", True, True)
+    assert [content for name, content, _ in drain(session) if name == "online"] == []
 
 
 def test_what_a_restart_of_control_has_changed_is_told_as_events() -> None:
