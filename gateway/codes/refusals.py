@@ -127,7 +127,8 @@ class RefusalReason(IntEnum):
             "another master owns the setpoint",
             "A command from a master that is not the owner.",
             "Two masters, or a client that you used before and that still holds it (owner_ip tells).",
-            "Disable there, or take over explicitly with control_word bit 3 (take ownership).",
+            "Disable there, or take over explicitly with control_word bit 3 (take ownership): 9 and a setpoint in one write "
+            "go on pressing, 8 alone clears enable.",
         ),
     )
     # the exception as Modbus/TCP Security answers a role that may not

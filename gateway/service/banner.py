@@ -1,14 +1,17 @@
 """What a person reads when the gateway is ready, and what a program reads with --json."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from ipaddress import ip_address
 from math import isfinite
 from shlex import quote
-from typing import Any
+from typing import Any, Final
 
 from gateway import VERSION, defaults
+from gateway.extras import is_installed, missing_note
 from gateway.fieldbus.peers import is_loopback
 from gateway.profiles import Rig
+from gateway.profiles.http_sections import split_listen
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +87,7 @@ def format_banner(ready: Ready) -> str:
         *([f"  valve        {ready.valve_port:<16} {rig.valve.device.name} {rig.valve.baud}"] if rig.valve else []),
         f"  lease        {_lease(rig)}",
         *_http_lines(ready),
+        *_telemetry_lines(rig),
         *(f"  {'' if index else 'try':<12} {line}" for index, line in enumerate(_all_lines_to_try(ready))),
         *(f"  note         {note}" for note in ready.notes),
         f"READY  loop {rig.loop_hz:g} Hz · Ctrl-C ramps the force to 0 and stops · not a safety device",
@@ -95,12 +99,35 @@ def _http_lines(ready: Ready) -> tuple[str, ...]:
     """Return where a browser and a scraper on this machine find the gateway, and whether others do; a token is the reader's to
     know."""
     paths = {"web": "/", "metrics": "/metrics"}
-    near = {"0.0.0.0": defaults.HOST, "::": "::1"}
     return tuple(
-        f"  {name:<12} http://{_in_url(near.get(host, host))}:{port}{paths[name]}"
-        + ("        (and on this machine's other addresses)" if host in near else "")
+        f"  {name:<12} {_url('http', host, port)}{paths[name]}{_beyond(host)}"
         for name, (host, port) in ready.http.items()
     )
+
+
+def _telemetry_lines(rig: Rig) -> Iterator[str]:
+    """Yield where OPC UA is found, and at which broker the topics are; or that it is off for want of a library."""
+    told = {}
+    if rig.opcua:
+        host, port = split_listen(rig.opcua.listen)
+        told["opcua", "asyncua"] = f"{_url('opc.tcp', host, port)}/{_beyond(host)}"
+    if mqtt := rig.mqtt:
+        node = f", spBv1.0/{mqtt.sparkplug.group}/+/{mqtt.sparkplug.node or rig.name}" if mqtt.sparkplug else ""
+        topics = f"{mqtt.base_topic or f'force-gateway/{rig.name}'}/#{node}"
+        told["mqtt", "aiomqtt"] = f"{_in_url(mqtt.host)}:{mqtt.port}   {topics}"
+    for (name, library), line in told.items():
+        yield f"  {name:<12} {line if is_installed(library) else missing_note(library, name)}"
+
+
+_NEAR: Final = {"0.0.0.0": defaults.HOST, "::": "::1"}
+
+
+def _url(scheme: str, host: str, port: int) -> str:
+    return f"{scheme}://{_in_url(_NEAR.get(host, host))}:{port}"
+
+
+def _beyond(host: str) -> str:
+    return "        (and on this machine's other addresses)" if host in _NEAR else ""
 
 
 def _all_lines_to_try(ready: Ready) -> tuple[str, ...]:
@@ -158,7 +185,7 @@ def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
 
 def _reachable_host(host: str, rig: Rig) -> str:
     """Return an address that takes connections: a server on all of them is reached at its loopback, where that may connect."""
-    loopback = {"0.0.0.0": defaults.HOST, "::": "::1"}.get(host)
+    loopback = _NEAR.get(host)
     if loopback is None:
         return host
     return loopback if any(ip_address(loopback) in network for network in rig.network.allow) else "THIS-MACHINE"

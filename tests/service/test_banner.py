@@ -11,6 +11,9 @@ import pytest
 
 from gateway.control.settings import LeaseAction
 from gateway.profiles import load_register_map, load_rig
+from gateway.profiles.http_sections import OpcUa
+from gateway.profiles.telemetry_sections import Mqtt, SparkplugNode
+from gateway.service import banner
 from gateway.service.banner import Ready, ServedFace, format_banner, ready_fields, tcp_face, try_lines
 from tests.service.rigs import demo, with_supervision
 
@@ -196,3 +199,20 @@ def test_a_terminal_of_a_serial_face_is_tried_as_its_rig_wants(
     text = format_banner(replace(ready(rig=rig), modbus=None, faces=(face,)))
     assert ("  try " in text) == bool(line)
     assert f"  try          {line}" in text if line else True
+
+
+def test_opc_ua_and_the_broker_are_told_as_the_page_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever looked for them found nothing of either, also where a library was missing, but a line of the log behind it."""
+    mqtt = Mqtt(host="broker.hall", sparkplug=SparkplugNode(group="plant"))
+    rig = replace(demo(), opcua=OpcUa(listen="0.0.0.0:4840"), mqtt=mqtt)
+    monkeypatch.setattr(banner, "is_installed", lambda library: True)
+    told = format_banner(ready(rig=rig))
+    assert "  opcua        opc.tcp://127.0.0.1:4840/        (and on this machine's other addresses)\n" in told
+    assert "  mqtt         broker.hall:1883   force-gateway/demo/#, spBv1.0/plant/+/demo\n" in told
+    named = replace(rig, opcua=None, mqtt=Mqtt(host="fd00::5", port=8883, base_topic="cells/7"))
+    assert "  mqtt         [fd00::5]:8883   cells/7/#\n" in format_banner(ready(rig=named))
+    assert "mqtt" not in format_banner(ready()) and "opcua" not in format_banner(ready(rig=named))
+    monkeypatch.setattr(banner, "is_installed", lambda library: False)
+    told = format_banner(ready(rig=rig))
+    assert "  opcua        E160 opcua is off: asyncua is not installed" in told
+    assert "  mqtt         E160 mqtt is off: aiomqtt is not installed" in told
