@@ -7,13 +7,14 @@ exception handler for it, as for a defect, and uvloop's, which cuts the new conn
 """
 
 import asyncio
+import contextlib
 import errno
 import os
 import socket
 from collections.abc import Callable
 from functools import partial
 from math import inf
-from typing import Final, Self
+from typing import Any, Final, Self
 
 _BACKLOG: Final = 100
 _PAUSE_S: Final = 0.25
@@ -94,8 +95,7 @@ class Listener:
 
 
 async def _bind(host: str, port: int) -> list[socket.socket]:
-    loop = asyncio.get_running_loop()
-    found = await loop.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    found = await _find_addresses(host, port)
     sockets: list[socket.socket] = []
     try:
         for family, kind, protocol, _, address in dict.fromkeys(found):
@@ -112,3 +112,15 @@ async def _bind(host: str, port: int) -> list[socket.socket]:
             each.close()
         raise OSError(error.errno, os.strerror(error.errno or 0)) from error
     return sockets
+
+
+async def _find_addresses(host: str, port: int) -> list[Any]:
+    """An address as it stands, and nothing is waited for; a name is asked for in a thread. OSError, also where the machine
+    refuses us one."""
+    ask = {"type": socket.SOCK_STREAM, "flags": socket.AI_PASSIVE}
+    with contextlib.suppress(socket.gaierror):
+        return socket.getaddrinfo(host or None, port, **ask | {"flags": socket.AI_PASSIVE | socket.AI_NUMERICHOST})
+    try:
+        return await asyncio.get_running_loop().getaddrinfo(host, port, **ask)
+    except RuntimeError as error:
+        raise OSError(errno.EAGAIN, f"no thread to ask for {host}: {error}") from None

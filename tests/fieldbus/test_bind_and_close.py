@@ -2,12 +2,14 @@
 
 import asyncio
 import socket
+import threading
 from ipaddress import ip_network
 from typing import Any
 
 import pytest
 
 from gateway.fieldbus import BindError, ModbusTcpServer, ServerSettings
+from gateway.fieldbus.listener import Listener
 from gateway.modbus import pdu
 from tests.fieldbus.by_hand import READ, READ_ANSWER, end_of, exchange, framed
 from tests.modbus.memory_bank import MemoryBank
@@ -21,6 +23,26 @@ def test_it_listens_where_it_was_told_to_and_nowhere_else(run: Any, serve: Any, 
         async with serve(host) as running:
             listening = running.server._listener._sockets
             assert [each.getsockname()[0] for each in listening] == [host]
+
+    run(main())
+
+
+def test_a_machine_that_refuses_every_thread_is_listened_on_all_the_same(
+    run: Any, serve: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The address was looked up in a thread, and the refusal of one was a traceback; a name still needs it, and says so."""
+
+    def refuse(thread: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    async def main() -> None:
+        with monkeypatch.context() as machine:
+            machine.setattr(threading.Thread, "start", refuse)
+            async with serve() as running:
+                assert (await exchange(running.port, framed(READ), 13))[7:] == READ_ANSWER
+            if isinstance(asyncio.get_running_loop(), asyncio.BaseEventLoop):  # uvloop has threads of its own
+                with pytest.raises(OSError, match="no thread to ask for no-such-name: can't start new thread"):
+                    await Listener.open(asyncio.Protocol, "no-such-name", 0, print)
 
     run(main())
 
