@@ -62,16 +62,7 @@ def warning_notes(rig: Rig) -> tuple[str, ...]:
 
 async def open_first(begin: Callable[[], Awaitable[None]]) -> None:
     """Open a port at a first start. begin: opens it, PortError where it does not open."""
-    deadline_s = time.monotonic() + _HELD_BOUND_S
-    while True:
-        try:
-            await begin()
-        except PortError as error:
-            if error.code != "E101" or time.monotonic() >= deadline_s:
-                raise
-        else:
-            return
-        await asyncio.sleep(_RETRY_S)
+    await _open_waiting(begin, "E101")
 
 
 async def open_again(port: SerialPort) -> PortError | None:
@@ -80,18 +71,25 @@ async def open_again(port: SerialPort) -> PortError | None:
     One that is held or away is a lost one, as it would be without the restart: a fault, and tried again for as long as it
     takes. Ending over it would use up the restarts within seconds (A402). PortError where the permission stays missing.
     """
+    try:
+        await _open_waiting(port.open, "E101", "E103")
+    except PortError as error:
+        if error.code == "E101":
+            raise
+        port.begin_lost(error)
+        return error
+    return None
+
+
+async def _open_waiting(begin: Callable[[], Awaitable[None]], *passing: str) -> None:
+    """Try again for a moment where the reason is one of those that may pass. PortError."""
     deadline_s = time.monotonic() + _HELD_BOUND_S
     while True:
         try:
-            await port.open()
-            return None
+            return await begin()
         except PortError as error:
-            is_over = time.monotonic() >= deadline_s
-            if error.code == "E101" and is_over:
+            if error.code not in passing or time.monotonic() >= deadline_s:
                 raise
-            if is_over or error.code not in ("E101", "E103"):
-                port.begin_lost(error)
-                return error
         await asyncio.sleep(_RETRY_S)
 
 
