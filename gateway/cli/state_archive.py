@@ -159,11 +159,13 @@ def _read_to_the_end(source: Path) -> None:
 
 
 def _files(state: Path) -> Iterator[Path]:
-    """Directories and plain files, parents first; links and sockets stay behind. The audit's head goes before its lines: those
-    that come meanwhile are beyond it, else it would name some that are not there. OSError for a directory that may not be read:
-    a backup without it would be taken for a whole one."""
-    for path in sorted(state.iterdir(), key=lambda path: (path.name != HEAD, path)):
-        if path.is_symlink() or not (path.is_dir() or path.is_file()):
+    """Directories and plain files, parents first; links and sockets stay behind. The audit's head goes before anybody looks
+    which files of lines there are: those that come meanwhile are beyond it, else it would name some that are not there. OSError
+    for a directory that may not be read: a backup without it would be taken for a whole one."""
+    if (head := state / HEAD).is_file() and not head.is_symlink():
+        yield head
+    for path in sorted(state.iterdir()):
+        if path == head or path.is_symlink() or not (path.is_dir() or path.is_file()):
             continue
         yield path
         if path.is_dir():

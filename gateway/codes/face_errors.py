@@ -106,7 +106,7 @@ FACE_ERRORS: Final = (
     Explanation(
         "E173",
         "server certificate outside its days",
-        "The gateway's own certificate has expired, or it or its CA's is not yet valid: no client would accept it.",
+        "The gateway's own certificate has expired, or it or its CA's is not yet valid: no client accepts it; all else works.",
         "It was made long ago, or this machine's clock is wrong.",
         "date shows the clock; make a new one (force-gateway certs) and give it to the rig file.",
     ),

@@ -117,10 +117,10 @@ async def _bind(host: str, port: int) -> list[socket.socket]:
 async def _find_addresses(host: str, port: int) -> list[Any]:
     """An address as it stands, and nothing is waited for; a name is asked for in a thread. OSError, also where the machine
     refuses us one."""
-    stream = socket.SOCK_STREAM
+    kind, bound = socket.SOCK_STREAM, socket.AI_PASSIVE
     with contextlib.suppress(socket.gaierror):
-        return socket.getaddrinfo(host or None, port, type=stream, flags=socket.AI_PASSIVE | socket.AI_NUMERICHOST)
+        return socket.getaddrinfo(host or None, port, type=kind, flags=bound | socket.AI_NUMERICHOST)
     try:
-        return await asyncio.get_running_loop().getaddrinfo(host, port, type=stream, flags=socket.AI_PASSIVE)
+        return await asyncio.get_running_loop().getaddrinfo(host, port, type=kind, flags=bound)
     except RuntimeError as error:
         raise OSError(errno.EAGAIN, f"no thread to ask for {host}: {error}") from None

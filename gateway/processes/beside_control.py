@@ -45,7 +45,8 @@ def yield_to_others() -> None:
 
 def exit_with_guardian(link: socket.socket) -> None:
     """Start a thread that waits for the guardian's end and takes the process with it, in the middle of whatever it does. A stop
-    that every process is told (systemd, `pkill`) is the guardian's to answer: until then the ramp is shown."""
+    that every process is told (systemd, `pkill`) is the guardian's to answer: until then the ramp is shown. SystemExit in words
+    where the machine refuses a thread."""
     signal.signal(signal.SIGTERM, lambda *_: None)
 
     def wait() -> None:
@@ -53,7 +54,12 @@ def exit_with_guardian(link: socket.socket) -> None:
             link.recv(1)
         os._exit(0)
 
-    threading.Thread(target=wait, daemon=True).start()
+    try:
+        threading.Thread(target=wait, daemon=True).start()
+    except RuntimeError as error:
+        raise SystemExit(
+            f"E106 no thread to wait for the guardian: {error}; too few processes or tasks allowed?"
+        ) from None
 
 
 def serve_until_guardian_ends(source: str, arguments: list[str], serve: Serve) -> int:

@@ -10,6 +10,7 @@ kept. A disk that takes no events is said once, on stderr (E150): nothing else d
 """
 
 import contextlib
+import errno
 import queue
 import sys
 import threading
@@ -209,8 +210,13 @@ class QueuedWriter:
         return self._thread.is_alive()
 
     def start(self) -> None:
-        """Start the writing thread."""
-        self._thread.start()
+        """Start the writing thread. OSError where the machine refuses one."""
+        try:
+            self._thread.start()
+        except RuntimeError as error:
+            raise OSError(
+                errno.EAGAIN, f"no thread for the log: {error}; too few processes or tasks allowed?"
+            ) from None
 
     def put(self, event: EventRecord) -> None:
         """Queue an event; a full queue drops it, and counts."""

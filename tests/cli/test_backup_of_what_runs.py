@@ -12,6 +12,28 @@ from gateway.cli import state_archive
 from gateway.cli.state_archive import pack_state, unpack_state
 
 
+@pytest.mark.parametrize("name", ["head", "audit", "000000000001.jsonl"])
+def test_an_audit_that_goes_on_in_another_file_while_it_is_packed_is_whole(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its files were listed before its head was read, which then named a line of one that was not among them."""
+    state, add = tmp_path / "state", state_archive._add
+    audit = AuditFile(state, longest_bytes=1)
+    audit.append([{"what": "enable"}])
+
+    def rotates(archive: tarfile.TarFile, path: Path, called: str) -> Any:
+        for _ in range(2 if path.name == name else 0):
+            audit.append([{"what": "disable"}])
+        add(archive, path, called)
+
+    monkeypatch.setattr(state_archive, "_add", rotates)
+    pack(state, tmp_path / "b.tar.gz")
+    audit.close()
+    unpack(tmp_path / "b.tar.gz", tmp_path / "restored")
+    verdict = verify_audit(tmp_path / "restored")
+    assert verdict.broken is None and verdict.lines >= 1
+
+
 def test_an_audit_that_grows_while_it_is_packed_is_not_taken_for_one_whose_end_was_removed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -106,3 +106,16 @@ def test_a_stop_that_every_process_is_told_leaves_it_there_until_the_guardian_en
         served.terminate()
         guardian.close()
         assert served.wait(10.0) == 0, "not by the signal"
+
+
+def test_a_machine_that_refuses_a_thread_is_told_in_one_line(tmp_path: Path) -> None:
+    """It was a traceback, at each of its starts."""
+    code, lines = say(
+        tmp_path,
+        "import threading\n"
+        'def refuse(thread): raise RuntimeError("can\'t start new thread")\n'
+        f"threading.Thread.start = refuse\n{SERVES_FOR_EVER}",
+    )
+    assert code == exit_codes.FAILED
+    (told,) = lines
+    assert told.startswith("E106 no thread to wait for the guardian: can't start new thread; too few processes")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from gateway.cli.errors import translate_error
 from gateway.codes.all_codes import CATALOGUE
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
@@ -241,3 +242,16 @@ def test_what_was_left_out_is_told_once_however_often_it_is_looked_at() -> None:
         for clock.now_s in (1.1, 1.2, 1.9):
             log._tell_left_out()
     assert texts(lines)[10:] == ["15 more lines of 'flood' left out"]
+
+
+def test_a_machine_that_refuses_a_thread_is_a_refusal_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`run` called it an internal error, and asked for a report."""
+
+    def refuse(thread: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", refuse)
+    with pytest.raises(OSError, match="no thread for the log: can't start new thread; too few processes") as refused:
+        EventLog().__enter__()
+    told = translate_error(refused.value, "run demo", debug=False).format_message()
+    assert told.startswith("E106 no thread for the log") and "internal error" not in told

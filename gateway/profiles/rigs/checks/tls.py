@@ -5,6 +5,7 @@ The files are looked at as the gateway will load them: a key that does not fit i
 expired, a key that others may read. All of it is told before the gateway starts.
 """
 
+import contextlib
 import errno
 import ssl
 import stat
@@ -81,9 +82,11 @@ def check_tls_files(parts: Parts) -> Found:
 
 
 def check_tls_days(parts: Parts) -> Found:
-    """Yield a warning for a server's certificate that is about to expire, and for its CA's: with that all go. And for one whose
-    days have not begun: as a rule nobody has set the clock yet, and behind a fault nobody would start a service again."""
+    """Yield a warning for a server's certificate that is about to expire, or has, and for its CA's: with that all go. And for
+    one whose days have not begun: as a rule nobody has set the clock yet. No fault: behind one nobody would start a service
+    again, whose other faces and page need no certificate."""
     for path, face in tls_faces(parts):
+        yield from _over(path, face)
         for name in CURES:
             file = str(getattr(face, name))
             shown = _certificates(file)
@@ -150,24 +153,51 @@ def _cure(error: OSError) -> str:
 
 
 def _unfit(path: str, face: TlsFace) -> Found:
-    server, client = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER), ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     try:
-        server.load_cert_chain(face.certificate, face.key, password=lambda: b"")
+        server = _server_of(face)
     except (ssl.SSLError, OSError, ValueError) as error:
         yield _unfit_key(path, face, error)
         return
     try:
-        client.load_verify_locations(face.ca)
+        client = _client_of(face)
     except (ssl.SSLError, OSError) as error:
         yield f"{path}.ca", f"E174 {face.ca} cannot be used: {_reason(error)}; {_MAKE}"
         return
-    shown, now = next(iter(_certificates(face.certificate)), None), _utc()
-    if shown and now > shown.ends:
-        cure = f"no client would connect; {_MAKE}"
+    if _is_in_its_days(face) and (code := _refusal(server, client)) and code != _EXPIRED:
+        yield f"{path}.certificate", _unwanted(face, code)
+
+
+def _over(path: str, face: TlsFace) -> Found:
+    shown = next(iter(_certificates(face.certificate)), None)
+    if shown and _utc() > shown.ends:
+        cure = f"until there is a new one no client connects; {_MAKE}"
         yield f"{path}.certificate", f"E173 {face.certificate} expired on {day_of(shown.ends)}: {cure}"
-    elif not (shown and now < shown.begins) and (why := _refusal(server, client)):
-        cure = f"no client that trusts {face.ca} would connect; {_MAKE}"
-        yield f"{path}.certificate", f"E175 {face.certificate} {why}: {cure}"
+    elif _is_in_its_days(face) and not list(_unreadable(path, face)):
+        with contextlib.suppress(ssl.SSLError, OSError, ValueError):  # a fault, and told as one
+            if _refusal(_server_of(face), _client_of(face)) == _EXPIRED:
+                yield f"{path}.certificate", _unwanted(face, _EXPIRED)
+
+
+def _unwanted(face: TlsFace, code: int) -> str:
+    why = _REFUSALS.get(code, "is not signed by the CA of this face")
+    return f"E175 {face.certificate} {why}: no client that trusts {face.ca} would connect; {_MAKE}"
+
+
+def _is_in_its_days(face: TlsFace) -> bool:
+    shown = next(iter(_certificates(face.certificate)), None)
+    return shown is None or shown.begins <= _utc() <= shown.ends
+
+
+def _server_of(face: TlsFace) -> ssl.SSLContext:
+    server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    server.load_cert_chain(face.certificate, face.key, password=lambda: b"")
+    return server
+
+
+def _client_of(face: TlsFace) -> ssl.SSLContext:
+    client = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    client.load_verify_locations(face.ca)
+    return client
 
 
 def _unfit_key(path: str, face: TlsFace, error: Exception) -> tuple[str, str]:
@@ -177,8 +207,9 @@ def _unfit_key(path: str, face: TlsFace, error: Exception) -> tuple[str, str]:
     return f"{path}.certificate", what
 
 
-def _refusal(server: ssl.SSLContext, client: ssl.SSLContext) -> str:
-    """Shake hands in memory, as a client will that has the CA's file; return why it would refuse, empty where it would not."""
+def _refusal(server: ssl.SSLContext, client: ssl.SSLContext) -> int:
+    """Shake hands in memory, as a client will that has the CA's file; return OpenSSL's number of why it would refuse, 0 where
+    it would not, or nobody need tell it here."""
     client.check_hostname = False  # by which name it will be reached, nobody knows here
     to_client, to_server = ssl.MemoryBIO(), ssl.MemoryBIO()
     ends = (client.wrap_bio(to_client, to_server), server.wrap_bio(to_server, to_client, server_side=True))
@@ -188,12 +219,10 @@ def _refusal(server: ssl.SSLContext, client: ssl.SSLContext) -> str:
         except ssl.SSLWantReadError:
             continue
         except ssl.SSLCertVerificationError as error:
-            if error.verify_code == _NOT_YET:  # of its CA: told as its days are
-                return ""
-            return _REFUSALS.get(error.verify_code, "is not signed by the CA of this face")
+            return 0 if error.verify_code == _NOT_YET else error.verify_code  # of its CA: told as its days are
         except ssl.SSLError:  # nothing that the files are to blame for
             break
-    return ""
+    return 0
 
 
 def _certificates(file: str) -> list[PeerCertificate]:
