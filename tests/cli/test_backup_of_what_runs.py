@@ -27,9 +27,9 @@ def test_an_audit_that_goes_on_in_another_file_while_it_is_packed_is_whole(
         add(archive, path, called)
 
     monkeypatch.setattr(state_archive, "_add", rotates)
-    pack(state, tmp_path / "b.tar.gz")
+    pack_state(state, tmp_path / "b.tar.gz")
     audit.close()
-    unpack(tmp_path / "b.tar.gz", tmp_path / "restored")
+    unpack_state(tmp_path / "b.tar.gz", tmp_path / "restored")
     verdict = verify_audit(tmp_path / "restored")
     assert verdict.broken is None and verdict.lines >= 1
 
