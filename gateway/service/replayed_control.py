@@ -6,7 +6,7 @@ only roughly: when between two rows a command came, and how long the wire was bu
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import isfinite, nan
+from math import ceil, isfinite, nan
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -29,6 +29,11 @@ if TYPE_CHECKING:
 
 _BEGIN_S: Final = 1000.0  # of virtual time
 _REPORTED_ROWS: Final = 500
+_PHASE: Final = (
+    0.5  # of a tick, behind a row: nobody knows it; the one that comes within a period leaves the decision to it
+)
+_LONGEST_GAP_S: Final = 5.0  # between two rows: behind it nothing new is decided
+_AT_ROW: Final = 0.05  # of a tick: one that is so near to the next row is that row's
 _SENT_DIGITS: Final = 4  # of the time of a setting, s: by each row that tells it
 _LEAST_SENT: Final = 10
 _ENABLED: Final = frozenset([State.READY, State.RAMPING, State.HOLDING])
@@ -73,7 +78,7 @@ def replay_control(recording: Recording, setup: ReplaySetup) -> Columns:
         compensation=replace(setup.rig.compensation, cell=None),  # the recorded force is the corrected one
     )
     rows: list[tuple[float, ...]] = []
-    for done, output in enumerate(_decide_all(recording, controller)):
+    for done, output in enumerate(_decide_all(recording, controller, 1.0 / setup.rig.loop_hz)):
         if done % _REPORTED_ROWS == 0:
             report(f"control with {setup.name}", done, recording.rows)
         rows.append(_row_of(output))
@@ -104,7 +109,8 @@ def _check(recording: Recording) -> None:
         )
 
 
-def _decide_all(recording: Recording, controller: Controller) -> Iterator[Output]:
+def _decide_all(recording: Recording, controller: Controller, period_s: float) -> Iterator[Output]:
+    """period_s: of the loop's tick."""
     columns = recording.columns
     lists = {name: columns[name].tolist() for name in _NEEDED}
     qualities = columns["quality"].tolist() if "quality" in columns else [0.0] * recording.rows
@@ -122,9 +128,23 @@ def _decide_all(recording: Recording, controller: Controller) -> Iterator[Output
         came_s = now_s - since_command[at]
         following = _next_command(command, setpoint_n, int(state) in _ENABLED, controller, came_s)
         if following is not command and at and came_s < now_s:
+            _tick(controller, (before_s, came_s, period_s), command, last)
             controller.step(came_s, following, *last)  # on arrival, with what was known then
-        command, last = following, (sample, line)
+            before_s = came_s
+        _tick(controller, (before_s, now_s, period_s), following, last)
+        command, last, before_s = following, (sample, line), now_s
         yield controller.step(now_s, command, *last)
+
+
+def _tick(
+    controller: Controller, span_s: tuple[float, float, float], command: Command, known: tuple[ForceSample, LineStatus]
+) -> None:
+    """Decide at the ticks between two rows of a slow cell, as the loop does (service/running_rig/control_loop.py): a ramp goes
+    on meanwhile. span_s: from and to when, and the period; known: the reading and the line, as far as they are."""
+    (from_s, until_s, period_s), (sample, line) = span_s, known
+    gap_s = min(until_s - from_s, _LONGEST_GAP_S)
+    for tick in range(1, ceil(gap_s / period_s - _PHASE - _AT_ROW)):
+        controller.step(from_s + (tick + _PHASE) * period_s, command, sample, line._replace(sent_v=None))
 
 
 def _next_command(command: Command, setpoint_n: float, enabled: bool, controller: Controller, now_s: float) -> Command:
