@@ -4,8 +4,8 @@ Open loop: the readings are the recorded ones, whatever voltage is decided on no
 only roughly: when between two rows a command came, and how long the wire was busy.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from math import ceil, isfinite, nan
 from typing import TYPE_CHECKING, Final
 
@@ -19,6 +19,7 @@ from gateway.devices.messages import ForceSample, Quality
 from gateway.profiles import Rig
 from gateway.progress import report
 from gateway.recording import Recording, RecordingError
+from gateway.recording.calibrations_used import numbers_by_row
 from gateway.recording.tables.row_validity import pulled_rows
 from gateway.recording.tables.time_axis import check_time_axis
 from gateway.registers.command import Command
@@ -48,11 +49,12 @@ Columns = dict[str, "NDArray[np.float64]"]
 
 @dataclass(frozen=True, slots=True)
 class ReplaySetup:
-    """What decides. name: as it is told."""
+    """What decides. name: as it is told; later: what the recording itself went over to, by number."""
 
     name: str
     rig: Rig
     calibration: Calibration
+    later: Mapping[int, Calibration] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +80,7 @@ def replay_control(recording: Recording, setup: ReplaySetup) -> Columns:
         compensation=replace(setup.rig.compensation, cell=None),  # the recorded force is the corrected one
     )
     rows: list[tuple[float, ...]] = []
-    for done, output in enumerate(_decide_all(recording, controller, 1.0 / setup.rig.loop_hz)):
+    for done, output in enumerate(_decide_all(recording, controller, setup)):
         if done % _REPORTED_ROWS == 0:
             report(f"control with {setup.name}", done, recording.rows)
         rows.append(_row_of(output))
@@ -109,15 +111,17 @@ def _check(recording: Recording) -> None:
         )
 
 
-def _decide_all(recording: Recording, controller: Controller, period_s: float) -> Iterator[Output]:
-    """period_s: of the loop's tick."""
+def _decide_all(recording: Recording, controller: Controller, setup: ReplaySetup) -> Iterator[Output]:
     columns = recording.columns
     lists = {name: columns[name].tolist() for name in _NEEDED}
     qualities = columns["quality"].tolist() if "quality" in columns else [0.0] * recording.rows
     sent, wire_s, since_command = _sent_before(columns, recording.rows), _wire_s(columns), _since_command_s(columns)
-    first_s, command = lists["time_s"][0], Command()
+    first_s, command, changes = lists["time_s"][0], Command(), _changes(recording, setup)
+    period_s = 1.0 / setup.rig.loop_hz
     rows = zip(lists["time_s"], lists["force_n"], lists["setpoint_n"], lists["state"], qualities, sent, strict=True)
     for at, (time_s, force_n, setpoint_n, state, quality, sent_v) in enumerate(rows):
+        if at in changes:
+            controller.use(setup.rig.calibration_in_use(changes[at]))
         now_s = _BEGIN_S + time_s - first_s
         sample = ForceSample(force_n, force_n, _QUALITY.get(quality, Quality.OK), now_s)
         line = LineStatus(acknowledged_v=sent_v or 0.0, sent_v=sent_v, wire_s=wire_s)
@@ -145,6 +149,15 @@ def _tick(
     gap_s = min(until_s - from_s, _LONGEST_GAP_S)
     for tick in range(1, ceil(gap_s / period_s - _PHASE - _AT_ROW)):
         controller.step(from_s + (tick + _PHASE) * period_s, command, sample, line._replace(sent_v=None))
+
+
+def _changes(recording: Recording, setup: ReplaySetup) -> dict[int, Calibration]:
+    """Return, by row, the calibration that is in use from there on."""
+    numbers = numbers_by_row(recording)
+    if numbers is None or not setup.later:
+        return {}
+    changed = (np.flatnonzero(np.diff(numbers)) + 1).tolist()
+    return {row: setup.later[number] for row in changed if (number := numbers[row]) in setup.later}
 
 
 def _next_command(command: Command, setpoint_n: float, enabled: bool, controller: Controller, now_s: float) -> Command:

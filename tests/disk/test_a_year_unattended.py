@@ -15,8 +15,7 @@ from gateway.profiles.recordings_section import Retention
 from gateway.recording import list_recordings, recording_paths
 from gateway.recording.care.keeping import keep_recording, prune_recordings
 from gateway.recording.label import RecordingLabel
-from gateway.service.running_rig.recording.recorded_row import COLUMNS
-from gateway.service.running_rig.recording.recordings import Recordings
+from gateway.service.running_rig.recording.recordings import RUN_COLUMNS, Recordings
 from tests.disk.at_once import AtOnce
 from tests.disk.failing_disks import FailingDisk
 from tests.disk.watched_disk import watching
@@ -26,7 +25,7 @@ from tests.service.rigs import demo
 HOUR_S, DAY_S = 3600.0, 86400.0
 ROWS_AN_HOUR = 150
 LIMIT = Retention(bytes=1_000_000, days=20.0)
-ROW = (1.0,) * len(COLUMNS)
+ROW = (1.0,) * len(RUN_COLUMNS)
 
 
 class Calendar:
@@ -93,7 +92,7 @@ def test_a_year_of_recording_takes_no_more_room_than_the_limit(
         if (fast_folder / "recordings" / "0002.fgr").exists() and not numbers & {"0003"}:
             keep_recording(fast_folder / "recordings" / "0002.fgr")
     recordings.stop()
-    written = days * 24 * ROWS_AN_HOUR * 8 * len(COLUMNS)
+    written = days * 24 * ROWS_AN_HOUR * 8 * len(RUN_COLUMNS)
     files = len(sizes(fast_folder))
     print(
         f"{days} days: {written / 1e6:.0f} MB of rows, at most {most_bytes / 1e6:.2f} MB kept, {files} files at the end"

@@ -12,6 +12,7 @@ from gateway.control import CellMap
 from gateway.control.settings import ValveControl
 from gateway.profiles import Rig
 from gateway.recording import Recording, RecordingError, list_recordings, read_recording
+from gateway.recording.calibrations_used import CalibrationUsed, later_calibrations
 from gateway.registers.words import State
 from gateway.service.replayed_control import ReplaySetup, SignalDifference, compare_decisions, replay_control
 from gateway.service.running_rig.recording.recordings import Recordings
@@ -20,8 +21,9 @@ from tests.service.rigs import demo, with_supervision
 from tests.service.wired import ENABLE, Wired
 
 
-def record_work(state: Path, rig: Rig | None = None) -> Recording:
-    """Record some levels of force, from OFF to OFF; commands come between two rows, and one step is shorter than a row."""
+def record_work(state: Path, later: Calibration | None = None, rig: Rig | None = None) -> Recording:
+    """Record some levels of force, from OFF to OFF; commands come between two rows, and one step is shorter than a row.
+    later: taken into use behind the second level."""
     wired = Wired(rig).ready()
     recordings = Recordings(state / "recordings", wired.rig, lambda cause, sentence: None, AtOnce())
     recordings.start()
@@ -30,6 +32,9 @@ def record_work(state: Path, rig: Rig | None = None) -> Recording:
     for level_n in (20.0, 35.0, 35.1, 10.0):
         wired.write(0, ENABLE, round(level_n * 100))
         wired.run(0.804)
+        if later and level_n == 35.0:
+            wired.controller.use(wired.rig.calibration_in_use(later))
+            recordings.calibration = later
     wired.write(0, 0, 0)
     wired.run(0.2)
     recordings.flush(1e9)
@@ -86,7 +91,7 @@ def test_a_slow_cells_recording_is_decided_on_at_the_ticks_between_its_rows(tmp_
     device = replace(rig.load_cell.device, stream=replace(rig.load_cell.device.stream, rate_hz=rate_hz))
     control = replace(rig.control, defaults=replace(rig.control.defaults, force_ramp_n_per_s=50.0))
     rig = replace(rig, load_cell=replace(rig.load_cell, device=device), control=control)
-    recording = record_work(tmp_path, rig)
+    recording = record_work(tmp_path, rig=rig)
     replayed = replay_control(recording, ReplaySetup("own", rig, rig.calibration))
     found = by_signal(compare_decisions(recording.columns["time_s"], recording.columns, replayed))
     assert found["fault_code"].rows == 0
@@ -113,6 +118,19 @@ def test_another_calibration_differs_in_what_it_decides_and_not_in_what_it_was_a
     assert found["feedforward_v"].rms > 0.1
     assert abs(found["command_v"].largest) > 0.2
     assert found["model_residual_n"].rms > 0.5
+
+
+def test_a_calibration_taken_into_use_amid_a_recording_decides_from_there(own: ReplaySetup, tmp_path: Path) -> None:
+    """Its header told the first one, and the replay blamed control for what the second had decided."""
+    later = replace(scaled(own.calibration, 1.3), number=7)
+    recorded = record_work(tmp_path, later)
+    time_s = recorded.columns["time_s"]
+    assert later_calibrations(recorded) == [CalibrationUsed(7, pytest.approx(1.81, abs=0.03))]
+    follows = replay_control(recorded, replace(own, later={7: later}))
+    found = by_signal(compare_decisions(time_s, recorded.columns, follows))
+    assert found["feedforward_v"].rms < 0.4
+    alone = by_signal(compare_decisions(time_s, recorded.columns, replay_control(recorded, own)))
+    assert alone["feedforward_v"].rms > 1.5
 
 
 def test_a_lease_is_no_matter_of_a_replay_and_an_overload_is_one(recording: Recording, own: ReplaySetup) -> None:

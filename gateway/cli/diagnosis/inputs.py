@@ -19,6 +19,7 @@ from gateway.plants.recorded_number import header_in_use
 from gateway.processes import exit_codes
 from gateway.profiles.kinds.plants import PlantProfile, load_shipped_plant
 from gateway.recording import Recording, find_recording, read_table
+from gateway.recording.calibrations_used import tell_changes
 from gateway.recording.measurement import measurement_of
 from gateway.recording.tables.mapping_file import column_mapping
 from gateway.service.fitting.recorded_rig import is_rehearsal, plant_of, recorded_noise_n, rig_of, rig_texts
@@ -99,7 +100,7 @@ def read_sources(
         plant=plant,
         rig=rig_name,
         known_rig=here,
-        notes=(*notes, *unknown),
+        notes=(*notes, *unknown, *_changes_of_calibration(recordings)),
         calibration_noise_n=noise_n,
         late_s=_WIRE_S if all(map(_of_gateway, recordings)) else 0.0,
         quantum_n=_quantum_n(here) if all(map(_of_gateway, recordings)) else 0.0,
@@ -162,6 +163,11 @@ def _calibration_noise(
 
     noise_n = calibration_in_use(rig, state_directory(state, rig.name)).noise_n
     return (noise_n if noise_n > 0.0 else None), ()
+
+
+def _changes_of_calibration(recordings: Sequence[Recording]) -> list[str]:
+    told = [(each.path.name, tell_changes(each)) for each in recordings]
+    return [f"{name}: {changes}" for name, changes in told if changes]
 
 
 def _load_rig(name: str) -> "Rig":

@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+from gateway.bsfm.model import Calibration
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice
 from gateway.plants.recorded_number import header_in_use
 from gateway.processes import exit_codes
 from gateway.profiles import Rig, list_shipped, load_calibration, load_rig
 from gateway.recording import Recording
+from gateway.recording.calibrations_used import later_calibrations, tell_changes
 from gateway.service.replayed_control import ReplaySetup
 
 
@@ -30,20 +32,38 @@ def own_setup(recording: Recording, state: StateChoice) -> tuple[ReplaySetup, li
         notes.append(f"the files of rig {rig.name} have changed since it was recorded, or were not read from here")
     if number := header_in_use(recording.header).get("number"):
         notes.append(f"plant {number} was in use; what was compensated of it is not replayed")
-    return _with_calibration(rig, recording.header.get("calibration"), state, notes), notes
+    number = recording.header.get("calibration")
+    calibration = _stored(rig, number, state)
+    if calibration is None:
+        calibration = rig.calibration
+        notes.append(f"calibration {number}, with which it was made, is not stored here: the rig's own is taken")
+    name = f"rig {rig.name}, calibration {calibration.number} {calibration.name}"
+    return ReplaySetup(name, rig, calibration, _later(recording, rig, state, notes)), notes
 
 
-def _with_calibration(rig: Rig, number: object, state: StateChoice, notes: list[str]) -> ReplaySetup:
+def _stored(rig: Rig, number: object, state: StateChoice) -> Calibration | None:
     from gateway.cli.calibration.store_access import find_calibration, open_store
 
-    calibration = rig.calibration
     named = str(number)  # of a CSV: its text
-    if named.isdecimal() and int(named) not in (0, calibration.number):
-        try:
-            calibration = find_calibration(open_store(state.directory, rig.name), named)
-        except CliError:
-            notes.append(f"calibration {number}, with which it was made, is not stored here: the rig's own is taken")
-    return ReplaySetup(f"rig {rig.name}, calibration {calibration.number} {calibration.name}", rig, calibration)
+    if not named.isdecimal() or int(named) in (0, rig.calibration.number):
+        return rig.calibration
+    try:
+        return find_calibration(open_store(state.directory, rig.name), named)
+    except CliError:
+        return None
+
+
+def _later(recording: Recording, rig: Rig, state: StateChoice, notes: list[str]) -> dict[int, Calibration]:
+    """Return the calibrations that were taken into use amid the recording, as far as they are here."""
+    later: dict[int, Calibration] = {}
+    for number in dict.fromkeys(change.number for change in later_calibrations(recording)):
+        if found := _stored(rig, number, state):
+            later[number] = found
+        else:
+            notes.append(f"calibration {number} is not stored here: the one before it goes on in its place")
+    if changes := tell_changes(recording):
+        notes.append(f"the calibration changed amid it, and so it does here: {changes}")
+    return later
 
 
 def other_setup(which: str, own: ReplaySetup, state: StateChoice) -> ReplaySetup:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from gateway.codes.faults import FaultCode
+from gateway.recording.calibrations_used import tell_changes
 from gateway.recording.reader import Recording
 
 if TYPE_CHECKING:
@@ -16,7 +17,8 @@ _LEAST_ROWS: Final = 2  # to say something of
 @dataclass(frozen=True, slots=True)
 class Happened:
     """ran: a run, a ladder or a plan; force_n: lowest and highest measured; residual_n: measured less what the model expects,
-    root of the mean square; None where the recording does not tell; pulled_s: how long the tool pulled."""
+    root of the mean square; None where the recording does not tell; pulled_s: how long the tool pulled;
+    calibrations: what was used of them beside the first."""
 
     ran: str
     setpoint_changes: int = 0
@@ -25,6 +27,7 @@ class Happened:
     residual_n: float | None = None
     pulled_s: float = 0.0
     faults: tuple[str, ...] = ()
+    calibrations: str = ""
 
     def as_words(self) -> str:
         """Return it in one line."""
@@ -38,6 +41,8 @@ class Happened:
             words.append(f"pulled for {self.pulled_s:.3g} s")
         if self.residual_n is not None:
             words.append(f"residual {self.residual_n:.2g} N")
+        if self.calibrations:
+            words.append(self.calibrations)
         return ", ".join([*words, *(f"fault {name}" for name in self.faults)])
 
     def as_facts(self) -> dict[str, Any]:
@@ -67,6 +72,7 @@ def tell_happened(recording: Recording) -> Happened | None:
         residual_n=_residual_n(recording),
         pulled_s=_pulled_s(recording),
         faults=tuple(_name_of_fault(code) for code in faults),
+        calibrations=tell_changes(recording),
     )
 
 

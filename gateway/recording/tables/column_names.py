@@ -40,3 +40,6 @@ SENT: Final = ("sent_v", "sent_age_s")
 
 PULLING: Final = "pulling"
 """What our recorder writes since it knows a valve: 1 while the tool pulls, where forces are negative; else 0."""
+
+CALIBRATION: Final = "calibration"
+"""What our recorder writes since one may change amid a recording, whose header has the first: its number, 0 the rig's own."""

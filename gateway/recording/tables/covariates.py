@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gateway.bsfm.ladder.plan import LABELS
 from gateway.recording.tables.column_mapping import join_names
-from gateway.recording.tables.column_names import CONTRACT, DERIVED, PULLING, SENT
+from gateway.recording.tables.column_names import CALIBRATION, CONTRACT, DERIVED, PULLING, SENT
 
 Floats = NDArray[np.float64]
 
@@ -36,11 +36,8 @@ def extract_covariates(
 ) -> tuple[dict[str, Floats], list[str]]:
     """Return the covariates without holes, and what was left out or filled. columns: all of the recording, at these times."""
     ours = is_own_recording(columns)
-    names = [
-        name
-        for name in columns
-        if name not in MEASUREMENT_COLUMNS and not (ours and name in (*DERIVED, *LABELS, *SENT, PULLING))
-    ]
+    own = (*DERIVED, *LABELS, *SENT, PULLING, CALIBRATION) if ours else ()
+    names = [name for name in columns if name not in (*MEASUREMENT_COLUMNS, *own)]
     dropped: dict[str, list[str]] = {}
     covariates: dict[str, Floats] = {}
     filled: list[str] = []

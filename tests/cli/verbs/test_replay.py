@@ -4,12 +4,17 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gateway.calibrations.store import CalibrationStore
+from gateway.cli.diagnosis.inputs import read_sources
 from gateway.profiles import load_calibration, shipped_profiles_folder
-from gateway.recording import read_recording
+from gateway.recording import read_recording, read_table
+from gateway.recording.calibrations_used import tell_changes
+from gateway.recording.care.what_happened import tell_happened
 from gateway.recording.export import export_csv
+from gateway.recording.measurement import measurement_of
 from tests.service.test_replayed_control import record_work, scaled
 
 
@@ -66,6 +71,29 @@ def test_an_exported_table_is_replayed_with_the_calibration_that_it_was_made_wit
     assert answer.exit_code == 0, answer.output
     assert f"calibration {number} " in answer.stdout
     assert "plant 3 was in use" in answer.stderr
+
+
+def test_a_calibration_that_came_into_use_amid_a_recording_is_told_with_its_time(
+    state: Path, call, tmp_path: Path
+) -> None:
+    """By the list of recordings, by replay and by diagnose: the header has the first one alone."""
+    recording = read_recording(state / "recordings" / "0001.fgr")
+    numbers = recording.columns["calibration"].copy()
+    numbers[recording.columns["time_s"] >= 1.5] = 2.0
+    numbers[recording.columns["time_s"] >= 2.5] = 99.0
+    export_csv(replace(recording, columns=recording.columns | {"calibration": numbers}), tmp_path / "changed.csv")
+    changes = "calibration 2 from 1.50 s on, calibration 99 from 2.50 s on"
+    told = call("replay", tmp_path / "changed.csv", "--state", state, "--rig", "demo")
+    assert told.exit_code == 0, told.output
+    assert changes in told.stderr and "calibration 99 is not stored here" in told.stderr
+    changed = read_table(tmp_path / "changed.csv")
+    assert changes in tell_happened(changed).as_words()
+    assert read_sources([str(tmp_path / "changed.csv")], rig="demo", columns=None, state=state).notes == (
+        f"changed.csv: {changes}",
+    )
+    assert "calibration" not in measurement_of(changed).covariates
+    quick = replace(changed, columns=changed.columns | {"calibration": np.arange(changed.rows) % 2.0})
+    assert tell_changes(quick).endswith(f"s on, {changed.rows - 4} more changes of calibration")
 
 
 def test_a_rig_of_a_file_is_the_one_that_is_given(state: Path, call, tmp_path: Path) -> None:

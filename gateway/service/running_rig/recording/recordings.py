@@ -20,6 +20,7 @@ from gateway.processes.event_log import EventLog
 from gateway.profiles import Rig
 from gateway.recording import Recorder
 from gateway.recording.label import NO_LABEL, RecordingLabel
+from gateway.recording.tables.column_names import CALIBRATION
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.service.running_rig.recording.recording_again import RecordingAgain
@@ -27,6 +28,7 @@ from gateway.service.running_rig.recording.retention import RecordingRetention
 from gateway.service.running_rig.recording.run_recording import RunRecording
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 
+RUN_COLUMNS: Final = (*COLUMNS, CALIBRATION)
 LONGEST_BYTES: Final = 256 << 20
 LONGEST_S: Final = 86400.0
 _SHARES: Final = 8
@@ -97,7 +99,7 @@ class Recordings:
             "simulated": rig.simulated,
             "seed": rig.seed,
         }
-        recording = RunRecording(self._disk, lambda: Recorder(self._directory, header, COLUMNS), self._log)
+        recording = RunRecording(self._disk, lambda: Recorder(self._directory, header, RUN_COLUMNS), self._log)
 
         def tell(error: OSError | None) -> None:
             if error and self._current is recording:
@@ -198,7 +200,7 @@ class Recordings:
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:
         """Append a row to the open recording, if there is one."""
         if self._current:
-            self._current.append(sample, decision, line)
+            self._current.append(sample, decision, line, float(self.calibration.number))
 
     def flush(self, now_s: float) -> None:
         """Hand over what waits, once a tick. A recording that has stopped (disk full) is logged once and dropped; one whose

@@ -17,7 +17,7 @@ from gateway.recording.label import RecordingLabel, label_of
 from gateway.recording.recorder import sync_recording
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recording.recorded_row import COLUMNS, row_of
-from gateway.service.running_rig.recording.recordings import LONGEST_S, Recordings
+from gateway.service.running_rig.recording.recordings import LONGEST_S, RUN_COLUMNS, Recordings
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 from tests.control.bench import bsfm
 from tests.disk.at_once import AtOnce
@@ -163,7 +163,7 @@ def test_one_that_a_full_disk_has_ended_goes_on_when_there_is_room(
     monkeypatch.setattr(os, "write", lambda descriptor, data: real_write(descriptor, data[:3] if is_full[0] else data))
     begin, tries = recordings._begin, []
     monkeypatch.setattr(recordings, "_begin", lambda opened: (tries.append(now_s), begin(opened)))
-    recordings._current._gathered.append((0.0,) * len(COLUMNS))
+    recordings._current._gathered.append((0.0,) * len(RUN_COLUMNS))
     for now_s in range(300):
         recordings.flush(float(now_s))
     assert tries == [32, 93, 214]
@@ -176,7 +176,7 @@ def test_one_that_a_full_disk_has_ended_goes_on_when_there_is_room(
     assert recordings.status()["recording"]
     assert "it goes on: recording to" in recordings._log[-1]
     is_full[0] = True
-    recordings._current._gathered.append((0.0,) * len(COLUMNS))
+    recordings._current._gathered.append((0.0,) * len(RUN_COLUMNS))
     for now_s in range(2000, 2040):
         recordings.flush(float(now_s))
     assert tries[-1] == 2031, "it went well for long enough: half a minute again"
@@ -204,7 +204,7 @@ def test_what_the_last_batch_has_cost_is_said_to_whoever_ends_it(
     recordings: Recordings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recordings.start()
-    recordings._current._gathered.append((0.0,) * len(COLUMNS))
+    recordings._current._gathered.append((0.0,) * len(RUN_COLUMNS))
     monkeypatch.setattr(os, "write", lambda descriptor, data: 3)
     ended = recordings.stop().result()
     assert ended["rows"] == 0
