@@ -6,7 +6,7 @@ only roughly: when between two rows a command came, and how long the wire was bu
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from math import isfinite, nan
+from math import ceil, isfinite, nan
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -30,6 +30,11 @@ if TYPE_CHECKING:
 
 _BEGIN_S: Final = 1000.0  # of virtual time
 _REPORTED_ROWS: Final = 500
+_PHASE: Final = (
+    0.5  # of a tick, behind a row: nobody knows it; the one that comes within a period leaves the decision to it
+)
+_LONGEST_GAP_S: Final = 5.0  # between two rows: behind it nothing new is decided
+_AT_ROW: Final = 0.05  # of a tick: one that is so near to the next row is that row's
 _SENT_DIGITS: Final = 4  # of the time of a setting, s: by each row that tells it
 _LEAST_SENT: Final = 10
 _ENABLED: Final = frozenset([State.READY, State.RAMPING, State.HOLDING])
@@ -112,6 +117,7 @@ def _decide_all(recording: Recording, controller: Controller, setup: ReplaySetup
     qualities = columns["quality"].tolist() if "quality" in columns else [0.0] * recording.rows
     sent, wire_s, since_command = _sent_before(columns, recording.rows), _wire_s(columns), _since_command_s(columns)
     first_s, command, changes = lists["time_s"][0], Command(), _changes(recording, setup)
+    period_s = 1.0 / setup.rig.loop_hz
     rows = zip(lists["time_s"], lists["force_n"], lists["setpoint_n"], lists["state"], qualities, sent, strict=True)
     for at, (time_s, force_n, setpoint_n, state, quality, sent_v) in enumerate(rows):
         if at in changes:
@@ -126,9 +132,23 @@ def _decide_all(recording: Recording, controller: Controller, setup: ReplaySetup
         came_s = now_s - since_command[at]
         following = _next_command(command, setpoint_n, int(state) in _ENABLED, controller, came_s)
         if following is not command and at and came_s < now_s:
+            _tick(controller, (before_s, came_s, period_s), command, last)
             controller.step(came_s, following, *last)  # on arrival, with what was known then
-        command, last = following, (sample, line)
+            before_s = came_s
+        _tick(controller, (before_s, now_s, period_s), following, last)
+        command, last, before_s = following, (sample, line), now_s
         yield controller.step(now_s, command, *last)
+
+
+def _tick(
+    controller: Controller, span_s: tuple[float, float, float], command: Command, known: tuple[ForceSample, LineStatus]
+) -> None:
+    """Decide at the ticks between two rows of a slow cell, as the loop does (service/running_rig/control_loop.py): a ramp goes
+    on meanwhile. span_s: from and to when, and the period; known: the reading and the line, as far as they are."""
+    (from_s, until_s, period_s), (sample, line) = span_s, known
+    gap_s = min(until_s - from_s, _LONGEST_GAP_S)
+    for tick in range(1, ceil(gap_s / period_s - _PHASE - _AT_ROW)):
+        controller.step(from_s + (tick + _PHASE) * period_s, command, sample, line._replace(sent_v=None))
 
 
 def _changes(recording: Recording, setup: ReplaySetup) -> dict[int, Calibration]:

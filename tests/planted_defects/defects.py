@@ -150,6 +150,9 @@ DEFECTS = (
            "if self._rules.require_byte_order_echo and not", "if False and not", _BANK),
     Defect("any master's leaving is the owner's", "service/running_rig/running_rig.py",
            "        if peer.identity == self.bank.owner:", "        if True:", ("service/running_rig/test_running_rig.py",)),
+    Defect("a tick passes over that the machine was suspended", "service/running_rig/control_loop.py",
+           " or self.last_tick.suspended_s():", ":",
+           ("service/running_rig/wired/test_suspended_machine.py",)),
     Defect("an owner that comes back stays lost", "service/running_rig/control_loop.py",
            "        self.owner_connected = True\n        self._heard_s", "        self._heard_s",
            ("service/running_rig/test_running_rig.py",)),
@@ -581,7 +584,7 @@ DEFECTS = (
            "        doing, self._doing, self._waiting = self._doing, \"\", None\n",
            ("service/running_rig/test_rig_plants.py",)),
     Defect("a loop that stood still does not tell its serial faces", "service/running_rig/running_rig.py",
-           "self._faces.note_tick(expirations / self._rig.loop_hz + late_s)", "self._faces.note_tick(late_s)",
+           "note_tick(expirations / self._rig.loop_hz + late_s + self.loop.last_tick.slept_s)", "note_tick(late_s)",
            ("service/running_rig/ends/test_ways_to_the_end.py",)),
     # -- and: standstills, room that is made, what a death has left
     Defect("a stop that waited through a standstill is not executed", "fieldbus/rtu_server.py",

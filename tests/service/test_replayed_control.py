@@ -10,19 +10,21 @@ from gateway.bsfm.model import Calibration
 from gateway.codes.faults import FaultCode
 from gateway.control import CellMap
 from gateway.control.settings import ValveControl
+from gateway.profiles import Rig
 from gateway.recording import Recording, RecordingError, list_recordings, read_recording
 from gateway.recording.calibrations_used import CalibrationUsed, later_calibrations
 from gateway.registers.words import State
 from gateway.service.replayed_control import ReplaySetup, SignalDifference, compare_decisions, replay_control
 from gateway.service.running_rig.recording.recordings import Recordings
 from tests.disk.at_once import AtOnce
+from tests.service.rigs import demo, with_supervision
 from tests.service.wired import ENABLE, Wired
 
 
-def record_work(state: Path, later: Calibration | None = None) -> Recording:
+def record_work(state: Path, later: Calibration | None = None, rig: Rig | None = None) -> Recording:
     """Record some levels of force, from OFF to OFF; commands come between two rows, and one step is shorter than a row.
     later: taken into use behind the second level."""
-    wired = Wired().ready()
+    wired = Wired(rig).ready()
     recordings = Recordings(state / "recordings", wired.rig, lambda cause, sentence: None, AtOnce())
     recordings.start()
     wired.loop.recordings = recordings
@@ -79,6 +81,22 @@ def test_the_replay_decides_as_the_gateway_did(recording: Recording, own: Replay
     assert found["state"].rows <= 6
     assert found["command_v"].rms < 0.17
     assert np.ptp(recording.columns["command_v"]) > 4.0
+
+
+@pytest.mark.parametrize("rate_hz", [5.0, 10.0, 20.0, 25.0])
+def test_a_slow_cells_recording_is_decided_on_at_the_ticks_between_its_rows(tmp_path: Path, rate_hz: float) -> None:
+    """As control had. By its rows alone a ramp went on for 45 ms of 100: 5 N off, at 5 Hz a fault in place of the work."""
+    rig = with_supervision(demo(), sample_timeout_s=0.5)
+    assert rig.load_cell.device.stream
+    device = replace(rig.load_cell.device, stream=replace(rig.load_cell.device.stream, rate_hz=rate_hz))
+    control = replace(rig.control, defaults=replace(rig.control.defaults, force_ramp_n_per_s=50.0))
+    rig = replace(rig, load_cell=replace(rig.load_cell, device=device), control=control)
+    recording = record_work(tmp_path, rig=rig)
+    replayed = replay_control(recording, ReplaySetup("own", rig, rig.calibration))
+    found = by_signal(compare_decisions(recording.columns["time_s"], recording.columns, replayed))
+    assert found["fault_code"].rows == 0
+    assert found["applied_n"].rms < 0.25
+    assert found["command_v"].rms < 0.4
 
 
 def test_a_rig_with_a_valve_replays_what_it_pushed_with(recording: Recording, own: ReplaySetup) -> None:

@@ -115,7 +115,7 @@ def test_a_pressure_that_is_not_measured_says_nothing() -> None:
 
 def test_a_step_is_timed_where_it_stands_out_of_the_noise() -> None:
     trace = [(0.01 * k, min(8.0, 4.0 + 0.1 * k)) for k in range(200)]
-    assert judge_step(trace, 4.0, 8.0, 0.0, RIG).text.startswith("260 ms to 63 % of a step")
+    assert judge_step(trace, 4.0, 8.0, 0.0, RIG).text.startswith("252 ms to 63 % of a step")
     assert judge_step(trace, 4.0, 8.0, 1.99, RIG).verdict is not NOT_TESTED
     small = judge_step(trace, 4.0, 8.0, 2.01, RIG)
     assert (small.item, small.verdict) == (Item.RESPONSE, NOT_TESTED)

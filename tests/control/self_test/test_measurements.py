@@ -1,6 +1,6 @@
 """What readings say as numbers, against numbers worked out by hand."""
 
-from math import sqrt
+from math import exp, sqrt
 
 import pytest
 
@@ -61,21 +61,30 @@ def test_a_slope_is_that_of_least_squares_with_its_standard_error() -> None:
 @pytest.mark.parametrize("from_n", [0.0, 20.0])
 @pytest.mark.parametrize(
     ("share", "sigma_n", "seconds"),
-    [(0.5, 0.0, 5.0), (0.9, 0.0, 9.0), (0.5, 1.7, 5.0), (0.5, 1.9, 5.5), (0.5, 2.2, 5.0), (0.5, 9.0, 10.0)],
+    [(0.5, 0.0, 4.5), (0.9, 0.0, 5.7), (0.9, 1.7, 5.7), (0.9, 1.9, 6.1), (0.9, 2.2, 6.5), (0.5, 9.0, 10.0)],
 )
 def test_the_time_to_a_share_of_the_way_is_that_of_the_middle_of_as_many_readings_as_noise_asks_for(
     way: float, from_n: float, share: float, sigma_n: float, seconds: float
 ) -> None:
     """Three, (noise / a tenth of the way) squared of them: four from 1.74 N on, five from 2 N on, and 30 at the most."""
-    trace = [(float(k), from_n + way * k) for k in range(11)]
+    trace = [(float(k), from_n + way * 10.0 * (k >= 5)) for k in range(11)]
     assert time_to_share_s(trace, from_n, from_n + 10.0 * way, share, sigma_n) == pytest.approx(seconds)
 
 
 def test_a_share_that_is_never_reached_took_as_long_as_was_looked() -> None:
     assert time_to_share_s(at_8_hz(0.0, 1.0, 2.0, 3.0), 0.0, 10.0, 0.9, 0.0) == 0.375
     assert time_to_share_s([], 0.0, 10.0, 0.9, 0.0) == 0.0
-    long = [(0.125 * k, 0.125 * k) for k in range(81)]
-    assert time_to_share_s(long, 0.0, 10.0, 0.5, 1e3) == pytest.approx(5.0625), "the mean of 30, the next to reach it"
+    long = [(0.125 * k, 10.0 * (k >= 5)) for k in range(81)]
+    assert time_to_share_s(long, 0.0, 10.0, 0.9, 1e3) == pytest.approx(16.5 * 0.125), "the mean of 30"
+
+
+@pytest.mark.parametrize("rate_hz", [5.0, 8.0, 10.0, 20.0, 100.0, 500.0])
+def test_a_slow_cell_makes_no_slow_machine(rate_hz: float) -> None:
+    """Wherever its readings lie beside the step: at 5 Hz half of the places had made 400 ms and more of these 239."""
+    for place in range(10):
+        times_s = [(k + 0.1 * place) / rate_hz for k in range(round(3.0 * rate_hz))]
+        trace = [(at_s, 10.0 * (1.0 - exp(-max(0.0, at_s - 0.08) / 0.16))) for at_s in times_s]
+        assert 0.239 - 0.06 < time_to_share_s(trace, 0.0, 10.0, 0.63, 0.1) < 0.239 * 1.4 + 0.05
 
 
 @pytest.mark.parametrize(

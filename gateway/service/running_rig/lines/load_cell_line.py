@@ -29,6 +29,8 @@ _AWAY_S: Final = 0.5  # of silence of a cell that is asked, beyond its period: w
 _NO_NAME: Final = (
     "it does not say what it is: power, wires, address, or a device without words for `identity` of its profile?"
 )
+_JITTER_S: Final = 1e-3  # of ticks
+_JITTER_SHARE: Final = 0.1  # of the period, at most
 _FASTEST_HZ: Final = 250.0  # the loop's fastest tick: more readings would only cost processor time
 
 
@@ -69,7 +71,7 @@ class CellExchange:
         self.unread.forget()
         self.identity.begin()
         self._sent_s: float | None = None
-        self._next_s, self._start_s = -inf, -inf
+        self._next_s = self._due_s = self._start_s = -inf  # the wire is free, and the device has had its period
         self._heard_s = inf  # before the first answer: what it is, is asked anyway
         self._is_overdue = False  # an answer is missing, and may still come
         self._is_heard = False  # one has come since the question that is out: its own, or the one that was missing
@@ -106,6 +108,7 @@ class CellExchange:
         if not self.identity.is_due:
             self.counts.heard += 1
             self._sent_s, self._is_overdue, self._next_s = None, False, now_s + self._host.gap_s
+            self._due_s = -inf
             self._send_next(now_s)
         return [*garbage]
 
@@ -118,13 +121,17 @@ class CellExchange:
         if self._sent_s is not None and now_s - self._sent_s > self._reply_timeout_s:
             self._host.forget()
             self._sent_s, self._is_overdue, self._next_s = None, not self._is_heard, now_s
+            self._due_s = now_s
             if now_s - self._heard_s > _AWAY_S + self._period_s:
                 self._heard_s = inf
                 self.identity.begin()
-        self._send_next(now_s)
+        self._send_next(now_s, min(_JITTER_S, _JITTER_SHARE * self._period_s))
 
-    def _send_next(self, now_s: float) -> None:
-        if self._question and self._sent_s is None and now_s >= self._next_s and not self.identity.fault:
-            self._sent_s, self._next_s, self._is_heard = now_s, now_s + self._period_s, False
+    def _send_next(self, now_s: float, early_s: float = 0.0) -> None:
+        """early_s: so much sooner than its period a device may be asked: a tick seldom comes to the microsecond, and the next
+        is a whole one later."""
+        is_due = now_s >= max(self._next_s, self._due_s - early_s)
+        if self._question and self._sent_s is None and is_due and not self.identity.fault:
+            self._sent_s, self._due_s, self._is_heard = now_s, now_s + self._period_s, False
             self.counts.asked += 1
             self._write(self.identity.question if self.identity.is_due else self._question)
