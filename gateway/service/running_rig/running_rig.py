@@ -252,8 +252,7 @@ class RunningRig:
         waited_s, now_s = waiting_s(is_restart=is_restart), time.monotonic()
         held = self._lateness.since(now_s - waited_s, now_s, self._counters.waited_s())
         _, blamed = cause_of_silence(FaultCode.OUTPUT_SILENT, waited_s, held, "")
-        safe_v = self._rig.control.limits.safe_voltage_v
-        return await why_silent(port, line, blamed, safe_v, is_restart=is_restart)
+        return await why_silent(port, line, blamed, self._rig.control.limits.safe_voltage_v, is_restart=is_restart)
 
     async def ramp_down(self) -> None:
         """Ramp the force to 0, then send the safe voltage (at most 4.5 s); at once where nobody guards it, or it fails."""
