@@ -20,7 +20,7 @@ from gateway.web import events
 from gateway.web.commands import Commands
 from gateway.web.context import WebContext
 from gateway.web.events import EventSource
-from gateway.web.security import Door
+from gateway.web.security import PageAccess
 from gateway.web.server import make_app
 from tests.service.requests.test_hostile_requests import Stage
 from tests.web import test_events
@@ -199,7 +199,7 @@ def test_a_stop_waits_neither_for_a_recording_whose_disk_hangs_nor_for_what_othe
             writer.close()
 
         context = WebContext(tmp_path, "demo", True, ControlLink(tmp_path))
-        app, headers = make_app(context, Door("127.0.0.1", 8080, TOKEN), None), {"authorization": f"Bearer {TOKEN}"}
+        app, headers = make_app(context, PageAccess("127.0.0.1", 8080, TOKEN), None), {"authorization": f"Bearer {TOKEN}"}
         async with await asyncio.start_unix_server(control, tmp_path / "control.sock"):
             other = asyncio.create_task(call(app, method, f"/api/v1/{path}", headers, body))
             await is_asked.wait()

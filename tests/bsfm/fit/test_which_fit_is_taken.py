@@ -157,7 +157,7 @@ def evaluated(monkeypatch: pytest.MonkeyPatch, reversal: Any, *, closed: bool = 
     asked = list[Any]()
     for name, stand_in in {
         "score_orders": lambda *given: asked.append(given) or [chosen],
-        "choose": lambda scores: chosen,
+        "choose_fit": lambda scores: chosen,
         "_is_poor": lambda *_: poor,
         "_fit_constrained": lambda *_: constrained,
         "choose_reversal": lambda *_: reversal,

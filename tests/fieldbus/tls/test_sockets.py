@@ -45,7 +45,7 @@ def test_foreign_clients_speak_with_it(folder: Folder) -> None:
         master.close()
         await ask_with_openssl(folder, port)
         await server.close()
-        assert server.pending == 0 and log == []
+        assert not server._handshakes.pending and log == []
 
     asyncio.run(asyncio.wait_for(main(), 20.0))
 
@@ -58,12 +58,12 @@ def test_a_server_cuts_who_connects_and_says_nothing(folder: Folder) -> None:
             NotingBank(), files, on_peer_closed=list[Peer]().append, log=lambda _, told: log.append(told), clock=clock
         )
         reader, writer = await asyncio.open_connection(*await server.start("127.0.0.1", 0))
-        while not server.pending:
+        while not server._handshakes.pending:
             await asyncio.sleep(0.001)
         clock.advance(HANDSHAKE_S + 0.5)
         with contextlib.suppress(ConnectionResetError):
             assert await reader.read() == b""
-        assert server.pending == 0 and log[0].startswith("W243 ")
+        assert not server._handshakes.pending and log[0].startswith("W243 ")
         writer.close()
         await server.close()
 
@@ -75,12 +75,12 @@ def test_an_end_of_the_face_cuts_who_is_shaking_hands(folder: Folder) -> None:
         files = TlsSettings(ServerSettings(), folder.crt("gateway"), folder.key("gateway"), folder.crt("ca"))
         server = ModbusTlsServer(NotingBank(), files, on_peer_closed=list[Peer]().append, log=lambda *_: None)
         reader, writer = await asyncio.open_connection(*await server.start("127.0.0.1", 0))
-        while not server.pending:
+        while not server._handshakes.pending:
             await asyncio.sleep(0.001)
         await server.close()
         with contextlib.suppress(ConnectionResetError):
             assert await reader.read() == b""
-        assert server.pending == 0
+        assert not server._handshakes.pending
         writer.close()
 
     asyncio.run(asyncio.wait_for(main(), 5.0))

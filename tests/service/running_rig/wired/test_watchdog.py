@@ -279,6 +279,6 @@ def test_a_trip_is_that_of_the_device_behind_the_plug_of_then() -> None:
     """Else the next one is told no voltage, not even the safe one."""
     checks = DeviceChecks(output_host(device()), is_waived=False)
     checks.trip()
-    assert checks.level.is_tripped and not checks.is_done
+    assert checks.is_tripped and not checks.is_done
     checks.begin()
-    assert not checks.level.is_tripped and checks.fault is FaultCode.NONE
+    assert not checks.is_tripped and checks.fault is FaultCode.NONE
