@@ -59,6 +59,14 @@ NOTICES: Final = (
         "Set baud, parity and stop_bits of the face (fieldbus in the rig file) as they are in the master, such as 19200 8E1.",
     ),
     Explanation(
+        "W237",
+        "a client asks faster than it is answered",
+        "More of a client's requests wait than are carried out in a second: what it asks comes late, a stop as well, and old "
+        "heartbeats keep its lease.",
+        "It sends without waiting for its answers, more than network.requests_per_s (200 unless the rig file says otherwise).",
+        "Let it wait for each answer, ask less often or for more registers at once; or raise network.requests_per_s.",
+    ),
+    Explanation(
         "W240",
         "certificate of a client not accepted",
         "A client connected by TLS without a certificate, with one of another CA, or did not accept the gateway's.",

@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 from typing import Final, Protocol, cast
 
 from gateway.fieldbus.peers import Peers, address_of
-from gateway.fieldbus.rate_limits import LogLimiter, RequestRate
+from gateway.fieldbus.rate_limits import Backlog, LogLimiter, RequestRate
 from gateway.fieldbus.settings import ServerSettings
 from gateway.modbus.fast import READ_FRAME_BYTES, whole_answer, whole_read_answer
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer, encode
@@ -102,6 +102,7 @@ class Connection(asyncio.BufferedProtocol):
         self._admitted = False
         self._rate: RequestRate | None = None
         self._has_place = False  # in the row of those who wait for the rate of one address
+        self._backlog = Backlog()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Admit the peer, or abort the connection where there are too many."""
@@ -157,6 +158,8 @@ class Connection(asyncio.BufferedProtocol):
         """Whatever is not exactly one frame from an unlimited peer."""
         if self._is_closing:
             return
+        if self._rate is not None:
+            self._note_backlog(size)
         self._framer.push(self._view[:size])
         self._answer_complete_requests()
         if size == BUFFER_BYTES and not (self._is_paused or self._is_closing):
@@ -205,6 +208,12 @@ class Connection(asyncio.BufferedProtocol):
         else:
             pdu = refuse_unit((request.unit, request.pdu), shared.settings.units, shared.bank, self.peer)
         return encode(Adu(request.transaction, request.unit, pdu))
+
+    def _note_backlog(self, size: int) -> None:
+        """Say of a client that asks beyond its rate and waits for no answer that it is late. size: of what has come."""
+        if self._backlog.note(self._shared.clock.time(), is_more=size == BUFFER_BYTES):
+            asks = f"asks more than {self._shared.settings.requests_per_s:g} requests/s and waits for no answer"
+            self._log("rate", f"W237 {self.peer}: {asks}: what it asks is carried out late, a stop as well")
 
     def _note_progress(self, answered: bool) -> None:
         """A partial frame counts from its first byte, so that a byte now and then does not keep it alive."""

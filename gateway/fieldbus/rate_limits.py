@@ -7,6 +7,8 @@ from collections.abc import Callable
 from typing import Final
 
 _BURST_S: Final = 0.25  # what a client saves up while it is quiet: a poll of several blocks in a row is normal
+LATE_S: Final = 1.0  # so long more may wait of a client than is taken at once, as behind a burst
+TOLD_AGAIN_S: Final = 60.0
 _LINES_PER_S: Final = 10
 _ROUNDING: Final = 1e-6  # of a request: whoever waited as long as told need not wait again
 
@@ -41,6 +43,25 @@ class RequestRate:
         """Return whether the bucket is as full as a new one."""
         self.wait_s(now_s)
         return self._tokens >= self._most
+
+
+class Backlog:
+    """Tells whether requests of a client pile up: it may not know how late its stop is, and old heartbeats keep its lease."""
+
+    __slots__ = ("_since_s",)
+
+    def __init__(self) -> None:
+        self._since_s: float | None = None
+
+    def note(self, now_s: float, *, is_more: bool) -> bool:
+        """Note what was taken; return whether to say now that it is late. is_more: as much waited as is taken at once."""
+        if not is_more or self._since_s is None:
+            self._since_s = now_s if is_more else None
+            return False
+        if now_s - self._since_s < LATE_S:
+            return False
+        self._since_s = now_s + TOLD_AGAIN_S - LATE_S
+        return True
 
 
 class LogLimiter:

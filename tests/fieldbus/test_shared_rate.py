@@ -87,3 +87,25 @@ def test_four_that_never_end_get_the_rate_together_and_each_its_part(stand: Any,
     counts = [len(flood.far.written) // len(framed(READ_ANSWER)) for flood in floods]
     assert sum(counts) == pytest.approx(50 + 200 * 2, abs=4)
     assert max(counts) - min(counts) <= 16, "a turn"
+
+
+def test_who_piles_up_requests_is_told_that_its_stop_is_late_and_a_burst_is_not(stand: Any, deliver: Any) -> None:
+    """300 a second of the 200 that are answered, and no answer waited for: after 20 s a stop took 10 s, and no line said so."""
+    made = stand(requests_per_s=200.0)
+    connection, far = made.connect(FAR)
+    for _ in range(5):
+        stream = framed(READ) * 180
+        while stream:
+            stream = stream[deliver(connection, far, stream) :]
+            made.clock.advance(0.005)
+        made.clock.advance(1.0)
+    assert not made.log
+    began_s, stream = made.clock.now_s, framed(READ) * 60_000
+    while made.clock.now_s < began_s + 65.0:
+        stream = stream[deliver(connection, far, stream) :]
+        made.clock.advance(0.005)
+        if len(made.log) == 1:
+            assert made.clock.now_s >= began_s + 1.0
+    told = f"W237 {FAR}:40000: asks more than 200 requests/s and waits for no answer"
+    assert [sentence.startswith(told) for _, sentence in made.log] == [True, True], "at most once a minute"
+    assert not far.ended
