@@ -219,6 +219,7 @@ def show_bytes(data: bytes) -> str:
     printable = sum(one.isprintable() for one in text)
     controls = sum(one in f"\r\n{CONTROL_CHARACTERS}" for one in text)
     is_all_shown = shown.isascii() and printable + controls == len(text)
-    is_text = is_all_shown and len(text) <= 2 * printable  # a short binary answer may be all controls
+    is_text = is_all_shown and len(text.rstrip("\r\n")) <= 2 * printable  # a short binary answer may be all controls
+    is_text = is_text and printable > 0
     more = "..." if len(data) > _SHOWN_BYTES else ""
     return quote(text) + more if is_text else shown.hex(" ") + more

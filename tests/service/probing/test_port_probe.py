@@ -135,6 +135,8 @@ def test_a_probe_tells_seven_data_bits_from_noise(tmp_path: Path) -> None:
         (b"ST,+1\r\n", r"'ST,+1\r\n'"),
         (b"\x02+1.0\tN\x03", "'<STX>+1.0<TAB>N<ETX>'"),
         (b"\x022    5.00\x0329\x04", "'<STX>2    5.00<ETX>29<EOT>'"),
+        (b"0\r\n", r"'0\r\n'"),  # an ITV at rest
+        (b"\r\n", "0d 0a"),
         (b"\x01\x06\x00", "01 06 00"),
         (b"\x01\x04\x02\x05\x06AB", "01 04 02 05 06 41 42"),
         (b"a" * 100, f"'{'a' * 48}'..."),
