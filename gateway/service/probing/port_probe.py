@@ -173,6 +173,9 @@ async def _asked(
         on_the_wire_s = (len(question.data) + _LONGEST_ANSWER) * settings.character_s
         timeout_s = max(patience_s, profile.reply_timeout_s + on_the_wire_s)
         words = await ear.ask(question, timeout_s)
+        if not (words or question.stranger(ear.received)):
+            # What was asked before, in other words or at another speed, may stand in the device ahead of it, up to its end
+            words = await ear.ask(question, timeout_s)
         if other := question.stranger(ear.received):
             strangers.append(Stranger(profile, settings, other))
             return None

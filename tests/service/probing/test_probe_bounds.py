@@ -126,9 +126,19 @@ def test_a_cell_that_says_what_it_is_is_asked_for_a_reading_too() -> None:
     answers[identity.data] = b""
     ear = FakeEar(answers.__getitem__)
     assert asyncio.run(_asked(ear, profile, profile.serial, 0.0, [])) is None  # type: ignore[arg-type]
-    assert len(ear.waited_s) == 1, "`$014` is a setting to an I-7021: it keeps its output as its power-on value"
+    assert len(ear.waited_s) == 2, "`$014` is a setting to an I-7021: it keeps its output as its power-on value"
     answers |= {identity.data: b"!014016\r", reading.data: b""}
     assert asyncio.run(_asked(FakeEar(answers.__getitem__), profile, profile.serial, 0.0, [])) is None  # type: ignore[arg-type]
+
+
+def test_a_question_behind_the_rest_of_another_is_asked_once_more() -> None:
+    """A device that waits for the end of a line has ahead of it what came at other speeds, or of a Modbus question."""
+    profile = load_device("mantracourt-dsc")
+    answers = iter([b"?\r", b"+00032.100\r"])
+    found = asyncio.run(
+        _asked(FakeEar(lambda data: next(answers, b"+00032.100\r")), profile, profile.serial, 0.0, [])  # type: ignore[arg-type]
+    )
+    assert found and found.said == "reads 32.1"
 
 
 def test_the_profiles_own_speeds_come_first_and_each_is_tried_once() -> None:
