@@ -28,6 +28,7 @@ class FakeEar:
 
     def __init__(self, answers: Callable[[bytes], bytes] = lambda data: b"", took_s: float = 0.0) -> None:
         self.received, self.now_s, self.waited_s = b"", 0.0, list[float]()
+        self.last_end: bytes | None = None
         self._answers, self._took_s = answers, took_s
 
     async def ask(self, question: HarmlessQuestion, timeout_s: float) -> str:
@@ -139,6 +140,13 @@ def test_a_question_behind_the_rest_of_another_is_asked_once_more() -> None:
         _asked(FakeEar(lambda data: next(answers, b"+00032.100\r")), profile, profile.serial, 0.0, [])  # type: ignore[arg-type]
     )
     assert found and found.said == "reads 32.1"
+
+
+def test_a_question_behind_one_with_its_own_end_is_asked_once() -> None:
+    """The first one has ended whatever stood ahead of it: a port without a device is not listened to for twice as long."""
+    profile, ear = load_device("smc-itv-rc"), FakeEar()
+    assert asyncio.run(_asked(ear, profile, profile.serial, 0.0, [])) is None  # type: ignore[arg-type]
+    assert len(list(harmless_questions(profile))) == 2 and len(ear.waited_s) == 3
 
 
 def test_the_profiles_own_speeds_come_first_and_each_is_tried_once() -> None:
