@@ -5,7 +5,7 @@ say: a number that outgrows its width at the end of its range, two questions tha
 refusal, a display without room for a minus sign.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import inf
 from typing import Final
 
@@ -115,7 +115,7 @@ def _talk(profile: DeviceProfile, request: OutputRequest, answer: OutputReply) -
         return str(error)
     replies = host.receive(answered, _NOW_S)
     if len(replies) != 1 or not _means(replies[0], answer):
-        names = " and ".join(map(_name, replies)) or "nothing"
+        names = _names(replies)
         return f"the answer {_line(answered)} to {_line(frame)} is read as {names}{_too_long(frame, answered)}"
     if (
         isinstance(request, SetVoltage)
@@ -142,7 +142,7 @@ def _refusals(profile: DeviceProfile) -> Found:
         if replies != [Refused(text)]:
             yield (
                 ("refusals",),
-                f"{quote(text)} as an answer is read as {' and '.join(map(_name, replies)) or 'nothing'}",
+                f"{quote(text)} as an answer is read as {_names(replies)}",
             )
 
 
@@ -178,7 +178,7 @@ def _shown(host: CellHost, device: CellDevice, reading: ForceReading, counts: in
     frame = device.frame(force_n)
     samples = host.receive(frame, _NOW_S)
     if len(samples) != 1 or not isinstance(sample := samples[0], ForceSample):
-        names = " and ".join(map(_name, samples)) or "nothing"
+        names = _names(samples)
         return f"{force_n:.3g} N, shown as {_line(frame)}, is read as {names}{_too_long(frame)}"
     if sample.quality is Quality.OVERLOAD or abs(sample.force_n - force_n) > 0.6 * host.resolution_n:
         return f"{force_n:.3g} N cannot be shown by {_shown_by(reading)}: {_why_not(reading, counts)}"
@@ -273,7 +273,7 @@ def _misread(host: CellHost, line: bytes, force_n: float) -> str:
     samples = host.receive(line, _NOW_S)
     if samples == [ForceSample(force_n, force_n, Quality.OVERLOAD, _NOW_S)]:
         return ""
-    return f"{_line(line)} is read as {' and '.join(map(_name, samples)) or 'nothing'}{_too_long(line)}"
+    return f"{_line(line)} is read as {_names(samples)}{_too_long(line)}"
 
 
 def _line(data: bytes) -> str:
@@ -284,6 +284,12 @@ def _line(data: bytes) -> str:
 def _too_long(*lines: bytes) -> str:
     longest = max(map(len, lines))
     return f": a line has at most {LONGEST_LINE_BYTES} characters" if longest > LONGEST_LINE_BYTES else ""
+
+
+def _names(messages: Iterable[object]) -> str:
+    """Return what a line was read as; pieces that are all garbage are none the clearer for their number."""
+    names = [_name(one) for one in messages]
+    return names[0] if names and {*names} == {_name(Garbage(b""))} else " and ".join(names) or "nothing"
 
 
 def _name(message: object) -> str:

@@ -184,7 +184,11 @@ def test_a_lease_that_is_short_for_one_request_at_a_time_is_told_to_who_wires_an
     """A heartbeat is two requests of MB_CLIENT, with some calls of the block each: 0.08 s at best."""
     title, row = "Siemens S7-1200/1500: connection of MB_CLIENT", "call of the block below"
     assert "set lease_s to 0.36 or more" in rows_of(page_of(own_rig), title)[row][0]
-    own_rig.write_text(own_rig.read_text().replace("lease_s: 0.2 ", "lease_s: 0.4 "))
+    assert "one that is late ends the force" in rows_of(page_of(own_rig), title)[row][0]
+    usual = own_rig.read_text()
+    own_rig.write_text(usual.replace("lease_action: fault", "lease_action: hold"))
+    assert "one that is late is a loss of the master" in rows_of(page_of(own_rig), title)[row][0]
+    own_rig.write_text(usual.replace("lease_s: 0.2 ", "lease_s: 0.4 "))
     assert "lease" not in rows_of(page_of(own_rig), title)[row][0]
     plc = S7(render_client(MAP, "scl", Endpoint("10.0.0.1", 502, 1)), gateway := GatewayAtHand(MAP))
     plc.enable(12.0)

@@ -99,6 +99,21 @@ def test_noise_between_values_is_counted_byte_for_byte() -> None:
     assert [type(one) for one in host.receive(frame, 0.0)] == [ForceSample]
 
 
+@pytest.mark.parametrize("bytes_at_a_time", [1, 3, 6, 10])
+def test_an_answer_in_digits_is_no_binary_value(bytes_at_a_time: int) -> None:
+    """An AED that has lost its setting answers as COF3: of each answer `2345` was a reading of 3289908, and so of any other."""
+    host = cell_host(load_device("hbm-aed-binary"), unit="N")
+    for text in (b"+0012345\r\n", b"-0000042\r\n"):
+        host.poll()
+        pieces = [text[k : k + bytes_at_a_time] for k in range(0, len(text), bytes_at_a_time)]
+        heard = [one for piece in pieces for one in host.receive(piece, 0.0)]
+        assert {type(one) for one in heard} == {Garbage}
+        assert b"".join(one.data for one in heard if isinstance(one, Garbage)) == text
+    host.poll()
+    (sample,) = host.receive(cell_device(load_device("hbm-aed-binary"), "N").frame(12.0), 0.0)
+    assert isinstance(sample, ForceSample) and sample.raw == 12.0
+
+
 def test_a_value_beyond_the_range_stands_at_its_end() -> None:
     profile = load_device("hbm-aed-binary")
     unit = None if profile.reading.newton_per_unit else "N"

@@ -82,6 +82,10 @@ PRESSURE = {"ask": "P?", "answer": "{p:d}", "range": {"device": [0, 10], "pressu
         ({"set_voltage__ask": "SET {channel:d},{value:d}", "constants": {"channel": 2}}, None),
         ({"read_voltage__ask": "REQ {channel:d}"}, "must not carry one but under `constants`"),
         ({"set_voltage__ask": "S" * 130 + "{counts:d}"}, "a line has at most 128 characters"),
+        (
+            {"read_voltage__answer": "S" * 130 + "{counts:d}"},
+            "is read as nothing that it knows: a line has at most 128",
+        ),
         ({"serial__baud": 57600}, None),
         ({"serial__baud": 57601}, "serial.baud: 57601 is not one of 300, 600, "),
         ({"read_voltage": None, "read_pressure": None, "steps": None}, None),

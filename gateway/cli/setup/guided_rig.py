@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 import click
 
@@ -120,7 +120,18 @@ def _ask_device(role: str, what: str, port: str) -> "tuple[DeviceProfile, int]":
     )
     device = profiles[name]
     baud = found[1] if found and found[0] == name else device.serial.baud
-    return device, click.prompt("baud", default=baud, type=int)
+    return device, click.prompt("baud", default=str(baud), value_proc=_speed)
+
+
+def _speed(answer: str) -> int:
+    from gateway.devices.line_settings import Baud
+
+    speeds = get_args(Baud)
+    if not answer.isdecimal() or int(answer) not in speeds:
+        raise click.UsageError(
+            f"{answer} is no speed of a serial port; 9600 and 115200 are, from {speeds[0]} to {speeds[-1]}"
+        )
+    return int(answer)
 
 
 def _probe(port: str, profiles: "list[DeviceProfile]") -> tuple[str, int] | None:

@@ -179,9 +179,10 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
     octets = where.host.split(".")
     calls, lease_s = "a cyclic interrupt of 10 ms: a heartbeat every 80 to 120 ms", rig.control.supervision.lease_s
     if lease_s is not None and lease_s < SHORTEST_S7_LEASE_S:
-        calls += (
-            f" (lease {lease_s:g} s: one that is late ends the force; set lease_s to {SHORTEST_S7_LEASE_S:g} or more)"
+        late = (
+            "is a loss of the master" if rig.control.supervision.lease_action is LeaseAction.HOLD else "ends the force"
         )
+        calls += f" (lease {lease_s:g} s: one that is late {late}; set lease_s to {SHORTEST_S7_LEASE_S:g} or more)"
     shown = f"ADDR[1] .. ADDR[4] = {', '.join(octets)}" if len(octets) == 4 else where.host
     rows = (
         ("CONNECT (TCON_IP_v4)", "value"),

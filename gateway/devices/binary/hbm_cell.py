@@ -7,6 +7,7 @@ middle costs a frame. `frame` of the profile names the format: {force:int32} COF
 -cdab their byte-swapped forms COF4 and COF12, COF6. Of four bytes the lowest is a status or 0: the value is the upper three.
 """
 
+import re
 import struct
 from math import copysign, isfinite
 from typing import Final
@@ -18,6 +19,8 @@ from gateway.devices.profile import DeviceProfile
 from gateway.devices.template_codecs.cell import TemplateCellDevice, TemplateCellHost
 
 _END: Final = b"\r\n"
+_DIGITS: Final = re.compile(rb"[+-]?[0-9]+")
+"""Of an answer as ASCII (COF3), `+0012345`, the last four digits would be a value, the same at any force."""
 _STATUS_BITS: Final = 8  # the lowest byte of four
 
 
@@ -47,11 +50,11 @@ class HbmCellHost(TemplateCellHost):
     def __init__(self, profile: DeviceProfile, sign: int = 1, unit: str | None = None) -> None:
         super().__init__(profile, sign, unit)
         self._format = _Format(profile)
-        self._buffer = b""
+        self._buffer, self._before = b"", b""  # _before: what was dropped last, ahead of what is kept
 
     def forget(self) -> None:
         """Drop half a value."""
-        self._buffer = b""
+        self._buffer, self._before = b"", b""
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
         """Return the samples and the garbage that these bytes complete, without our own words, which an adapter may hear."""
@@ -66,11 +69,16 @@ class HbmCellHost(TemplateCellHost):
                 break
             if not self._buffer[:size].endswith(_END):
                 dropped, self._buffer = dropped + self._buffer[:1], self._buffer[1:]
+                self._before = dropped[-1:]
+                continue
+            value, self._buffer = self._buffer[: self._format.size], self._buffer[size:]
+            before, self._before = self._before, b""
+            if before and _DIGITS.fullmatch(before + value):
+                dropped += value + _END
                 continue
             found += [Garbage(dropped)] if dropped else []
-            raw, dropped = float(self._format.decode(self._buffer[: self._format.size])), b""
+            raw, dropped = float(self._format.decode(value)), b""
             found.append(ForceSample(raw, self._newtons(raw, {}), self._quality(raw, {}), now_s))
-            self._buffer = self._buffer[size:]
         return [*found, Garbage(dropped)] if dropped else found
 
 

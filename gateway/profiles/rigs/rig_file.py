@@ -3,8 +3,9 @@
 Each field's comment is also its help in editors: gateway.profiles.schema carries it into the JSON schema.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
 from annotated_types import Ge, Gt, Le, MinLen
 from pydantic import Field
@@ -29,10 +30,17 @@ from gateway.profiles.rigs.addresses import Address, Network4Or6, Owner
 from gateway.profiles.rigs.faces import Face
 from gateway.profiles.telemetry_sections import Mqtt
 
+_FRAME_OF_A_DEVICE: Final = dict.fromkeys(
+    ("data_bits", "parity", "stop_bits"), "under `serial` in the device's profile: copy a shipped one beside the rig"
+)
+"""What a rig does not say of a device's line, and where it stands."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputFile:
     """The serial line to the DAC or regulator."""
+
+    KEPT_ELSEWHERE: ClassVar[Mapping[str, str]] = _FRAME_OF_A_DEVICE
 
     __pydantic_config__ = STRICT
     device: Annotated[str, MinLen(1)]  # name of a shipped device profile, or the path of one from this file
@@ -51,6 +59,8 @@ class OutputFile:
 class CellFile:
     """The serial line from the load-cell amplifier."""
 
+    KEPT_ELSEWHERE: ClassVar[Mapping[str, str]] = _FRAME_OF_A_DEVICE
+
     __pydantic_config__ = STRICT
     device: Annotated[str, MinLen(1)]  # name of a shipped device profile, or the path of one from this file
     port: Annotated[str, MinLen(1)] | None = None  # /dev/serial/by-id/...; absent in a simulated rig
@@ -67,6 +77,8 @@ class CellFile:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValveFile(ValveControl):
     """The directional valve that control_word bit 4 switches, and the serial line to its relay."""
+
+    KEPT_ELSEWHERE: ClassVar[Mapping[str, str]] = _FRAME_OF_A_DEVICE
 
     __pydantic_config__ = STRICT
     device: Annotated[

@@ -99,7 +99,7 @@ def unknown_key(
     key: str, group: Mapping[Any, Any], known: Iterable[str], elsewhere: Mapping[str, str]
 ) -> tuple[str, str]:
     """Return (sentence, key that was meant) for a key that its group does not have; the latter empty where nobody
-    knows. group: what stands there; elsewhere: key -> where it belongs.
+    knows. group: what stands there; elsewhere: key -> where it belongs, as `under limits`.
 
     A key that the group has already cannot have been meant.
     """
@@ -112,7 +112,7 @@ def unknown_key(
         if name != key and without_unit(name) == key:
             return f"is not a known key; did you mean {name}? (a key ends with its unit)", name
     if key in elsewhere:
-        return f"is not a known key here; it belongs under {elsewhere[key]}", ""
+        return f"is not a known key here; it belongs {elsewhere[key]}", ""
     if (near := closest(key, free)) is not None:
         return f"is not a known key; did you mean {near}?", near
     return "is not a known key; " + (f"known are {one_of(known)}" if known else "nothing may stand here"), ""

@@ -92,9 +92,11 @@ def _fault(kind: type, document: Document, path: Path, place: Path, finding: Map
         missing = f"is missing{_what_it_is(place[len(path) :])}"
         return replace(document.fault(place, missing, at_key=True), kind=FaultKind.MISSING)
     if finding["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        known = names(kind_at(kind, place[len(path) : -1], document.at(*place[:-1])) or kind)
+        holder = kind_at(kind, place[len(path) : -1], document.at(*place[:-1])) or kind
+        known = names(holder)
         here = next((step for step in reversed(place[:-1]) if isinstance(step, str)), "")  # also of its other types
-        elsewhere = {name: group for name, group in groups_by_key(kind).items() if group != here}
+        elsewhere = {name: f"under {group}" for name, group in groups_by_key(kind, here).items()}
+        elsewhere |= getattr(holder, "KEPT_ELSEWHERE", {})
         sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, elsewhere)
         return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=suggestion)
     value, group = document.at(*place), kind_at(kind, place[len(path) :])
@@ -170,6 +172,11 @@ def _members(hint: Any) -> Iterator[Any]:
         yield hint
 
 
-def groups_by_key(kind: type) -> dict[str, str]:
-    """Return where each key of a nested group belongs: {"force_max_n": "limits"}."""
-    return {name: group for group, inner in groups(kind) for name in names(inner)}
+def groups_by_key(kind: type, but: str) -> dict[str, str]:
+    """Return where each key of a nested group belongs: {"force_max_n": "limits", "unit": "load_cell or fieldbus"}. but: a
+    group that is none of these."""
+    found: dict[str, list[str]] = {}
+    for group, inner in groups(kind):
+        for name in names(inner) if group != but else ():
+            found.setdefault(name, []).append(group)
+    return {name: " or ".join(dict.fromkeys(where)) for name, where in found.items()}

@@ -67,10 +67,12 @@ class PortReport:
 
 
 class _Ear:
-    """An open port and what came through it."""
+    """An open port and what came through it. last_end: how the last question at this speed ended. Behind another end, or
+    none, it may stand in the device ahead of the next one, as do characters of other speeds."""
 
     def __init__(self, path: str, settings: SerialSettings) -> None:
         self.received = b""
+        self.last_end: bytes | None = None
         self._changed = asyncio.Event()
         events = PortEvents(self._on_bytes, on_lost=lambda _: self._changed.set(), on_open=lambda _: None)
         self.port = SerialPort(path, settings, events)
@@ -173,6 +175,9 @@ async def _asked(
         on_the_wire_s = (len(question.data) + _LONGEST_ANSWER) * settings.character_s
         timeout_s = max(patience_s, profile.reply_timeout_s + on_the_wire_s)
         words = await ear.ask(question, timeout_s)
+        if ear.last_end != profile.question_terminator_bytes and not (words or question.stranger(ear.received)):
+            words = await ear.ask(question, timeout_s)
+        ear.last_end = profile.question_terminator_bytes
         if other := question.stranger(ear.received):
             strangers.append(Stranger(profile, settings, other))
             return None
@@ -219,6 +224,7 @@ def show_bytes(data: bytes) -> str:
     printable = sum(one.isprintable() for one in text)
     controls = sum(one in f"\r\n{CONTROL_CHARACTERS}" for one in text)
     is_all_shown = shown.isascii() and printable + controls == len(text)
-    is_text = is_all_shown and len(text) <= 2 * printable  # a short binary answer may be all controls
+    is_text = is_all_shown and len(text.rstrip("\r\n")) <= 2 * printable  # a short binary answer may be all controls
+    is_text = is_text and printable > 0
     more = "..." if len(data) > _SHOWN_BYTES else ""
     return quote(text) + more if is_text else shown.hex(" ") + more

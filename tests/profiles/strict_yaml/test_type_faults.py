@@ -55,6 +55,8 @@ def test_the_example_of_the_first_hour() -> None:
          "supervision.lease: is not a known key; did you mean lease_s? (a key ends with its unit)"),
         ("limit_v: 0.5", "limit_mv: 500", "trim.limit_mv: is not a known key; this quantity is given as limit_v: 0.5"),
         ("sign: 1", "over_force_n: 1", "load_cell.over_force_n: is not a known key here; it belongs under limits"),
+        ("sign: 1", "parity: even", "load_cell.parity: is not a known key here; it belongs under `serial` in the device's"),
+        ("limit_v: 0.5", "unit: 1", "trim.unit: is not a known key here; it belongs under load_cell or fieldbus"),
         ("bind: 127.0.0.1", "xyz: 1", "network.xyz: is not a known key; known are bind, port, "),
     ],
 )  # fmt: skip

@@ -75,6 +75,15 @@ def test_a_force_that_is_no_number_is_asked_again() -> None:
     assert "newton_per_count: 12.5" in text and "force_max_n: 40" in text and "range_n: 98.07" in text
 
 
+@pytest.mark.parametrize("slip", ["115300", "fast", "-9600", "98.07"])
+def test_a_speed_that_no_port_has_is_asked_again(slip: str) -> None:
+    """It was written into the file, which `check` then refused."""
+    result = answered("later", "", slip, "9600", "y", "later", "", slip, "57600", "98.07", "40")
+    assert result.output.count(f"{slip} is no speed of a serial port") == 2
+    rig = check_report("own.yaml", simulated=True).rig
+    assert rig and (rig.output.baud, rig.load_cell.baud) == (9600, 57600)
+
+
 def test_a_file_that_is_written_with_a_fault_has_it_told() -> None:
     """What was answered at the last time went into the file without a look at it."""
     result = answered("later", "", "", "y", "later", "", "", *["98.07", "300"] * 3, "98.07", "299")

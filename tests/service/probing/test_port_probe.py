@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from gateway.cli.main import command
-from gateway.cli.setup.port_probing import tell_report
+from gateway.cli.setup.port_probing import known_profiles, probe_path, tell_report
 from gateway.devices import SerialSettings, ValveDevice, cell_device
 from gateway.devices.messages import AskDevice, DeviceStep, Garbage, ReadPressure, ReadVoltage
 from gateway.devices.profile import DeviceRole
@@ -97,6 +97,14 @@ def test_listening_says_what_comes_and_sends_nothing() -> None:
     assert module.heard == []
 
 
+@pytest.mark.parametrize(("name", "baud"), [("mantracourt-dsc", 115200), ("hbm-aed", 57600)])
+def test_a_device_is_found_behind_what_was_asked_before_it(name: str, baud: int) -> None:
+    """The laumas-tlb's question has no end of a line: a DSC heard it and its own as one, and answered neither."""
+    with behind_ptys(FarEnd(load_device(name), baud)) as (path,):
+        report = probe_path(path, known_profiles("load cell"))
+    assert [(one.profile.name, one.settings.baud) for one in report.answers] == [(name, baud)]
+
+
 class SevenDataBits(FarEnd):
     """An indicator as many are delivered: 2400 7E1 or 7O1, the eighth bit of what comes being its parity."""
 
@@ -135,6 +143,8 @@ def test_a_probe_tells_seven_data_bits_from_noise(tmp_path: Path) -> None:
         (b"ST,+1\r\n", r"'ST,+1\r\n'"),
         (b"\x02+1.0\tN\x03", "'<STX>+1.0<TAB>N<ETX>'"),
         (b"\x022    5.00\x0329\x04", "'<STX>2    5.00<ETX>29<EOT>'"),
+        (b"0\r\n", r"'0\r\n'"),  # an ITV at rest
+        (b"\r\n", "0d 0a"),
         (b"\x01\x06\x00", "01 06 00"),
         (b"\x01\x04\x02\x05\x06AB", "01 04 02 05 06 41 42"),
         (b"a" * 100, f"'{'a' * 48}'..."),

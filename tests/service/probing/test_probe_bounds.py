@@ -28,6 +28,7 @@ class FakeEar:
 
     def __init__(self, answers: Callable[[bytes], bytes] = lambda data: b"", took_s: float = 0.0) -> None:
         self.received, self.now_s, self.waited_s = b"", 0.0, list[float]()
+        self.last_end: bytes | None = None
         self._answers, self._took_s = answers, took_s
 
     async def ask(self, question: HarmlessQuestion, timeout_s: float) -> str:
@@ -126,9 +127,26 @@ def test_a_cell_that_says_what_it_is_is_asked_for_a_reading_too() -> None:
     answers[identity.data] = b""
     ear = FakeEar(answers.__getitem__)
     assert asyncio.run(_asked(ear, profile, profile.serial, 0.0, [])) is None  # type: ignore[arg-type]
-    assert len(ear.waited_s) == 1, "`$014` is a setting to an I-7021: it keeps its output as its power-on value"
+    assert len(ear.waited_s) == 2, "`$014` is a setting to an I-7021: it keeps its output as its power-on value"
     answers |= {identity.data: b"!014016\r", reading.data: b""}
     assert asyncio.run(_asked(FakeEar(answers.__getitem__), profile, profile.serial, 0.0, [])) is None  # type: ignore[arg-type]
+
+
+def test_a_question_behind_the_rest_of_another_is_asked_once_more() -> None:
+    """A device that waits for the end of a line has ahead of it what came at other speeds, or of a Modbus question."""
+    profile = load_device("mantracourt-dsc")
+    answers = iter([b"?\r", b"+00032.100\r"])
+    found = asyncio.run(
+        _asked(FakeEar(lambda data: next(answers, b"+00032.100\r")), profile, profile.serial, 0.0, [])  # type: ignore[arg-type]
+    )
+    assert found and found.said == "reads 32.1"
+
+
+def test_a_question_behind_one_with_its_own_end_is_asked_once() -> None:
+    """The first one has ended whatever stood ahead of it: a port without a device is not listened to for twice as long."""
+    profile, ear = load_device("smc-itv-rc"), FakeEar()
+    assert asyncio.run(_asked(ear, profile, profile.serial, 0.0, [])) is None  # type: ignore[arg-type]
+    assert len(list(harmless_questions(profile))) == 2 and len(ear.waited_s) == 3
 
 
 def test_the_profiles_own_speeds_come_first_and_each_is_tried_once() -> None:
