@@ -66,6 +66,24 @@ def test_a_full_disk_is_an_alarm_and_nothing_is_lost_that_memory_holds() -> None
     assert said[-1].startswith("A351 the audit is stored again")
 
 
+def test_each_failure_of_the_disk_is_told_and_each_end_of_one_once() -> None:
+    """The second one behind a day that went well is an alarm as the first was; what is stored in between is no news."""
+    file, said, now = FailingFile(), list[str](), [0.0]
+    log = audit_log(file, said, lambda: now[0])
+    for is_full in (True, False, False, True, True, False):
+        file.is_full = is_full
+        now[0] += 100.0
+        log.put({"k": now[0]})
+        log.flush()
+    assert [sentence[:33] for sentence in said] == [
+        "A351 the audit is not stored: No ",
+        "A351 the audit is stored again, 2",
+        "A351 the audit is not stored: No ",
+        "A351 the audit is stored again, 3",
+    ]
+    assert len(file.taken) == 6
+
+
 def test_what_a_full_disk_kept_back_is_written_at_the_end_where_it_is_free_again() -> None:
     """Found by tests/simulation: the file stayed open, and what came after the failure was lost."""
 

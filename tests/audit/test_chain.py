@@ -168,6 +168,28 @@ def test_old_files_go_and_the_chain_says_so(tmp_path: Path) -> None:
     assert verify_audit(tmp_path).broken, "what is removed by hand is not what was dropped"
 
 
+def test_an_old_file_stays_until_the_line_that_says_so_is_on_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a disk that is full just then: gone first, it would be missed for ever, and taken for tampering."""
+    file, write = AuditFile(tmp_path, FILE_BYTES, kept=3), os.write
+
+    def refuse(descriptor: int, data: bytes) -> int:
+        if b'"what": "dropped"' in data:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(descriptor, data)
+
+    monkeypatch.setattr("gateway.audit.audit_file.os.write", refuse)
+    for record in records(20):
+        file.append([record])
+    assert len(files_of(tmp_path)) > 3 and verify_audit(tmp_path).broken is None
+    monkeypatch.undo()
+    for record in records(20, 21):
+        file.append([record])
+    file.close()
+    assert len(files_of(tmp_path)) == 3 and verify_audit(tmp_path).broken is None
+
+
 def test_a_full_audit_with_an_altered_old_file_goes_on_and_keeps_it(tmp_path: Path) -> None:
     file = AuditFile(tmp_path, FILE_BYTES, kept=3)
     for record in records(LINES):

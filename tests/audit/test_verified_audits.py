@@ -1,6 +1,7 @@
 """What the reader of an audit calls tampering, and what it does not: pieces of lines, other names, another past, growth."""
 
 import json
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,33 @@ def test_no_line_holds_before_the_first_one_where_that_is_the_break(state: Path)
     verdict = verify_audit(state)
     assert verdict.broken and "no line says that those before it were dropped" in verdict.broken.text
     assert (verdict.broken.line, verdict.lines, verdict.end.number) == (1, 0, 0)
+
+
+def test_a_first_line_that_is_gone_with_its_file_is_missed(tmp_path: Path) -> None:
+    """Of files of one line each: nothing is damaged in what is left, and its numbers go on."""
+    file = AuditFile(tmp_path, longest_bytes=1)
+    for record in records(3):
+        file.append([record])
+    file.close()
+    assert verify_audit(tmp_path).broken is None
+    files_of(tmp_path)[0].unlink()
+    broken = verify_audit(tmp_path).broken
+    assert broken and "is number 2, and no line says that those before it were dropped" in broken.text
+
+
+def test_a_missing_line_is_called_missing_and_one_that_names_none_before_it_replaced(state: Path) -> None:
+    """Its number tells where to look for it; a line without the hash before it would vouch for whatever stood there."""
+    path = files_of(state)[0]
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:1] + lines[2:]))
+    broken = verify_audit(state).broken
+    assert broken and (broken.line, broken.text) == (2, "has number 3 after 1: line 2 is missing")
+    fields, _ = open_line(lines[1].rstrip())
+    body = json.dumps({name: fields[name] for name in fields if name != "prev"})
+    seal = sha256(body.encode()).hexdigest()
+    path.write_bytes(lines[0] + f'{body[:-1]}, "sha256": "{seal}"}}\n'.encode() + b"".join(lines[2:]))
+    broken = verify_audit(state).broken
+    assert broken and (broken.line, broken.text) == (2, "does not continue the line before it: that one was replaced")
 
 
 def test_a_chain_that_is_written_anew_behind_what_was_dropped_is_found(tmp_path: Path) -> None:

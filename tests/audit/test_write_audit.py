@@ -143,6 +143,17 @@ def test_summaries_come_before_the_edge_that_ends_them(watched: Watched) -> None
     assert (summary["min"], summary["max"]) == (9.95, 10.49)
 
 
+def test_summaries_come_before_an_edge_also_where_another_of_the_same_write_is_only_counted(watched: Watched) -> None:
+    """A program that holds tare at 1: the enable beside its thirtieth is told, and what led to it before that."""
+    for _ in range(30):
+        watched.write(ROBOT, 0, 4)
+    for setpoint in (1000, 1100, 1200):
+        watched.write(ROBOT, 1, setpoint)
+    watched.write(ROBOT, 0, 5)
+    told = watched.told("what", "new")
+    assert told.index(("force_setpoint", 12.0)) < told.index(("enable", 1.0))
+
+
 @pytest.mark.parametrize("words", [(0, 4), (1, 9999), (0, 3, 1000)])
 def test_a_flood_of_edges_or_refusals_is_counted(watched: Watched, words: tuple[int, ...]) -> None:
     """A master that holds tare at 1 in every cycle, or writes what is refused."""

@@ -100,6 +100,16 @@ def test_a_ramp_lasts_as_long_as_it_says_at_any_pace_of_loop_and_cell(gap_s):
     assert at_n == pytest.approx(10.0 * steps * gap_s, abs=10.0 * TICK_S)
 
 
+def test_of_two_limits_that_act_the_slew_is_told_until_the_range_alone_is_left():
+    """On the way to a voltage that is out of range it is the pace that keeps it: `limited_by` says the strongest."""
+    stage, told = VoltageLimiter(LIMITS), []
+    for _ in range(400):
+        stage.earn(0.01)
+        told.append(stage.drive(LIMITS.voltage_max_v + 5.0))
+    assert list(dict.fromkeys(told)) == [LimitedBy.VOLTAGE_SLEW, LimitedBy.VOLTAGE_RANGE]
+    assert stage.voltage_v == LIMITS.voltage_max_v
+
+
 def test_a_late_step_does_not_catch_up_in_one_jump():
     stage = VoltageLimiter(LIMITS)
     stage.earn(0.09)

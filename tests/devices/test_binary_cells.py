@@ -146,6 +146,17 @@ def test_a_zero_that_is_none_and_the_lower_byte_first_are_those_of_both_ends() -
     assert device.frame(12.0)[:4] == usual[3::-1]
 
 
+def test_the_zero_of_raw_counts_is_the_converters_whichever_way_the_cell_is_wired() -> None:
+    """Turned with the sign, a cell that hangs the other way round was off by twice its zero."""
+    profile = load_device("hbm-aed-binary")
+    assert profile.read_force
+    other = replace(profile, read_force=replace(profile.read_force, zero_count=5000.0))
+    frame = cell_device(other, "N").frame(12.0)
+    readings = [cell_host(other, sign, "N").receive(frame, 0.0)[0] for sign in (1, -1)]
+    forces = [one.force_n for one in readings if isinstance(one, ForceSample)]
+    assert forces == [pytest.approx(12.0, abs=0.1), pytest.approx(-12.0, abs=0.1)]
+
+
 def at_its_end(kind: RegisterType, end_count: float, decimals: int = 0) -> DeviceProfile:
     """An amplifier that says nothing of an overload but stands at its converter's end."""
     registers = WeightRegisters(function=4, first=0, last=1, weight=0, type=kind, decimals=decimals)

@@ -84,6 +84,17 @@ def test_who_would_change_something_does_not_go_on_without_the_lock_and_a_reader
     assert refused.value.errno == errno.EBUSY
 
 
+def test_two_who_read_do_not_wait_for_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A start beside `calibration list`, or beside a reader that is stopped, would be two seconds later."""
+
+    def wait(seconds: float) -> None:
+        raise AssertionError("it waits")
+
+    monkeypatch.setattr(durable_file.time, "sleep", wait)
+    with lock_directory(tmp_path, shared=True) as one, lock_directory(tmp_path, shared=True) as other:
+        assert one != other
+
+
 def refused(*_: object, **__: object) -> None:
     raise OSError(errno.EIO, "Input/output error")
 

@@ -23,6 +23,8 @@ CASES = [
     ("03 0000 007e", 3, RefusalReason.QUANTITY, 0, "W220 quantity 126, allowed 1 .. 125 at address 0", "42fc0000"),
     ("10 0001 0001 03 000100", 3, RefusalReason.QUANTITY, 1, "W220 byte count 3, expected 2 at address 1", "40400000"),
     ("05 0000 1234", 3, RefusalReason.OUT_OF_RANGE, 0, "W223 coil value 0x1234, allowed 0x0000 and 0xFF00", "4591a000"),
+    ("17 0064 0001 00", 3, RefusalReason.QUANTITY, 100, "W220 function 23 with 6 bytes, a read/write has", "40c00000"),
+    ("16 0002 0000", 3, RefusalReason.QUANTITY, 2, "W220 function 22 with 5 bytes, a mask write has 7", "40a00000"),
     ("07", 1, RefusalReason.FUNCTION, NO_ADDRESS, "W221 function 7 is not served", "40e00000"),
     ("2b 0e 04 63", 2, RefusalReason.ADDRESS, NO_ADDRESS, "W224 no identification object 99", "42c60000"),
 ]

@@ -199,7 +199,10 @@ def test_a_stop_waits_neither_for_a_recording_whose_disk_hangs_nor_for_what_othe
             writer.close()
 
         context = WebContext(tmp_path, "demo", True, ControlLink(tmp_path))
-        app, headers = make_app(context, PageAccess("127.0.0.1", 8080, TOKEN), None), {"authorization": f"Bearer {TOKEN}"}
+        app, headers = (
+            make_app(context, PageAccess("127.0.0.1", 8080, TOKEN), None),
+            {"authorization": f"Bearer {TOKEN}"},
+        )
         async with await asyncio.start_unix_server(control, tmp_path / "control.sock"):
             other = asyncio.create_task(call(app, method, f"/api/v1/{path}", headers, body))
             await is_asked.wait()

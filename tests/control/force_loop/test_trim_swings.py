@@ -99,3 +99,12 @@ def test_another_target_counts_anew_at_the_pace_that_was_found_and_a_rest_forget
     assert pace_of(one) == pytest.approx(0.6)
     one.reset()
     assert not one.has_hunted and pace_of(one) == pytest.approx(1.0)
+
+
+def test_a_contact_that_is_lost_takes_the_correction_and_not_the_pace_that_was_found() -> None:
+    """A tool that swings off its workpiece each time would else swing at the full gain for good."""
+    one = swing(trim(), FREE_SWINGS + 3)
+    slow = pace_of(one)
+    one.forget()
+    assert (one.value_v, one.has_hunted) == (0.0, True)
+    assert pace_of(one) == pytest.approx(slow) and slow < 1.0

@@ -1,0 +1,168 @@
+"""What an output device was asked before is asked again: by a reset, behind a silence, and of a port that is opened anew; and
+what it did not answer is held against it only in a row."""
+
+from dataclasses import replace
+
+import pytest
+
+from gateway.codes.faults import FaultCode
+from gateway.devices import output_device, output_host
+from gateway.devices.messages import Accepted, AskDevice, DeviceAnswer, DeviceStep, ReadVoltage, SetVoltage
+from gateway.service.running_rig.lines.device_checks import DeviceChecks, DeviceLevel
+from gateway.service.running_rig.lines.output_line import OutputExchange
+from tests.profile_files import load_device
+
+DEVICE = "icpdas-702x"
+IDENTITY, STATUS, ARM, VERIFY = DeviceStep.IDENTITY, DeviceStep.STATUS, DeviceStep.ARM, DeviceStep.VERIFY
+MISSES = 5
+REPLY_TIMEOUT_S, ROUND_TRIP_S = 0.06, 0.003
+
+
+def checks_of_it(*, is_armed: bool = False) -> DeviceChecks:
+    checks = DeviceChecks(output_host(load_device(DEVICE)), is_waived=False)
+    if is_armed:
+        answer_all(checks)
+    return checks
+
+
+def answer_all(checks: DeviceChecks) -> list[DeviceStep]:
+    """What was asked, each answered as a device does that is well."""
+    asked = []
+    while not checks.is_done and (step := checks.next_step(0.0)):
+        asked.append(step)
+        text = "" if step is not STATUS else "armed" if ARM in asked else "off"
+        checks.take(DeviceAnswer(step, is_right=True, text=text))
+    return asked
+
+
+@pytest.mark.parametrize("is_refused", [True, False])
+def test_a_reset_asks_a_wrong_device_anew_what_it_is(is_refused: bool) -> None:
+    """It was exchanged, or its answer was spoiled: without it only a new start of the gateway would find out."""
+    checks = checks_of_it()
+    checks.refuse(IDENTITY, "WHAT?") if is_refused else checks.take(
+        DeviceAnswer(IDENTITY, is_right=False, text="a lamp")
+    )
+    assert checks.fault is FaultCode.WRONG_DEVICE
+    checks.clear()
+    assert answer_all(checks) == [IDENTITY, STATUS, ARM, VERIFY]
+    assert (checks.fault, checks.said, checks.is_armed) == (FaultCode.NONE, "", True)
+
+
+def test_the_next_device_behind_the_port_is_not_armed_because_the_one_before_was() -> None:
+    checks = checks_of_it(is_armed=True)
+    assert checks.level == DeviceLevel(has_one=True, is_armed=True)
+    checks.begin()
+    assert checks.level == DeviceLevel(has_one=True)
+
+
+def test_a_device_that_misses_a_question_now_and_then_is_not_refused() -> None:
+    """Five of one question in a row are a device without words for it; a noisy line loses some of each."""
+    checks = checks_of_it()
+    while not checks.is_done and (step := checks.next_step(0.0)):
+        for _ in range(MISSES - 1):
+            checks.miss(step)
+        assert checks.next_step(0.0) is step
+        checks.take(DeviceAnswer(step, is_right=True, text="off" if step is STATUS else ""))
+    assert (checks.fault, checks.is_armed) == (FaultCode.NONE, True)
+    checks.begin()
+    for _ in range(MISSES):
+        checks.miss(IDENTITY)
+    assert checks.fault is FaultCode.WRONG_DEVICE
+
+
+@pytest.mark.parametrize("has_verify", [True, False])
+def test_a_look_that_is_not_answered_is_no_word_against_an_armed_watchdog(has_verify: bool) -> None:
+    """A busy wire loses some: armed anew each time, its setpoints would wait for that."""
+    profile = load_device(DEVICE)
+    watchdog = profile.own_watchdog
+    assert watchdog
+    known = profile if has_verify else replace(profile, watchdog=replace(watchdog, verify=None))
+    checks = DeviceChecks(output_host(known), is_waived=False)
+    answer_all(checks)
+    assert checks.is_armed
+    for now_s in range(2 * MISSES):
+        step = checks.next_step(float(now_s))
+        assert step
+        checks.miss(step)
+    assert (checks.is_armed, checks.is_done, checks.fault) == (True, True, FaultCode.NONE)
+
+
+def test_what_was_never_armed_has_not_forgotten_it() -> None:
+    """W249 says that the device was off meanwhile: not so where its first tries fail."""
+    checks = checks_of_it()
+    for _ in range(2):
+        for step in (IDENTITY, STATUS, ARM):
+            checks.take(DeviceAnswer(step, is_right=True, text="off" if step is STATUS else ""))
+        checks.take(DeviceAnswer(VERIFY, is_right=False))
+    assert checks.times_forgotten == 0
+    answer_all(checks)
+    checks.take(DeviceAnswer(VERIFY, is_right=False))
+    assert (checks.is_armed, checks.times_forgotten) == (False, 1)
+
+
+class PlayedLine:
+    """Answered is each question but those in `deaf_to`; asked: what the device was asked about itself."""
+
+    def __init__(self) -> None:
+        profile = load_device(DEVICE)
+        self.device, self.now_s, self.stands_v = output_device(profile), 100.0, 0.0
+        self.deaf_to: tuple[DeviceStep, ...] = ()
+        self.is_silent = False
+        self.asked: list[DeviceStep] = []
+        self.written: list[bytes] = []
+        self.exchange = OutputExchange(output_host(profile), self.written.append, REPLY_TIMEOUT_S)
+
+    def run(self, seconds: float, step_v: float = 0.0) -> float:
+        """Let the setpoint rise by so much at each answer; the oldest silence that the line has told."""
+        until_s, oldest_s = self.now_s + seconds, 0.0
+        while self.now_s < until_s:
+            self.now_s += ROUND_TRIP_S
+            for data in [self.written.pop(0) for _ in self.written[:]]:
+                for asked in self.device.receive(data, self.now_s):
+                    self.hear(asked)
+            self.exchange.set_voltage(min(10.0, (self.exchange.sent_v or 0.0) + step_v), self.now_s)
+            self.exchange.tick(self.now_s)
+            since_s = self.exchange.unanswered_since_s
+            oldest_s = max(oldest_s, 0.0 if since_s is None else self.now_s - since_s)
+        return oldest_s
+
+    def hear(self, asked: object) -> None:
+        if self.is_silent or (isinstance(asked, AskDevice) and asked.step in self.deaf_to):
+            return
+        if isinstance(asked, AskDevice):
+            self.asked.append(asked.step)
+            self.exchange.on_bytes(self.device.reply(DeviceAnswer(asked.step, is_right=True)), self.now_s)
+        elif isinstance(asked, SetVoltage | ReadVoltage):
+            self.stands_v = asked.voltage_v if isinstance(asked, SetVoltage) else self.stands_v
+            self.exchange.on_bytes(self.device.reply(Accepted(self.stands_v), to=asked), self.now_s)
+
+
+def test_a_device_that_was_silent_for_long_is_asked_anew_what_it_is_and_armed_anew() -> None:
+    """Its plug was pulled, or another one put in its place: what answers then may be anybody, and does not watch."""
+    line = PlayedLine()
+    line.run(0.5)
+    assert line.asked[:4] == [IDENTITY, STATUS, ARM, VERIFY] and line.exchange.checks.is_done
+    line.is_silent = True
+    line.run(0.4)
+    line.is_silent = False
+    line.run(0.3)
+    assert IDENTITY not in line.asked[4:], "a short silence is none"
+    line.is_silent = True
+    line.run(0.8)
+    del line.asked[:]
+    line.is_silent = False
+    line.run(0.5)
+    assert IDENTITY in line.asked, "perhaps behind a look that was under way"
+    assert line.asked[line.asked.index(IDENTITY) :][:4] == [IDENTITY, STATUS, ARM, VERIFY]
+    assert line.exchange.checks.is_done
+
+
+def test_an_arming_that_nobody_answers_leaves_every_other_turn_to_the_setpoint() -> None:
+    """A device that has forgotten it, under a force that rises: asked alone, it would be taken for a silent one."""
+    line = PlayedLine()
+    line.run(0.5)
+    assert line.device.watchdog
+    line.device.watchdog.do(DeviceStep.DISARM, None, line.now_s)
+    line.deaf_to = (ARM,)
+    assert line.run(2.0, step_v=0.01) < 2.0 * REPLY_TIMEOUT_S
+    assert line.exchange.checks.times_forgotten == 1 and line.stands_v > 0.1
