@@ -11,13 +11,17 @@ from typing import Final
 import click
 
 from gateway.cli.diagnosis.progress_line import handle_interrupt
+from gateway.cli.errors import already_exists
 
 STDOUT: Final = Path("-")  # as the name of a file
+_OURS: Final = "Written by force-gateway diagnose"  # at the head of what --extend and --plan write
+_HEAD_CHARACTERS: Final = 500
 
 
 def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Raise UsageError where two outputs, or an output and an input, are one file, FileNotFoundError where no directory is,
-    IsADirectoryError where one is in the place of a file, OSError where links lead in a circle."""
+    IsADirectoryError where one is in the place of a file, OSError where links lead in a circle, E405 where a rig, a plant
+    or another profile that somebody wrote would be lost."""
     occupied = {path.resolve(): f"{path} is read" for path in inputs if path.exists()}
     for target in targets:
         with contextlib.suppress(FileNotFoundError):
@@ -26,6 +30,16 @@ def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
             raise click.UsageError(f"{target} would be overwritten: {occupied[target.resolve()]}")
         occupied[target.resolve()] = f"{target} is written by another option"
         _refuse_place(target)
+        if _is_written_by_hand(target):
+            raise already_exists(target, "diagnose has not written it: name another file")
+
+
+def _is_written_by_hand(target: Path) -> bool:
+    """Decide whether a target is YAML that is not ours: `--extend my-cell.yaml` made a plant of the rig's file."""
+    if target.suffix not in (".yaml", ".yml") or not target.is_file():
+        return False
+    head = target.read_bytes()[:_HEAD_CHARACTERS].decode("utf-8", "replace")
+    return bool(head.strip()) and _OURS not in head
 
 
 def write_all(texts: Mapping[Path, str]) -> None:

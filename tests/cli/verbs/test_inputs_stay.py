@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from gateway.cli.diagnosis.outputs import check_targets, write_all
 from gateway.profiles import shipped_profiles_folder
 from tests.cli.verbs.calibration.test_fit import ladder_rows, written
 
@@ -38,6 +39,35 @@ def test_no_output_takes_the_place_of_what_is_read(here: Path, call, words: tupl
     answer = call(*words)
     assert answer.exit_code == 2 and "would be overwritten" in answer.stderr, answer.output
     assert {path: path.read_bytes() for path in here.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("diagnose", "ladder.csv", "--extend", "rigs.yaml"),
+        ("diagnose", "ladder.csv", "--extend", "plants.yaml"),
+        ("diagnose", "ladder.csv", "--plan", "calibrations.yaml"),
+        ("diagnose", "ladder.csv", "--report", "rigs.yaml"),
+        ("fit", "ladder.csv", "--report", "rigs.yaml"),
+        ("simulate", "ladder.csv", "--csv", "rigs.yaml"),
+    ],
+)
+def test_no_output_takes_the_place_of_a_profile_that_somebody_wrote(here: Path, call, words: tuple[str, ...]) -> None:
+    """`--extend my-cell.yaml`, meant as "extend my cell", made a plant of the rig's file."""
+    before = {path: path.read_bytes() for path in here.iterdir()}
+    answer = call(*words)
+    assert answer.exit_code == 1, answer.output
+    assert f"E405 {words[-1]} exists and was left alone; diagnose has not written it" in answer.stderr
+    assert {path: path.read_bytes() for path in here.iterdir()} == before
+
+
+def test_what_diagnose_wrote_is_written_anew(tmp_path: Path) -> None:
+    (tmp_path / "plan.yaml").write_text("# Written by force-gateway diagnose for what 1 could not tell\nname: plan\n")
+    (tmp_path / "empty.yaml").touch()
+    targets = [tmp_path / name for name in ("plan.yaml", "empty.yaml", "new.yaml")]
+    check_targets(targets, [])
+    write_all(dict.fromkeys(targets, "anew"))
+    assert [target.read_text() for target in targets] == ["anew"] * 3
 
 
 @pytest.mark.parametrize(
