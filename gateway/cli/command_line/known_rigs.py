@@ -23,11 +23,27 @@ def running_rigs() -> list[str]:
 
 
 def rigs_with_state() -> list[str]:
-    """Return the names of rigs that have run here, with the usual state directory."""
+    """Return the names of rigs that have run here, with the usual state directory. A start that was refused leaves its event
+    there and a lock, no folder: `run dmo` is no rig that has run."""
     from gateway.service.supervisor.run_options import default_state_root
 
     root = default_state_root()
-    return sorted(path.name for path in root.iterdir() if path.is_dir()) if root.is_dir() else []
+    return sorted(path.name for path in root.iterdir() if _has_run(path)) if root.is_dir() else []
+
+
+def _has_run(state: Path) -> bool:
+    try:
+        return any(entry.is_dir() for entry in state.iterdir())
+    except NotADirectoryError:
+        return False
+    except OSError:  # another user's
+        return True
+
+
+def _has_state(name: str) -> bool:
+    from gateway.service.supervisor.run_options import default_state_root
+
+    return Path(name).name == name and (default_state_root() / name).is_dir()
 
 
 def known_rigs() -> list[str]:
@@ -40,7 +56,7 @@ def known_rigs() -> list[str]:
 def check_rig(name: str) -> None:
     """Raise UsageError for a rig that is neither known nor a file; it lists those that are."""
     path = Path(name).expanduser()
-    if name in known_rigs() or path.is_file() or path.with_name(f"{path.name}.yaml").is_file():
+    if name in known_rigs() or _has_state(name) or path.is_file() or path.with_name(f"{path.name}.yaml").is_file():
         return
     from difflib import get_close_matches
 

@@ -8,6 +8,8 @@ import pytest
 from gateway.cli import control_socket
 from gateway.cli.command_line import known_rigs, rig_choice
 from gateway.cli.options import state_directory
+from gateway.processes.event_file import EventFile
+from gateway.processes.event_log import EventLog
 from gateway.profiles import shipped_profiles_folder
 from gateway.recording import Recorder
 
@@ -16,7 +18,7 @@ from gateway.recording import Recorder
 def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "state" / "force-gateway" / "my-cell").mkdir(parents=True)
+    (tmp_path / "state" / "force-gateway" / "my-cell" / "audit").mkdir(parents=True)
     return tmp_path / "state" / "force-gateway"
 
 
@@ -39,6 +41,18 @@ def test_an_unknown_rig_is_answered_with_those_that_exist(verb: tuple[str, ...],
     assert answer.exit_code == 2, answer.output
     assert "rig irc-cell is not known; did you mean irc5-cell?" in answer.stderr
     assert "Shipped: demo, irc5-cell, paper-pull. Run here: my-cell." in answer.stderr
+
+
+def test_a_start_that_was_refused_makes_no_rig_that_has_run(root: Path, call) -> None:
+    """Each typo in `run RIG` was offered from then on as one that had run here; what was said of it can still be read."""
+    (root / "dmo").mkdir()
+    with EventLog(source="control", file=EventFile(root / "dmo")) as log:
+        log.note("start", "E151 no such rig")
+    (root / "dmo" / "lock").touch()
+    (root / "events.jsonl").touch()
+    answer = call("events", "--rig", "nope")
+    assert "Run here: my-cell." in answer.stderr
+    assert "E151 no such rig" in call("events", "--rig", "dmo").stdout
 
 
 def test_a_file_that_is_not_there_is_said_to_be_none(root: Path, call) -> None:
