@@ -33,6 +33,15 @@ _KINDS: Final = {
 }
 
 
+def expand_home(name: Path | str) -> Path:
+    """Return the path that its user means: ~ is the home directory. `~nobody/cell`, where nobody of that name is known, is a
+    name like another."""
+    path = Path(name)
+    with suppress(RuntimeError):
+        return path.expanduser()
+    return path
+
+
 def other_kind(path: Path | str) -> str:
     """Return what has this name where it is no plain file, such as "a pipe"; empty for a plain one. OSError without any."""
     return _other_kind(os.stat(path))  # noqa: PTH116

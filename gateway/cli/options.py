@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, cast, get_args
 import click
 
 from gateway import defaults
+from gateway.cli.command_line.given_path import GivenPath
 
 if TYPE_CHECKING:
     from gateway.cli.master.wires import Wire
@@ -18,7 +19,7 @@ Endpoint = tuple[str, int]
 _LONGEST_NAME: Final = 60
 _LINE_OPTIONS: Final = ("baud", "parity", "stop_bits")
 _TLS_OPTIONS: Final = ("tls", "cert", "key")
-_FILE: Final = click.Path(path_type=Path, dir_okay=False)
+_FILE: Final = GivenPath(dir_okay=False)
 _PARITIES: Final = ("none", "even", "odd")  # gateway.devices.line_settings.Parity, without its imports
 DEFAULT_ENDPOINT: Final = f"{defaults.HOST}:{defaults.MODBUS_PORT}"
 
@@ -221,7 +222,7 @@ class StateChoice:
 
 def state_option(text: str) -> Callable[[Function], Function]:
     """Return --state with this help. One that cannot be read is told by E105, which ends with 77."""
-    return click.option("--state", type=click.Path(path_type=Path, file_okay=False, readable=False), help=text)
+    return click.option("--state", type=GivenPath(file_okay=False, readable=False), help=text)
 
 
 def state_options(function: Callable[..., Any]) -> Callable[..., Any]:

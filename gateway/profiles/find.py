@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Final
 
 import gateway
-from gateway.plain_file import DIRECTORY, other_kind
+from gateway.plain_file import DIRECTORY, expand_home, other_kind
 from gateway.profiles.strict_yaml.faults import closest, one_of
 
 FOLDERS: Final = {
@@ -39,11 +39,13 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
 
     FileNotFoundError with a sentence that follows the name: what is there, and what was probably meant.
     """
+    if not name:
+        raise FileNotFoundError("an empty name, as of a variable that is not set")
     known = list_shipped(kind)
     if name in known:
         return shipped_profiles_folder() / FOLDERS[kind] / f"{name}.yaml"
     folder = beside or Path()
-    path = folder / Path(name).expanduser()
+    path = folder / expand_home(name)
     for candidate in (path, folder / f"{name}.yaml", folder / FOLDERS[kind] / f"{name}.yaml"):
         if _is_file(candidate):
             return candidate

@@ -36,7 +36,7 @@ class ProfileReference:
 
 def refer_to(name: str | Path) -> ProfileReference:
     """Return a profile that was named on the command line or by a program."""
-    return ProfileReference(str(name), lambda sentence: ProfileFault(str(name), 0, 0, "", sentence))
+    return ProfileReference(str(name), lambda sentence: ProfileFault(str(name) or "''", 0, 0, "", sentence))
 
 
 def refer_at(

@@ -155,5 +155,5 @@ def test_the_lines_for_the_rig_file_are_yaml_whatever_the_folder_is_called(host:
 def test_an_empty_name_is_no_folder_for_a_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     refused = CliRunner().invoke(command, ["certs", ""])
-    assert refused.exit_code == 2 and "an empty name is no folder" in refused.stderr
+    assert refused.exit_code == 2 and "an empty name: is a variable" in refused.stderr
     assert not list(tmp_path.iterdir())

@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from gateway import defaults
+from gateway.plain_file import expand_home
 
 
 def running_rigs() -> list[str]:
@@ -55,7 +56,7 @@ def known_rigs() -> list[str]:
 
 def check_rig(name: str) -> None:
     """Raise UsageError for a rig that is neither known nor a file; it lists those that are."""
-    path = Path(name).expanduser()
+    path = expand_home(name)
     if name in known_rigs() or _has_state(name) or path.is_file() or path.with_name(f"{path.name}.yaml").is_file():
         return
     from difflib import get_close_matches

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice
+from gateway.plain_file import expand_home
 from gateway.plants.recorded_number import header_in_use
 from gateway.processes import exit_codes
 from gateway.profiles import Rig, list_shipped, load_calibration, load_rig
@@ -19,7 +20,7 @@ def own_setup(recording: Recording, state: StateChoice) -> tuple[ReplaySetup, li
 
     named = recording.header.get("rig")
     rig = rig_of(recording)
-    if rig is None and named and Path(meant := state.rig).expanduser().is_file():
+    if rig is None and named and expand_home(meant := state.rig).is_file():
         given = load_rig(meant)
         rig = given if given.name == named else None
     if rig is None:

@@ -14,6 +14,7 @@ from gateway import defaults
 from gateway.defaults import STRICT
 from gateway.devices.line_settings import Baud, Parity, SerialSettings
 from gateway.modbus.rtu import LARGEST_UNIT
+from gateway.plain_file import expand_home
 from gateway.profiles.rigs.addresses import Address, Network4Or6
 
 
@@ -82,7 +83,7 @@ class TlsFace:
 
     def within(self, folder: Path) -> "TlsFace":
         """Return the face with its paths taken from this folder, that of its rig file."""
-        certificate, key, ca = (str(folder / Path(name).expanduser()) for name in (self.certificate, self.key, self.ca))
+        certificate, key, ca = (str(folder / expand_home(name)) for name in (self.certificate, self.key, self.ca))
         return replace(self, certificate=certificate, key=key, ca=ca)
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from gateway import defaults
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.numbers import Quantity, Whole
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice, json_option, map_option, name_option, state_options, wire_options
@@ -61,7 +62,7 @@ EXAMPLES = ("calibrate --quick --yes", 'calibrate --groups 3 --step 0.25 --name 
 @click.option(
     "--plan",
     "plan_file",
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    type=GivenPath(exists=True, dir_okay=False),
     help="Plan as YAML: a ladder's, or an experiment of diagnose --plan.",
 )
 @click.option("--resume", is_flag=True, help="Go on with the groups that the last stopped run did not climb.")

@@ -13,6 +13,7 @@ import click
 
 from gateway.cli.command_line.completion_words import complete_calibration_numbers, complete_calibrations
 from gateway.cli.command_line.folding import fold_entry
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
@@ -113,7 +114,7 @@ def rollback_command(*, state: StateChoice, as_json: bool) -> None:
 @command.command(name="compare")
 @click.argument("a", metavar="A", shell_complete=complete_calibrations)
 @click.argument("b", metavar="B", shell_complete=complete_calibrations)
-@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="Draw both loops into this HTML file.")
+@click.option("--plot", type=GivenPath(dir_okay=False), help="Draw both loops into this HTML file.")
 @state_options
 @json_option
 def compare_command(*, a: str, b: str, plot: Path | None, state: StateChoice, as_json: bool) -> None:
@@ -147,8 +148,8 @@ def compare_command(*, a: str, b: str, plot: Path | None, state: StateChoice, as
 
 @command.command(name="export")
 @click.argument("which", metavar="N", shell_complete=complete_calibrations)
-@click.option("--yaml", "yaml_file", type=click.Path(path_type=Path, allow_dash=True), help="YAML; - is stdout.")
-@click.option("--c", "c_directory", type=click.Path(path_type=Path, file_okay=False), help="C header and source.")
+@click.option("--yaml", "yaml_file", type=GivenPath(allow_dash=True), help="YAML; - is stdout.")
+@click.option("--c", "c_directory", type=GivenPath(file_okay=False), help="C header and source.")
 @click.option("--force", is_flag=True, help="Overwrite.")
 @state_options
 def export_command(

@@ -8,6 +8,7 @@ import click
 
 from gateway import defaults
 from gateway.cli.command_line.completion_words import complete_recordings
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.errors import CliError, no_such_recording
@@ -63,9 +64,7 @@ EXAMPLES = ("fit ladder.csv --models bsfm --orders 1-3", "fit ladder.csv --model
 )
 @table_options
 @click.option("--force-unit", metavar="UNIT", help="What the force is in (N, kgf, gf, lbf), if the table does not say.")
-@click.option(
-    "--report", type=click.Path(path_type=Path, dir_okay=False), help="HTML report; default beside the recording."
-)
+@click.option("--report", type=GivenPath(dir_okay=False), help="HTML report; default beside the recording.")
 @click.option("--no-report", is_flag=True, help="Write no report.")
 @click.option("--store", is_flag=True, help="Store the chosen fit as a numbered calibration (it is not activated).")
 @name_option

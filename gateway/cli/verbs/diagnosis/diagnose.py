@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from gateway.cli.command_line.completion_words import complete_calibrations, complete_effects, complete_recordings
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.options import state_directory, state_option
@@ -38,7 +39,7 @@ _OF_A_DIAGNOSIS: Final = (
     "closed_loop",
 )
 """Options that a comparison of two runs has no use for."""
-_OUTPUT: Final = click.Path(path_type=Path, dir_okay=False)
+_OUTPUT: Final = GivenPath(dir_okay=False)
 
 
 class _Finite(click.FloatRange):
@@ -83,7 +84,7 @@ def _not_an_option(context: click.Context, parameter: click.Parameter, value: Pa
 @click.option(
     "--json",
     "json_file",
-    type=click.Path(path_type=Path, allow_dash=True),
+    type=GivenPath(allow_dash=True),
     callback=_not_an_option,
     metavar="OUT",
     help="- is stdout.",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.errors import CliError, already_exists
@@ -41,9 +42,7 @@ def _fleet_options(function: Function) -> Function:
         click.option(
             "--workers", type=click.IntRange(1, 256), default=os.cpu_count() or 1, help="Processes  [default: cores]"
         ),
-        click.option(
-            "--output", "-o", type=click.Path(path_type=Path, file_okay=False), help="Folder  [default: fleet-VERB]"
-        ),
+        click.option("--output", "-o", type=GivenPath(file_okay=False), help="Folder  [default: fleet-VERB]"),
         click.option("--fresh", is_flag=True, help="Compute everything anew, also what is kept from an earlier run."),
         table_options,
         rig_option("The rig of all of them  [default: each recording's own]"),

@@ -12,6 +12,7 @@ import click
 
 from gateway.cli.command_line.completion_words import complete_plant_numbers, complete_recordings
 from gateway.cli.command_line.folding import fold_entry
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.options import StateChoice, json_option, state_options
 
@@ -81,7 +82,7 @@ def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
 @command.command(name="compare")
 @click.argument("a", metavar="A", shell_complete=complete_plant_numbers)
 @click.argument("b", metavar="B", shell_complete=complete_plant_numbers)
-@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="Write what differs into this HTML file.")
+@click.option("--plot", type=GivenPath(dir_okay=False), help="Write what differs into this HTML file.")
 @click.option(
     "--recording",
     metavar="RECORDING",
@@ -134,7 +135,7 @@ def _simulate_both(recording: str, plants: "tuple[PlantProfile, PlantProfile]", 
 
 
 @command.command(name="add")
-@click.argument("file", metavar="FILE", type=click.Path(path_type=Path, dir_okay=False))
+@click.argument("file", metavar="FILE", type=GivenPath(dir_okay=False))
 @state_options
 @json_option
 def add_command(*, file: Path, state: StateChoice, as_json: bool) -> None:

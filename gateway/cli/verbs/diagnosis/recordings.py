@@ -11,6 +11,7 @@ import click
 
 from gateway.cli.command_line.byte_count import ByteCount
 from gateway.cli.command_line.completion_words import complete_recording_numbers
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
@@ -85,7 +86,7 @@ def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
 
 @command.command(name="plot")
 @_number
-@click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), help="FILE.html or FILE.svg.")
+@click.option("-o", "--output", type=GivenPath(dir_okay=False), help="FILE.html or FILE.svg.")
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 @state_options
 def plot_command(*, number: int, output: Path | None, force: bool, state: StateChoice) -> None:
@@ -164,9 +165,7 @@ def prune_command(*, dry_run: bool, yes: bool, state: StateChoice, days: float |
 @click.option(
     "--parquet", "form", flag_value="parquet", help="Parquet with the facts as metadata (for -o FILE.parquet, too)."
 )
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path, allow_dash=True), help="File to write; - is stdout (CSV)."
-)
+@click.option("-o", "--output", type=GivenPath(allow_dash=True), help="File to write; - is stdout (CSV).")
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 @state_options
 def export_command(*, number: int, form: str | None, output: Path | None, force: bool, state: StateChoice) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway.cli.command_line.completion_words import complete_plant_files, complete_recordings
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.options import json_option, state_option
@@ -31,7 +32,7 @@ EXAMPLES = ("simulate press.csv --rig demo", "simulate press.csv --plant paper-s
     help="The plant to run, such as diagnose --extend writes; default the rig's.",
 )
 @table_options
-@click.option("--csv", "csv_file", type=click.Path(path_type=Path, dir_okay=False), help="Write the simulated series.")
+@click.option("--csv", "csv_file", type=GivenPath(dir_okay=False), help="Write the simulated series.")
 @state_option("State directory, for numbers.")
 @json_option
 def command(*, recording: str, as_json: bool, csv_file: Path | None, plant: str | None, **options: Any) -> None:

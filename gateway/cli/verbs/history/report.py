@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import already_exists
 from gateway.cli.options import StateChoice, state_options
 
@@ -12,7 +13,7 @@ EXAMPLES = ("report for-support.tar.gz", "report --show")
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path, dir_okay=False), default=Path("force-gateway-report.tar.gz"))
+@click.argument("file", type=GivenPath(dir_okay=False), default=Path("force-gateway-report.tar.gz"))
 @click.option("--force", is_flag=True, help="Overwrite FILE.")
 @click.option("--show", is_flag=True, help="Print what would go in instead.")
 @state_options

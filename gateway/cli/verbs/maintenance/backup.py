@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import already_exists, no_state_directory
 from gateway.cli.options import StateChoice, count_of, state_options
 
@@ -11,7 +12,7 @@ EXAMPLES = ("backup cell.tar.gz", "backup today.tar.gz --rig demo")
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
+@click.argument("file", type=GivenPath(dir_okay=False))
 @click.option("--force", is_flag=True, help="Overwrite FILE.")
 @state_options
 def command(*, file: Path, force: bool, state: StateChoice) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, count_of, state_options
 from gateway.processes import exit_codes, state_lock
@@ -14,7 +15,7 @@ EXAMPLES = ("restore kept.tar.gz --state elsewhere --dry-run", "restore kept.tar
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path, dir_okay=False, exists=True))
+@click.argument("file", type=GivenPath(dir_okay=False, exists=True))
 @click.option("--force", is_flag=True, help="Also into a directory that is not empty; its content is kept beside it.")
 @click.option("--dry-run", is_flag=True, help="Check FILE and say what would be restored.")
 @state_options

@@ -7,12 +7,13 @@ from typing import Any, Final
 
 import click
 
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
 
 _ROOT = click.option(
     "--root",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=GivenPath(file_okay=False),
     default=Path("/"),
     help="Write below this folder, and start nothing: for an image.",
 )
@@ -39,7 +40,7 @@ def command() -> None:
     metavar="NETWORK",
     help="Who may reach it besides this machine, such as 192.168.125.0/24; more than once  [default: as the rig says]",
 )
-@click.option("--command", "program", type=click.Path(path_type=Path), help="The program  [default: this one]")
+@click.option("--command", "program", type=GivenPath(), help="The program  [default: this one]")
 @_ROOT
 def install_command(*, rig: str, dry_run: bool, networks: tuple[str, ...], program: Path | None, root: Path) -> None:
     """Write a hardened unit for RIG, the udev rule and the service's user, and start it.

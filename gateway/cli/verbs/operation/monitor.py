@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, state_option
 from gateway.processes import exit_codes
@@ -23,7 +24,7 @@ EXAMPLES = ("monitor", "monitor --svg monitor.svg --seconds 1")
 
 @click.command()
 @click.option("--once", is_flag=True, help="Print one frame and end.")
-@click.option("--svg", type=click.Path(path_type=Path, dir_okay=False), help="Write one frame to FILE as a picture.")
+@click.option("--svg", type=GivenPath(dir_okay=False), help="Write one frame to FILE as a picture.")
 @click.option(
     "--seconds", type=click.FloatRange(min=0.0), help="End after this time; with --once or --svg, watch first."
 )

@@ -6,10 +6,11 @@ from datetime import UTC, datetime, timedelta
 from ipaddress import ip_address
 from pathlib import Path
 from shlex import quote
-from typing import Any, Final
+from typing import Final
 
 import click
 
+from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import CliError
 from gateway.modbus import Role
 from gateway.modbus.certificate import ROLES
@@ -58,13 +59,6 @@ def parse_clients(context: click.Context, parameter: click.Parameter, values: tu
     return clients
 
 
-class _Folder(click.Path):
-    """An empty name, as of a variable that is not set, would be the folder that one stands in, for a key."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return super().convert(value, param, ctx) if value else self.fail("an empty name is no folder", param, ctx)
-
-
 EXAMPLES = (
     "certs keys --host 192.168.125.20 --client robot:setpoint",
     "certs more-keys --host localhost --client panel:monitor",
@@ -72,7 +66,7 @@ EXAMPLES = (
 
 
 @click.command()
-@click.argument("folder", metavar="DIR", type=_Folder(path_type=Path, file_okay=False))
+@click.argument("folder", metavar="DIR", type=GivenPath(file_okay=False))
 @click.option(
     "--host",
     "hosts",

@@ -1,0 +1,32 @@
+"""Paths of the command line as people mean them, and an empty name, which a variable of the shell that is not set leaves."""
+
+import os
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from gateway.plain_file import expand_home
+
+EMPTY: Final = "an empty name: is a variable of the shell not set?"
+
+
+class GivenPath(click.Path):
+    """A path. `~` is the home directory also in `--state=~/cell`, where bash leaves it: a folder called ~ was made here. An
+    empty name would be the folder that one stands in, for a state directory, or for a key."""
+
+    def __init__(self, **rules: Any) -> None:
+        super().__init__(path_type=Path, **rules)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path; BadParameter where it breaks a rule of click.Path, or names nothing."""
+        if not os.fspath(value):
+            self.fail(EMPTY, param, ctx)
+        return super().convert(expand_home(value), param, ctx)
+
+
+def named_rig(context: click.Context, parameter: click.Parameter, value: str) -> str:
+    """Return the name of a rig that is to run, for an argument's callback."""
+    if not value:
+        raise click.BadParameter(EMPTY)
+    return value

@@ -1,0 +1,65 @@
+"""A path is the one that its user means: `~` also where no shell says so, and nothing is no path."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.profiles import ProfileError, load_rig
+from gateway.profiles.rigs.faces import TlsFace
+
+WRITES = (
+    ("run", "demo", "--sim", "--bind", "127.0.0.1:0", "--state", ""),
+    ("run", "", "--sim"),
+    ("backup", ""),
+    ("backup", "b.tar.gz", "--state", ""),
+    ("events", "--state", ""),
+    ("report", ""),
+    ("certs", ""),
+)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path
+
+
+@pytest.mark.parametrize("words", WRITES, ids=" ".join)
+def test_an_empty_name_is_refused_and_is_not_the_folder_that_one_stands_in(
+    words: tuple[str, ...], here: Path, call
+) -> None:
+    """`run demo --sim --state "$CELL"`, CELL not set, kept the rig's state among what lay there."""
+    answer = call(*words)
+    assert answer.exit_code == 2, answer.output
+    assert "an empty name: is a variable of the shell not set?" in answer.stderr
+    assert [path.name for path in here.iterdir()] == ["here"] and not list(Path().iterdir())
+
+
+def test_a_tilde_that_no_shell_has_replaced_is_the_home_directory(here: Path, call) -> None:
+    """bash leaves it in `--state=~/cell`, and a folder called ~ was made."""
+    (here / "home" / "cell" / "recordings").mkdir(parents=True)
+    answer = call("backup", "~/cell.tar.gz", "--state=~/cell")
+    assert answer.exit_code == 0, answer.output
+    assert (here / "home" / "cell.tar.gz").is_file() and not list(Path().iterdir())
+
+
+@pytest.mark.parametrize("words", [("check", "~nobody-here/x.yaml"), ("recordings", "list", "--rig", "~nobody-here/x")])
+def test_a_home_of_nobody_is_a_name_like_another(words: tuple[str, ...], here: Path, call) -> None:
+    """It was an internal error, and a traceback of `run`."""
+    answer = call(*words)
+    assert answer.exit_code in (2, 78) and "~nobody-here/x" in answer.stderr and "E500" not in answer.stderr
+
+
+def test_a_rig_by_such_a_name_is_refused_in_words(here: Path) -> None:
+    with pytest.raises(ProfileError, match="is no file"):
+        load_rig("~nobody-here/x.yaml")
+    with pytest.raises(ProfileError, match="'': an empty name"):
+        load_rig("")
+
+
+def test_a_certificate_in_such_a_home_is_looked_for_beside_the_rig(here: Path) -> None:
+    face = TlsFace(type="tls", certificate="~nobody-here/a", key="~/b", ca="c").within(here)
+    assert face.certificate == str(here / "~nobody-here/a") and face.key == str(here / "home" / "b")
