@@ -1,7 +1,7 @@
 """Numbers of the command line with bounds: a refusal says what is allowed, as the gateway's own refusals do."""
 
 from math import isfinite
-from typing import Any
+from typing import Any, Final
 
 import click
 
@@ -13,6 +13,41 @@ def describe_allowed(value: str, low: float | None, high: float | None, unit: st
         bound = f"at least {low:g}" if low is not None else f"at most {high:g}"
         return f"{value}{unit}: allowed {bound}{unit}"
     return f"{value}{unit}: allowed {low:.10g} .. {high:.10g}{unit}"
+
+
+def decimal_hint(text: str) -> str:
+    """Return what a number with a comma should have been, as the end of a sentence; empty for what is none either way."""
+    pointed = text.replace(",", ".")
+    try:
+        float(pointed)
+    except ValueError:
+        return ""
+    return f"; decimals take a point: {pointed}" if pointed != text else ""
+
+
+class Number(click.types.FloatParamType):
+    """A number; one with a comma is told how it is written."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number; BadParameter for what is none."""
+        try:
+            return float(value)
+        except ValueError:
+            return self.fail(f"{value or 'nothing'} is not a number{decimal_hint(str(value))}", param, ctx)
+
+
+NUMBER: Final = Number()
+
+
+class Finite(click.FloatRange):
+    """A number within click's bounds, in which NaN always is, and infinite where one is open."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number; BadParameter for what is none, is not finite or beyond the bounds."""
+        number = NUMBER.convert(value, param, ctx)
+        if not isfinite(number):
+            self.fail(f"{value} is no finite number", param, ctx)
+        return float(super().convert(number, param, ctx))
 
 
 class Whole(click.IntRange):
@@ -39,7 +74,7 @@ class Quantity(click.FloatRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the number; BadParameter with the bounds."""
-        number = click.FLOAT.convert(value, param, ctx)
+        number = NUMBER.convert(value, param, ctx)
         low, high = self.min, self.max
         if not ((low is None or number >= low) and (high is None or number <= high)):  # so that nan is none
             self.fail(describe_allowed(str(value), low, high, self._unit), param, ctx)

@@ -4,7 +4,7 @@ from difflib import get_close_matches
 from ipaddress import IPv4Address
 from math import inf, isnan
 
-from gateway.cli.command_line.numbers import describe_allowed
+from gateway.cli.command_line.numbers import decimal_hint, describe_allowed
 from gateway.cli.master.client import RegisterReading
 from gateway.registers import Register
 from gateway.registers.values import RAW_LIMITS
@@ -18,7 +18,10 @@ def parse_value(register: Register, text: str) -> bytes:
     elif register.values:
         number = _choice(register, text)
     else:
-        number = _number(text, f"a number in {register.unit}" if register.unit else "a number")
+        expected = f"a number in {register.unit}" if register.unit else "a number"
+        number = _number(text, expected)
+        if isnan(number) and register.type != "float32":  # it would go out as the largest negative count
+            raise ValueError(f"{text.strip()} is not {expected}")
     register.check_meant(number)
     return encode_within(register, number)
 
@@ -111,16 +114,7 @@ def _number(text: str, expected: str, names: "dict[str, int] | tuple[()]" = ()) 
     except ValueError:
         near = get_close_matches(_plain(text), list(names), 1)
         meant = f"; did you mean {near[0]}?" if near else ""
-        decimal = f"; decimals take a point: {text.replace(',', '.')}" if _is_number(text.replace(",", ".")) else ""
-        raise ValueError(f"{text or 'nothing'} is not {expected}{meant}{decimal}") from None
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+        raise ValueError(f"{text or 'nothing'} is not {expected}{meant}{decimal_hint(text)}") from None
 
 
 def _plain(name: str) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from gateway.cli.command_line.numbers import Finite
 from gateway.cli.errors import CliError
 from gateway.cli.setup import port_probing as probing
 from gateway.cli.setup.starter_rig import starter_rig
@@ -174,10 +175,8 @@ def _ask_unit(rig: GuidedRig, device: "DeviceProfile") -> None:
     if unit != "counts":
         rig.settings["load_cell", "unit"] = unit
         return
-    rig.settings["load_cell", "zero_count"] = click.prompt("counts without a force", default=0.0)
-    rig.settings["load_cell", "newton_per_count"] = click.prompt(
-        "newtons of one count", type=click.FloatRange(0, min_open=True)
-    )
+    rig.settings["load_cell", "zero_count"] = click.prompt("counts without a force", default=0.0, type=Finite())
+    rig.settings["load_cell", "newton_per_count"] = click.prompt("newtons of one count", type=Finite(0, min_open=True))
 
 
 def _fit_output(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None:
@@ -208,7 +207,7 @@ def _fit_supervision(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None
 
 
 def _ask_forces(rig: GuidedRig) -> None:
-    positive = click.FloatRange(0, min_open=True)
+    positive = Finite(0, min_open=True)
     range_n = click.prompt("rated force of the load cell, N", default=98.07, type=positive)
     most_n = click.prompt(
         "largest force that tool and workpiece take, N", default=round(min(0.4 * range_n, _MOST_N), 1), type=positive

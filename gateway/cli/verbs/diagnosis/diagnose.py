@@ -7,7 +7,6 @@ import json
 import os
 import time
 from dataclasses import replace
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,6 +14,7 @@ import click
 
 from gateway.cli.command_line.completion_words import complete_calibrations, complete_effects, complete_recordings
 from gateway.cli.command_line.given_path import GivenPath
+from gateway.cli.command_line.numbers import Finite
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.options import state_directory, state_option
@@ -40,14 +40,6 @@ _OF_A_DIAGNOSIS: Final = (
 )
 """Options that a comparison of two runs has no use for."""
 _OUTPUT: Final = GivenPath(dir_okay=False)
-
-
-class _Finite(click.FloatRange):
-    """NaN is in every range for click, and infinite is no noise."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        number = float(super().convert(value, param, ctx))
-        return number if isfinite(number) else self.fail(f"{value} is no finite number.", param, ctx)
 
 
 EXAMPLES = ("diagnose press.csv --report why.html", "diagnose press.csv --rig demo --extend creeping.yaml")
@@ -77,7 +69,7 @@ def _not_an_option(context: click.Context, parameter: click.Parameter, value: Pa
 )
 @click.option(
     "--noise-floor-n",
-    type=_Finite(min=0.0, min_open=True),
+    type=Finite(min=0.0, min_open=True),
     metavar="X",
     help="RMS noise of the readings, N, if known.",
 )

@@ -5,7 +5,7 @@ import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -13,6 +13,7 @@ from gateway.cli.command_line.byte_count import ByteCount
 from gateway.cli.command_line.completion_words import complete_recording_numbers
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.listed_number import ListedNumber
+from gateway.cli.command_line.numbers import Finite
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from gateway.watch.reference_recording import ReferenceRecording
 
 
+_WORKBOOKS: Final = frozenset((".xlsx", ".xlsm", ".xls", ".ods"))
 EXAMPLES = (
     "recordings list",
     "recordings show 1",
@@ -136,9 +138,7 @@ def delete_command(*, number: int, yes: bool, state: StateChoice) -> None:
 
 @command.command(name="prune")
 @click.option("--dry-run", is_flag=True, help="Only say what would go.")
-@click.option(
-    "--days", type=click.FloatRange(min=0, min_open=True), help="Delete older ones  [default: as the rig says]"
-)
+@click.option("--days", type=Finite(min=0, min_open=True), help="Delete older ones  [default: as the rig says]")
 @click.option(
     "--bytes",
     "most_bytes",
@@ -160,7 +160,7 @@ def prune_command(*, dry_run: bool, yes: bool, state: StateChoice, days: float |
 
 
 @command.command(name="export")
-@click.argument("number", metavar="ID", type=click.IntRange(min=1))
+@click.argument("number", metavar="N", type=ListedNumber("recordings"))
 @click.option("--csv", "form", flag_value="csv", help="CSV with # key: value lines (default).")
 @click.option(
     "--parquet", "form", flag_value="parquet", help="Parquet with the facts as metadata (for -o FILE.parquet, too)."
@@ -169,10 +169,10 @@ def prune_command(*, dry_run: bool, yes: bool, state: StateChoice, days: float |
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 @state_options
 def export_command(*, number: int, form: str | None, output: Path | None, force: bool, state: StateChoice) -> None:
-    """Export recording ID (a number of `recordings list`)."""
+    """Export recording N (a number of `recordings list`)."""
     from gateway import recording as room
 
-    form = form or ("parquet" if output and output.suffix == ".parquet" else "csv")
+    form = _form_of(form, output)
     recording = room.read_recording(room.find_recording(state.directory, number))
     for note in recording.notes:
         click.echo(f"{recording.path}: {note}", err=True)
@@ -186,6 +186,17 @@ def export_command(*, number: int, form: str | None, output: Path | None, force:
         raise already_exists(target)
     (room.export_csv if form == "csv" else room.export_parquet)(recording, target)
     click.echo(f"wrote {recording.rows} rows to {target}", err=True)
+
+
+def _form_of(form: str | None, output: Path | None) -> str:
+    """Return csv or parquet. UsageError where the file's name says another: what opens it goes by that."""
+    ending = output.suffix.lower() if output else ""
+    if ending in _WORKBOOKS:
+        raise click.UsageError(f"{output}: an export is CSV or Parquet: a spreadsheet opens FILE.csv")
+    named = {".csv": "csv", ".parquet": "parquet"}.get(ending)
+    if form and named and form != named:
+        raise click.UsageError(f"{output}: --{form} writes FILE.{form}")
+    return form or named or "csv"
 
 
 @command.command(name="reference")

@@ -14,6 +14,7 @@ import click
 
 from gateway import defaults
 from gateway.cli.command_line.duration import parse_duration_s
+from gateway.cli.command_line.numbers import NUMBER
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, json_option
@@ -49,7 +50,7 @@ EXAMPLES = ("hold 12 --for 1s", "hold 8.5 --for 500ms --rig demo")
 
 
 @click.command(cls=_TakesNegative)
-@click.argument("newton", type=float)
+@click.argument("newton", type=NUMBER)
 @click.option("--for", "for_s", callback=_parse_time, metavar="TIME", help="Let go by itself after 10s, 2min, ...")
 @click.option("--reset", "resets", is_flag=True, help="Reset a latched fault first.")
 @rig_option(

@@ -207,3 +207,23 @@ def test_an_export_stays_here_whatever_the_rig_of_a_foreign_recording_is_called(
     record(tmp_path, rig="../elsewhere")
     assert call("recordings", "export", "1", "--state", tmp_path).exit_code == 0
     assert [path.name for path in here.iterdir()] == [".._elsewhere-0001.csv"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("1", "-o", "run.xlsx"), "run.xlsx: an export is CSV or Parquet: a spreadsheet opens FILE.csv"),
+        (("1", "--parquet", "-o", "run.csv"), "run.csv: --parquet writes FILE.parquet"),
+        (("1", "--csv", "-o", "run.PARQUET"), "run.PARQUET: --csv writes FILE.csv"),
+        (("run.csv",), "run.csv is no number: a number of `force-gateway recordings list` is wanted"),
+    ],
+)
+def test_an_export_is_what_its_name_says(
+    words: tuple[str, ...], said: str, tmp_path: Path, call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """CSV in a file called run.xlsx was opened by no spreadsheet."""
+    monkeypatch.chdir(tmp_path)
+    record(tmp_path / "state", rig="demo")
+    answer = call("recordings", "export", *words, "--state", "state")
+    assert answer.exit_code == 2 and said in answer.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["state"]
