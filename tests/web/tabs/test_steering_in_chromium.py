@@ -70,3 +70,54 @@ def test_time_goes_on_on_the_page_where_no_sample_comes(page, chromium) -> None:
     window: Any = open_tab(browser, page.address, "wiring")
     assert window.evaluate(SILENCE) == [[100.4, True, 5000.0], [129.0, False, 5000.0]]
     browser.close()
+
+
+@pytest.mark.parametrize(
+    ("typed", "force_n", "said"),
+    [
+        ("1,5", 1.5, "Enabled with 1.50 N."),
+        (" 12.5 ", 12.5, "Enabled with 12.50 N."),
+        ("1,500.0", None, "A force in newtons, such as 12.5."),
+        ("12 N", None, "A force in newtons, such as 12.5."),
+        ("", None, "A force in newtons, such as 12.5."),
+    ],
+)
+def test_a_force_is_the_one_that_was_typed(page, chromium, typed: str, force_n: float | None, said: str) -> None:
+    """The field dropped a comma as it was typed: who wanted 1,5 N pressed with 15 N."""
+    window: Any = open_tab(chromium, page.address, "live")
+    asked: list[Any] = []
+
+    def answer(route: Any) -> None:
+        asked.append(route.request.post_data_json)
+        route.fulfill(json={})
+
+    window.route("**/api/v1/command/enable", answer)
+    field = window.get_by_label("Setpoint, N")
+    field.select_text()
+    window.keyboard.type(typed or "\b")
+    field.press("Enter")
+    window.locator("#said").get_by_text(said).wait_for()
+    assert asked == ([] if force_n is None else [{"force_n": force_n}])
+    window.close()
+
+
+def test_a_plan_of_ones_own_takes_numbers_as_they_are_typed_and_no_others(page, served, chromium) -> None:
+    window: Any = open_tab(chromium, page.address, "calibrate")
+    asked: list[Any] = []
+
+    def answer(route: Any) -> None:
+        asked.append(route.request.post_data_json["plan"])
+        route.fulfill(status=409, json={"error": "seen"})
+
+    window.route("**/api/v1/calibrate/preview", answer)
+    window.get_by_text("Set the height of a stair").click()
+    stair, go = window.get_by_label("Stair (V)", exact=True), window.get_by_role("button", name="Continue")
+    stair.select_text()
+    window.keyboard.type("0,05")
+    go.click()
+    window.locator("#tab-calibrate .told.bad").get_by_text("seen").wait_for()
+    stair.fill("")
+    go.click()
+    window.locator("#tab-calibrate .told.bad").get_by_text("Stair (V): a number, such as 0.2.").wait_for()
+    assert [plan["step_v"] for plan in asked] == [0.05]
+    window.close()

@@ -1,5 +1,6 @@
 // The big figures, and what commands the force: setpoint, enable, take over, tare, record.
 
+import { typedNumber } from "../typed_number.js";
 import { make } from "./health.js";
 
 const newton = (value) => (value === null || value === undefined ? "–" : `${value.toFixed(2)}`);
@@ -15,7 +16,7 @@ export function makeSteering(api) {
   const voltage = big("Output", "V");
   const tiles = make("dl", { className: "tiles figures" }, force.element, wanted.element, error.element, voltage.element);
 
-  const input = make("input", { type: "number", id: "setpoint", step: "0.1", min: "0", value: "12", inputMode: "decimal", required: true });
+  const input = make("input", { type: "text", id: "setpoint", value: "12", inputMode: "decimal", autocomplete: "off", required: true });
   const range = make("p", { className: "small", id: "setpoint-range" });
   input.setAttribute("aria-describedby", "setpoint-range");
   const enable = make("button", { type: "submit", className: "main", textContent: "Enable" });
@@ -41,10 +42,10 @@ export function makeSteering(api) {
 
   form.addEventListener("submit", (event) => {
     event.preventDefault();
-    const force_n = Number(input.value);
-    if (input.value === "" || !Number.isFinite(force_n)) return api.say("A force in newtons, such as 12.5.", true);
+    const force_n = typedNumber(input.value);
+    if (!Number.isFinite(force_n)) return api.say("A force in newtons, such as 12.5.", true);
     const isOn = state?.status.includes("enabled") && state.owner === "web";
-    act(isOn ? "setpoint" : "enable", { force_n }, `${isOn ? "Setpoint" : "Enabled with"} ${force_n} N.`);
+    act(isOn ? "setpoint" : "enable", { force_n }, `${isOn ? "Setpoint" : "Enabled with"} ${newton(force_n)} N.`);
   });
   take.addEventListener("click", () => act("take-ownership", {}, "This page owns the setpoint."));
   tare.addEventListener("click", () => act("tare", {}, "The force that rests on the cell is 0 now."));
@@ -72,7 +73,6 @@ export function makeSteering(api) {
       wanted.value.textContent = newton(state.force.requested_n);
       voltage.value.textContent = state.force.voltage_v === null ? "–" : state.force.voltage_v.toFixed(3);
       showForce(state.force.measured_n); // also where no sample comes
-      input.max = state.limits.force_max_n;
       range.textContent = `${newton(state.limits.force_min_n)} .. ${newton(state.limits.force_max_n)} N`
         + (state.limits.lease_s ? `; lease ${Math.round(1000 * state.limits.lease_s)} ms, kept while this page is open` : "");
       const isOther = state.owner !== null && state.owner !== "web";

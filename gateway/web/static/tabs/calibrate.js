@@ -1,6 +1,7 @@
 // Tab Calibrate: plan, questions, run, result. What the run is at stands on the server; this shows it, after a reload too.
 
 import { Told, button, duration, h, number, prepare, showOnce, whileShown } from "./dom.js";
+import { typedNumber } from "../typed_number.js";
 import { resultOf } from "./calibration_result.js";
 
 const PHASES = {
@@ -177,9 +178,14 @@ function ownPlan(full) {
   const kinds = { step_v: "Stair (V)", groups: "Groups", minor_points: "Points of reversals", response_steps: "Large steps" };
   const inputs = {};
   const fields = Object.entries(kinds).map(([key, words]) => {
-    inputs[key] = h("input", { type: "number", min: "0", step: key === "step_v" ? "0.05" : "1", value: String(full[key]) });
+    inputs[key] = h("input", { type: "text", inputmode: key === "step_v" ? "decimal" : "numeric", autocomplete: "off", value: String(full[key]) });
     return h("label", { class: "field" }, words, inputs[key]);
   });
-  const read = () => Object.fromEntries(Object.entries(inputs).map(([key, input]) => [key, Number(input.value)]));
+  const numberOf = (key) => {
+    const value = typedNumber(inputs[key].value);
+    if (Number.isFinite(value)) return value;
+    throw new Error(`${kinds[key]}: a number, such as ${full[key]}.`);
+  };
+  const read = () => Object.fromEntries(Object.keys(inputs).map((key) => [key, numberOf(key)]));
   return { fields, read };
 }
