@@ -643,8 +643,6 @@ DEFECTS = (
     Defect("a restart waits for a port that stays held", "service/running_rig/starting.py",
            "            if error.code not in passing or time.monotonic() >= deadline_s:",
            "            if error.code not in passing:", ("service/test_starting.py",)),
-           "            if is_over or error.code not in (\"E101\", \"E103\"):",
-           "            if error.code not in (\"E101\", \"E103\"):", ("service/test_starting.py",)),
     Defect("a setpoint that is lowered takes enable with it", "registers/writes/command_block.py",
            "        self.store(lowered, int(lowered[CONTROL_WORD]))\n        return setpoint_n",
            "        self.store(lowered, 0)\n        return setpoint_n", ("registers/test_beside_a_held_force.py",)),
