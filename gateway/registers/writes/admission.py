@@ -141,9 +141,8 @@ class Admission:
     def _is_plain(self, host: str, word: int) -> bool:
         """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, it held none, nothing
         was lowered, no run has the output. What the checks below would find is known."""
-        is_usual = not (
-            self.held_runs.of(host) or self.lowered_from_n or self.is_calibrating or word & RUN_BITS_OR_EDGES
-        )
+        is_holder = host in self.held_runs.by_host
+        is_usual = not (is_holder or self.lowered_from_n or self.is_calibrating or word & RUN_BITS_OR_EDGES)
         return is_usual and self._ownership.admits(host)
 
     # -- what the write asks for

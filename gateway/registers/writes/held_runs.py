@@ -10,26 +10,26 @@ _MOST_HOLDERS: Final = 64  # memory stays bounded whoever writes
 
 
 class HeldRuns:
-    """on_change: told of all that is held, by host, whenever that is another."""
+    """by_host: the bits of each host that keeps any; on_change: told of all of them whenever they are others."""
 
     def __init__(self) -> None:
         self.on_change: Callable[[dict[str, int]], None] = lambda held: None
-        self._held: dict[str, int] = {}
+        self.by_host: dict[str, int] = {}
 
     def of(self, host: str) -> int:
         """Return the bits that a host keeps at 1."""
-        return self._held.get(host, 0)
+        return self.by_host.get(host, 0)
 
     def keep(self, host: str, held: int) -> None:
         """Note which bits a host keeps at 1."""
-        before = self._held.pop(host, 0)
+        before = self.by_host.pop(host, 0)
         if held:
-            self._held[host] = held
-            if len(self._held) > _MOST_HOLDERS:
-                del self._held[next(iter(self._held))]
+            self.by_host[host] = held
+            if len(self.by_host) > _MOST_HOLDERS:
+                del self.by_host[next(iter(self.by_host))]
         if held != before:
-            self.on_change(dict(self._held))
+            self.on_change(dict(self.by_host))
 
     def restore(self, held: Mapping[str, int]) -> None:
         """Go on with what was held in the process before."""
-        self._held.update(held)
+        self.by_host.update(held)
