@@ -8,7 +8,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.devices import output_device, output_host
 from gateway.devices.messages import Accepted, AskDevice, DeviceAnswer, DeviceStep, ReadVoltage, SetVoltage
-from gateway.service.running_rig.lines.device_checks import DeviceChecks, DeviceLevel
+from gateway.service.running_rig.lines.device_checks import DeviceChecks
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from tests.profile_files import load_device
 
@@ -50,9 +50,9 @@ def test_a_reset_asks_a_wrong_device_anew_what_it_is(is_refused: bool) -> None:
 
 def test_the_next_device_behind_the_port_is_not_armed_because_the_one_before_was() -> None:
     checks = checks_of_it(is_armed=True)
-    assert checks.level == DeviceLevel(has_one=True, is_armed=True)
+    assert checks.is_armed
     checks.begin()
-    assert checks.level == DeviceLevel(has_one=True)
+    assert not checks.is_armed
 
 
 def test_a_device_that_misses_a_question_now_and_then_is_not_refused() -> None:
