@@ -66,8 +66,7 @@ class RegisterBank:
         self._writers, self._now, self.refusals = LastWriters(), now, 0  # refused since the start
         self.last_refusal: Refusal | None = None
         self.identity: Mapping[int, bytes] = build_identity(register_map.name, rules.rig_name)
-        self._map = register_map
-        self._image = RegisterImage(register_map)
+        self._map, self._image = register_map, RegisterImage(register_map)
         self._roles = write_roles(register_map.blocks)
         self._data, self._room = self._image.data, self._image.room
         self._command_block, self._command_role = register_map.block("command"), self._roles["command"]
@@ -78,6 +77,7 @@ class RegisterBank:
         self._ownership = Ownership(rules.owner)
         self._echo = ByteOrderEcho(register_map.find("byte_order_echo"), self._image)
         self._admission = Admission(self._commands, self._ownership, self._echo, rules)
+        self.held_runs = self._admission.held_runs
         self.staging = StagingBlock(register_map, self._image)
         self._image.put(register_map.find("map_version"), register_map.version)
         self._watchdogs = next((one for one in register_map.registers if one.name == "watchdogs"), None)

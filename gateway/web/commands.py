@@ -18,7 +18,7 @@ from collections.abc import Awaitable, Callable
 from math import isfinite
 from typing import Any, Final
 
-from gateway.live.control_link import ANSWER_S
+from gateway.live.control_link import ANSWER_S, ControlLink
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.map.register_map import Register
 from gateway.registers.words import ControlBit, Mode, StatusBit
@@ -139,13 +139,13 @@ class Commands:
         answer = await self._send(P.read_write_request(status.address, 1, beat.address, data))
         return bool(int.from_bytes(answer[2:4], "big") & StatusBit.ENABLED)
 
-    async def words(self, block: str) -> list[int]:
-        """Return the registers of a block as they are now."""
+    async def words(self, block: str, link: ControlLink | None = None) -> list[int]:
+        """Return the registers of a block as they are now. link: way to control's socket, None for that of the commands."""
         place = self._context.profile.register_map.block(block)
         words: list[int] = []
         for first in range(place.first, place.last + 1, _MOST_WORDS):
             count = min(_MOST_WORDS, place.last + 1 - first)
-            answer = await self._send(P.read_request(P.READ_HOLDING_REGISTERS, first, count))
+            answer = await self._send(P.read_request(P.READ_HOLDING_REGISTERS, first, count), link=link)
             words += struct.unpack(f">{count}H", answer[2:])
         return words
 
@@ -198,12 +198,12 @@ class Commands:
     def _find(self, name: str) -> Register:
         return self._context.profile.register_map.find(name)
 
-    async def _send(self, pdu: bytes, *, is_stop: bool = False) -> bytes:
+    async def _send(self, pdu: bytes, *, is_stop: bool = False, link: ControlLink | None = None) -> bytes:
         unit = self._context.profile.network.units[0]
         request: dict[str, Any] = {"do": "modbus", "via": "web", "unit": unit, "pdu": pdu.hex()}
         if not is_stop:
             request["until_s"] = self._clock() + ANSWER_S
-        answer = await self._context.control.ask(request)
+        answer = await (link or self._context.control).ask(request)
         pdu = bytes.fromhex(answer["pdu"])
         if P.is_exception(pdu):
             raise RefusedCommand(str(answer.get("refusal") or f"refused with exception {pdu[1]:02d}"))

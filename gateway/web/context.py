@@ -15,7 +15,7 @@ from gateway.profiles.kept_rig import unchanged_rig
 @dataclass
 class WebContext:
     """state: directory; rig: name or file, as `run` was given it; simulated: its devices are; control: the way to control's
-    socket, for questions and commands; fingerprint: of the rig that runs, None: whatever it is. jobs: long work that a tab has
+    socket for commands and heartbeats; fingerprint: of the rig that runs, None: whatever it is. jobs: long work that a tab has
     begun, by a name of its own; it outlives a reload, and `tasks` keeps what must not be collected while it runs. viewers: how
     many pages are open, whatever tab they show."""
 
@@ -27,6 +27,12 @@ class WebContext:
     jobs: dict[str, Any] = field(default_factory=dict)
     tasks: set["asyncio.Task[Any]"] = field(default_factory=set)
     viewers: Callable[[], int] = lambda: 0
+
+    @cached_property
+    def questions(self) -> ControlLink:
+        """The way to control's socket for what any viewer asks: it answers one request of a way at a time, and however many
+        ask, neither a Stop nor a heartbeat must wait with them."""
+        return ControlLink(self.state)
 
     @cached_property
     def profile(self) -> Rig:

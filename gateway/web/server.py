@@ -20,6 +20,7 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import BaseRoute, Route
 
 from gateway import VERSION
+from gateway.live.control_link import ask_once
 from gateway.live.ring_rows import RingRows
 from gateway.live.standstill import Standstill
 from gateway.processes.json_socket.messages import encode_answer
@@ -58,6 +59,7 @@ def make_app(context: WebContext, door: Door, rows: RingRows | None) -> Starlett
         await context.end_work()
         await commands.close()
         await context.control.close()
+        await context.questions.close()
 
     routes = [*_page_routes(), *_api_routes(context, commands, events)]
     routes += [route for module in _tab_modules() for route in module.routes(context)]
@@ -104,7 +106,7 @@ def _file(name: str) -> Response:
 
 def _api_routes(context: WebContext, commands: Commands, events: EventSource) -> list[BaseRoute]:
     async def state(request: Request) -> Response:
-        return _answer(await context.control.ask({"do": "state"}))
+        return _answer(await context.questions.ask({"do": "state"}))
 
     async def stream(request: Request) -> Response:
         viewer = request.query_params.get("viewer", "")[:64]
@@ -114,14 +116,13 @@ def _api_routes(context: WebContext, commands: Commands, events: EventSource) ->
         return JSONResponse({"ok": True, "version": VERSION})
 
     async def registers(request: Request) -> Response:
-        port = (await context.control.ask({"do": "running"}))["port"]
+        port = (await context.questions.ask({"do": "running"}))["port"]
         return JSONResponse(register_table(context.profile, port))
 
     async def words(request: Request) -> Response:
         block = request.path_params["block"]
-        return JSONResponse(
-            {"first": context.profile.register_map.block(block).first, "words": await commands.words(block)}
-        )
+        read = await commands.words(block, context.questions)
+        return JSONResponse({"first": context.profile.register_map.block(block).first, "words": read})
 
     async def model(request: Request) -> Response:
         # a store that somebody changes on a slow disk is waited for, and a Stop must not wait with it
@@ -151,7 +152,8 @@ def _command(context: WebContext, commands: Commands) -> Callable[[Request], Awa
         "take-ownership": lambda viewer, body: commands.take_ownership(viewer),
         "reset": lambda viewer, body: commands.reset(),
         "tare": lambda viewer, body: commands.tare(),
-        "record": lambda viewer, body: context.control.ask({"do": "record", "on": _switch(body, "on")}),
+        # by a way of its own: its answer waits for the disk, and neither a Stop nor a heartbeat must wait with it
+        "record": lambda viewer, body: ask_once(context.state, {"do": "record", "on": _switch(body, "on")}),
     }
 
     async def command(request: Request) -> Response:

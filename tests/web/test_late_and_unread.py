@@ -1,6 +1,7 @@
 """Where control is slow nothing that comes late presses; where the log cannot be read the force is shown all the same."""
 
 import asyncio
+import json
 import threading
 import weakref
 from collections.abc import AsyncGenerator, Iterator
@@ -9,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from gateway.live.control_link import ANSWER_S
+from gateway.live.control_link import ANSWER_S, ControlLink
 from gateway.live.ring_rows import RingRows
 from gateway.processes.event import EventRecord
 from gateway.processes.event_file import EventFile
@@ -17,13 +18,19 @@ from gateway.processes.event_log import EventLog
 from gateway.recording.ring import SampleRing
 from gateway.web import events
 from gateway.web.commands import Commands
+from gateway.web.context import WebContext
 from gateway.web.events import EventSource
+from gateway.web.security import Door
+from gateway.web.server import make_app
 from tests.service.requests.test_hostile_requests import Stage
 from tests.web import test_events
+from tests.web.asgi import call
 from tests.web.test_commands import Link, play
 from tests.web.test_events import Context, put, read, ring
 
 __all__ = ["ring"]
+
+TOKEN = "a token of sixteen characters"
 
 
 @pytest.mark.parametrize("is_before", [True, False])
@@ -162,3 +169,47 @@ def test_all_but_a_stop_says_until_when_it_is_wanted(tmp_path: Path, monkeypatch
         assert "until_s" not in asked[-1]
 
     play(tmp_path, scene)
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body"),
+    [
+        ("POST", "command/record", b'{"on": true}'),
+        ("GET", "state", None),
+        ("GET", "registers", None),
+        ("GET", "words/status", None),
+    ],
+)
+def test_a_stop_waits_neither_for_a_recording_whose_disk_hangs_nor_for_what_others_ask(
+    tmp_path: Path, method: str, path: str, body: bytes | None
+) -> None:
+    """All went by one way, on which control answers one after the other. Beside a recording Esc came two seconds late, beside
+    two hundred who asked for the state more than one, and so did each heartbeat, which is the end of a lease."""
+
+    async def scene() -> bool:
+        is_asked, served = asyncio.Event(), set[asyncio.Task[None] | None]()
+
+        async def control(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            served.add(asyncio.current_task())
+            while line := await reader.readline():
+                if json.loads(line).get("pdu", "").startswith("10"):
+                    writer.write(b'{"ok": true, "pdu": "1000000001"}\n')
+                else:  # its answer never comes
+                    is_asked.set()
+            writer.close()
+
+        context = WebContext(tmp_path, "demo", True, ControlLink(tmp_path))
+        app, headers = make_app(context, Door("127.0.0.1", 8080, TOKEN), None), {"authorization": f"Bearer {TOKEN}"}
+        async with await asyncio.start_unix_server(control, tmp_path / "control.sock"):
+            other = asyncio.create_task(call(app, method, f"/api/v1/{path}", headers, body))
+            await is_asked.wait()
+            stopped = await call(app, "POST", "/api/v1/command/stop", headers)
+            is_first = stopped.status == 200 and not other.done()
+            other.cancel()
+            await asyncio.gather(other, return_exceptions=True)
+            await context.control.close()
+            await context.questions.close()
+            await asyncio.gather(*filter(None, served), return_exceptions=True)
+        return is_first
+
+    assert asyncio.run(asyncio.wait_for(scene(), 10.0))

@@ -1,5 +1,5 @@
 """The thread that keeps the heartbeat: it alone speaks to the gateway, so a terminal that takes no more lines, or one that is
-slow to draw, never costs the lease.
+slow to draw, never costs the lease, nor keeps the force beyond its time.
 """
 
 import re
@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from math import inf
 from typing import Final
 
 from gateway import defaults
@@ -49,7 +50,7 @@ class KnownLease:
 class HeartbeatThread(threading.Thread):
     """Runs a HoldRun against a gateway until it ends. `status` is the newest one read; `failure` what went wrong, if anything.
 
-    lease: None where nobody has said what the rig's is.
+    lease: None where nobody has said what the rig's is. ends_s: when it lets go by itself, by the clock.
     """
 
     def __init__(
@@ -62,6 +63,7 @@ class HeartbeatThread(threading.Thread):
         self.failure: Exception | None = None
         self.stopping = threading.Event()
         self.dropping = threading.Event()
+        self.ends_s = inf
         self._pause = threading.Event()  # nobody ends it
         self._client = client
         self._lease = lease
@@ -80,6 +82,8 @@ class HeartbeatThread(threading.Thread):
             self._look()
             while self.hold.end is None:
                 began_s = self._clock()
+                if began_s >= self.ends_s:
+                    self.stopping.set()
                 self._step(began_s)
                 if self.hold.end is None:
                     self._wait(self._period_s - (self._clock() - began_s))

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from math import isfinite
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -125,20 +125,19 @@ def _check_force(register_map: Any, newton: float) -> float:
 
 
 def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bool) -> None:
-    """Show the line until the beat ends; what stops it comes as a signal, as the end of its time, or as a closed pipe."""
+    """Show the line until the beat ends; what stops it comes as a signal, as the end of its time (the beat's own to see, for a
+    paused terminal keeps us here), or as a closed pipe."""
     from gateway.cli.force_hold.state_line import StateLine
 
     state_line, began_s = StateLine(as_json=as_json), time.monotonic()
+    beat.ends_s = inf if for_s is None else began_s + for_s
     with _handle_signals(beat):
         beat.start()
         try:
             while beat.is_alive():
                 beat.join(_SHOW_S)
-                now_s = time.monotonic() - began_s
-                if for_s is not None and now_s >= for_s:
-                    beat.stopping.set()
                 if beat.status:
-                    state_line.show(beat.status, now_s)
+                    state_line.show(beat.status, time.monotonic() - began_s)
         except BrokenPipeError:
             sys.stdout = open("/dev/null", "w")  # noqa: PTH123, SIM115 - nobody reads what would follow
         finally:  # a full disk behind stdout, too: what ends us lets go of the force first

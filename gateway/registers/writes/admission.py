@@ -30,6 +30,7 @@ from gateway.registers.writes.command_block import (
     CommandBlock,
     Values,
 )
+from gateway.registers.writes.held_runs import HeldRuns
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
 
@@ -39,7 +40,6 @@ STARTS: Final = ENABLE | RUN_BITS
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
 ALL_BITS: Final = 0xFFFF
-_MOST_HOLDERS: Final = 64  # memory stays bounded whoever writes
 _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
 
 
@@ -94,11 +94,11 @@ class Admission:
         self.decide: Decide = decide_nothing
         self.is_calibrating = False
         self.lowered_from_n = 0.0
+        self.held_runs = HeldRuns()
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
         self._rules = rules
-        self._held: dict[str, int] = {}
 
     def admit(self, write: Write, number: int, now_s: float) -> AdmittedWrite | None:
         """Return what a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
@@ -113,7 +113,7 @@ class Admission:
         asked = int(values[CONTROL_WORD])
         permitted = self._permit(write, values)
         if permitted is None:
-            self._keep_held(write.host, self._held_by(write, asked, asked))
+            self.held_runs.keep(write.host, self._held_by(write, asked, asked))
             return None
         values, written, is_stop = permitted
         if is_stop:
@@ -135,20 +135,15 @@ class Admission:
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered."""
-        self._keep_held(admitted.command.peer, admitted.held)
+        self.held_runs.keep(admitted.command.peer, admitted.held)
         self.lowered_from_n = admitted.command.lowered_from_n
-
-    def _keep_held(self, host: str, held: int) -> None:
-        self._held.pop(host, None)
-        if held:
-            self._held[host] = held
-            if len(self._held) > _MOST_HOLDERS:
-                del self._held[next(iter(self._held))]
 
     def _is_plain(self, host: str, word: int) -> bool:
         """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, it held none, nothing
         was lowered, no run has the output. What the checks below would find is known."""
-        is_usual = not (host in self._held or self.lowered_from_n or self.is_calibrating or word & RUN_BITS_OR_EDGES)
+        is_usual = not (
+            self.held_runs.of(host) or self.lowered_from_n or self.is_calibrating or word & RUN_BITS_OR_EDGES
+        )
         return is_usual and self._ownership.admits(host)
 
     # -- what the write asks for
@@ -192,7 +187,7 @@ class Admission:
 
         By another master's 0 behind the run, a Stop from the page say, the holder's next cycle would begin another run. Its
         own 0 counts, too, while another owns. asked: the control word as it came."""
-        held = self._held.get(write.host, 0)
+        held = self.held_runs.of(write.host)
         if not held and not written & RUN_BITS:
             return 0
         if CONTROL_WORD not in self._offsets(write):
@@ -230,7 +225,7 @@ class Admission:
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
     def _check_starts(self, host: str, rises: int, written: int, word_at: int) -> None:
-        if held := rises & self._held.get(host, 0):
+        if held := rises & self.held_runs.of(host):
             name = str(ControlBit(held & -held).name).lower()
             text = f"{name} was kept at 1 beyond the end of its run: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))

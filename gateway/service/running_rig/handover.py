@@ -1,6 +1,7 @@
 """What a control process leaves, through the guardian, to the one that is started when it dies: the recording goes on, a TLS
-face whose port is any free one (0) keeps it, and a calibration or a plant that is another one now (their files are gone, say)
-is told, as is a tare that is forgotten. By itself a start knows only what it finds.
+face whose port is any free one (0) keeps it, a master that keeps the bit of a run at 1 begins no other one by that, and a
+calibration or a plant that is another one now (their files are gone, say) is told, as is a tare that is forgotten. By itself a
+start knows only what it finds.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,6 +25,11 @@ class Handover:
     def tls_ports(self) -> dict[str, int]:
         """The port of each TLS face, by its place in `fieldbus`, as masters know it."""
         return dict(self._kept.get("tls_ports", {}))
+
+    @property
+    def held_runs(self) -> dict[str, int]:
+        """Bits of runs that masters kept at 1, by host."""
+        return dict(self._kept.get("held_runs", {}))
 
     def recording(self, now_s: float) -> WantedRecording | None:
         """Return what is to be recorded; None: nothing, or its time is over by now_s (monotonic)."""

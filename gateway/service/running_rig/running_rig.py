@@ -142,6 +142,7 @@ class RunningRig:
     def _wire_loop(self, cause: FaultCode) -> None:
         rig, log = self._rig, self._log
         self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=time.monotonic)
+        self.bank.held_runs.on_change = lambda held: self._guardian.keep(held_runs=held)
         self._watchdogs = WatchdogRegister(self._line, self.bank.show_watchdogs, self._log)
         self._audit.watch(self.bank)
         self.bank.on_refusal = lambda refusal, peer: log(
@@ -162,16 +163,15 @@ class RunningRig:
             LoopProcess(time.monotonic, log, self._tick.period_s, self._counters.read, self._lateness, suspended_s),
         )
         self.loop.is_watched = False  # until READY: before it the guardian knows of no heartbeat to miss
-        self.loop.valve = self._valve_line
-        self._ports.loop = self.loop
-        self.loop.pressure_pa_per_v = self._rig.output.device.pressure_pa_per_v
+        self.loop.valve, self.loop.restart_cause = self._valve_line, cause
+        self._ports.loop, self.loop.pressure_pa_per_v = self.loop, rig.output.device.pressure_pa_per_v
         self.loop.recordings, self.loop.ring = self._recordings, self.ring
-        self.loop.restart_cause = cause
         self.loop.warnings = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
 
     async def start(self, bind: list[Any] | None, handover: Handover, *, restarted: Ending | None) -> banner.Ready:
         """Open the ports, greet both devices, then serve Modbus: nobody is answered before there is an answer."""
         self._wire(cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
+        self.bank.held_runs.restore(handover.held_runs)
         await self._ports.open(is_restart=bool(restarted))
         self._tick.start()
         with contextlib.suppress(TimeoutError):

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import threading
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -29,6 +30,22 @@ def test_it_lets_go_by_itself_when_its_time_is_over(fake: Any, call: Any) -> Non
     assert done.exit_code == 0, done.output
     assert json.loads(done.output.splitlines()[-1]) == {"end": "stopped"}
     assert fake.bank.writes[0][1][:2] == (1, 1200) and fake.bank.writes[-1][1][:2] == (0, 0)
+
+
+def test_its_time_is_over_also_where_nobody_takes_its_lines(fake: Any, call: Any, monkeypatch) -> None:
+    """A paused terminal, a full pipe: it pressed on until somebody read. The first line comes before the time is over."""
+    let_go, write, seen = threading.Event(), fake.bank.write_registers, []
+
+    def note(address: int, data: bytes, peer: Any) -> None:
+        write(address, data, peer)
+        if fake.bank.writes[-1][1][:2] == (0, 0):
+            let_go.set()
+
+    monkeypatch.setattr(fake.bank, "write_registers", note)
+    monkeypatch.setattr(StateLine, "show", lambda *_: seen.append(let_go.wait(5.0)))
+    fake.bank.set("state", State.HOLDING)
+    call("hold", "12", "--for", "500ms", "--gateway", fake.address)
+    assert fake.bank.writes[0][1][:2] == (1, 1200) and seen and all(seen)
 
 
 @pytest.mark.parametrize("trouble", [errno.ENOSPC, errno.EIO], ids=["full disk", "no terminal"])

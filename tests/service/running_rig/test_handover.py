@@ -7,10 +7,13 @@ from typing import Any
 
 import pytest
 
+from gateway.modbus import Peer
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.recording import list_recordings
 from gateway.recording.label import RecordingLabel, label_of
+from gateway.registers import Refusal
+from gateway.registers.words import ControlBit, State
 from gateway.service.running_rig.handover import Handover, KeptZero
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
@@ -168,3 +171,35 @@ def test_the_port_of_each_tls_face_is_left_to_the_next_process(devices: OwnDevic
 
     with_running_rig(devices, scene, Ending(EndCause.DIED, "control process died"), {"tls_ports": ports})
     assert kept["tls_ports"] == ports
+
+
+RUN, ROBOT = int(ControlBit.START_CALIBRATION).to_bytes(2, "big"), Peer("10.0.0.5")
+
+
+def test_the_bit_of_a_run_that_a_master_keeps_at_1_is_left_to_the_next_process(devices: OwnDevices) -> None:
+    kept: dict[str, Any] = {}
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        for _ in range(2):  # once is no cycle
+            rig.bank.write_registers(0, RUN, ROBOT)
+        while "held_runs" not in kept and (message := message_link.receive(guardian)) is not None:
+            kept.update(message.body if message.tag == message_link.KEEP else {})
+            message.drop_descriptors()
+
+    with_running_rig(devices, scene)
+    assert kept["held_runs"] == {"10.0.0.5": int(ControlBit.START_CALIBRATION)}
+
+
+def test_behind_a_restart_that_bit_begins_no_other_run(devices: OwnDevices) -> None:
+    """Control died in a ladder, and the robot's next cycle, a tenth of a second later, began another one."""
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        with pytest.raises(Refusal, match="was kept at 1 beyond the end of its run"):
+            rig.bank.write_registers(0, RUN, ROBOT)
+        assert rig.controller.state is State.OFF
+        rig.bank.write_registers(0, bytes(2), ROBOT)
+        rig.bank.write_registers(0, RUN, ROBOT)
+        assert rig.controller.state is State.CALIBRATING, "its own 0 lets the next 1 count"
+
+    died = Ending(EndCause.DIED, "control process died")
+    with_running_rig(devices, scene, died, {"held_runs": {"10.0.0.5": int(ControlBit.START_CALIBRATION)}})
