@@ -141,12 +141,13 @@ NOTICES: Final = (
     ),
     Explanation(
         "W250",
-        "another calibration or plant since the restart",
-        "Control was started again and found another calibration or plant in use than the process before it had: forces may "
+        "another calibration, plant or zero since the restart",
+        "Control was started again and has another calibration or plant in use than before it, or no tare any more: forces may "
         "be off by the difference.",
-        "The state directory, or the document's file in it, is gone or damaged; or another one was chosen meanwhile.",
-        "force-gateway calibration list shows what there is: choose with calibration use N, upload it anew, or restore a "
-        "backup.",
+        "A restart forgets the tare. The state directory, or the document's file in it, is gone or damaged; or another was "
+        "chosen meanwhile.",
+        "Tare again, with nothing pressed. calibration list shows what there is: choose with calibration use N, upload it "
+        "anew, or restore a backup.",
     ),
     Explanation(
         "W251",

@@ -142,6 +142,17 @@ def test_a_recording_from_while_the_clock_was_ahead_is_not_waited_for(tmp_path):
     assert kept is not None and kept.name == "0002.fgr"
 
 
+def test_a_calibration_that_came_into_use_while_the_clock_was_ahead_finds_its_reference(tmp_path: Path) -> None:
+    """None began behind that for as long as the clock had been ahead, years."""
+    use_calibration(tmp_path, 2)
+    (selection,) = (tmp_path / "calibrations").glob("active.*")
+    os.utime(selection, (time.time() + 1e8, time.time() + 1e8))
+    record(tmp_path, calibration=1)
+    record(tmp_path)
+    kept = FirstGoodRecording(tmp_path).keep(time.time())
+    assert kept is not None and (kept.name, kept.calibration) == ("0002.fgr", 2)
+
+
 def test_a_recording_from_before_the_calibration_came_into_use_is_none(tmp_path):
     record(tmp_path)
     use_calibration(tmp_path, 2)

@@ -1,13 +1,15 @@
 """What a control process leaves, through the guardian, to the one that is started when it dies: the recording goes on, a TLS
 face whose port is any free one (0) keeps it, a master that keeps the bit of a run at 1 begins no other one by that, and a
-calibration or a plant that is another one now (their files are gone, say) is told. By itself a start knows only what it finds.
+calibration or a plant that is another one now (their files are gone, say) is told, as is a tare that is forgotten. By itself a
+start knows only what it finds.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 
+_LEAST_TOLD_N: Final = 0.05
 _OWN: Final = "the rig's own"
 
 
@@ -38,9 +40,29 @@ class Handover:
         return None if wanted is None or wanted.is_over(now_s) else wanted
 
     def changes(self, **in_use: int) -> tuple[str, ...]:
-        """Return W250 for each number in use that is not the one before. in_use: what is in use now, by its noun."""
-        return tuple(
+        """Return W250 for each number in use that is not the one before, and for the zero of a tare. in_use: what is in use
+        now, by its noun."""
+        changed = tuple(
             f"W250 {noun} {before} was in use before the restart, now it is {number or _OWN}: see `force-gateway {noun} list`"
             for noun, number in in_use.items()
             if (before := self._kept.get(noun, number)) != number
         )
+        zero_n = self._kept.get("zero_n", 0.0)
+        if abs(zero_n) < _LEAST_TOLD_N:
+            return changed
+        off = f"the cell reads {abs(zero_n):.2f} N {'more' if zero_n > 0.0 else 'less'} than before it"
+        return (*changed, f"W250 the tare before the restart is forgotten, and {off}: tare again before you press")
+
+
+class KeptZero:
+    """The zero of the last tare, for the process behind this one to tell. keep: with the guardian."""
+
+    def __init__(self, keep: Callable[..., None]) -> None:
+        self._keep = keep
+        self._kept_n: float | None = None
+
+    def follow(self, zero_n: float) -> None:
+        """Keep it where it has changed; at each tick. zero_n: force of the cell that is taken for none."""
+        if zero_n != self._kept_n:
+            self._kept_n = zero_n
+            self._keep(zero_n=zero_n)

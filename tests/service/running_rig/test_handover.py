@@ -14,7 +14,7 @@ from gateway.recording import list_recordings
 from gateway.recording.label import RecordingLabel, label_of
 from gateway.registers import Refusal
 from gateway.registers.words import ControlBit, State
-from gateway.service.running_rig.handover import Handover
+from gateway.service.running_rig.handover import Handover, KeptZero
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 from gateway.service.running_rig.running_rig import RunningRig
@@ -119,13 +119,39 @@ def test_another_calibration_than_before_the_restart_is_told_by_name_and_kept_fo
         while (message := message_link.receive(guardian)) is not None:
             told.append(message)
             message.drop_descriptors()
-            if message.tag == message_link.KEEP:
+            if message.tag == message_link.KEEP and "calibration" in message.body:
                 return
 
     died = Ending(EndCause.DIED, "control process died")
     lines = with_running_rig(devices, scene, died, {"calibration": 7})
-    [number] = {message.body["calibration"] for message in told if message.tag == message_link.KEEP}
+    [number] = {message.body["calibration"] for message in told if "calibration" in message.body}
     assert any(f"W250 calibration 7 was in use before the restart, now it is {number}: " in line for line in lines)
+
+
+@pytest.mark.parametrize(("zero_n", "words"), [(8.3, "8.30 N more"), (-2.0, "2.00 N less")])
+def test_a_tare_that_a_restart_has_forgotten_is_told_once(devices: OwnDevices, zero_n: float, words: str) -> None:
+    """Behind a crash at noon all forces were off by what had been tared in the morning, and nobody said a word."""
+    kept: dict[str, Any] = {"zero_n": zero_n}
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        while kept["zero_n"] and (message := message_link.receive(guardian)) is not None:
+            kept.update(message.body if message.tag == message_link.KEEP else {})
+            message.drop_descriptors()
+
+    lines = with_running_rig(devices, scene, Ending(EndCause.DIED, "control process died"), dict(kept))
+    assert any(
+        f"W250 the tare before the restart is forgotten, and the cell reads {words} than before it" in line
+        for line in lines
+    )
+    assert kept["zero_n"] == 0.0 and Handover(kept, record=False).changes() == ()
+
+
+def test_the_zero_is_kept_whenever_it_changes() -> None:
+    kept: list[float] = []
+    zero = KeptZero(lambda zero_n: kept.append(zero_n))
+    for zero_n in (0.0, 0.0, 8.3, 8.3, 0.0):
+        zero.follow(zero_n)
+    assert kept == [0.0, 8.3, 0.0]
 
 
 def test_the_port_of_each_tls_face_is_left_to_the_next_process(devices: OwnDevices) -> None:
