@@ -18,6 +18,7 @@ function ageInWords(seconds) {
 }
 
 function showState(state) {
+  if (!at("gone").hidden && !mounted.has(nameOfTab())) openTab(); // what could not be loaded meanwhile
   at("gone").hidden = true;
   document.body.classList.remove("old");
   at("rig").textContent = state.rig + (state.simulated ? " (simulated)" : "");
@@ -54,8 +55,13 @@ async function stopForce() {
   }
 }
 
+function nameOfTab() {
+  const name = location.hash.slice(1);
+  return NAMES.includes(name) ? name : "live";
+}
+
 async function openTab() {
-  const name = NAMES.includes(location.hash.slice(1)) ? location.hash.slice(1) : "live";
+  const name = nameOfTab();
   for (const other of NAMES) {
     const element = at(`tab-${other}`);
     if (!element.hidden && other !== name) element.dispatchEvent(new Event("hidden"));

@@ -55,6 +55,28 @@ def test_what_could_not_be_read_at_first_is_there_when_the_gateway_is_back(page,
     browser.close()
 
 
+def test_a_tab_that_could_not_be_loaded_is_there_when_the_gateway_is_back(
+    page, served: ScriptedControl, chromium
+) -> None:
+    """It said so until somebody went to another tab and came back."""
+    from playwright.sync_api import expect
+
+    window = open_tab(chromium, page.address, "wiring")
+    state = window.locator("#state")
+    expect(state).to_have_text("off", timeout=10_000)
+    answer = served.answer
+    served.answer = lambda request: {"ok": False, "error": "away"}  # type: ignore[method-assign]
+    expect(state).to_have_text("no answer", timeout=10_000)
+    window.route("**/static/tabs/recordings.js", lambda route: route.abort())
+    window.get_by_role("link", name="Recordings").click()
+    expect(window.locator("#tab-recordings")).to_contain_text("This section could not be loaded")
+    window.unroute("**/static/tabs/recordings.js")
+    served.answer = answer  # type: ignore[method-assign]
+    window.get_by_role("button", name="Start recording").wait_for()
+    assert "could not be loaded" not in window.inner_text("#tab-recordings")
+    window.close()
+
+
 def test_what_says_how_the_gateway_is_does_not_go_on_saying_it_while_that_is_away(
     page, served: ScriptedControl, chromium
 ) -> None:
