@@ -94,10 +94,13 @@ def read_plain(path: Path | str) -> bytes:
 def replaced_by(path: Path) -> Path:
     """Return the place of a file that is written beside it and renamed: where a link leads to. OSError where something else
     than a plain file stands: root would make a device such as /dev/null a file, for everybody; and where there is no folder,
-    which would else be told by the name of the file beside it, that nobody has given."""
+    or one that takes no file, which would else be told by the name of the file beside it, that nobody has given."""
     place = Path(os.path.realpath(path))
     if not place.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "no such directory", str(path.parent))
+    if not os.access(place.parent, os.W_OK | os.X_OK):
+        number = errno.EROFS if os.statvfs(place.parent).f_flag & os.ST_RDONLY else errno.EACCES
+        raise OSError(number, os.strerror(number), str(path))
     with suppress(FileNotFoundError):
         check_plain(place)
     return place

@@ -222,7 +222,7 @@ class StateChoice:
 
 def state_option(text: str) -> Callable[[Function], Function]:
     """Return --state with this help. One that cannot be read is told by E105, which ends with 77."""
-    return click.option("--state", type=GivenPath(file_okay=False, readable=False), help=text)
+    return click.option("--state", type=GivenPath(file_okay=False), help=text)
 
 
 def state_options(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -13,10 +13,11 @@ EMPTY: Final = "an empty name: is a variable of the shell not set?"
 
 class GivenPath(click.Path):
     """A path. `~` is the home directory also in `--state=~/cell`, where bash leaves it: a folder called ~ was made here. An
-    empty name would be the folder that one stands in, for a state directory, or for a key."""
+    empty name would be the folder that one stands in, for a state directory, or for a key. What may not be read is told by who
+    opens it (E105, with its exit code)."""
 
     def __init__(self, **rules: Any) -> None:
-        super().__init__(path_type=Path, **rules)
+        super().__init__(path_type=Path, **{"readable": False, **rules})
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path; BadParameter where it breaks a rule of click.Path, or names nothing."""

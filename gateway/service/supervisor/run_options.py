@@ -1,5 +1,6 @@
 """What `force-gateway run` was asked for. Standard library only."""
 
+import errno
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,9 +35,14 @@ class RunOptions:
 
 
 def default_state_root() -> Path:
-    """Return where the state directories of rigs are that were given none."""
-    home = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
-    return Path(home) / "force-gateway"
+    """Return where the state directories of rigs are that were given none. OSError where this user has no home either, as in a
+    container by a number alone."""
+    try:
+        home = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state")
+    except RuntimeError:
+        nowhere = "this user has no home directory for the state: set XDG_STATE_HOME, or give --state DIR"
+        raise FileNotFoundError(errno.ENOENT, nowhere) from None
+    return home / "force-gateway"
 
 
 def stem_of(rig: str) -> str:

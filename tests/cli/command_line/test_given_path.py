@@ -1,5 +1,6 @@
 """A path is the one that its user means: `~` also where no shell says so, and nothing is no path."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -63,3 +64,33 @@ def test_a_rig_by_such_a_name_is_refused_in_words(here: Path) -> None:
 def test_a_certificate_in_such_a_home_is_looked_for_beside_the_rig(here: Path) -> None:
     face = TlsFace(type="tls", certificate="~nobody-here/a", key="~/b", ca="c").within(here)
     assert face.certificate == str(here / "~nobody-here/a") and face.key == str(here / "home" / "b")
+
+
+def test_a_user_without_a_home_is_told_where_the_state_may_go(
+    here: Path, call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a container by a number alone each verb ended in an internal error."""
+
+    def no_home() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_STATE_HOME")
+    monkeypatch.setattr(Path, "home", no_home)
+    for verb in (("events",), ("run", "demo", "--sim", "--bind", "127.0.0.1:0")):
+        answer = call(*verb)
+        assert answer.exit_code == 1
+        assert answer.stderr.startswith(
+            "E106 this user has no home directory for the state: set XDG_STATE_HOME, or give"
+        )
+
+
+def test_what_may_not_be_read_or_written_is_told_by_its_own_name(
+    here: Path, call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`restore` called it a wrong use of the verb, and `backup` named the file that it writes beside."""
+    Path("b.tar.gz").write_text("")
+    Path("state").mkdir()
+    monkeypatch.setattr(os, "access", lambda *_, **__: False)
+    assert "is not readable" not in call("restore", "b.tar.gz", "--state", "new").stderr
+    answer = call("backup", "c.tar.gz", "--state", "state")
+    assert answer.exit_code == 77 and answer.stderr == "E105 c.tar.gz: Permission denied: this user may not\n"
