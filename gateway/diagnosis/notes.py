@@ -36,6 +36,11 @@ def uninformative_force(measurements: Sequence[Measurement]) -> str:
     return whys[0] if all(whys) else ""
 
 
+def is_frozen(measurements: Sequence[Measurement]) -> bool:
+    """Decide whether each of these recordings has one force in every row: a cell that is dead or repeats itself."""
+    return all(each.usable.any() and np.ptp(each.force_n[each.usable]) == 0.0 for each in measurements)
+
+
 def _why_uninformative(measurement: Measurement) -> str:
     moved = _movement(measurement)
     if not moved or _is_moving(measurement):

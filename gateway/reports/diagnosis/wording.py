@@ -32,11 +32,15 @@ def machine_sentence(diagnosis: Diagnosis) -> str:
 
 
 def why_blind(diagnosis: Diagnosis) -> str:
-    """Return why the recordings say nothing, where they do not and nothing else was found."""
+    """Return why the recordings say nothing, where they do not and nothing else was found. What is found in a force whose
+    readings are all the same is the base model's, which is nowhere quite still."""
+    measurements = [trace.measurement for trace in diagnosis.traces]
     has_findings = (
         diagnosis.suspects or diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
     )
-    return "" if has_findings else notes.uninformative_force([trace.measurement for trace in diagnosis.traces])
+    if has_findings and not notes.is_frozen(measurements):
+        return ""
+    return notes.uninformative_force(measurements)
 
 
 def others(cause: Cause) -> list[str]:

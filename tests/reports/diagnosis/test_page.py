@@ -276,3 +276,15 @@ def test_each_leftover_is_told_and_drawn(left: Leftover, drawn: str) -> None:
     section = section.partition("<h2>")[0]
     assert left.shape in section and left.experiment in section
     assert "<svg" in section and drawn in section
+
+
+def test_nothing_is_told_of_a_force_that_is_the_same_in_every_row() -> None:
+    """What the base model left of a frozen cell, 0.0001 N, was told as an unknown effect that depends on time."""
+    alive = trace()
+    frozen = replace(
+        alive, measurement=replace(alive.measurement, force_n=np.full(alive.measurement.force_n.size, 5.0))
+    )
+    found = diagnosis(verdict=Verdict.UNKNOWN, causes=(), traces=(frozen,))
+    told = "Nothing can be told: press-07.csv: the force stands at 5 N while command_v moves by"
+    assert headline.answer_sentence(found).startswith(told) and headline.lack_sentence(found) == ""
+    assert not headline.answer_sentence(diagnosis(traces=(frozen, alive))).startswith("Nothing")
