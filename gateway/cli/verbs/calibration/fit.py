@@ -39,8 +39,10 @@ def _orders(context: click.Context, parameter: click.Parameter, value: str) -> t
         first, dash, last = part.strip().partition("-")
         if not first.isdecimal() or (dash and not last.isdecimal()):
             raise click.BadParameter(f"{value} is not a list of orders such as 1-5 or 2,3")
-        if not 1 <= int(first) <= int(last or first) <= ORDER_MAX:
+        if not (1 <= int(first) <= ORDER_MAX and int(last or first) <= ORDER_MAX):
             raise click.BadParameter(f"{value}: orders are 1 .. {ORDER_MAX}")
+        if int(last or first) < int(first):
+            raise click.BadParameter(f"{value} goes down: the smaller order stands first, {last}-{first}")
         orders |= set(range(int(first), int(last or first) + 1))
     return tuple(sorted(orders))
 
@@ -79,6 +81,8 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
     from gateway.cli.diagnosis.outputs import check_targets
     from gateway.cli.diagnosis.progress_line import show_progress
 
+    if options["report"] and options["no_report"]:
+        raise click.UsageError("--report or --no-report, not both")
     path = _source(recording, options)
     target = None if options["no_report"] else options["report"] or _beside(path)
     named = [Path(options[name]) for name in ("rig", "columns") if options[name]]

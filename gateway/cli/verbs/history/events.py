@@ -8,6 +8,7 @@ from typing import Any, Final
 import click
 
 from gateway.cli.command_line.completion_words import complete_codes
+from gateway.cli.command_line.known_codes import entries_of
 from gateway.cli.command_line.since_option import since_option
 from gateway.cli.errors import no_state_directory
 from gateway.cli.options import StateChoice, json_option, state_options
@@ -29,7 +30,7 @@ EXAMPLES = ("events --since 10m", "events --severity warning --code W204")
     multiple=True,
     metavar="CODE",
     shell_complete=complete_codes,
-    help="Only this code, such as W204; may be repeated.",
+    help="Only this code or name, such as W204; may be repeated.",
 )
 @click.option("--follow", is_flag=True, help="Wait for more; Ctrl-C ends it.")
 @json_option
@@ -39,15 +40,16 @@ def command(*, follow: bool, as_json: bool, state: StateChoice, **filters: Any) 
 
     Time (UTC), severity, cause, code, sentence. `force-gateway explain CODE` says what to do.
     """
-    directory = state.directory
+    directory, wanted = state.directory, _event_filter(**filters)
     if not directory.is_dir():
         raise no_state_directory(directory)
     with EventReader(directory) as reader:
-        _show(reader, _event_filter(**filters), follow, as_json)
+        _show(reader, wanted, follow, as_json)
 
 
 def _event_filter(after: str, severity: str, codes: tuple[str, ...]) -> Callable[[EventRecord], bool]:
-    severities, chosen = SEVERITIES[SEVERITIES.index(severity) :], {code.upper() for code in codes}
+    severities = SEVERITIES[SEVERITIES.index(severity) :]
+    chosen = {entry.code for code in codes for entry in entries_of(code)}
 
     def is_wanted(event: EventRecord) -> bool:
         return event.time >= after and event.severity in severities and (not chosen or event.code in chosen)

@@ -2,12 +2,12 @@
 
 import json
 from dataclasses import asdict
-from difflib import get_close_matches
 
 import click
 
 from gateway.cli.command_line.completion_words import complete_codes
 from gateway.cli.command_line.folding import fold
+from gateway.cli.command_line.known_codes import entries_of
 from gateway.cli.options import json_option
 
 EXAMPLES = ("explain W204", "explain over_force")
@@ -34,11 +34,7 @@ def command(*, code: str | None, as_json: bool) -> None:
 
 def _explain_code(code: str, *, as_json: bool) -> None:
     """Print the entries of one code or name; UsageError where there is none."""
-    from gateway.codes.all_codes import find_codes
-
-    entries = find_codes(code)
-    if not entries:
-        raise click.UsageError(_describe_unknown_code(code))
+    entries = entries_of(code)
     if as_json:
         click.echo(json.dumps([asdict(entry) for entry in entries], indent=2))
         return
@@ -47,13 +43,3 @@ def _explain_code(code: str, *, as_json: bool) -> None:
         for heading, text in (("seen", entry.seen), ("probably", entry.probably), ("do", entry.do)):
             for line in fold(f"  {heading:<10}{text}", 12, widest=100):
                 click.echo(line)
-
-
-def _describe_unknown_code(code: str) -> str:
-    """Return the sentence about a code that does not exist, with those that are near."""
-    from gateway.codes.all_codes import CATALOGUE
-
-    codes = [*CATALOGUE, *(entry.name for entry in CATALOGUE.values() if entry.name)]
-    near = get_close_matches(code.upper().replace("-", "_"), codes, n=2, cutoff=0.6)
-    meant = f"; did you mean {' or '.join(near)}?" if near else ";"
-    return f"{code} is not a code{meant} `force-gateway explain` lists them all"

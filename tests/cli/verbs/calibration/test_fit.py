@@ -176,7 +176,14 @@ def test_a_missing_recording_is_told_with_the_numbers_there_are(tmp_path: Path, 
 
 @pytest.mark.parametrize(
     "option",
-    [("--orders", "0"), ("--orders", "1-16"), ("--orders", "1-99999999999"), ("--orders", "a"), ("--models", "spline")],
+    [
+        ("--orders", "0"),
+        ("--orders", "3-1"),
+        ("--orders", "1-16"),
+        ("--orders", "1-99999999999"),
+        ("--orders", "a"),
+        ("--models", "spline"),
+    ],
 )
 def test_what_cannot_be_asked_is_a_usage_error(option: tuple[str, str], tmp_path: Path, call) -> None:
     assert call("fit", "x.csv", *option).exit_code == 2

@@ -143,3 +143,11 @@ def test_a_file_that_gets_another_name_during_a_backup_is_no_failure(
 def test_times_sort_as_texts() -> None:
     assert utc_text(0.0) == "1970-01-01T00:00:00.000Z"
     assert utc_text(NOON_S) < utc_text(NOON_S + 0.001) < utc_text(NOON_S + 86400)
+
+
+def test_a_code_that_there_is_none_of_is_no_event_that_never_came(state: Path, call) -> None:
+    """`events --code W2O4` printed nothing and ended well: who looked for refusals heard that there were none."""
+    assert codes(call("events", "--state", state, "--json", "--code", "out_of_range").output) == ["W204"]
+    for word, said in (("W2O4", "W2O4 is not a code; did you mean W2"), ("", " is not a code")):
+        answer = call("events", "--state", state, "--code", word)
+        assert answer.exit_code == 2 and said in answer.stderr and not answer.stdout
