@@ -4,8 +4,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
+from gateway.cli.command_line.questions import is_confirmed
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice, count_of
 from gateway.cli.recordings.listing import reference_name
@@ -23,7 +22,7 @@ def delete_recording(state: Path, number: int, *, asks: bool) -> Path:
 
     path, reference = find_recording(state, number), reference_name(state)
     why = why_protected(path, reference)
-    if not why and asks and not click.confirm(f"delete recording {number} ({path})?", err=True):
+    if not why and asks and not is_confirmed(f"delete recording {number} ({path})?"):
         raise CliError("nothing was deleted")
     if why := why or delete_recording(path, reference):
         raise CliError(f"E407 recording {number} was not deleted: {why}{_cure(why, path)}", exit_codes.DATA)
@@ -67,6 +66,6 @@ def prune_recordings(state: Path, retention: "Retention", *, dry_run: bool, asks
     chosen = choose_prunable(recording_paths(state), retention, reference, time.time(), needed)
     if dry_run or not chosen:
         return chosen
-    if asks and not click.confirm(f"delete {count_of(chosen, 'recording')}?", err=True):
+    if asks and not is_confirmed(f"delete {count_of(chosen, 'recording')}?"):
         raise CliError("nothing was deleted")
     return prune_recordings(state, retention, reference, needed)

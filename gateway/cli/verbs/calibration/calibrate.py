@@ -14,6 +14,7 @@ import click
 from gateway import defaults
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.numbers import Quantity, Whole
+from gateway.cli.command_line.questions import is_confirmed
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice, json_option, map_option, name_option, state_options, wire_options
 from gateway.processes import exit_codes
@@ -205,7 +206,7 @@ def _ask(preview: dict[str, Any], yes: bool) -> None:
     force_n, top_v = preview.get("force_max_n"), preview.get("v_max_v")
     asked = preconditions(force_n, top_v, has_check=preview.get("check", True))
     for words in (*asked, *preview.get("questions", ())):
-        if not click.confirm(words, err=True):
+        if not is_confirmed(words):
             raise CliError("not begun: nothing has moved")
 
 

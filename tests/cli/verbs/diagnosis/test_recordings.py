@@ -58,8 +58,8 @@ def test_what_is_kept_is_not_deleted_until_it_is_let_go(state: Path, call) -> No
 
 
 def test_delete_asks_and_a_no_deletes_nothing(state: Path, call) -> None:
-    answer = call("recordings", "delete", "1", "--state", state)  # nobody answers
-    assert answer.exit_code == 1
+    answer = call("recordings", "delete", "1", "--state", state)
+    assert answer.exit_code == 1 and "nobody is here to answer, and nothing was done: --yes answers" in answer.stderr
     assert (state / "recordings" / "0001.fgr").exists()
 
 
