@@ -13,6 +13,7 @@ from typing import Any, Final
 import click
 
 from gateway import VERSION
+from gateway.cli import plain_spelling
 from gateway.cli.errors import translate_error
 
 SECTIONS: Final = {
@@ -121,11 +122,12 @@ def _open_standard_streams() -> None:
 
 
 def _print_what_the_terminal_can() -> None:
-    """Print `?` for a character that the terminal's encoding does not have, or that a file's name has made of a stray byte:
-    a verb that has done its work ended on it."""
+    """Print what is like it, or `?`, for a character that the terminal's encoding does not have, or that a file's name has made
+    of a stray byte: a verb that has done its work ended on it."""
+    plain_spelling.register()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
-            stream.reconfigure(errors="replace")
+            stream.reconfigure(errors=plain_spelling.ERRORS)
 
 
 def main() -> None:

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis.bench.bench import Bench
+from gateway.diagnosis.bench.recording_drive import rows_after_unseen_settings
 from gateway.diagnosis.measurement import Flags, Measurement
 from gateway.diagnosis.noise.whitening import fast_noise_n
 
@@ -20,6 +21,7 @@ def recording_notes(measurements: Sequence[Measurement], offsets_n: Sequence[flo
     for each in measurements:
         yield from each.notes
         yield from _dead_drive_notes(each)
+        yield from _unseen_setting_notes(each)
     if max(offsets_n) - min(offsets_n) > _OFFSETS_APART_RATIO * floor_n:
         offsets = ", ".join(
             f"{each.name} {offset_n:.3g} N" for each, offset_n in zip(measurements, offsets_n, strict=True)
@@ -109,6 +111,16 @@ def _dead_drive_notes(measurement: Measurement) -> Iterator[str]:
         yield (
             f"{measurement.name}: command_v stands at {volts[0]:g} V throughout while the force moves by "
             f"{np.ptp(force_n):.3g} N: is it the right column? Without a command that moves, no cause can be told"
+        )
+
+
+def _unseen_setting_notes(measurement: Measurement) -> Iterator[str]:
+    unseen = rows_after_unseen_settings(measurement)
+    if count := int((unseen & measurement.usable).sum()):
+        first_s, last_s = measurement.time_s[np.flatnonzero(unseen)[[0, -1]]]
+        yield (
+            f"{measurement.name}: {count} of {int(measurement.usable.sum())} readings are not judged, between {first_s:.1f} "
+            f"and {last_s:.1f} s: the gateway's loop was late while the voltage moved (A342), and a setting may be missing"
         )
 
 

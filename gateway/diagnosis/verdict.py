@@ -5,7 +5,7 @@ jackknife's over blocks, which believes in no noise model.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.catalogue.effect import Effect, Parameter
 from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.bench.parameters import STARTS
+from gateway.diagnosis.bench.recording_drive import rows_after_unseen_settings
 from gateway.diagnosis.confidence import bound_confidences
 from gateway.diagnosis.experiments.identifiability import find_invisible_effects
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
@@ -283,9 +284,11 @@ def _rejected_effects(
 
 
 def _traces(bench: Bench, reported: ReportedModels) -> tuple[Trace, ...]:
+    """Rows behind an unseen setting were not judged: in the report's figures they were a residual that the answer denied."""
     before, after = bench.simulate([reported.base.parameters, reported.fitted.parameters])
+    judged = [replace(each, usable=each.usable & ~rows_after_unseen_settings(each)) for each in bench.measurements]
     return tuple(
-        Trace(bench.measurements[channel.recording], before[channel.rows], after[channel.rows])
+        Trace(judged[channel.recording], before[channel.rows], after[channel.rows])
         for channel in bench.channels
         if channel.is_force
     )

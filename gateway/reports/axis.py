@@ -7,6 +7,7 @@ from typing import Final
 
 _MANY_TICKS: Final = 5  # every second one goes where the chart is narrow
 _MOST_DECADES: Final = 2  # of a logarithmic axis whose ticks stay where the chart is narrow
+_STILL: Final = 1e-9  # of a value: moves no more than its rounding
 _STEPS: Final = (1.0, 2.0, 5.0, 10.0)
 
 
@@ -53,11 +54,17 @@ def _round_ticks(low: float, high: float, count: int = 6) -> list[float]:
 
 
 def spread(values: Iterable[float], margin: float = 0.06, around: float | None = None) -> tuple[float, float]:
-    """Return limits that hold all values with a margin; symmetric about `around` where given."""
+    """Return limits that hold all values with a margin; symmetric about `around` where given. About a value that stands still
+    they are as wide as about one of its size: rounding would be marked in steps of 2e-11."""
     finite = list(values)
     low, high = min(finite), max(finite)
     if around is not None:
-        reach = max(abs(low - around), abs(high - around), 1e-9) * (1.0 + 2.0 * margin)
+        reach = _width(max(abs(low - around), abs(high - around)), around) * (1.0 + 2.0 * margin)
         return around - reach, around + reach
-    width = max(high - low, 1e-9)
+    width = _width(high - low, high)
     return low - margin * width, high + margin * width
+
+
+def _width(width: float, value: float) -> float:
+    size = max(abs(value), 1.0)
+    return width if width > _STILL * size else size

@@ -4,9 +4,11 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from gateway.recording import Recording
 from gateway.recording.tables.column_names import DERIVED
+from gateway.reports.axis import spread
 from gateway.reports.recording_plot import recording_svg
 
 N = 100
@@ -34,3 +36,12 @@ def test_the_setpoint_of_a_pull_is_drawn_beside_its_force() -> None:
 def test_whoever_measures_the_wrong_way_without_a_pull_sees_it() -> None:
     asked, measured = drawn(np.zeros(N), force_n=np.full(N, -12.0))
     assert asked != measured
+
+
+@pytest.mark.parametrize("value", [0.0, 5.0, 5.0 + 1e-13])
+def test_a_value_that_stands_still_is_drawn_among_values_of_its_size(value: float) -> None:
+    """The voltage of a recording at rest had an axis from -6e-11 to 6e-11 V."""
+    for around in (None, 5.0):
+        low, high = spread([value, 5.0 if value else 0.0], around=around)
+        assert low < value < high and high - low > 0.1
+    assert spread([0.0, 2.0], margin=0.0) == (0.0, 2.0) and spread([1e-6, 3e-6], margin=0.0) == (1e-6, 3e-6)

@@ -27,7 +27,7 @@ def test_ctrl_c_while_the_first_modules_are_read_shows_no_traceback(monkeypatch:
     assert ended.value.code == "Aborted!"
 
 
-@pytest.mark.parametrize(("encoding", "printed"), [("ascii", "rig ? S?d"), ("latin-1", "rig · Süd")])
+@pytest.mark.parametrize(("encoding", "printed"), [("ascii", "rig . S?d"), ("latin-1", "rig · Süd")])
 def test_what_a_terminal_cannot_print_ends_no_verb(
     monkeypatch: pytest.MonkeyPatch, encoding: str, printed: str
 ) -> None:

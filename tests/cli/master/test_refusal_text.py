@@ -140,6 +140,7 @@ def test_a_limit_that_only_registers_can_tell_is_told(
         (("write", "force_setpoint=nan"), "force_setpoint: nan is not a number in N"),
         (("hold", "8,5"), "8,5 is not a number; decimals take a point: 8.5"),
         (("hold", "8N"), "8N is not a number"),
+        (("hold", "8", "--for", "0"), "0 is no time such as 10s, 500ms or 2min"),
         (("calibrate", "--step", "0,5"), "0,5 is not a number; decimals take a point: 0.5"),
         (("diagnose", "1", "--noise-floor-n", "0,1"), "0,1 is not a number; decimals take a point: 0.1"),
         (("recordings", "prune", "--days", "nan"), "nan is no finite number"),

@@ -1,13 +1,18 @@
 """Where a loop woke late, a setting may be in no row: what follows is no witness until it is forgotten."""
 
 from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from gateway.diagnosis import Measurement
+from gateway.diagnosis import Measurement, verdict
 from gateway.diagnosis.bench.bench import bench_of
+from gateway.diagnosis.bench.parameters import ModelParameters
 from gateway.diagnosis.bench.recording_drive import rows_after_unseen_settings
+from gateway.diagnosis.notes import recording_notes
+from gateway.profiles import load_plant
 
 ROW_S = 0.01
 
@@ -57,3 +62,17 @@ def test_the_bench_does_not_judge_these_rows() -> None:
     judged = bench_of([stairs([400])]).judged
     assert not judged[400:700].any()
     assert judged[750:].all()
+
+
+def test_that_these_rows_are_not_judged_is_told_and_no_figure_shows_them() -> None:
+    """A report said that the simulation is off by 0.12 N, above a plot of a residual of 1.2 N for four seconds."""
+    (note,) = recording_notes([stairs([400])], [0.0], 0.1)
+    assert note.startswith(
+        "stairs: 299 of 1999 readings are not judged, between 4.0 and 7.0 s: the gateway's loop was late"
+    )
+    assert not list(recording_notes([stairs([])], [0.0], 0.1))
+    bench = bench_of([stairs([400])])
+    model: Any = SimpleNamespace(parameters=ModelParameters(load_plant("paper-slide").plant, (0.0,)))
+    reported: Any = SimpleNamespace(base=model, fitted=model)
+    (trace,) = verdict._traces(bench, reported)
+    assert (trace.measurement.usable == bench.judged).all()

@@ -73,7 +73,7 @@ def test_a_tab_that_could_not_be_loaded_is_there_when_the_gateway_is_back(
     window.unroute("**/static/tabs/recordings.js")
     served.answer = answer  # type: ignore[method-assign]
     window.get_by_role("button", name="Start recording").wait_for()
-    assert "could not be loaded" not in window.locator("#tab-recordings").inner_text()
+    assert "could not be loaded" not in window.inner_text("#tab-recordings")
     window.close()
 
 

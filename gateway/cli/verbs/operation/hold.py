@@ -28,9 +28,10 @@ _SHOW_S: Final = 0.1
 
 
 def _parse_time(context: click.Context, parameter: click.Parameter, text: str | None) -> float | None:
-    """Return the seconds that the option's text means, None where it is not given; BadParameter for no duration."""
+    """Return the seconds that the option's text means, None where it is not given; BadParameter for no duration, and for 0,
+    which pressed for a moment."""
     seconds = parse_duration_s(text) if text is not None else None
-    if text is not None and seconds is None:
+    if text is not None and not seconds:
         raise click.BadParameter(f"{text} is no time such as 10s, 500ms or 2min")
     return seconds
 
