@@ -2,6 +2,14 @@
 
 from gateway.clients.endpoint import Endpoint
 from gateway.clients.exchange import ExchangeTable, MissingRegisterError
-from gateway.clients.rendering import LANGUAGES, endpoint_of, render_client
+from gateway.clients.rendering import LANGUAGES, UnspeakableNameError, endpoint_of, render_client
 
-__all__ = ["LANGUAGES", "Endpoint", "ExchangeTable", "MissingRegisterError", "endpoint_of", "render_client"]
+__all__ = [
+    "LANGUAGES",
+    "Endpoint",
+    "ExchangeTable",
+    "MissingRegisterError",
+    "UnspeakableNameError",
+    "endpoint_of",
+    "render_client",
+]

@@ -14,6 +14,7 @@ from gateway import defaults
 from gateway.clients.endpoint import Endpoint
 from gateway.clients.exchange import ExchangeTable
 from gateway.clients.spellings import SPELLINGS
+from gateway.clients.spellings.keywords import unspeakable
 from gateway.control.settings import LeaseAction
 from gateway.profiles import Rig
 from gateway.registers.map.register_map import RegisterMap
@@ -43,11 +44,18 @@ _BESIDE_THE_GATEWAY: Final = ("c", "python")
 """Languages of programs that may run on the gateway's machine."""
 
 
+class UnspeakableNameError(ValueError):
+    """A register of the map has a name that the language cannot have; the message names all of them."""
+
+
 def render_client(register_map: RegisterMap, language: str, where: Endpoint) -> str:
-    """Return the client's whole text. Raises MissingRegisterError, ValueError for an unknown language."""
+    """Return the client's whole text. Raises MissingRegisterError, UnspeakableNameError, ValueError for an unknown
+    language."""
     if language not in TEMPLATES:
         raise ValueError(f"{language} is not one of {', '.join(LANGUAGES)}")
     table = ExchangeTable(register_map, where)
+    if odd := list(unspeakable(table, language)):
+        raise UnspeakableNameError(f"map {register_map.name}: {'; '.join(odd)}: give it another name")
     text = files("gateway.clients").joinpath("templates", TEMPLATES[language]).read_text("utf-8")
     remarks = (*where.to_fill_in(from_elsewhere=language not in _BESIDE_THE_GATEWAY), *where.cautions)
     fill_in = "".join(map(_REMARKS[language].format, remarks))

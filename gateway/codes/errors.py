@@ -143,8 +143,8 @@ ERRORS: Final = (
         "the map lacks registers that a client needs",
         "A client for a robot or PLC is made from the register map, and `hold`, `upload` and others go by it: they name "
         "registers that this one does not have.",
-        "A map of your own in which registers were renamed or left out.",
-        "Take the missing ones over from profiles/registers/force-v1.yaml, or make the client from force-v1.",
+        "A map of your own in which registers were renamed or left out, or have names that the client's language cannot have.",
+        "Take the missing ones over from profiles/registers/force-v1.yaml, and give those of your own a short name.",
     ),
     Explanation(
         "E186",

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from gateway.clients import MissingRegisterError, render_client
+from gateway.clients import MissingRegisterError, UnspeakableNameError, render_client
 from gateway.profiles import load_register_map
 from gateway.registers import Status
 from tests.clients.conftest import CONTROLLERS
@@ -58,6 +58,29 @@ def test_a_map_without_the_names_that_a_client_says_is_told_so(
     """A CASE or an enumeration with nothing in it is no text that a compiler takes, and no commit would ever end."""
     with pytest.raises(MissingRegisterError, match=f"^map own lacks {told}$"):
         render_client(own_map(tmp_path, old, new), language, WHERE)
+
+
+@pytest.mark.parametrize(
+    ("name", "languages"),
+    [
+        ("type", {"scl", "st"}),
+        ("default", {"c"}),
+        ("force_of_the_left_hand_cells", {"rapid"}),  # FG_S_ and 28 characters
+        ("force_of_the_left_hand_cell", set[str]()),
+    ],
+)
+def test_a_register_of_ones_own_that_a_language_cannot_name_is_told(
+    name: str, languages: set[str], tmp_path: Path
+) -> None:
+    """The gateway serves it, and a compiler of the controller would have been the first to refuse."""
+    known = '      - {name: plant_id, address: 131, type: uint16, text: "Number of the plant in use'
+    own = own_map(tmp_path, known, known.replace("plant_id", name))
+    for language in LANGUAGES:
+        if language in languages:
+            with pytest.raises(UnspeakableNameError, match=f"^map own: {name} .*: give it another name$"):
+                render_client(own, language, WHERE)
+        else:
+            assert name in render_client(own, language, WHERE).lower()
 
 
 def test_a_status_block_that_one_request_cannot_read_is_told(tmp_path: Path) -> None:

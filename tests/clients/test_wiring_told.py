@@ -41,6 +41,21 @@ def test_who_binds_ipv6_is_told_that_robots_and_plcs_know_ipv4_alone(tmp_path: P
     assert not any("IPv6" in one for one in told)
 
 
+@pytest.mark.parametrize(
+    ("lease_s", "is_short", "rate"), [(0.05, True, "60 Hz"), (0.12, False, "25 Hz"), (0.2, False, "20 Hz")]
+)
+def test_a_lease_that_is_short_for_a_robot_is_told(lease_s: float, is_short: bool, rate: str, tmp_path: Path) -> None:
+    """Of 0.05 s the page said "use the task", which exchanges every 0.04 s, and "20 Hz or more": a beat in 0.05 s."""
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    (tmp_path / "own.yaml").write_text(text.replace("lease_s: 0.2 ", f"lease_s: {lease_s} "))
+    page = page_of(tmp_path / "own.yaml")
+    rows = rows_of(page, "ABB IRC5: RAPID sockets")
+    assert ("set lease_s to 0.12 or more" in rows["task"][0]) is is_short
+    assert ("use the task" in rows["without 623-1"][0]) is not is_short
+    (told,) = [" ".join(one["sentences"]) for one in page["sections"] if one["title"] == "Universal Robots"]
+    assert ("set lease_s to 0.12 or more" in told) is is_short and f"{rate} or more for the heartbeat" in told
+
+
 def test_of_eight_outputs_the_one_that_is_driven_is_named(tmp_path: Path) -> None:
     text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("device: smc-itv-rc", "device: waveshare-ao8b")
     (tmp_path / "own.yaml").write_text(text)

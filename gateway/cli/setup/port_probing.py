@@ -8,7 +8,7 @@ from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from gateway.devices import DeviceProfile, SerialSettings
     from gateway.ports import PortError
@@ -39,13 +39,16 @@ def known_profiles(role: str) -> "list[DeviceProfile]":
     return [one for one in profiles if one.role.value == role]
 
 
-def probe_path(path: str, profiles: "list[DeviceProfile]", patience_s: float = 0.0) -> "PortReport":
-    """Ask one port what is behind it. CliError with the port's own code where it does not open."""
+def probe_path(
+    path: str, profiles: "list[DeviceProfile]", patience_s: float = 0.0, *, is_speed_known: bool = False
+) -> "PortReport":
+    """Ask one port what is behind it, at each usual speed or at those of the profiles alone. CliError with the port's own code
+    where it does not open."""
     from gateway.ports import PortError
-    from gateway.service.probing.port_probe import probe_port
+    from gateway.service.probing.port_probe import BAUDS, probe_port
 
     try:
-        return asyncio.run(probe_port(path, profiles, patience_s=patience_s))
+        return asyncio.run(probe_port(path, profiles, () if is_speed_known else BAUDS, patience_s=patience_s))
     except PortError as error:
         raise port_failure(error) from None
 
@@ -55,19 +58,27 @@ def port_failure(error: "PortError") -> CliError:
     return CliError(str(error), error.exit_code)
 
 
-def probe_line(line: "AnyLine") -> "PortReport":
-    """Ask the port of a rig's line: its own device at its own speed first, then at others, then every shipped profile."""
+def probe_line(line: "AnyLine", others_of_rig: "Iterable[AnyLine]" = ()) -> "PortReport":
+    """Ask the port of a rig's line: its own device at its own speed first, then at others, then the rig's other devices, whose
+    ports may be exchanged, then every shipped profile of its role."""
     assert line.port
-    as_set = replace(line.device, serial=line.settings)
-    report = probe_path(line.port, [as_set], PATIENCE_S)
+    report = probe_path(line.port, [_as_set(line)], PATIENCE_S)
     if report.answers:
         return report
+    for other in others_of_rig:
+        exchanged = probe_path(line.port, [_as_set(other)], PATIENCE_S, is_speed_known=True)
+        if exchanged.answers:
+            return exchanged
     others = [one for one in known_profiles(line.device.role.value) if one.name != line.device.name]
     second = probe_path(line.port, others)
     second.heard = {**second.heard, **report.heard}
     second.strangers = report.strangers + second.strangers
     second.unasked = report.unasked
     return second
+
+
+def _as_set(line: "AnyLine") -> "DeviceProfile":
+    return replace(line.device, serial=line.settings)
 
 
 def is_as_named(line: "AnyLine", report: "PortReport") -> bool:
@@ -88,6 +99,8 @@ def tell_report(report: "PortReport", line: "AnyLine | None" = None, *, is_own_f
             yield f"  the file says {answer.profile.serial}: correct it, or say `baud: {answer.settings.baud}` in the rig"
         if line and not _fits(line, answer):
             cure = f"write device: {answer.profile.name}, baud: {answer.settings.baud}, or exchange the ports"
+            if answer.profile.role is not line.device.role:
+                cure = f"this one is of role {answer.profile.role}: exchange the ports"
             yield f"E113 the rig names {line.device.name} at {line.baud}: {cure}"
     for other in () if report.answers else report.strangers:
         known = ", ".join(map(str, other.profile.own_identity.models)) if other.profile.own_identity else ""

@@ -4,6 +4,7 @@ and a Universal Robot. Addresses come from the exchange table that the generated
 from collections.abc import Iterator
 from dataclasses import replace
 from ipaddress import ip_address
+from math import ceil
 from shlex import quote
 from typing import Final
 
@@ -24,8 +25,12 @@ _LOST: Final = {
 _SHOWN: Final = ("status_word", "state", "force_measured", "fault_code", "refusal_reason")
 """What a robot wants to see that reads register by register."""
 _IPV4: Final = 4
+_USUAL_HZ: Final = 20
+_BEATS_OF_A_LEASE: Final = 3  # two lost ones are not a loss of the master
 SHORTEST_TIMER_LEASE_S: Final = 0.3
 """Three periods of RAPID's shortest cyclic timer, 0.1 s: two lost ones are not a loss of the master."""
+SHORTEST_CYCLE_LEASE_S: Final = 0.12
+"""Three exchanges of a task of RAPID or a thread of URScript, with their pause of 0.04 s."""
 SHORTEST_S7_LEASE_S: Final = 0.36
 """Three heartbeats of MB_CLIENT, one request at a time: 8 to 12 calls of the block of 10 ms each."""
 
@@ -136,15 +141,16 @@ def _rights(rig: Rig) -> Iterator[str]:
 
 def _irc5(rig: Rig, table: ExchangeTable) -> Section:
     where, lease_s = table.where, rig.control.supervision.lease_s
-    timer = "any lease" if lease_s is None else f"lease {lease_s:g} s"
+    timer, short = "any lease" if lease_s is None else f"lease {lease_s:g} s", _short_of_a_cycle(lease_s)
     if lease_s is not None and lease_s < SHORTEST_TIMER_LEASE_S:
-        timer += f": too short for a timer of 0.1 s; use the task, or set lease_s to {SHORTEST_TIMER_LEASE_S:g} or more"
+        task = "" if short else "use the task, or "
+        timer += f": too short for a timer of 0.1 s; {task}set lease_s to {SHORTEST_TIMER_LEASE_S:g} or more"
     rows = (
         ("what", "value"),
         ("options", "616-1 PC Interface (sockets); 623-1 Multitasking for the background task"),
         ("module", "ForceGateway.mod, from the command below"),
         ("FG_HOST, FG_PORT, FG_UNIT", f'"{where.host}", {where.shown_port}, {where.unit}'),
-        ("task", "T_FORCE, Type SemiStatic, Main entry FgServe, TrustLevel NoSafety; every FG_CYCLE 0.04 s"),
+        ("task", f"T_FORCE, Type SemiStatic, Main entry FgServe, TrustLevel NoSafety; every FG_CYCLE 0.04 s{short}"),
         (
             "program that stops",
             "T_ROB1's timer counts fgAlive on: where that stands, the task takes the force off (0.5 s)",
@@ -152,6 +158,13 @@ def _irc5(rig: Rig, table: ExchangeTable) -> Section:
         ("without 623-1", f"FgTimerStart in T_ROB1, every 0.1 s ({timer})"),
     )
     return Section("ABB IRC5: RAPID sockets", rows=rows)
+
+
+def _short_of_a_cycle(lease_s: float | None) -> str:
+    """Return what a lease means for who exchanges every 0.04 s, empty where it is long enough."""
+    if lease_s is None or lease_s >= SHORTEST_CYCLE_LEASE_S:
+        return ""
+    return f" (lease {lease_s:g} s: too short for it; set lease_s to {SHORTEST_CYCLE_LEASE_S:g} or more)"
 
 
 def _requests(table: ExchangeTable) -> Iterator[tuple[str, bool, int, int]]:
@@ -240,13 +253,15 @@ def _codesys(rig: Rig, table: ExchangeTable) -> Section:
 
 
 def _universal_robot(rig: Rig, table: ExchangeTable) -> Section:
-    where = table.where
+    where, lease_s = table.where, rig.control.supervision.lease_s
+    rate_hz = max(_USUAL_HZ, ceil(_BEATS_OF_A_LEASE / lease_s)) if lease_s else _USUAL_HZ
     slave = 255 if 255 in rig.network.units else where.unit
     by_script = (
         "By script (recommended: all words and reasons): a Script node in BeforeStart with the file made below, then"
     )
     own = "By the robot's own Modbus client: Installation, Fieldbus, Modbus; one 16-bit register per signal, slave address"
-    sentences = [f"{by_script} `fg_run = run fg_thread()`.", f"{own} {slave}, 20 Hz or more for the heartbeat."]
+    thread = f"`fg_run = run fg_thread()`, which exchanges every 0.04 s{_short_of_a_cycle(lease_s)}"
+    sentences = [f"{by_script} {thread}.", f"{own} {slave}, {rate_hz} Hz or more for the heartbeat."]
     if where.port != 502:
         sentences.append(
             f"It asks port 502 always, and this rig listens on {where.shown_port}: set network.port to 502 (force-gateway "

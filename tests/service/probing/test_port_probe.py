@@ -73,6 +73,17 @@ def test_a_rig_whose_devices_answer_as_it_says(tmp_path: Path) -> None:
     assert set(module.heard) <= {AskDevice(DeviceStep.IDENTITY)}, "nothing else was ever asked of it"
 
 
+def test_exchanged_ports_are_told_so(tmp_path: Path) -> None:
+    """Of an indicator at the output's port only noise was told: what came at another speed, in hexadecimal."""
+    module, indicator = FarEnd(load_device("smc-itv-rc")), FarEnd(load_device("stream-st-gs"))
+    with behind_ptys(module, indicator) as (output, cell):
+        code, said = probe(tmp_path, [cell, output], "smc-itv-rc")
+    assert code == exit_codes.DEVICE
+    assert "E113 the rig names smc-itv-rc at 9600: this one is of role load cell: exchange the ports" in said
+    assert "E113 the rig names stream-st-gs at 115200: this one is of role output: exchange the ports" in said
+    assert all(isinstance(one, HARMLESS[:3]) or one == HARMLESS[3] for one in module.heard)
+
+
 def test_a_device_at_another_speed_is_found_and_told(tmp_path: Path) -> None:
     module, indicator = FarEnd(load_device("icpdas-702x"), 19200), FarEnd(load_device("stream-st-gs"))
     with behind_ptys(module, indicator) as paths:

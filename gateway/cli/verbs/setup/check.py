@@ -64,11 +64,14 @@ def _probe(checked: "Checked", port: str | None, *, is_quiet: bool) -> tuple[int
     if not is_quiet:
         click.echo(f"{'probe':<12} {probing.HARMLESS}")
     code, found = exit_codes.OK, {}
-    lines = [("device", None)] if port else probing.lines_to_probe(checked.value)
+    lines = [("device", None)] if port else list(probing.lines_to_probe(checked.value))
     for name, line in lines:
+        others = [other for _, other in lines if other and other is not line]
         try:
             report = (
-                probing.probe_line(line) if line else probing.probe_path(str(port), [checked.value], probing.PATIENCE_S)
+                probing.probe_line(line, others)
+                if line
+                else probing.probe_path(str(port), [checked.value], probing.PATIENCE_S)
             )
         except CliError as error:  # the other ports are asked all the same
             _tell(name, iter([error.message]), is_quiet=is_quiet)

@@ -50,12 +50,14 @@ def command(*, name: str | None, form: str | None, map_name: str | None, rig: st
     if form in TABLES:
         click.echo(render_registers(register_map, form), nl=False)
         return
-    from gateway.clients import MissingRegisterError, endpoint_of, render_client
+    from gateway.clients import MissingRegisterError, UnspeakableNameError, endpoint_of, render_client
 
     try:
         click.echo(render_client(register_map, form, endpoint_of(chosen)), nl=False)
     except MissingRegisterError as error:
         raise CliError(f"E185 {error}: a {form} client needs them; copy them from {defaults.REGISTER_MAP}") from None
+    except UnspeakableNameError as error:
+        raise CliError(f"E185 {error}") from None
 
 
 def _load_rig(name: str) -> "Rig":

@@ -1,0 +1,34 @@
+"""Names of registers that a language cannot have: too long, or its own. A map of the user's may have registers of its own."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from gateway.clients.exchange import ExchangeTable
+
+_LONGEST: Final = {"rapid": 32 - len("FG_S_")}  # of an identifier, behind what the client sets before it
+_KEYWORDS: Final = {
+    "st": "abs action and any array at bool by byte case configuration constant date dint do dt dword else "
+    "elsif end exit false for from function goto if int interface lint lreal lword method mod not of on "
+    "or pointer private program property protected public real reference repeat resource retain return "
+    "sint step string struct super task then this time tod transition true type udint uint ulint union "
+    "until usint var while with word xor",
+    "scl": "and any array at begin bool by byte case char continue date dint div do dt dword else elsif exit "
+    "false for function goto if int label lint lreal mod nil not of or pointer program real region repeat "
+    "return sint string struct then time timer to tod true type udint uint ulint until usint var variant "
+    "version void while with word xor",
+    "c": "auto bool break case char class const continue default delete do double else enum export extern "
+    "float for friend goto if inline int long mutable namespace new operator private protected public "
+    "register restrict return short signed sizeof static struct switch template this throw try typedef "
+    "typename union unsigned using virtual void volatile while",
+}
+"""Of Structured Text and SCL, whose structures have the registers as members; of C with those of C++."""
+
+
+def unspeakable(table: ExchangeTable, language: str) -> Iterator[str]:
+    """Yield in a sentence each register of the command or the status that this language cannot name."""
+    longest, keywords = _LONGEST.get(language), _KEYWORDS.get(language, "").split()
+    for register in (*table.command, *table.status):
+        if longest and len(register.name) > longest:
+            yield f"{register.name} has {len(register.name)} characters, and {language} has room for {longest}"
+        elif register.name in keywords:
+            yield f"{register.name} is a word of {language} itself"
