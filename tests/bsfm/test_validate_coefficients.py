@@ -21,12 +21,17 @@ from gateway.bsfm.slip.slip_stops import half_width_bound_v
 from tests.calibrations.coefficients import calibration
 
 LIMITS = CoefficientLimits(cell_range_n=98.0)
+HANDLES, WEIGHTS = ("rising_handles_n", "falling_handles_n"), ("rising_weights", "falling_weights")
 GOOD = Coefficients(0.0, 5.0, (0.5, 14.0, 38.0), (1.0, 0.93, 1.2), (0.5, 22.0, 38.0), (1.0, 1.1, 1.2), 3.0)
 
 
 def swapped(number: float) -> float:
     data = struct.pack(">f", number)
     return struct.unpack(">f", data[2:] + data[:2])[0]
+
+
+def bits(digits: str) -> float:
+    return struct.unpack(">f", bytes.fromhex(digits))[0]
 
 
 def branches(rising: tuple[float, ...], falling: tuple[float, ...]) -> Branches:
@@ -51,6 +56,8 @@ def test_a_good_set_has_no_fault():
         ({"rising_handles_n": (0.5, 14.0, 1e39)}, 2, CoefficientReason.NOT_FINITE),
         ({"falling_handles_n": (0.5, 39.0, 38.0)}, 32, CoefficientReason.NOT_INCREASING),
         ({"rising_handles_n": (0.5, 0.6, 38.0)}, 0, CoefficientReason.SLOPE_FLOOR),
+        ({"falling_handles_n": (0.5, 37.9, 38.0)}, 32, CoefficientReason.SLOPE_FLOOR),
+        ({"rising_handles_n": (0.5, swapped(bits("41608001")), 38.0)}, 1, CoefficientReason.WORDS_SWAPPED),
         ({"falling_handles_n": (0.5, 13.0, 38.0)}, -1, CoefficientReason.CROSSING),
         ({"x1_v": 10.5}, -1, CoefficientReason.VOLTAGE_RANGE),
         ({"x1_v": 1e-40}, -1, CoefficientReason.VOLTAGE_RANGE),
@@ -59,11 +66,18 @@ def test_a_good_set_has_no_fault():
         ({"x0_v": -0.5}, -1, CoefficientReason.VOLTAGE_RANGE),
         ({"blend_span_n": math.nan}, -1, CoefficientReason.BLEND_SPAN),
         ({"rising_weights": (1.0, 1.0)}, -1, CoefficientReason.ORDER),
+        (dict.fromkeys(HANDLES, (0.5,)) | dict.fromkeys(WEIGHTS, (1.0,)), -1, CoefficientReason.ORDER),
     ],
 )
 def test_the_faulty_number_is_named_with_its_reason(change, index, reason):
     faults = validate_coefficients(replace(GOOD, **change), LIMITS)
     assert [(fault.index, fault.reason) for fault in faults] == [(index, reason)]
+
+
+def test_next_to_nothing_that_means_nothing_in_the_other_order_is_what_a_fit_has_left():
+    """1e-30 N is no force, but it is in range: refused it would be told as such."""
+    assert validate_coefficients(replace(GOOD, rising_handles_n=(bits("0da20001"), 14.0, 38.0)), LIMITS) == []
+    assert validate_coefficients(replace(GOOD, rising_handles_n=(bits("8da20001"), 14.0, 38.0)), LIMITS) == []
 
 
 @pytest.mark.parametrize(("weight", "faulty"), [(0.5, []), (0.5625, [17])])

@@ -55,6 +55,19 @@ def test_ten_lines_a_second_of_a_cause_and_the_rest_counted() -> None:
     assert ("idle", "other") in lines
 
 
+def test_log_lines_are_bounded_in_each_second_and_ten_of_one_leave_none_out() -> None:
+    """A port scan of minutes is as bounded in its last second as in its first; what was not left out is not told of."""
+    lines: list[str] = []
+    gate = LogLimiter(lambda cause, sentence: lines.append(sentence))
+    for second in range(5):
+        for number in range(30 if second < 3 else 10):
+            gate("refused", f"line {second}.{number}", 20.0 + second + number / 100)
+    assert [sum(line.startswith(f"line {second}.") for line in lines) for second in range(5)] == [10] * 5
+    assert [line for line in lines if "left out" in line] == [
+        f"line {second}.0 (20 more lines like this were left out)" for second in (1, 2, 3)
+    ]
+
+
 NETWORK = ServerSettings(allow=(ip_network("192.0.2.0/24"), ip_network("2001:db8::/32")))
 
 

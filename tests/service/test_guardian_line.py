@@ -220,3 +220,21 @@ def test_what_the_guardian_is_told_are_its_own_words(ends: Pair) -> None:
         guardian.close()
 
     asyncio.run(scene())
+
+
+def test_a_start_that_waits_for_the_simulated_rig_ends_with_its_guardian(ends: Pair) -> None:
+    """Nobody is left to answer: without an end the process would stay, and hold the state directory."""
+
+    async def scene() -> dict[str, str] | None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        asked = asyncio.ensure_future(guardian.simulated_ports("demo"))
+        await asyncio.sleep(0)
+        ends[0].close()
+        async with asyncio.timeout(2):
+            ports = await asked
+        assert guardian.is_gone and guardian.told_to_stop.is_set()
+        guardian.close()
+        return ports
+
+    assert asyncio.run(scene()) is None

@@ -79,3 +79,11 @@ def test_a_watchdog_that_is_meant_for_another_process_is_not_fed(systemd: Heard)
     )
     manager.feed(1.0)
     assert systemd.all() == []
+
+
+def test_a_start_has_never_less_time_than_the_unit_gives(systemd: Heard) -> None:
+    """WatchdogSec of two minutes, and a start that needs one: cut down to it, a slow machine would be restarted for ever."""
+    manager = ServiceManager(systemd.address, 120.0)
+    manager.starting("control is started again: it died", 60.0)
+    manager.starting("control is started again: it died", 180.0)
+    assert [int(words["WATCHDOG_USEC"]) for words in systemd.all()] == [120_000_000, 180_000_000]

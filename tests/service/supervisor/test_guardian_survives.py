@@ -135,6 +135,8 @@ def test_a_dead_childs_last_words_still_count(scene, port):
         b'r{"info": {"modbus": null}, "banner": "", "stall_s": 0.1, "optional": {}, "listening": [1]}',
         b'r{"info": {"modbus": null}, "banner": "", "stall_s": NaN, "optional": {}}',
         b'r{"info": {"modbus": null}, "banner": "", "stall_s": 1e999, "optional": {}}',
+        b'r{"info": {"modbus": null}, "banner": "", "stall_s": 0, "optional": {}}',
+        b'r{"info": {"modbus": null}, "banner": "", "stall_s": -0.1, "optional": {}}',
         b'b{"pid": 1e999}',
         b"c" + b'{"a":' * 20_000 + b"1" + b"}" * 20_000,  # Python 3.13 reads a few thousand
     ],

@@ -11,6 +11,7 @@ from gateway.processes.state_lock import hold_state_lock
 from gateway.processes.systemd.service_manager import ServiceManager
 from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.supervisor import guardian
+from gateway.service.supervisor.control_child import START_GRACE_S
 from gateway.service.supervisor.run_options import RunOptions
 from tests.service.supervisor.guarded import PTYS, READY, FakeChild, Scene, Script, port
 from tests.service.supervisor.scripted_children import assert_comes_up, dies_after, lives, rig_lives, scene
@@ -165,6 +166,14 @@ def test_the_service_manager_hears_of_a_restart_and_of_a_stop(scene, port):
     ]
 
 
+def test_the_service_manager_gives_a_restart_the_time_of_two_starts(scene, port, monkeypatch):
+    """One that comes to nothing, and the next: ended sooner, nobody would be there for the output's safe voltage."""
+    one, given_s = scene(dies_after(8, port), lives(port)), list[float]()
+    monkeypatch.setattr(one.guardian.manager, "starting", lambda status, within_s: given_s.append(within_s))
+    one.run(lambda: len(one.starter.started) == 2)
+    assert given_s == [pytest.approx(2.0 * START_GRACE_S)]
+
+
 def test_a_guardian_that_lives_is_no_sign_of_life_of_a_loop(scene, port):
     """Its child waits for a disk for as long as it likes: systemd is to see that."""
     one = scene(lives(port))
@@ -223,6 +232,29 @@ def test_the_last_beat_of_a_dead_process_does_not_make_its_successor_silent(scen
     assert_comes_up(one)
     memory.beat(one.now_s + 0.01)
     one.run(lambda: len(one.starter.started) == 2)
+    one.now_s += 3.0
+    one.child.say(message_link.READY, READY)
+    ready_s = one.now_s
+    one.run(lambda: len(one.starter.started) == 3)
+    assert one.now_s == pytest.approx(ready_s + 0.1)
+    memory.close()
+
+
+def test_a_beat_that_came_behind_the_last_look_is_none_of_its_successor(scene, port):
+    """The loop may have beaten once more before it was killed: taken for the next one's, that one is silent as it comes up."""
+    one = scene(lives(port), dies_after(5, port, None))
+    one.guardian.share_memory()
+    memory, control = HeartbeatMemory(one.guardian.beat), one.guardian.control
+    assert_comes_up(one)
+    write_safe_voltage = control.write_safe_voltage
+
+    def beats_once_more():
+        memory.beat(one.now_s)
+        return write_safe_voltage()
+
+    control.write_safe_voltage = beats_once_more
+    one.run(lambda: len(one.starter.started) == 2)
+    control.write_safe_voltage = write_safe_voltage
     one.now_s += 3.0
     one.child.say(message_link.READY, READY)
     ready_s = one.now_s
