@@ -36,6 +36,8 @@ def happen(simulation: "Simulation", event: Event) -> None:
             simulation.around.set_as_asked(event.data, simulation.person.say)
     elif event.whom == "world":
         simulation.around.set_fault(event.what, on=bool(event.numbers[0]))
+    elif event.whom == "crowd":
+        simulation.crowd.connect(*map(int, event.numbers))
     elif event.whom == "machine":
         _shake(simulation, event)
     else:

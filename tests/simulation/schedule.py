@@ -17,6 +17,8 @@ from tests.simulation.healing import ANSWER_S, RATE_S, count_answers, heal
 from tests.simulation.judges.audit_judge import judge_audit
 from tests.simulation.judges.explained_force import ExplainedForce
 from tests.simulation.judges.held_force import HeldForce
+from tests.simulation.judges.lease_judge import LeaseJudge
+from tests.simulation.judges.lying_cell import LyingCell
 from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS
 from tests.simulation.judges.reason_judge import MACHINE, ReasonJudge
 from tests.simulation.judges.recording_judge import judge_recordings
@@ -30,16 +32,19 @@ from tests.simulation.kernel.network import DELAY_S
 from tests.simulation.kernel.processes import SimulatedService
 from tests.simulation.kernel.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 from tests.simulation.masters.bus_master import make_master
+from tests.simulation.masters.crowd import Crowd
 from tests.simulation.masters.integrator import Integrator, Sets
 from tests.simulation.masters.socket_user import SocketUser
 from tests.simulation.masters.spelling import (
     BITS,
     DISABLED_BY_BIT,
     ENABLE,
+    MODE,
     control_of,
     hangs_payload,
     read_pdu,
     tells_weight,
+    word_of,
 )
 from tests.simulation.masters.tcp_master import BEATS_S, RESET, RUNS, TARE, Master
 from tests.simulation.surroundings import Surroundings
@@ -48,6 +53,7 @@ RUN_BIT, SELF_TEST = RUNS.values()
 RECORDED_EVERY, RECORDED = 8, 1
 """Of so many gateways one records from its start."""
 LOOK_S, READ_S = 0.02, 0.1
+COMMAND_EVERY, MOST_UNHEARD = 3, 4
 
 
 @dataclass(frozen=True)
@@ -66,6 +72,7 @@ class Simulation:
     rates: how many answers each healthy device gives in RATE_S, the same."""
 
     rest_n: float | None = None
+    _looks = _unheard = 0
 
     def __init__(self, seed: int, folder: Path) -> None:
         self._folder = folder
@@ -83,7 +90,8 @@ class Simulation:
         self.around = Surroundings(rig, self.outside, self.observer, drawn.cell_s)
         SimulatedDisk.is_gone = SimulatedDisk.is_hung = False
         SimulatedDisk.fails = ""
-        SimulatedDisk.folder = folder
+        SimulatedDisk.folder, SimulatedDisk.chance = folder, Random(f"torn {seed}")
+        SimulatedDisk.working.clear()
         SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(*DISK_S))
         self.sets = Sets(store_documents(seed, rig, folder))
         SimulatedFit.outside, SimulatedFit.chance, SimulatedFit.built_in = (
@@ -93,6 +101,8 @@ class Simulation:
         )
         SimulatedFit.on_stored, SimulatedFit.ended = staticmethod(lambda mark: self.sets.expect_mark(mark)), []
         self.status = StatusWitness(self.observer, lambda: CABLES["load_cell"].heard_s)
+        self.lease = LeaseJudge(self.observer)
+        self.cell = LyingCell(self.observer)
         self.reasons = ReasonJudge(self.observer)
         self.explained = ExplainedForce(self.observer)
         self.held_force = HeldForce(self.observer, BEGIN_S + 2.0)
@@ -120,10 +130,13 @@ class Simulation:
         for one in self.integrators.values():
             one.sets = self.sets
         self.integrator = self.integrators["integrator"]
+        self.crowd = Crowd(self.outside, lambda: self.service.inside)
         self.person = SocketUser(lambda: self.service.inside, self.service.answer_socket)
         self.person.on_write = lambda control: self._on_write(control, True)
         self.person.on_model = self._expect_any_model
         self.person.on_tare = self._note_tare
+        for master in self.masters.values():
+            master.on_refusal = lambda: self.status.note_refusal(self.clock.now_s)
         for client in (*self.masters.values(), self.person):
             client.on_pdu = partial(self._note_pdu, client.name if type(client) is Master else "")
         self.clients = (*self.masters.values(), self.reader, *self.integrators.values())
@@ -138,6 +151,7 @@ class Simulation:
         self._run_for(1.0 - RATE_S)
         self.rates = count_answers(self)
         self.rest_n = self._read_force_n()
+        self.zeros.rest_n = self.around.pressing_n()
         self._happen_next(iter(events))
         self._run_for(duration_s)
         self.held_force.end()
@@ -189,6 +203,8 @@ class Simulation:
     def _note_pdu(self, host: str, pdu: bytes, is_answered: bool) -> None:
         self.status.note_write(host if is_answered else "", pdu, self._done_s(is_answered))
         self.explained.note_write(host, self.clock.now_s)
+        self.cell.note_mode(word_of(pdu, MODE))
+        self.lease.note_write(pdu, self._done_s(is_answered), is_answered=is_answered)
         if (control := control_of(pdu)) is not None and control & TARE:
             self._note_tare()
         if tells_weight(pdu):
@@ -248,6 +264,7 @@ class Simulation:
         is_watched = self.person.watched_s is not None
         if is_watched or self._was_watched:
             self._follow_person(is_watched)
+            self.lease.note_local_run(self.clock.now_s)
         if self.service.is_serving:
             self.observer.note_serving(self.clock.now_s)
         self.around.look()
@@ -256,10 +273,16 @@ class Simulation:
         if self.service.is_standing:
             self.reasons.note(MACHINE, self.clock.now_s)
         self.observer.look(self.clock.now_s)
+        self.lease.look(self.clock.now_s)
+        is_whole = self.observer.control_lost_s is None and self.around.is_whole
+        self.cell.look(self.around.world.settings.values, self.clock.now_s, is_whole=is_whole)
         self.outside.call_later(LOOK_S, self._look)
 
     def _read_status(self) -> None:
+        self._judge_unheard()
         for at_s, pdu in self.reader.heard:
+            if pdu[:2] == b"\x03\x02":
+                self.status.note_control_word(int.from_bytes(pdu[2:]), at_s - DELAY_S)
             if pdu[0] == 3 and len(pdu) == 2 + 2 * STATUS_WORDS:
                 self.observer.note_status(pdu, at_s)
                 self.status.note(pdu[2:], at_s - DELAY_S)
@@ -268,7 +291,18 @@ class Simulation:
                 self.explained.note(pdu[2:], at_s - DELAY_S, self.reasons.disturbed_s)
         self.reader.heard.clear()
         self.reader.ask(read_pdu(STATUS_FIRST, STATUS_WORDS))
+        self._looks += 1
+        if self._looks % COMMAND_EVERY == 0:
+            self.reader.ask(read_pdu(0, 1))
         self.outside.call_later(READ_S, self._read_status)
+
+    def _judge_unheard(self) -> None:
+        """Who only reads is answered at once, whatever the others do, as long as the process stands still for nobody."""
+        is_there = self.service.is_serving and not self.service.is_standing
+        self._unheard = 0 if self.reader.heard or not is_there else self._unheard + 1
+        if self._unheard > MOST_UNHEARD:
+            self.observer.complain("I12", "a master that only reads is not answered", self.clock.now_s)
+            self._unheard = 0
 
     def _run_for(self, duration_s: float) -> None:
         self.clock.run_until(self.clock.now_s + duration_s)

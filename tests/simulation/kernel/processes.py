@@ -61,6 +61,8 @@ class SimulatedProcess(Child):
             _close(self.beat)
 
     def kill(self) -> None:
+        if self.exit_code is None:
+            SimulatedDisk.kill(self.loop)
         self.leave(-signal.SIGKILL)
 
     def wait(self, bound_s: float = 0.0) -> int:
