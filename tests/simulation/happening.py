@@ -79,6 +79,8 @@ def _shake(simulation: "Simulation", event: Event) -> None:
             simulation._lose_control()
     elif event.what == "stop_guardian":
         _stop_guardian(simulation, event.numbers[0])
+    elif event.what == "no_process":
+        simulation.service.refuse_processes(event.numbers[0])
     elif event.what == "clock_jump":
         simulation.clock.jump_s += event.numbers[1]
     elif event.what == "disk_hung":

@@ -84,6 +84,7 @@ def _repair(simulation: "Simulation") -> None:
         cable.spoil()
     SimulatedDisk.fails = ""
     SimulatedDisk.go_on()
+    simulation.service.refuse_processes(0.0)
     for master in simulation.masters.values():
         master.fall_silent()
         master.disconnect()

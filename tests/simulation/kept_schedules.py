@@ -223,5 +223,9 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(23.7587, "worker", "reset"),
         ],
     ),
+    (
+        855018,
+        [Event(7.9372, "rival", "hold", (34.52,)), Event(8.3021, "output", "pull"), Event(8.3135, "output", "push")],
+    ),
 ]
 """Schedules that once broke a law, or were said to: the seed of the machine, and what happened to it."""

@@ -15,6 +15,7 @@ from tests.simulation.draws.rigs import DEMO_CELL, draw_badges, draw_rig, store_
 from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, RATE_S, count_answers, heal
 from tests.simulation.judges.audit_judge import judge_audit
+from tests.simulation.judges.command_witness import WORDS, CommandWitness, Counted
 from tests.simulation.judges.explained_force import ExplainedForce
 from tests.simulation.judges.held_force import HeldForce
 from tests.simulation.judges.lease_judge import LeaseJudge
@@ -22,7 +23,7 @@ from tests.simulation.judges.lying_cell import LyingCell
 from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS
 from tests.simulation.judges.reason_judge import MACHINE, ReasonJudge
 from tests.simulation.judges.recording_judge import judge_recordings
-from tests.simulation.judges.status_witness import StatusWitness
+from tests.simulation.judges.status_witness import SCALES, StatusWitness
 from tests.simulation.judges.zero_witness import ZeroWitness
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_edges
@@ -53,7 +54,9 @@ RUN_BIT, SELF_TEST = RUNS.values()
 RECORDED_EVERY, RECORDED = 8, 1
 """Of so many gateways one records from its start."""
 LOOK_S, READ_S = 0.02, 0.1
-COMMAND_EVERY, MOST_UNHEARD = 3, 4
+COMMAND_EVERY, FLOATS_EVERY, MOST_UNHEARD = 4, 9, 4
+FLOAT_STATUS = 232
+COMMAND_BLOCK, FLOAT_BLOCK = bytes((3, 2 * WORDS)), bytes((3, 4 * len(SCALES)))
 
 
 @dataclass(frozen=True)
@@ -83,7 +86,7 @@ class Simulation:
         self.clock, self.chance = VirtualClock(), Random(~seed)
         self.observer = drawn.observer()
         self.observer.history.is_plain = rig.load_cell.device.name == DEMO_CELL
-        self.observer.history.has_valve = rig.valve is not None
+        self.observer.history.has_valve = rig.valve is not None or rig.load_cell.sign < 0
         self.outside = VirtualLoop(self.clock)
         self.outside.set_exception_handler(self._on_error)
         self.log = Log(self.clock)
@@ -101,13 +104,14 @@ class Simulation:
         )
         SimulatedFit.on_stored, SimulatedFit.ended = staticmethod(lambda mark: self.sets.expect_mark(mark)), []
         self.status = StatusWitness(self.observer, lambda: CABLES["load_cell"].heard_s)
+        self.commands, self.tares = CommandWitness(self.observer), Counted("a zero was taken")
         self.lease = LeaseJudge(self.observer)
         self.cell = LyingCell(self.observer)
         self.reasons = ReasonJudge(self.observer)
         self.explained = ExplainedForce(self.observer)
         self.held_force = HeldForce(self.observer, BEGIN_S + 2.0)
         self.zeros = ZeroWitness(self.observer, self.around.pressing_n, lambda: CABLES["output"].falsified_s)
-        self.log.on_zero = self.zeros.note_zero  # type: ignore[method-assign]
+        self.log.on_zero = self._note_zero  # type: ignore[method-assign]
         self.service = SimulatedService(
             rig, folder, self.outside, self.log, self.clock, records=seed % RECORDED_EVERY == RECORDED
         )
@@ -134,7 +138,7 @@ class Simulation:
         self.person = SocketUser(lambda: self.service.inside, self.service.answer_socket)
         self.person.on_write = lambda control: self._on_write(control, True)
         self.person.on_model = self._expect_any_model
-        self.person.on_tare = self._note_tare
+        self.person.on_tare = self._note_run_tare
         for master in self.masters.values():
             master.on_refusal = lambda: self.status.note_refusal(self.clock.now_s)
         for client in (*self.masters.values(), self.person):
@@ -163,6 +167,8 @@ class Simulation:
         for client in (*self.clients, self.person):
             self.observer.broken += client.complaints
         self.observer.broken += self.log.internal_errors
+        if "bus" not in CABLES:  # what was doubled on its way is asked for twice
+            self.observer.broken += self.tares.judge()
         self.observer.fingerprint.update("\n".join(self.observer.broken).encode())
         return Outcome(
             tuple(self.observer.broken),
@@ -205,8 +211,10 @@ class Simulation:
         self.explained.note_write(host, self.clock.now_s)
         self.cell.note_mode(word_of(pdu, MODE))
         self.lease.note_write(pdu, self._done_s(is_answered), is_answered=is_answered)
+        self.commands.note_write(pdu, self._done_s(is_answered))
         if (control := control_of(pdu)) is not None and control & TARE:
             self._note_tare()
+            self.tares.note_asked(is_sure=is_answered and control > 0)
         if tells_weight(pdu):
             self._note_weight(pdu)
 
@@ -215,6 +223,14 @@ class Simulation:
         if hangs_payload(pdu):
             self.observer.history.weighed_s = min(self.observer.history.weighed_s, self.clock.now_s)
             self.reasons.has_payload = True
+
+    def _note_zero(self, now_s: float) -> None:
+        self.zeros.note_zero(now_s)
+        self.tares.note_done()
+
+    def _note_run_tare(self) -> None:
+        self._note_tare()
+        self.tares.note_asked(is_sure=False)
 
     def _note_tare(self) -> None:
         self.observer.history.tares.append(self.clock.now_s)
@@ -281,8 +297,11 @@ class Simulation:
     def _read_status(self) -> None:
         self._judge_unheard()
         for at_s, pdu in self.reader.heard:
-            if pdu[:2] == b"\x03\x02":
-                self.status.note_control_word(int.from_bytes(pdu[2:]), at_s - DELAY_S)
+            if pdu[:2] == COMMAND_BLOCK:
+                self.commands.note(pdu[2:], at_s - DELAY_S)
+                self.status.note_control_word(int.from_bytes(pdu[2:4]), at_s - DELAY_S)
+            if pdu[:2] == FLOAT_BLOCK:
+                self.status.note_floats(pdu[2:], at_s - DELAY_S)
             if pdu[0] == 3 and len(pdu) == 2 + 2 * STATUS_WORDS:
                 self.observer.note_status(pdu, at_s)
                 self.status.note(pdu[2:], at_s - DELAY_S)
@@ -293,7 +312,9 @@ class Simulation:
         self.reader.ask(read_pdu(STATUS_FIRST, STATUS_WORDS))
         self._looks += 1
         if self._looks % COMMAND_EVERY == 0:
-            self.reader.ask(read_pdu(0, 1))
+            self.reader.ask(read_pdu(0, WORDS))
+        if self._looks % FLOATS_EVERY == 0:
+            self.reader.ask(read_pdu(FLOAT_STATUS, 2 * len(SCALES)))
         self.outside.call_later(READ_S, self._read_status)
 
     def _judge_unheard(self) -> None:

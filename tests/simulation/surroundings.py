@@ -37,6 +37,7 @@ class Surroundings:
 
     def __init__(self, rig: Rig, outside: VirtualLoop, observer: Observer, cell_s: float | None) -> None:
         self._rig, self._outside, self._observer, self._cell_s = rig, outside, observer, cell_s
+        self._pulled = set[str]()  # since the last look, and perhaps pushed again
         self.world = SimulatedRig(
             rig,
             send_output=lambda data: CABLES["output"].send_to_host(data),
@@ -90,6 +91,7 @@ class Surroundings:
     def pull(self, line: str) -> None:
         """Pull the plug of this line."""
         CABLES[line].pull()
+        self._pulled.add(line)
         if line == "output":
             now_s = self._outside.time()
             self._observer.note_cut(now_s)
@@ -166,8 +168,9 @@ class Surroundings:
         now_s = self._outside.time()
         reasons.note_settings(self.world.settings.values, now_s)
         for line, cable in CABLES.items():
-            if cable.is_disturbed:
+            if cable.is_disturbed or line in self._pulled:
                 reasons.note(line, now_s)
+        self._pulled.clear()
         if self.cell_pace != 1.0:
             reasons.note(CELL, now_s)
         if now_s < self._dark_until_s + NOTICED_S:

@@ -1,6 +1,6 @@
 """What masters do now and then besides, each drawn from a stream of its own, so that all other schedules stay as they are: one
-whose program hangs while its frames flow on, one that stops what another has begun, one that writes its whole block, and a
-crowd that connects and says nothing.
+whose program hangs while its frames flow on, one that stops what another has begun, one that writes its whole block, a
+crowd that connects and says nothing, and a machine without a process to give.
 """
 
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from random import Random
 from tests.simulation.draws.event import Event
 from tests.simulation.masters.spelling import coil_pdu, coils_pdu, floats_pdu, mask_pdu, write_one_pdu, write_pdu
 
-SHARE, CROWD_SHARE = 0.16, 0.04
+SHARE, CROWD_SHARE = 0.2, 0.04
 STOPS = (
     write_one_pdu(0, 0),
     write_pdu(0, 0),
@@ -29,7 +29,7 @@ def draw_behaviours(seed: int) -> Iterator[Event]:
     chance = Random(f"behaviour {seed}")
     draw, at_s = chance.random(), round(chance.uniform(0.5, 15.0), 4)
     if draw < SHARE:
-        yield from chance.choice((_hang, _stop, _program))(chance, at_s)
+        yield from chance.choice((_hang, _stop, _program, _refuse))(chance, at_s)
     elif draw < SHARE + CROWD_SHARE:
         yield from draw_crowd(chance, at_s)
 
@@ -67,6 +67,14 @@ def _program(chance: Random, at_s: float) -> Iterator[Event]:
         numbers = (round(chance.uniform(0.0, 60.0), 2), ramp, before_n, contact_ms, band_n, band_ms)
         yield Event(round(at_s, 4), whom, "program", tuple(map(float, numbers)))
         at_s += chance.choice((0.05, 0.5, 3.0)) * chance.uniform(0.5, 1.5)
+
+
+def _refuse(chance: Random, at_s: float) -> Iterator[Event]:
+    """A machine has no process to give, for a moment or for longer than anybody tries, when control dies."""
+    yield _command(chance, at_s, "worker")
+    at_s = round(at_s + chance.uniform(0.5, 2.0), 4)
+    yield Event(at_s, "machine", "no_process", (round(chance.choice((0.05, 1.0, 5.0)) * chance.uniform(0.5, 1.5), 4),))
+    yield Event(at_s, "machine", chance.choice(("kill", "kill", "kill_guardian", "terminate")), (0.1, 0.0))
 
 
 def draw_crowd(chance: Random, at_s: float) -> Iterator[Event]:

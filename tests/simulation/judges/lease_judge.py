@@ -9,7 +9,6 @@ from tests.simulation.masters.spelling import BEAT, control_of, word_of
 RUN_BITS = 32 | 64
 ON_WIRE_S = 0.04
 """20 ms, and two sentences at 9600 baud."""
-LOOKED_S = 0.02
 
 
 class LeaseJudge:
@@ -40,7 +39,9 @@ class LeaseJudge:
         if observer.is_safe or observer.output_lost_s is not None or observer.control_lost_s is not None:
             return
         is_down = observer.is_run or now_s - observer.run_ended_s < DOWN_S
-        bound_s = bounds.lease_s + max(bounds.lost_down_s, DOWN_S if is_down else 0.0) + bounds.period_s + ON_WIRE_S
+        bound_s = (
+            bounds.lease_s + max(bounds.lost_down_s, DOWN_S if is_down else 0.0) + 2.0 * bounds.period_s + ON_WIRE_S
+        )
         if (
             observer.answers_lost_s is not None
             or now_s - observer.answer_spoiled_s < 2.0 * bounds.reply_timeout_s + 0.1

@@ -23,7 +23,7 @@ STATUS_FIRST, STATUS_WORDS = 100, 20
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the rig's file says, and what the wire takes (`GRACE_S`: one tick, two sentences of 9600 baud, the loop's grid).
+    """What the rig's file says, and what the wire takes (`GRACE_S`, and two periods).
     lease_s: endless where a lost master's force is held; lost_down_s: how long it may take to ramp down; reply_timeout_s: how
     long an answer of the output is waited for, before anything else is sent."""
 
@@ -51,7 +51,7 @@ SENTENCE = re.compile(
 UNITS_N = {b"kg": 9.80665, b" N": 1.0, b" g": 9.80665e-3, b"lb": 4.4482216152605}
 OVER_READINGS = 3  # in a row are over-force
 ZERO_N = 8.0  # so far may the zero have been moved by somebody who has tared
-GRACE_S = 0.05  # and two periods: a tick decides nothing within one of a sample
+GRACE_S = 0.04  # 20 ms, and two sentences on the wire; and two periods: a tick decides nothing within one of a command
 
 
 @dataclass

@@ -21,6 +21,9 @@ AGE_SLACK_S = 0.012
 SETTLED_S = 0.5
 """A voltage that has not changed for so long is the one that has been asked for as long, wherever the wire works."""
 COUNT_V = 0.012
+SCALES = (1.0, 1.0, 0.01, 0.01, 0.01, 0.01, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+SIGNED = frozenset((2, 3, 4, 5, 6, 7, 8, 12, 13))
+"""Of the first of the status registers."""
 SAME_S, BEATEN_S = 1e-6, 5.0
 MASTER_LOST, RELEASED_S = 1, 0.3
 LATE_LOOKS, WRITTEN_S = 3, 0.6
@@ -31,6 +34,7 @@ class StatusWitness:
     """heard_s: when the load cell's wire has brought its last byte."""
 
     _state, _held_s = 0, 0.0
+    _words: tuple[int, ...] = ()
 
     def __init__(self, observer: Observer, heard_s: Callable[[], float]) -> None:
         self._observer, self._heard_s = observer, heard_s
@@ -47,7 +51,7 @@ class StatusWitness:
         """Judge the status block as it was at at_s."""
         words = struct.unpack(f">{STATUS_WORDS}H", block)
         self._judge_state(words, at_s)
-        self._state = words[1]
+        self._state, self._words = words[1], words
         self._judge_age(words[12], at_s)
         self._judge_voltage(words[6], at_s)
         self._judge_owner(words[16] << 16 | words[17], at_s)
@@ -78,6 +82,20 @@ class StatusWitness:
     def forget_owner(self) -> None:
         """Another gateway begins: it has none, whoever had the one before, and has refused nothing."""
         self._owner, self._refused_s = 0, inf
+
+    def note_floats(self, block: bytes, at_s: float) -> None:
+        """Judge the same quantities as float32, read with the block before."""
+        if at_s - self._last_s > SAME_S:
+            return
+        for place, (number, word) in enumerate(
+            zip(struct.unpack(f">{len(SCALES)}f", block), self._words, strict=False)
+        ):
+            scale = SCALES[place]
+            is_signed = place in SIGNED
+            counts = word - 65536 if is_signed and word & UNAVAILABLE else word
+            is_same = counts == -UNAVAILABLE if number != number else abs(number - counts * scale) <= 0.51 * scale
+            if not is_same and not (is_signed and abs(counts) >= LONGEST_MS):
+                self._observer.complain("I10", f"status {place} is {word} and as a float {number}", at_s)
 
     def note_control_word(self, word: int, at_s: float) -> None:
         """Judge the control word, read with the block before: off and a fault leave no enable standing."""

@@ -36,7 +36,7 @@ EXCEPTIONS = frozenset((1, 2, 3, 4, 6, 11))
 STOPS = frozenset(
     (write_one_pdu(0, 0), write_pdu(0, 0), coil_pdu(0, on=False), coils_pdu(0, 0, 1), mask_pdu(0, 0xFFFE, 0))
 )
-READS = frozenset((read_pdu(100, 20), read_pdu(102, 1), read_pdu(0, 1)))
+READS = frozenset((read_pdu(100, 20), read_pdu(102, 1), read_pdu(0, 13)))
 RESET_S = 0.3
 """Until what a reset has changed is seen: some ticks."""
 
