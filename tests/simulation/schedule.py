@@ -24,6 +24,7 @@ from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS
 from tests.simulation.judges.reason_judge import MACHINE, ReasonJudge
 from tests.simulation.judges.recording_judge import judge_recordings
 from tests.simulation.judges.status_witness import SCALES, StatusWitness
+from tests.simulation.judges.target_witness import TargetWitness
 from tests.simulation.judges.zero_witness import ZeroWitness
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_edges
@@ -109,6 +110,7 @@ class Simulation:
         self.cell = LyingCell(self.observer)
         self.reasons = ReasonJudge(self.observer)
         self.explained = ExplainedForce(self.observer)
+        self.target = TargetWitness(self.observer)
         self.held_force = HeldForce(self.observer, BEGIN_S + 2.0)
         self.zeros = ZeroWitness(self.observer, self.around.pressing_n, lambda: CABLES["output"].falsified_s)
         self.log.on_zero = self._note_zero  # type: ignore[method-assign]
@@ -299,6 +301,8 @@ class Simulation:
         for at_s, pdu in self.reader.heard:
             if pdu[:2] == COMMAND_BLOCK:
                 self.commands.note(pdu[2:], at_s - DELAY_S)
+                *_, band, band_ms = struct.unpack(f">{WORDS}h", pdu[2:])
+                self.target.band_n, self.target.band_s = 0.01 * band, 0.001 * band_ms
                 self.status.note_control_word(int.from_bytes(pdu[2:4]), at_s - DELAY_S)
             if pdu[:2] == FLOAT_BLOCK:
                 self.status.note_floats(pdu[2:], at_s - DELAY_S)
@@ -308,6 +312,7 @@ class Simulation:
                 self.reasons.judge(pdu[2:], at_s - DELAY_S)
                 self.held_force.note(pdu[2:], at_s - DELAY_S, CABLES["load_cell"].spoiled_s)
                 self.explained.note(pdu[2:], at_s - DELAY_S, self.reasons.disturbed_s)
+                self.target.note(pdu[2:], at_s - DELAY_S)
         self.reader.heard.clear()
         self.reader.ask(read_pdu(STATUS_FIRST, STATUS_WORDS))
         self._looks += 1

@@ -9,6 +9,7 @@ import pytest
 from tests.simulation.judges.command_witness import WORDS, CommandWitness, Counted
 from tests.simulation.judges.observer import STATUS_WORDS, Bounds, Observer
 from tests.simulation.judges.status_witness import SCALES, StatusWitness
+from tests.simulation.judges.target_witness import TargetWitness
 from tests.simulation.masters.spelling import floats_pdu, write_one_pdu, write_pdu
 
 BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05, output_timeout_s=0.2)
@@ -82,3 +83,36 @@ def test_a_float_that_is_not_what_its_word_is_is_seen(place: int, word: int, num
     witness.note(struct.pack(f">{STATUS_WORDS}H", *words), 1.0)
     witness.note_floats(struct.pack(f">{len(SCALES)}f", *numbers), 1.0)
     assert bool(observer.broken) is is_seen
+
+
+def look_at_target(witness: TargetWitness, seconds: float, **registers: int) -> None:
+    places = {"word": 0, "state": 1, "measured": 2, "accepted": 4, "applied": 5, "warnings": 11}
+    words = [0] * STATUS_WORDS
+    for name, value in ({"state": 3, "word": 1, "accepted": 2000, "applied": 2000} | registers).items():
+        words[places[name]] = value
+    for number in range(round(10 * seconds)):
+        witness.note(struct.pack(f">{STATUS_WORDS}h", *words), 1000.0 + 0.1 * number)
+
+
+@pytest.mark.parametrize(
+    ("registers", "seconds", "is_seen"),
+    [
+        ({"measured": 1700}, 4.5, True),
+        ({"measured": 1700}, 3.0, False),
+        ({"measured": 1700, "warnings": 2}, 4.5, False),
+        ({"measured": 1700, "word": 513}, 4.5, False),
+        ({"measured": 0, "applied": 300, "state": 1}, 4.5, True),
+        ({"measured": 1850}, 4.5, False),
+        ({"measured": -2000, "word": 9}, 4.5, False),
+        ({"measured": 1750, "word": 9}, 1.0, True),
+        ({"measured": 1850, "word": 9}, 1.0, False),
+        ({"measured": 1990}, 2.0, True),
+        ({"measured": 1990, "state": 2}, 2.0, False),
+    ],
+)
+def test_a_target_that_is_missed_without_a_word_and_a_false_band_are_seen(
+    registers: dict[str, int], seconds: float, is_seen: bool
+) -> None:
+    observer = Observer(BOUNDS)
+    look_at_target(TargetWitness(observer), seconds, **registers)
+    assert {line.partition(" at ")[0] for line in observer.broken} == ({"target"} if is_seen else set())

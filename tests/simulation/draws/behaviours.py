@@ -1,15 +1,17 @@
 """What masters do now and then besides, each drawn from a stream of its own, so that all other schedules stay as they are: one
 whose program hangs while its frames flow on, one that stops what another has begun, one that writes its whole block, a
-crowd that connects and says nothing, and a machine without a process to give.
+crowd that connects and says nothing, a machine without a process to give,
+and blows that fall right behind what has begun.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from random import Random
 
 from tests.simulation.draws.event import Event
 from tests.simulation.masters.spelling import coil_pdu, coils_pdu, floats_pdu, mask_pdu, write_one_pdu, write_pdu
 
-SHARE, CROWD_SHARE = 0.2, 0.04
+SHARE, CROWD_SHARE = 0.3, 0.04
 STOPS = (
     write_one_pdu(0, 0),
     write_pdu(0, 0),
@@ -22,6 +24,34 @@ STOPS = (
 """Any master may clear enable, by whatever function."""
 MOST_CROWD = 60
 FORCE_N = 4.0, 60.0
+BEGUN = (
+    Event(0.0, "worker", "take", (30.0,)),
+    Event(0.0, "worker", "let_go"),
+    Event(0.0, "worker", "self_test"),
+    Event(0.0, "worker", "calibrate"),
+    Event(0.0, "integrator", "upload"),
+    Event(0.0, "machine", "terminate", (0.1, 0.0)),
+    Event(0.0, "output", "push"),
+    Event(0.0, "person", "say", data=b'{"do": "record", "on": true}'),
+    Event(0.0, "person", "say", data=b'{"do": "calibration", "use": 0}'),
+    Event(0.0, "person", "say", data=b'{"do": "calibrate", "plan": {"groups": 1, "step_v": 0.25}, "name": "20"}'),
+)
+BLOWS = (
+    Event(0.0, "machine", "kill", (0.1, 0.0)),
+    Event(0.0, "machine", "kill", (0.1, 0.0)),
+    Event(0.0, "machine", "kill_guardian", (0.1, 0.0)),
+    Event(0.0, "machine", "terminate", (0.1, 0.0)),
+    Event(0.0, "machine", "stop", (0.12, 0.0)),
+    Event(0.0, "machine", "freeze", (0.3,)),
+    Event(0.0, "output", "pull"),
+    Event(0.0, "output", "push"),
+    Event(0.0, "load_cell", "pull"),
+    Event(0.0, "load_cell", "push"),
+    Event(0.0, "worker", "vanish"),
+    Event(0.0, "worker", "reset"),
+)
+CLOSE_S = 0.0003, 0.002, 0.01, 0.03, 0.16, 0.2, 0.35, 0.6
+"""Less than a sentence takes on its wire, than a tick, than a start, and more."""
 
 
 def draw_behaviours(seed: int) -> Iterator[Event]:
@@ -29,7 +59,7 @@ def draw_behaviours(seed: int) -> Iterator[Event]:
     chance = Random(f"behaviour {seed}")
     draw, at_s = chance.random(), round(chance.uniform(0.5, 15.0), 4)
     if draw < SHARE:
-        yield from chance.choice((_hang, _stop, _program, _refuse))(chance, at_s)
+        yield from chance.choice((_hang, _stop, _program, _refuse, _strike, _strike))(chance, at_s)
     elif draw < SHARE + CROWD_SHARE:
         yield from draw_crowd(chance, at_s)
 
@@ -75,6 +105,16 @@ def _refuse(chance: Random, at_s: float) -> Iterator[Event]:
     at_s = round(at_s + chance.uniform(0.5, 2.0), 4)
     yield Event(at_s, "machine", "no_process", (round(chance.choice((0.05, 1.0, 5.0)) * chance.uniform(0.5, 1.5), 4),))
     yield Event(at_s, "machine", chance.choice(("kill", "kill", "kill_guardian", "terminate")), (0.1, 0.0))
+
+
+def _strike(chance: Random, at_s: float) -> Iterator[Event]:
+    """Something begins, and a blow falls close behind it, perhaps another one amid the start that follows."""
+    yield _command(chance, at_s, "worker")
+    at_s += chance.choice((0.002, 0.4, 2.0)) * chance.uniform(0.5, 1.5)
+    yield replace(chance.choice(BEGUN), at_s=round(at_s, 4))
+    for _ in range(chance.randrange(1, 4)):
+        at_s += chance.choice(CLOSE_S) * chance.uniform(0.7, 1.3)
+        yield replace(chance.choice(BLOWS), at_s=round(at_s, 4))
 
 
 def draw_crowd(chance: Random, at_s: float) -> Iterator[Event]:
