@@ -244,6 +244,8 @@ class Simulation:
             self.person.lose()  # a run that was asked for at the machine excludes that
             self._was_watched = False
         self._has_set_bits |= control == BITS and is_answered
+        if is_answered:
+            self.observer.note_serving(self.clock.now_s)
         note = self.observer.note_accepted if is_answered else self.observer.note_unanswered
         note(control, self._done_s(is_answered))
 

@@ -1,7 +1,7 @@
 """What masters do now and then besides, each drawn from a stream of its own, so that all other schedules stay as they are: one
 whose program hangs while its frames flow on, one that stops what another has begun, one that writes its whole block, a
-crowd that connects and says nothing, a machine without a process to give,
-and blows that fall right behind what has begun.
+crowd that connects and says nothing, a machine without a process to give or busy for seconds, and blows that fall right behind
+what has begun.
 """
 
 from collections.abc import Iterator
@@ -59,7 +59,7 @@ def draw_behaviours(seed: int) -> Iterator[Event]:
     chance = Random(f"behaviour {seed}")
     draw, at_s = chance.random(), round(chance.uniform(0.5, 15.0), 4)
     if draw < SHARE:
-        yield from chance.choice((_hang, _stop, _program, _refuse, _strike, _strike))(chance, at_s)
+        yield from chance.choice((_hang, _stop, _program, _refuse, _strike, _strike, _dawdle))(chance, at_s)
     elif draw < SHARE + CROWD_SHARE:
         yield from draw_crowd(chance, at_s)
 
@@ -115,6 +115,20 @@ def _strike(chance: Random, at_s: float) -> Iterator[Event]:
     for _ in range(chance.randrange(1, 4)):
         at_s += chance.choice(CLOSE_S) * chance.uniform(0.7, 1.3)
         yield replace(chance.choice(BLOWS), at_s=round(at_s, 4))
+
+
+def _dawdle(chance: Random, at_s: float) -> Iterator[Event]:
+    """A busy machine: control gets its processor late, again and again, and never so late that it counts as a standstill."""
+    yield _command(chance, at_s, chance.choice(("worker", "rival")))
+    yield from draw_delays(chance, at_s, chance.choice((0.02, 0.05, 0.09)))
+
+
+def draw_delays(chance: Random, at_s: float, most_s: float) -> Iterator[Event]:
+    """Each is at most so long."""
+    for _ in range(chance.randrange(5, 40)):
+        at_s += chance.uniform(0.02, 0.2)
+        yield Event(round(at_s, 4), "machine", "stop", (round(chance.uniform(0.002, most_s), 4), 0.0))
+        at_s += most_s
 
 
 def draw_crowd(chance: Random, at_s: float) -> Iterator[Event]:

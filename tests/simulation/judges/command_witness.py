@@ -42,15 +42,15 @@ class CommandWitness:
             self._written.popleft()
         for place in range(1, WORDS):  # of control_word single bits are written, and momentary ones read as 0
             word = words[place]
-            is_lowered = place == SETPOINT and word < self._known[place]  # by a calibration that allows less
-            if word not in (0, self._known[place]) and not is_lowered and not self._is_written(place, word):
+            if word not in (0, self._known[place]) and not self._is_written(place, word):
                 told = f"word {place} of the command is {word}, which nobody has written"
                 self._observer.complain("I7", told, at_s)
         self._known = words
 
     def _is_written(self, place: int, word: int) -> bool:
-        found = (one[place] for _, one in self._written)
-        return any(one == word or (one is not None and isnan(one)) for one in found)
+        """A setpoint may be lowered, by a calibration that allows less."""
+        found = (*(one[place] for _, one in self._written), self._known[place])
+        return any(one == word or isnan(one) or (place == SETPOINT and word < one) for one in found if one is not None)
 
 
 class Counted:

@@ -3,8 +3,9 @@ the world, and reads the status registers as any master could. What it finds bro
 
 I1 range, I2 slew, I3 the safe voltage in time after the loss of cell, output, master or control and after over-force, I4 none
 without an enable, I5 faults latch, I6 the safe voltage first, I7 whole sentences, I11 one first cause. What registers say
-besides is judged by status_witness.py (I7, I10), I8 and roles (I7) by the masters, I9 by the integrator, I12 by the log and
-the soak, I13 by the schedule.
+besides is judged by status_witness.py, command_witness.py and target_witness.py (I7, I8, I10), what renews a lease by
+lease_judge.py and a load cell that lies by lying_cell.py (I3), I8 and roles (I7) by the masters, I9 by the integrator, I12 by
+the log and the soak, I13 by the schedule.
 """
 
 import re
