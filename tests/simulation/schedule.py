@@ -55,7 +55,7 @@ RUN_BIT, SELF_TEST = RUNS.values()
 RECORDED_EVERY, RECORDED = 8, 1
 """Of so many gateways one records from its start."""
 LOOK_S, READ_S = 0.02, 0.1
-COMMAND_EVERY, FLOATS_EVERY, MOST_UNHEARD = 4, 9, 4
+COMMAND_EVERY, FLOATS_EVERY, MOST_UNHEARD = 6, 16, 4
 FLOAT_STATUS = 232
 COMMAND_BLOCK, FLOAT_BLOCK = bytes((3, 2 * WORDS)), bytes((3, 4 * len(SCALES)))
 
@@ -294,8 +294,9 @@ class Simulation:
             self.reasons.note(MACHINE, self.clock.now_s)
         self.observer.look(self.clock.now_s)
         self.lease.look(self.clock.now_s)
-        is_whole = self.observer.control_lost_s is None and self.around.is_whole
-        self.cell.look(self.around.world.settings.values, self.clock.now_s, is_whole=is_whole)
+        settings = self.around.world.settings.values
+        is_whole = bool(settings) and self.observer.control_lost_s is None and self.around.is_whole
+        self.cell.look(settings, self.clock.now_s, is_whole=is_whole)
         self.outside.call_later(LOOK_S, self._look)
 
     def _read_status(self) -> None:

@@ -11,7 +11,7 @@ from random import Random
 from tests.simulation.draws.event import Event
 from tests.simulation.masters.spelling import coil_pdu, coils_pdu, floats_pdu, mask_pdu, write_one_pdu, write_pdu
 
-SHARE, CROWD_SHARE = 0.3, 0.04
+SHARE, CROWD_SHARE = 0.24, 0.03
 STOPS = (
     write_one_pdu(0, 0),
     write_pdu(0, 0),

@@ -1,5 +1,5 @@
 """Whether the command block holds what masters have written, word for word, and nothing of a write that was refused (I7); and
-whether a zero was taken, and a fault reset, as often as somebody has asked for it (I8). No code of the gateway is used here.
+whether a zero was taken as often as somebody has asked for it (I8). No code of the gateway is used here.
 """
 
 import struct
@@ -7,9 +7,9 @@ from collections import deque
 from math import isnan, nan
 
 from tests.simulation.judges.observer import Observer
-from tests.simulation.masters.spelling import word_of
+from tests.simulation.masters.spelling import word_of, written_address
 
-WORDS, SETPOINT = 13, 1
+WORDS, SETPOINT, FLOATS = 13, 1, 200
 KEPT_S = 5.0
 """So long a write is kept: it may have waited for a machine that stood still."""
 LATE_LOOKS = 3
@@ -20,16 +20,13 @@ class CommandWitness:
 
     def __init__(self, observer: Observer) -> None:
         self._observer = observer
-        self._written: deque[tuple[float, tuple[float | None, ...]]] = deque()
+        self._written: deque[tuple[float, bytes]] = deque()
         self._looks: deque[tuple[float, tuple[int, ...]]] = deque()
         self._known = (0,) * WORDS
 
     def note_write(self, pdu: bytes, now_s: float) -> None:
         """A write was taken, or nobody knows whether it was."""
-        words = tuple(word_of(pdu, place) for place in range(WORDS))
-        if any(word is not None for word in words):
-            is_float = int.from_bytes(pdu[5:7] if pdu[0] == 23 else pdu[1:3]) >= 200
-            self._written.append((now_s, tuple(nan if is_float and word is not None else word for word in words)))
+        self._written.append((now_s, pdu))
 
     def note(self, block: bytes, at_s: float) -> None:
         """Judge a look of some time ago: who hears no answer tells so late."""
@@ -49,8 +46,14 @@ class CommandWitness:
 
     def _is_written(self, place: int, word: int) -> bool:
         """A setpoint may be lowered, by a calibration that allows less."""
-        found = (*(one[place] for _, one in self._written), self._known[place])
+        found = (*(_word_of(pdu, place) for _, pdu in self._written), self._known[place])
         return any(one == word or isnan(one) or (place == SETPOINT and word < one) for one in found if one is not None)
+
+
+def _word_of(pdu: bytes, place: int) -> float | None:
+    """A float says it in another unit: it may be any."""
+    word = word_of(pdu, place)
+    return nan if word is not None and written_address(pdu) >= FLOATS else word
 
 
 class Counted:

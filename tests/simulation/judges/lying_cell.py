@@ -33,14 +33,13 @@ class LyingCell:
 
     def look(self, settings: Mapping[str, Any], now_s: float, *, is_whole: bool) -> None:
         """Judge the voltage that stands now. is_whole: whether wires and machine are."""
-        observer, names = self._observer, frozenset(settings)
+        observer = self._observer
         is_judged = is_whole and not (observer.is_safe or observer.is_run or self.is_driving)
         if not is_judged:
             self._was_false = self._was_frozen = False
-        if not is_judged or len(names) != 1:
-            return
-        self._judge_frozen(names, now_s)
-        self._judge_false(settings, now_s)
+        elif len(settings) == 1:
+            self._judge_frozen(frozenset(settings), now_s)
+            self._judge_false(settings, now_s)
 
     def _judge_frozen(self, names: frozenset[str], now_s: float) -> None:
         voltage_v = self._observer.voltage_v
