@@ -36,6 +36,8 @@ def happen(simulation: "Simulation", event: Event) -> None:
             simulation.around.set_as_asked(event.data, simulation.person.say)
     elif event.whom == "world":
         simulation.around.set_fault(event.what, on=bool(event.numbers[0]))
+    elif event.whom == "crowd":
+        simulation.crowd.connect(*map(int, event.numbers))
     elif event.whom == "machine":
         _shake(simulation, event)
     else:
@@ -77,6 +79,8 @@ def _shake(simulation: "Simulation", event: Event) -> None:
             simulation._lose_control()
     elif event.what == "stop_guardian":
         _stop_guardian(simulation, event.numbers[0])
+    elif event.what == "no_process":
+        simulation.service.refuse_processes(event.numbers[0])
     elif event.what == "clock_jump":
         simulation.clock.jump_s += event.numbers[1]
     elif event.what == "disk_hung":

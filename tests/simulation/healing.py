@@ -22,7 +22,7 @@ FIRST_WORDS_S = 3.5
 """So long a start waits for the first words of a device that obeys nothing until a person resets; then it serves."""
 MOST_OFF_N = 0.5
 """By how much a healthy cell may read another force at rest than at first, until the zero is taken anew."""
-TARES, TARE_S = 5, 0.3
+TARES, TARE_S, LIFT_S = 5, 0.3, 1.3
 """Two readings that differ too much refuse it as long as both are looked at."""
 
 
@@ -38,8 +38,7 @@ def heal(simulation: "Simulation") -> None:
     simulation._run_for(0.1)
     for _ in range(TARES):
         if _is_zero_off(simulation):  # somebody has tared while the cell was broken; noise may refuse one of these
-            healer.tare()
-            simulation._run_for(TARE_S)
+            _tare(simulation)
     healer.hold(HELD_N)
     simulation._run_for(HEAL_S - RATE_S)
     rates = count_answers(simulation)
@@ -51,6 +50,19 @@ def heal(simulation: "Simulation") -> None:
     if not abs(error_n) <= IN_BAND_N:
         words = f"{error_n:+.2f} N off {HEAL_S:g} s after healing; {list(simulation.log.lines)[-4:]}"
         simulation.observer.broken.append(f"I13: {words}")
+
+
+def _tare(simulation: "Simulation") -> None:
+    """Where the safe voltage presses, the tool is lifted for it."""
+    is_lifted = simulation.observer.bounds.safe_v > 0.0
+    if is_lifted:
+        simulation.around.set_fault("no-contact", on=True)
+        simulation._run_for(LIFT_S)
+    simulation.masters["healer"].tare()
+    simulation._run_for(TARE_S)
+    if is_lifted:
+        simulation.around.set_fault("no-contact", on=False)
+        simulation._run_for(LIFT_S)
 
 
 def count_answers(simulation: "Simulation") -> dict[str, int]:
@@ -72,6 +84,7 @@ def _repair(simulation: "Simulation") -> None:
         cable.spoil()
     SimulatedDisk.fails = ""
     SimulatedDisk.go_on()
+    simulation.service.refuse_processes(0.0)
     for master in simulation.masters.values():
         master.fall_silent()
         master.disconnect()

@@ -223,5 +223,18 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(23.7587, "worker", "reset"),
         ],
     ),
+    (
+        864986,
+        [
+            Event(2.3934, "rival", "take", (8.98,)),
+            Event(2.4476, "machine", "stop", (0.0567, 0.0)),
+            Event(2.7152, "machine", "stop", (0.0537, 0.0)),
+        ],
+    ),
+    (864683, [Event(0.1336, "worker", "hold_on", (37.07,)), Event(3.7748, "worker", "hold_on", (8.61,))]),
+    (
+        855018,
+        [Event(7.9372, "rival", "hold", (34.52,)), Event(8.3021, "output", "pull"), Event(8.3135, "output", "push")],
+    ),
 ]
 """Schedules that once broke a law, or were said to: the seed of the machine, and what happened to it."""

@@ -15,12 +15,16 @@ from tests.simulation.draws.rigs import DEMO_CELL, draw_badges, draw_rig, store_
 from tests.simulation.happening import happen
 from tests.simulation.healing import ANSWER_S, RATE_S, count_answers, heal
 from tests.simulation.judges.audit_judge import judge_audit
+from tests.simulation.judges.command_witness import WORDS, CommandWitness, Counted
 from tests.simulation.judges.explained_force import ExplainedForce
 from tests.simulation.judges.held_force import HeldForce
+from tests.simulation.judges.lease_judge import LeaseJudge
+from tests.simulation.judges.lying_cell import LyingCell
 from tests.simulation.judges.observer import DOWN_S, STATUS_FIRST, STATUS_WORDS
 from tests.simulation.judges.reason_judge import MACHINE, ReasonJudge
 from tests.simulation.judges.recording_judge import judge_recordings
-from tests.simulation.judges.status_witness import StatusWitness
+from tests.simulation.judges.status_witness import SCALES, StatusWitness
+from tests.simulation.judges.target_witness import TargetWitness
 from tests.simulation.judges.zero_witness import ZeroWitness
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import DISK_S, Log, SimulatedDisk, simulated_edges
@@ -30,16 +34,19 @@ from tests.simulation.kernel.network import DELAY_S
 from tests.simulation.kernel.processes import SimulatedService
 from tests.simulation.kernel.virtual_time import BEGIN_S, VirtualClock, VirtualLoop
 from tests.simulation.masters.bus_master import make_master
+from tests.simulation.masters.crowd import Crowd
 from tests.simulation.masters.integrator import Integrator, Sets
 from tests.simulation.masters.socket_user import SocketUser
 from tests.simulation.masters.spelling import (
     BITS,
     DISABLED_BY_BIT,
     ENABLE,
+    MODE,
     control_of,
     hangs_payload,
     read_pdu,
     tells_weight,
+    word_of,
 )
 from tests.simulation.masters.tcp_master import BEATS_S, RESET, RUNS, TARE, Master
 from tests.simulation.surroundings import Surroundings
@@ -48,6 +55,9 @@ RUN_BIT, SELF_TEST = RUNS.values()
 RECORDED_EVERY, RECORDED = 8, 1
 """Of so many gateways one records from its start."""
 LOOK_S, READ_S = 0.02, 0.1
+COMMAND_EVERY, FLOATS_EVERY, MOST_UNHEARD = 6, 16, 4
+FLOAT_STATUS = 232
+COMMAND_BLOCK, FLOAT_BLOCK = bytes((3, 2 * WORDS)), bytes((3, 4 * len(SCALES)))
 
 
 @dataclass(frozen=True)
@@ -66,6 +76,7 @@ class Simulation:
     rates: how many answers each healthy device gives in RATE_S, the same."""
 
     rest_n: float | None = None
+    _looks = _unheard = 0
 
     def __init__(self, seed: int, folder: Path) -> None:
         self._folder = folder
@@ -76,14 +87,15 @@ class Simulation:
         self.clock, self.chance = VirtualClock(), Random(~seed)
         self.observer = drawn.observer()
         self.observer.history.is_plain = rig.load_cell.device.name == DEMO_CELL
-        self.observer.history.has_valve = rig.valve is not None
+        self.observer.history.has_valve = rig.valve is not None or rig.load_cell.sign < 0
         self.outside = VirtualLoop(self.clock)
         self.outside.set_exception_handler(self._on_error)
         self.log = Log(self.clock)
         self.around = Surroundings(rig, self.outside, self.observer, drawn.cell_s)
         SimulatedDisk.is_gone = SimulatedDisk.is_hung = False
         SimulatedDisk.fails = ""
-        SimulatedDisk.folder = folder
+        SimulatedDisk.folder, SimulatedDisk.chance = folder, Random(f"torn {seed}")
+        SimulatedDisk.working.clear()
         SimulatedDisk.delay_s = staticmethod(lambda: self.chance.uniform(*DISK_S))
         self.sets = Sets(store_documents(seed, rig, folder))
         SimulatedFit.outside, SimulatedFit.chance, SimulatedFit.built_in = (
@@ -93,11 +105,15 @@ class Simulation:
         )
         SimulatedFit.on_stored, SimulatedFit.ended = staticmethod(lambda mark: self.sets.expect_mark(mark)), []
         self.status = StatusWitness(self.observer, lambda: CABLES["load_cell"].heard_s)
+        self.commands, self.tares = CommandWitness(self.observer), Counted("a zero was taken")
+        self.lease = LeaseJudge(self.observer)
+        self.cell = LyingCell(self.observer)
         self.reasons = ReasonJudge(self.observer)
         self.explained = ExplainedForce(self.observer)
+        self.target = TargetWitness(self.observer)
         self.held_force = HeldForce(self.observer, BEGIN_S + 2.0)
         self.zeros = ZeroWitness(self.observer, self.around.pressing_n, lambda: CABLES["output"].falsified_s)
-        self.log.on_zero = self.zeros.note_zero  # type: ignore[method-assign]
+        self.log.on_zero = self._note_zero  # type: ignore[method-assign]
         self.service = SimulatedService(
             rig, folder, self.outside, self.log, self.clock, records=seed % RECORDED_EVERY == RECORDED
         )
@@ -120,10 +136,13 @@ class Simulation:
         for one in self.integrators.values():
             one.sets = self.sets
         self.integrator = self.integrators["integrator"]
+        self.crowd = Crowd(self.outside, lambda: self.service.inside)
         self.person = SocketUser(lambda: self.service.inside, self.service.answer_socket)
         self.person.on_write = lambda control: self._on_write(control, True)
         self.person.on_model = self._expect_any_model
-        self.person.on_tare = self._note_tare
+        self.person.on_tare = self._note_run_tare
+        for master in self.masters.values():
+            master.on_refusal = lambda: self.status.note_refusal(self.clock.now_s)
         for client in (*self.masters.values(), self.person):
             client.on_pdu = partial(self._note_pdu, client.name if type(client) is Master else "")
         self.clients = (*self.masters.values(), self.reader, *self.integrators.values())
@@ -138,6 +157,7 @@ class Simulation:
         self._run_for(1.0 - RATE_S)
         self.rates = count_answers(self)
         self.rest_n = self._read_force_n()
+        self.zeros.rest_n = self.around.pressing_n()
         self._happen_next(iter(events))
         self._run_for(duration_s)
         self.held_force.end()
@@ -149,6 +169,8 @@ class Simulation:
         for client in (*self.clients, self.person):
             self.observer.broken += client.complaints
         self.observer.broken += self.log.internal_errors
+        if "bus" not in CABLES:  # what was doubled on its way is asked for twice
+            self.observer.broken += self.tares.judge()
         self.observer.fingerprint.update("\n".join(self.observer.broken).encode())
         return Outcome(
             tuple(self.observer.broken),
@@ -189,8 +211,12 @@ class Simulation:
     def _note_pdu(self, host: str, pdu: bytes, is_answered: bool) -> None:
         self.status.note_write(host if is_answered else "", pdu, self._done_s(is_answered))
         self.explained.note_write(host, self.clock.now_s)
+        self.cell.note_mode(word_of(pdu, MODE))
+        self.lease.note_write(pdu, self._done_s(is_answered), is_answered=is_answered)
+        self.commands.note_write(pdu, self._done_s(is_answered))
         if (control := control_of(pdu)) is not None and control & TARE:
             self._note_tare()
+            self.tares.note_asked(is_sure=is_answered and control > 0)
         if tells_weight(pdu):
             self._note_weight(pdu)
 
@@ -199,6 +225,14 @@ class Simulation:
         if hangs_payload(pdu):
             self.observer.history.weighed_s = min(self.observer.history.weighed_s, self.clock.now_s)
             self.reasons.has_payload = True
+
+    def _note_zero(self, now_s: float) -> None:
+        self.zeros.note_zero(now_s)
+        self.tares.note_done()
+
+    def _note_run_tare(self) -> None:
+        self._note_tare()
+        self.tares.note_asked(is_sure=False)
 
     def _note_tare(self) -> None:
         self.observer.history.tares.append(self.clock.now_s)
@@ -210,6 +244,8 @@ class Simulation:
             self.person.lose()  # a run that was asked for at the machine excludes that
             self._was_watched = False
         self._has_set_bits |= control == BITS and is_answered
+        if is_answered:
+            self.observer.note_serving(self.clock.now_s)
         note = self.observer.note_accepted if is_answered else self.observer.note_unanswered
         note(control, self._done_s(is_answered))
 
@@ -248,6 +284,7 @@ class Simulation:
         is_watched = self.person.watched_s is not None
         if is_watched or self._was_watched:
             self._follow_person(is_watched)
+            self.lease.note_local_run(self.clock.now_s)
         if self.service.is_serving:
             self.observer.note_serving(self.clock.now_s)
         self.around.look()
@@ -256,19 +293,45 @@ class Simulation:
         if self.service.is_standing:
             self.reasons.note(MACHINE, self.clock.now_s)
         self.observer.look(self.clock.now_s)
+        self.lease.look(self.clock.now_s)
+        settings = self.around.world.settings.values
+        is_whole = bool(settings) and self.observer.control_lost_s is None and self.around.is_whole
+        self.cell.look(settings, self.clock.now_s, is_whole=is_whole)
         self.outside.call_later(LOOK_S, self._look)
 
     def _read_status(self) -> None:
+        self._judge_unheard()
         for at_s, pdu in self.reader.heard:
+            if pdu[:2] == COMMAND_BLOCK:
+                self.commands.note(pdu[2:], at_s - DELAY_S)
+                *_, band, band_ms = struct.unpack(f">{WORDS}h", pdu[2:])
+                self.target.band_n, self.target.band_s = 0.01 * band, 0.001 * band_ms
+                self.status.note_control_word(int.from_bytes(pdu[2:4]), at_s - DELAY_S)
+            if pdu[:2] == FLOAT_BLOCK:
+                self.status.note_floats(pdu[2:], at_s - DELAY_S)
             if pdu[0] == 3 and len(pdu) == 2 + 2 * STATUS_WORDS:
                 self.observer.note_status(pdu, at_s)
                 self.status.note(pdu[2:], at_s - DELAY_S)
                 self.reasons.judge(pdu[2:], at_s - DELAY_S)
                 self.held_force.note(pdu[2:], at_s - DELAY_S, CABLES["load_cell"].spoiled_s)
                 self.explained.note(pdu[2:], at_s - DELAY_S, self.reasons.disturbed_s)
+                self.target.note(pdu[2:], at_s - DELAY_S)
         self.reader.heard.clear()
         self.reader.ask(read_pdu(STATUS_FIRST, STATUS_WORDS))
+        self._looks += 1
+        if self._looks % COMMAND_EVERY == 0:
+            self.reader.ask(read_pdu(0, WORDS))
+        if self._looks % FLOATS_EVERY == 0:
+            self.reader.ask(read_pdu(FLOAT_STATUS, 2 * len(SCALES)))
         self.outside.call_later(READ_S, self._read_status)
+
+    def _judge_unheard(self) -> None:
+        """Who only reads is answered at once, whatever the others do, as long as the process stands still for nobody."""
+        is_there = self.service.is_serving and not self.service.is_standing
+        self._unheard = 0 if self.reader.heard or not is_there else self._unheard + 1
+        if self._unheard > MOST_UNHEARD:
+            self.observer.complain("I12", "a master that only reads is not answered", self.clock.now_s)
+            self._unheard = 0
 
     def _run_for(self, duration_s: float) -> None:
         self.clock.run_until(self.clock.now_s + duration_s)

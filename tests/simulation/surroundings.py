@@ -9,6 +9,7 @@ from gateway.devices import output_device
 from gateway.devices.device_checks.watchdog import WatchdogState
 from gateway.profiles import Rig
 from gateway.service.simulation.world import SimulatedRig
+from tests.simulation.draws.rigs import draw_adapter_s
 from tests.simulation.judges.observer import Observer
 from tests.simulation.judges.reason_judge import CELL, OUTPUT, ReasonJudge
 from tests.simulation.kernel.cables import CABLES, lay_cables
@@ -36,6 +37,7 @@ class Surroundings:
 
     def __init__(self, rig: Rig, outside: VirtualLoop, observer: Observer, cell_s: float | None) -> None:
         self._rig, self._outside, self._observer, self._cell_s = rig, outside, observer, cell_s
+        self._pulled = set[str]()  # since the last look, and perhaps pushed again
         self.world = SimulatedRig(
             rig,
             send_output=lambda data: CABLES["output"].send_to_host(data),
@@ -44,6 +46,9 @@ class Surroundings:
         )
         self._move_valve, self.world.valve.move = self.world.valve.move, self._judge_valve  # type: ignore[method-assign]
         lay_cables(outside, rig, self._on_output, self.world.on_cell_bytes, self._on_valve)
+        adapter_s = draw_adapter_s(rig.seed)
+        for cable in CABLES.values():
+            cable.adapter_s = adapter_s
         CABLES["load_cell"].on_host = observer.hear_cell
         CABLES["output"].on_unheard = observer.history.cuts.append
         if cell_s:
@@ -86,6 +91,7 @@ class Surroundings:
     def pull(self, line: str) -> None:
         """Pull the plug of this line."""
         CABLES[line].pull()
+        self._pulled.add(line)
         if line == "output":
             now_s = self._outside.time()
             self._observer.note_cut(now_s)
@@ -106,6 +112,12 @@ class Surroundings:
         CABLES[line].push()
         self._judge()
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether every wire is, and each device at its own pace."""
+        is_dark = self._outside.time() < self._dark_until_s + NOTICED_S
+        return self.cell_pace == 1.0 and not is_dark and not any(cable.is_disturbed for cable in CABLES.values())
+
     def pressing_n(self) -> float:
         """What the air presses with, in whichever chamber."""
         twin = self.world.twin
@@ -124,7 +136,7 @@ class Surroundings:
     def look(self) -> None:
         """A sentence that fits is a sample, or an answer, whoever says it: cell and output are lost from then on."""
         observer = self._observer
-        observer.cell_heard_s = CABLES["load_cell"].heard_s
+        observer.cell_heard_s = observer.cell_said_s if observer.history.is_plain else CABLES["load_cell"].heard_s
         is_noisy = self.world.settings.number("wire.noise") > 0.0
         observer.answer_spoiled_s = self._outside.time() if is_noisy else CABLES["output"].spoiled_s
         if observer.cell_lost_s is not None:
@@ -136,7 +148,7 @@ class Surroundings:
     def _judge_watchdog(self) -> None:
         """While it presses, the device's own watchdog watches; one that has forgotten is armed anew."""
         now_s, watchdog = self._outside.time(), getattr(self.world._output, "watchdog", None)
-        presses = self._observer.voltage_v > 0.0 and self._observer.output_lost_s is None
+        presses = not self._observer.is_safe and self._observer.output_lost_s is None
         is_off = presses and watchdog is not None and watchdog.state is WatchdogState.OFF
         self._unwatched_s = _since(self._unwatched_s, is_off, now_s)
         if self._unwatched_s is not None and now_s - self._unwatched_s > UNWATCHED_S:
@@ -156,8 +168,9 @@ class Surroundings:
         now_s = self._outside.time()
         reasons.note_settings(self.world.settings.values, now_s)
         for line, cable in CABLES.items():
-            if cable.is_disturbed:
+            if cable.is_disturbed or line in self._pulled:
                 reasons.note(line, now_s)
+        self._pulled.clear()
         if self.cell_pace != 1.0:
             reasons.note(CELL, now_s)
         if now_s < self._dark_until_s + NOTICED_S:

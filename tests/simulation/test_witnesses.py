@@ -72,7 +72,7 @@ def test_a_voltage_that_stands_behind_over_force_is_seen(
     observer.hear(b"SET 0\r\nSET 1\r\n", 0.9)
     for sentence in sentences:
         observer.hear_cell(sentence, 1.0)
-    observer.look(1.1)
+    observer.look(1.13)
     assert not observer.broken
     observer.look(1.16)
     assert [line.partition(" at ")[0] for line in observer.broken] == ["I3 over-force"] * is_over

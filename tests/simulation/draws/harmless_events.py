@@ -12,6 +12,7 @@ from heapq import merge
 from operator import attrgetter
 from random import Random
 
+from tests.simulation.draws.behaviours import draw_crowd, draw_delays
 from tests.simulation.draws.event import Event
 from tests.simulation.draws.events import draw_usual
 from tests.simulation.draws.rare_events import DISKS, draw_rare_events
@@ -40,13 +41,23 @@ FALSE = "digit"
 QUIET = ("calibrate", "self_test", "reset", "let_go", "tare", "burst")
 """What another master may do to stop the force, by right."""
 ENABLE, TAKE = 1, 8
+CROWD_SHARE, DELAYS_SHARE = 0.2, 0.2
 
 
 def draw_harmless_events(seed: int, duration_s: float) -> Iterator[Event]:
     """A master that holds, and what happens beside it, in its order."""
     streams = [draw_usual(Random(f"held {seed} {number}"), duration_s) for number in range(STREAMS)]
     drawn = merge(*streams, draw_rare_events(f"held {seed}", duration_s), key=attrgetter("at_s"))
-    return merge(_draw_holds(seed, duration_s), _keep_harmless(drawn), key=attrgetter("at_s"))
+    crowds = tuple(_draw_crowds(seed, duration_s))
+    return merge(_draw_holds(seed, duration_s), _keep_harmless(drawn), crowds, key=attrgetter("at_s"))
+
+
+def _draw_crowds(seed: int, duration_s: float) -> Iterator[Event]:
+    chance = Random(f"held crowd {seed}")
+    if chance.random() < CROWD_SHARE:
+        yield from draw_crowd(chance, round(chance.uniform(1.0, 0.8 * duration_s), 4))
+    elif chance.random() < DELAYS_SHARE:
+        yield from draw_delays(chance, chance.uniform(1.0, 0.5 * duration_s), LONGEST_STOP_S)
 
 
 def _draw_holds(seed: int, duration_s: float) -> Iterator[Event]:

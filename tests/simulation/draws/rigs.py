@@ -59,6 +59,12 @@ VALVES = (
 """What switches it, and where it goes while the output is off."""
 KINDS = ("plain",) * 28 + ("rate",) + ("cell",) * 4 + ("valve",) * 3 + ("devices",) * 4 + ("bus",) * 3
 TLS_SHARE = 0.08
+ADAPTER_SHARE, ADAPTERS_S = 0.1, (0.001, 0.004, 0.016)
+REST_SHARE, VARIED_SHARE = 0.05, 0.06
+RESTS_V = (0.3, 0.0), (0.55, 0.55), (1.0, 0.0), (1.0, 1.0)
+"""Safe voltages that press, where a tool would drop at 0 V, and the least that may be out."""
+BUS_TOO_SHARE = 0.2
+"""Of rigs that have something else of their own."""
 BOW = 0.005
 RIG = """name: pair
 plant: paper-slide
@@ -112,6 +118,8 @@ def bounds_of(rig: Rig) -> Bounds:
         supervision.output_timeout_s + rig.output.device.reply_timeout_s + POLL_S,
         rig.output.device.reply_timeout_s,
         limits.over_force_n,
+        limits.safe_voltage_v,
+        limits.voltage_min_v,
     )
 
 
@@ -128,17 +136,37 @@ def draw_rig(seed: int) -> Drawn:
     elif kind == "devices":
         output = chance.choice(OUTPUTS)
     rig = demo() if kind != "valve" else with_valve(*Random(f"valve {seed}").choice(VALVES))
-    if kind == "bus":
-        rig = replace(rig, fieldbus=(RtuFace(type="rtu", port="bus"),))
-    elif kind == "devices":
+    if kind == "devices":
         rig = with_devices(output, chance.choice(CELLS))
+    if kind == "bus" or (kind != "plain" and Random(f"bus beside {seed}").random() < BUS_TOO_SHARE):
+        rig = replace(rig, fieldbus=(RtuFace(type="rtu", port="bus"),))
     cell_hz = share * loop_hz
+    rig = _varied(_resting(rig, Random(f"safe {seed}")), Random(f"varied 2 {seed}"))
     device = rig.load_cell.device
     if reading := device.read_force:
         cell_hz = min(cell_hz, reading.rate_hz or cell_hz)
         asked = replace(device, read_force=replace(reading, rate_hz=2.0 * cell_hz))  # so that each tick finds it due
         rig = replace(rig, load_cell=replace(rig.load_cell, device=asked))
     return Drawn(_strict(rig, seed, loop_hz, cell_hz), 1.0 / cell_hz if device.stream else None, output)
+
+
+def _resting(rig: Rig, chance: Random) -> Rig:
+    """In few rigs the safe voltage is not 0 V; with a valve it must be."""
+    if chance.random() > REST_SHARE or rig.valve:
+        return rig
+    safe_v, least_v = chance.choice(RESTS_V)
+    limits = replace(rig.control.limits, safe_voltage_v=safe_v, voltage_min_v=least_v)
+    return replace(rig, control=replace(rig.control, limits=limits))
+
+
+def _varied(rig: Rig, chance: Random) -> Rig:
+    """In few rigs a push reads negative, small forces are given none, and the force rises slowly behind the touch."""
+    if chance.random() > VARIED_SHARE:
+        return rig
+    limits = replace(rig.control.limits, smallest_force_n=chance.choice((0.0, 2.0, 5.0)))
+    defaults = replace(rig.control.defaults, contact_ramp_s=chance.choice((0.0, 0.2, 1.0)))
+    cell = replace(rig.load_cell, sign=chance.choice((1, -1, -1)))
+    return replace(rig, load_cell=cell, control=replace(rig.control, limits=limits, defaults=defaults))
 
 
 def draw_badges(seed: int) -> dict[str, tuple[str, str]]:
@@ -157,6 +185,12 @@ def draw_badges(seed: int) -> dict[str, tuple[str, str]]:
         "designer": "calibration",
     }
     return {name: (f"the {name}", role) for name, role in roles.items()}
+
+
+def draw_adapter_s(seed: int) -> float:
+    """How often this machine's serial adapters hand over what has come, s; in most of them each message comes whole."""
+    chance = Random(f"adapter 9 {seed}")
+    return chance.choice(ADAPTERS_S) if chance.random() < ADAPTER_SHARE else 0.0
 
 
 def _strict(rig: Rig, seed: int, loop_hz: float, cell_hz: float) -> Rig:

@@ -3,8 +3,9 @@ the world, and reads the status registers as any master could. What it finds bro
 
 I1 range, I2 slew, I3 the safe voltage in time after the loss of cell, output, master or control and after over-force, I4 none
 without an enable, I5 faults latch, I6 the safe voltage first, I7 whole sentences, I11 one first cause. What registers say
-besides is judged by status_witness.py (I7, I10), I8 and roles (I7) by the masters, I9 by the integrator, I12 by the log and
-the soak, I13 by the schedule.
+besides is judged by status_witness.py, command_witness.py and target_witness.py (I7, I8, I10), what renews a lease by
+lease_judge.py and a load cell that lies by lying_cell.py (I3), I8 and roles (I7) by the masters, I9 by the integrator, I12 by
+the log and the soak, I13 by the schedule.
 """
 
 import re
@@ -23,7 +24,7 @@ STATUS_FIRST, STATUS_WORDS = 100, 20
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the rig's file says, and what the wire takes (`GRACE_S`: one tick, two sentences of 9600 baud, the loop's grid).
+    """What the rig's file says, and what the wire takes (`GRACE_S`, and two periods).
     lease_s: endless where a lost master's force is held; lost_down_s: how long it may take to ramp down; reply_timeout_s: how
     long an answer of the output is waited for, before anything else is sent."""
 
@@ -37,6 +38,8 @@ class Bounds:
     output_timeout_s: float = inf
     reply_timeout_s: float = 0.0
     over_force_n: float = 75.0
+    safe_v: float = 0.0
+    voltage_min_v: float = 0.0
 
 
 ENABLE, RESET, RUN_BITS = 1, 2, 32 | 64
@@ -44,12 +47,12 @@ DOWN_S = 4.0  # a run's end, whoever ends it, is a ramp down that needs no maste
 ORDER_S = 0.02  # by which the answer to an earlier write may come after that to a later one, on another wire
 UNHEARD_S = 0.1  # so late a write may be taken whose master has hung up, or fallen silent on a bus
 SENTENCE = re.compile(
-    rb"(ST|US|OL),(?:GS|NT),([ +\-.0-9]{8})(kg| N|lb)\r\n"
+    rb"(ST|US|OL),(?:GS|NT),([ +\-.0-9]{8})(kg| N|lb| g)\r\n"
 )  # of the demo rig's cell; OL: beyond its range
-UNITS_N = {b"kg": 9.80665, b" N": 1.0, b"lb": 4.4482216152605}
+UNITS_N = {b"kg": 9.80665, b" N": 1.0, b" g": 9.80665e-3, b"lb": 4.4482216152605}
 OVER_READINGS = 3  # in a row are over-force
 ZERO_N = 8.0  # so far may the zero have been moved by somebody who has tared
-GRACE_S = 0.05  # and two periods: a tick decides nothing within one of a sample
+GRACE_S = 0.04  # 20 ms, and two sentences on the wire; and two periods: a tick decides nothing within one of a command
 
 
 @dataclass
@@ -66,6 +69,7 @@ class Observer:
     fingerprint: Any = field(default_factory=sha256)
     cell_lost_s: float | None = None
     cell_heard_s: float = 0.0
+    cell_said_s: float = 0.0
     over_s: float | None = None
     answers_lost_s: float | None = None
     output_lost_s: float | None = None
@@ -77,6 +81,7 @@ class Observer:
     run_ended_s: float = -DOWN_S
     _over: int = 0
     _line: bytes = b""
+    _cell_line: bytes = b""
     _is_cut: bool = True
     _must_be_safe: bool = True
     _begun_s: float = 0.0
@@ -99,9 +104,25 @@ class Observer:
                 self.complain("I7", f"{line!r} is no sentence", now_s)
             self._is_cut = False
 
+    @property
+    def is_safe(self) -> bool:
+        """Whether the safe voltage stands: less than it may drop a tool, too."""
+        is_begun = self.settings or self.voltage_v
+        return not is_begun or abs(self.voltage_v - self.bounds.safe_v) <= 0.6 * COUNT_V
+
     def hear_cell(self, chunk: bytes, now_s: float) -> None:
         """What has reached the gateway from its load cell, most often a sentence."""
-        found = SENTENCE.fullmatch(chunk)
+        if not self.history.is_plain:
+            self.history.readings.append((now_s, None))
+            return
+        *lines, self._cell_line = (self._cell_line + chunk).split(b"\n")
+        for line in lines:
+            self._hear_sentence(line + b"\n", now_s)
+
+    def _hear_sentence(self, line: bytes, now_s: float) -> None:
+        found = SENTENCE.search(line)
+        if found:
+            self.cell_said_s = now_s
         self.history.readings.append((now_s, _force_n(found) if found and found[1] != b"OL" else None))
         self._over = self._over + 1 if found and self._is_over(found) else 0
         self.over_s = (self.over_s or now_s) if self._over >= OVER_READINGS else None
@@ -119,20 +140,20 @@ class Observer:
         self._begun_s = until_s
 
     def _note_setting(self, voltage_v: float, now_s: float) -> None:
-        if not -1e-9 <= voltage_v <= self.bounds.voltage_max_v + COUNT_V:
+        if not self.bounds.voltage_min_v - 0.6 * COUNT_V <= voltage_v <= self.bounds.voltage_max_v + COUNT_V:
             self.complain("I1", f"{voltage_v:.3f} V", now_s)
         if self._must_be_safe and now_s > self._begun_s:
-            if voltage_v > 0.0:
+            if abs(voltage_v - self.bounds.safe_v) > 0.6 * COUNT_V:
                 self.complain("I6", f"{voltage_v:.3f} V comes first", now_s)
             self._must_be_safe = False
-        before_s, before_v = self.setting_s, self.voltage_v
-        if before_v <= 0.0 < voltage_v:
-            self._pressing_s = now_s
+        before_s, before_v, was_safe = self.setting_s, self.voltage_v, self.is_safe
         allowed_v = self.bounds.slew_v_per_s * (now_s - before_s + 0.02) + COUNT_V
         if self.settings and voltage_v - before_v > allowed_v + 1e-9:
             self.complain("I2", f"{before_v:.3f} -> {voltage_v:.3f} V in {now_s - before_s:.4f} s", now_s)
         self.history.settings.append((now_s, voltage_v))
         self.setting_s, self.voltage_v, self.largest_v = now_s, voltage_v, max(self.largest_v, voltage_v)
+        if was_safe and not self.is_safe:
+            self._pressing_s = now_s
         self.settings += 1
         self.fingerprint.update(f"{now_s:.6f} {voltage_v:.4f}\n".encode())
 
@@ -213,7 +234,7 @@ class Observer:
 
     def look(self, now_s: float) -> None:
         """Judge the voltage that stands now."""
-        if self.voltage_v <= 0.0 or self.output_lost_s is not None:
+        if self.is_safe or self.output_lost_s is not None:
             return
         standing_s = now_s - self.setting_s
         down_s = DOWN_S if self.is_run or now_s - self.run_ended_s < DOWN_S else 0.0

@@ -66,7 +66,9 @@ def judge_recordings(folder: Path, history: History) -> Iterator[str]:
 def judge_rows(rows: list[Row], history: History) -> list[str]:
     """Return what does not hold where the rows fit best."""
     best = MOST_TOLD * ["it fits nowhere"]
-    readings = {_key(at_s): force_n for at_s, force_n in history.readings}
+    readings = dict[int, float | None]()
+    for at_s, force_n in history.readings:  # of two that an adapter has handed over as one nobody knows which is which
+        readings[_key(at_s)] = None if _key(at_s) in readings else force_n
     settings = sorted(history.settings)
     anchors_s = (
         rows[0]["time_s"],

@@ -5,26 +5,36 @@ import struct
 from collections import deque
 from collections.abc import Callable
 from ipaddress import ip_address
+from math import inf
 
 from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Observer
-from tests.simulation.masters.spelling import control_of, setpoints_of
+from tests.simulation.masters.spelling import BEAT, control_of, setpoints_of, word_of
 
 UNAVAILABLE = 0x8000
 LONGEST_MS = 32767  # a register holds no more
 LARGEST_PLACE, TAKE, MARGIN_S = 255, 8, 0.005
 """Of serial faces, which are shown as an owner, too; who takes over; how late an answer tells of its write."""
 FAULT_BIT, ENABLED_BIT = 16, 1
+WARNING_BIT, LIMITED_BIT, UNREACHABLE_BIT = 32, 64, 128
 AGE_SLACK_S = 0.012
 """And two periods: a tick that finds a fresh sample decides nothing, and the age is that of the last decision."""
 SETTLED_S = 0.5
 """A voltage that has not changed for so long is the one that has been asked for as long, wherever the wire works."""
 COUNT_V = 0.012
+SCALES = (1.0, 1.0, 0.01, 0.01, 0.01, 0.01, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+SIGNED = frozenset((2, 3, 4, 5, 6, 7, 8, 12, 13))
+"""Of the first of the status registers."""
+SAME_S, BEATEN_S = 1e-6, 5.0
+MASTER_LOST, RELEASED_S = 1, 0.3
 LATE_LOOKS, WRITTEN_S = 3, 0.6
 """A written setpoint is looked for in this time before it is seen, and until so many looks later."""
 
 
 class StatusWitness:
     """heard_s: when the load cell's wire has brought its last byte."""
+
+    _state, _held_s = 0, 0.0
+    _words: tuple[int, ...] = ()
 
     def __init__(self, observer: Observer, heard_s: Callable[[], float]) -> None:
         self._observer, self._heard_s = observer, heard_s
@@ -33,14 +43,23 @@ class StatusWitness:
         self._owner, self._commands = 0, list[tuple[float, str, int]]()
         self._requested: deque[tuple[float, int]] = deque()
         self._written: deque[tuple[float, float]] = deque()
+        self._beats: deque[tuple[float, float]] = deque()
+        self._echoes: deque[tuple[float, int]] = deque()
+        self._beat, self._refused_s, self._write_s = 0, inf, 0.0
 
     def note(self, block: bytes, at_s: float) -> None:
         """Judge the status block as it was at at_s."""
         words = struct.unpack(f">{STATUS_WORDS}H", block)
         self._judge_state(words, at_s)
+        self._state, self._words = words[1], words
         self._judge_age(words[12], at_s)
         self._judge_voltage(words[6], at_s)
         self._judge_owner(words[16] << 16 | words[17], at_s)
+        self._judge_refusal(words[19], at_s)
+        self._judge_released(words, at_s)
+        self._echoes.append((at_s, words[14]))
+        if len(self._echoes) > LATE_LOOKS:
+            self._judge_echo()
         self._requested.append((at_s, words[3]))
         if len(self._requested) > LATE_LOOKS:
             self._judge_requested()
@@ -52,10 +71,58 @@ class StatusWitness:
         if (control := control_of(pdu)) is not None:
             self._commands.append((now_s, host, control))
         self._written += ((now_s, counts) for counts in setpoints_of(pdu))
+        self._write_s = max(self._write_s, now_s)
+        if (beat := word_of(pdu, BEAT)) is not None:
+            self._beats.append((now_s, beat))
+
+    def note_refusal(self, now_s: float) -> None:
+        """A request was refused."""
+        self._refused_s = min(self._refused_s, now_s)
 
     def forget_owner(self) -> None:
-        """Another gateway begins: it has none, whoever had the one before."""
-        self._owner = 0
+        """Another gateway begins: it has none, whoever had the one before, and has refused nothing."""
+        self._owner, self._refused_s = 0, inf
+
+    def note_floats(self, block: bytes, at_s: float) -> None:
+        """Judge the same quantities as float32, read with the block before."""
+        if at_s - self._last_s > SAME_S:
+            return
+        for place, (number, word) in enumerate(
+            zip(struct.unpack(f">{len(SCALES)}f", block), self._words, strict=False)
+        ):
+            scale = SCALES[place]
+            is_signed = place in SIGNED
+            counts = word - 65536 if is_signed and word & UNAVAILABLE else word
+            is_same = counts == -UNAVAILABLE if number != number else abs(number - counts * scale) <= 0.51 * scale
+            if not is_same and not (is_signed and abs(counts) >= LONGEST_MS):
+                self._observer.complain("I10", f"status {place} is {word} and as a float {number}", at_s)
+
+    def note_control_word(self, word: int, at_s: float) -> None:
+        """Judge the control word, read with the block before: off and a fault leave no enable standing."""
+        if word & ENABLED_BIT and self._state in (0, FAULT) and at_s - self._last_s < SAME_S:
+            self._observer.complain("I10", f"control_word {word:#x} in state {self._state}", at_s)
+
+    def _judge_refusal(self, reason: int, at_s: float) -> None:
+        """Each refusal leaves its reason."""
+        if self._refused_s < at_s - MARGIN_S and not reason:
+            self._observer.complain("I10", "something was refused, and no reason is told", at_s)
+            self._refused_s = inf
+
+    def _judge_released(self, words: tuple[int, ...], at_s: float) -> None:
+        """A lease's end releases the setpoint, until somebody commands anew."""
+        owner, is_lost = words[16] << 16 | words[17], words[1] == FAULT and words[10] == MASTER_LOST
+        self._held_s = self._held_s if is_lost else at_s
+        if owner and is_lost and self._write_s < self._held_s and at_s - self._held_s > RELEASED_S:
+            self._observer.complain("owner", f"{owner:#x} owns behind its lease's end", at_s)
+
+    def _judge_echo(self) -> None:
+        """As `_judge_requested`: a heartbeat of a write that was refused is never used."""
+        at_s, beat = self._echoes.popleft()
+        while self._beats and self._beats[0][0] < at_s - BEATEN_S:
+            self._beats.popleft()
+        if beat not in (0, self._beat) and not any(one == beat or one != one for _, one in self._beats):
+            self._observer.complain("I7", f"heartbeat {beat} is used, which nobody has written", at_s)
+        self._beat = beat
 
     def _judge_requested(self) -> None:
         """A look of some time ago: who hears no answer tells so late."""
@@ -84,8 +151,14 @@ class StatusWitness:
     def _judge_state(self, words: tuple[int, ...], at_s: float) -> None:
         if bool(words[0] & FAULT_BIT) != (words[1] == FAULT):
             self._observer.complain("I10", f"status word {words[0]:#x} in state {words[1]}", at_s)
-        if words[0] & ENABLED_BIT and words[1] in (0, FAULT):
-            self._observer.complain("I10", f"enabled in state {words[1]}", at_s)
+        if bool(words[0] & ENABLED_BIT) == (words[1] in (0, FAULT)):
+            self._observer.complain("I10", f"status word {words[0]:#x} in state {words[1]}", at_s)
+        if words[1] in (0, FAULT) and (words[4] or words[5]):
+            told = f"{words[4]} and {words[5]} counts are pursued in state {words[1]}"
+            self._observer.complain("I10", told, at_s)
+        for bit, word in ((WARNING_BIT, words[11]), (LIMITED_BIT, words[9]), (UNREACHABLE_BIT, words[11] & 1 << 1)):
+            if bool(words[0] & bit) != bool(word):
+                self._observer.complain("I10", f"status word {words[0]:#x} beside {word:#x}", at_s)
 
     def _judge_age(self, age_ms: int, at_s: float) -> None:
         """No sample is younger than the last byte that has come. What is read first after a standstill is as it was before."""

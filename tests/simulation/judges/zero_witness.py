@@ -17,6 +17,8 @@ SILENT = frozenset(("output.silent", "cell.silent"))
 class ZeroWitness:
     """pressing_n: what the air presses with now; heard_falsely_s: when the output's answers were spoiled last."""
 
+    rest_n = 0.0
+    """What the air presses with at the safe voltage: whoever tares then is told so."""
     _other_s = -UNKNOWN_S
 
     def __init__(
@@ -32,5 +34,5 @@ class ZeroWitness:
     def note_zero(self, now_s: float) -> None:
         """A zero has been taken."""
         is_known = now_s - max(self._other_s, self._heard_falsely_s()) > UNKNOWN_S
-        if is_known and (pressing_n := self._pressing_n()) > MOST_N:
+        if is_known and (pressing_n := self._pressing_n()) > self.rest_n + MOST_N:
             self._observer.complain("zero", f"it was taken while the air pressed with {pressing_n:.1f} N", now_s)

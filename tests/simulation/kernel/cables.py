@@ -56,6 +56,9 @@ class Cable:
         self.reworded = (b"", b"")  # what the device says, and from now on says instead
         self._character_s = settings.character_s
         self._to_device, self._to_host = Direction(), Direction()
+        self.adapter_s = (
+            0.0  # its adapter hands over what has come every so often; 0: each message as soon as it is whole
+        )
 
     def cut(self) -> None:
         """What was on the wire is lost."""
@@ -149,10 +152,24 @@ class Cable:
         now_s = self._outside.time()
         begin_s = max(now_s, direction.through_s)
         data = data[: max(0, MOST_QUEUED - int((begin_s - now_s) / self._character_s))]
-        if data:
+        if data and self.adapter_s and direction is self._to_host:
+            self._put_in_pieces(direction, data, begin_s)
+        elif data:
             direction.through_s = through_s = begin_s + len(data) * self._character_s
             direction.waiting.append((begin_s, data))
             self._outside.call_at(through_s + 1e-9, take, direction, data)
+
+    def _put_in_pieces(self, direction: Direction, data: bytes, begin_s: float) -> None:
+        direction.through_s = begin_s + len(data) * self._character_s
+        turn, sent = ceil(begin_s / self.adapter_s), 0
+        while sent < len(data):
+            come = min(len(data), int((turn * self.adapter_s - begin_s) / self._character_s))
+            if come > sent:
+                direction.waiting.append((begin_s, data[sent:come]))
+                at_s = max(turn * self.adapter_s, self._outside.time()) + 1e-9
+                self._outside.call_at(at_s, self._reach_host, direction, data[sent:come])
+                sent = come
+            turn += 1
 
     def _arrive(self, direction: Direction, data: bytes) -> None:
         direction.waiting.popleft()

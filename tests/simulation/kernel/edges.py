@@ -6,8 +6,9 @@ import os
 import re
 from collections import deque
 from collections.abc import Callable
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
+from random import Random
 from types import SimpleNamespace
 from typing import Any, ClassVar
 from weakref import WeakSet
@@ -27,6 +28,7 @@ TWIN_STEP_S = 10e-3
 """The period of the fastest loop. At its own step of 1 ms the twin takes a third of the processor's time."""
 DISK_S = (0.001, 0.08)
 DONE_AT_ONCE_S = 0.04
+MOST_CALLS = 16
 CHOSEN = re.compile(r"\d")
 HOST = re.compile(r"10\.0\.0\.\d+|serial:\d+")
 """The lines of each cause are limited, so it may name a client, and no number of what that has written."""
@@ -45,9 +47,12 @@ class SimulatedDisk:
     is_gone = is_hung = False
     folder = Path()
     hung: ClassVar[WeakSet["SimulatedDisk"]] = WeakSet()
+    working: ClassVar[WeakSet["SimulatedDisk"]] = WeakSet()
+    chance: ClassVar[Random] = Random(0)
 
     def __init__(self) -> None:
         self._free_s = 0.0
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._waiting: deque[tuple[Callable[[], Any], bool]] = deque()  # and whether somebody wants the result
         self._results: deque[Any] = deque()
         self._held: deque[tuple[asyncio.AbstractEventLoop, Callable[[Any], None]]] = deque()
@@ -55,6 +60,8 @@ class SimulatedDisk:
     def __call__(self, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
         loop, delay_s = asyncio.get_running_loop(), type(self).delay_s()
         self._free_s = max(self._free_s, loop.time()) + delay_s
+        self._loop = loop
+        self.working.add(self)
         self._waiting.append((work, True))
         if delay_s < DONE_AT_ONCE_S:
             self._work_off()
@@ -93,6 +100,16 @@ class SimulatedDisk:
             result = self._result(work)
             if is_wanted:
                 self._results.append(result)
+
+    @classmethod
+    def kill(cls, loop: asyncio.AbstractEventLoop) -> None:
+        """The process of this loop is killed: of the calls that its work is made of the first have been made, up to any."""
+        for disk in tuple(cls.working):
+            if disk._loop is loop and disk._waiting and not cls.is_hung and not cls.fails:
+                work, _ = disk._waiting.popleft()
+                disk._waiting.clear()
+                with suppress(Exception), watching(FailingDisk(cls.folder, "broken", cls.chance.randrange(MOST_CALLS))):
+                    work()
 
     @classmethod
     def do(cls, work: Callable[[], Any]) -> Any:

@@ -5,6 +5,7 @@ stopped, killed and gone, and who starts the guardian again when it has ended, a
 """
 
 import asyncio
+import errno
 import os
 import signal
 from collections.abc import Callable
@@ -61,6 +62,8 @@ class SimulatedProcess(Child):
             _close(self.beat)
 
     def kill(self) -> None:
+        if self.exit_code is None:
+            SimulatedDisk.kill(self.loop)
         self.leave(-signal.SIGKILL)
 
     def wait(self, bound_s: float = 0.0) -> int:
@@ -138,6 +141,7 @@ class SimulatedService:
     """
 
     thaws_s = 0.0
+    _refused_until_s = 0.0
 
     def __init__(
         self, rig: Rig, state: Path, outside: VirtualLoop, log: Log, clock: VirtualClock, *, records: bool = False
@@ -261,7 +265,9 @@ class SimulatedService:
         guardian.share_memory()
         _close(guardian.ring)  # nobody reads along here
         guardian.ring = None
-        guardian._start_control()
+        if guardian._start_control() is not None:
+            self._end_guardian(guardian)
+            return
         self._wake()
 
     def _wake(self) -> None:
@@ -301,7 +307,13 @@ class SimulatedService:
 
     # -- control
 
+    def refuse_processes(self, duration_s: float) -> None:
+        """A machine that has none to give for so long."""
+        self._refused_until_s = self._clock.now_s + duration_s
+
     def _spawn(self, arguments: dict[str, Any]) -> SimulatedProcess:
+        if self._clock.now_s < self._refused_until_s:
+            raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
         process = SimulatedProcess(_FIRST_PID + len(self._processes), self._clock, self._on_death)
         process.beat = arguments["beat"] = os.dup(arguments["beat"])
         self._processes.append(process)

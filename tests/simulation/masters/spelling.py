@@ -61,15 +61,22 @@ def floats_pdu(address: int, *numbers: float, is_swapped: bool) -> bytes:
 
 @dataclass(frozen=True)
 class Wish:
-    """What a master commands. voltage_v: drive this instead of a force, None for a force; beat: its heartbeat."""
+    """What a master commands. voltage_v: drive this instead of a force, None for a force; beat: its heartbeat;
+    program: of one that writes its whole block, in counts: ramp, force before contact, ramp from the contact on, width of the
+    band and time in it."""
 
     control: int
     force_n: float
     beat: int
     voltage_v: float | None = None
+    program: tuple[int, ...] = ()
 
     @property
     def words(self) -> tuple[int, ...]:
+        if self.program:
+            ramp, before_n, contact_ms, *band = self.program
+            block = (self.control, round(100 * self.force_n), ramp, 0, self.beat, 0)
+            return (*block, 0, before_n, contact_ms, 0, self.beat & 0x7FFF, *band)
         block = (self.control, round(100 * self.force_n), 0)
         return (*block, 0, self.beat) if self.voltage_v is None else (*block, 1, self.beat, round(1e3 * self.voltage_v))
 
@@ -108,6 +115,27 @@ WAYS: dict[str, Way] = {
 def written_address(pdu: bytes) -> int:
     """The first address that a write changes."""
     return int.from_bytes(pdu[5:7] if pdu[0] == 23 else pdu[1:3])
+
+
+MODE, BEAT = 3, 4
+
+
+def word_of(pdu: bytes, place: int) -> float | None:
+    """What a write would set this word of the command to; None where it is not among what it writes, not a number where nobody
+    can tell."""
+    data = {6: pdu[3:5], 16: pdu[6:], 23: pdu[10:]}.get(pdu[0], b"")
+    address = written_address(pdu)
+    if pdu[0] == 22:
+        return nan if address == place or address >= 200 else None
+    if data and address <= place and len(data) >= 2 * (place + 1 - address):
+        return float(struct.unpack_from(">H", data, 2 * (place - address))[0])
+    for first in (200 + 2 * place, 300 + 2 * place):
+        at = 2 * (first - address)
+        if data and -2 <= at < len(data):
+            four = data[at : at + 4] if at >= 0 else b""
+            four = four if first < 300 else four[2:] + four[:2]
+            return float(struct.unpack(">f", four)[0]) if len(four) == 4 else nan
+    return None
 
 
 def setpoints_of(pdu: bytes) -> tuple[float, ...]:

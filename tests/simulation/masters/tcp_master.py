@@ -15,8 +15,12 @@ from tests.simulation.masters.spelling import (
     WAYS,
     WRITES,
     Wish,
+    coil_pdu,
+    coils_pdu,
     control_of,
+    mask_pdu,
     read_and_write_pdu,
+    read_pdu,
     write_one_pdu,
     write_pdu,
     written_address,
@@ -27,6 +31,12 @@ RUNS = {"calibrate": 32, "self_test": 64}
 """Bits that start a run, which lasts while they stand."""
 BEATS_S = (0.08, 0.1, 0.15)
 """Time between two heartbeats of one that works: more than once within a lease of 0.2 s."""
+UNITS = frozenset((0, 1, 255))
+EXCEPTIONS = frozenset((1, 2, 3, 4, 6, 11))
+STOPS = frozenset(
+    (write_one_pdu(0, 0), write_pdu(0, 0), coil_pdu(0, on=False), coils_pdu(0, 0, 1), mask_pdu(0, 0xFFFE, 0))
+)
+READS = frozenset((read_pdu(100, 20), read_pdu(102, 1), read_pdu(0, 13)))
 RESET_S = 0.3
 """Until what a reset has changed is seen: some ticks."""
 
@@ -38,6 +48,7 @@ class Asked:
     transaction: int
     pdu: bytes
     control: int | None
+    unit: int = 1
 
 
 class Master:
@@ -46,6 +57,8 @@ class Master:
 
     badge: tuple[str, str] = ("", "")
     on_pdu: Callable[[bytes, bool], None] = staticmethod(lambda pdu, is_answered: None)
+    on_refusal: Callable[[], None] = staticmethod(lambda: None)
+    _is_hung = False
 
     def __init__(
         self,
@@ -123,7 +136,7 @@ class Master:
 
     def _frame(self, pdu: bytes, unit: int = 1) -> bytes:
         self._transaction = (self._transaction + 1) & 0xFFFF
-        self._waiting.append(Asked(self._transaction, pdu, control_of(pdu)))
+        self._waiting.append(Asked(self._transaction, pdu, control_of(pdu), unit))
         return struct.pack(">HHHB", self._transaction, 0, len(pdu) + 1, unit) + pdu
 
     def _send(self, data: bytes) -> None:
@@ -174,12 +187,21 @@ class Master:
 
     def hold(self, force_n: float, control: int = ENABLE, way: str = "block", voltage_v: float | None = None) -> None:
         """Command this force, or this voltage, and beat from now on; way: of WAYS."""
-        self._wish, self._way = Wish(control, force_n, self._beat, voltage_v), WAYS[way]
+        self._wish, self._way, self._is_hung = Wish(control, force_n, self._beat, voltage_v), WAYS[way], False
         self._beating += 1
         if self._way.beat:
             for pdu in self._way.begin(self._wish):
                 self.ask(pdu)
         self._keep_beating(self._beating)
+
+    def program(self, force_n: float, *numbers: float) -> None:
+        """Command by the whole block from now on."""
+        self.hold(force_n, ENABLE)
+        self._wish = replace(self._wish, program=tuple(map(int, numbers)))
+
+    def hang(self) -> None:
+        """Go on with the last frame, whose heartbeat stays as it was."""
+        self._is_hung = True
 
     def run(self, name: str) -> None:
         """Clear what is latched, start a run by its bit, and beat from now on."""
@@ -216,7 +238,7 @@ class Master:
 
     def _keep_beating(self, number: int) -> None:
         if number == self._beating:
-            self._beat += 1
+            self._beat += not self._is_hung
             wish = self._wish = replace(self._wish, beat=self._beat)
             for pdu in (self._way.beat(wish),) if self._way.beat else self._way.begin(wish):
                 self.ask(pdu)
@@ -250,6 +272,8 @@ class Master:
             return
         self.heard.append((self._outside.time(), pdu))
         del self.heard[:-64]
+        if pdu[0] & 0x80:
+            self._judge_refusal(asked, pdu[1])
         if pdu[0] in WRITES:
             self._judge_role(asked.pdu)
             self._tell(asked, True)
@@ -268,6 +292,16 @@ class Master:
         is_coil = asked[0] in (5, 15)
         if role == "monitor" or (role == "setpoint" and 1000 <= address < 1200 and not is_coil):
             self.complaints.append(f"I7: {name} with the role {role} wrote {asked.hex()}, which was taken")
+
+    def _judge_refusal(self, asked: Asked, code: int) -> None:
+        """Whoever may write at all may clear enable, and every refusal has a code that the map knows."""
+        self.on_refusal()
+        if code not in EXCEPTIONS:
+            self.complaints.append(f"I8: {self.name} asked {asked.pdu.hex()}, was refused with {code}")
+        if asked.pdu in READS and asked.unit in UNITS:
+            self.complaints.append(f"I12: {self.name} asked {asked.pdu.hex()}, was refused with {code}")
+        if asked.pdu in STOPS and asked.unit in UNITS and self.badge[1] != "monitor":
+            self.complaints.append(f"stop: {self.name} clears enable by {asked.pdu.hex()}, was refused with {code}")
 
     def note_answer(self, asked: bytes, answer: bytes) -> None:
         """For those who want to know."""

@@ -1,0 +1,53 @@
+"""Whether a master's lease is renewed by what renews it: a heartbeat that changes, or an enable's rise. Frames that flow with
+one and the same heartbeat, reads and refused writes renew nothing. No code of the gateway is used here."""
+
+from math import inf, isnan
+
+from tests.simulation.judges.observer import DOWN_S, Observer
+from tests.simulation.masters.spelling import BEAT, control_of, word_of
+
+RUN_BITS = 32 | 64
+ON_WIRE_S = 0.04
+"""20 ms, and two sentences at 9600 baud."""
+
+
+class LeaseJudge:
+    """Told of each write of a master: in its order, before the observer is."""
+
+    def __init__(self, observer: Observer) -> None:
+        self._observer = observer
+        self._beat: float | None = None
+        """What the register holds; None where nobody knows."""
+        self._renewed_s = -inf
+
+    def note_write(self, pdu: bytes, now_s: float, *, is_answered: bool) -> None:
+        """A write was taken, or nobody knows whether it was."""
+        beat, control = word_of(pdu, BEAT), control_of(pdu)
+        begins = control is not None and (control < 0 or control & RUN_BITS or self._observer.disabled_s is not None)
+        if begins or not is_answered or (beat is not None and (isnan(beat) or beat != self._beat)):
+            self._renewed_s = max(self._renewed_s, now_s)
+        if beat is not None:
+            self._beat = beat if is_answered and not isnan(beat) else None
+
+    def note_local_run(self, now_s: float) -> None:
+        """A run that a person watches at the machine needs no master."""
+        self._renewed_s = max(self._renewed_s, now_s)
+
+    def look(self, now_s: float) -> None:
+        """Judge the voltage that stands now."""
+        observer, bounds = self._observer, self._observer.bounds
+        if observer.is_safe or observer.output_lost_s is not None or observer.control_lost_s is not None:
+            return
+        is_down = observer.is_run or now_s - observer.run_ended_s < DOWN_S
+        bound_s = (
+            bounds.lease_s + max(bounds.lost_down_s, DOWN_S if is_down else 0.0) + 2.0 * bounds.period_s + ON_WIRE_S
+        )
+        if (
+            observer.answers_lost_s is not None
+            or now_s - observer.answer_spoiled_s < 2.0 * bounds.reply_timeout_s + 0.1
+        ):
+            bound_s += bounds.reply_timeout_s + 0.05
+        if now_s - self._renewed_s > bound_s:
+            told = f"{observer.voltage_v:.3f} V, {now_s - self._renewed_s:.3f} s behind the last heartbeat that changed"
+            observer.complain("I3 heartbeat", told, now_s)
+            self._renewed_s = now_s

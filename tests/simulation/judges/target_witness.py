@@ -1,0 +1,60 @@
+"""Whether it is said that a force does not come, and that one has come, whatever is disturbed: a target that is not reached for
+so long is told as that, and `in_band` is what the readings say. No code of the gateway is used here.
+"""
+
+import struct
+
+from tests.simulation.judges.observer import STATUS_WORDS, Observer
+
+IN_BAND, SWITCHING, UNREACHABLE = 1 << 3, 1 << 9, 1 << 1
+COUNT_N = 0.01
+LEAST_N, OFF_N, HELD_OFF_S = 5.0, 2.0, 3.5
+"""A target of so much, missed by so much, for so long: two seconds, and what a smoothed reading takes."""
+BAND_N, MORE_N, LOOKS = 1.0, 1.0, 4
+"""Of the rig's own band; what readings and their mean differ by; for so many looks on end."""
+SHARE, COME_S = 0.4, 1.5
+LONGEST_BAND_S = 0.2
+HOLDING = 3
+
+
+class TargetWitness:
+    """Told of each look at the status block. band_n, band_s: what the command block says of it, 0 for the rig's own."""
+
+    band_n = band_s = 0.0
+    _held = 0, 0
+    _off_s = _out_s = 0.0
+    _false = 0
+
+    def __init__(self, observer: Observer) -> None:
+        self._observer = observer
+
+    def note(self, block: bytes, at_s: float) -> None:
+        """Judge the status block as it was at at_s. A voltage that is driven has no target, and a band of its own."""
+        words = struct.unpack(f">{STATUS_WORDS}h", block)
+        held = words[4], words[5]
+        is_held = words[1] in (1, 2, HOLDING) and not words[0] & SWITCHING and words[2] != -32768 and held == self._held
+        self._held = held
+        error_n = abs(abs(words[2]) - words[4]) * COUNT_N
+        self._judge_unreached(words, at_s, is_off=is_held and error_n > OFF_N and words[4] * COUNT_N >= LEAST_N)
+        self._judge_in_band(words, error_n, at_s, is_held=is_held and 0 < words[4] == words[5])
+
+    def _judge_unreached(self, words: tuple[int, ...], at_s: float, *, is_off: bool) -> None:
+        if not is_off or words[11] & UNREACHABLE:
+            self._off_s = at_s
+        if at_s - self._off_s > HELD_OFF_S:
+            self._complain("unreached", words, at_s)
+            self._off_s = at_s
+
+    def _judge_in_band(self, words: tuple[int, ...], error_n: float, at_s: float, *, is_held: bool) -> None:
+        band_n, is_shown = self.band_n or BAND_N, bool(words[0] & IN_BAND)
+        self._false = self._false + 1 if is_held and is_shown and error_n > band_n + MORE_N else 0
+        is_in = is_held and words[1] == HOLDING and error_n < SHARE * band_n and self.band_s <= LONGEST_BAND_S
+        if not is_in or is_shown:
+            self._out_s = at_s
+        if self._false >= LOOKS or at_s - self._out_s > COME_S:
+            self._complain("in band" if is_shown else "not in band", words, at_s)
+            self._false, self._out_s = 0, at_s
+
+    def _complain(self, what: str, words: tuple[int, ...], at_s: float) -> None:
+        force, target = words[2] * COUNT_N, words[4] * COUNT_N
+        self._observer.complain("target", f"{what}: {force:.2f} N of {target:.2f} N, status {words[0]:#x}", at_s)

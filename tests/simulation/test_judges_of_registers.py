@@ -1,0 +1,118 @@
+"""Those who judge registers: a word of the command that nobody has written, what is done more often than asked for, a float
+that is not what its word is."""
+
+import struct
+from math import inf, nan
+
+import pytest
+
+from tests.simulation.judges.command_witness import WORDS, CommandWitness, Counted
+from tests.simulation.judges.observer import STATUS_WORDS, Bounds, Observer
+from tests.simulation.judges.status_witness import SCALES, StatusWitness
+from tests.simulation.judges.target_witness import TargetWitness
+from tests.simulation.masters.spelling import floats_pdu, write_one_pdu, write_pdu
+
+BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05, output_timeout_s=0.2)
+
+
+@pytest.mark.parametrize(
+    ("pdu", "later", "is_seen"),
+    [
+        (write_pdu(7, 300), 300, False),
+        (write_pdu(7, 300), 301, True),
+        (write_pdu(6, 0, 300, 5), 300, False),
+        (floats_pdu(214, 3.0, is_swapped=False), 300, False),
+        (write_one_pdu(8, 300), 300, True),
+    ],
+)
+def test_a_word_of_the_command_that_nobody_has_written_is_seen(pdu: bytes, later: int, is_seen: bool) -> None:
+    observer = Observer(BOUNDS)
+    witness = CommandWitness(observer)
+    witness.note(bytes(2 * WORDS), 1.0)
+    witness.note_write(pdu, 1.1)
+    for number in range(6):
+        witness.note(struct.pack(f">{WORDS}H", *[0] * 7, later, *[0] * 5), 1.2 + 0.1 * number)
+    assert [line.partition(" at ")[0] for line in observer.broken] == ["I7"] * is_seen
+
+
+def test_a_setpoint_is_lowered_by_a_calibration_and_never_raised() -> None:
+    observer = Observer(BOUNDS)
+    witness = CommandWitness(observer)
+    witness.note_write(write_one_pdu(1, 5000), 1.0)
+    for number, counts in enumerate((5000, 4000, 4000, 4500, 0, 0, 0)):
+        witness.note(struct.pack(f">{WORDS}H", 1, counts, *[0] * 11), 1.0 + 2.0 * number)
+    assert len(observer.broken) == 1
+
+
+@pytest.mark.parametrize(
+    ("asked", "done", "is_seen"),
+    [
+        ((True, True), 2, False),
+        ((True, True), 1, True),
+        ((True, True), 3, True),
+        ((True, False), 1, False),
+        ((), 1, True),
+    ],
+)
+def test_what_is_done_more_or_less_often_than_asked_for_is_seen(
+    asked: tuple[bool, ...], done: int, is_seen: bool
+) -> None:
+    counted = Counted("a zero was taken")
+    for is_sure in asked:
+        counted.note_asked(is_sure=is_sure)
+    for _ in range(done):
+        counted.note_done()
+    assert bool(counted.judge()) is is_seen
+
+
+@pytest.mark.parametrize(
+    ("place", "word", "number", "is_seen"),
+    [
+        (2, 1234, 12.34, False),
+        (2, 1234, 1234.0, True),
+        (2, 0x8000, nan, False),
+        (2, 0, nan, True),
+        (2, 65526, -0.1, False),
+    ],
+)
+def test_a_float_that_is_not_what_its_word_is_is_seen(place: int, word: int, number: float, is_seen: bool) -> None:
+    observer = Observer(BOUNDS)
+    witness = StatusWitness(observer, lambda: inf)
+    words, numbers = [0] * STATUS_WORDS, [0.0] * len(SCALES)
+    words[place], numbers[place] = word, number
+    witness.note(struct.pack(f">{STATUS_WORDS}H", *words), 1.0)
+    witness.note_floats(struct.pack(f">{len(SCALES)}f", *numbers), 1.0)
+    assert bool(observer.broken) is is_seen
+
+
+def look_at_target(witness: TargetWitness, seconds: float, **registers: int) -> None:
+    places = {"word": 0, "state": 1, "measured": 2, "accepted": 4, "applied": 5, "warnings": 11}
+    words = [0] * STATUS_WORDS
+    for name, value in ({"state": 3, "word": 1, "accepted": 2000, "applied": 2000} | registers).items():
+        words[places[name]] = value
+    for number in range(round(10 * seconds)):
+        witness.note(struct.pack(f">{STATUS_WORDS}h", *words), 1000.0 + 0.1 * number)
+
+
+@pytest.mark.parametrize(
+    ("registers", "seconds", "is_seen"),
+    [
+        ({"measured": 1700}, 4.5, True),
+        ({"measured": 1700}, 3.0, False),
+        ({"measured": 1700, "warnings": 2}, 4.5, False),
+        ({"measured": 1700, "word": 513}, 4.5, False),
+        ({"measured": 0, "applied": 300, "state": 1}, 4.5, True),
+        ({"measured": 1850}, 4.5, False),
+        ({"measured": -2000, "word": 9}, 4.5, False),
+        ({"measured": 1750, "word": 9}, 1.0, True),
+        ({"measured": 1850, "word": 9}, 1.0, False),
+        ({"measured": 1990}, 2.0, True),
+        ({"measured": 1990, "state": 2}, 2.0, False),
+    ],
+)
+def test_a_target_that_is_missed_without_a_word_and_a_false_band_are_seen(
+    registers: dict[str, int], seconds: float, is_seen: bool
+) -> None:
+    observer = Observer(BOUNDS)
+    look_at_target(TargetWitness(observer), seconds, **registers)
+    assert {line.partition(" at ")[0] for line in observer.broken} == ({"target"} if is_seen else set())
