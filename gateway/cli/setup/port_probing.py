@@ -146,12 +146,14 @@ def _tell_silence(report: "PortReport") -> str:
 
 
 def _tell_heard(report: "PortReport") -> str:
-    from gateway.service.probing.port_probe import show_bytes
+    from gateway.service.probing.port_probe import is_text, show_bytes
 
     heard = {settings: data for settings, data in report.heard.items() if data}
     if not heard:
         return f"not one byte at {', '.join(report.heard)}: power, crossed wires, another port?"
-    settings, data = max(heard.items(), key=lambda one: len(one[1]))
+    settings, data = max(
+        heard.items(), key=lambda one: (is_text(one[1]), len(one[1]))
+    )  # noise comes at every other speed
     if parity := next(filter(None, map(_parity_of, heard.values())), None):
         settings, data = next(one for one in heard.items() if _parity_of(one[1]) == parity)
         text = show_bytes(_seven_bits(data))

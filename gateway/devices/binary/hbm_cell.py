@@ -19,8 +19,8 @@ from gateway.devices.profile import DeviceProfile
 from gateway.devices.template_codecs.cell import TemplateCellDevice, TemplateCellHost
 
 _END: Final = b"\r\n"
-_DIGITS: Final = re.compile(rb"[+-]?[0-9]+")
-"""Of an answer as ASCII (COF3), `+0012345`, the last four digits would be a value, the same at any force."""
+_TEXT: Final = re.compile(rb"[ -~]+")
+"""Of an answer as ASCII (COF3), `+0012345`, the last four digits would be a value, the same at any force; so of any line."""
 _STATUS_BITS: Final = 8  # the lowest byte of four
 
 
@@ -73,7 +73,7 @@ class HbmCellHost(TemplateCellHost):
                 continue
             value, self._buffer = self._buffer[: self._format.size], self._buffer[size:]
             before, self._before = self._before, b""
-            if before and _DIGITS.fullmatch(before + value):
+            if before and _TEXT.fullmatch(before + value):
                 dropped += value + _END
                 continue
             found += [Garbage(dropped)] if dropped else []

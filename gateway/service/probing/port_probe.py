@@ -220,11 +220,14 @@ async def listen_to_port(path: str, settings: Iterable[SerialSettings], duration
 def show_bytes(data: bytes) -> str:
     """Return bytes as people can read them: text as text, anything else in hexadecimal."""
     shown = data[:_SHOWN_BYTES]
-    text = shown.decode("ascii", "replace")
+    more = "..." if len(data) > _SHOWN_BYTES else ""
+    return (quote(shown.decode("ascii")) if is_text(data) else shown.hex(" ")) + more
+
+
+def is_text(data: bytes) -> bool:
+    """Decide whether what is shown of these bytes is text: a short binary answer may be all controls."""
+    text = data[:_SHOWN_BYTES].decode("ascii", "replace")
     printable = sum(one.isprintable() for one in text)
     controls = sum(one in f"\r\n{CONTROL_CHARACTERS}" for one in text)
-    is_all_shown = shown.isascii() and printable + controls == len(text)
-    is_text = is_all_shown and len(text.rstrip("\r\n")) <= 2 * printable  # a short binary answer may be all controls
-    is_text = is_text and printable > 0
-    more = "..." if len(data) > _SHOWN_BYTES else ""
-    return quote(text) + more if is_text else shown.hex(" ") + more
+    is_all_shown = text.isascii() and printable + controls == len(text)
+    return is_all_shown and printable > 0 and len(text.rstrip("\r\n")) <= 2 * printable
