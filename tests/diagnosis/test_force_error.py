@@ -12,6 +12,7 @@ from gateway.diagnosis.force_error import (
     error_blocks,
     rms_n,
 )
+from gateway.registers.words import State
 
 ROWS_HZ = 50.0
 
@@ -101,3 +102,31 @@ def test_a_pull_is_compared_with_a_pull_and_its_error_is_not_twice_the_force():
     pairs = ((pulled, pulled_later), (pushed, pushed_later))
     changes = [compare_runs(error_blocks(before), error_blocks(after)) for before, after in pairs]
     assert changes[0].blocks == changes[1].blocks != (0, 0), "levels a little apart are the same task"
+
+
+def test_a_row_counts_where_a_force_is_held_or_on_its_way_and_no_fault_stands() -> None:
+    """A way that is too slow is an error of the commanded force; what a fault let go of, or a calibration pressed, is none."""
+    states = list(State)
+    rows = len(states)
+    columns = {
+        "time_s": np.arange(rows, dtype=float),
+        "setpoint_n": np.full(rows, 10.0),
+        "force_n": np.full(rows, 9.0),
+        "state": np.array(states, dtype=float),
+        "fault_code": np.zeros(rows),
+    }
+    counted = [state for state, counts in zip(states, commanded_force(columns).counts, strict=True) if counts]
+    assert counted == [State.RAMPING, State.HOLDING]
+    columns["fault_code"] = np.full(rows, 310.0)
+    assert not commanded_force(columns).counts.any()
+
+
+def test_each_task_weighs_as_many_rows_as_the_run_with_fewer_of_them_has() -> None:
+    """By the larger number a run that stood for long at its hardest task would look worse than the other by that alone."""
+
+    def played(easy_rows: int, hard_rows: int) -> list[ErrorBlock]:
+        easy = ErrorBlock(10.0, 10.0, True, True, easy_rows, 1.0 * easy_rows)
+        return [easy, ErrorBlock(30.0, 30.0, True, True, hard_rows, 9.0 * hard_rows)]
+
+    change = compare_runs(played(100, 10), played(50, 40))
+    assert change.before_rms_n == change.after_rms_n == pytest.approx(((50 * 1.0 + 10 * 9.0) / 60) ** 0.5)

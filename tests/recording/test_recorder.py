@@ -105,16 +105,18 @@ def test_batches_that_are_missing_repeated_or_moved_are_said(tmp_path: Path) -> 
     data = path.read_bytes()
     ends = batch_ends(data, len(COLUMNS))
     head, batches = data[: ends[0]], [data[start:end] for start, end in pairwise(ends)]
-    for order, left, words in (
-        ((0, 1, 3), (0, 1, 3), "1 batches before byte"),
-        ((2, 3), (2, 3), "2 batches before byte"),
-        ((0, 1, 1, 2, 3), (0, 1, 2, 3), "batch 1 at byte"),
-        ((0, 2, 1, 3), (0, 2, 3), "batch 1 at byte"),
+    for order, left, words, notes in (
+        ((0, 1, 3), (0, 1, 3), "1 batches before byte", 1),
+        ((0, 2, 3), (0, 2, 3), "1 batches before byte", 1),
+        ((2, 3), (2, 3), "2 batches before byte", 1),
+        ((0, 1, 1, 2, 3), (0, 1, 2, 3), "batch 1 at byte", 1),
+        ((0, 2, 1, 3), (0, 2, 3), "batch 1 at byte", 2),
     ):
         path.write_bytes(head + b"".join(batches[number] for number in order))
         recording = read_recording(path)
         assert recording.columns["force_n"].tolist() == [3 * batch + row for batch in left for row in range(3)]
         assert recording.truncated and any(words in note for note in recording.notes)
+        assert len(recording.notes) == notes, "each gap is said once"
 
 
 def test_a_damaged_header_is_refused_and_not_guessed(tmp_path: Path) -> None:
