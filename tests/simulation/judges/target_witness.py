@@ -14,19 +14,24 @@ BAND_N, MORE_N, LOOKS = 1.0, 1.0, 4
 """Of the rig's own band; what readings and their mean differ by; for so many looks on end."""
 SHARE, COME_S = 0.4, 1.5
 LONGEST_BAND_S = 0.2
-HOLDING = 3
+HOLDING, NOTHING = 3, (-1, -1)
 
 
 class TargetWitness:
     """Told of each look at the status block. band_n, band_s: what the command block says of it, 0 for the rig's own."""
 
     band_n = band_s = 0.0
-    _held = 0, 0
+    _held, _writer = NOTHING, ""
     _off_s = _out_s = 0.0
     _false = 0
 
     def __init__(self, observer: Observer) -> None:
         self._observer = observer
+
+    def note_write(self, writer: str) -> None:
+        """Note whose write was taken: two masters who take the force from each other each have theirs between two looks."""
+        if writer != self._writer:
+            self._writer, self._held = writer, NOTHING
 
     def note(self, block: bytes, at_s: float) -> None:
         """Judge the status block as it was at at_s. A voltage that is driven has no target, and a band of its own."""
