@@ -224,6 +224,21 @@ KEPT: list[tuple[int, list[Event]]] = [
         ],
     ),
     (
+        873009,
+        [
+            Event(0.0718, "world", "no-air", (1.0,)),
+            Event(1.2202, "worker", "drive", (0.56,)),
+            Event(7.4461, "worker", "hold", (32.78,), way="swapped"),
+            Event(8.7497, "output", "torn", (2.0, 0.0094)),
+            Event(9.2576, "world", "sign-inverted", (1.0,)),
+            Event(9.8187, "worker", "reset"),
+            Event(9.9116, "rival", "tare"),
+            Event(10.2764, "worker", "hold", (44.52,)),
+            Event(10.3116, "rival", "tare"),
+            Event(10.8041, "machine", "terminate", (0.2698, -164734.0)),
+        ],
+    ),
+    (
         864986,
         [
             Event(2.3934, "rival", "take", (8.98,)),

@@ -211,6 +211,7 @@ class Simulation:
     def _note_pdu(self, host: str, pdu: bytes, is_answered: bool) -> None:
         self.status.note_write(host if is_answered else "", pdu, self._done_s(is_answered))
         self.explained.note_write(host, self.clock.now_s)
+        self.target.note_write(host)
         self.cell.note_mode(word_of(pdu, MODE))
         self.lease.note_write(pdu, self._done_s(is_answered), is_answered=is_answered)
         self.commands.note_write(pdu, self._done_s(is_answered))

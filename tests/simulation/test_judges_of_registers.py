@@ -85,13 +85,13 @@ def test_a_float_that_is_not_what_its_word_is_is_seen(place: int, word: int, num
     assert bool(observer.broken) is is_seen
 
 
-def look_at_target(witness: TargetWitness, seconds: float, **registers: int) -> None:
+def look_at_target(witness: TargetWitness, seconds: float, begun_s: float = 1000.0, **registers: int) -> None:
     places = {"word": 0, "state": 1, "measured": 2, "accepted": 4, "applied": 5, "warnings": 11}
     words = [0] * STATUS_WORDS
     for name, value in ({"state": 3, "word": 1, "accepted": 2000, "applied": 2000} | registers).items():
         words[places[name]] = value
     for number in range(round(10 * seconds)):
-        witness.note(struct.pack(f">{STATUS_WORDS}h", *words), 1000.0 + 0.1 * number)
+        witness.note(struct.pack(f">{STATUS_WORDS}h", *words), begun_s + 0.1 * number)
 
 
 @pytest.mark.parametrize(
@@ -116,3 +116,13 @@ def test_a_target_that_is_missed_without_a_word_and_a_false_band_are_seen(
     observer = Observer(BOUNDS)
     look_at_target(TargetWitness(observer), seconds, **registers)
     assert {line.partition(" at ")[0] for line in observer.broken} == ({"target"} if is_seen else set())
+
+
+@pytest.mark.parametrize(("masters", "is_seen"), [(1, True), (2, False)])
+def test_two_masters_who_take_a_target_from_each_other_have_none(masters: int, is_seen: bool) -> None:
+    observer = Observer(BOUNDS)
+    witness = TargetWitness(observer)
+    for number in range(9):
+        witness.note_write(f"10.0.0.{1 + number % masters}")
+        look_at_target(witness, 0.5, 1000.0 + 0.5 * number, measured=1700)
+    assert bool(observer.broken) is is_seen

@@ -14,24 +14,32 @@ BAND_N, MORE_N, LOOKS = 1.0, 1.0, 4
 """Of the rig's own band; what readings and their mean differ by; for so many looks on end."""
 SHARE, COME_S = 0.4, 1.5
 LONGEST_BAND_S = 0.2
-HOLDING = 3
+LONGEST_GAP_S = 0.5
+HOLDING, NOTHING = 3, (-1, -1)
 
 
 class TargetWitness:
     """Told of each look at the status block. band_n, band_s: what the command block says of it, 0 for the rig's own."""
 
     band_n = band_s = 0.0
-    _held = 0, 0
-    _off_s = _out_s = 0.0
+    _held, _writer = NOTHING, ""
+    _last_s = _off_s = _out_s = 0.0
     _false = 0
 
     def __init__(self, observer: Observer) -> None:
         self._observer = observer
 
+    def note_write(self, writer: str) -> None:
+        """Note whose write was taken: two masters who take the force from each other each have theirs between two looks."""
+        if writer != self._writer:
+            self._writer, self._held = writer, NOTHING
+
     def note(self, block: bytes, at_s: float) -> None:
         """Judge the status block as it was at at_s. A voltage that is driven has no target, and a band of its own."""
         words = struct.unpack(f">{STATUS_WORDS}h", block)
-        held = words[4], words[5]
+        if at_s - self._last_s > LONGEST_GAP_S:  # another gateway may have begun
+            self._held = NOTHING
+        held, self._last_s = (words[4], words[5]), at_s
         is_held = words[1] in (1, 2, HOLDING) and not words[0] & SWITCHING and words[2] != -32768 and held == self._held
         self._held = held
         error_n = abs(abs(words[2]) - words[4]) * COUNT_N
