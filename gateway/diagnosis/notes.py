@@ -35,12 +35,13 @@ def recording_notes(measurements: Sequence[Measurement], offsets_n: Sequence[flo
 def uninformative_force(measurements: Sequence[Measurement]) -> str:
     """Return why these recordings say nothing of the machine, as a sentence; empty where one of them does: its force moves."""
     whys = [_why_uninformative(each) for each in measurements]
-    return whys[0] if all(whys) else ""
+    return whys[0] if whys and all(whys) else ""
 
 
 def is_frozen(measurements: Sequence[Measurement]) -> bool:
     """Decide whether each of these recordings has one force in every row: a cell that is dead or repeats itself."""
-    return all(each.usable.any() and np.ptp(each.force_n[each.usable]) == 0.0 for each in measurements)
+    still = [each.usable.any() and np.ptp(each.force_n[each.usable]) == 0.0 for each in measurements]
+    return bool(still) and all(still)
 
 
 def _why_uninformative(measurement: Measurement) -> str:

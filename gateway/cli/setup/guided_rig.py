@@ -128,9 +128,7 @@ def _speed(answer: str) -> int:
 
     speeds = get_args(Baud)
     if not answer.isdecimal() or int(answer) not in speeds:
-        raise click.UsageError(
-            f"{answer} is no speed of a serial port; 9600 and 115200 are, from {speeds[0]} to {speeds[-1]}"
-        )
+        raise click.UsageError(f"{answer} is no speed of a serial port; known are {', '.join(map(str, speeds))}")
     return int(answer)
 
 
