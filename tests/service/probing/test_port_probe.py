@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from gateway.cli.main import command
-from gateway.cli.setup.port_probing import known_profiles, probe_path, tell_report
+from gateway.cli.setup.port_probing import PATIENCE_S, probe_path, tell_report
 from gateway.devices import SerialSettings, ValveDevice, cell_device
 from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import AskDevice, DeviceStep, Garbage, ReadPressure, ReadVoltage
@@ -117,12 +117,12 @@ def test_listening_says_what_comes_and_sends_nothing() -> None:
     assert module.heard == []
 
 
-@pytest.mark.parametrize(("name", "baud"), [("mantracourt-dsc", 115200), ("hbm-aed", 57600)])
-def test_a_device_is_found_behind_what_was_asked_before_it(name: str, baud: int) -> None:
+@pytest.mark.parametrize("names", [("laumas-tlb", "mantracourt-dsc"), ("hbm-aed",)])
+def test_a_device_is_found_behind_what_was_asked_before_it(names: tuple[str, ...]) -> None:
     """The laumas-tlb's question has no end of a line: a DSC heard it and its own as one, and answered neither."""
-    with behind_ptys(FarEnd(load_device(name), baud)) as (path,):
-        report = probe_path(path, known_profiles("load cell"))
-    assert [(one.profile.name, one.settings.baud) for one in report.answers] == [(name, baud)]
+    with behind_ptys(FarEnd(load_device(names[-1]), 57600)) as (path,):
+        report = probe_path(path, [load_device(one) for one in names], PATIENCE_S)
+    assert [(one.profile.name, one.settings.baud) for one in report.answers] == [(names[-1], 57600)]
 
 
 class SevenDataBits(FarEnd):
