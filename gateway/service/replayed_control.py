@@ -30,9 +30,7 @@ if TYPE_CHECKING:
 
 _BEGIN_S: Final = 1000.0  # of virtual time
 _REPORTED_ROWS: Final = 500
-_PHASE: Final = (
-    0.5  # of a tick, behind a row: nobody knows it; the one that comes within a period leaves the decision to it
-)
+_PHASE: Final = 0.5  # of a tick, behind a row: nobody knows it. One within a period leaves the decision to the row
 _LONGEST_GAP_S: Final = 5.0  # between two rows: behind it nothing new is decided
 _AT_ROW: Final = 0.05  # of a tick: one that is so near to the next row is that row's
 _SENT_DIGITS: Final = 4  # of the time of a setting, s: by each row that tells it

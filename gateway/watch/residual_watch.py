@@ -20,9 +20,7 @@ _FRESH_SHARE: Final = 0.6
 """Share of a window that must be younger than the last healthy one: half old and half new has a wrong name."""
 _ALL_ROWS: Final = 1 << 30
 _LONGEST_PAUSE_S: Final = 600.0  # between searches: a cause that has stood for long is looked at every ten minutes
-_MOST_DOUBLINGS: Final = (
-    16  # far beyond the longest pause of any interval; a week's windows are more than a float can carry
-)
+_MOST_DOUBLINGS: Final = 16  # far beyond the longest pause; the windows of a week are more than a float carries
 _WINDOWS_BEFORE_PAUSES: Final = 2
 """Windows in a row that show the same cause, from which on the search pauses longer and longer: more add nothing."""
 TOLERANCE_SHARE: Final = 0.25

@@ -56,9 +56,7 @@ class Cable:
         self.reworded = (b"", b"")  # what the device says, and from now on says instead
         self._character_s = settings.character_s
         self._to_device, self._to_host = Direction(), Direction()
-        self.adapter_s = (
-            0.0  # its adapter hands over what has come every so often; 0: each message as soon as it is whole
-        )
+        self.adapter_s = 0.0  # how often its adapter hands over what has come; 0: each message as soon as it is whole
 
     def cut(self) -> None:
         """What was on the wire is lost."""
