@@ -17,6 +17,7 @@ from gateway.diagnosis.bench.parameters import STARTS
 from gateway.diagnosis.bench.recording_drive import rows_after_unseen_settings
 from gateway.diagnosis.confidence import bound_confidences
 from gateway.diagnosis.experiments.identifiability import find_invisible_effects
+from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
 from gateway.diagnosis.model_fit.normal_equations import covariance, held_out_errors
 from gateway.diagnosis.noise.noise_floor import NoiseFloor, find_floor
@@ -284,14 +285,19 @@ def _rejected_effects(
 
 
 def _traces(bench: Bench, reported: ReportedModels) -> tuple[Trace, ...]:
-    """Rows behind an unseen setting were not judged: in the report's figures they were a residual that the answer denied."""
     before, after = bench.simulate([reported.base.parameters, reported.fitted.parameters])
-    judged = [replace(each, usable=each.usable & ~rows_after_unseen_settings(each)) for each in bench.measurements]
+    judged = [_judged_part(each) for each in bench.measurements]
     return tuple(
         Trace(judged[channel.recording], before[channel.rows], after[channel.rows])
         for channel in bench.channels
         if channel.is_force
     )
+
+
+def _judged_part(measurement: Measurement) -> Measurement:
+    """Rows behind an unseen setting were not judged: in the report's figures they were a residual that the answer denied."""
+    unseen = rows_after_unseen_settings(measurement)
+    return replace(measurement, usable=measurement.usable & ~unseen) if unseen.any() else measurement
 
 
 def _experiments_for_groups(causes: Sequence[Cause]) -> tuple[str, ...]:
