@@ -233,7 +233,8 @@ class ControlLoop:
         return waited_s_of(self._used_since_tick()) if late_s >= _LONG_SILENCE_S else None
 
     def _line(self, now_s: float) -> LineStatus:
-        late_s, output = self.last_tick.late_s(now_s), self.output
+        suspended_s, output = self.last_tick.suspended_s(), self.output
+        late_s = self.last_tick.late_s(now_s, suspended_s)
         return LineStatus(
             acknowledged_v=output.confirmed_v if self.is_watched else None,  # then no enable is taken
             standing_v=output.standing_v,
@@ -246,7 +247,7 @@ class ControlLoop:
             owner_connected=self.owner_connected,
             late_s=late_s,
             waited_s=self._waited_since_tick(late_s),  # for which the machine is to blame
-            suspended_s=self.last_tick.suspended_s(),
+            suspended_s=suspended_s,
             warnings=self.warnings,
             sent_v=output.sent_v,
             wire_s=output.round_trip_s,

@@ -24,8 +24,10 @@ class LastTick:
 
     def note(self, now_s: float, processor_time: ProcessorTime | None) -> None:
         """Note a tick."""
-        self.slept_s = self.suspended_s()
-        self._until_then_s = max(self._until_then_s, self._until_now_s())
+        until_s = self._until_now_s()
+        grown_s = until_s - self._until_then_s
+        self.slept_s = grown_s if grown_s > _WORTH_S else 0.0
+        self._until_then_s = max(self._until_then_s, until_s)
         self._time_s, self.processor_time = now_s, processor_time
 
     def suspended_s(self) -> float:
@@ -33,6 +35,6 @@ class LastTick:
         grown_s = self._until_now_s() - self._until_then_s
         return grown_s if grown_s > _WORTH_S else 0.0
 
-    def late_s(self, now_s: float) -> float:
+    def late_s(self, now_s: float, suspended_s: float) -> float:
         """Return the time since, s, that in which the machine was suspended with it."""
-        return 0.0 if self._time_s is None else now_s - self._time_s + self.suspended_s()
+        return 0.0 if self._time_s is None else now_s - self._time_s + suspended_s
