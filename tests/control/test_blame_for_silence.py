@@ -29,6 +29,12 @@ OUTPUT_FAULT = RefusalReason.OUTPUT_FAULT
         ),
         (Held(loop_late_s=0.24, loop_waited_s=0.01), False, "240 ms late in that time, only 10 ms of them waiting"),
         (Held(loop_late_s=0.24), False, "240 ms late in that time, not counted why: this machine stood still"),
+        (
+            Held(loop_late_s=0.24, loop_waited_s=0.01, loop_stolen_s=0.12),
+            True,
+            "240 ms late in that time; the host of this virtual machine kept a processor away for 120 ms",
+        ),
+        (Held(loop_late_s=0.24, loop_waited_s=0.01, loop_stolen_s=0.11), False, "this machine stood still"),
         (Held(rig_waited_s=0.2), True, "the simulated rig's process waited 200 ms of them for a processor"),
         (Held(rig_waited_s=0.02), False, "power or wires"),
         (Held(rig_stopped_s=0.25), False, "the simulated rig's process was stopped for 250 ms"),

@@ -248,6 +248,7 @@ class ControlLoop:
             late_s=late_s,
             waited_s=self._waited_since_tick(late_s),  # for which the machine is to blame
             suspended_s=suspended_s,
+            stolen_s=self._lateness.stolen_s() if self._lateness and late_s >= _LONG_SILENCE_S else 0.0,
             warnings=self.warnings,
             sent_v=output.sent_v,
             wire_s=output.round_trip_s,

@@ -136,6 +136,8 @@ def test_what_was_left_at_rest_before_an_enable_does_not_count_behind_it() -> No
         (READY._replace(late_s=0.5), FaultCode.LOOP_STALLED),
         (READY._replace(late_s=0.5, waited_s=0.1875), FaultCode.LOOP_STALLED),
         (READY._replace(late_s=0.5, waited_s=0.25), FaultCode.MACHINE_BUSY),
+        (READY._replace(late_s=0.5, waited_s=0.0, stolen_s=0.1875), FaultCode.LOOP_STALLED),
+        (READY._replace(late_s=0.5, waited_s=0.0, stolen_s=0.25), FaultCode.MACHINE_BUSY),
         (READY._replace(late_s=0.5, fault=FaultCode.OUTPUT_LOST), FaultCode.LOOP_STALLED),
         (READY._replace(fault=FaultCode.OUTPUT_LOST, cell_lost=True), FaultCode.OUTPUT_LOST),
         (READY._replace(cell_lost=True), FaultCode.CELL_LOST),

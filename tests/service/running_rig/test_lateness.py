@@ -8,12 +8,14 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from gateway.control.blame_for_silence import Held
 from gateway.devices.force_reading import ForceReading
-from gateway.processes.scheduler_counters import SchedulerCounters
+from gateway.processes.scheduler_counters import SchedulerCounters, StolenTime
 from gateway.service.running_rig.lateness import Lateness
 from tests.service.rigs import demo
 from tests.service.wired import Wired
@@ -31,7 +33,9 @@ class Kernel:
         self.now_s, self.waited_s = 100.0, 5.0
         self.ran_ns = self.rig_waited_ns = 0
         self.write("S")
-        self.lateness = Lateness(TICK_S)
+        self.stolen = SimpleNamespace(note=lambda now_s: None, lately_s=lambda: self.stolen_s)
+        self.stolen_s = 0.0
+        self.lateness = Lateness(TICK_S, cast(StolenTime, self.stolen))
         self.lateness.follow_rig(SchedulerCounters(PID, folder))
 
     def write(self, state: str) -> None:
@@ -79,6 +83,14 @@ def test_a_loop_that_came_late_says_how_late_and_how_much_it_waited(kernel: Kern
     assert kernel.held(0.5).loop_late_s == 0.0, "what was before the silence explains nothing"
 
 
+def test_what_a_host_has_taken_counts_where_the_loop_came_late(kernel: Kernel) -> None:
+    kernel.stolen_s = 0.1
+    assert kernel.held(0.3).loop_stolen_s == 0.0, "in time all the same"
+    kernel.stall(0.12, waited_s=0.0)
+    held = kernel.held(0.12)
+    assert (held.loop_stolen_s, held.loop_waited_s) == (0.1, 0.0)
+
+
 def test_a_rig_that_waits_for_a_processor_is_seen_while_it_waits_and_after(kernel: Kernel) -> None:
     kernel.ticks(20, rig_runs=False)
     kernel.write("R")
@@ -98,7 +110,7 @@ def test_a_rig_that_sleeps_is_silent_of_its_own(kernel: Kernel, state: str, stop
 
 def test_a_stopped_process_is_told_from_a_silent_one() -> None:
     process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
-    lateness = Lateness(TICK_S)
+    lateness = Lateness(TICK_S, StolenTime())
     lateness.follow_rig(SchedulerCounters(process.pid))
     try:
         os.kill(process.pid, signal.SIGSTOP)

@@ -169,6 +169,15 @@ class NoCounters:
     def close(self) -> None: ...
 
 
+class NothingStolen:
+    """Stands for `StolenTime`: a machine whose host takes nothing."""
+
+    def note(self, now_s: float) -> None: ...
+
+    def lately_s(self) -> float:
+        return 0.0
+
+
 class SimulatedSafeLine:
     """Stands for `SafeLine`: the guardian's last write goes out behind what is on the wire; who is plugged in answers."""
 
@@ -275,6 +284,8 @@ def simulated_edges(fit: Any = _no_fit) -> Any:
         patch.setattr("gateway.fieldbus.tcp_server.Listener", MemoryListener)
         NotedRunningRig.of.clear()
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
+        for user in (_RIG, f"{_SUPERVISOR}.heartbeat"):
+            patch.setattr(f"{user}.StolenTime", NothingStolen)
         patch.setattr("gateway.service.running_rig.starting.explain_silent_device", _explain)
         patch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", fit)
         for user in (
