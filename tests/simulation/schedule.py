@@ -5,6 +5,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import takewhile
 from math import nan
 from pathlib import Path
 from random import Random
@@ -88,7 +89,7 @@ class Simulation:
         self.observer = drawn.observer()
         self.observer.history.is_plain = rig.load_cell.device.name == DEMO_CELL
         self.observer.history.has_valve = rig.valve is not None or rig.load_cell.sign < 0
-        self.outside = VirtualLoop(self.clock)
+        self.outside = VirtualLoop(self.clock, has_tasks=False)
         self.outside.set_exception_handler(self._on_error)
         self.log = Log(self.clock)
         self.around = Surroundings(rig, self.outside, self.observer, drawn.cell_s)
@@ -158,7 +159,7 @@ class Simulation:
         self.rates = count_answers(self)
         self.rest_n = self._read_force_n()
         self.zeros.rest_n = self.around.pressing_n()
-        self._happen_next(iter(events))
+        self._happen_next(takewhile(lambda event: event.at_s < duration_s, events))
         self._run_for(duration_s)
         self.held_force.end()
         heal(self)

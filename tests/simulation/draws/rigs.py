@@ -35,14 +35,14 @@ LEASES = ((LEASE_S, LeaseAction.FAULT),) * 20 + (
     (None, LeaseAction.FAULT),
 )
 """How long a command lasts without a heartbeat, and what becomes of the force then."""
-RATES_HZ = (20,) * 16 + (25,) * 3 + (100,)
+RATES_HZ = (20,) * 16 + (25,) * 3 + (50,)
 """Of loop and load cell, drawn for each seed: at 20 Hz a schedule takes half of the time, and its laws are the same."""
 LEAST_HZ = 50
 """The least that a rig file may ask for. Slower loops are here for the sake of time and have no lead: a push that stands for
 longer than the lags that it inverts goes beyond them, and such a loop swings."""
 SLOW_HZ = 25
 """The most for rigs that have something else of their own, for the sake of time."""
-OTHER_RATES_HZ = (50, 50, 250)
+OTHER_RATES_HZ = (50, 100, 250)
 CELL_SHARES = (0.5, 1.0 / 3.0, 2.0)
 """Of a load cell's rate in the loop's, where they differ."""
 DEMO_OUTPUT, DEMO_CELL = "smc-itv-rc", "stream-st-gs"

@@ -88,7 +88,7 @@ class VirtualClock:
                 if loop.is_halted:
                     loop.waiting.append(handle)
                 elif not handle._cancelled:
-                    if loop is not running:
+                    if loop is not running and loop.has_tasks:
                         running = loop
                         asyncio._set_running_loop(loop)
                     try:
@@ -103,13 +103,15 @@ class VirtualClock:
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):
-    """One process's loop. servers: those that listen, by port; is_halted: it does nothing, what becomes due waits."""
+    """One process's loop. servers: those that listen, by port; is_halted: it does nothing, what becomes due waits; has_tasks:
+    what it calls may ask asyncio for the running loop, which takes a system call to set at each change."""
 
-    def __init__(self, clock: VirtualClock) -> None:
+    def __init__(self, clock: VirtualClock, *, has_tasks: bool = True) -> None:
         super().__init__()
         self._virtual_clock = clock
         self.servers: dict[int, Any] = {}
         self.is_halted = False
+        self.has_tasks = has_tasks
         self.waiting: list[Handle] = []
 
     def time(self) -> float:
