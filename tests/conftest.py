@@ -14,6 +14,8 @@ from typing import Any
 import hypothesis
 import pytest
 
+from tests.tried_again import TriedAgain
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosis' matrices are small
 
 
@@ -21,6 +23,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """A shell's background job inherits an ignored SIGINT, and so would every process under test."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     config.pluginmanager.register(GroupsStayTogether())
+    config.pluginmanager.register(TriedAgain(lambda nodeid: "tests/web/" in nodeid or group_of(nodeid) in IN_REAL_TIME))
     draw_examples(at_random=config.getoption("--long"))
     gc.disable()  # until all tests are collected, of which none is garbage
     if hasattr(config, "workerinput") and config.args_source is pytest.Config.ArgsSource.TESTPATHS:
@@ -129,6 +132,8 @@ not compete with each other, and no worker that has something to calculate waits
 LONG_WAITS = ("end_to_end/first_hour/test_calibrate.py", "end_to_end/first_hour/test_experiment_run.py")
 """Of these, what waits for minutes while a plan is run, and is held to no second: another worker does that meanwhile."""
 
+IN_REAL_TIME = ("real time", "long waits")
+
 SLOW = (
     "service/closed_loop/test_study.py",
     "service/edge_table/test_edge_table.py",
@@ -215,7 +220,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Workers of pure tests step back behind the one that is held to seconds."""
-    if hasattr(item.config, "workerinput") and group_of(item.nodeid) not in ("real time", "long waits"):
+    if hasattr(item.config, "workerinput") and group_of(item.nodeid) not in IN_REAL_TIME:
         os.setpriority(os.PRIO_PROCESS, 0, max(BEHIND_REAL_TIME, os.getpriority(os.PRIO_PROCESS, 0)))
 
 
