@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-from gateway.units import format_ms
-
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
@@ -27,13 +25,6 @@ class Explanation:
 
 BUSY_CURE = "the machine is too busy: end other programs, or `run --realtime`"
 """Ends the sentences whose cause is a machine with too much to do (MACHINE_BUSY, A403)."""
-
-
-def blame_host(stolen_s: float) -> str:
-    """Return what ends the sentences whose cause is the host of a virtual machine (MACHINE_BUSY, A403), and the cure."""
-    taken = f"the host of this virtual machine kept a processor away for {format_ms(stolen_s)} about then (steal)"
-    return f"{taken}: give the machine processors of its own, or less to do"
-
 
 NO_CODE = Explanation("", "none", "", "", "")
 """Of the number 0 in the registers."""

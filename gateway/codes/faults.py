@@ -189,8 +189,8 @@ class FaultCode(IntEnum):
             "A403",
             "machine too busy",
             "The control loop, or a simulated rig's process, was later than a bound; most of that time it got no processor.",
-            "Other programs take all cores: a build, more gateways, a virtual machine with too few of them; or its host takes "
-            "them away (steal).",
+            "Other programs take all cores: a build, more gateways; or a virtual machine's host, or a container's CPU quota, "
+            "withholds them.",
             "End them, or `nice -n 10` them; else give the loop priority (run --realtime), a virtual machine cores of its "
             "own, or the rig a longer stall_s.",
         ),

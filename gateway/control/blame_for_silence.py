@@ -11,7 +11,7 @@ Bounds: Supervision.sample_timeout_s and output_timeout_s in control/settings.py
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.codes.explanation import BUSY_CURE, blame_host
+from gateway.codes.explanation import BUSY_CURE
 from gateway.codes.faults import FaultCode
 from gateway.units import format_ms
 
@@ -24,16 +24,16 @@ class Held:
     """What kept processes from running since a device was last heard, in seconds.
 
     loop_late_s: how late our own loop came, in sum; loop_waited_s: so much of it waiting for a processor, None where the
-    machine does not count that; loop_stolen_s: for how long the host of a virtual machine kept a processor away about then.
-    Of the process behind a simulated rig, 0 for a real one: rig_waited_s: runnable, and not let; rig_stopped_s: held by a
-    signal or a debugger.
+    machine does not count that; withheld: processor time that was kept from us from outside about then, and by whom, in
+    words. Of the process behind a simulated rig, 0 for a real one: rig_waited_s: runnable, and not let; rig_stopped_s: held
+    by a signal or a debugger.
     """
 
     loop_late_s: float = 0.0
     loop_waited_s: float | None = None
     rig_waited_s: float = 0.0
     rig_stopped_s: float = 0.0
-    loop_stolen_s: float = 0.0
+    withheld: tuple[float, str] = 0.0, ""
 
 
 NOT_HELD: Final = Held()
@@ -52,13 +52,16 @@ def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: st
         )
     if held.rig_waited_s >= enough_s:
         evidence = f"the simulated rig's process waited {format_ms(held.rig_waited_s)} of them for a processor"
-        return FaultCode.MACHINE_BUSY, f"{evidence}: {BUSY_CURE}"
+        return FaultCode.MACHINE_BUSY, f"{evidence}: {_cure(held, held.rig_waited_s)}"
     if not held.loop_late_s >= enough_s:  # nor where silent_s is nan
         return fault, f"{ours}: {suspects}" if held.loop_late_s >= _WORTH_TELLING_S and suspects else suspects
     if waited_s is not None and waited_s >= _SHARE * held.loop_late_s:
-        return FaultCode.MACHINE_BUSY, f"{ours}, {format_ms(waited_s)} of them waiting for a processor: {BUSY_CURE}"
-    if held.loop_stolen_s >= _SHARE * held.loop_late_s:
-        return FaultCode.MACHINE_BUSY, f"{ours}; {blame_host(held.loop_stolen_s)}"
+        return (
+            FaultCode.MACHINE_BUSY,
+            f"{ours}, {format_ms(waited_s)} of them waiting for a processor: {_cure(held, waited_s)}",
+        )
+    if held.withheld[0] >= _SHARE * held.loop_late_s:
+        return FaultCode.MACHINE_BUSY, f"{ours}: {_cure(held, held.loop_late_s)}"
     count_words = (
         "not counted why" if waited_s is None else f"only {format_ms(waited_s)} of them waiting for a processor"
     )
@@ -66,3 +69,9 @@ def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: st
         fault,
         f"{ours}, {count_words}: this machine stood still (a virtual one on a busy host, a stop), not the device",
     )
+
+
+def _cure(held: Held, part_s: float) -> str:
+    """Return what to do against that part of a silence, s: where time was withheld from outside no program here is to blame."""
+    withheld_s, by_whom = held.withheld
+    return by_whom if withheld_s >= _SHARE * part_s else BUSY_CURE

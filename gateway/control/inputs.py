@@ -66,11 +66,12 @@ class LineStatus(NamedTuple):
     where it has said something to it;
     pressure_pa_per_v: of the output device by the ranges in its profile; owner_connected: False once the owning master's last
     connection has closed; late_s: how late this step runs; waited_s: so much of it the process could have run and was not
-    let, None where the machine does not count that; suspended_s: so much of it the whole machine was suspended; stolen_s: for
-    how long a virtual machine's host kept a processor away about then; cell_held, output_held: what kept us from hearing a
-    device that has not been heard for a while; temperature_c, feed_mm_s: of the load cell and under the tool, for
-    compensation; nan: nobody knows. output_counts, cell_counts: of the two lines, growing; None where nobody counts. valve: of
-    the directional valve, None on a rig without one. cell_says: what the cell says in place of readings, empty where nothing.
+    let, None where the machine does not count that; suspended_s: so much of it the whole machine was suspended; withheld:
+    processor time that was kept from us from outside about then, s, and by whom, in words; cell_held, output_held: what kept
+    us from hearing a device that has not been heard for a while; temperature_c, feed_mm_s: of the load cell and under the
+    tool, for compensation; nan: nobody knows. output_counts, cell_counts: of the two lines, growing; None where nobody
+    counts. valve: of the directional valve, None on a rig without one. cell_says: what the cell says in place of readings,
+    empty where nothing.
     """
 
     acknowledged_v: float | None = None
@@ -97,7 +98,7 @@ class LineStatus(NamedTuple):
     cell_says: str = ""
     answer_late_s: float = 0.0
     suspended_s: float = 0.0
-    stolen_s: float = 0.0
+    withheld: tuple[float, str] = 0.0, ""
 
 
 class LoopInputs(NamedTuple):

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.extras import MissingExtraError
-from gateway.processes import exit_codes, priority
+from gateway.processes import exit_codes
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
+from gateway.processes.scheduling import priority
 
 Serve = Callable[[dict[str, Any], EventLog], Coroutine[Any, Any, None]]
 """Serves until the process ends; its first argument: the options that the guardian gives, `state` among them."""

@@ -18,11 +18,12 @@ from pathlib import Path
 from typing import Any
 
 from gateway.ports import PortError
-from gateway.processes import exit_codes, priority
+from gateway.processes import exit_codes
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import Ending
-from gateway.processes.priority import use_realtime
+from gateway.processes.scheduling import priority
+from gateway.processes.scheduling.priority import use_realtime
 from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.profiles.kept_rig import keep_rig, kept_rig
 from gateway.recording.ring import SampleRing

@@ -20,12 +20,13 @@ from typing import Any, Final
 
 from gateway.devices import DeviceProfile
 from gateway.ports import PacedPty
-from gateway.processes import exit_codes, priority
+from gateway.processes import exit_codes
 from gateway.processes import message_link as guardian_link
 from gateway.processes.clock_tick import ClockTick
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.json_socket.server import JsonLineServer
+from gateway.processes.scheduling import priority
 from gateway.profiles import ProfileError, Rig
 from gateway.profiles.kept_rig import kept_rig
 from gateway.service.simulation.kept_settings import KeptSettings

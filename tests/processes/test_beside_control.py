@@ -6,7 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from gateway.processes import exit_codes, priority
+from gateway.processes import exit_codes
+from gateway.processes.scheduling import priority
 
 BROKER_AWAY_THEN_END = """
 import sys

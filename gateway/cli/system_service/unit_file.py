@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.processes import exit_codes
-from gateway.processes.priority import LOOP_NICE
+from gateway.processes.scheduling.priority import LOOP_NICE
 
 NAME: Final = "force-gateway"
 USER: Final = "force-gateway"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Final
 
-from gateway.codes.explanation import BUSY_CURE, blame_host
+from gateway.codes.explanation import BUSY_CURE
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control.blame_for_silence import cause_of_silence
@@ -70,8 +70,9 @@ def _lateness(line: LineStatus, allowed_s: float) -> StopCause:
     if line.suspended_s >= 0.5 * line.late_s:
         slept = f"this machine was suspended for {line.suspended_s:.1f} s of them"
         return stop_cause(FaultCode.LOOP_STALLED, f"{observation}: {slept}; {_AWAKE}; {dropped}")
-    if line.stolen_s >= 0.5 * line.late_s:
-        return stop_cause(FaultCode.MACHINE_BUSY, f"{observation}; {blame_host(line.stolen_s)}; {dropped}")
+    withheld_s, by_whom = line.withheld
+    if withheld_s >= 0.5 * line.late_s:
+        return stop_cause(FaultCode.MACHINE_BUSY, f"{observation}; {by_whom}; {dropped}")
     if line.waited_s is None:
         return stop_cause(FaultCode.LOOP_STALLED, f"{observation}: the machine is overloaded; {dropped}")
     waited = f"{line.waited_s * 1e3:.0f} ms of them it waited for a processor"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from gateway.calibrations.store import CalibrationStore
     from gateway.service.fitting.ladder_fit import LadderFit
 
-from gateway.processes import priority
+from gateway.processes.scheduling import priority
 
 
 def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from gateway.control import Controller
 from gateway.control.blame_for_silence import NOT_HELD, Held
 from gateway.control.inputs import LineStatus, Output
 from gateway.devices.messages import ForceSample, Garbage
-from gateway.processes.scheduler_counters import ProcessorTime, time_between, waited_s_of
+from gateway.processes.scheduling.scheduler_counters import ProcessorTime, time_between, waited_s_of
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
 from gateway.registers.command import Command, Status
@@ -248,7 +248,7 @@ class ControlLoop:
             late_s=late_s,
             waited_s=self._waited_since_tick(late_s),  # for which the machine is to blame
             suspended_s=suspended_s,
-            stolen_s=self._lateness.stolen_s() if self._lateness and late_s >= _LONG_SILENCE_S else 0.0,
+            withheld=self._lateness.withheld() if self._lateness and late_s >= _LONG_SILENCE_S else (0.0, ""),
             warnings=self.warnings,
             sent_v=output.sent_v,
             wire_s=output.round_trip_s,

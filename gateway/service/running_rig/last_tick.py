@@ -7,7 +7,7 @@ does whatever is measured by it: an enable that the network has kept since would
 from collections.abc import Callable
 from typing import Final
 
-from gateway.processes.scheduler_counters import ProcessorTime
+from gateway.processes.scheduling.scheduler_counters import ProcessorTime
 
 _WORTH_S: Final = 0.02  # less passes between the reading of two clocks
 

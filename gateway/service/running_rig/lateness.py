@@ -8,7 +8,8 @@ from collections import deque
 from typing import Final
 
 from gateway.control.blame_for_silence import Held
-from gateway.processes.scheduler_counters import STOPPED_STATES, ProcessorTime, SchedulerCounters, StolenTime
+from gateway.processes.scheduling.scheduler_counters import STOPPED_STATES, ProcessorTime, SchedulerCounters
+from gateway.processes.scheduling.withheld_time import WithheldTime
 
 _WORTH_S: Final = 0.005  # shorter pauses explain nothing
 _KEPT: Final = 256
@@ -38,8 +39,8 @@ class _Pauses:
 class Lateness:
     """period_s: of the tick. Times are monotonic seconds."""
 
-    def __init__(self, period_s: float, stolen: StolenTime) -> None:
-        self._period_s, self._stolen = period_s, stolen
+    def __init__(self, period_s: float, withheld: WithheldTime) -> None:
+        self._period_s, self._withheld = period_s, withheld
         self._ours, self._of_rig = _Pauses(), _Pauses()
         self._tick_s: float | None = None
         self._waited_s: float | None = None
@@ -60,7 +61,7 @@ class Lateness:
             waited = waited_s - self._waited_s if waited_s is not None and self._waited_s is not None else 0.0
             self._ours.add(now_s, now_s - self._tick_s - self._period_s, waited)
         self._tick_s, self._waited_s = now_s, waited_s
-        self._stolen.note(now_s)
+        self._withheld.note(now_s)
         self._look_at_rig(now_s)
 
     def _look_at_rig(self, now_s: float) -> None:
@@ -87,14 +88,14 @@ class Lateness:
         return Held(
             loop_late_s=late_s,
             loop_waited_s=late_waited_s if waited_s is not None else None,
-            loop_stolen_s=self.stolen_s() if late_s >= _WORTH_S else 0.0,
+            withheld=self.withheld() if max(late_s, rig_waited_s) >= _WORTH_S else (0.0, ""),
             rig_waited_s=rig_waited_s + (still_s if state == "R" else 0.0),
             rig_stopped_s=still_s if state and state in STOPPED_STATES else 0.0,
         )
 
-    def stolen_s(self) -> float:
-        """Return for how long a host has kept a processor away in the last second or two, s."""
-        return self._stolen.lately_s()
+    def withheld(self) -> tuple[float, str]:
+        """Return the processor time that was withheld in the last second or two, s, and who did that, in words."""
+        return self._withheld.lately()
 
     def close(self) -> None:
         """Close the counters of the simulated rig."""

@@ -22,7 +22,8 @@ from gateway.ports import SerialPort
 from gateway.processes.clock_tick import ClockTick
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import Ending
-from gateway.processes.scheduler_counters import SchedulerCounters, StolenTime
+from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
+from gateway.processes.scheduling.withheld_time import WithheldTime
 from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
@@ -91,7 +92,7 @@ class RunningRig:
         self._line = OutputExchange(host, self._ports.write_output, rig.output.device.reply_timeout_s, checks, rest_v)
         self._line.drop_unsent = self._ports.drop_output
         self._counters = SchedulerCounters(os.getpid())
-        self._lateness = Lateness(1.0 / rig.loop_hz, StolenTime())
+        self._lateness = Lateness(1.0 / rig.loop_hz, WithheldTime())
         self._follow_rig()
         cell = rig.load_cell
         reads, stall_s = cell_host(cell.device, cell.sign, cell.unit), rig.control.supervision.stall_s

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from gateway.processes import message_link as guardian_link
 from gateway.processes.module_command import module_command
-from gateway.processes.scheduler_counters import SchedulerCounters
+from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 
 _END_BOUND_S: Final = 1.0
 _REAP_BOUND_S: Final = 2.0  # a killed process is gone in milliseconds, unless a driver holds it

@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.processes import message_link as guardian_link
-from gateway.processes import priority
+from gateway.processes.scheduling import priority
 
 CONTROL: Final = "gateway.service.control_process"
 RIG: Final = "gateway.service.simulated_rig"

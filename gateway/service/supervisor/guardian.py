@@ -18,11 +18,12 @@ from math import inf
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.processes import exit_codes, message_link, priority
+from gateway.processes import exit_codes, message_link
 from gateway.processes.durable_file import give_all_to_owner
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
+from gateway.processes.scheduling import priority
 from gateway.processes.state_lock import hold_state_lock
 from gateway.processes.systemd.service_manager import ServiceManager, service_manager
 from gateway.service.heartbeat_memory import HeartbeatMemory

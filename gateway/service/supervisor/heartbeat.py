@@ -9,14 +9,14 @@ from typing import Final
 
 from gateway import defaults
 from gateway.processes.exit_cause import Ending
-from gateway.processes.scheduler_counters import (
+from gateway.processes.scheduling.scheduler_counters import (
     ProcessorTime,
     Silence,
-    StolenTime,
     explain_silence,
     load_of_machine,
     time_between,
 )
+from gateway.processes.scheduling.withheld_time import WithheldTime
 from gateway.service.supervisor.child_process import Child
 
 _LATE_S: Final = 0.02
@@ -31,7 +31,7 @@ class Heartbeat:
         self._heard_s = 0.0
         self._used: ProcessorTime | None = None  # at the last heartbeat
         self._was_late = False
-        self._stolen = StolenTime()
+        self._withheld = WithheldTime()
 
     @property
     def is_up(self) -> bool:
@@ -57,7 +57,7 @@ class Heartbeat:
         self._beat_s = self._heard_s = now_s
         self._was_late = False
         self._used = control.counters.read() if control.counters else None
-        self._stolen.note(now_s)
+        self._withheld.note(now_s)
 
     def is_overdue(self, now_s: float) -> bool:
         """Decide whether stall_s of silence are over.
@@ -76,7 +76,7 @@ class Heartbeat:
 
         def why() -> Ending:
             turns = time_between(before, control.counters.read() if control.counters else None)
-            stolen_s = self._stolen.lately_s()
-            return explain_silence(Silence(silent_s, self.stall_s, turns, state, was_late, stolen_s), load_of_machine())
+            silence = Silence(silent_s, self.stall_s, turns, state, was_late, self._withheld.lately())
+            return explain_silence(silence, load_of_machine())
 
         return why

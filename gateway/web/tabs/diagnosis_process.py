@@ -15,7 +15,7 @@ import time
 from typing import Final
 
 from gateway import progress
-from gateway.processes import priority
+from gateway.processes.scheduling import priority
 
 _LAST_NICE: Final = 19
 _TOLD_EVERY_S: Final = 0.1

@@ -14,7 +14,8 @@ from gateway import profiles
 from gateway.cli.main import command
 from gateway.cli.system_service.installation import plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, unit_text
-from gateway.processes import exit_codes, priority
+from gateway.processes import exit_codes
+from gateway.processes.scheduling import priority
 from gateway.profiles import load_rig
 from gateway.profiles.http_sections import Metrics, OpcUa, Web
 from gateway.profiles.recordings_section import Retention

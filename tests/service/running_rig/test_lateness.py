@@ -15,7 +15,8 @@ import pytest
 
 from gateway.control.blame_for_silence import Held
 from gateway.devices.force_reading import ForceReading
-from gateway.processes.scheduler_counters import SchedulerCounters, StolenTime
+from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
+from gateway.processes.scheduling.withheld_time import WithheldTime
 from gateway.service.running_rig.lateness import Lateness
 from tests.service.rigs import demo
 from tests.service.wired import Wired
@@ -33,9 +34,9 @@ class Kernel:
         self.now_s, self.waited_s = 100.0, 5.0
         self.ran_ns = self.rig_waited_ns = 0
         self.write("S")
-        self.stolen = SimpleNamespace(note=lambda now_s: None, lately_s=lambda: self.stolen_s)
-        self.stolen_s = 0.0
-        self.lateness = Lateness(TICK_S, cast(StolenTime, self.stolen))
+        self.withheld = 0.0, ""
+        counter = SimpleNamespace(note=lambda now_s: None, lately=lambda: self.withheld)
+        self.lateness = Lateness(TICK_S, cast(WithheldTime, counter))
         self.lateness.follow_rig(SchedulerCounters(PID, folder))
 
     def write(self, state: str) -> None:
@@ -83,12 +84,12 @@ def test_a_loop_that_came_late_says_how_late_and_how_much_it_waited(kernel: Kern
     assert kernel.held(0.5).loop_late_s == 0.0, "what was before the silence explains nothing"
 
 
-def test_what_a_host_has_taken_counts_where_the_loop_came_late(kernel: Kernel) -> None:
-    kernel.stolen_s = 0.1
-    assert kernel.held(0.3).loop_stolen_s == 0.0, "in time all the same"
+def test_what_was_withheld_counts_where_the_loop_came_late(kernel: Kernel) -> None:
+    kernel.withheld = 0.1, "the host"
+    assert kernel.held(0.3) == Held(loop_waited_s=0.0), "in time all the same"
     kernel.stall(0.12, waited_s=0.0)
     held = kernel.held(0.12)
-    assert (held.loop_stolen_s, held.loop_waited_s) == (0.1, 0.0)
+    assert (held.withheld, held.loop_waited_s) == ((0.1, "the host"), 0.0)
 
 
 def test_a_rig_that_waits_for_a_processor_is_seen_while_it_waits_and_after(kernel: Kernel) -> None:
@@ -110,7 +111,7 @@ def test_a_rig_that_sleeps_is_silent_of_its_own(kernel: Kernel, state: str, stop
 
 def test_a_stopped_process_is_told_from_a_silent_one() -> None:
     process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
-    lateness = Lateness(TICK_S, StolenTime())
+    lateness = Lateness(TICK_S, WithheldTime())
     lateness.follow_rig(SchedulerCounters(process.pid))
     try:
         os.kill(process.pid, signal.SIGSTOP)

@@ -7,7 +7,7 @@ import pytest
 
 from gateway.codes.warning_bits import WarningBit
 from gateway.devices.messages import Garbage
-from gateway.processes.scheduler_counters import ProcessorTime
+from gateway.processes.scheduling.scheduler_counters import ProcessorTime
 from gateway.profiles import load_device, load_rig
 from gateway.registers.words import State
 from gateway.service.running_rig.rate_warnings import LEAST, SHARE, WINDOW_S, LineNoise, SlowLoop

@@ -21,7 +21,7 @@ from tests.service.rigs import demo
 
 @pytest.fixture
 def arguments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    monkeypatch.setattr("gateway.processes.priority.set_nice", lambda _nice: None)
+    monkeypatch.setattr("gateway.processes.scheduling.priority.set_nice", lambda _nice: None)
     ours, theirs = socket.socketpair()
     descriptor = os.dup(ours.fileno())
     ours.close()

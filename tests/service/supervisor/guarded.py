@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from gateway.processes import message_link
-from gateway.processes.scheduler_counters import ProcessorTime
+from gateway.processes.scheduling.scheduler_counters import ProcessorTime
 from gateway.service.supervisor.child_process import Child
 from gateway.service.supervisor.event_wait import wait_readable
 from gateway.service.supervisor.guardian import Guardian

@@ -4,7 +4,7 @@ import pytest
 
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.processes.scheduler_counters import ProcessorTime
+from gateway.processes.scheduling.scheduler_counters import ProcessorTime
 from gateway.service.supervisor.safe_line import SafeLine
 from tests.service.supervisor.guarded import (
     PTYS,

@@ -10,7 +10,7 @@ from typing import cast
 import pytest
 
 from gateway.processes.exit_cause import EndCause, Ending
-from gateway.processes.scheduler_counters import ProcessorTime
+from gateway.processes.scheduling.scheduler_counters import ProcessorTime
 from gateway.processes.systemd.service_manager import ServiceManager
 from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.supervisor.child_process import Child

@@ -169,13 +169,13 @@ class NoCounters:
     def close(self) -> None: ...
 
 
-class NothingStolen:
-    """Stands for `StolenTime`: a machine whose host takes nothing."""
+class NothingWithheld:
+    """Stands for `WithheldTime`: a machine from which nothing is withheld."""
 
     def note(self, now_s: float) -> None: ...
 
-    def lately_s(self) -> float:
-        return 0.0
+    def lately(self) -> tuple[float, str]:
+        return 0.0, ""
 
 
 class SimulatedSafeLine:
@@ -285,7 +285,7 @@ def simulated_edges(fit: Any = _no_fit) -> Any:
         NotedRunningRig.of.clear()
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
         for user in (_RIG, f"{_SUPERVISOR}.heartbeat"):
-            patch.setattr(f"{user}.StolenTime", NothingStolen)
+            patch.setattr(f"{user}.WithheldTime", NothingWithheld)
         patch.setattr("gateway.service.running_rig.starting.explain_silent_device", _explain)
         patch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", fit)
         for user in (

@@ -13,8 +13,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from gateway.processes import priority
 from gateway.processes.clock_tick import ClockTick
+from gateway.processes.scheduling import priority
 
 
 class EmptyAnswer(asyncio.BufferedProtocol):

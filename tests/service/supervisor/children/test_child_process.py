@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.processes.scheduler_counters import SchedulerCounters
+from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 from gateway.service.supervisor import child_process
 from gateway.service.supervisor.child_process import LOST, Child, describe_exit, reap_orphans, spawn_child
 from gateway.service.supervisor.event_wait import wait_readable

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from gateway.processes import priority
 from gateway.processes.exit_cause import EndCause
-from gateway.processes.scheduler_counters import (
+from gateway.processes.scheduling import priority
+from gateway.processes.scheduling.scheduler_counters import (
     ProcessorTime,
     SchedulerCounters,
     Silence,
@@ -134,7 +134,7 @@ def taken(wanted: int, *before: str) -> int:
     code = "; ".join(
         [
             "import os, resource",
-            "from gateway.processes import priority",
+            "from gateway.processes.scheduling import priority",
             *before,
             f"print(priority.set_nice({wanted}))",
         ]

@@ -8,21 +8,17 @@ zombie, before it is reaped. Only the main thread counts: it is the control loop
 import contextlib
 import os
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from gateway.codes.explanation import BUSY_CURE, blame_host
+from gateway.codes.explanation import BUSY_CURE
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.units import format_ms
 
 STOPPED_STATES: Final = "Tt"
 _OR_LONGER: Final = ", or a longer stall_s in the rig"
 _CURE: Final = f": {BUSY_CURE}{_OR_LONGER}"
-_STOLEN_SHARE: Final = 0.5
-_EVERY_S: Final = 1.0
-_STEAL: Final = 8  # behind the processor's name, user, nice, system, idle, iowait, irq and softirq
-_LINE_BYTES: Final = 256
+_WITHHELD_SHARE: Final = 0.5
 
 
 class ProcessorTime(NamedTuple):
@@ -35,15 +31,15 @@ class ProcessorTime(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class Silence:
     """One silence of the control loop. turns: what it had in it; state: the kernel's letter before the kill, empty where
-    it is not known; was_late: the guardian, which does nothing but watch, was not let run in time either; stolen_s: for how
-    long the host of a virtual machine kept a processor away about then."""
+    it is not known; was_late: the guardian, which does nothing but watch, was not let run in time either; withheld:
+    processor time that was kept from it from outside about then, s, and by whom, in words."""
 
     silent_s: float
     bound_s: float
     used: ProcessorTime | None
     state: str
     was_late: bool
-    stolen_s: float = 0.0
+    withheld: tuple[float, str] = 0.0, ""
 
 
 class SchedulerCounters:
@@ -82,42 +78,6 @@ class SchedulerCounters:
             self._descriptor = -1
 
 
-class StolenTime:
-    """Time for which the host of a virtual machine kept a processor from it: `steal` of /proc/stat, see proc(5).
-
-    A host that gives a machine a share of its processors takes them away when the share is used up, by 100 ms at a time as a
-    rule. In no process's own counters does that stand: one that waits for a timer sleeps, as it seems. Read once a second,
-    for a large machine needs long to say it.
-    """
-
-    def __init__(self, proc: Path = Path("/proc")) -> None:
-        self._file = proc / "stat"
-        self._bytes = _LINE_BYTES * (1 + (os.cpu_count() or 1))
-        self._ticks_per_s = os.sysconf("SC_CLK_TCK")
-        self._before: list[int] = []
-        self._noted: list[int] = []
-        self._noted_s = -inf
-
-    def note(self, now_s: float) -> None:
-        """Note that our process runs now."""
-        if now_s - self._noted_s >= _EVERY_S:
-            self._noted_s, self._before, self._noted = now_s, self._noted, self._read()
-
-    def lately_s(self) -> float:
-        """Return for how long a processor was away within the last second or two, the one that was longest; 0 where nobody
-        counts it. A pause that `note` has just ended is in it."""
-        ticks = (now - then for now, then in zip(self._read(), self._before or self._noted, strict=False))
-        return max(ticks, default=0) / self._ticks_per_s
-
-    def _read(self) -> list[int]:
-        try:
-            with self._file.open("rb", buffering=0) as file:
-                lines = file.read(self._bytes).split(b"\n")
-            return [int(line.split()[_STEAL]) for line in lines if line[:3] == b"cpu" and line[3:4].isdigit()]
-        except (OSError, ValueError, IndexError):
-            return []
-
-
 def waited_s_of(time: ProcessorTime | None) -> float | None:
     """Return how long a processor was waited for, s; None where the kernel does not count that."""
     return time.waited_s if time else None
@@ -136,9 +96,9 @@ def explain_silence(silence: Silence, load: str) -> Ending:
     observation = f"control process stalled: {format_ms(silence.silent_s)} without a tick, {allowed}"
     if silence.state and silence.state in STOPPED_STATES:
         return Ending(EndCause.STOPPED, f"{observation}; it was stopped by a signal or a debugger")
-    if silence.stolen_s >= _STOLEN_SHARE * silence.silent_s:
-        host = f"{load}; {blame_host(silence.stolen_s)}{_OR_LONGER}"
-        return Ending(EndCause.MACHINE_BUSY, f"{observation}; {host}")
+    withheld_s, by_whom = silence.withheld
+    if withheld_s >= _WITHHELD_SHARE * silence.silent_s:
+        return Ending(EndCause.MACHINE_BUSY, f"{observation}; {load}; {by_whom}{_OR_LONGER}")
     if silence.used is None:
         cause = EndCause.MACHINE_BUSY if silence.was_late else EndCause.STALLED
         return Ending(

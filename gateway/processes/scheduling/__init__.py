@@ -1,0 +1,1 @@
+"""When our processes get a processor: the priority they take, and what the kernel counts where they got none."""
