@@ -85,11 +85,12 @@ class Lateness:
         rig_waited_s, _ = self._of_rig.since(then_s)
         still_s = now_s - max(self._rig_ran_s, then_s) if self._rig_turns else 0.0
         state = self._rig.state() if self._rig and still_s >= _WORTH_S else ""
+        rig_waited_s += still_s if state == "R" else 0.0
         return Held(
             loop_late_s=late_s,
             loop_waited_s=late_waited_s if waited_s is not None else None,
             withheld=self.withheld() if max(late_s, rig_waited_s) >= _WORTH_S else (0.0, ""),
-            rig_waited_s=rig_waited_s + (still_s if state == "R" else 0.0),
+            rig_waited_s=rig_waited_s,
             rig_stopped_s=still_s if state and state in STOPPED_STATES else 0.0,
         )
 

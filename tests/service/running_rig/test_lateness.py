@@ -95,7 +95,9 @@ def test_what_was_withheld_counts_where_the_loop_came_late(kernel: Kernel) -> No
 def test_a_rig_that_waits_for_a_processor_is_seen_while_it_waits_and_after(kernel: Kernel) -> None:
     kernel.ticks(20, rig_runs=False)
     kernel.write("R")
+    kernel.withheld = 0.15, "a quota"
     assert kernel.held(0.2).rig_waited_s == pytest.approx(0.2, abs=0.011)
+    assert kernel.held(0.2).withheld == (0.15, "a quota"), "while it lasts, too"
     kernel.ticks(1, rig_waits_s=0.2)
     assert kernel.held(0.21).rig_waited_s == pytest.approx(0.2, abs=0.011)
 
