@@ -100,7 +100,7 @@ class ControlLoop:
         self.last_tick = LastTick(process.suspended_s)
         self._heard_s = -inf
         self._fresh_s = _FRESH_PERIODS * process.period_s
-        self._slow_loop = SlowLoop(process.period_s)
+        self._slow_loop = SlowLoop(process.period_s, process.lateness.withheld if process.lateness else None)
         self._cell_noise, self._output_noise = LineNoise("load cell's", cell.unread.explain), LineNoise("output's")
         bank.on_command = self._on_command
         bank.on_asked = self._on_asked

@@ -100,11 +100,12 @@ class LineNoise(_RateWarning):
 
 
 class SlowLoop(_RateWarning):
-    """Ticks of the loop, and those of them that were missed or late. period_s: of the tick."""
+    """Ticks of the loop, and those of them that were missed or late. period_s: of the tick; withheld: processor time that was
+    kept from us from outside in the last second or two, s, and by whom, in words; None where nobody counts it."""
 
-    def __init__(self, period_s: float) -> None:
+    def __init__(self, period_s: float, withheld: Callable[[], tuple[float, str]] | None = None) -> None:
         super().__init__()
-        self._period_s = period_s
+        self._period_s, self._withheld = period_s, withheld
         self._recent = _RecentSums(6)
 
     def tick(
@@ -129,6 +130,9 @@ class SlowLoop(_RateWarning):
         self.is_on = True
         bound = _ms(LATE_PERIODS * self._period_s)
         observation = f"{missed:.0f} of {ticks:.0f} ticks within {WINDOW_S:g} s were missed or over {bound} late"
+        withheld_s, by_whom = self._withheld() if self._withheld else (0.0, "")
+        if withheld_s >= _HALF * spent_s[0]:
+            return f"A342 {observation}, {_ms(spent_s[0])} in all: {by_whom}"
         return f"A342 {observation}, {_cause_of_lateness(*spent_s, is_counted=used is not None)}"
 
 

@@ -182,6 +182,17 @@ def test_a_slow_loop_says_whether_the_machine_or_the_program_is_to_blame(
     assert words in sentence
 
 
+@pytest.mark.parametrize(("withheld_s", "is_told"), [(0.066, True), (0.065, False)])
+def test_what_was_withheld_from_outside_is_no_other_program(withheld_s: float, is_told: bool) -> None:
+    slow, told = SlowLoop(TICK_S, lambda: (withheld_s, "a quota did it")), []
+    for tick in range(2 * TICKS_PER_WINDOW):
+        late_s = 0.012 if tick % 20 == 0 else 0.0
+        told.append(slow.tick(tick * TICK_S, 1, late_s, lambda: ProcessorTime(0.001, 0.009)))
+    (sentence,) = filter(None, told)
+    assert ("132 ms in all: a quota did it" in sentence) is is_told
+    assert ("the machine is too busy" in sentence) is not is_told
+
+
 def test_the_loop_asks_the_kernel_what_the_time_since_the_last_tick_went_to() -> None:
     wired, had = Wired().ready(), ProcessorTime()
 
