@@ -26,7 +26,13 @@ from gateway.diagnosis.model_fit.initial_state import drop_unfelt_starts, settle
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
 from gateway.diagnosis.model_fit.line_lengths import fit_line_lengths
 from gateway.diagnosis.noise.whitening import Whitener, fast_noise_n, timing_weights, white_whitener
-from gateway.diagnosis.notes import implausible_area, nothing_to_switch_off, set_aside_notes, uninformative_force
+from gateway.diagnosis.notes import (
+    implausible_area,
+    nothing_to_switch_off,
+    set_aside_notes,
+    uninformative_force,
+    withhold_all_clear,
+)
 from gateway.diagnosis.residuals.dependence_tests import find_dependences
 from gateway.diagnosis.result import Baseline, Diagnosis, Extended, Trace, Verdict
 from gateway.diagnosis.search.direct_evidence import (
@@ -94,13 +100,14 @@ def diagnose(
     if any(each.is_sure for each in suspected):
         return diagnosis_of_wrong_columns(measurements, given, suspected)
     result = _diagnose_columns(measurements, given, options)
-    return replace(
+    result = replace(
         result,
         notes=(*result.notes, *_notes_on_the_start(measurements, given, options, result, suspected)),
         suspects=suspected,
         base=with_readings_of(given, result.base),
         plant=with_readings_of(given, result.plant),
     )
+    return withhold_all_clear(result)
 
 
 def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options: Options) -> Diagnosis:

@@ -1,6 +1,7 @@
 """What a reader of an answer has to know beside it: sentences about the recordings and about what was asked."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -9,11 +10,14 @@ from gateway.diagnosis.bench.bench import Bench
 from gateway.diagnosis.bench.recording_drive import rows_after_unseen_settings
 from gateway.diagnosis.measurement import Flags, Measurement
 from gateway.diagnosis.noise.whitening import fast_noise_n
+from gateway.diagnosis.result import Diagnosis, Verdict
 
 _MOVING_RATIO: Final = 30.0  # times the noise, from which a force moves
 _RESTING_RATIO: Final = 8.0  # times the noise, below which nearly all readings of a force lie that stands
 _IMPLAUSIBLE_RATIO: Final = 30.0  # times larger or smaller than the start: a unit, more likely than a machine
 _OFFSETS_APART_RATIO: Final = 10.0  # times the floor, from which offsets are told
+_NO_AREA_M2: Final = 5.0e-6
+"""What is left of the model's area where no force answers; a small signal leaves it whole."""
 
 
 def recording_notes(measurements: Sequence[Measurement], offsets_n: Sequence[float], floor_n: float) -> Iterator[str]:
@@ -38,7 +42,24 @@ def uninformative_force(measurements: Sequence[Measurement]) -> str:
     return whys[0] if whys and all(whys) else ""
 
 
-def is_frozen(measurements: Sequence[Measurement]) -> bool:
+def why_blind(diagnosis: Diagnosis) -> str:
+    """Return why the recordings say nothing, where they do not and nothing else was found. What is found in a force whose
+    readings are all the same is the base model's, which is nowhere quite still."""
+    measurements = [trace.measurement for trace in diagnosis.traces]
+    has_findings = (
+        diagnosis.suspects or diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
+    )
+    if has_findings and not _is_frozen(measurements):
+        return ""
+    return uninformative_force(measurements)
+
+
+def withhold_all_clear(diagnosis: Diagnosis) -> Diagnosis:
+    """Return the answer, as unknown where the recordings say nothing: nothing is found in the force of a dead cell."""
+    return replace(diagnosis, verdict=Verdict.UNKNOWN) if why_blind(diagnosis) else diagnosis
+
+
+def _is_frozen(measurements: Sequence[Measurement]) -> bool:
     """Decide whether each of these recordings has one force in every row: a cell that is dead or repeats itself."""
     still = [each.usable.any() and np.ptp(each.force_n[each.usable]) == 0.0 for each in measurements]
     return bool(still) and all(still)

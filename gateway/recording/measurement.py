@@ -19,6 +19,7 @@ from gateway.recording.tables.column_names import SENT
 from gateway.recording.tables.covariates import extract_covariates, interpolate_missing, is_constant, is_own_recording
 from gateway.recording.tables.even_rows import resample_evenly
 from gateway.recording.tables.row_validity import (
+    flag_clipped,
     flag_dropouts,
     flag_repeated,
     pulled_rows,
@@ -63,6 +64,9 @@ def measurement_of(recording: Recording) -> Measurement:
     notes += more_notes
     columns = columns | {"force_n": np.where(dropouts, np.nan, columns["force_n"])}
     usable &= driven & ~dropouts
+    clipped, more_notes = flag_clipped(columns["force_n"], usable)
+    notes += more_notes
+    usable &= ~clipped
     _check_enough(recording, axis, usable, notes)
     repeated, more_notes = flag_repeated(columns["force_n"])
     others, suspicions = extract_covariates(columns, axis.time_s, columns["force_n"])

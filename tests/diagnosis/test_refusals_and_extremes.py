@@ -129,7 +129,11 @@ def said(*words: str) -> str:
 @pytest.mark.parametrize("force_n", [noise(0.05) + 3.0, np.full(TIME_S.size, 3.0)], ids=["noisy", "frozen"])
 def test_a_force_that_does_not_answer_is_told_and_gives_no_plant(tmp_path: Path, force_n: Floats) -> None:
     path, plant = written(tmp_path / "dead.csv", columns(force_n=force_n)), tmp_path / "plant.yaml"
-    text = said(str(path), "--extend", str(plant))
+    words = [str(path), "--extend", str(plant), "--json", str(tmp_path / "dead.json"), "--fail-on", "unknown"]
+    done = CliRunner().invoke(command, ["diagnose", *words])
+    text, document = " ".join(done.output.split()), json.loads((tmp_path / "dead.json").read_text("utf-8"))
+    assert (done.exit_code, document["verdict"]) == (1, "unknown")
+    assert document["notes"][0].startswith("dead.csv: the force stands at 3 N while command_v moves by")
     assert "Nothing can be told: dead.csv: the force stands at 3 N while command_v moves by" in text
     assert f"{plant} is not written" in text
     assert not plant.exists()

@@ -1,5 +1,6 @@
 """Which rows may be judged: by what a quality column means, by readings that were renewed, by times that can be believed."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 
 from gateway.recording import Recording, RecordingError
 from gateway.recording.foreign.time_stamps import parse_stamp, seconds_from_stamps
-from gateway.recording.tables.row_validity import flag_repeated, valid_by_quality
+from gateway.recording.tables.row_validity import Floats, flag_clipped, flag_repeated, valid_by_quality
 from gateway.recording.tables.time_axis import check_time_axis
 
 
@@ -150,3 +151,34 @@ def test_clocks_that_pass_midnight_go_on_and_stamps_that_nobody_knows_stay_unkno
     clocks = np.array([parse_stamp(clock) for clock in ("23:59:59.5", "00:00:00.5", "00:00:01.5")], dtype=float)
     assert np.diff(seconds_from_stamps(clocks)) == pytest.approx([1.0, 1.0])
     assert np.isnan(seconds_from_stamps(np.full(3, np.nan))).all()
+
+
+def held_readings(rng: np.random.Generator) -> Floats:
+    """Thirty levels of 0 to 40 N, 40 readings each, with a noise of 0.1 N."""
+    return np.repeat(rng.uniform(0.0, 40.0, 30), 40) + rng.normal(0.0, 0.1, 1200)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_readings_at_the_end_of_the_cell_s_range_are_no_witness(side: float) -> None:
+    """A cell that ended at 30 N was given a supply that saturates and outliers, of confidence 0.99, and a noise of 0 N."""
+    force_n = side * np.minimum(held_readings(np.random.default_rng(3)), 30.0)
+    usable = np.ones(force_n.size, dtype=bool)
+    usable[:40] = False
+    clipped, notes = flag_clipped(force_n, usable)
+    assert np.array_equal(clipped, usable & (force_n == side * 30.0)) and clipped.sum() > 40
+    assert len(notes) == 1 and f"stand at {side * 30.0:.5g} N" in notes[0]
+
+
+@pytest.mark.parametrize(
+    "made_n",
+    [
+        pytest.param(lambda force_n: force_n, id="as it is"),
+        pytest.param(lambda force_n: np.round(np.minimum(force_n, 30.0) / 0.5) * 0.5, id="coarser than its noise"),
+        pytest.param(lambda force_n: np.where(np.arange(1200) // 100 == 5, 50.0, force_n), id="frozen for a while"),
+        pytest.param(lambda force_n: np.zeros(force_n.size), id="dead"),
+    ],
+)
+def test_readings_that_rest_at_the_largest_for_another_reason_are_kept(made_n: Callable[[Floats], Floats]) -> None:
+    force_n = made_n(held_readings(np.random.default_rng(4)))
+    clipped, notes = flag_clipped(force_n, np.ones(force_n.size, dtype=bool))
+    assert not clipped.any() and notes == []

@@ -105,7 +105,10 @@ def _possible(ladder: Ladder, orders: Sequence[int], notes: list[str]) -> tuple[
             LadderFlaw.TOO_SHORT, f"{stairs} stairs on a branch carry no order of {', '.join(map(str, orders))}"
         )
     if len(possible) < len(orders):
-        notes.append(f"{stairs} stairs on a branch: orders above {max(possible)} are not tried")
+        notes.append(
+            f"{stairs} stairs on a branch: orders above {max(possible)} are not tried, and the errors are those at the stairs; "
+            "between them nothing was measured"
+        )
     return possible
 
 

@@ -28,6 +28,7 @@ KGF_SLACK: Final = 1.35  # plants of one kind differ by this much, not by 9.81
 FAR_RATIO: Final = 2.0
 CLIPPED_N: Final = 0.02  # stairs of a saturated cell agree to a count
 FEWEST_CLIPPED: Final = 3
+FEWEST_CLIPPED_RISING: Final = 2  # the top stair always is
 BEYOND_CELL: Final = 1.1  # times its saturation: no cell reads so much
 DIP_SHARE: Final = 0.02  # of the force range: a stair this far below an earlier one is no noise
 NOISE_AT: Final = 5.0
@@ -219,12 +220,16 @@ def _judge_ratio(ratio: float, against: str, unit_known: bool) -> list[str]:
 
 
 def _without_saturated(ladder: Ladder, saturation_n: float | None) -> tuple[Ladder, list[str]]:
-    """Stairs at which the force stands still at its highest value, in the way a saturated cell (or supply) does."""
+    """Stairs at which the force stands still at its highest value, in the way a saturated cell (or supply) does: on the way up,
+    too. On the way down alone it is friction that holds."""
     top_n = float(ladder.force_n.max())
     level_n = top_n - CLIPPED_N if saturation_n is None else min(top_n - CLIPPED_N, 0.98 * saturation_n)
     clipped = ladder.force_n >= level_n
-    apart = np.unique(np.round(ladder.voltage_v[clipped], 3))
-    if len(apart) < FEWEST_CLIPPED:
+    apart, rising = (
+        np.unique(np.round(ladder.voltage_v[each], 3)) for each in (clipped, clipped & (ladder.direction == RISING))
+    )
+    is_at_end = saturation_n is not None and top_n > 0.98 * saturation_n
+    if len(apart) < FEWEST_CLIPPED or (len(rising) < FEWEST_CLIPPED_RISING and not is_at_end):
         return ladder, []
     clipped = ladder.voltage_v >= apart[0] - 1.0e-9  # the falling branch above that voltage starts from the clipped one
     note = _clipped_sentence(top_n, apart, saturation_n)

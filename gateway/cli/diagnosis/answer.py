@@ -18,8 +18,8 @@ from gateway import defaults
 from gateway.cli.diagnosis.inputs import Sources
 from gateway.cli.diagnosis.terminal import render_diagnosis
 from gateway.diagnosis import EFFECTS, Diagnosis
+from gateway.diagnosis.notes import why_blind
 from gateway.reports.diagnosis.document import diagnosis_document
-from gateway.reports.diagnosis.wording import why_blind
 
 if TYPE_CHECKING:
     from gateway.diagnosis.experiments.experiments import Plan

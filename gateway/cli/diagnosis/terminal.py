@@ -9,6 +9,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from gateway.diagnosis.notes import why_blind
 from gateway.diagnosis.result import Cause, Diagnosis, Verdict
 from gateway.reports.diagnosis import headline
 from gateway.reports.diagnosis import wording as words
@@ -36,7 +37,7 @@ def render_diagnosis(
     yield Text()
     for suspect in diagnosis.suspects:
         yield Text(suspect.sentence, style="bold red" if suspect.is_sure else "bold yellow")
-    colour = "yellow" if words.why_blind(diagnosis) else _COLOUR[diagnosis.verdict]
+    colour = "yellow" if why_blind(diagnosis) else _COLOUR[diagnosis.verdict]
     yield Text(headline.answer_sentence(diagnosis), style=f"bold {colour}")
     if lack := headline.lack_sentence(diagnosis):
         yield Text(lack)

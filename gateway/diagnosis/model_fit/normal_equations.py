@@ -11,7 +11,8 @@ from typing import Final
 import numpy as np
 
 from gateway.diagnosis.bench.bench import Bench
-from gateway.diagnosis.measurement import Floats
+from gateway.diagnosis.bench.parameters import StartParameter
+from gateway.diagnosis.measurement import Flags, Floats
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
 from gateway.diagnosis.noise.whitening import Whitener
 
@@ -72,7 +73,20 @@ class NormalEquations:
 
 def model_span(fitted: FittedModel, whiten: Whitener) -> ModelSpan:
     """Return what a fitted model spans, by spectra of the whitened columns."""
-    return ModelSpan.of(whiten.spectra(fitted.jacobian), whiten.spectra(fitted.residual_n))
+    columns, residual = whiten.spectra(fitted.jacobian), whiten.spectra(fitted.residual_n)
+    columns[held_at_bounds(fitted, columns @ residual)] = 0.0
+    return ModelSpan.of(columns, residual)
+
+
+def held_at_bounds(fitted: FittedModel, slope: Floats) -> Flags:
+    """Return which columns no step may use, (columns,): of a plant's number at the end of its range that would go on from
+    there. What it would save beyond it is not the model's. slope: columns by the residual, both whitened."""
+    first, held = len(fitted.parameters.offsets_n), np.zeros(slope.size, dtype=bool)
+    for at, parameter in enumerate(fitted.free, first):
+        if not isinstance(parameter, StartParameter):  # of a start nobody knows more than its fit
+            value, rises = fitted.parameters.value(parameter), slope[at] > 0.0
+            held[at] = value >= parameter.high if rises else value <= parameter.low
+    return held
 
 
 def orthonormal(rows: Floats) -> Floats:
@@ -124,9 +138,10 @@ def held_out_errors(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Held
     sums, and applied to the raw residual of the block.
     """
     columns, residual = whiten(fitted.jacobian), whiten(fitted.residual_n)
+    held = held_at_bounds(fitted, columns @ residual)
     blocks = int(bench.block_of_row.max()) + 1
     scale = np.sqrt(np.maximum(np.sum(columns**2, axis=1), 1.0e-300))
-    columns = columns / scale[:, None]
+    columns = columns / scale[:, None] * ~held[:, None]
     normal_matrix, slope = columns @ columns.T + _RIDGE * np.eye(columns.shape[0]), columns @ residual
     squares = np.zeros(bench.rows)
     errors, counts, steps = np.zeros(blocks), np.zeros(blocks), np.zeros((blocks, columns.shape[0]))
@@ -134,7 +149,7 @@ def held_out_errors(bench: Bench, fitted: FittedModel, whiten: Whitener) -> Held
         rows = bench.block_of_row == block
         inside = columns[:, rows]
         left = normal_matrix - inside @ inside.T
-        steps[block] = np.linalg.lstsq(left, slope - inside @ residual[rows], rcond=1.0e-10)[0] / scale
+        steps[block] = np.linalg.lstsq(left, slope - inside @ residual[rows], rcond=1.0e-10)[0] * ~held / scale
         judged = rows & bench.judged
         error = fitted.residual_n[judged] - steps[block] @ fitted.jacobian[:, judged]
         squares[judged] = error**2

@@ -123,12 +123,27 @@ def find_dependences(
         found.append(dependence)
         taken = np.vstack([fitted.jacobian, bench.reduce(dependence.regressors.columns)])
         fitted = FittedModel(fitted.parameters, fitted.free, fitted.residual_n, fitted.chi2, taken)
-    leftovers = [describe_leftover(bench, each.regressors, each.sizes, each.share) for each in distinct]
+    shares = [_share_of_left(bench, each, fitted, given) for each in distinct]
+    leftovers = [
+        describe_leftover(bench, each.regressors, each.sizes, share)
+        for each, share in zip(distinct, shares, strict=True)
+    ]
     kinds = {each.regressors.kind for each in distinct}
     is_uneven = bool(kinds & {"jump", "slow"})  # these are louder somewhere themselves
     if not is_uneven and bench.rms_n(fitted.residual_n) >= RESOLUTION_N:
         leftovers += find_unsteadiness(bench, fitted, whiten)
     return tuple(leftovers[:MOST_LEFTOVERS])
+
+
+def _share_of_left(bench: Bench, dependence: Dependence, fitted: FittedModel, given: Sequence[Dependence]) -> float:
+    """Return its share of what is left. Of a line that is its power: noise with a line in it is what the residual is whitened
+    by, and little of a strong one is left there. given: what the search has taken out of the residual."""
+    if not dependence.regressors.frequency_hz:
+        return dependence.share
+    line_n2 = float(np.mean(dependence.contribution_n[bench.judged] ** 2))
+    rest_n2 = float(np.mean(fitted.residual_n[bench.judged] ** 2))
+    is_out = any(dependence is each for each in given)
+    return line_n2 / max(rest_n2 + (line_n2 if is_out else 0.0), line_n2)
 
 
 def _is_new(bench: Bench, dependence: Dependence, distinct: Sequence[Dependence]) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gateway.recording.tables.column_names import DERIVED, PULLING
+from gateway.robust import noise_from_second_differences
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -23,6 +24,11 @@ _ENOUGH: Final = 10
 _FINE_STEPS: Final = 5.0
 _ENDS: Final = (0.05, 0.95)
 _BEYOND: Final = 5.0  # times as far away as nine tenths of all readings lie apart, or from 0
+_LEAST_CLIPPED: Final = 20
+_CLIPPED_SHARE: Final = 0.01
+_NOISE_STEPS: Final = (
+    2.0  # of the resolution that the noise must have: then no two readings in a hundred are the largest
+)
 _OFF_V: Final = 0.01
 _FORGOTTEN_S: Final = 12.0  # behind a pull; what comes higher later is not waited for
 _REMEMBERED_S: Final = 1.0  # that a force still follows what drove it
@@ -119,6 +125,26 @@ def _repeats_by_resolution(force_n: Floats, resting: Flags) -> float | None:
     if twos < _ENOUGH:
         return None
     return float(0.75 * ones * max(ones / twos, 1.0) ** (1.0 / 3.0))  # half again as many, for a force that creeps
+
+
+def flag_clipped(force_n: Floats, usable: Flags) -> tuple[Flags, list[str]]:
+    """Return the usable rows at the end of the cell's or its converter's range: the largest reading there is, push or pull,
+    again and again, though noise of several steps should tell readings apart. A stretch that is frozen at it is none."""
+    none, known = np.zeros(force_n.size, dtype=bool), force_n[usable]
+    if known.size < _ENOUGH:
+        return none, []
+    end_n = float(known[np.argmax(np.abs(known))])
+    clipped = usable & (force_n == end_n)
+    rows = int(clipped.sum())
+    beside = force_n[usable & ~clipped]
+    if rows < max(_LEAST_CLIPPED, _CLIPPED_SHARE * known.size) or beside.size < _ENOUGH:
+        return none, []
+    step_n = float(np.median(np.diff(np.unique(beside))))
+    stretches = int(np.sum(np.diff(clipped.astype(np.int8)) == 1))
+    if stretches < _LEAST_REPEATS or noise_from_second_differences(beside) < _NOISE_STEPS * step_n:
+        return none, []
+    seen = f"{rows} readings ({rows / known.size:.1%}) stand at {end_n:.5g} N"
+    return clipped, [f"{seen}: the end of the cell's or its converter's range? They are not judged"]
 
 
 def flag_dropouts(force_n: Floats, time_s: Floats, drives: Iterable[Floats]) -> tuple[Flags, list[str]]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from gateway.diagnosis.input_checks import Suspect
+from gateway.diagnosis.notes import why_blind
 from gateway.diagnosis.result import Baseline, Cause, Diagnosis, Estimate, Interval, Leftover
 from gateway.reports.diagnosis.wording import all_notes
 from gateway.reports.json_numbers import finite_or_none
@@ -35,7 +36,7 @@ def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
         },
         "runtime_s": finite_or_none(runtime_s),
         "suspects": [_suspect(each) for each in diagnosis.suspects],
-        "notes": all_notes(diagnosis),
+        "notes": [*filter(None, [why_blind(diagnosis)]), *all_notes(diagnosis)],
     } | ({"machine": _machine(diagnosis)} if diagnosis.machine else {})
 
 

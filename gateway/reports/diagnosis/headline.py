@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
+from gateway.diagnosis.notes import why_blind
 from gateway.diagnosis.result import Cause, Diagnosis, Verdict
 from gateway.reports.diagnosis import wording as words
 
@@ -22,7 +23,7 @@ _DEPENDS_ON_NOTHING: Final = "What is left is more than the noise, and depends o
 
 def badge(diagnosis: Diagnosis) -> tuple[str, str]:
     """Return the verdict as a word or two, and its colour."""
-    if _has_wrong_columns(diagnosis) or words.why_blind(diagnosis):
+    if _has_wrong_columns(diagnosis) or why_blind(diagnosis):
         return "nothing can be told", "warn"
     if diagnosis.verdict is Verdict.PARTIAL and not _leaves_more_than_noise(diagnosis):
         return "explained, not confirmed", "warn"
@@ -33,7 +34,7 @@ def answer_sentence(diagnosis: Diagnosis) -> str:
     """Return `Creep explains part of the difference: 0.42 N before, 0.21 N after, the noise is 0.10 N`. N RMS."""
     if _has_wrong_columns(diagnosis):
         return _WRONG_COLUMNS
-    if why := words.why_blind(diagnosis):
+    if why := why_blind(diagnosis):
         return f"Nothing can be told: {why}"
     tell = _describe_finding if diagnosis.machine is None else _describe_change
     return f"{tell(diagnosis)}: {_describe_error(diagnosis)}"
@@ -43,7 +44,7 @@ def lack_sentence(diagnosis: Diagnosis) -> str:
     """Return what the answer lacks, or that it lacks nothing; empty where the answer has said it."""
     if _has_wrong_columns(diagnosis):
         return _FIX_COLUMNS
-    if words.why_blind(diagnosis) or diagnosis.verdict is Verdict.NOTHING_FOUND:
+    if why_blind(diagnosis) or diagnosis.verdict is Verdict.NOTHING_FOUND:
         return ""
     if diagnosis.verdict is Verdict.CONFIRMED:
         return _NOTHING_LEFT

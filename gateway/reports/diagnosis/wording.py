@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from math import floor, isfinite, log10, sqrt
 from typing import Final
 
-from gateway.diagnosis import notes
 from gateway.diagnosis.result import Cause, Diagnosis, Estimate, FloorSource, Interval, Leftover
 from gateway.twin.plant import Plant
 
@@ -15,8 +14,6 @@ _FLOOR_SOURCES: Final = {
     FloorSource.CALIBRATION: "from the calibration",
     FloorSource.SEARCH: "estimated",
 }
-_NO_AREA_M2: Final = 5.0e-6
-"""What is left of the model's area where no force answers; a small signal leaves it whole."""
 
 
 def machine_sentence(diagnosis: Diagnosis) -> str:
@@ -29,18 +26,6 @@ def machine_sentence(diagnosis: Diagnosis) -> str:
         f"belongs to the machine, by {join_words(machine.recordings)}: {names}, and {force(machine.common_error_n)} N RMS that "
         f"its model gets wrong in the same way every time; {force(machine.left_n)} N RMS is left beside it"
     )
-
-
-def why_blind(diagnosis: Diagnosis) -> str:
-    """Return why the recordings say nothing, where they do not and nothing else was found. What is found in a force whose
-    readings are all the same is the base model's, which is nowhere quite still."""
-    measurements = [trace.measurement for trace in diagnosis.traces]
-    has_findings = (
-        diagnosis.suspects or diagnosis.causes or diagnosis.leftover or diagnosis.base.cylinder.area_m2 > _NO_AREA_M2
-    )
-    if has_findings and not notes.is_frozen(measurements):
-        return ""
-    return notes.uninformative_force(measurements)
 
 
 def others(cause: Cause) -> list[str]:

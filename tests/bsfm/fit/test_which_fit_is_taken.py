@@ -136,7 +136,9 @@ def test_orders_that_the_stairs_cannot_carry_are_not_tried() -> None:
     ladder = ladder_of(2, 12)
     tried = _possible(ladder, (1, 2, 3, 15), notes)
     assert _possible(ladder, (3, 4, 5), []) == (3, 4), "nine coefficients, of 12 stairs"
-    assert tried and 15 not in tried and notes == [f"12 stairs on a branch: orders above {max(tried)} are not tried"]
+    assert tried and 15 not in tried and len(notes) == 1
+    assert notes[0].startswith(f"12 stairs on a branch: orders above {max(tried)} are not tried")
+    assert notes[0].endswith("the errors are those at the stairs; between them nothing was measured")
     notes.clear()
     assert _possible(ladder, tried, notes) == tried and notes == []
     with pytest.raises(LadderError, match="12 stairs on a branch carry no order of 15"):

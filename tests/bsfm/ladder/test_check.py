@@ -26,8 +26,10 @@ def stairs(groups: int = 3) -> list[float]:
     return (up + up[-2::-1]) * groups
 
 
-def recorded(voltages: list[float], dwell_s: float = 0.4, noise_n: float = 0.1, seed: int = 1) -> Table:
-    """50 Hz rows of a loop with a play of 3 N that answers with a lag; a row's force is read before its command acts."""
+def recorded(
+    voltages: list[float], dwell_s: float = 0.4, noise_n: float = 0.1, seed: int = 1, friction_n: float = 1.5
+) -> Table:
+    """50 Hz rows of a loop with friction that answers with a lag; a row's force is read before its command acts."""
     rng, rows, felt_v, force_n, time_s = np.random.default_rng(seed), [], 0.0, 0.0, 0.0
     for volts in [*voltages, voltages[-1]]:
         for _ in range(round(dwell_s / 0.02)):
@@ -35,7 +37,7 @@ def recorded(voltages: list[float], dwell_s: float = 0.4, noise_n: float = 0.1, 
             time_s += 0.02
             felt_v += (volts - felt_v) * 0.3
             thrust_n = NEWTON_PER_VOLT * felt_v
-            force_n = float(np.clip(force_n, thrust_n - 1.5, thrust_n + 1.5))
+            force_n = float(np.clip(force_n, thrust_n - friction_n, thrust_n + friction_n))
     return dict(zip(("time_s", "command_v", "force_n"), np.array(rows).T.copy(), strict=True))
 
 
@@ -179,6 +181,14 @@ def test_a_saturated_cell_costs_its_stairs_only() -> None:
     checked = check_table(with_force(lambda force: np.minimum(force, 52.0)))
     assert checked.ladder.voltage_v.max() == pytest.approx(6.0)
     assert any("saturated" in note and "ends at 6.00 V" in note for note in checked.notes)
+
+
+def test_a_force_that_friction_holds_on_the_way_down_is_no_saturated_cell() -> None:
+    """A dry slide lost the top of its range to `saturated load cell, or no more supply pressure`: 0.5 V of 5 V."""
+    checked = check_table(recorded(stairs(), noise_n=0.0, friction_n=6.0))
+    top = checked.ladder.force_n > checked.ladder.force_n.max() - 0.02
+    assert len(np.unique(checked.ladder.voltage_v[top])) >= 3  # of the way down
+    assert (checked.ladder.voltage_v.max(), checked.closed, checked.notes) == (TOP_V, True, ())
 
 
 def test_a_cell_saturated_for_most_of_the_way_is_refused() -> None:

@@ -1,5 +1,7 @@
 """What is left is told in words and numbers, each thing once, and no more than three of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,21 @@ def test_a_line_is_told_in_hertz_and_newtons() -> None:
     assert one.frequency_hz == pytest.approx(7.3, rel=0.01)
     assert one.amplitude_n == pytest.approx(0.15, rel=0.1)
     assert "7.3 Hz" in one.experiment
+
+
+def test_a_strong_line_s_share_is_that_of_its_power() -> None:
+    """0.5 N of 0.38 N RMS were `2 % of what is left`: noise with the line in it had whitened the line away."""
+    line_n = 0.5 * np.sin(2.0 * np.pi * 1.3 * TIME_S)
+    noise_n = np.random.default_rng(12).normal(0.0, NOISE_N, TIME_S.size)
+    bench = bench_of([measurement(TIME_S, VOLTS, CLEAN_N + line_n + noise_n, {})])
+    fitted, whiten = _known_model(bench, CLEAN_N)
+    (noise,) = whiten.noises
+    hertz = np.arange(noise.weights.size) * 100.0 / noise.length
+    weights = noise.weights * np.where(np.abs(hertz - 1.3) < 0.1, 0.08, 1.0)
+    whiten = replace(whiten, noises=(replace(noise, weights=weights),))
+    (one, *_) = find_dependences(bench, fitted, whiten, ())
+    assert one.frequency_hz == pytest.approx(1.3, rel=0.02) and one.amplitude_n == pytest.approx(0.5, rel=0.1)
+    assert one.share == pytest.approx(np.var(line_n) / (np.var(line_n) + NOISE_N**2), rel=0.1)
 
 
 def test_a_slow_wander_is_told_in_seconds_and_newtons() -> None:
