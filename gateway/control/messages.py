@@ -52,7 +52,8 @@ def noisy_sentence(force_n: float) -> str:
     """Return W361, which says why the state does not become holding."""
     return (
         f"W361 at {force_n:.1f} N single readings keep leaving the band that their mean is in, so nothing counts as holding: "
-        "the noise is as large as the band, or the tool shakes; a wider in_band_tolerance, or a filter on the amplifier"
+        "the noise is as large as the band, the tool shakes or the regulator hunts; a wider in_band_tolerance, or a filter on "
+        "the amplifier"
     )
 
 

@@ -2,7 +2,7 @@
 model."""
 
 from dataclasses import replace
-from math import cos, e, pi, radians
+from math import cos, e, pi, radians, sin
 
 import pytest
 
@@ -272,3 +272,16 @@ def test_noise_as_large_as_the_band_is_told_once_an_enable_as_what_keeps_the_sta
         assert (bench.last.state is State.HOLDING) is not bool(times)
         bench.write(control_word=0)
         bench.run(0.5)
+
+
+@pytest.mark.parametrize("frequency_hz", [3.0, 7.0, 11.0])
+def test_a_force_that_swings_far_over_both_edges_of_the_band_is_told(frequency_hz: float) -> None:
+    """A regulator that hunts: the smoothed force crosses the edges, too, so it was neither noise nor a target that is missed,
+    and with a trim that stands nothing was said for as long as it went on."""
+    bench = enabled(replace(settings(), trim=Trim()), gain_n_per_v=7.2)
+    turn = 2.0 * pi * frequency_hz
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 9.0 * sin(turn * sample.time_s))
+    bench.force(20.0)
+    bench.run(12.0)
+    assert bench.last.state is State.RAMPING
+    assert len([one for one in bench.events if one.startswith(("W360", "W361", "A301"))]) > 0

@@ -21,7 +21,8 @@ _WAIT, _MOVE, _SETTLE = StateEvent.WAIT, StateEvent.MOVE, StateEvent.SETTLE
 _RAMP_BANDS: Final = 2.0  # tolerances, so far a force in contact may be off on a ramp, ...
 _RAMP_LATE_S: Final = 0.5  # ... and what the ramp gains in this time: lags that nobody has measured
 _SMOOTHING_S: Final = 0.3  # of the force that is called missed
-_NOISY_S: Final = 5.0  # beyond the in-band time, with the mean inside and nothing settled
+_NOISY_S: Final = 5.0  # beyond the in-band time, neither in band nor unreachable; ...
+_NOISY_WAITS: Final = 2.0  # ... and so many times what makes a target unreachable: that is told first
 _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
 _LEAST_SHARE: Final = 0.3  # of the expected force: less is no answer, though friction may keep the tool in contact, ...
 _SLACK_N: Final = 1.0  # ... but for so much, which zero and noise may hide
@@ -64,14 +65,15 @@ class SettlingCheck:
     """Decides which event of the state table a step of the force loop is. Times are monotonic seconds.
 
     unreachable_s: how long out of band, or without an answer in voltage mode, until the target counts as unreachable. is_noisy:
-    single readings keep leaving the band that their mean is in, so that nothing settles.
+    readings keep crossing the edges of the band, so that the force is neither held nor missed.
     """
 
     def __init__(self, unreachable_s: float) -> None:
+        self._unreachable_s = unreachable_s
         self._band = InBandTimer(unreachable_s)
         self._answer = InBandTimer(unreachable_s)
         self._smooth_n: float | None = None  # contact force behind a low-pass, None where it begins anew
-        self._near_since_s = inf  # since when it has been in the band, with single readings that have not
+        self._undecided_since_s = inf  # since when the force has been neither in band nor unreachable
         self.is_noisy = False
         self._driven_v: float | None = None  # that the band is of; None: it is of a force, or of nothing
 
@@ -92,6 +94,7 @@ class SettlingCheck:
 
     def retime(self, unreachable_s: float) -> None:
         """Replace the time until the target counts as unreachable, s, by that of another calibration's response."""
+        self._unreachable_s = unreachable_s
         self._band.retime(unreachable_s)
         self._answer.retime(unreachable_s)
 
@@ -100,32 +103,39 @@ class SettlingCheck:
         self._band.restart()
         self._answer.restart()
         self._driven_v = self._smooth_n = None
-        self._near_since_s, self.is_noisy = inf, False
+        self._undecided_since_s, self.is_noisy = inf, False
 
     def judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float, applied_n: float) -> StateEvent:
         """Return the event of a step in force mode. goal_n: where the ramp of the applied force leads."""
         self._answer.restart()
         if self._driven_v is not None:  # what was held was a voltage
             self._band.restart()
+            self._undecided_since_s = inf
         self._driven_v = None
         if demand.force_n <= 0.0:
             self._band.restart()
+            self._undecided_since_s = inf
             return _WAIT if applied_n <= 0.0 else _MOVE
         if abs(goal_n - applied_n) > demand.tolerance_n:
             self._smooth_n = None
-            self._near_since_s = inf
+            self._undecided_since_s = inf
             self._follow_ramp(demand, inputs, applied_n)
             return _MOVE
         may_be = inputs.touching and abs(demand.force_n - applied_n) <= demand.tolerance_n
         inside = may_be and abs(inputs.reading.contact_n - demand.force_n) <= demand.tolerance_n
         out = not may_be or abs(self._smooth(inputs.reading) - demand.force_n) > demand.tolerance_n
         self._band.update(inputs.now_s, inside, demand.in_band_time_s, is_out=out)
-        is_near = not (out or self._band.in_band)
-        self._near_since_s = min(self._near_since_s, inputs.now_s) if is_near else inf
-        self.is_noisy = inputs.now_s - self._near_since_s > demand.in_band_time_s + _NOISY_S
+        self._judge_noise(inputs.now_s, demand.in_band_time_s)
         if self._band.in_band:
             return _SETTLE
         return _MOVE if inputs.touching or applied_n != goal_n else _WAIT
+
+    def _judge_noise(self, now_s: float, in_band_time_s: float) -> None:
+        """Of a wide swing the smoothed force crosses the edges of the band, too: it is never missed for long, either."""
+        is_undecided = not (self._band.in_band or self._band.unreachable)
+        self._undecided_since_s = min(self._undecided_since_s, now_s) if is_undecided else inf
+        longest_s = in_band_time_s + max(_NOISY_S, _NOISY_WAITS * self._unreachable_s)
+        self.is_noisy = now_s - self._undecided_since_s > longest_s
 
     def _smooth(self, reading: Reading) -> float:
         if self._smooth_n is None or not isfinite(self._smooth_n):

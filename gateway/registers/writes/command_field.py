@@ -87,7 +87,10 @@ class CommandField:
 
     def _out_of_range(self, value: float, address: int) -> Refusal:
         allowed = ("0 and " if self.low > 0.0 else "") + allowed_range(self.low, self.high, self.unit)
-        text = f"{self.name} = {self.format(value)}, allowed {allowed} ({self.limit_source})"
+        shown = self.format(value)
+        if self.low <= round(value, self.decimals) <= self.high:  # these digits would name a value that is allowed
+            shown = f"{decimal(value)} {self.unit}".rstrip()
+        text = f"{self.name} = {shown}, allowed {allowed} ({self.limit_source})"
         return Refusal(RefusalReason.OUT_OF_RANGE, address, text, value=value)
 
 

@@ -81,6 +81,8 @@ BAD_FLOATS = [
     (202, math.inf, R.NOT_FINITE, "W207 force_setpoint = inf"),
     (202, -math.inf, R.NOT_FINITE, "W207"),
     (202, 60.01, R.OUT_OF_RANGE, "W204 force_setpoint = 60.01 N, allowed 0 .. 60 N (rig demo)"),
+    (202, 60.000004, R.OUT_OF_RANGE, "W204 force_setpoint = 60.000004 N, allowed 0 .. 60 N (rig demo)"),
+    (202, -0.004, R.OUT_OF_RANGE, "W204 force_setpoint = -0.004 N, allowed 0 .. 60 N (rig demo)"),
     (202, -0.5, R.OUT_OF_RANGE, "W204"),
     (202, 1e30, R.OUT_OF_RANGE, "W204 force_setpoint = 1e+30 N"),
     (202, 9e-4, R.TOO_SMALL, "W208 force_setpoint = 0.0009 N"),
