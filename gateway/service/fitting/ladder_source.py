@@ -111,7 +111,13 @@ def check_source(recording: Recording, context: RigContext) -> CheckedLadder:
     """Return the ladder of a recording, of a resumed one with what came before. LadderError if it must not be fitted."""
     expected, rig_notes = expectation(recording, context)
     recordings = read_resumed(recording)
-    ladder = join_ladders([check_ladder(part.columns, part.header, expected) for part in recordings])
+    ladders = [check_ladder(part.columns, part.header, expected) for part in recordings]
+    if len(ladders) > 1:  # or what is left out of one would read as if the fit had to do without it
+        ladders = [
+            replace(ladder, notes=tuple(f"{part.path.name}: {note}" for note in ladder.notes))
+            for part, ladder in zip(recordings, ladders, strict=True)
+        ]
+    ladder = join_ladders(ladders)
     notes = dict.fromkeys(note for part in recordings for note in part.notes)
     return replace(ladder, notes=(*notes, *rig_notes, *ladder.notes))
 
