@@ -92,9 +92,18 @@ def read_resumed(recording: Recording) -> list[Recording]:
     """Return the recordings that a resumed run goes on from, oldest first, and itself. An exported table stands alone."""
     numbers = recording.header.get("continues", ()) if recording.path.suffix == SUFFIX else ()
     earlier = numbers if isinstance(numbers, list) else ()
-    beside = recording.path.parent
-    parts = [*(read_recording(beside / f"{int(number):04d}{recording.path.suffix}") for number in earlier), recording]
+    parts = [*(_read_earlier(recording, int(number)) for number in earlier), recording]
     return [_shift_to_zero(part, float(parts[0].header.get("zero_n", 0.0))) for part in parts]
+
+
+def _read_earlier(recording: Recording, number: int) -> Recording:
+    path = recording.path.with_name(f"{number:04d}{recording.path.suffix}")
+    try:
+        return read_recording(path)
+    except FileNotFoundError:
+        raise RecordingError(
+            f"{recording.path}: goes on from {path.name}, which has the groups before and does not lie beside it: copy it there"
+        ) from None
 
 
 def _shift_to_zero(part: Recording, zero_n: float) -> Recording:
