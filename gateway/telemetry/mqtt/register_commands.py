@@ -19,8 +19,8 @@ from gateway.registers.map.register_map import Register, RegisterMap
 
 _SETPOINTS: Final = ("force_setpoint", "voltage_setpoint")
 _LONGEST: Final = 16_384
-_SUCH: Final = 'a command is JSON such as {"force_setpoint": 12.0, "control_word": 1}'
 """Bytes of a command: far beyond one that names every register, and too few to nest deeply."""
+_SUCH: Final = 'a command is JSON such as {"force_setpoint": 12.0, "control_word": 1}'
 _TWICE: Final = object()
 """Stands for the value of a name that stands twice."""
 
