@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 
 import click
 
-from gateway.cli.command_line.numbers import Finite
+from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.command_line.questions import is_yes
 from gateway.cli.errors import CliError
 from gateway.cli.setup import port_probing as probing
@@ -186,8 +186,8 @@ def _ask_unit(rig: GuidedRig, device: "DeviceProfile") -> None:
     if unit != "counts":
         rig.settings["load_cell", "unit"] = unit
         return
-    rig.settings["load_cell", "zero_count"] = click.prompt("counts without a force", default=0.0, type=Finite())
-    rig.settings["load_cell", "newton_per_count"] = click.prompt("newtons of one count", type=Finite(0, min_open=True))
+    rig.settings["load_cell", "zero_count"] = click.prompt("counts without a force", default=0.0, type=Quantity())
+    rig.settings["load_cell", "newton_per_count"] = click.prompt("newtons of one count", type=Quantity(0, above=True))
 
 
 def _fit_output(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None:
@@ -218,7 +218,7 @@ def _fit_supervision(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None
 
 
 def _ask_forces(rig: GuidedRig) -> None:
-    positive = Finite(0, min_open=True)
+    positive = Quantity(0, above=True)
     range_n = click.prompt("rated force of the load cell, N", default=98.07, type=positive)
     most_n = click.prompt(
         "largest force that tool and workpiece take, N", default=round(min(0.4 * range_n, _MOST_N), 1), type=positive

@@ -68,9 +68,25 @@ def test_forces_that_do_not_fit_are_asked_again() -> None:
 
 def test_a_force_that_is_no_number_is_asked_again() -> None:
     """NaN was taken, for the cell's range and for the newtons of a count."""
-    answers = ("later", "smc-itv-rc", "", "y", "later", "adam-4016", "", "counts", "0", "nan", "12,5", "12.5", "nan")
+    answers = (
+        "later",
+        "smc-itv-rc",
+        "",
+        "y",
+        "later",
+        "adam-4016",
+        "",
+        "counts",
+        "0",
+        "nan",
+        "12,5",
+        "12.5",
+        "nan",
+        "-5",
+    )
     result = answered(*answers, "98.07", "inf", "40")
     assert result.exit_code == 0 and "decimals take a point: 12.5" in result.output, result.output
+    assert "-5: allowed above 0" in result.output
     text = Path("own.yaml").read_text(encoding="utf-8")
     assert "newton_per_count: 12.5" in text and "force_max_n: 40" in text and "range_n: 98.07" in text
 
