@@ -64,4 +64,4 @@ def error_row(task: Task, error: BaseException | str) -> Row:
     match = _CODED.match(text)
     known = isinstance(error, (OSError, ValueError, RecordingError, str))
     code, sentence = match.groups() if match else (UNREADABLE if known else INTERNAL, text)
-    return {**task.head, "error_code": code, "error": sentence[:_LONGEST_ERROR]}
+    return {**task.head, "error_code": code, "error": sentence.removeprefix(f"{task.path}: ")[:_LONGEST_ERROR]}

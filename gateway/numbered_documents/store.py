@@ -202,7 +202,8 @@ class NumberedStore(ABC, Generic[Document]):
     def _built_in(self, number: int) -> Document:
         if self.built_in is not None and self.number_of(self.built_in) == number:
             return self.built_in
-        known = ", ".join(map(str, self.numbers())) or "none yet"
+        own = [] if self.built_in is None else [self.number_of(self.built_in)]
+        known = ", ".join(map(str, sorted({*own, *self.numbers()}))) or "none yet"
         raise StoreError("E433", f"there is no {self.noun} {number} in {self.directory}; there are: {known}")
 
     def numbers(self) -> Numbers:

@@ -82,7 +82,7 @@ def test_the_last_number_is_the_last(store):
 
 
 def test_an_unknown_number_is_told_with_those_that_there_are(used):
-    with pytest.raises(StoreError, match=r"E433 there is no calibration 7 in .*; there are: 2, 3"):
+    with pytest.raises(StoreError, match=r"E433 there is no calibration 7 in .*; there are: 1, 2, 3"):
         used.use(7)
     with pytest.raises(StoreError, match="none yet"):
         CalibrationStore(used.directory / "elsewhere").load(1)

@@ -102,7 +102,10 @@ def test_other_numbers_stay_under_their_own_names_and_words_go(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("time_s,force_n\n0,1\n1,abc\n", "table.csv:3, column force_n (the 2. of the table): 'abc' is no number"),
+        (
+            "time_s,force_n\n0,1\n1,abc\n",
+            "(the 2. of the table): 'abc' is no number; where nothing was read, leave the cell empty",
+        ),
         ("# note: x\ntime_s,force_n\n\n0,1\n1;2,3\n", "table.csv:5, column time_s"),
         ("time_s,force_n\n0,1\n1\n2,3\n", "table.csv:3: 1 cells, the header 2"),
         ("time_s,force_n\n0,1\n1,2,3\n2,3\n", "table.csv:3: 3 cells, the header 2"),

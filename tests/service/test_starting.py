@@ -204,7 +204,11 @@ def test_a_port_that_is_away_or_held_ends_the_first_start_at_once(code: str) -> 
     ("error", "code", "words"),
     [
         (PermissionError(13, "Permission denied"), exit_codes.PERMISSION, "E120 port 502 needs the capability"),
-        (OSError(errno.EADDRINUSE, "Address already in use"), exit_codes.DEVICE, "E121 cannot listen on"),
+        (
+            OSError(errno.EADDRINUSE, "Address already in use"),
+            exit_codes.DEVICE,
+            "1:502: Address already in use; another program .*`ss -ltnp`",
+        ),
         (OSError(errno.EADDRNOTAVAIL, "Cannot assign"), exit_codes.DEVICE, "is no address of this machine"),
     ],
 )

@@ -29,8 +29,8 @@ def rig_with(**mqtt: Any) -> Rig:
         ({}, ["force-gateway/demo"], ()),
         ({"base_topic": "hall/3"}, ["hall/3"], ()),
         ({"commands": True}, ["force-gateway/demo"], ("force-gateway/demo/command",)),
-        ({"sparkplug": SparkplugNode(group="plant")}, ["force-gateway/demo", "plant/demo"], ()),
-        ({"sparkplug": SparkplugNode(group="plant", node="cell")}, ["force-gateway/demo", "plant/cell"], ()),
+        ({"sparkplug": SparkplugNode(group="plant")}, ["force-gateway/demo", "spBv1.0/plant/demo"], ()),
+        ({"sparkplug": SparkplugNode(group="plant", node="cell")}, ["force-gateway/demo", "spBv1.0/plant/cell"], ()),
     ],
 )
 def test_a_rig_says_who_is_told_and_whether_commands_are_heard(
@@ -41,6 +41,13 @@ def test_a_rig_says_who_is_told_and_whether_commands_are_heard(
     assert [type(one) for one in sessions] == [JsonTopics, EdgeNode][: len(names)]
     assert [one.name for one in sessions] == names
     assert tuple(sessions[0].subscriptions) == heard
+
+
+def test_the_two_sessions_of_a_rig_have_two_names_at_the_broker_whatever_it_calls_them(tmp_path: Path) -> None:
+    """As the page's own example has it: each took the other's place every two seconds, for ever."""
+    link: Any = None
+    rig = rig_with(base_topic="plant/cell-7", sparkplug=SparkplugNode(group="plant", node="cell-7"))
+    assert len({one.name for one in make_sessions(rig, link, tmp_path)}) == 2
 
 
 def test_each_session_is_told_at_each_look_what_control_says_and_that_it_says_nothing(

@@ -27,6 +27,8 @@ def at(force_n: float) -> LiveState:
         (b'{"force_setpoint": 1}' + b" " * 16_364, "16385 bytes"),
         (b"{}", "a command is JSON such as"),
         (b"[1]", "a command is JSON such as"),
+        (b"junk", "a command is JSON such as"),
+        (b"\xff", "a command is JSON such as"),
         (b'{"force_setpoint": "12"}', "force_setpoint is no number"),
         (b'{"force_setpoint": null}', "force_setpoint is no number"),
         (b'{"force_setpoint": 5, "force_setpoint": 30}', "force_setpoint stands twice"),

@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from gateway.reports.fit.headline import answer_sentence, policy
-from gateway.reports.fit.names import describe_model, spell_model
+from gateway.reports.fit.names import describe_model, spell_groups, spell_model
 
 _LEAST_WIDTH: Final = 90  # below it headings stand in two lines, and a held-out error below its RMS
 _CLOSE_WIDTH: Final = 76  # below it cells stand close together, too
@@ -79,7 +79,7 @@ def summary(document: dict[str, Any]) -> list[Text]:
     lines = [
         Text(
             "RMS and max: of the stairs, each by its own branch; * the paper's normalised figure, no force; dips: a branch is "
-            "not increasing; flat: below 0.5 N/V somewhere",
+            "not increasing; flat: below 0.5 N/V somewhere; crosses: the falling branch is below the rising one somewhere",
             style="dim",
         ),
         Text(),
@@ -88,7 +88,7 @@ def summary(document: dict[str, Any]) -> list[Text]:
         ),
         Text(),
         Text(
-            f"ladder    {ladder['points']} stairs in {_groups(ladder['groups'])}, {low_v:g} .. {high_v:g} V, rig {rig}"
+            f"ladder    {ladder['points']} stairs in {spell_groups(ladder['groups'])}, {low_v:g} .. {high_v:g} V, rig {rig}"
         ),
         Text(f"chosen    {spell_model(chosen['model'], chosen['order'])}, {low_n:.1f} .. {high_n:.1f} N", style="bold"),
         Text(f"          {describe_model(chosen['model'])}"),
@@ -145,7 +145,3 @@ def _reversal(reversal: dict[str, Any]) -> str:
         f"{policy(reversal)}: {reversal['rms_n']:.2f} N RMS on {reversal['points']} minor-loop points, "
         f"{reversal['switched_rms_n']:.2f} N if branches were switched{other}"
     )
-
-
-def _groups(count: int) -> str:
-    return "1 group" if count == 1 else f"{count} groups"

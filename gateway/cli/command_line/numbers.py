@@ -39,17 +39,6 @@ class Number(click.types.FloatParamType):
 NUMBER: Final = Number()
 
 
-class Finite(click.FloatRange):
-    """A number within click's bounds, in which NaN always is, and infinite where one is open."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the number; BadParameter for what is none, is not finite or beyond the bounds."""
-        number = NUMBER.convert(value, param, ctx)
-        if not isfinite(number):
-            self.fail(f"{value} is no finite number", param, ctx)
-        return float(super().convert(number, param, ctx))
-
-
 class Whole(click.IntRange):
     """A whole number within bounds."""
 
@@ -66,18 +55,21 @@ class Whole(click.IntRange):
 
 
 class Quantity(click.FloatRange):
-    """A number within bounds, in a unit."""
+    """A finite number within bounds, in a unit. above: the lower bound itself is not allowed."""
 
-    def __init__(self, low: float | None = None, high: float | None = None, unit: str = "") -> None:
-        super().__init__(low, high)
+    def __init__(
+        self, low: float | None = None, high: float | None = None, unit: str = "", *, above: bool = False
+    ) -> None:
+        super().__init__(low, high, min_open=above)
         self._unit = unit
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the number; BadParameter with the bounds."""
-        number = NUMBER.convert(value, param, ctx)
-        low, high = self.min, self.max
-        if not ((low is None or number >= low) and (high is None or number <= high)):  # so that nan is none
+        """Return the number; BadParameter for what is none, is not finite (JSON has no word for it) or beyond the bounds."""
+        number, low, high = NUMBER.convert(value, param, ctx), self.min, self.max
+        if self.min_open and low is not None and not number > low:  # so that nan is none
+            self.fail(f"{value}: allowed above {low:g}", param, ctx)
+        if not ((low is None or number >= low) and (high is None or number <= high)):
             self.fail(describe_allowed(str(value), low, high, self._unit), param, ctx)
-        if not isfinite(number):  # JSON has no word for it: the gateway could not even say what is wrong
+        if not isfinite(number):
             self.fail(f"{value} is not a finite number", param, ctx)
         return number

@@ -15,6 +15,9 @@ _MOST_SHOWN = 3  # numbers that are told in the sentence on a comparison
 def describe_provenance(plant: NumberedPlant) -> Iterator[str]:
     """Yield where a plant comes from: its recordings and causes."""
     source = plant.provenance
+    if not plant.number:
+        yield f"plant 0 ({plant.profile.name}), the rig's own"
+        return
     yield f"plant {plant.number} ({plant.profile.name}), made {source.made_utc} by force-gateway {source.version}"
     if source.file:
         yield f"added from {source.file}"

@@ -35,6 +35,14 @@ def load_stored(store: PlantStore, number: int) -> NumberedPlant:
         raise CliError(str(error), exit_codes.DATA) from None
 
 
+def load_numbered(state: StateChoice, number: int) -> NumberedPlant:
+    """Return a plant by its number, 0: the rig's own. CliError (65) when it is not there or damaged."""
+    if number:
+        return load_stored(open_store(state.directory), number)
+    nothing = Provenance(made_utc="", version="", rig=state.rig, start="")
+    return NumberedPlant(number=0, profile=find_plant(state, "0"), provenance=nothing)
+
+
 def load_rig_or_none(state: StateChoice) -> Rig | None:
     """Return the rig that is meant, with the calibration that is in use on it; None where it cannot be read."""
     from gateway.calibrations.store import CalibrationStore
@@ -208,7 +216,7 @@ def all_plant_facts(plant: NumberedPlant, rig: Rig | None) -> dict[str, Any]:
         "number": plant.number,
         "name": plant.profile.name,
         "description": plant.profile.description,
-        "provenance": asdict(plant.provenance),
+        "provenance": asdict(plant.provenance) if plant.number else None,
         **compensation_facts(plant, rig),
         "plant": asdict(plant.profile.plant),
     }

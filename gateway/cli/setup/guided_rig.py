@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 
 import click
 
-from gateway.cli.command_line.numbers import Finite
+from gateway.cli.command_line.numbers import Quantity
+from gateway.cli.command_line.questions import is_yes
 from gateway.cli.errors import CliError
 from gateway.cli.setup import port_probing as probing
 from gateway.cli.setup.starter_rig import starter_rig
@@ -36,6 +37,7 @@ _MOST_N: Final = 40.0
 _STUCK_N: Final = 15.0  # where the file does not say it
 _LEAST_STUCK_N: Final = 1.0  # the starter rig's calibration expects a little less at 0 V
 _ATTEMPTS: Final = 3  # to mend answers that check refuses; then the file is written with its faults told
+_OF_FORCES: Final = ("limits.", "load_cell.range_n")  # what is asked again where check refuses it
 Settings = dict[tuple[str, str], Any]
 
 
@@ -67,7 +69,7 @@ def ask_rig(name: str) -> str:
         faults = list(faults_of(rig))
         for path, sentence in faults:
             click.echo(f"  {path}: {sentence}")
-        if not left or not any(path.startswith("limits.") for path, _ in faults):
+        if not left or not any(path.startswith(_OF_FORCES) for path, _ in faults):
             break
         _ask_forces(rig)
     return rig.text()
@@ -111,7 +113,7 @@ def _ask_port(what: str, taken: str | None) -> str:
 def _ask_device(role: str, what: str, port: str) -> "tuple[DeviceProfile, int]":
     profiles = {one.name: one for one in (*own_profiles(role), *probing.known_profiles(role))}
     found: tuple[str, int] | None = None
-    if port != _LATER and click.confirm("ask the device which it is?", default=True):
+    if port != _LATER and is_yes("ask the device which it is?", default=True):
         found = _probe(port, list(profiles.values()))
     default = found[0] if found else ("smc-itv-rc" if role == "output" else "stream-st-gs")
     click.echo(f"  known: {', '.join(profiles)}")
@@ -172,7 +174,7 @@ def _ask_watchdog(rig: GuidedRig, device: "DeviceProfile") -> None:
         rig.settings["", "accept_no_device_watchdog"] = "false"
         return
     click.echo(f"  {device.name} has no watchdog: it holds its last voltage when this machine loses power")
-    accepted = click.confirm("does something else help then, such as an air dump valve?", default=False)
+    accepted = is_yes("does something else help then, such as an air dump valve?")
     rig.settings["", "accept_no_device_watchdog"] = "true" if accepted else "true # EDIT: nothing else helps yet"
 
 
@@ -184,8 +186,8 @@ def _ask_unit(rig: GuidedRig, device: "DeviceProfile") -> None:
     if unit != "counts":
         rig.settings["load_cell", "unit"] = unit
         return
-    rig.settings["load_cell", "zero_count"] = click.prompt("counts without a force", default=0.0, type=Finite())
-    rig.settings["load_cell", "newton_per_count"] = click.prompt("newtons of one count", type=Finite(0, min_open=True))
+    rig.settings["load_cell", "zero_count"] = click.prompt("counts without a force", default=0.0, type=Quantity())
+    rig.settings["load_cell", "newton_per_count"] = click.prompt("newtons of one count", type=Quantity(0, above=True))
 
 
 def _fit_output(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None:
@@ -216,7 +218,7 @@ def _fit_supervision(rig: GuidedRig, device: "DeviceProfile", baud: int) -> None
 
 
 def _ask_forces(rig: GuidedRig) -> None:
-    positive = Finite(0, min_open=True)
+    positive = Quantity(0, above=True)
     range_n = click.prompt("rated force of the load cell, N", default=98.07, type=positive)
     most_n = click.prompt(
         "largest force that tool and workpiece take, N", default=round(min(0.4 * range_n, _MOST_N), 1), type=positive

@@ -65,7 +65,7 @@ def tell_happened(recording: Recording) -> Happened | None:
     changes = int((setpoints[1:] != setpoints[:-1]).sum())
     faults = sorted({int(code) for code in _known(recording, "fault_code") if code})
     return Happened(
-        ran=_what_ran(recording.header),
+        ran=_what_ran(recording),
         setpoint_changes=changes,
         most_setpoint_n=float(setpoints.max()) if changes else 0.0,
         force_n=(float(force_n.min()), float(force_n.max())) if len(force_n) else None,
@@ -106,11 +106,17 @@ def _residual_n(recording: Recording) -> float | None:
     return float(np.sqrt(np.mean(residual_n**2))) if len(residual_n) else None
 
 
-def _what_ran(header: dict[str, Any]) -> str:
+def _what_ran(recording: Recording) -> str:
+    from gateway.bsfm.ladder.labels import Labels  # numpy
+
+    header = recording.header
     if ladder := header.get("ladder"):
+        labels = Labels.of(recording.columns)
+        is_cut = labels is not None and not labels.is_finished and "stairs" in ladder
+        climbed = f", {labels.last_stair} of {ladder['stairs']} stairs climbed" if labels and is_cut else ""
         step_v = ladder.get("step_v", 0.0)
         stairs = f"{step_v:g} V stairs" if isinstance(step_v, (int, float)) else "stairs"
-        return f"calibration ladder of {ladder.get('groups', '?')} × {stairs}"
+        return f"calibration ladder of {ladder.get('groups', '?')} × {stairs}{climbed}"
     if experiment := header.get("experiment"):
         return f"experiment {experiment.get('name', '')}".strip()
     return "run"

@@ -259,6 +259,7 @@ class _LineReader:
         if pick.is_contract and not self._lenient:
             raise RecordingError(
                 f"{self._form.path}:{at}, column {pick.name} (the {pick.index + 1}. of the table): {cell[:20]!r} is no number"
+                "; where nothing was read, leave the cell empty"
             )
         if pick.is_contract:
             self._findings.append(f"line {at}, {pick.name}: {cell[:20]!r} is no number")

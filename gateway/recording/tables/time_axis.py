@@ -48,10 +48,11 @@ def check_time_axis(recording: Recording) -> TimeAxis:
     steps = np.diff(stamps[rows])
     if (steps < -_SAME_S).any():
         at = int(np.flatnonzero(steps < -_SAME_S)[0])
+        times = int((steps < -_SAME_S).sum())
         before, after = stamps[rows[at]], stamps[rows[at + 1]]
         raise RecordingError(
             f"{recording.place(int(rows[at + 1]))}, column time_s: {after:.12g} after {before:.12g}: time runs backwards "
-            f"({int((steps < -_SAME_S).sum())} times in the file). Two recordings in one file, a clock that was set, or the "
+            f"({times} time{'s' * (times > 1)} in the file). Two recordings in one file, a clock that was set, or the "
             "wrong column? Split it there, or name the column with --columns time_s=..."
         )
     last_of_stamp = np.append(steps > _SAME_S, True)[: rows.size]

@@ -20,6 +20,11 @@ def describe_model(model: str) -> str:
     return _DESCRIPTIONS[str(model)]
 
 
+def spell_groups(count: int) -> str:
+    """Return `1 group`, `3 groups`."""
+    return f"{count} group{'s' * (count != 1)}"
+
+
 def spell_reversal(stops: int, span_n: float) -> str:
     """Return how the command turns back within the loop: `2 slip stops`, or `a linear blend over 5 N`."""
     if stops:

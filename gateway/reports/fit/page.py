@@ -9,7 +9,7 @@ from gateway.reports.figures import figure
 from gateway.reports.fit import charts
 from gateway.reports.fit.document import Document
 from gateway.reports.fit.headline import answer_sentence, policy, reversal_sentence
-from gateway.reports.fit.names import describe_model, spell_model
+from gateway.reports.fit.names import describe_model, spell_groups, spell_model
 from gateway.reports.fit.raw_ladder import RawLadder
 from gateway.reports.frame import Head, notes, page, section, table, tiles
 
@@ -67,7 +67,7 @@ def _head(document: Document) -> Head:
         facts=(
             f"rig {document['rig']}" if document["rig"] else "unnamed rig",
             name,
-            f"{ladder['points']} stairs in {ladder['groups']} group{'s' * (ladder['groups'] > 1)}, {low_v:g} to {high_v:g} V",
+            f"{ladder['points']} stairs in {spell_groups(ladder['groups'])}, {low_v:g} to {high_v:g} V",
         ),
         title=f"{document['name']} · {number or 'fit of ' + name}",
     )

@@ -19,6 +19,7 @@ from gateway.processes.durable_file import replace_text
 from gateway.profiles.rigs.rig import rehearsed
 from gateway.recording import Recording
 from gateway.reports.fit.document import Document, fit_document
+from gateway.reports.fit.names import spell_groups
 from gateway.reports.fit.page import fit_page
 from gateway.reports.fit.raw_ladder import raw_ladder
 from gateway.service.fitting.acceptance import Acceptance, judge_fit
@@ -105,8 +106,8 @@ def _source(fit: LadderFit) -> str:
     ladder, fingerprint = fit.document["ladder"], str(fit.document["rig_fingerprint"] or "unknown")[:12]
     low_v, high_v = ladder["voltage_v"]
     return (
-        f"recording {fit.recording.path.name}: {ladder['points']} stairs {low_v:g}-{high_v:g}-{low_v:g} V, {ladder['groups']} "
-        f"groups, {ladder['minor_points']} minor-loop points; rig fingerprint {fingerprint}"
+        f"recording {fit.recording.path.name}: {ladder['points']} stairs {low_v:g}-{high_v:g}-{low_v:g} V, "
+        f"{spell_groups(ladder['groups'])}, {ladder['minor_points']} minor-loop points; rig fingerprint {fingerprint}"
     )
 
 

@@ -92,9 +92,18 @@ def read_resumed(recording: Recording) -> list[Recording]:
     """Return the recordings that a resumed run goes on from, oldest first, and itself. An exported table stands alone."""
     numbers = recording.header.get("continues", ()) if recording.path.suffix == SUFFIX else ()
     earlier = numbers if isinstance(numbers, list) else ()
-    beside = recording.path.parent
-    parts = [*(read_recording(beside / f"{int(number):04d}{recording.path.suffix}") for number in earlier), recording]
+    parts = [*(_read_earlier(recording, int(number)) for number in earlier), recording]
     return [_shift_to_zero(part, float(parts[0].header.get("zero_n", 0.0))) for part in parts]
+
+
+def _read_earlier(recording: Recording, number: int) -> Recording:
+    path = recording.path.with_name(f"{number:04d}{recording.path.suffix}")
+    try:
+        return read_recording(path)
+    except FileNotFoundError:
+        raise RecordingError(
+            f"{recording.path}: goes on from {path.name}, which has the groups before and does not lie beside it: copy it there"
+        ) from None
 
 
 def _shift_to_zero(part: Recording, zero_n: float) -> Recording:
@@ -111,7 +120,13 @@ def check_source(recording: Recording, context: RigContext) -> CheckedLadder:
     """Return the ladder of a recording, of a resumed one with what came before. LadderError if it must not be fitted."""
     expected, rig_notes = expectation(recording, context)
     recordings = read_resumed(recording)
-    ladder = join_ladders([check_ladder(part.columns, part.header, expected) for part in recordings])
+    ladders = [check_ladder(part.columns, part.header, expected) for part in recordings]
+    if len(ladders) > 1:  # or what is left out of one would read as if the fit had to do without it
+        ladders = [
+            replace(ladder, notes=tuple(f"{part.path.name}: {note}" for note in ladder.notes))
+            for part, ladder in zip(recordings, ladders, strict=True)
+        ]
+    ladder = join_ladders(ladders)
     notes = dict.fromkeys(note for part in recordings for note in part.notes)
     return replace(ladder, notes=(*notes, *rig_notes, *ladder.notes))
 

@@ -132,5 +132,7 @@ async def listen(server: ModbusTcpServer, host: str, port: int, instead: str = "
         cure = f"another {instead or '--bind HOST:PORT'}?"
         if error.errno == errno.EADDRNOTAVAIL:
             cure = f"{host} is no address of this machine, `ip address` lists them"
-        sentence = f"E121 cannot listen on {host}:{port}: {error}; {cure}"
+        elif error.errno == errno.EADDRINUSE:
+            cure = f"another program listens there, `ss -ltnp` shows which; {cure}"
+        sentence = f"E121 cannot listen on {host}:{port}: {error.strerror or error}; {cure}"
         raise StartError(sentence, exit_codes.DEVICE) from error

@@ -58,8 +58,9 @@ class EdgeNode:
 
     @property
     def name(self) -> str:
-        """Group and node, under which no other edge node may be at the broker."""
-        return f"{self._group}/{self._node}"
+        """Group and node, under which no other edge node may be at the broker, and no JSON topics are: their base may be
+        `plant/cell-7`, too."""
+        return f"spBv1.0/{self._group}/{self._node}"
 
     @property
     def subscriptions(self) -> Sequence[str]:

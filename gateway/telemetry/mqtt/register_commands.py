@@ -20,6 +20,7 @@ from gateway.registers.map.register_map import Register, RegisterMap
 _SETPOINTS: Final = ("force_setpoint", "voltage_setpoint")
 _LONGEST: Final = 16_384
 """Bytes of a command: far beyond one that names every register, and too few to nest deeply."""
+_SUCH: Final = 'a command is JSON such as {"force_setpoint": 12.0, "control_word": 1}'
 _TWICE: Final = object()
 """Stands for the value of a name that stands twice."""
 
@@ -97,8 +98,10 @@ def _registers(payload: bytes) -> dict[str, float]:
         content = json.loads(payload, object_pairs_hook=_each_once)
     except RecursionError:
         raise ValueError("nested too deeply for a command") from None
+    except ValueError as error:
+        raise ValueError(f"{_SUCH}: {error}") from None
     if not isinstance(content, dict) or not content:
-        raise ValueError('a command is JSON such as {"force_setpoint": 12.0, "control_word": 1}')
+        raise ValueError(_SUCH)
     if not _does_stop(content):
         for name, value in content.items():
             _check_number(name, value)

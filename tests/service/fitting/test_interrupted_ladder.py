@@ -20,7 +20,7 @@ from gateway.calibrations.store import CalibrationStore
 from gateway.cli.calibration.resume import find_rest_of_ladder
 from gateway.cli.errors import CliError
 from gateway.profiles import load_rig
-from gateway.recording import Recorder, Recording, read_recording
+from gateway.recording import Recorder, Recording, RecordingError, read_recording
 from gateway.registers.words import CalibrationPhase
 from gateway.service.fitting.fit_process import fit_and_store
 from gateway.service.fitting.ladder_source import RigContext, check_source
@@ -136,6 +136,9 @@ def test_a_run_that_was_cut_gives_a_calibration_as_good_as_one_that_was_not(runs
     assert checked.ladder.group.tolist() == whole.ladder.group.tolist()
     assert checked.minor_v == pytest.approx(whole.minor_v)
     assert np.abs(checked.ladder.force_n - whole.ladder.force_n).max() < 0.6
+    assert not [
+        note for note in checked.notes if rest.groups and "left out" in note and not note.startswith("0001.fgr: ")
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -217,3 +220,12 @@ def test_only_the_last_stair_left_makes_a_run_whole(runs) -> None:
 def test_without_a_recorded_ladder_there_is_nothing_to_go_on_with(tmp_path: Path) -> None:
     with pytest.raises(CliError, match="E422"):
         find_rest_of_ladder(tmp_path)
+
+
+def test_a_resumed_run_without_the_recording_that_it_goes_on_from_names_it(runs, tmp_path: Path) -> None:
+    """`0001.fgr: No such file or directory` was the answer to `fit 0002.fgr`."""
+    written(tmp_path, runs.whole, int(np.searchsorted(runs.whole.columns["stair"], 30)))
+    path = written(tmp_path, runs.rest[1])
+    path.with_name("0001.fgr").unlink()
+    with pytest.raises(RecordingError, match=r"0002.fgr: goes on from 0001.fgr, .* copy it there"):
+        check_source(read_recording(path), DEMO)

@@ -68,11 +68,42 @@ def test_forces_that_do_not_fit_are_asked_again() -> None:
 
 def test_a_force_that_is_no_number_is_asked_again() -> None:
     """NaN was taken, for the cell's range and for the newtons of a count."""
-    answers = ("later", "smc-itv-rc", "", "y", "later", "adam-4016", "", "counts", "0", "nan", "12,5", "12.5", "nan")
+    answers = (
+        "later",
+        "smc-itv-rc",
+        "",
+        "y",
+        "later",
+        "adam-4016",
+        "",
+        "counts",
+        "0",
+        "nan",
+        "12,5",
+        "12.5",
+        "nan",
+        "-5",
+    )
     result = answered(*answers, "98.07", "inf", "40")
     assert result.exit_code == 0 and "decimals take a point: 12.5" in result.output, result.output
+    assert "-5: allowed above 0" in result.output
     text = Path("own.yaml").read_text(encoding="utf-8")
     assert "newton_per_count: 12.5" in text and "force_max_n: 40" in text and "range_n: 98.07" in text
+
+
+@pytest.mark.parametrize("slip", ["maybe", "/dev/ttyUSB0"])
+def test_an_answer_that_is_neither_yes_nor_no_is_told_what_is_allowed(slip: str) -> None:
+    """`Error: invalid input` was all that stood there."""
+    result = answered("later", "smc-itv-rc", "", slip, "yes", "later", "", "", "98.07", "40")
+    assert f"{slip} is neither y (yes) nor n (no); Enter alone means n" in result.output
+    assert check_report("own.yaml", simulated=True).rig
+
+
+def test_a_range_that_no_cell_has_is_asked_again() -> None:
+    """The fault was told, and the file written with it."""
+    result = answered("later", "", "", "y", "later", "", "", "98070", "40", "98.07", "40")
+    assert "load_cell.range_n: 98070 N is above 5000 N" in result.output
+    assert check_report("own.yaml", simulated=True).rig
 
 
 @pytest.mark.parametrize("slip", ["115300", "fast", "-9600", "98.07"])

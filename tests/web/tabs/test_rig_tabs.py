@@ -81,6 +81,19 @@ def test_files_that_have_changed_since_the_start_are_not_shown_as_what_runs(own_
     assert "W247" in _configuration(context)["warnings"][0]
 
 
+def test_the_wiring_of_a_gateway_that_listens_elsewhere_says_where(page, control, state) -> None:
+    """Under `run --bind` its mbpoll lines and a robot's settings named the port of the file, without a word."""
+    answer = control.answer
+    for port, told in (
+        (15020, "Modbus TCP is on port 15020 now, where the lines below say 5020"),
+        (5020, ""),
+        (None, ""),
+    ):
+        control.answer = lambda asked, port=port: {"port": port} if asked["do"] == "running" else answer(asked)
+        other = page.get("/api/v1/wiring").json["other"]
+        assert told in other and bool(other) is bool(told), other
+
+
 def test_the_wiring_is_that_of_the_verb(page) -> None:
     answer = page.get("/api/v1/wiring").json
     assert answer["title"].startswith("Wiring of rig demo")

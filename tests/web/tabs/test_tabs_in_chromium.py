@@ -180,3 +180,17 @@ def test_an_unreadable_recording_has_no_time_and_no_duration(page, state, chromi
     row.wait_for()
     assert [row.locator(f"td[data-label={name}]").inner_text() for name in ("started", "duration")] == ["–", "–"]
     window.close()
+
+
+@pytest.mark.parametrize("width", [360, 640, 768])
+def test_no_value_of_the_configuration_stands_in_a_column_of_single_letters(page, state, chromium, width: int) -> None:
+    """On a telephone, a tablet and at 200 % it did; 640: 1280 at 200 %."""
+    window = open_tab(chromium, page.address, "configuration")
+    window.set_viewport_size({"width": width, "height": 740})
+    window.wait_for_selector("table.values td")
+    heights = window.eval_on_selector_all(
+        "table.values td:nth-child(2)", "cells => cells.map((cell) => cell.getBoundingClientRect().height)"
+    )
+    assert 0.0 < max(heights) < 120.0, sorted(heights)[-3:]
+    assert window.evaluate("document.documentElement.scrollWidth") <= width
+    window.close()

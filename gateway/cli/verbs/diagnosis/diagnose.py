@@ -14,7 +14,7 @@ import click
 
 from gateway.cli.command_line.completion_words import complete_calibrations, complete_effects, complete_recordings
 from gateway.cli.command_line.given_path import GivenPath
-from gateway.cli.command_line.numbers import Finite
+from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.options import state_directory, state_option
@@ -69,7 +69,7 @@ def _not_an_option(context: click.Context, parameter: click.Parameter, value: Pa
 )
 @click.option(
     "--noise-floor-n",
-    type=Finite(min=0.0, min_open=True),
+    type=Quantity(0.0, above=True),
     metavar="X",
     help="RMS noise of the readings, N, if known.",
 )

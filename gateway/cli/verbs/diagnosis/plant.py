@@ -62,20 +62,22 @@ def _describe(entry: "StoredDocument[NumberedPlant]") -> list[str]:
 
 
 @command.command(name="show")
-@click.argument("number", metavar="N", type=ListedNumber("plant"), shell_complete=complete_plant_numbers)
+@click.argument("number", metavar="N", type=ListedNumber("plant", least=0), shell_complete=complete_plant_numbers)
 @state_options
 @json_option
 def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
-    """Show plant N: where it comes from, what is compensated of it, and its file."""
+    """Show plant N (0: the rig's own): where it comes from, what is compensated of it, and its file."""
     from gateway.cli.plants.descriptions import describe_compensation, describe_provenance
-    from gateway.cli.plants.store_access import all_plant_facts, load_rig_or_none, load_stored, open_store
+    from gateway.cli.plants.store_access import all_plant_facts, load_numbered, load_rig_or_none
     from gateway.plants.store import as_text
+    from gateway.profiles.kinds.plant_writer import plant_text
 
-    plant, rig = load_stored(open_store(state.directory), number), load_rig_or_none(state)
+    plant, rig = load_numbered(state, number), load_rig_or_none(state)
     if as_json:
         click.echo(json.dumps(all_plant_facts(plant, rig), indent=2))
         return
-    for line in (*describe_provenance(plant), *describe_compensation(plant, rig), "", as_text(plant).rstrip()):
+    text = as_text(plant) if number else plant_text(plant.profile)
+    for line in (*describe_provenance(plant), *describe_compensation(plant, rig), "", text.rstrip()):
         click.echo(line)
 
 

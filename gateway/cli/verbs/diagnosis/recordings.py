@@ -13,7 +13,7 @@ from gateway.cli.command_line.byte_count import ByteCount
 from gateway.cli.command_line.completion_words import complete_recording_numbers
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.listed_number import ListedNumber
-from gateway.cli.command_line.numbers import Finite
+from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
@@ -138,7 +138,7 @@ def delete_command(*, number: int, yes: bool, state: StateChoice) -> None:
 
 @command.command(name="prune")
 @click.option("--dry-run", is_flag=True, help="Only say what would go.")
-@click.option("--days", type=Finite(min=0, min_open=True), help="Delete older ones  [default: as the rig says]")
+@click.option("--days", type=Quantity(0, above=True), help="Delete older ones  [default: as the rig says]")
 @click.option(
     "--bytes",
     "most_bytes",

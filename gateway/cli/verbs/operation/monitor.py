@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from gateway.cli.command_line.given_path import GivenPath
-from gateway.cli.command_line.numbers import Finite
+from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, state_option
 from gateway.processes import exit_codes
@@ -26,7 +26,7 @@ EXAMPLES = ("monitor", "monitor --svg monitor.svg --seconds 1")
 @click.command()
 @click.option("--once", is_flag=True, help="Print one frame and end.")
 @click.option("--svg", type=GivenPath(dir_okay=False), help="Write one frame to FILE as a picture.")
-@click.option("--seconds", type=Finite(min=0.0), help="End after this time; with --once or --svg, watch first.")
+@click.option("--seconds", type=Quantity(0.0), help="End after this time; with --once or --svg, watch first.")
 @state_option("State directory, for last writers, where it is not the usual one.")
 @gateway_options
 def command(*, svg: Path | None, seconds: float | None, wire: "Wire", **options: Any) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from gateway.cli.command_line.numbers import Finite
+from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.errors import CliError
 from gateway.cli.options import json_option
 from gateway.processes import exit_codes
@@ -23,7 +23,9 @@ EXAMPLES = ("ports", "ports --json")
 @click.command()
 @click.argument("paths", metavar="[PORT]...", nargs=-1)
 @click.option("--listen", is_flag=True, help="Listen at each port, without sending a byte: what comes, at which speed.")
-@click.option("--seconds", type=Finite(0.1, 60.0), default=0.5, show_default=True, help="Listen so long at each speed.")
+@click.option(
+    "--seconds", type=Quantity(0.1, 60.0), default=0.5, show_default=True, help="Listen so long at each speed."
+)
 @json_option
 @click.pass_context
 def command(context: click.Context, *, paths: tuple[str, ...], listen: bool, seconds: float, as_json: bool) -> None:

@@ -122,6 +122,15 @@ def test_show_and_compare(added):
     assert "same numbers" in call(added, "compare", "1", "1").stdout
 
 
+def test_the_rigs_own_plant_is_shown_by_the_number_that_the_list_gives_it(state):
+    """`0 is not in the range x>=1` was the answer, below a list with 0 in it."""
+    shown = call(state, "show", 0)
+    assert (shown.exit_code, shown.stdout.splitlines()[0]) == (0, "plant 0 (paper-slide), the rig's own"), shown.output
+    assert "regulator:" in shown.stdout and "provenance" not in shown.stdout
+    facts = json.loads(call(state, "show", 0, "--json").stdout)
+    assert (facts["number"], facts["name"], facts["provenance"]) == (0, "paper-slide", None)
+
+
 def test_compare_draws_both_plants_over_a_recording(added, tmp_path):
     plot, recording = tmp_path / "plants.html", table(tmp_path / "run.csv")
     told = call(added, "compare", "0", "1", "--plot", plot, "--recording", recording)
