@@ -13,6 +13,7 @@ from typing import Final
 from gateway.devices.binary.rtu_framing import exception_text, quiet_s
 from gateway.devices.device_checks.spelling import CheckSpelling
 from gateway.devices.exchange import Exchange, VoltageExchange
+from gateway.devices.fields import Plain, RegisterNumber, Scientific
 from gateway.devices.framing import Line
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import (
@@ -122,10 +123,14 @@ class TemplateOutputHost:
         return self._questions[template]
 
     def _step_v(self, exchange: VoltageExchange, template: str) -> float:
-        """What one count of the number in this template means, V; 0 where it carries none."""
-        if self._grammar.profile.number_in(template) is None:
+        """What one count of the number in this template means at most, V; 0 where it carries none."""
+        number, decimals = self._grammar.number_in(template)
+        if number is None:
             return 0.0
-        return exchange.range.scale.physical_per_number * float(10.0 ** -self._grammar.profile.decimals_in(template))
+        step = float(10.0**-decimals)
+        if isinstance(number, Scientific | Plain | RegisterNumber):
+            step = number.step_below(max(map(abs, exchange.range.device)))
+        return exchange.range.scale.physical_per_number * step
 
     def _steps_between(self, answered: VoltageExchange) -> float:
         """V: a setting is rounded once on its way, and once more where the answer counts in other numbers."""
