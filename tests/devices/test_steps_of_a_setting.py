@@ -68,6 +68,21 @@ def test_what_rounds_large_numbers_coarsely_is_judged_by_its_step_there(
         assert not host.confirms(voltage_v, Accepted(heard.voltage_v + far_v), SetVoltage(voltage_v))
 
 
+@pytest.mark.parametrize(
+    ("kind", "full", "answer"),
+    [("g", 689_475.7, b"689476"), (".3E", 689_475.7, b"6.895E+05"), ("float32-cdab", 16_777.3, b"129A4683")],
+)
+def test_the_end_of_a_range_is_heard_where_it_is_rounded_up(
+    itv: DeviceProfile, kind: str, full: float, answer: bytes
+) -> None:
+    profile = spoken(itv, f"SET {{n:{kind}}}", f"{{n:{kind}}}", (0.0, full), (0.0, 10.0))
+    host, device = output_host(profile), output_device(profile)
+    (obeyed,) = device.receive(host.request(SetVoltage(10.0)), 0.0)
+    (heard,) = host.receive(answer + b"\r\n", 0.0)
+    assert isinstance(obeyed, SetVoltage) and isinstance(heard, Accepted)
+    assert host.confirms(10.0, heard, SetVoltage(10.0))
+
+
 @pytest.mark.parametrize("volts", [(0.0, 10.0), (-10.0, 10.0), (2.0, 10.0)])
 @pytest.mark.parametrize("span", [(0.0, 4095.0), (819.0, 4095.0)])
 def test_a_device_is_set_to_what_was_meant_wherever_it_begins_to_count(

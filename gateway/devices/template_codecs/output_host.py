@@ -13,7 +13,6 @@ from typing import Final
 from gateway.devices.binary.rtu_framing import exception_text, quiet_s
 from gateway.devices.device_checks.spelling import CheckSpelling
 from gateway.devices.exchange import Exchange, VoltageExchange
-from gateway.devices.fields import Plain, RegisterNumber, Scientific
 from gateway.devices.framing import Line
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import (
@@ -124,13 +123,7 @@ class TemplateOutputHost:
 
     def _step_v(self, exchange: VoltageExchange, template: str) -> float:
         """What one count of the number in this template means at most, V; 0 where it carries none."""
-        number, decimals = self._grammar.number_in(template)
-        if number is None:
-            return 0.0
-        step = float(10.0**-decimals)
-        if isinstance(number, Scientific | Plain | RegisterNumber):
-            step = number.step_below(max(map(abs, exchange.range.device)))
-        return exchange.range.scale.physical_per_number * step
+        return exchange.range.scale.physical_per_number * self._grammar.step(exchange, template)
 
     def _steps_between(self, answered: VoltageExchange) -> float:
         """V: a setting is rounded once on its way, and once more where the answer counts in other numbers."""
@@ -174,7 +167,7 @@ class TemplateOutputHost:
         """How far beyond its range the device's number may be: a setting by its rounding, a measured pressure by much more."""
         low, high = exchange.range.device
         beyond = _PRESSURE_BEYOND * (high - low) if isinstance(request, ReadPressure) else 0.0
-        return beyond + self._grammar.half_step(exchange.answer)
+        return beyond + 0.5 * self._grammar.step(exchange, exchange.answer)
 
     def _refusal(self, body: bytes) -> Refused | None:
         text = self._grammar.refusal(body) or (exception_text(body) if self._grammar.profile.is_modbus else "")
