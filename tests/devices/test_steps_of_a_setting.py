@@ -68,6 +68,20 @@ def test_what_rounds_large_numbers_coarsely_is_judged_by_its_step_there(
         assert not host.confirms(voltage_v, Accepted(heard.voltage_v + far_v), SetVoltage(voltage_v))
 
 
+def test_a_small_number_with_an_exponent_is_sent_with_all_its_digits(itv: DeviceProfile) -> None:
+    """A current source that is set in A: of 4 .. 20 mA `.4E` went out in steps of 0.1 mA, 0.06 V."""
+    profile = spoken(itv, "CURR {n:.4E}", "{n:.4E}", (0.004, 0.02), (0.0, 10.0))
+    host, device = output_host(profile), output_device(profile)
+    asked = host.request(SetVoltage(3.456))
+    (heard,) = device.receive(asked, 0.0)
+    assert asked == b"CURR 9.5300E-03\r\n"
+    assert isinstance(heard, SetVoltage) and heard.voltage_v == pytest.approx(3.456, abs=1e-3)
+    assert host.resolution_v == pytest.approx(10.0 / 16_000)
+    (answer,) = host.receive(device.reply(Accepted(3.456), heard), 0.0)
+    assert isinstance(answer, Accepted) and host.confirms(3.456, answer, SetVoltage(3.456))
+    assert not host.confirms(3.456, Accepted(3.47), SetVoltage(3.456))
+
+
 @pytest.mark.parametrize(
     ("kind", "full", "answer"),
     [("g", 689_475.7, b"689476"), (".3E", 689_475.7, b"6.895E+05"), ("float32-cdab", 16_777.3, b"129A4683")],

@@ -153,7 +153,11 @@ class Scientific:
 
     def step_below(self, largest: float) -> float:
         """Return the widest gap between two numbers that it tells apart up to this one."""
-        return max(10.0**-self.decimals, _digit_below(largest) * 10.0**-self.decimals)
+        return _digit_below(largest) * 10.0**-self.decimals
+
+    def decimals_below(self, largest: float) -> int:
+        """Return the decimals of numbers up to this one: those of the mantissa, and of small numbers the zeros ahead of it."""
+        return self.decimals + max(0, -_exponent_below(largest))
 
     @property
     def is_open(self) -> bool:
@@ -211,7 +215,11 @@ class Plain:
 
 def _digit_below(largest: float) -> float:
     """Return what the first digit of the numbers below this one counts."""
-    return float(10.0 ** (ceil(log10(largest)) - 1))
+    return float(10.0 ** _exponent_below(largest))
+
+
+def _exponent_below(largest: float) -> int:
+    return ceil(log10(largest)) - 1
 
 
 def _bounded(name: str, value: Value) -> float:
