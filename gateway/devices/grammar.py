@@ -6,7 +6,7 @@ from gateway.devices.binary.raw_bytes import ByteSplitter, TextSplitter
 from gateway.devices.binary.rtu_framing import RtuSplitter, answers, requests, rtu_frame
 from gateway.devices.checksum import add_checksum, strip_checksum
 from gateway.devices.exchange import Exchange, VoltageExchange
-from gateway.devices.fields import Choice, Field, Text, Value, ValueRefused
+from gateway.devices.fields import Choice, Field, Plain, RegisterNumber, Scientific, Text, Value, ValueRefused
 from gateway.devices.framing import Line, LineSplitter
 from gateway.devices.messages import OutputRequest, ReadPressure, ReadVoltage, SetVoltage
 from gateway.devices.profile import DeviceProfile
@@ -160,10 +160,13 @@ class Grammar:
         number_field, _ = self.number_in(template)
         return float(values[number_field.name]) if number_field else None
 
-    def half_step(self, template: str) -> float:
-        """Return half of what the template's number counts in: a reading beyond its range by less than that was only
-        rounded."""
-        return 0.5 * float(10.0 ** -self.number_in(template)[1])
+    def step(self, exchange: Exchange, template: str) -> float:
+        """Return the widest gap between the numbers that this template of the exchange tells apart, in the device's unit:
+        half of it is lost where a number is rounded. 0 where it carries none."""
+        number, decimals = self.number_in(template)
+        if isinstance(number, Scientific | Plain | RegisterNumber):
+            return number.step_below(max(map(abs, exchange.range.device)))
+        return float(10.0**-decimals) if number is not None else 0.0
 
 
 def _fill(template: str) -> dict[str, Value]:

@@ -18,7 +18,7 @@ from gateway.devices.binary.register_access import VALUE, check_direction
 from gateway.devices.checksum import ChecksumName
 from gateway.devices.device_checks.identity import Identity
 from gateway.devices.device_checks.watchdog import Watchdog
-from gateway.devices.exchange import PressureExchange, Refusals, Span, Step, VoltageExchange
+from gateway.devices.exchange import Exchange, PressureExchange, Refusals, Span, Step, VoltageExchange
 from gateway.devices.fields import (
     Choice,
     Decimals,
@@ -187,7 +187,11 @@ class DeviceProfile:
     def decimals_in(self, template_text: str) -> int:
         """Return the decimals of the number that a template carries; 0 for a whole number, or none."""
         number = self.number_in(template_text)
-        return number.decimals if isinstance(number, Decimals | Scientific | Plain | RegisterNumber) else 0
+        if isinstance(number, Scientific):
+            exchanges: tuple[Exchange | None, ...] = (self.set_voltage, self.read_voltage, self.read_pressure)
+            spoken = [each.range.device for each in exchanges if each and template_text in (each.ask, each.answer)]
+            return number.decimals_below(max((abs(end) for span in spoken for end in span), default=1.0))
+        return number.decimals if isinstance(number, Decimals | Plain | RegisterNumber) else 0
 
     @property
     def reading(self) -> ForceReading:

@@ -41,6 +41,28 @@ def test_who_binds_ipv6_is_told_that_robots_and_plcs_know_ipv4_alone(tmp_path: P
     assert not any("IPv6" in one for one in told)
 
 
+def test_who_has_no_plain_tcp_is_told_what_holds_and_shown_nothing_that_connects_by_it(tmp_path: Path) -> None:
+    """`none of what follows can connect`, it said, and then gave four robots and mbpoll an address to connect to."""
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    faces = "\nfieldbus:\n  - {type: rtu, port: /dev/ttyS7, role: ROLE}\n".replace("ROLE", "monitor")
+    own = text.replace("owner: null", "plain: false\n  owner: serial:1").replace(
+        "byte_order_echo: false", "byte_order_echo: true"
+    )
+    (tmp_path / "own.yaml").write_text(own + faces)
+    page = page_of(tmp_path / "own.yaml")
+    lines = [line for one in page["sections"] for line in one.get("commands", [])]
+    assert [line.split(" -m rtu ")[0] for line in lines] == ["mbpoll -1"], "the serial face alone can be tried"
+    (role,) = rows_of(page, "Serial face 1: Modbus RTU, masters ask here")["role"]
+    assert role.startswith("monitor: reads only")
+    network = page["sections"][-1]
+    shown = rows_of(page, network["title"])
+    assert network["title"] == "Network: Modbus TCP" and not {"address", "may connect", "upload of models"} & set(shown)
+    assert shown["lease"] and shown["owner"] == ["serial:1"]
+    told = " ".join(network["sentences"])
+    assert "Plain Modbus TCP is off" in told and "1234.5" in told
+    assert "plain Modbus TCP may read" not in told and "generated clients do so" not in told
+
+
 @pytest.mark.parametrize(
     ("lease_s", "is_short", "rate"), [(0.05, True, "60 Hz"), (0.12, False, "25 Hz"), (0.2, False, "20 Hz")]
 )

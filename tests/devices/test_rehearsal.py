@@ -68,7 +68,11 @@ PRESSURE = {"ask": "P?", "answer": "{p:d}", "range": {"device": [0, 10], "pressu
                 "set_voltage__answer": "{volts:.1E}",
                 "set_voltage__range__device": [0, 100],
             },
-            "set_voltage: 7.361 V: 'SET 73.610\\r\\n' is confirmed as 7.4 V by '7.4E+01\\r\\n': the ranges do not fit",
+            None,
+        ),
+        (
+            {"set_voltage__answer": None, "read_voltage__range__voltage_v": [0, 5]},
+            "the ranges do not fit",
         ),
         ({"set_voltage__answer": "{counts:+.3E}"}, None),
         (

@@ -46,6 +46,57 @@ def test_a_setting_is_confirmed_within_the_rounding_of_both_ways_and_no_further(
     assert within == [True, False]
 
 
+@pytest.mark.parametrize("kind", [".2E", ".4E", ".6E", "g", "float32", "float32-cdab"])
+@pytest.mark.parametrize("full", [10.0, 150.0, 10_000.0, 1.0e6])
+def test_what_rounds_large_numbers_coarsely_is_judged_by_its_step_there(
+    itv: DeviceProfile, kind: str, full: float
+) -> None:
+    """A regulator in mbar or Pa: of 133412.3 Pa `.4E` says 1.3341E+05, a C program's %g 133412, a float32 133412.297."""
+    host = output_host(spoken(itv, f"SET {{n:{kind}}}", f"{{n:{kind}}}", (0.0, full), (0.0, 10.0)))
+    for voltage_v in (0.12345678, 1.33412345, 7.36123456, 9.87654321):
+        number = voltage_v / 10.0 * full
+        if kind == "g":
+            answer = f"{number:g}".encode()
+        else:
+            answer = host.request(SetVoltage(voltage_v)).removeprefix(b"SET ").removesuffix(b"\r\n")
+            host.forget()
+        host.request(SetVoltage(voltage_v))
+        (heard,) = host.receive(answer + b"\r\n", 0.0)
+        assert isinstance(heard, Accepted)
+        assert host.confirms(voltage_v, heard, SetVoltage(voltage_v)), (voltage_v, answer)
+        far_v = 3.0 * max(host.resolution_v, 1e-3)
+        assert not host.confirms(voltage_v, Accepted(heard.voltage_v + far_v), SetVoltage(voltage_v))
+
+
+def test_a_small_number_with_an_exponent_is_sent_with_all_its_digits(itv: DeviceProfile) -> None:
+    """A current source that is set in A: of 4 .. 20 mA `.4E` went out in steps of 0.1 mA, 0.06 V."""
+    profile = spoken(itv, "CURR {n:.4E}", "{n:.4E}", (0.004, 0.02), (0.0, 10.0))
+    host, device = output_host(profile), output_device(profile)
+    asked = host.request(SetVoltage(3.456))
+    (heard,) = device.receive(asked, 0.0)
+    assert asked == b"CURR 9.5300E-03\r\n"
+    assert isinstance(heard, SetVoltage) and heard.voltage_v == pytest.approx(3.456, abs=1e-3)
+    assert host.resolution_v == pytest.approx(10.0 / 16_000)
+    (answer,) = host.receive(device.reply(Accepted(3.456), heard), 0.0)
+    assert isinstance(answer, Accepted) and host.confirms(3.456, answer, SetVoltage(3.456))
+    assert not host.confirms(3.456, Accepted(3.47), SetVoltage(3.456))
+
+
+@pytest.mark.parametrize(
+    ("kind", "full", "answer"),
+    [("g", 689_475.7, b"689476"), (".3E", 689_475.7, b"6.895E+05"), ("float32-cdab", 16_777.3, b"129A4683")],
+)
+def test_the_end_of_a_range_is_heard_where_it_is_rounded_up(
+    itv: DeviceProfile, kind: str, full: float, answer: bytes
+) -> None:
+    profile = spoken(itv, f"SET {{n:{kind}}}", f"{{n:{kind}}}", (0.0, full), (0.0, 10.0))
+    host, device = output_host(profile), output_device(profile)
+    (obeyed,) = device.receive(host.request(SetVoltage(10.0)), 0.0)
+    (heard,) = host.receive(answer + b"\r\n", 0.0)
+    assert isinstance(obeyed, SetVoltage) and isinstance(heard, Accepted)
+    assert host.confirms(10.0, heard, SetVoltage(10.0))
+
+
 @pytest.mark.parametrize("volts", [(0.0, 10.0), (-10.0, 10.0), (2.0, 10.0)])
 @pytest.mark.parametrize("span", [(0.0, 4095.0), (819.0, 4095.0)])
 def test_a_device_is_set_to_what_was_meant_wherever_it_begins_to_count(

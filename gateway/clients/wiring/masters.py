@@ -36,10 +36,12 @@ SHORTEST_S7_LEASE_S: Final = 0.36
 
 
 def network_sections(rig: Rig, called: str) -> Iterator[Section]:
-    """Yield the sections about Modbus TCP. called: the rig in commands. MissingRegisterError where the map lacks what the
-    clients need."""
+    """Yield the sections about Modbus TCP: of a rig without it, what holds on its other faces too. called: the rig in commands.
+    MissingRegisterError where the map lacks what the clients need."""
     table = ExchangeTable(rig.register_map, _reachable(rig))
     yield _network(rig, table)
+    if not rig.network.plain:
+        return
     for describe, language, file in (
         (_irc5, "rapid", "ForceGateway.mod"),
         (_s7, "scl", "ForceGateway.scl"),
@@ -63,21 +65,22 @@ def _reachable(rig: Rig) -> Endpoint:
 def _network(rig: Rig, table: ExchangeTable) -> Section:
     network, where, lease_s = rig.network, table.where, rig.control.supervision.lease_s
     allowed = ", ".join(map(str, network.allow)) or "nobody but this machine"
-    rows = (
-        ("what", "value"),
+    upload = "allowed" if network.allow_plain_upload else "refused on plain TCP (W211): allow_plain_upload"
+    plain = (
         ("address", f"{where.host}:{where.shown_port}, TCP"),
         ("unit ids", ", ".join(map(str, network.units))),
         ("may connect", allowed),
+        ("upload of models", upload),
+    )
+    rows = (
+        ("what", "value"),
+        *(plain if network.plain else ()),
         ("owner", network.owner or "the first master that commands, until it lets go"),
         (
             "lease",
             "none: a command lasts until the next one"
             if lease_s is None
             else f"{lease_s:g} s without a new heartbeat, then {_LOST[rig.control.supervision.lease_action]}",
-        ),
-        (
-            "upload of models",
-            "allowed" if network.allow_plain_upload else "refused on plain TCP (W211): allow_plain_upload",
         ),
         (
             "byte order",
@@ -91,7 +94,8 @@ def _network_sentences(rig: Rig, table: ExchangeTable) -> tuple[str, ...]:
     network, where = rig.network, table.where
     sentences = ["Ethernet cable to the robot's or PLC's network (IRC5: WAN, LAN or service port)."]
     if not network.plain:
-        sentences = ["Plain Modbus TCP is off in this rig (network.plain: false): none of what follows can connect."]
+        off = "Plain Modbus TCP is off in this rig (network.plain: false): masters use the faces above"
+        sentences = [f"{off}. The generated clients and mbpoll by TCP cannot connect. What follows holds on each face."]
     elif ip_address(network.bind).is_loopback:
         sentences.append(
             f"This rig listens on {network.bind} only: no robot can reach it. Set network.bind to this machine's address on "
@@ -109,15 +113,16 @@ def _network_sentences(rig: Rig, table: ExchangeTable) -> tuple[str, ...]:
         )
     sentences += _rights(rig)
     values = table.command_span[0] + table.values_first
+    generated = " The generated clients do so." if network.plain else ""
     sentences.append(
         "A program of your own that writes control_word in each cycle, enable in it, undoes another master's stop: write it "
-        f"only when you want it changed, else from address {values} (4{values + 1:04d}) on. The generated clients do so."
+        f"only when you want it changed, else from address {values} (4{values + 1:04d}) on.{generated}"
     )
     if network.require_byte_order_echo:
         echo = table.map.find("byte_order_echo").address
         sentences.append(
             f"Before the first enable write 1234.5 to byte_order_echo: words 16#449A, 16#5000 to address {echo} "
-            f"(4{echo + 1:04d}); the generated clients do it by themselves."
+            f"(4{echo + 1:04d}), once a connection.{generated}"
         )
     return tuple(sentences)
 
@@ -136,7 +141,8 @@ def _rights(rig: Rig) -> Iterator[str]:
             "or its cable is pulled. Before a robot or PLC commands it, set fault or ramp."
         )
     if is_no_address(owner):
-        yield f"Only {owner} may command here (network.owner): a robot or PLC on plain Modbus TCP may read, and disable."
+        others = "a robot or PLC on plain Modbus TCP" if rig.network.plain else "whoever asks by another face"
+        yield f"Only {owner} may command here (network.owner): {others} may read, and disable."
 
 
 def _irc5(rig: Rig, table: ExchangeTable) -> Section:

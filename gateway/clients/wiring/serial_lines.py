@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 from ipaddress import ip_address
 from shlex import quote
+from typing import Final
 
 from gateway.clients.exchange import ExchangeTable
 from gateway.clients.rendering import endpoint_of
@@ -13,6 +14,12 @@ from gateway.devices.profile import ADDRESS
 from gateway.profiles import Rig
 from gateway.profiles.rigs.device_settings import CHANNEL
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
+
+_ALLOWED: Final = {
+    "monitor": "reads only, each write is refused (W211)",
+    "setpoint": "commands, uploads no model (W211)",
+    "calibration": "commands, and uploads models",
+}
 
 
 def serial_sections(rig: Rig) -> Iterator[Section]:
@@ -62,6 +69,7 @@ def _face_section(place: int, face: RtuFace, status: tuple[int, int]) -> Section
         ("line", f"{face.settings}, unit {face.unit}"),
         *(("wires", text) for text in GENERAL[RS485]),
         ("master", "Modbus RTU master of the PLC or robot, 8 data bits, the same settings; one owner per serial face"),
+        *((("role", f"{face.role}: {_ALLOWED[face.role]}"),) if face.role else ()),
     )
     options = f"-m rtu -b {face.baud} -P {parity} -s {face.stop_bits} -a {face.unit}"
     first, words = status

@@ -3,11 +3,12 @@
 import re
 from dataclasses import dataclass
 from functools import cache
-from math import isfinite, nan
+from math import ceil, isfinite, log10, nan
 from typing import Final
 
 from gateway.devices.fields.field import LONGEST_NUMBER, Value, finite, of_width, refuse
 
+_DECIMALS_OF_G: Final = 5  # behind its first digit
 _PADDED_NUMBER = r"(?:[+-] *| *[+-]?)"  # "+  12" and "  +12": both orders are sent by real indicators
 
 
@@ -150,6 +151,14 @@ class Scientific:
     decimals: int
     letter: str = "E"
 
+    def step_below(self, largest: float) -> float:
+        """Return the widest gap between two numbers that it tells apart up to this one."""
+        return _digit_below(largest) * 10.0**-self.decimals
+
+    def decimals_below(self, largest: float) -> int:
+        """Return the decimals of numbers up to this one: those of the mantissa, and of small numbers the zeros ahead of it."""
+        return self.decimals + max(0, -_exponent_below(largest))
+
     @property
     def is_open(self) -> bool:
         """Return True: an exponent takes as many digits as it needs."""
@@ -179,6 +188,10 @@ class Plain:
     sign: str = ""
     decimals: int = 4
 
+    def step_below(self, largest: float) -> float:
+        """Return the widest gap between two numbers up to this one, where a program prints six digits of each, as C's %g."""
+        return max(10.0**-self.decimals, _digit_below(largest) * 10.0**-_DECIMALS_OF_G)
+
     @property
     def is_open(self) -> bool:
         """Return True: it takes as many digits as it needs."""
@@ -198,6 +211,15 @@ class Plain:
     def decode(self, text: str) -> Value | None:
         """Return the number, None for one that no double holds."""
         return _finite_or_none(float(text))
+
+
+def _digit_below(largest: float) -> float:
+    """Return what the first digit of the numbers below this one counts."""
+    return float(10.0 ** _exponent_below(largest))
+
+
+def _exponent_below(largest: float) -> int:
+    return ceil(log10(largest)) - 1
 
 
 def _bounded(name: str, value: Value) -> float:

@@ -2,12 +2,13 @@
 
 import struct
 from dataclasses import dataclass
-from math import isfinite
+from math import frexp, isfinite
 from typing import Final
 
 from gateway.devices.fields.field import Value, finite, refuse
 
 _WORD_FORMATS: Final = {"uint16": ">H", "int16": ">h", "uint32": ">I", "int32": ">i", "float32": ">f"}
+_FLOAT_BITS: Final = 24  # of its mantissa
 _FLOAT_DECIMALS: Final = 4  # of a float32 setting: a tenth of a millivolt, which a float32 of 10 V still tells apart
 
 
@@ -28,6 +29,11 @@ class RegisterNumber:
     def decimals(self) -> int:
         """Decimals that such a number is rounded to before it is sent."""
         return _FLOAT_DECIMALS if self.kind == "float32" else 0
+
+    def step_below(self, largest: float) -> float:
+        """Return the widest gap between two numbers that it tells apart up to this one."""
+        is_float = self.kind == "float32"
+        return max(10.0**-self.decimals, 2.0 ** (frexp(largest)[1] - _FLOAT_BITS) if is_float else 0.0)
 
     @property
     def pattern(self) -> str:

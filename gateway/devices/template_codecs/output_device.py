@@ -141,7 +141,8 @@ class TemplateOutputDevice:
         number = self._set_number(body)
         if number is None:
             number = self._setting_after_step(body)
-        if number is not None and self._scale.carries(number, self._grammar.half_step(self._grammar.set_voltage.ask)):
+        setting = self._grammar.set_voltage
+        if number is not None and self._scale.carries(number, 0.5 * self._grammar.step(setting, setting.ask)):
             if self.is_tripped:
                 return Garbage(line.data)
             self._setting = number

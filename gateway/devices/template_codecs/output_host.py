@@ -122,10 +122,8 @@ class TemplateOutputHost:
         return self._questions[template]
 
     def _step_v(self, exchange: VoltageExchange, template: str) -> float:
-        """What one count of the number in this template means, V; 0 where it carries none."""
-        if self._grammar.profile.number_in(template) is None:
-            return 0.0
-        return exchange.range.scale.physical_per_number * float(10.0 ** -self._grammar.profile.decimals_in(template))
+        """What one count of the number in this template means at most, V; 0 where it carries none."""
+        return exchange.range.scale.physical_per_number * self._grammar.step(exchange, template)
 
     def _steps_between(self, answered: VoltageExchange) -> float:
         """V: a setting is rounded once on its way, and once more where the answer counts in other numbers."""
@@ -169,7 +167,7 @@ class TemplateOutputHost:
         """How far beyond its range the device's number may be: a setting by its rounding, a measured pressure by much more."""
         low, high = exchange.range.device
         beyond = _PRESSURE_BEYOND * (high - low) if isinstance(request, ReadPressure) else 0.0
-        return beyond + self._grammar.half_step(exchange.answer)
+        return beyond + 0.5 * self._grammar.step(exchange, exchange.answer)
 
     def _refusal(self, body: bytes) -> Refused | None:
         text = self._grammar.refusal(body) or (exception_text(body) if self._grammar.profile.is_modbus else "")

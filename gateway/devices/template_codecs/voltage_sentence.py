@@ -19,7 +19,7 @@ class VoltageSentence:
         self._grammar, self._template = grammar, exchange.ask
         scale, self._range_v = exchange.range.scale, exchange.range.voltage_v
         self._number, self._decimals = grammar.number_in(exchange.ask)
-        half_step = grammar.half_step(exchange.ask)
+        half_step = 0.5 * 10.0**-self._decimals
         self._first, self._first_v, self._v_per_number = scale.device[0], scale.physical[0], scale.physical_per_number
         self._least, self._most = scale.device[0] - half_step, scale.device[1] + half_step
         self._per_unit: int = 10**self._decimals
