@@ -26,9 +26,7 @@ class GivenPath(click.Path):
         if not os.fspath(value):
             self.fail(EMPTY, param, ctx)
         path = super().convert(expand_home(value), param, ctx)
-        with suppress(
-            OSError
-        ):  # not there yet, or not for us to look at; click itself refuses files, and takes devices
+        with suppress(OSError):  # not there yet, or not for us to look at; click refuses files alone, a device is none
             is_folder = S_ISDIR(Path(os.fsdecode(path)).stat().st_mode)
             if not (self.file_okay or is_folder):
                 self.fail(f"{os.fspath(path)!r} is no directory", param, ctx)
