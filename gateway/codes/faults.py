@@ -31,8 +31,10 @@ class FaultCode(IntEnum):
             "A310",
             "master lost",
             "The owner's heartbeat did not change within the lease.",
-            "The robot program stopped, its connection closed, or it writes a constant heartbeat.",
-            "Let the master change the heartbeat register at least every lease; then reset with setpoint 0.",
+            "The robot program stopped, its connection closed, it writes a constant heartbeat, or the writes that carry it are "
+            "refused, of which nothing is taken.",
+            "Let the master change the heartbeat register at least every lease, and mend what refusal_reason and the log say "
+            "was refused; then reset with setpoint 0.",
         ),
     )
     SAMPLE_STALE = (

@@ -112,7 +112,7 @@ NOTICES: Final = (
     Explanation(
         "W246",
         "server certificate is about to expire",
-        "The gateway's own certificate, or its CA's, ends within 30 days; after that no client connects by TLS.",
+        "The gateway's own certificate, its CA's or one between ends within 30 days; after that no client connects by TLS.",
         "Certificates are made for a limited time, and certs makes a CA for the same as what it signs first.",
         "Make a new one with the same CA, put it into the rig file and start anew; clients keep theirs. Of a CA: all anew.",
     ),

@@ -82,7 +82,8 @@ class RefusalReason(IntEnum):
             "W204",
             "value out of range",
             "A value beyond the register's or the rig's limits; it is refused, never clipped.",
-            "The scale was forgotten (12.00 N is 1200 in block 0), or the rig's force_max_n is lower than you think.",
+            "The scale was forgotten (12.00 N is 1200 in block 0), or the rig's force_max_n, or what the calibration in use "
+            "allows, is lower than you think.",
             "Stay within what is allowed; unit and scale: `force-gateway registers NAME`, the rig's limit: the gateway's log.",
         ),
     )

@@ -16,9 +16,11 @@ CURES: Final = {
 
 def end_of(name: str, certificates: Sequence[PeerCertificate]) -> str:
     """Return when what stands in this file ends, empty where nothing stands there: the first certificate, of a CA's the last
-    one to end. One that another of the file has signed ends with that one, too, and that one counts for nothing else."""
+    one to end. One that another of the file has signed ends with that one, too, and that one counts for nothing else. A root
+    beside our own certificate is a copy: its clients have theirs."""
     if name != "ca":
-        return certificates[0].ends if certificates else ""
+        chain = [each for each in certificates if each.issuer != each.subject]
+        return _end_of_chain(certificates[0], chain) if certificates else ""
     signers = {each.issuer for each in certificates if each.issuer != each.subject}
     last = [each for each in certificates if each.subject not in signers] or certificates
     return max((_end_of_chain(each, certificates) for each in last), default="")

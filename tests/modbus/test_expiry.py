@@ -30,6 +30,20 @@ def test_a_ca_that_another_of_its_file_has_signed_ends_with_the_chain(ca: list[P
     assert end_of("ca", ca) == end_of("ca", ca[::-1]) == ends
 
 
-def test_of_the_gateway_s_own_the_first_counts() -> None:
-    assert end_of("certificate", [shown("gateway", "2027", "cells"), shown("cells", "2026")]) == "2027"
-    assert end_of("certificate", []) == ""
+@pytest.mark.parametrize(
+    ("own", "ends"),
+    [
+        ([], ""),
+        ([shown("gateway", "2027", "cells"), shown("cells", "2026")], "2027"),
+        ([shown("gateway", "2027", "cells"), shown("other", "2025", "root")], "2027"),
+        ([shown("gateway", "2027", "cells"), shown("cells", "2026", "root")], "2026"),
+        (
+            [shown("gateway", "2027", "cells"), shown("cells", "2028", "middle"), shown("middle", "2025", "root")],
+            "2025",
+        ),
+        ([shown("gateway", "2027")], "2027"),
+    ],
+)
+def test_the_gateway_s_own_ends_with_those_between_it_and_the_root(own: list[PeerCertificate], ends: str) -> None:
+    """A root's copy does not count, every client has its own; of one between, which only we send, nothing was told."""
+    assert end_of("certificate", own) == ends

@@ -95,7 +95,7 @@ class Wired:
         """Of each tick: periods since the one before, and how late it is, as the clock would say."""
         self.suspended_s = 0.0
         """For how long the machine has been suspended, while this clock stood still."""
-        self._steps = 0
+        self._steps, self.tick_steps = 0, 10
         self._down = wire_of(rig.output)
         self._stream, self._asks = wire_of(rig.load_cell), wire_of(rig.load_cell)
         self._frame_steps = round(1.0 / (STEP_S * rig.load_cell.device.rate_hz)) if rig.load_cell.device.rate_hz else 0
@@ -172,8 +172,8 @@ class Wired:
             self.loop.on_output_bytes(heard, self.now_s)
         if (frame := self._stream.bytes_through(self.now_s)) and self.is_cell_plugged:
             self.loop.on_cell_bytes(frame, self.now_s)
-        if self._steps % 10 == 0:
-            self.loop.on_tick(*self.lateness(self._steps // 10))
+        if self._steps % self.tick_steps == 0:
+            self.loop.on_tick(*self.lateness(self._steps // self.tick_steps))
 
     def _wire_has_time(self) -> bool:
         """An amplifier leaves out the readings that its wire cannot carry."""

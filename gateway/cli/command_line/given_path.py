@@ -1,7 +1,9 @@
 """Paths of the command line as people mean them, and an empty name, which a variable of the shell that is not set leaves."""
 
 import os
+from contextlib import suppress
 from pathlib import Path
+from stat import S_ISDIR
 from typing import Any, Final
 
 import click
@@ -23,7 +25,12 @@ class GivenPath(click.Path):
         """Return the path; BadParameter where it breaks a rule of click.Path, or names nothing."""
         if not os.fspath(value):
             self.fail(EMPTY, param, ctx)
-        return super().convert(expand_home(value), param, ctx)
+        path = super().convert(expand_home(value), param, ctx)
+        with suppress(OSError):  # not there yet, or not for us to look at; click refuses files alone, a device is none
+            is_folder = S_ISDIR(Path(os.fsdecode(path)).stat().st_mode)
+            if not (self.file_okay or is_folder):
+                self.fail(f"{os.fspath(path)!r} is no directory", param, ctx)
+        return path
 
 
 def named_rig(context: click.Context, parameter: click.Parameter, value: str) -> str:

@@ -34,6 +34,13 @@ def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
             raise already_exists(target, "diagnose has not written it: name another file")
 
 
+def check_page(target: Path, inputs: Iterable[Path]) -> None:
+    """Raise what `check_targets` does, and UsageError where the name says that it is no HTML: no program would open it."""
+    check_targets([target], inputs)
+    if target.suffix.lower() not in ("", ".html", ".htm"):
+        raise click.UsageError(f"{target}: an HTML file ends in .html")
+
+
 def _is_written_by_hand(target: Path) -> bool:
     """Decide whether a target is YAML that is not ours: `--extend my-cell.yaml` made a plant of the rig's file."""
     if target.suffix not in (".yaml", ".yml") or not target.is_file():

@@ -13,6 +13,7 @@ from gateway.devices import DeviceProfile, SerialSettings
 from gateway.devices.template import CONTROL_CHARACTERS, quote
 from gateway.ports import PortEvents, SerialPort
 from gateway.ports.port import monotonic_s
+from gateway.progress import reported
 from gateway.service.probing.harmless_questions import (
     HarmlessQuestion,
     count_readings,
@@ -105,7 +106,7 @@ async def probe_port(
     patience_s: the least time that is waited for an answer, where the profile's own is shorter."""
     report = PortReport(path)
     report.unasked = tuple(profile.name for profile in profiles if not any(harmless_questions(profile)))
-    for settings, fitting in _settings_to_try(profiles, bauds):
+    for settings, fitting in reported(f"speeds of {path}", list(_settings_to_try(profiles, bauds))):
         await _probe_at(report, settings, fitting, patience_s)
         if report.answers or report.strangers:
             break

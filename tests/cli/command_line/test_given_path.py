@@ -94,3 +94,10 @@ def test_what_may_not_be_read_or_written_is_told_by_its_own_name(
     assert "is not readable" not in call("restore", "b.tar.gz", "--state", "new").stderr
     answer = call("backup", "c.tar.gz", "--state", "state")
     assert answer.exit_code == 77 and answer.stderr == "E105 c.tar.gz: Permission denied: this user may not\n"
+
+
+@pytest.mark.parametrize("words", [("run", "demo", "--sim", "--bind", "127.0.0.1:0"), ("events",), ("audit", "show")])
+def test_a_device_is_no_state_directory(words: tuple[str, ...], here: Path, call) -> None:
+    """`run --state /dev/null` said that the file exists, and others that there is no such directory."""
+    answer = call(*words, "--state", "/dev/null")
+    assert answer.exit_code == 2 and "'/dev/null' is no directory" in answer.stderr, answer.output

@@ -94,3 +94,14 @@ def test_a_recording_is_exported_as_its_file_is_called(state: Path, call: Call) 
     assert (state.parent / "run.parquet").read_bytes()[:4] == b"PAR1"
     assert call("recordings", "export", "1", "-o", "run.txt", "--state", "state").exit_code == 0
     assert (state.parent / "run.txt").read_text().startswith("# ")
+
+
+@pytest.mark.parametrize("name", ["loops.bmp", "loops.SVG", "loops.html.gz"])
+@pytest.mark.parametrize("words", [("calibration", "compare", "demo", "demo"), ("plant", "compare", "0", "0")])
+def test_a_page_under_the_name_of_a_picture_is_refused(
+    words: tuple[str, ...], name: str, state: Path, call: Call
+) -> None:
+    """The HTML was written there, and no program opened it."""
+    answer = call(*words, "--plot", name, "--state", "state")
+    assert answer.exit_code == 2 and f"{name}: an HTML file ends in .html" in answer.output, answer.output
+    assert not (state.parent / name).exists()

@@ -8,6 +8,7 @@ between two samples and two ticks counts. The same seeds give the same figures o
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
@@ -35,7 +36,22 @@ def until_safe(wired: Wired) -> float:
 
 def heartbeat_stops(moment_ms: int) -> float:
     """Measure from the last new heartbeat; reads, and the same heartbeat again, flow on."""
-    wired = Wired(with_supervision(strict(), lease_s=LEASE_S), seed=moment_ms).ready()
+    return _heartbeat_stops(Wired(with_supervision(strict(), lease_s=LEASE_S), seed=moment_ms), moment_ms)
+
+
+def heartbeat_stops_of_slow(moment_ms: int) -> float:
+    """Measure it where the loop decides seldom: by its slowest tick, and few readings between."""
+    rig = with_supervision(strict(), lease_s=LEASE_S)
+    stream = rig.load_cell.device.stream
+    assert stream
+    device = replace(rig.load_cell.device, stream=replace(stream, rate_hz=25.0))
+    wired = Wired(replace(rig, load_cell=replace(rig.load_cell, device=device)), seed=moment_ms)
+    wired.tick_steps = 20
+    return _heartbeat_stops(wired, moment_ms)
+
+
+def _heartbeat_stops(wired: Wired, moment_ms: int) -> float:
+    wired.ready()
     wired.write(0, ENABLE, 1500, 0, 0, 1)
     for beat in range(2, 40):
         wired.run(BEAT_S + moment_ms / 1e3)
@@ -85,6 +101,7 @@ def disabled(moment_ms: int) -> float:
 ROWS: tuple[tuple[str, float, Callable[[int], float]], ...] = (
     ("the master clears enable", LAST_WORD_S, disabled),
     ("the owner's heartbeat stops (lease 200 ms)", LEASE_S + 0.02, heartbeat_stops),
+    ("the same, 25 readings/s, a loop of 50 Hz", LEASE_S + 0.04, heartbeat_stops_of_slow),
     ("the load cell falls silent (50 ms)", 0.05 + LAST_WORD_S, named("cell-cut")),
     ("over-force, three samples of 10 ms", 0.03 + LAST_WORD_S, over_force),
     ("the load cell's sign turns", 1.0 + LAST_WORD_S, named("sign-inverted")),

@@ -127,9 +127,9 @@ def compare_command(*, a: str, b: str, plot: Path | None, state: StateChoice, as
 
     store = open_store(state.directory, state.rig)
     if plot:
-        from gateway.cli.diagnosis.outputs import check_targets
+        from gateway.cli.diagnosis.outputs import check_page
 
-        check_targets([plot], [Path(a), Path(b)])
+        check_page(plot, [Path(a), Path(b)])
     first, second = find_calibration(store, a), find_calibration(store, b)
     try:
         comparison = compare_calibrations(first, second)

@@ -103,9 +103,9 @@ def compare_command(*, a: str, b: str, state: StateChoice, as_json: bool, **draw
 
     plot, recording = drawn["plot"], drawn["recording"]
     if plot:
-        from gateway.cli.diagnosis.outputs import check_targets
+        from gateway.cli.diagnosis.outputs import check_page
 
-        check_targets([plot], [Path(name) for name in (a, b, recording) if name])
+        check_page(plot, [Path(name) for name in (a, b, recording) if name])
     first, second = find_plant(state, a), find_plant(state, b)
     differing = differing_numbers(first, second)
     if plot:

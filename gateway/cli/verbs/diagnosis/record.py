@@ -1,6 +1,7 @@
 """`record`: start and stop a recording in the gateway that runs; by its clock, too, so that it ends whatever becomes of us."""
 
 import json
+import threading
 import time
 from pathlib import Path
 from typing import Any, Final
@@ -65,21 +66,26 @@ def command(*, what: str | None, state: StateChoice, as_json: bool, for_s: float
         request["for_s"] = for_s
     if starts or what in _ON:
         request["on"] = starts
-    answer = ask(state.directory, request)
-    if for_s:
-        answer = _follow(state.directory, answer["recording"], for_s)
+    answer = _record(state.directory, request, for_s) if for_s else ask(state.directory, request)
     click.echo(json.dumps(answer) if as_json else _sentence(answer))
     if for_s and answer["fault"]:
         raise CliError(f"{answer['fault']}: not the {for_s:g} s that were asked for")
 
 
-def _follow(state: Path, recording: str, for_s: float) -> dict[str, Any]:
-    """Wait for the end of a recording, and return what it has become. recording: the path that it began in; later: files in
-    which it went on, as behind a restart of control or with another plant; fault: of the disk, that has ended it."""
-    from gateway.cli.diagnosis.progress_line import show_progress
+def _record(state: Path, request: dict[str, Any], for_s: float) -> dict[str, Any]:
+    """Begin a recording, wait for its end, and return what it has become. recording: the path that it began in; later: files in
+    which it went on, as behind a restart of control or with another plant; fault: of the disk, that has ended it. A Ctrl-C
+    before the answer counts behind it: the recording may have begun."""
+    from gateway.cli.control_socket import ask
+    from gateway.cli.diagnosis.progress_line import handle_interrupt, show_progress
 
+    pressed = threading.Event()
+    with handle_interrupt(lambda number, frame: pressed.set()):
+        recording: str = ask(state, request)["recording"]
     is_stopped, fault, files = False, "", [recording]
     try:
+        if pressed.is_set():
+            raise KeyboardInterrupt
         with show_progress("record"):
             fault = _wait(state, for_s, files)
     except KeyboardInterrupt:

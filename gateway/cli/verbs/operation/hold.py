@@ -65,7 +65,8 @@ def command(
 ) -> None:
     """Hold NEWTON until Ctrl-C, which ramps the force to 0.
 
-    Sets the force, enables, and keeps the heartbeat that a rig with a lease wants. A second Ctrl-C skips the ramp.
+    Sets the force, enables, and keeps the heartbeat that a rig with a lease wants. A second Ctrl-C skips the ramp; Ctrl-Z
+    does what Ctrl-C does.
 
     The lease is read from a gateway on this machine (unless it runs with a --state of its own); for a remote one give
     --rig.
@@ -151,8 +152,8 @@ def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bo
 
 @contextmanager
 def _handle_signals(beat: "HeartbeatThread", clock: Callable[[], float] = time.monotonic) -> Iterator[None]:
-    """The first of Ctrl-C, SIGTERM and a closed terminal (not with nohup) ramps down, a second Ctrl-C or SIGTERM drops the
-    force at once."""
+    """The first of Ctrl-C, Ctrl-Z, SIGTERM and a closed terminal (not with nohup) ramps down, a second one but that drops the
+    force at once. Suspended by Ctrl-Z nobody would watch a force that goes on, and its heartbeat would stand still."""
     from gateway.service.supervisor.event_wait import StopSignals
 
     stops = StopSignals(clock)
@@ -162,8 +163,7 @@ def _handle_signals(beat: "HeartbeatThread", clock: Callable[[], float] = time.m
             (beat.dropping if beat.stopping.is_set() and number != signal.SIGHUP else beat.stopping).set()
 
     heard = [signal.SIGINT, signal.SIGTERM]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-        heard.append(signal.SIGHUP)
+    heard += [each for each in (signal.SIGHUP, signal.SIGTSTP) if signal.getsignal(each) is not signal.SIG_IGN]
     before = {number: signal.signal(number, on_signal) for number in heard}
     try:
         yield

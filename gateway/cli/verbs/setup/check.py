@@ -46,7 +46,10 @@ def command(context: click.Context, *, file: str, probe: bool, port: str | None,
         _print(file, checked)
     failed = exit_codes.OK
     if probe and not checked.faults:
-        failed, document["probe"] = _probe(checked, port, is_quiet=as_json)
+        from gateway.cli.diagnosis.progress_line import show_progress
+
+        with show_progress("probing"):
+            failed, document["probe"] = _probe(checked, port, is_quiet=as_json)
     if as_json:
         click.echo(json.dumps(document, indent=2))
     context.exit(exit_codes.CONFIGURATION if checked.faults else failed)
