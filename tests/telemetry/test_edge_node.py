@@ -203,6 +203,10 @@ def test_a_broker_that_is_away_costs_the_disk_one_write(tmp_path: Path, monkeypa
         node.begin()
         node.greet()
     assert KeptBdSeq(tmp_path).next() == 103 and len(writes) == 1 + 1 + 1 + 2 + 1
+    (tmp_path / "sparkplug.json").unlink()
+    node.lose()
+    node.begin()
+    assert KeptBdSeq(tmp_path).next() == 104, "a number is kept before it is told, behind a connection as at first"
 
 
 def test_bd_seq_is_kept_while_a_gateway_has_the_state_directory(
