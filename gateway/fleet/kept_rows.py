@@ -13,6 +13,7 @@ from typing import Any, Final, Self
 
 from gateway.fleet.tasks import Row, Task
 from gateway.plain_file import read_plain
+from gateway.processes.durable_file import replace_text
 
 FORMAT: Final = 1
 
@@ -34,9 +35,7 @@ class KeptRows:
         """Go on behind what is kept, without a cut last line, or begin anew. OSError where the folder takes no file."""
         kept = self._read()
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        beside = self._path.with_name(f".{self._path.name}.new")
-        beside.write_text("".join(_line(each) for each in (self._head, *kept)), encoding="utf-8")
-        beside.replace(self._path)
+        replace_text(self._path, "".join(_line(each) for each in (self._head, *kept)))
         self._descriptor = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
         return self
 

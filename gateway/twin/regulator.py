@@ -155,9 +155,8 @@ class RegulatorState:
         self._take(regulator)
         latest = self._now + self._delay
         self._arriving = deque((min(moment, latest), target) for moment, target in self._arriving)
-        if not self._delay and self._arriving:
-            self._seen_pa = self._arriving[-1][1]
-            self._arriving.clear()
+        if not self._delay:
+            self._arriving.clear()  # what is seen now is sent again
         self.command(self._voltage_v)
 
     def command(self, voltage_v: float) -> None:

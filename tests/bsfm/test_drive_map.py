@@ -41,7 +41,7 @@ DEAD_START_N = np.array([0.0, 13.0, 33.0, 55.0])  # little below, as a valve tha
 FLATTENING_N = np.array([0.0, 20.5, 39.0, 55.0])
 
 
-@pytest.mark.parametrize("bow", [-0.3, 0.0, 0.2])
+@pytest.mark.parametrize("bow", [-0.9, -0.3, 0.0, 0.2, 0.9])
 def test_it_increases_and_leads_back_to_the_volts_beyond_the_range_as_well(bow):
     scale = DriveMap(model(bow))
     straight_v = np.array([scale.linear_v(volts) for volts in VOLTS.tolist()])

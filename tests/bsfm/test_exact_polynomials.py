@@ -87,10 +87,12 @@ def test_products_that_underflow_a_double_keep_their_sign():
     assert not RationalBezier(0.0, 1.0, (0.0, 1.0, 3.0, 2.0), weights).is_increasing()
 
 
+@pytest.mark.parametrize(("x0", "x1"), [(0.0, 8.0), (0.25, 8.25), (1.125, 1.625)])
 @pytest.mark.parametrize("order", [1, 2, 5, 15])
-def test_slope_floor_is_exact_on_a_straight_line(order):
-    line = RationalBezier(0.0, 8.0, [4.0 * i for i in range(order + 1)], (1.0,) * (order + 1))
-    slope = 4.0 * order / 8.0
+def test_slope_floor_is_exact_on_a_straight_line(order, x0, x1):
+    """Over broken voltages as well: a flat branch that passed would amplify noise."""
+    line = RationalBezier(x0, x1, [4.0 * i for i in range(order + 1)], (1.0,) * (order + 1))
+    slope = 4.0 * order / (x1 - x0)
     assert line.slope_is_at_least(slope)
     assert not line.slope_is_at_least(math.nextafter(slope, math.inf))
     assert slope * (1 - 2e-8) <= line.minimum_slope() <= slope

@@ -54,6 +54,7 @@ FAULTS = [
     ({"x1_v": 10.5}, -1, CoefficientReason.VOLTAGE_RANGE, "range 0 .. 10.5 V: 0 <= x0 < x1 <= 10 V is allowed"),
     ({"x1_v": 0.0}, -1, CoefficientReason.VOLTAGE_RANGE, "range 0 .. 0 V: 0 <= x0 < x1 <= 10 V is allowed"),
     ({"blend_span_n": 100.5}, -1, CoefficientReason.BLEND_SPAN, "blend span 100.5 N: 0 .. 100 N is allowed"),
+    ({"blend_span_n": -0.5}, -1, CoefficientReason.BLEND_SPAN, "blend span -0.5 N: 0 .. 100 N is allowed"),
     ({"rising_handles_n": (0.5, 14.0, 98.5)}, 2, CoefficientReason.HANDLE_RANGE,
      "rising handle 2 = 98.5: -98 .. 98 is allowed"),
     ({"rising_handles_n": (0.5, 0.6, 38.0)}, 0, CoefficientReason.SLOPE_FLOOR,

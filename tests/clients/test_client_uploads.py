@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import zlib
 from typing import Any
@@ -49,6 +50,17 @@ def test_an_upload_that_fails_says_why(client: Any, gateway: GatewayAtHand) -> N
     cycles(client, 8)
     assert not client.uploaded
     assert "not increasing" in client.text
+
+
+@pytest.mark.parametrize(("change", "number"), [({"blend_span": 1e3}, "-1"), ({"rising_b": [0.0, 500.0, 600.0]}, "1")])
+def test_the_number_that_is_to_blame_is_told_by_its_place_and_none_as_minus_1(
+    client: Any, gateway: GatewayAtHand, change: dict[str, Any], number: str
+) -> None:
+    """65535, said of a set whose span is too wide, is no number of any set."""
+    client.begin_upload(MODEL | change, 0)
+    cycles(client, 8)
+    assert not client.uploaded and any(word in client.text for word in ("range", "span"))
+    assert re.findall(r"number (-?\d+)", client.text) in ([], [number])
 
 
 def test_the_crc_s_check_value_comes_out() -> None:

@@ -1,10 +1,13 @@
 """A recording that is longer than a search needs: which part is judged, and that a beginning amid motion is no cause."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gateway.diagnosis import Measurement, diagnose
 from gateway.diagnosis.excerpt import take_excerpt
+from gateway.diagnosis.measurement import Settings
 from tests.diagnosis.machine import MACHINE, Floats, command_v, measurement, readings_n, times_s
 
 
@@ -41,6 +44,36 @@ def test_the_liveliest_stretch_is_judged_but_not_its_beginning() -> None:
     assert not part.usable[:300].any()
     assert part.usable[300:].all()
     assert "in which the drive moves most, 40 to 70 s" in part.notes[-1]
+
+
+def test_all_that_a_stretch_has_beside_its_readings_is_of_the_same_moments() -> None:
+    time_s = times_s(100.0)
+    volts = np.where((time_s > 40.0) & (time_s < 70.0), 2.0 + np.round(np.sin(time_s), 2), 2.0)
+    whole = replace(long(200.0, 100.0, volts), covariates={"temperature_c": time_s}, sent=Settings(time_s, volts))
+    part = take_excerpt(whole, 6000)
+    first_s = float(part.covariates["temperature_c"][0])
+    assert part.covariates["temperature_c"] == pytest.approx(part.time_s + first_s)
+    assert part.sent is not None and part.sent.times_s == pytest.approx(time_s - first_s)
+    assert part.command_v is not None
+    edges_s = np.append(part.time_s, part.time_s[-1] + 0.005)
+    assert part.sent.interval_means(edges_s) == pytest.approx(part.command_v)
+
+
+def test_a_row_of_several_counts_only_where_all_of_them_do() -> None:
+    """One reading of -9999 N among eight is in their mean."""
+    whole = long(4000.0, 4.0)
+    whole.usable[59] = False
+    part = take_excerpt(whole, 2000)
+    assert np.flatnonzero(~part.usable).tolist() == [59 // 8]
+
+
+def test_a_drive_that_moves_where_no_reading_counts_shows_nothing() -> None:
+    time_s = times_s(100.0)
+    volts = 2.0 + np.where(time_s < 30.0, np.sin(5.0 * time_s), np.sin(time_s))
+    whole = long(200.0, 100.0, volts)
+    whole.usable[time_s < 30.0] = False
+    part = take_excerpt(whole, 6000)
+    assert part.usable[300:].all()
 
 
 @pytest.mark.parametrize("first", [9000, 10000])

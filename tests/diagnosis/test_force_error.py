@@ -86,6 +86,13 @@ def test_only_what_was_asked_of_both_is_compared():
     assert "are needed" in apart.why
 
 
+def test_a_force_that_is_come_to_from_above_is_not_compared_with_one_from_below():
+    """Friction stands the other way round: a machine that is as it was would have become worse."""
+    risen, fallen = ([ErrorBlock(20.0, 20.0, rising, True, 250, 25.0)] * 10 for rising in (True, False))
+    assert compare_runs(risen, fallen).blocks == (0, 0)
+    assert compare_runs(risen, (*fallen, *risen)).blocks == (10, 10)
+
+
 def as_pull(pushed: CommandedForce) -> CommandedForce:
     columns = {"time_s": pushed.time_s, "setpoint_n": pushed.wanted_n, "force_n": -pushed.measured_n}
     return commanded_force(columns | {"pulling": np.ones(pushed.time_s.size)})

@@ -115,6 +115,13 @@ def test_a_name_that_stands_on_two_late_days_is_not_why_a_cell_has_drifted_for_t
     assert headline(find_drifts(rows)).startswith("1 of 1 cells drifts: cell a (leak or warm-up, +0.")
 
 
+def test_a_cell_that_gets_better_has_changed_as_well_by_what_has_gone_and_not_by_what_came_beside_it() -> None:
+    rows = [row("a", day, 2.0 - 0.06 * day, ("leak", 1.0 - 0.08 * day), ("creep", 0.12 * day)) for day in range(10)]
+    (cell,) = find_drifts(rows)
+    assert cell.drifts and cell.change_n == pytest.approx(-0.54)
+    assert cell.cause == "leak" and cell.cause_n == pytest.approx(-0.72)
+
+
 def test_the_page_answers_first_and_hides_no_name_of_a_file() -> None:
     rows = [*fleet(np.random.default_rng(1), 3, 8, slope_n=0.1), row("<b>", 1, 0.0, error="E403")]
     text = fleet_page(rows, find_drifts(rows), "diagnose")

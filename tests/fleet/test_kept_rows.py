@@ -1,6 +1,9 @@
 """What is finished stays, and only for the same question and the same file."""
 
+import os
 from pathlib import Path
+
+import pytest
 
 from gateway.fleet.kept_rows import KeptRows
 from gateway.fleet.tasks import Task
@@ -52,3 +55,26 @@ def test_a_line_that_is_no_row_is_passed_over(tmp_path: Path) -> None:
         stream.write('3\n[]\n"a"\nnull\n{"a": 1}\n')
     fill(file, TASKS[1])
     assert list(kept(file).known(TASKS)) == TASKS
+
+
+def test_what_is_kept_is_on_the_disk_before_it_counts_as_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A power cut takes what was written and not synced: hours of work, also where the file is only begun again."""
+    file, on_disk, replaced = tmp_path / "rows.jsonl", dict[int, bytes](), list[bool]()
+    sync, replace = os.fsync, Path.replace
+
+    def note_sync(descriptor: int) -> None:
+        sync(descriptor)
+        if (name := Path(f"/proc/self/fd/{descriptor}")).is_file():
+            on_disk[os.fstat(descriptor).st_ino] = name.read_bytes()
+
+    def note_replace(beside: Path, target: Path) -> Path:
+        replaced.append(on_disk.get(beside.stat().st_ino) == beside.read_bytes())
+        return replace(beside, target)
+
+    monkeypatch.setattr(os, "fsync", note_sync)
+    monkeypatch.setattr(Path, "replace", note_replace)
+    for task in TASKS:
+        with kept(file) as rows:
+            rows.keep({**task.head, "error_code": ""})
+            assert on_disk.get(file.stat().st_ino) == file.read_bytes()
+    assert replaced == [True, True]

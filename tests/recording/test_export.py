@@ -60,6 +60,15 @@ def test_a_torn_tail_is_said_in_both(recording: Recording, tmp_path: Path) -> No
     assert b"torn tail" in pq.read_schema(tmp_path / "out.parquet").metadata[b"dropped"]
 
 
+def test_whoever_reads_an_export_meanwhile_reads_the_old_one_to_its_end(recording: Recording, tmp_path: Path) -> None:
+    target = tmp_path / "out.csv"
+    target.write_text("of before\n")
+    with target.open() as reader:
+        export_csv(recording, target)
+        assert reader.read() == "of before\n"
+    assert read_csv(target)[0]["rig"] == "demo"
+
+
 def test_a_failed_export_leaves_nothing_behind(recording: Recording, tmp_path: Path) -> None:
     target = tmp_path / "out.csv"
     target.mkdir()

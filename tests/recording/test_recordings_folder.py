@@ -1,6 +1,7 @@
 """What others put into the folder of the recordings, or take out of it, neither stops a recorder nor passes for a recording."""
 
 import errno
+import fcntl
 import os
 import shutil
 from math import inf, nan
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from gateway.recording import Recorder, RecordingError, find_recording, list_recordings, read_recording
+from gateway.recording.care.keeping import is_being_recorded
 from gateway.recording.care.summaries import list_summaries
 from gateway.recording.reader import recording_paths
 from gateway.service.fitting.ladder_source import rig_of_state
@@ -141,3 +143,11 @@ def test_a_header_s_number_that_is_none_is_not_counted_with(number: float, place
     recorder.close()
     with pytest.raises(RecordingError, match=f"whose {place} is no number"):
         read_recording(recorder.path)
+
+
+def test_who_looks_whether_a_recording_is_being_written_is_not_taken_for_who_writes_it(tmp_path: Path) -> None:
+    """Two lists at once: each would have told that nothing may be deleted."""
+    path = record(tmp_path / "recordings", 1)
+    with path.open("rb") as other:
+        fcntl.flock(other, fcntl.LOCK_SH)
+        assert not is_being_recorded(path)

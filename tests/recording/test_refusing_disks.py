@@ -67,3 +67,21 @@ def test_what_ends_a_recording_is_told_by_its_cause(
     recorder.append((0.1, 1.0, 2.0))
     recorder.write()
     assert recorder.failure is not None and words in recorder.failure
+
+
+@pytest.mark.parametrize("taken", [0, 20])
+def test_a_disk_that_takes_no_header_is_left_without_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, taken: int
+) -> None:
+    """Each list would show a recording that nobody can read, and each try would leave one more."""
+    write, parts = os.write, [taken]
+
+    def refuse(descriptor: int, data: bytes) -> int:
+        if parts and (part := parts.pop()):
+            return write(descriptor, data[:part])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "write", refuse)
+    with pytest.raises(OSError, match="No space left"):
+        Recorder(tmp_path / "recordings", HEADER, COLUMNS)
+    assert list((tmp_path / "recordings").iterdir()) == []

@@ -60,6 +60,7 @@ class Library:
 
     def __init__(self, publish: Callable[[bytes], Awaitable[None]]) -> None:
         self.heard: asyncio.Queue[Any] = asyncio.Queue()
+        self.told: list[tuple[str, int, bool]] = []
         self._publish = publish
 
     def Will(self, *words: Any, **more: Any) -> None: ...  # noqa: N802  the library's name
@@ -76,6 +77,7 @@ class Library:
         return ()
 
     async def publish(self, topic: str, payload: bytes, qos: int, retain: bool) -> None:
+        self.told.append((topic, qos, retain))
         await self._publish(payload)
 
     @property
@@ -207,6 +209,16 @@ def test_who_has_nothing_to_say_waits_until_there_is_something(monkeypatch: pyte
         assert said == [b"1", b"later"]
 
     play(monkeypatch, scene, b"1")
+
+
+def test_who_comes_later_is_told_by_the_broker_what_is_to_stay_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene(session: Session, library: Library, said: list[bytes]) -> None:
+        session.waiting += [BrokerMessage("cell/state", b"{}", retain=True), BrokerMessage("cell/force", b"1", qos=1)]
+        session.ready.set()
+        await turns()
+        assert library.told == [("cell/state", 0, True), ("cell/force", 1, False)]
+
+    play(monkeypatch, scene)
 
 
 def test_a_password_is_shown_to_nobody() -> None:

@@ -203,6 +203,10 @@ def test_a_broker_that_is_away_costs_the_disk_one_write(tmp_path: Path, monkeypa
         node.begin()
         node.greet()
     assert KeptBdSeq(tmp_path).next() == 103 and len(writes) == 1 + 1 + 1 + 2 + 1
+    (tmp_path / "sparkplug.json").unlink()
+    node.lose()
+    node.begin()
+    assert KeptBdSeq(tmp_path).next() == 104, "a number is kept before it is told, behind a connection as at first"
 
 
 def test_bd_seq_is_kept_while_a_gateway_has_the_state_directory(
@@ -274,3 +278,12 @@ def test_numbers_of_every_length_are_written_as_they_are_read() -> None:
     numbers = [0, 1, 0x7F, 0x80, 0x3FFF, 0x4000, 2**32, 2**64 - 1]
     metrics = [SparkplugMetric(str(number), DataType.UINT64, number, 0) for number in numbers]
     assert decode_values(encode_payload(0, metrics, 0)) == {str(number): number for number in numbers}
+
+
+def test_the_errors_of_a_line_are_its_own() -> None:
+    state = holding()
+    state = replace(
+        state, output=replace(state.output, garbled=3), load_cell=replace(state.load_cell, garbled=8), refusals=5
+    )
+    shown = values_of(state)
+    assert (shown["Output/Errors"], shown["Load Cell/Errors"], shown["Refusals"]) == (3, 8, 5)

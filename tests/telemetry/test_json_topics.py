@@ -203,6 +203,11 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
         (b'{"control_word": 0.7}', None, []),
         (b'{"control_word": 1.5}', None, []),
         (b'{"heartbeat": 0.5}', None, []),
+        (
+            b'{"heartbeat": 7}',
+            {"ok": True, "written": ["heartbeat"]},
+            ["100004000102" + "0007"],
+        ),  # late it is no sign of life
         (b"[1]", None, []),
         (b"{", None, []),
         (b'{"force_setpoint": true}', None, []),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gateway.twin import LoadCell, Plant, Twin
+from gateway.twin.load_cell import History
 
 
 def pressed(cell: LoadCell, seed: int = 1, voltage_v: float = 2.0) -> Twin:
@@ -62,3 +63,14 @@ def test_the_reading_of_a_moment_stays_until_time_passes_or_a_new_one_is_taken()
     second = twin.measured_n
     twin.advance(0.001)
     assert twin.measured_n != second
+
+
+@pytest.mark.parametrize("first", [0, 700])
+def test_a_late_reading_shows_its_moment_after_any_time(first: int) -> None:
+    """What lies further back than any reading looks is dropped on the way."""
+    history = History(0.001, float(first), first)
+    for step in range(first + 1, first + 15_000):
+        history.put(float(step))
+        shown = max(step - 100.25, first)
+        assert history.at(shown * 0.001) == pytest.approx(shown)
+    assert len(history._values) < 10_000

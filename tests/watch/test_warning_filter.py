@@ -41,6 +41,20 @@ def test_members_of_one_group_agree_and_the_name_stays():
     assert after(offset, delay) is C.TRANSPORT_DELAY
 
 
+def test_one_that_could_be_the_other_is_not_it_while_the_other_could_not_be_that_one():
+    """The second window has told the two apart."""
+    either = names_cause(C.TRANSPORT_DELAY, "clock-offset")
+    assert after(either, names_cause(C.CLOCK_OFFSET)) is C.UNKNOWN
+    assert after(names_cause(C.CLOCK_OFFSET), either) is C.UNKNOWN
+
+
+def test_of_what_has_no_name_the_newest_sentence_is_told():
+    warning = WarningFilter()
+    for n in (0.3, 0.4, 0.9):
+        warning.add(WindowVerdict(C.UNKNOWN, f"{n} N are off", 1.0))
+    assert (warning.published.cause, warning.published.sentence) == (C.UNKNOWN, "0.9 N are off")
+
+
 def test_another_cause_takes_its_place_after_two_windows():
     assert after(FRICTION, FRICTION, DELAY) is C.COULOMB_FRICTION
     assert after(FRICTION, FRICTION, DELAY, DELAY) is C.TRANSPORT_DELAY

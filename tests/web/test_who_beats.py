@@ -48,6 +48,22 @@ def test_where_the_byte_order_must_be_proven_the_page_proves_it(tmp_path: Path) 
     play(tmp_path, scene, rig)
 
 
+def test_a_robot_that_enables_right_behind_a_stop_meets_no_beat_of_the_page(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
+        commands.join("me")
+        await commands.enable("me", 12.0)
+        for _ in range(20):
+            await asyncio.sleep(0)
+        await commands.stop()
+        wired.write(0, 1, 1000, 0, 0, 77)
+        for _ in range(20):
+            await asyncio.sleep(0)
+        assert wired.bank.owner == "10.0.0.5" and wired.bank.refusals == 0
+
+    play(tmp_path, scene, leased())
+
+
 def test_behind_a_fault_nobody_beats_and_the_robot_that_enables_meets_no_page(tmp_path: Path) -> None:
     """Not even behind a reset of the page's own: the robot had eight refusals of a beat in its registers, and in the log."""
 
@@ -132,6 +148,28 @@ def test_a_browser_that_leaves_is_not_there_for_longer_than_one_that_stays_silen
         assert not commands.is_attended
 
     play(tmp_path, scene)
+
+
+def test_a_master_that_takes_the_page_s_force_for_moments_ends_no_beat(tmp_path: Path) -> None:
+    """Refused beats count in a row: the page's own force would end with its lease."""
+
+    async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
+        commands.join("me")
+        await commands.enable("me", 12.0)
+        for beat in range(10):
+            wired.write(0, 1 | 8, 1200, 0, 0, beat + 1)
+            told = wired.bank.refusals
+            while wired.bank.refusals < told + 2:
+                await asyncio.sleep(0)
+            await commands.take_ownership("me")
+            for _ in range(4):
+                await asyncio.sleep(0)
+                commands.note_alive("me")
+            assert commands._beat and not commands._beat.done()
+        assert commands.commander == "me" and wired.state in (State.RAMPING, State.HOLDING)
+
+    play(tmp_path, scene, leased())
 
 
 def test_behind_an_absence_that_ended_the_beat_the_next_command_begins_it_again(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Where a loop woke late, a setting may be in no row: what follows is no witness until it is forgotten."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -76,3 +77,10 @@ def test_that_these_rows_are_not_judged_is_told_and_no_figure_shows_them() -> No
     reported: Any = SimpleNamespace(base=model, fitted=model)
     (trace,) = verdict._traces(bench, reported)
     assert (trace.measurement.usable == bench.judged).all()
+
+
+def test_each_recording_is_drawn_with_its_own_simulation() -> None:
+    bench = bench_of([stairs([400]), replace(stairs([]), name="whole")])
+    model: Any = SimpleNamespace(parameters=ModelParameters(load_plant("paper-slide").plant, (0.0, 0.0)))
+    reported: Any = SimpleNamespace(base=model, fitted=model)
+    assert [trace.measurement.name for trace in verdict._traces(bench, reported)] == ["stairs", "whole"]

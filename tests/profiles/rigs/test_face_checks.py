@@ -5,6 +5,9 @@ from pathlib import Path
 import pytest
 
 from gateway.profiles import Report, check_report, load_rig
+from tests.certificates import store_all
+from tests.profiles.rigs.test_tls_checks import files
+from tests.profiles.rigs.test_tls_checks import report as tls_report
 
 RIGS = Path(__file__).parents[3] / "profiles" / "rigs"
 CELL = (RIGS / "irc5-cell.yaml").read_text(encoding="utf-8")
@@ -90,3 +93,10 @@ def test_a_simulated_run_takes_no_port_of_the_cell_and_says_so(tmp_path: Path) -
     rig = report(tmp_path, f"[{{type: rtu, port: {OUTPUT}}}]", simulated=True).rig
     assert rig is not None and [face.port for face in rig.fieldbus] == [None]
     assert any(note.startswith("serial faces are pseudo-terminals") for note in rig.notes)
+
+
+@pytest.mark.parametrize(("mode", "is_told"), [(0o620, True), (0o604, True), (0o640, False)])
+def test_a_key_is_for_its_group_to_read_at_most(tmp_path: Path, mode: int, is_told: bool) -> None:
+    store_all(tmp_path)
+    (tmp_path / "gateway.key").chmod(mode)
+    assert ["E172" in str(fault) for fault in tls_report(tmp_path, files()).faults] == [True] * is_told

@@ -13,6 +13,7 @@ from gateway.processes import message_link
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.live_answers import AlarmTimes
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
+from gateway.service.running_rig.last_tick import LastTick
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.rig_plants import RigPlants
@@ -162,6 +163,29 @@ def test_a_tick_behind_a_standstill_tells_the_serial_faces(
             rig._on_tick(1, 0.0)
             assert told == []
             rig._on_tick(1 + round(periods_s * rig._rig.loop_hz), late_s)
+
+    with_running_rig(devices, scene)
+    assert told == ["stood still"]
+
+
+def test_the_first_tick_of_a_machine_that_slept_tells_the_serial_faces(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its clock stood still meanwhile, so that neither periods nor lateness show it. The ticks behind it are as any others."""
+    told: list[str] = []
+    suspended_s = 0.0
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        nonlocal suspended_s
+        with monkeypatch.context() as patch:
+            patch.setattr(rig._faces, "_serial", [SimpleNamespace(note_standstill=lambda: told.append("stood still"))])
+            patch.setattr(rig.loop, "last_tick", LastTick(lambda: suspended_s))
+            rig._on_tick(1, 0.0)
+            assert told == []
+            suspended_s = STANDSTILL_S + 0.1
+            rig._on_tick(1, 0.0)
+            assert told == ["stood still"]
+            rig._on_tick(1, 0.0)
 
     with_running_rig(devices, scene)
     assert told == ["stood still"]
