@@ -38,6 +38,8 @@ class LeaseJudge:
         observer, bounds = self._observer, self._observer.bounds
         if observer.is_safe or observer.output_lost_s is not None or observer.control_lost_s is not None:
             return
+        if not observer.is_answered_by(now_s):
+            return
         is_down = observer.is_run or now_s - observer.run_ended_s < DOWN_S
         bound_s = (
             bounds.lease_s + max(bounds.lost_down_s, DOWN_S if is_down else 0.0) + 2.0 * bounds.period_s + ON_WIRE_S

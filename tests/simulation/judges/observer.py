@@ -223,6 +223,10 @@ class Observer:
         if self.disabled_s is None or is_going_down:
             self.disabled_s = now_s
 
+    def is_answered_by(self, now_s: float) -> bool:
+        """Whether the answer to the write that began the pressing must have come."""
+        return now_s - self._pressing_s > GRACE_S
+
     def note_serving(self, now_s: float) -> None:
         """Control is there; a moment later it is judged again by what it has heard."""
         if self.control_lost_s is not None and now_s - self.control_lost_s > self._grace_s:
@@ -254,8 +258,8 @@ class Observer:
         for law, since_s, bound_s in limits:
             if self.control_lost_s is not None and law != "I3 control":
                 continue  # who stands still hears nothing: then it is the guardian's turn, within its own bound
-            if law in ("I4", "I3 master") and now_s - self._pressing_s <= GRACE_S:
-                continue  # the answer to the write that has begun it is still on its way
+            if law in ("I4", "I3 master") and not self.is_answered_by(now_s):
+                continue
             if since_s is not None and now_s - since_s > bound_s + grace_s:
                 self.complain(
                     law, f"{self.voltage_v:.3f} V for {standing_s:.3f} s, {now_s - since_s:.3f} s after", now_s

@@ -249,8 +249,9 @@ class SimulatedPort:
     # -- the kernel's side
 
     def hear(self, chunk: bytes) -> None:
-        self._buffer += chunk
-        self._loop.call_soon(self._read)
+        if self.is_open:  # what comes to a port that nobody has open is kept nowhere
+            self._buffer += chunk
+            self._loop.call_soon(self._read)
 
     def notice_loss(self) -> None:
         self._loop.call_soon(self._lose)
