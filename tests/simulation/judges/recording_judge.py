@@ -83,9 +83,11 @@ def judge_rows(rows: list[Row], history: History) -> list[str]:
 
 
 def read_rows(data: bytes) -> list[Row]:
-    """Return the rows of all whole batches."""
-    length, crc = struct.unpack_from("<II", data, len(MAGIC))
+    """Return the rows of all whole batches; none where a kill has cut the header, behind which the first would come."""
     at = len(MAGIC) + 8
+    length, crc = struct.unpack_from("<II", data, len(MAGIC)) if len(data) >= at else (0, 0)
+    if len(data) < at + length:
+        return []
     assert data.startswith(MAGIC) and crc32(data[at : at + length]) == crc
     columns, at, rows = json.loads(data[at : at + length])["columns"], at + length, list[Row]()
     layout = struct.Struct(f"<{len(columns)}d")

@@ -11,7 +11,7 @@ from pathlib import Path
 from random import Random
 from types import SimpleNamespace
 from typing import Any, ClassVar
-from weakref import WeakSet
+from weakref import WeakKeyDictionary, WeakSet
 
 import pytest
 
@@ -46,8 +46,9 @@ class SimulatedDisk:
     fails = ""
     is_gone = is_hung = False
     folder = Path()
-    hung: ClassVar[WeakSet["SimulatedDisk"]] = WeakSet()
-    working: ClassVar[WeakSet["SimulatedDisk"]] = WeakSet()
+    hung: ClassVar[WeakKeyDictionary["SimulatedDisk", None]] = WeakKeyDictionary()
+    working: ClassVar[WeakKeyDictionary["SimulatedDisk", None]] = WeakKeyDictionary()
+    """In the order in which they began, which is the same in each run; that of a set is not."""
     chance: ClassVar[Random] = Random(0)
 
     def __init__(self) -> None:
@@ -61,7 +62,7 @@ class SimulatedDisk:
         loop, delay_s = asyncio.get_running_loop(), type(self).delay_s()
         self._free_s = max(self._free_s, loop.time()) + delay_s
         self._loop = loop
-        self.working.add(self)
+        self.working[self] = None
         self._waiting.append((work, True))
         if delay_s < DONE_AT_ONCE_S:
             self._work_off()
@@ -92,7 +93,7 @@ class SimulatedDisk:
             done(self._results.popleft())
         else:
             self._held.append((loop, done))
-            self.hung.add(self)
+            self.hung[self] = None
 
     def _work_off(self) -> None:
         while self._waiting and not type(self).is_hung:
