@@ -9,6 +9,7 @@ from gateway.diagnosis.bench.bench import bench_of
 from gateway.diagnosis.model_fit.base_fit import base_parameters, fit_base
 from gateway.diagnosis.model_fit.normal_equations import NormalEquations, held_out_errors, model_span
 from gateway.diagnosis.noise.whitening import white_whitener
+from gateway.diagnosis.verdict import estimates_of
 from tests.diagnosis.machine import MACHINE, NOISE_N, recorded, times_s
 
 
@@ -43,3 +44,20 @@ def test_what_a_number_at_the_end_of_its_range_would_save_beyond_it_is_not_the_m
     columns = [k for k, each in enumerate(fitted.free, 1) if each.path == CLOCK_OFFSET.path]
     beyond = NormalEquations(model_span(fitted, whiten), whiten.spectra(fitted.jacobian[columns]))
     assert beyond.add([0]).gain > 0.1 * fitted.chi2
+
+
+def test_the_intervals_of_a_fit_hold_the_truth_as_often_as_they_say() -> None:
+    """Of 95 %: neither ten times too narrow, which would make any number a sure one, nor so wide that they say nothing."""
+    shares = []
+    for seed in range(6):
+        bench = bench_of([recorded({}, seed=seed, time_s=times_s(30.0, 100.0))])
+        whiten = white_whitener(bench, bench.measured_n)
+        fitted = fit_base(bench, MACHINE, base_parameters(bench, frozenset()), whiten)
+        for name, estimate in estimates_of(bench, fitted, fitted.free, whiten).items():
+            if estimate.section in ("regulator", "cylinder", "friction", "contact"):
+                low, high = estimate.ci95
+                truth = getattr(getattr(MACHINE, estimate.section), name)
+                shares.append(abs(estimate.value - truth) / (0.5 * (high - low)))
+    inside = np.mean(np.array(shares) <= 1.0)
+    assert inside >= 0.8, shares
+    assert np.median(shares) > 0.1
