@@ -1,9 +1,14 @@
 """A name is no surer than what is still open beside it allows."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from gateway.diagnosis import Options, diagnose
 from gateway.diagnosis.confidence import bound_confidences
-from gateway.diagnosis.result import Cause, Gain
+from gateway.diagnosis.result import Cause, Gain, Verdict
+from tests.diagnosis.machine import MACHINE, NOISE_N, recorded, times_s
 
 FLOOR_N = 0.1
 
@@ -37,3 +42,23 @@ def test_what_a_stronger_cause_may_have_left_is_no_sure_cause_but_two_alike_are(
 
 def test_a_cause_that_explains_nothing_is_never_sure() -> None:
     assert bounded(0.0) == [0.0]
+
+
+def test_noise_is_not_what_a_cause_leaves_open() -> None:
+    """A wave of 0.05 N that has no name is: above the floor it leaves a tenth of what the noise itself would."""
+    given = recorded({"contact.creep_share": 0.03, "contact.creep_s": 4.0}, seed=2, time_s=times_s(24.0, 100.0))
+    waved = replace(given, force_n=given.force_n + 0.05 * np.sin(2.0 * np.pi * 0.9 * given.time_s))
+    (creep,) = diagnose([waved], MACHINE, Options(noise_floor_n=NOISE_N)).causes
+    assert creep.name == "creep"
+    assert 0.9 < creep.confidence < 0.99
+
+
+def test_a_cause_that_another_one_s_form_may_be_confirms_nothing() -> None:
+    """The floor is given, and reached: without its doubt about the second cause the answer would be `confirmed`."""
+    hidden = {"contact.creep_share": 0.1, "contact.creep_s": 4.0, "regulator.hysteresis_pa": 3000.0}
+    answer = diagnose([recorded(hidden, seed=2, time_s=times_s(24.0, 100.0))], MACHINE, Options(noise_floor_n=NOISE_N))
+    strong, weak = answer.causes
+    assert (strong.name, weak.name) == ("creep", "regulator-hysteresis")
+    assert answer.extended.reaches_noise_floor and not answer.leftover
+    assert weak.confidence < 0.5
+    assert answer.verdict is Verdict.PARTIAL
