@@ -262,6 +262,7 @@ def test_limits_that_a_register_cannot_carry_are_refused_at_the_edge(document):
 def test_every_fault_is_told_at_once_with_its_place():
     document = small() | {"version": 0}
     document["blocks"]["only"]["registers"][0]["access"] = "W"
+    document["blocks"]["only"]["registers"][1]["text"] = 3
     document["blocks"]["twin"] = {"first": 5, "last": 20, "repeats": {"onyl": 5}}
     document["blocks"]["third"] = {"first": 30, "last": 31, "registers": {}, "txet": ""}
     with pytest.raises(MapError) as caught:
@@ -270,6 +271,7 @@ def test_every_fault_is_told_at_once_with_its_place():
         (("blocks", "third", "txet"), True),
         (("blocks", "twin"), False),
         (("blocks", "only", "registers", 0, "access"), False),
+        (("blocks", "only", "registers", 1, "text"), False),
         (("blocks", "third", "registers"), False),
         (("blocks", "twin", "repeats", "onyl"), False),
         (("version",), False),

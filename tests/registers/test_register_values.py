@@ -64,5 +64,5 @@ def test_what_does_not_fit_is_said_not_wrapped():
 def test_unavailable():
     assert pack_number("int16", WordOrder.ABCD, math.nan) == b"\x80\x00"
     assert math.isnan(unpack_number("int16", WordOrder.ABCD, b"\x80\x00"))
-    assert math.isinf(float32(1e39))
+    assert float32(1e39) == math.inf
     assert float32(-1e39) == -math.inf

@@ -27,7 +27,7 @@ def test_who_stops_another_s_force_with_a_whole_block_wrote_the_control_word_alo
     other.write(0, 0, 1300, 500, 0, 99)
     writers = {name: peer for name, (peer, _) in bank.last_writer.items()}
     assert writers["control_word"] == other.peer and bank.command.force_ramp_n_per_s == 30.0
-    assert {writers[name] for name in ("force_ramp", "mode", "heartbeat")} == {master.peer}
+    assert {writers[name] for name in ("force_setpoint", "force_ramp", "mode", "heartbeat")} == {master.peer}
 
 
 @pytest.mark.parametrize(

@@ -166,11 +166,16 @@ def test_who_commits_and_who_chooses_a_slot_is_told_to_the_audit(bank, master):
     assert told == [("commit", "commit", master.peer), ("slot_select", "slot 3", master.peer)]
 
 
-def test_a_slot_is_selected_by_its_number(bank, master):
+def test_a_slot_is_selected_by_its_number(bank, master, register_map):
     seen = []
     bank.staging.on_select = lambda slot, peer: seen.append((slot, peer))
     master.write(1149, 3)
     assert (seen, master.word(1149)) == ([(3, master.peer)], 3)
+    with pytest.raises(Refusal, match=r"allowed 0 \.\. 7"):
+        master.write(1149, 8)
+    value = register_map.find("refusal_value")
+    assert value.decode(bank.read_registers(value.address, value.words)) == 8
+    assert (len(seen), master.word(1149)) == (1, 3)
 
 
 def test_the_active_set_is_read_back_with_its_crc(bank, register_map):

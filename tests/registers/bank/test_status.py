@@ -98,6 +98,8 @@ def test_what_is_not_finite_is_unavailable(bank, register_map, missing):
     bank.publish(Status(force_measured_n=missing, loop_time_s=missing))
     assert bank.read_registers(102, 1) == bank.read_registers(113, 1) == b"\x80\x00"
     assert math.isnan(shown(bank, register_map, "force_measured@float_abcd"))
+    bank.publish(Status(missed_ticks=missing))
+    assert shown(bank, register_map, "missed_ticks") == 0, "a counter has no word for it"
 
 
 def test_a_measured_value_beyond_int16_is_clamped_there_only(bank, register_map):
