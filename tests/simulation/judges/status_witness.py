@@ -42,6 +42,7 @@ class StatusWitness:
         self._asked_mv, self._asked_s = 0, 0.0
         self._owner, self._commands = 0, list[tuple[float, str, int]]()
         self._requested: deque[tuple[float, int]] = deque()
+        self._requested_s = 0.0
         self._written: deque[tuple[float, float]] = deque()
         self._beats: deque[tuple[float, float]] = deque()
         self._echoes: deque[tuple[float, int]] = deque()
@@ -125,10 +126,12 @@ class StatusWitness:
         self._beat = beat
 
     def _judge_requested(self) -> None:
-        """A look of some time ago: who hears no answer tells so late."""
+        """A look of some time ago: who hears no answer tells so late. What was written since the look before it, which a
+        standstill may have made long, may be seen now for the first time."""
         at_s, counts = self._requested.popleft()
-        while self._written and self._written[0][0] < at_s - WRITTEN_S:
+        while self._written and self._written[0][0] < min(at_s, self._requested_s) - WRITTEN_S:
             self._written.popleft()
+        self._requested_s = at_s
         signed = counts - 65536 if counts & UNAVAILABLE else counts
         is_known = counts in (0, self._known) or any(not abs(signed - one) > 1.0 for _, one in self._written)
         if not is_known:
