@@ -140,3 +140,14 @@ def test_the_turn_that_a_kill_ends_is_counted_too() -> None:
     assert next(readings) == ProcessorTime(1.0, 5.1), "not read before the kill"
     readings = iter([ProcessorTime(1.0, 5.1)])
     assert why().cause is EndCause.MACHINE_BUSY
+
+
+def test_a_silence_for_which_the_processor_was_withheld_is_none_of_the_loop_s(monkeypatch: pytest.MonkeyPatch) -> None:
+    noted_s: list[float] = []
+    kernel = SimpleNamespace(note=noted_s.append, lately=lambda: (0.1, "the host did it"))
+    monkeypatch.setattr("gateway.service.supervisor.heartbeat.WithheldTime", lambda: kernel)
+    heartbeat, control = Heartbeat(), cast(Child, SimpleNamespace(counters=None))
+    heartbeat.record_beat(control, 10.0)
+    ending = heartbeat.why_silent(control, 10.12)()
+    assert noted_s == [10.0]
+    assert ending.cause is EndCause.MACHINE_BUSY and "the host did it" in ending.text
