@@ -257,6 +257,7 @@ class Simulation:
 
     def _on_death(self) -> None:
         self.status.forget_owner()
+        self.target.forget()
         self.observer.note_death(self.clock.now_s, CABLES["output"].through_s)
         self._lose_control()
         self.person.lose()

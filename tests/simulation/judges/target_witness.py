@@ -34,11 +34,15 @@ class TargetWitness:
         if writer != self._writer:
             self._writer, self._held = writer, NOTHING
 
+    def forget(self) -> None:
+        """Another gateway begins, which has its own time until it tells that a target is missed."""
+        self._held = NOTHING
+
     def note(self, block: bytes, at_s: float) -> None:
         """Judge the status block as it was at at_s. A voltage that is driven has no target, and a band of its own."""
         words = struct.unpack(f">{STATUS_WORDS}h", block)
         if at_s - self._last_s > LONGEST_GAP_S:  # another gateway may have begun
-            self._held = NOTHING
+            self.forget()
         held, self._last_s = (words[4], words[5]), at_s
         is_held = words[1] in (1, 2, HOLDING) and not words[0] & SWITCHING and words[2] != -32768 and held == self._held
         self._held = held
