@@ -24,6 +24,7 @@ ON_WIRE_S = 0.08
 """From a setting's first byte to its last, behind whatever is on the wire before it."""
 AROUND_CUT_S = 0.1
 AWAKE_S = 0.02
+DATED_S = 0.3  # what has waited through a standstill is dated at its beginning, no longer before
 TURN_S = 0.05
 """The longest pause of a loop between two ticks."""
 MOST_TOLD, MOST = 4, 20_000
@@ -115,7 +116,8 @@ def _judge_laid(
         if _is_near(history.awoken, at_s, AWAKE_S) or _is_near(history.frozen, at_s, TURN_S):
             continue  # what has waited for it came before, or behind what it was taken for
         if _key(at_s) not in readings:
-            yield f"nothing came at {at_s:.4f}"
+            if not _is_near(history.awoken, at_s + DATED_S, DATED_S):
+                yield f"nothing came at {at_s:.4f}"
             continue
         force_n = readings[_key(at_s)] if history.is_plain else None
         if force_n is None or not isfinite(row["force_n"]):
