@@ -8,7 +8,7 @@ own counters that does not stand, or in part: one that waits for a timer sleeps,
 
 import contextlib
 import os
-from math import inf
+from math import inf, nan
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -28,8 +28,8 @@ class _Reading(NamedTuple):
 
 
 def _most(now: list[float], then: list[float]) -> float:
-    """Return the most that any of them has grown by."""
-    return max((after - before for after, before in zip(now, then, strict=False)), default=0.0)
+    """Return the most that any of them has grown by; one that was not to be read, nan, has not."""
+    return max((after - before for after, before in zip(now, then, strict=False) if after > before), default=0.0)
 
 
 class WithheldTime:
@@ -62,7 +62,7 @@ class WithheldTime:
 
     def _read(self) -> _Reading:
         stolen_s = [int(line.split()[_STEAL]) / self._ticks_per_s for line in self._lines_of_processors()]
-        return _Reading(stolen_s, [_throttled_s(file) or 0.0 for file in self._quotas])
+        return _Reading(stolen_s, [nan if (one := _throttled_s(file)) is None else one for file in self._quotas])
 
     def _lines_of_processors(self) -> list[bytes]:
         try:
@@ -70,18 +70,18 @@ class WithheldTime:
                 lines = file.read(self._bytes).split(b"\n")
         except OSError:
             return []
-        return [line for line in lines if line[:3] == b"cpu" and line[3:4].isdigit() and len(line.split()) > _STEAL]
+        processors = (line for line in lines if line[:3] == b"cpu" and line[3:4].isdigit())
+        return [line for line in processors if len(words := line.split()) > _STEAL and words[_STEAL].isdigit()]
 
 
 def _files_of_quotas(proc: Path, groups: Path) -> list[Path]:
     """Return cpu.stat of our own control group and of those it lies in, in either version, as far as they have a quota's."""
     try:
-        lines = (proc / "self" / "cgroup").read_text().splitlines()
+        lines = (proc / "self" / "cgroup").read_text(errors="surrogateescape").splitlines()
     except OSError:
         return []
     found: list[Path] = []
-    for line in lines:
-        _, controllers, path = line.split(":", 2)
+    for _, controllers, path in (line.split(":", 2) for line in lines if line.count(":") >= 2):
         if controllers and "cpu" not in controllers.split(","):
             continue
         base = groups / "cpu" if controllers else groups

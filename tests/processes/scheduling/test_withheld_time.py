@@ -87,12 +87,25 @@ def test_a_quota_of_any_group_that_we_are_in_counts(machine: Machine, line: str,
     assert "CPU quota of our container or service withheld 90 ms" in words
 
 
-@pytest.mark.parametrize("text", [None, "", "cpu0 1 2 3\n"])
+@pytest.mark.parametrize("text", [None, "", "cpu0 1 2 3\n", "cpu0 a b c d e f g h i\n"])
 def test_a_kernel_that_counts_none_is_no_error(tmp_path: Path, text: str | None) -> None:
     if text is not None:
         (tmp_path / "stat").write_text(text)
     counter = WithheldTime(tmp_path, tmp_path)
     counter.note(100.0)
+    assert counter.lately()[0] == 0.0
+
+
+def test_a_group_of_any_name_and_a_file_that_is_away_for_once_withhold_nothing(machine: Machine) -> None:
+    """Neither may keep a gateway from starting, or be told as hours that somebody withheld."""
+    (machine.folder / "self" / "cgroup").write_bytes(b"\nx\n0::/a\xff\n")
+    machine.throttle(".", "throttled_usec 3600000000")
+    counter = machine.counter()
+    counter.note(100.0)
+    (machine.folder / "cgroup" / "cpu.stat").rename(machine.folder / "away")
+    counter.note(101.0)
+    counter.note(102.0)
+    (machine.folder / "away").rename(machine.folder / "cgroup" / "cpu.stat")
     assert counter.lately()[0] == 0.0
 
 
