@@ -61,7 +61,7 @@ def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: st
             f"{ours}, {format_ms(waited_s)} of them waiting for a processor: {_cure(held, waited_s)}",
         )
     if held.withheld[0] >= _SHARE * held.loop_late_s:
-        return FaultCode.MACHINE_BUSY, f"{ours}: {_cure(held, held.loop_late_s)}"
+        return FaultCode.MACHINE_BUSY, f"{ours}: {held.withheld[1]}"
     count_words = (
         "not counted why" if waited_s is None else f"only {format_ms(waited_s)} of them waiting for a processor"
     )

@@ -40,8 +40,7 @@ class WithheldTime:
         self._quotas = _files_of_quotas(proc, groups)
         self._bytes = _LINE_BYTES * (1 + (os.cpu_count() or 1))
         self._ticks_per_s = os.sysconf("SC_CLK_TCK")
-        self._before: _Reading | None = None
-        self._noted = self._read()
+        self._before = self._noted = self._read()
         self._noted_s = -inf
 
     def note(self, now_s: float) -> None:
@@ -52,7 +51,7 @@ class WithheldTime:
     def lately(self) -> tuple[float, str]:
         """Return how much was withheld within the last second or two, s, and who did it, in words with the cure; 0 where
         nobody counts it. A pause that `note` has just ended is in it."""
-        now, then = self._read(), self._before or self._noted
+        now, then = self._read(), self._before
         stolen_s, throttled_s = _most(now.stolen_s, then.stolen_s), _most(now.throttled_s, then.throttled_s)
         if throttled_s > stolen_s:
             taken = f"the CPU quota of our container or service withheld {format_ms(throttled_s)} of processor time about then"

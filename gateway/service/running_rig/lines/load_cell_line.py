@@ -132,9 +132,8 @@ class CellExchange:
         is a whole one later."""
         is_due = now_s >= max(self._next_s, self._due_s - early_s)
         if self._question and self._sent_s is None and is_due and not self.identity.fault:
-            began_s = (
-                self._due_s if now_s - self._due_s < self._period_s else now_s
-            )  # so that the rate is met between ticks
+            # from when it was due, not from this tick, so that the rate is met between ticks
+            began_s = self._due_s if now_s - self._due_s < self._period_s else now_s
             self._sent_s, self._due_s, self._is_heard = now_s, began_s + self._period_s, False
             self.counts.asked += 1
             self._write(self.identity.question if self.identity.is_due else self._question)
