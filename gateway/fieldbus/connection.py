@@ -132,8 +132,7 @@ class Connection(asyncio.BufferedProtocol):
         shared.connections.add(self)
         self._rate = shared.peers.rate(self.peer.host, now_s)
         self._fast_units = frozenset(shared.settings.units if self._rate is None else ())
-        read, peer = shared.bank.read_registers, self.peer
-        self._read_registers = lambda address, count: read(address, count, peer)
+        self._read_registers = shared.bank.read_registers
         self._transport.set_write_buffer_limits(high=shared.settings.write_buffer_bytes)
 
     def get_buffer(self, _size_hint: int) -> memoryview:
@@ -145,7 +144,7 @@ class Connection(asyncio.BufferedProtocol):
         if self._partial_since_s is None:
             frame = None
             if size == READ_FRAME_BYTES:
-                frame = whole_read_answer(self._buffer, self._fast_units, self._read_registers)
+                frame = whole_read_answer(self._buffer, self._fast_units, self._read_registers, self.peer)
             if frame is None:
                 frame = whole_answer(self._buffer, size, self._fast_units, self._shared.bank, self.peer)
             if frame is not None:

@@ -68,7 +68,7 @@ class RegisterBank:
         self.identity: Mapping[int, bytes] = build_identity(register_map.name, rules.rig_name)
         self._map, self._image = register_map, RegisterImage(register_map)
         self._roles = write_roles(register_map.blocks)
-        self._data, self._room = self._image.data, self._image.room
+        self._words, self._room = memoryview(self._image.data), self._image.room
         self._command_block, self._command_role = register_map.block("command"), self._roles["command"]
         self._commands = CommandBlock(register_map, rules, self._image)
         self._status = StatusBlock(register_map, self._image)
@@ -110,7 +110,7 @@ class RegisterBank:
             raise self._note_refusal(no_such_address(self._map.blocks, address, count), peer)
         if self._image.is_behind:
             self._catch_up()
-        return bytes(self._data[2 * address : 2 * (address + count)])
+        return self._words[2 * address : 2 * (address + count)].tobytes()
 
     def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
         """Check that these registers can be read, of a request that writes behind that; Refusal (02) as `read_registers`."""
