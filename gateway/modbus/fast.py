@@ -20,6 +20,7 @@ _FRAME: Final = Struct(">HHHBBHH")  # transaction, protocol, length, unit, funct
 _WRITE: Final = Struct(">HHHBBHHB")  # the same of FC16, and the bytes that follow
 _REFUSED: Final = Struct(">HHHBBB")  # transaction, protocol, length, unit, function, exception
 _ANSWER: Final = Struct(">HHHBBB")  # transaction, protocol, length, unit, function, bytes that follow
+_unpack_frame, _pack_answer = _FRAME.unpack_from, _ANSWER.pack  # looked up once: here alone that shows
 
 
 def whole_read_answer(
@@ -27,20 +28,16 @@ def whole_read_answer(
     units: Container[int],
     read_registers: Callable[[int, int, Peer], bytes],
     peer: Peer,
-    # Bound as defaults because this is the one place where looking up a global twice shows.
-    unpack_from: Callable[[bytes | bytearray], tuple[int, ...]] = _FRAME.unpack_from,
-    pack: Callable[..., bytes] = _ANSWER.pack,
 ) -> bytes | None:
     """Return the answer to the 12 bytes at the start of frame; None when they are not one plain, allowed register read."""
-    transaction, protocol, length, unit, function, address, count = unpack_from(frame)
+    transaction, protocol, length, unit, function, address, count = _unpack_frame(frame)
     if protocol or length != 6 or not 3 <= function <= 4 or not 0 < count < 126 or unit not in units:
         return None
     try:
-        return pack(transaction, 0, count + count + 3, unit, function, count + count) + read_registers(
-            address, count, peer
-        )
+        head = _pack_answer(transaction, 0, count + count + 3, unit, function, count + count)
+        return head + read_registers(address, count, peer)
     except ModbusError as refusal:
-        return pack(transaction, 0, 3, unit, function | 0x80, refusal.code)
+        return _REFUSED.pack(transaction, 0, 3, unit, function | 0x80, refusal.code)
 
 
 def whole_answer(buffer: bytearray, size: int, units: Container[int], bank: DataBank, peer: Peer) -> bytes | None:

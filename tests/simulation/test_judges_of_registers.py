@@ -126,3 +126,15 @@ def test_two_masters_who_take_a_target_from_each_other_have_none(masters: int, i
         witness.note_write(f"10.0.0.{1 + number % masters}")
         look_at_target(witness, 0.5, 1000.0 + 0.5 * number, measured=1700)
     assert bool(observer.broken) is is_seen
+
+
+@pytest.mark.parametrize(("awoken_s", "is_seen"), [(1.08, False), (1.25, True), (0.9, True)])
+def test_a_reading_may_be_dated_behind_the_standstill_that_it_waited_through(awoken_s: float, is_seen: bool) -> None:
+    observer = Observer(BOUNDS)
+    observer.history.awoken.append(awoken_s)
+    witness = StatusWitness(observer, lambda: 1.0)
+    for tenths in range(13, 17):
+        words = [0] * STATUS_WORDS
+        words[12], words[16] = 100 * (tenths - 10) - 150, 0x0A00
+        witness.note(struct.pack(f">{STATUS_WORDS}H", *words), 0.1 * tenths)
+    assert bool(observer.broken) is is_seen

@@ -18,6 +18,8 @@ FAULT_BIT, ENABLED_BIT = 16, 1
 WARNING_BIT, LIMITED_BIT, UNREACHABLE_BIT = 32, 64, 128
 AGE_SLACK_S = 0.012
 """And two periods: a tick that finds a fresh sample decides nothing, and the age is that of the last decision."""
+WAITED_S = 0.1
+"""A reading that waited through a standstill of no more is dated when it is read, and so long the last decision stands."""
 SETTLED_S = 0.5
 """A voltage that has not changed for so long is the one that has been asked for as long, wherever the wire works."""
 COUNT_V = 0.012
@@ -167,8 +169,13 @@ class StatusWitness:
         """No sample is younger than the last byte that has come. What is read first after a standstill is as it was before."""
         if not 0.09 < at_s - self._last_s < 0.11:
             return
-        silent_s = at_s - self._heard_s()
-        if age_ms < LONGEST_MS and age_ms * 1e-3 < silent_s - AGE_SLACK_S - 2.0 * self._observer.bounds.period_s:
+        heard_s, period_s = self._heard_s(), self._observer.bounds.period_s
+        silent_s, awoken = at_s - heard_s, self._observer.history.awoken
+        waits = sum(
+            any(begin_s < one_s <= end_s for one_s in awoken)
+            for begin_s, end_s in ((heard_s, heard_s + WAITED_S), (at_s - 2.0 * period_s, at_s))
+        )
+        if age_ms < LONGEST_MS and age_ms * 1e-3 < silent_s - AGE_SLACK_S - 2.0 * period_s - WAITED_S * waits:
             self._observer.complain("I10", f"a sample of {age_ms} ms, after {silent_s:.3f} s of silence", at_s)
 
     def _judge_voltage(self, asked_mv: int, at_s: float) -> None:
