@@ -251,5 +251,26 @@ KEPT: list[tuple[int, list[Event]]] = [
         855018,
         [Event(7.9372, "rival", "hold", (34.52,)), Event(8.3021, "output", "pull"), Event(8.3135, "output", "push")],
     ),
+    (
+        7137,
+        [
+            Event(
+                3.1571,
+                "person",
+                "say",
+                data=b'{"do": "calibrate", "plan": {"tare": true}, "name": "20", "dry_run": false, "continues": [999999]}',
+            ),
+            Event(6.602, "machine", "disk_hung", (0.1309, 58870.24555141572)),
+            Event(9.2869, "machine", "kill_guardian", (0.1442, -737385.8992157052)),
+        ],
+    ),
+    (
+        28454,
+        [
+            Event(16.4704, "rival", "ask", (1,), b"\x05\x00\x02\xff\x00"),
+            Event(18.2184, "worker", "drive", (1.81,)),
+            Event(18.571, "output", "power", (0.0149, 0.0)),
+        ],
+    ),
 ]
 """Schedules that once broke a law, or were said to: the seed of the machine, and what happened to it."""

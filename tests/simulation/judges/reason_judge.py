@@ -40,7 +40,7 @@ REASONS: dict[int, tuple[str, ...]] = {
     22: (OUTPUT,),
 }
 """Of a number in fault_code: whose disturbance may be its cause. Of those that are not here none ever is."""
-MASTER_LOST, OVER_FORCE, GAIN_WRONG = 1, 4, 6
+MASTER_LOST, OVER_FORCE, SIGN_INVERTED, GAIN_WRONG = 1, 4, 5, 6
 REFUSED: dict[int, tuple[float, tuple[str, ...]]] = {
     13: (EVER_S, (OUTPUT, MACHINE)),
     14: (REOPENED_S, (CELL, MACHINE)),
@@ -94,8 +94,13 @@ class ReasonJudge:
         before, self._fault = self._fault, words[10] if words[1] == FAULT else 0
         if self._fault in (0, before, MASTER_LOST) or (self._fault == OVER_FORCE and self.has_payload):
             return
-        after_s = RISE_S if self._fault == GAIN_WRONG else AFTER_S
-        self._judge_blame(f"fault {self._fault}", REASONS.get(self._fault, ()), at_s, after_s)
+        after_s, reasons = RISE_S if self._fault == GAIN_WRONG else AFTER_S, REASONS.get(self._fault, ())
+        if self._fault == SIGN_INVERTED and self._observer.bounds.safe_v > 0.0:
+            reasons = (
+                *reasons,
+                OUTPUT,
+            )  # what pressed at the last tare has left with its power: the cell reads below 0
+        self._judge_blame(f"fault {self._fault}", reasons, at_s, after_s)
 
     def _judge_refusal(self, refusal: int, at_s: float) -> None:
         before, self._refusal = self._refusal, refusal

@@ -248,6 +248,10 @@ class SimulatedPort:
 
     # -- the kernel's side
 
+    def is_of(self, loop: asyncio.AbstractEventLoop) -> bool:
+        """Whether the process whose loop this is has opened it."""
+        return self._loop is loop
+
     def hear(self, chunk: bytes) -> None:
         if self.is_open:  # what comes to a port that nobody has open is kept nowhere
             self._buffer += chunk

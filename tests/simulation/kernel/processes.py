@@ -337,8 +337,9 @@ class SimulatedService:
             process.leave(exit_codes.FAILED)
 
     def _on_death(self, process: SimulatedProcess) -> None:
-        for cable in CABLES.values():
-            cable.port = None
+        for cable in CABLES.values():  # one that a hanging disk has kept may end behind its successor's start
+            if cable.port and cable.port.is_of(process.loop):
+                cable.port = None
         self.on_death()
         self._wake()
 
