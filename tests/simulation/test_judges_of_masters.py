@@ -144,6 +144,21 @@ def test_a_cell_that_lies_and_is_believed_is_seen(observer: Observer, settings: 
     assert {line.partition(" at ")[0] for line in observer.broken} == ({law} if law else set())
 
 
+@pytest.mark.parametrize(("fallen_s", "is_seen"), [(0.95, False), (0.2, True)])
+def test_a_force_that_need_not_have_left_yet_may_read_the_same(
+    observer: Observer, fallen_s: float, is_seen: bool
+) -> None:
+    judge = LyingCell(observer)
+    observer.hear_cell(b"ST,GS,+0005.00kg\r\n", 0.1)
+    for setting, at_s in ((b"SET 700\r\n", 0.15), (b"SET 90\r\n", fallen_s)):
+        observer.hear(setting, at_s)
+    for number in range(60):
+        if number == 2:
+            observer.hear(b"SET 600\r\n", 1.4)
+        judge.look({"cell.frozen": True}, 1.3 + 0.05 * number, is_whole=True)
+    assert any(line.startswith("I3 frozen") for line in observer.broken) is is_seen
+
+
 @pytest.mark.parametrize("why", ["driving", "run", "disturbed", "safe"])
 def test_a_cell_that_nothing_is_held_by_may_lie(observer: Observer, why: str) -> None:
     judge = LyingCell(observer)

@@ -3,6 +3,7 @@ whose sign is turned, and one that shows many times the force, or hardly any. No
 """
 
 from collections.abc import Mapping
+from math import inf
 from typing import Any
 
 from tests.simulation.judges.observer import Observer
@@ -12,6 +13,8 @@ RISEN_V = 3.0
 FROZEN_S, FALSE_S = 1.2, 1.3
 """0.5 s of equal readings, of which the force must have moved in 0.3 s behind a dead time; and 1 s."""
 TOUCHES_N = 10.0
+LEAVES_S = 1.0
+"""So long what pressed before may still press: a voltage that has just fallen and risen again need have moved nothing."""
 SMALL, LARGE = 0.2, 4.0
 """Shares of the true force that are told from 1 whatever the friction."""
 
@@ -45,15 +48,23 @@ class LyingCell:
         voltage_v = self._observer.voltage_v
         was_frozen, self._was_frozen = self._was_frozen, "cell.frozen" in names
         if not self._was_frozen or not was_frozen:
-            self._lowest_v, self._risen_s = voltage_v, now_s
+            self._lowest_v, self._risen_s = inf, now_s
             return
-        self._lowest_v = min(self._lowest_v, voltage_v)
+        self._lowest_v = min(self._lowest_v, self._highest_lately_v(now_s))
         if voltage_v - self._lowest_v < RISEN_V or not self._touches:
             self._risen_s = now_s
         if now_s - self._risen_s > FROZEN_S:
             told = f"{self._lowest_v:.2f} -> {voltage_v:.2f} V, and it reads the same"
             self._observer.complain("I3 frozen", told, now_s)
             self._risen_s = now_s
+
+    def _highest_lately_v(self, now_s: float) -> float:
+        highest_v = self._observer.voltage_v
+        for set_s, voltage_v in reversed(self._observer.history.settings):
+            highest_v = max(highest_v, voltage_v)
+            if now_s - set_s >= LEAVES_S:  # it stood until the next one
+                break
+        return highest_v
 
     @property
     def _touches(self) -> bool:
