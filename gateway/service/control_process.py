@@ -137,16 +137,19 @@ def _loop_factory() -> Any:
 
 async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: EventLog, notes: tuple[str, ...]) -> int:
     """Run the rig from the first open port to the final safe-voltage write; return the exit code."""
-    guardian = GuardianLine(link, heartbeat_memory(options["beat"]))
-    ports = await guardian.simulated_ports(options["rig"]) if rig.simulated else rig.ports()
-    if ports is None:
-        return exit_codes.DEVICE
-    listeners = Listeners(options["listening"])
-    notes += listeners.open(rig, {name: options[name] for name in ("web", "metrics")})
-    running = RunningRig(rig, ports, Path(options["state"]), guardian, log)
-    running.ring = sample_ring(options["ring"], log)
-    guardian.on_ports = running.move_ports
-    try:
+    async with contextlib.AsyncExitStack() as ending:  # the last one first
+        guardian = GuardianLine(link, heartbeat_memory(options["beat"]))
+        ending.callback(guardian.close)
+        ports = await guardian.simulated_ports(options["rig"]) if rig.simulated else rig.ports()
+        if ports is None:
+            return exit_codes.DEVICE
+        listeners = Listeners(options["listening"])
+        notes += listeners.open(rig, {name: options[name] for name in ("web", "metrics")})
+        running = RunningRig(rig, ports, Path(options["state"]), guardian, log)
+        ending.push_async_callback(running.close)
+        ending.callback(listeners.close)
+        running.ring = sample_ring(options["ring"], log)
+        guardian.on_ports = running.move_ports
         ready = await running.start(
             options["bind"],
             Handover(options["kept"], record=options["record"]),
@@ -168,10 +171,6 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
         if running.failed.is_set():
             return exit_codes.FAILED
         await running.ramp_down()
-    finally:
-        listeners.close()
-        await running.close()
-        guardian.close()
     return exit_codes.OK
 
 
