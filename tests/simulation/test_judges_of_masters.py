@@ -159,6 +159,21 @@ def test_a_force_that_need_not_have_left_yet_may_read_the_same(
     assert any(line.startswith("I3 frozen") for line in observer.broken) is is_seen
 
 
+@pytest.mark.parametrize(("scaled_s", "is_seen"), [(2.55, False), (1.0, True)])
+def test_a_frozen_cell_that_is_scaled_anew_has_read_something_else(
+    observer: Observer, scaled_s: float, is_seen: bool
+) -> None:
+    judge = LyingCell(observer)
+    observer.hear_cell(b"ST,GS,+0005.00kg\r\n", 1.0)
+    for number in range(60):
+        at_s = 1.0 + 0.05 * number
+        if number == 10:
+            observer.hear(b"SET 800\r\n", 1.5)
+        scale = {"cell.scale": 3.3} if abs(at_s - scaled_s) < 0.3 else {}
+        judge.look({"cell.frozen": True} | scale, at_s, is_whole=True)
+    assert any(line.startswith("I3 frozen") for line in observer.broken) is is_seen
+
+
 @pytest.mark.parametrize("why", ["driving", "run", "disturbed", "safe"])
 def test_a_cell_that_nothing_is_held_by_may_lie(observer: Observer, why: str) -> None:
     judge = LyingCell(observer)

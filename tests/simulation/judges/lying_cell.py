@@ -38,9 +38,9 @@ class LyingCell:
         """Judge the voltage that stands now. is_whole: whether wires and machine are."""
         observer = self._observer
         is_judged = is_whole and not (observer.is_safe or observer.is_run or self.is_driving)
-        if not is_judged:
+        if not is_judged or len(settings) != 1:  # of a frozen cell another scale is another reading
             self._was_false = self._was_frozen = False
-        elif len(settings) == 1:
+        else:
             self._judge_frozen(frozenset(settings), now_s)
             self._judge_false(settings, now_s)
 
