@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 from gateway.bsfm import Bsfm
 from gateway.control.demand import Demand, Manner, demand_of, is_same_manner, manner_of
 from gateway.control.limits import NotFiniteError, narrow_limits
+from gateway.control.messages import master_lost_sentence
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.lease import Lease
 from gateway.registers.command import Command
@@ -79,7 +80,10 @@ class CommandTracker:
             self._adopt_heartbeat = False
             if not command.control_word and not command.heartbeat:  # any other value is a master's
                 self._lease.adopt(command.heartbeat)
-        self._lease.observe(now_s, command.heartbeat)
+        if command.has_waited:
+            self._lease.adopt(command.heartbeat)
+        else:
+            self._lease.observe(now_s, command.heartbeat)
         self._update_demand()
         return edges
 
@@ -110,6 +114,10 @@ class CommandTracker:
     def is_lease_lost(self, now_s: float, owner_connected: bool) -> bool:
         """Return whether the master is lost: disconnected, or without a heartbeat for one length of the lease."""
         return self._lease.is_lost(now_s, owner_connected)
+
+    def lost_sentence(self, now_s: float, owner_connected: bool) -> str:
+        """Return how the loss of the master was seen."""
+        return master_lost_sentence(owner_connected, self.lease_age_s(now_s), is_behind=self.command.has_waited)
 
     def lease_age_s(self, now_s: float) -> float:
         """Return the time since the lease was renewed, s."""

@@ -17,7 +17,7 @@ from gateway.control.edge_checks import EdgeCheck
 from gateway.control.force_loop.force_loop import ForceLoop, Moved
 from gateway.control.force_loop.response_timing import timing_of
 from gateway.control.inputs import CalibrationInUse, LineStatus, LoopInputs, Output
-from gateway.control.messages import master_lost_sentence, tare_sentence
+from gateway.control.messages import tare_sentence
 from gateway.control.readiness import Readiness, Situation
 from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
@@ -280,7 +280,7 @@ class Controller:
         elif self._goes_on_alone or not self._commands.is_lease_lost(now_s, line.owner_connected):
             self._machine.is_master_lost = self._machine.is_master_lost and self._machine.is_ramping_down
         elif not self._machine.is_master_lost:
-            lost = master_lost_sentence(line.owner_connected, self._commands.lease_age_s(now_s))
+            lost = self._commands.lost_sentence(now_s, line.owner_connected)
             self._machine.lose_master(now_s, lost, self._settings.supervision.lease_action)
 
     @property

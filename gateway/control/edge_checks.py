@@ -51,7 +51,7 @@ class EdgeCheck:
     def refusal(self, proposal: ProposedWrite, at: Situation) -> EdgeRefusal | None:
         """Return why this write cannot be taken now; None takes it."""
         edges = self._commands.edges_of(proposal.command)
-        if not edges.stops and (busy := self._busy(proposal, edges, at)):
+        if not edges.stops and (busy := self._busy(proposal, edges, at) or _old(proposal.command, edges)):
             return busy
         return next(self._refusals(proposal.command, edges, at), None)
 
@@ -194,6 +194,16 @@ def _refuse_blocked(at: Situation, bit: ControlBit, what: str = "enable") -> Edg
     late = at.excuse if reason is at.block else ""
     line_fault = at.line_fault if reason is RefusalReason.OUTPUT_FAULT else ""
     return EdgeRefusal(reason, bit, f"{what} refused: {late or line_fault or reason.explanation.sentence}")
+
+
+def _old(command: Command, edges: Edges) -> EdgeRefusal | None:
+    """Why nothing begins by a command that has waited in a pile: its master may be gone, or expect no force any more."""
+    acts = edges.rises & ~_TAKE
+    if not command.has_waited or not acts:
+        return None
+    bit = ControlBit(acts & -acts)
+    waits = f"{command.peer} asks more than is answered, so that this has waited"
+    return EdgeRefusal(RefusalReason.NOT_READY, bit, f"{str(bit.name).lower()} refused: {waits}: wait for each answer")
 
 
 def _no_run(reason: RefusalReason, why: str, plan: AnyPlan) -> EdgeRefusal:

@@ -112,7 +112,10 @@ def tare_sentence(zero_n: float, rest_n: float) -> str:
     return f"tare: zero at {zero_n:.2f} N{hint}"
 
 
-def master_lost_sentence(connected: bool, lease_age_s: float) -> str:
-    """Return how the loss of the master was seen. lease_age_s: since its heartbeat last changed."""
+def master_lost_sentence(connected: bool, lease_age_s: float, *, is_behind: bool = False) -> str:
+    """Return how the loss of the master was seen. lease_age_s: since its heartbeat last changed; is_behind: it changes, but has
+    waited in a pile of requests."""
+    if connected and is_behind:
+        return "master lost: its heartbeats wait behind its other requests, and it may be gone: let it wait for each answer"
     closed = "" if connected else "connection closed, "
     return f"master lost: {closed}heartbeat unchanged for {lease_age_s * 1e3:.0f} ms"

@@ -22,7 +22,7 @@ import asyncio
 import socket
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, Protocol, cast
 
 from gateway.fieldbus.peers import Peers, address_of
@@ -132,6 +132,7 @@ class Connection(asyncio.BufferedProtocol):
         shared.connections.add(self)
         self._rate = shared.peers.rate(self.peer.host, now_s)
         self._fast_units = frozenset(shared.settings.units if self._rate is None else ())
+        self._peer_behind = replace(self.peer, is_behind=True)
         self._read_registers = shared.bank.read_registers
         self._transport.set_write_buffer_limits(high=shared.settings.write_buffer_bytes)
 
@@ -203,7 +204,7 @@ class Connection(asyncio.BufferedProtocol):
         self._has_place = False
         shared = self._shared
         if request.unit in shared.settings.units:
-            pdu = answer(request.pdu, shared.bank, self.peer)
+            pdu = answer(request.pdu, shared.bank, self._peer_behind if self._backlog.is_late else self.peer)
         else:
             pdu = refuse_unit((request.unit, request.pdu), shared.settings.units, shared.bank, self.peer)
         return encode(Adu(request.transaction, request.unit, pdu))

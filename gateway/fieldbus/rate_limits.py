@@ -4,6 +4,7 @@ The limit on connections per peer is in peers.py.
 """
 
 from collections.abc import Callable
+from math import inf
 from typing import Final
 
 _BURST_S: Final = 0.25  # what a client saves up while it is quiet: a poll of several blocks in a row is normal
@@ -46,21 +47,26 @@ class RequestRate:
 
 
 class Backlog:
-    """Tells whether requests of a client pile up: it may not know how late its stop is, and old heartbeats keep its lease."""
+    """Tells whether requests of a client pile up: it may not know how late its stop is, and may be long gone while its
+    heartbeats are read. is_late: what is taken now has waited for longer than a burst may."""
 
-    __slots__ = ("_since_s",)
+    __slots__ = ("_since_s", "_told_s", "is_late")
 
     def __init__(self) -> None:
         self._since_s: float | None = None
+        self._told_s = -inf
+        self.is_late = False
 
     def note(self, now_s: float, *, is_more: bool) -> bool:
         """Note what was taken; return whether to say now that it is late. is_more: as much waited as is taken at once."""
         if not is_more or self._since_s is None:
-            self._since_s = now_s if is_more else None
+            self._since_s, self.is_late = now_s if is_more else None, False
             return False
-        if now_s - self._since_s < LATE_S:
+        waited_s = now_s - self._since_s
+        self.is_late = waited_s >= _BURST_S
+        if waited_s < LATE_S or now_s - self._told_s < TOLD_AGAIN_S:
             return False
-        self._since_s = now_s + TOLD_AGAIN_S - LATE_S
+        self._told_s = now_s
         return True
 
 

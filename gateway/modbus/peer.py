@@ -1,6 +1,6 @@
 """Who asks: what the bank needs to decide about ownership and role, and what people read in the log."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
@@ -20,12 +20,13 @@ class Role(IntEnum):
 @dataclass(frozen=True, slots=True)
 class Peer:
     """The far end. host: numeric address, or `serial:N` for the Nth face of a rig's `fieldbus`; port: 0 where there is none;
-    name: from a certificate."""
+    name: from a certificate; is_behind: more of it waits than is answered, so that what it asks now was asked a while ago."""
 
     host: str
     port: int = 0
     name: str = ""
     role: Role = Role.SETPOINT
+    is_behind: bool = field(default=False, compare=False)
 
     @property
     def identity(self) -> str:

@@ -131,7 +131,7 @@ class RegisterBank:
         """Write all or nothing. Refusal says why not; nothing but the last-refusal registers has changed then."""
         try:
             if self._is_command(address, len(data) // 2, peer):
-                self._write_command(Write(self._command_block, address, data, peer.identity), peer)
+                self._write_command(self._command_block, address, data, peer)
             else:
                 self._write(address, data, peer)
         except Refusal as refusal:
@@ -267,7 +267,7 @@ class RegisterBank:
             text = f"{cut.name}@{cut.block} is the registers {cut.address} and {cut.address + 1}: write both in one request"
             raise Refusal(RefusalReason.HALF_VALUE, address, text)
         if self._commands.holds(block, address):
-            self._write_command(Write(block, address, data, peer.identity, touched), peer)
+            self._write_command(block, address, data, peer, touched)
         elif block.name == "proof":
             self._write_echo(address, data, peer)
         else:
@@ -288,8 +288,8 @@ class RegisterBank:
             self._writers.note(("byte_order_echo",), peer, self._now())
             self._tell(f"byte_order_echo {order.upper()}: use {self._map.name_float_block(order)}", peer)
 
-    def _write_command(self, write: Write, peer: Peer) -> None:
-        now_s = self._now()
+    def _write_command(self, block: Block, address: int, data: bytes, peer: Peer, touched: int = ALL_BITS) -> None:
+        now_s, write = self._now(), Write(block, address, data, peer.identity, touched, peer.is_behind)
         admitted = self._admission.admit(write, self.command.number + 1, now_s)
         if admitted is None:
             return

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from gateway.modbus import pdu
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
 from tests.fieldbus.conftest import HandClock, HandTimer
 
@@ -109,3 +110,25 @@ def test_who_piles_up_requests_is_told_that_its_stop_is_late_and_a_burst_is_not(
     told = f"W237 {FAR}:40000: asks more than 200 requests/s and waits for no answer"
     assert [sentence.startswith(told) for _, sentence in made.log] == [True, True], "at most once a minute"
     assert not far.ended
+
+
+def test_what_waits_in_a_pile_is_known_as_asked_for_a_while_ago(stand: Any, deliver: Any) -> None:
+    """A master that dies behind ten seconds of heartbeats would keep its force for as long."""
+    made = stand(requests_per_s=200.0)
+    connection, far = made.connect(FAR)
+    write = framed(pdu.write_registers_request(0, bytes(26)))
+
+    def pile_up(writes: int) -> list[bool]:
+        made.bank.writes.clear()
+        stream = write * writes
+        while len(made.bank.writes) < writes:
+            stream = stream[deliver(connection, far, stream) :]
+            made.clock.advance(0.005)
+        return [peer.is_behind for _, _, peer in made.bank.writes]
+
+    assert not any(pile_up(100)), "a burst"
+    piled = pile_up(600)
+    began, ended = piled.index(True), len(piled) - piled[::-1].index(True)
+    assert all(piled[began:ended]), "as long as it lasts"
+    assert began < 0.5 * 200 + 50 and len(piled) - ended < 50
+    assert not any(pile_up(20)), "and no longer"

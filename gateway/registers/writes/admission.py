@@ -44,13 +44,15 @@ _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
 
 
 class Write(NamedTuple):
-    """A write of the command block. touched: bits of the control word that the master has named (coils name some)."""
+    """A write of the command block. touched: bits of the control word that the master has named (coils name some);
+    has_waited: it was asked for a while ago (`Peer.is_behind`)."""
 
     block: Block
     address: int
     data: bytes
     host: str
     touched: int = ALL_BITS
+    has_waited: bool = False
 
 
 class AdmittedWrite(NamedTuple):
@@ -105,7 +107,7 @@ class Admission:
         commands, before = self._commands, self._commands.values
         values = commands.decode(write.block, write.address, write.data)
         commands.check_known(values, write.block)
-        if values[CONTROL_WORD] == before[CONTROL_WORD] and self._is_plain(write.host, int(values[CONTROL_WORD])):
+        if values[CONTROL_WORD] == before[CONTROL_WORD] and self._is_plain(write, int(values[CONTROL_WORD])):
             word = int(values[CONTROL_WORD])
             command = commands.command(values, word, number, now_s, write.host)
             self._ask(command, values, write)
@@ -123,6 +125,8 @@ class Admission:
             command = command._replace(stops=True)
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write):
             command = command._replace(lowered_from_n=self.lowered_from_n)
+        if write.has_waited:
+            command = command._replace(has_waited=True)
         word_at = commands.address(write.block, CONTROL_WORD)
         self._ask(command, values, write)
         rises = written & ~int(before[CONTROL_WORD])
@@ -138,12 +142,12 @@ class Admission:
         self.held_runs.keep(admitted.command.peer, admitted.held)
         self.lowered_from_n = admitted.command.lowered_from_n
 
-    def _is_plain(self, host: str, word: int) -> bool:
+    def _is_plain(self, write: Write, word: int) -> bool:
         """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, it held none, nothing
-        was lowered, no run has the output. What the checks below would find is known."""
-        is_holder = host in self.held_runs.by_host
-        is_usual = not (is_holder or self.lowered_from_n or self.is_calibrating or word & RUN_BITS_OR_EDGES)
-        return is_usual and self._ownership.admits(host)
+        was lowered, no run has the output, it has not waited. What the checks below would find is known."""
+        is_special = write.has_waited or write.host in self.held_runs.by_host
+        is_usual = not (is_special or self.lowered_from_n or self.is_calibrating or word & RUN_BITS_OR_EDGES)
+        return is_usual and self._ownership.admits(write.host)
 
     # -- what the write asks for
 

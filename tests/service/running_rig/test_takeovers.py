@@ -113,6 +113,31 @@ def test_a_reset_with_a_new_heartbeat_counts_in_the_very_moment_of_the_fault() -
     assert rig.state is State.OFF
 
 
+@pytest.mark.parametrize("is_behind", [True, False])
+def test_heartbeats_that_have_waited_in_a_pile_renew_no_lease(is_behind: bool) -> None:
+    """Of a master that asks more than is answered they may come seconds behind its end."""
+    rig = leased().holding()
+    rig.beats = False
+    for _ in range(8):
+        rig.beat += 1
+        rig.write(4, rig.beat, peer=replace(OWNER, is_behind=is_behind))
+        rig.run(0.1)
+    assert rig.state is (State.FAULT if is_behind else State.HOLDING)
+    assert any("wait behind its other requests" in line for line in rig.log) is is_behind
+
+
+@pytest.mark.parametrize("word", [ENABLE, RESET, TARE, CALIBRATE])
+def test_nothing_begins_by_a_command_that_has_waited_in_a_pile_and_a_stop_is_obeyed(word: int) -> None:
+    behind, rig = replace(OWNER, is_behind=True), SmallRig()
+    refused = rig.answer(0, word, peer=behind)
+    assert refused is not None and refused.reason is RefusalReason.NOT_READY
+    assert "wait for each answer" in refused.sentence
+    assert rig.answer(0, word) is None
+    rig = SmallRig().holding()
+    rig.write(0, 0, peer=behind)
+    assert rig.until(State.OFF, 0.1)
+
+
 def test_a_force_that_is_still_leaving_cannot_become_the_zero() -> None:
     rig = SmallRig().holding(30.0)
     rig.write(0, 0)
