@@ -61,8 +61,8 @@ NOTICES: Final = (
     Explanation(
         "W237",
         "a client asks faster than it is answered",
-        "More of a client's requests wait than are carried out in a second: a stop comes late, no heartbeat renews a lease, and "
-        "nothing begins.",
+        "More of a client's requests wait than are carried out in a second: a stop comes late, no heartbeat renews a lease, "
+        "and nothing begins.",
         "It sends without waiting for its answers, more than network.requests_per_s (200 unless the rig file says otherwise).",
         "Let it wait for each answer, ask less often or for more registers at once; or raise network.requests_per_s.",
     ),

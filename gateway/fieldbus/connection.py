@@ -211,7 +211,8 @@ class Connection(asyncio.BufferedProtocol):
 
     def _note_backlog(self, size: int) -> None:
         """Say of a client that asks beyond its rate and waits for no answer that it is late. size: of what has come."""
-        if self._backlog.note(self._shared.clock.time(), is_more=size == BUFFER_BYTES):
+        is_more = size == BUFFER_BYTES or bool(self._transport.get_extra_info("modbus_more"))
+        if self._backlog.note(self._shared.clock.time(), is_more=is_more):
             asks = f"asks more than {self._shared.settings.requests_per_s:g} requests/s and waits for no answer"
             self._log("rate", f"W237 {self.peer}: {asks}: what it asks is carried out late, a stop as well")
 

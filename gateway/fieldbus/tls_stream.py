@@ -81,7 +81,7 @@ class TlsStream(asyncio.BufferedProtocol):
         self._buffer = bytearray(_BUFFER_BYTES)
         self._view = memoryview(self._buffer)
         self._connection: Connection | None = None
-        self._is_paused = self._is_closing = False
+        self._is_paused = self._is_closing = self._is_more = False
         self._shaken_bytes = 0
         self._allowed_bytes = LONGEST_RECORD
 
@@ -119,6 +119,7 @@ class TlsStream(asyncio.BufferedProtocol):
         if self._connection is None and not self._is_short(size):
             return
         self._incoming.write(self._view[:size])
+        self._is_more = size == _BUFFER_BYTES
         if self._connection is None:
             self._shake_hands()
         else:
@@ -152,8 +153,10 @@ class TlsStream(asyncio.BufferedProtocol):
     # -- towards the connection
 
     def get_extra_info(self, name: str, default: Any = None) -> Any:
-        """Return what is known of the far end: `peername`, and as `modbus_peer` who its certificate says that it is."""
-        return self.peer if name == "modbus_peer" else self._peername if name == "peername" else default
+        """Return what is known of the far end: `peername`, as `modbus_peer` who its certificate says that it is, and as
+        `modbus_more` whether more may wait than has been read: records of one request each never fill a connection's buffer."""
+        known = {"peername": self._peername, "modbus_peer": self.peer, "modbus_more": self._is_more}
+        return known.get(name, default)
 
     def set_write_buffer_limits(self, high: int) -> None:
         """Set what the socket may hold."""

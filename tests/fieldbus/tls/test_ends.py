@@ -8,6 +8,7 @@ import pytest
 
 from gateway.fieldbus.tls_server import _utc
 from gateway.fieldbus.tls_settings import HANDSHAKE_S
+from gateway.modbus.pdu import write_registers_request
 from tests.certificates import Folder
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
 from tests.fieldbus.tls.by_hand import VERSIONS, Face, Line, SocketInHand, client, face
@@ -31,11 +32,12 @@ def greeted(face: Face, folder: Folder, name: str = "setpoint") -> Line:
     return line
 
 
-def deliver(line: Line, data: bytes) -> None:
-    """As a socket does that was told to stop too late."""
+def deliver(line: Line, data: bytes) -> int:
+    """As a socket does, one that was told to stop too late as well; returns how much that was."""
     room = line.stream.get_buffer(-1)
     room[: len(data)] = data
     line.stream.buffer_updated(len(data))
+    return len(data)
 
 
 @pytest.mark.parametrize("name", ["setpoint", "roleless"])
@@ -157,3 +159,22 @@ def test_certificates_are_judged_by_utc_wherever_the_machine_stands() -> None:
     # without an argument gmtime asks a clock that is a kernel's tick behind
     before, now, after = time.gmtime(time.time()), _utc(), time.gmtime(time.time())
     assert f"{time.strftime('%Y%m%d%H%M%S', before)}Z" <= now <= f"{time.strftime('%Y%m%d%H%M%S', after)}Z"
+
+
+def test_what_waits_in_a_pile_of_records_of_one_request_each_is_known_as_asked_for_a_while_ago(
+    face: Face, folder: Folder
+) -> None:
+    """None of them fills a connection's buffer: of a master that was long gone each heartbeat counted."""
+    line = Line(face, SocketInHand("192.0.2.7"))
+    line.greet(client(folder, "setpoint"))
+    for _ in range(300):
+        line.tls.write(framed(write_registers_request(0, bytes(26))))
+    stream = line.outgoing.read()
+    while stream:
+        if line.socket.reading:
+            stream = stream[deliver(line, stream[:1024]) :]
+        face.clock.advance(0.005)
+    face.clock.advance(1.0)
+    behind = [peer.is_behind for _, _, peer in face.bank.writes]
+    assert len(behind) == 300
+    assert not any(behind[:60]) and all(behind[150:280]) and not behind[-1]
