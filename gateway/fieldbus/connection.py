@@ -28,6 +28,7 @@ from typing import Final, Protocol, cast
 from gateway.fieldbus.peers import Peers, address_of
 from gateway.fieldbus.rate_limits import Backlog, LogLimiter, RequestRate
 from gateway.fieldbus.settings import ServerSettings
+from gateway.fieldbus.waiting_bytes import count_waiting
 from gateway.modbus.fast import READ_FRAME_BYTES, whole_answer, whole_read_answer
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer, encode
 from gateway.modbus.peer import Peer
@@ -158,8 +159,7 @@ class Connection(asyncio.BufferedProtocol):
         """Whatever is not exactly one frame from an unlimited peer."""
         if self._is_closing:
             return
-        if self._rate is not None:
-            self._note_backlog(size)
+        self._note_backlog(size)
         self._framer.push(self._view[:size])
         self._answer_complete_requests()
         if size == BUFFER_BYTES and not (self._is_paused or self._is_closing):
@@ -210,10 +210,11 @@ class Connection(asyncio.BufferedProtocol):
         return encode(Adu(request.transaction, request.unit, pdu))
 
     def _note_backlog(self, size: int) -> None:
-        """Say of a client that asks beyond its rate and waits for no answer that it is late. size: of what has come."""
-        is_more = size == BUFFER_BYTES or bool(self._transport.get_extra_info("modbus_more"))
-        if self._backlog.note(self._shared.clock.time(), is_more=is_more):
-            asks = f"asks more than {self._shared.settings.requests_per_s:g} requests/s and waits for no answer"
+        """Say of a client that asks more than is answered, and waits for no answer, that it is late. size: of what has come."""
+        is_more = size == BUFFER_BYTES or self._transport.get_extra_info("modbus_more")
+        if self._backlog.note(self._shared.clock.time(), size, count_waiting(self._transport) if is_more else 0.0):
+            rate = f"{self._shared.settings.requests_per_s:g} requests/s" if self._rate else "is answered"
+            asks = f"asks more than {rate} and waits for no answer"
             self._log("rate", f"W237 {self.peer}: {asks}: what it asks is carried out late, a stop as well")
 
     def _note_progress(self, answered: bool) -> None:

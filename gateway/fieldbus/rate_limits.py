@@ -48,23 +48,25 @@ class RequestRate:
 
 class Backlog:
     """Tells whether requests of a client pile up: it may not know how late its stop is, and may be long gone while its
-    heartbeats are read. is_late: what is taken now has waited for longer than a burst may."""
+    heartbeats are read. is_late: what is taken now has waited for longer than a burst may. One that has always some requests
+    under way, but waits for answers, is not late: at the pace at which they are taken, what waits is soon answered."""
 
-    __slots__ = ("_since_s", "_told_s", "is_late")
+    __slots__ = ("_since_s", "_taken", "_told_s", "is_late")
 
     def __init__(self) -> None:
         self._since_s: float | None = None
-        self._told_s = -inf
+        self._told_s, self._taken = -inf, 0
         self.is_late = False
 
-    def note(self, now_s: float, *, is_more: bool) -> bool:
-        """Note what was taken; return whether to say now that it is late. is_more: as much waited as is taken at once."""
-        if not is_more or self._since_s is None:
-            self._since_s, self.is_late = now_s if is_more else None, False
+    def note(self, now_s: float, taken: int, waiting: float) -> bool:
+        """Note how many bytes were taken, and how many wait behind them; return whether to say now that it is late."""
+        if not waiting or self._since_s is None:
+            self._since_s, self._taken, self.is_late = now_s if waiting else None, 0, False
             return False
-        waited_s = now_s - self._since_s
-        self.is_late = waited_s >= _BURST_S
-        if waited_s < LATE_S or now_s - self._told_s < TOLD_AGAIN_S:
+        self._taken += taken
+        lasts_s = now_s - self._since_s
+        self.is_late = self.is_late or (lasts_s >= _BURST_S and waiting * lasts_s >= self._taken * _BURST_S)
+        if not self.is_late or lasts_s < LATE_S or now_s - self._told_s < TOLD_AGAIN_S:
             return False
         self._told_s = now_s
         return True

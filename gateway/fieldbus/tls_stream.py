@@ -153,8 +153,10 @@ class TlsStream(asyncio.BufferedProtocol):
     # -- towards the connection
 
     def get_extra_info(self, name: str, default: Any = None) -> Any:
-        """Return what is known of the far end: `peername`, as `modbus_peer` who its certificate says that it is, and as
-        `modbus_more` whether more may wait than has been read: records of one request each never fill a connection's buffer."""
+        """Return what is known of the far end: `socket`, `peername`, as `modbus_peer` who its certificate says that it is, and
+        as `modbus_more` whether more may wait than was read: records of one request each never fill a connection's buffer."""
+        if name == "socket":
+            return self._socket.get_extra_info(name, default)
         known = {"peername": self._peername, "modbus_peer": self.peer, "modbus_more": self._is_more}
         return known.get(name, default)
 

@@ -70,8 +70,11 @@ class HandTransport:
     connection: Any = None
     options: list[int] = field(default_factory=list)
 
-    def get_extra_info(self, name: str) -> Any:
+    def get_extra_info(self, name: str, _default: Any = None) -> Any:
         return {"peername": (self.host, self.port), "socket": self}.get(name)
+
+    def fileno(self) -> int:
+        return -1  # how much waits nobody knows
 
     def setsockopt(self, _level: int, option: int, _value: int) -> None:
         self.options.append(option)

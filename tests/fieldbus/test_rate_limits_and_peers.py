@@ -1,6 +1,9 @@
 """Rates, log lines, and who may connect."""
 
+import asyncio
+import socket
 from ipaddress import ip_network
+from math import inf
 
 import pytest
 from hypothesis import given
@@ -8,7 +11,8 @@ from hypothesis import strategies as st
 
 from gateway.fieldbus import ServerSettings
 from gateway.fieldbus.peers import Peers, address_of, is_loopback
-from gateway.fieldbus.rate_limits import LogLimiter, RequestRate
+from gateway.fieldbus.rate_limits import Backlog, LogLimiter, RequestRate
+from gateway.fieldbus.waiting_bytes import count_waiting
 
 
 @given(st.floats(1.0, 1000.0), st.lists(st.floats(0.0, 0.5), max_size=100))
@@ -121,3 +125,32 @@ def test_leaving_and_coming_back_is_no_way_to_a_new_burst() -> None:
     assert peers.rate(host, 10.01) is rate
     peers.forget(11.0)
     assert peers.rate(host, 11.0) is not rate
+
+
+@pytest.mark.parametrize(
+    ("taken", "waiting", "is_late"), [(5_000, 1_200.0, False), (60, 3_000.0, True), (60, inf, True)]
+)
+def test_only_who_has_more_under_way_than_is_soon_answered_is_late(taken: int, waiting: float, is_late: bool) -> None:
+    """A client with forty requests always under way has its answers within milliseconds; its heartbeats must count."""
+    backlog = Backlog()
+    for tick in range(60):
+        backlog.note(0.01 * tick, taken, waiting)
+        assert backlog.is_late is (is_late and tick >= 25)
+    backlog.note(0.6, taken, 0.0)
+    assert not backlog.is_late
+
+
+def test_what_waits_in_a_socket_is_counted_and_of_one_that_is_closed_nobody_knows() -> None:
+    ours, theirs = socket.socketpair()
+
+    class Transport(asyncio.BaseTransport):
+        def get_extra_info(self, name: str, _default: object = None) -> object:
+            return {"socket": ours}.get(name)
+
+    theirs.sendall(bytes(3000))
+    assert count_waiting(Transport()) == 3000.0
+    ours.recv(1000)
+    assert count_waiting(Transport()) == 2000.0
+    ours.close()
+    theirs.close()
+    assert count_waiting(Transport()) == inf
