@@ -8,9 +8,12 @@ import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.control import CalibrationInUse
+from gateway.modbus.pdu import write_registers_request
 from gateway.profiles import load_calibration
 from gateway.registers.words import State
-from tests.service.running_rig.runs.test_runs_and_masters import leased, locally
+from tests.fieldbus.by_hand import framed
+from tests.fieldbus.conftest import Stand, put
+from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S, leased, locally
 from tests.service.running_rig.simulated_rig import (
     CALIBRATE,
     ENABLE,
@@ -124,6 +127,24 @@ def test_heartbeats_that_have_waited_in_a_pile_renew_no_lease(is_behind: bool) -
         rig.run(0.1)
     assert rig.state is (State.FAULT if is_behind else State.HOLDING)
     assert any("wait behind its other requests" in line for line in rig.log) is is_behind
+
+
+def test_a_master_that_hangs_behind_a_pile_of_its_own_heartbeats_keeps_no_force() -> None:
+    """A thousand of them, of which two hundred a second are taken: five seconds of a lease of 0.35 s."""
+    rig, stand = leased(), Stand(requests_per_s=200.0)
+    rig.holding().beats = False
+    stand.shared.bank = rig.bank  # type: ignore[assignment]
+    connection, far = stand.connect(OWNER.host)
+    stream = b"".join(framed(write_registers_request(4, pack(">H", beat))) for beat in range(1000, 2000))
+    held_s = 0.0
+    while rig.state is State.HOLDING and held_s < 4.0:
+        stream = stream[put(connection, far, stream) :]
+        rig.run(0.01)
+        stand.clock.advance(0.01)
+        held_s += 0.01
+    assert rig.state is State.FAULT
+    assert 0.25 <= held_s < 0.25 + LEASE_S + 0.2
+    assert len(stream) > 5000, "most of them have never been read"
 
 
 @pytest.mark.parametrize("word", [ENABLE, RESET, TARE, CALIBRATE])
