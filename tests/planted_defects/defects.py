@@ -674,4 +674,11 @@ DEFECTS = (
     Defect("a turned cell's zero is turned with it", "devices/template_codecs/cell.py",
            "self._sign * (raw - self._reading.zero_count) * per_unit",
            "(self._sign * raw - self._reading.zero_count) * per_unit", ("devices/test_binary_cells.py",)),
+    Defect("a heartbeat that has waited in a pile renews the lease", "control/command_edges.py",
+           "        if command.has_waited:\n            self._lease.adopt", "        if False:\n            self._lease.adopt",
+           ("service/running_rig/test_takeovers.py",)),
+    Defect("an enable that has waited in a pile presses", "control/edge_checks.py",
+           "    if not command.has_waited or not acts:\n", "    if True:\n", ("service/running_rig/test_takeovers.py",)),
+    Defect("who has some requests under way is late", "fieldbus/rate_limits.py",
+           " and waiting * lasts_s >= self._taken * _BURST_S)", ")", ("fieldbus/test_rate_limits_and_peers.py",)),
 )  # fmt: skip
