@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from gateway.codes.explanation import BUSY_CURE, is_cause
 from gateway.devices.messages import Garbage
 from gateway.processes.scheduling.scheduler_counters import ProcessorTime
 
@@ -27,7 +28,6 @@ _BUSY: Final = (
     "our own loop is late (A342), which tears answers, too: end other programs, or `run --realtime`, then look again"
 )
 _NONE_READ: Final = "none could be read: another speed, another device or profile? force-gateway check the rig"
-_HALF: Final = 0.5
 
 
 class _RecentSums:
@@ -131,7 +131,7 @@ class SlowLoop(_RateWarning):
         bound = _ms(LATE_PERIODS * self._period_s)
         observation = f"{missed:.0f} of {ticks:.0f} ticks within {WINDOW_S:g} s were missed or over {bound} late"
         withheld_s, by_whom = self._withheld() if self._withheld else (0.0, "")
-        if withheld_s >= _HALF * spent_s[0]:
+        if is_cause(withheld_s, spent_s[0]):
             return f"A342 {observation}, {_ms(spent_s[0])} in all: {by_whom}"
         return f"A342 {observation}, {_cause_of_lateness(*spent_s, is_counted=used is not None)}"
 
@@ -141,9 +141,9 @@ def _cause_of_lateness(late_s: float, waited_s: float, ran_s: float, *, is_count
     if not is_counted:
         return f"{_ms(late_s)} in all, not counted why: end other programs, or `run --realtime`"
     times_text = f"{_ms(late_s)} in all, {_ms(waited_s)} of them waiting for a processor, {_ms(ran_s)} at work"
-    if waited_s >= _HALF * late_s:
-        return f"{times_text}: the machine is too busy; end other programs, or `run --realtime`"
-    if ran_s >= _HALF * late_s:
+    if is_cause(waited_s, late_s):
+        return f"{times_text}: {BUSY_CURE}"
+    if is_cause(ran_s, late_s):
         return f"{times_text}: the gateway's own work takes too long here; a slower loop_hz, fewer clients, or a faster machine"
     return f"{times_text}: this machine stood still or slept (a virtual one on a busy host, a CPU in deep sleep)"
 
