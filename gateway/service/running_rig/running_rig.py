@@ -166,7 +166,7 @@ class RunningRig:
         self.loop.valve, self.loop.restart_cause = self._valve_line, cause
         self._ports.loop, self.loop.pressure_pa_per_v = self.loop, rig.output.device.pressure_pa_per_v
         self.loop.recordings, self.loop.ring = self._recordings, self.ring
-        self.loop.warnings = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
+        self.loop.warnings.bits = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
 
     async def start(self, bind: list[Any] | None, handover: Handover, *, restarted: Ending | None) -> banner.Ready:
         """Open the ports, greet both devices, then serve Modbus: nobody is answered before there is an answer."""
