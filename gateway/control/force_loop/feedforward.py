@@ -33,7 +33,7 @@ class ModelError(Exception):
 
 
 class Approach:
-    """Goal and rate of the target by contact. `touched_s` is when the present contact began."""
+    """Goal and rate of the target by contact, and when the present contact began."""
 
     def __init__(self) -> None:
         self._touched_s: float | None = None
