@@ -14,7 +14,7 @@ from tests.tried_again import TriedAgain
 
 readings = count()
 def stolen_s():
-    return [1.0, 5.0 + {each_s} * next(readings)]
+    return {{"cpu0": 1.0, "cpu1": 5.0 + {each_s} * next(readings)}}
 
 def pytest_configure(config):
     config.pluginmanager.register(TriedAgain(lambda nodeid: "pure" not in nodeid, stolen_s))

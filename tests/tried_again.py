@@ -1,37 +1,29 @@
 """A test in real time that fails while the host of this virtual machine keeps a processor away is tried once more.
 
 Such a test holds the gateway to bounds of 100 ms, and a host that gives shares takes a processor for as long. What the kernel
-has counted as stolen meanwhile decides (`steal`, proc(5)), not how the test failed; a second failure counts. Each is told at
+has counted as stolen meanwhile decides (`steal`), not how the test failed; a second failure counts. Each is told at
 the end.
 """
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
 from _pytest.runner import runtestprotocol
 
+from gateway.processes.scheduling.withheld_time import most_growth, read_stolen_s
+
 STOLEN_S = 0.05
 """Less breaks no bound: the shortest is twice as long."""
-TICKS_PER_S = 100
-STEAL = 8
 TOLD_AS = "tried again"
-
-
-def stolen_s() -> list[float]:
-    """Return for how long each processor has been away since the machine's start; empty where nobody counts it."""
-    try:
-        lines = Path("/proc/stat").read_text().splitlines()
-    except OSError:
-        return []
-    return [int(line.split()[STEAL]) / TICKS_PER_S for line in lines if line.startswith("cpu") and line[3].isdigit()]
 
 
 class TriedAgain:
     """is_concerned: decides which tests are held to real time; stolen_s: of each processor until now."""
 
-    def __init__(self, is_concerned: Callable[[str], bool], stolen: Callable[[], list[float]] = stolen_s) -> None:
+    def __init__(
+        self, is_concerned: Callable[[str], bool], stolen: Callable[[], dict[str, float]] = read_stolen_s
+    ) -> None:
         self._is_concerned, self._stolen_s = is_concerned, stolen
         self._told: list[str] = []
 
@@ -41,7 +33,7 @@ class TriedAgain:
         item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
         before = self._stolen_s()
         reports = runtestprotocol(item, nextitem=nextitem, log=False)
-        lost_s = max((now - then for now, then in zip(self._stolen_s(), before, strict=False)), default=0.0)
+        lost_s = most_growth(self._stolen_s(), before)
         if any(report.failed for report in reports) and lost_s >= STOLEN_S:
             why = f"{1e3 * lost_s:.0f} ms stolen; {next(report.longreprtext[-200:] for report in reports if report.failed)}"
             item._initrequest()  # type: ignore[attr-defined]  # as pytest does before the first time: fixtures are made anew

@@ -23,6 +23,15 @@ class Explanation:
         return f"{self.title}: {self.do[:1].lower()}{self.do[1:].rstrip('.')}"
 
 
+_DECIDING_SHARE = 0.5
+
+
+def is_cause(part_s: float, whole_s: float) -> bool:
+    """Decide whether what took a part of a silence or a lateness, both s, is told as its cause: it took at least half of it.
+    Of one that is not known, nan, nothing is."""
+    return part_s >= _DECIDING_SHARE * whole_s
+
+
 BUSY_CURE = "the machine is too busy: end other programs, or `run --realtime`"
 """Ends the sentences whose cause is a machine with too much to do (MACHINE_BUSY, A403)."""
 

@@ -11,11 +11,10 @@ Bounds: Supervision.sample_timeout_s and output_timeout_s in control/settings.py
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.codes.explanation import BUSY_CURE
+from gateway.codes.explanation import BUSY_CURE, is_cause
 from gateway.codes.faults import FaultCode
 from gateway.units import format_ms
 
-_SHARE: Final = 0.5
 _WORTH_TELLING_S: Final = 1e-3
 
 
@@ -42,25 +41,24 @@ NOT_HELD: Final = Held()
 def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: str) -> tuple[FaultCode, str]:
     """Return the fault and what is to blame, in words. suspects: what it is where the machine did let us run; nan s: never
     heard."""
-    enough_s = _SHARE * silent_s
     waited_s = held.loop_waited_s
     ours = f"our own loop came {format_ms(held.loop_late_s)} late in that time"
-    if held.rig_stopped_s >= enough_s:
+    if is_cause(held.rig_stopped_s, silent_s):
         return (
             fault,
             f"the simulated rig's process was stopped for {format_ms(held.rig_stopped_s)} of them (a signal, a debugger)",
         )
-    if held.rig_waited_s >= enough_s:
+    if is_cause(held.rig_waited_s, silent_s):
         evidence = f"the simulated rig's process waited {format_ms(held.rig_waited_s)} of them for a processor"
         return FaultCode.MACHINE_BUSY, f"{evidence}: {_cure(held, held.rig_waited_s)}"
-    if not held.loop_late_s >= enough_s:  # nor where silent_s is nan
+    if not is_cause(held.loop_late_s, silent_s):
         return fault, f"{ours}: {suspects}" if held.loop_late_s >= _WORTH_TELLING_S and suspects else suspects
-    if waited_s is not None and waited_s >= _SHARE * held.loop_late_s:
+    if waited_s is not None and is_cause(waited_s, held.loop_late_s):
         return (
             FaultCode.MACHINE_BUSY,
             f"{ours}, {format_ms(waited_s)} of them waiting for a processor: {_cure(held, waited_s)}",
         )
-    if held.withheld[0] >= _SHARE * held.loop_late_s:
+    if is_cause(held.withheld[0], held.loop_late_s):
         return FaultCode.MACHINE_BUSY, f"{ours}: {held.withheld[1]}"
     count_words = (
         "not counted why" if waited_s is None else f"only {format_ms(waited_s)} of them waiting for a processor"
@@ -74,4 +72,4 @@ def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: st
 def _cure(held: Held, part_s: float) -> str:
     """Return what to do against that part of a silence, s: where time was withheld from outside no program here is to blame."""
     withheld_s, by_whom = held.withheld
-    return by_whom if withheld_s >= _SHARE * part_s else BUSY_CURE
+    return by_whom if is_cause(withheld_s, part_s) else BUSY_CURE

@@ -92,7 +92,9 @@ class CommandTracker:
         return self._turned(demand_of(command, self._settings))
 
     def _turned(self, demand: Demand) -> Demand:
-        return demand._replace(gravity_n=-demand.gravity_n) if self._direction < 0.0 else demand
+        if self._direction > 0.0:
+            return demand
+        return demand._replace(manner=demand.manner._replace(gravity_n=-demand.manner.gravity_n))
 
     def _update_demand(self) -> None:
         try:
@@ -105,7 +107,7 @@ class CommandTracker:
     @property
     def gravity_n(self) -> float:
         """Contact force that the payload's weight gives under the present command."""
-        return self.demand.gravity_n
+        return self.demand.manner.gravity_n
 
     def start_lease(self, now_s: float) -> None:
         """Start the lease at enable: the master has one length of the lease to beat."""

@@ -36,12 +36,7 @@ class Demand(NamedTuple):
     force_n: float
     force_limited_by: LimitedBy
     voltage_v: float
-    ramp_n_per_s: float
-    precontact_n: float
-    contact_ramp_s: float
-    gravity_n: float
-    tolerance_n: float
-    in_band_time_s: float
+    manner: Manner
 
 
 def gravity_n(payload_kg: float, tilt_rad: float) -> float:
@@ -54,7 +49,7 @@ def demand_of(command: Command, settings: ControlSettings, manner: Manner | None
     manner: of this command, where it is known."""
     force_n, limited_by = force_limited(command.force_setpoint_n, settings.limits)
     voltage_v = finite(command.voltage_setpoint_v, "voltage_setpoint_v")
-    return Demand(command.mode, force_n, limited_by, voltage_v, *(manner or manner_of(command, settings.defaults)))
+    return Demand(command.mode, force_n, limited_by, voltage_v, manner or manner_of(command, settings.defaults))
 
 
 def manner_of(command: Command, defaults: Defaults) -> Manner:
@@ -94,4 +89,4 @@ def _or_default(value: float, default: float, name: str) -> float:
 def ramp_down_demand(demand: Demand, settings: ControlSettings) -> Demand:
     """Return the same on the way to 0 N, within STOP_S whatever the force is."""
     rate_n_per_s = max(settings.defaults.force_ramp_n_per_s, settings.limits.force_max_n / STOP_S)
-    return demand._replace(mode=Mode.FORCE, force_n=0.0, force_limited_by=LimitedBy.NONE, ramp_n_per_s=rate_n_per_s)
+    return Demand(Mode.FORCE, 0.0, LimitedBy.NONE, demand.voltage_v, demand.manner._replace(ramp_n_per_s=rate_n_per_s))

@@ -163,7 +163,7 @@ class EdgeCheck:
             return f"{at.reading.cell_n:.2f} N {at.repeats}: amplifier or cell is dead, its reading is no zero"
         if at.leaving_n > self._conditioner.zero_spread_n:
             return f"about {at.leaving_n:.1f} N are still on their way to 0: wait a moment"
-        return self._conditioner.why_no_zero(self._commands.demand_by(command).gravity_n)
+        return self._conditioner.why_no_zero(self._commands.demand_by(command).manner.gravity_n)
 
     def _forbids_run(self, plan: AnyPlan, at: Situation) -> str:
         begins = "it begins from OFF, or from READY with force 0"

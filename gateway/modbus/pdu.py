@@ -1,6 +1,5 @@
 """Requests as bytes, both ends of the wire side by side: NAME_request() is the host's, parse_NAME() the device's.
-The service is a device only: three of the host's builders serve `upload` (gateway/cli/master), the others are the master's
-side that tests use as the other end.
+Hosts here are those who write as any master does: the page (web), MQTT (telemetry) and `upload` (cli/master).
 
 Plain functions and tuples on purpose: a frozen dataclass for each request costs more than the answer itself.
 parse_* check shape and quantity and raise RequestError(03): a truncated PDU, surplus bytes and a byte count that
@@ -9,11 +8,10 @@ caller's mistake, never the wire's.
 Source of layouts and limits: MODBUS Application Protocol V1.1b3, section 6.
 """
 
-from collections.abc import Sequence
 from struct import Struct
 from typing import Final
 
-from gateway.modbus.bits import pack_bits, unpack_bits
+from gateway.modbus.bits import unpack_bits
 from gateway.modbus.errors import RequestError, RequestFault
 
 READ_COILS: Final = 1
@@ -62,11 +60,6 @@ def parse_read(pdu: bytes, most: int) -> tuple[int, int]:
     return address, count
 
 
-def write_coil_request(address: int, value: bool) -> bytes:
-    """Return an FC05 request."""
-    return _TWO.pack(WRITE_COIL, address, 0xFF00 if value else 0)
-
-
 def write_register_request(address: int, word: int) -> bytes:
     """Return an FC06 request. word: 0..65535."""
     return _TWO.pack(WRITE_REGISTER, address, word)
@@ -78,13 +71,6 @@ def parse_write_one(pdu: bytes) -> tuple[int, int]:
         raise wrong_length(pdu, f"a single write has {_TWO.size}")
     _function, address, word = _TWO.unpack(pdu)
     return address, word
-
-
-def write_coils_request(address: int, values: Sequence[bool]) -> bytes:
-    """Return an FC15 request."""
-    _own_quantity(len(values), MOST_BITS_WRITTEN)
-    data = pack_bits(values)
-    return _MANY.pack(WRITE_COILS, address, len(values), len(data)) + data
 
 
 def parse_write_coils(pdu: bytes) -> tuple[int, list[bool]]:

@@ -9,6 +9,7 @@ _MANY_TICKS: Final = 5  # every second one goes where the chart is narrow
 _MOST_DECADES: Final = 2  # of a logarithmic axis whose ticks stay where the chart is narrow
 _STILL: Final = 1e-9  # of a value: moves no more than its rounding
 _STEPS: Final = (1.0, 2.0, 5.0, 10.0)
+_ROUND_STEPS: Final = 6  # about so many from one end of the axis to the other
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +46,8 @@ class Axis:
         return set(ticks[1::2]) if len(ticks) > _MANY_TICKS else set()
 
 
-def _round_ticks(low: float, high: float, count: int = 6) -> list[float]:
-    rough = (high - low) / count
+def _round_ticks(low: float, high: float) -> list[float]:
+    rough = (high - low) / _ROUND_STEPS
     unit = 10.0 ** floor(log10(rough))
     step = next(s for s in _STEPS if s * unit >= rough * (1 - 1e-9)) * unit
     first = ceil(low / step - 1e-9)

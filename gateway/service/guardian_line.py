@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import copy
 import os
 import socket
 from collections import deque
@@ -29,6 +30,7 @@ class GuardianLine:
         self.rig_pid: int | None = None
         self._link = link
         self._memory = memory
+        self._kept: dict[str, Any] = {}
         self._waiting: deque[tuple[str, dict[str, Any], tuple[int, ...]]] = deque()
         self._rig: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
         self.told_to_stop = asyncio.Event()
@@ -70,8 +72,11 @@ class GuardianLine:
         self._tell(guardian_link.LINE_LOST, {})
 
     def keep(self, **facts: Any) -> None:
-        """Have the guardian tell the next control process; each name's newest fact counts."""
-        self._tell(guardian_link.KEEP, facts)
+        """Have the guardian tell the next control process; each name's newest fact counts. What it knows already is not told
+        again: this may be called at each tick."""
+        if not facts.items() <= self._kept.items():
+            self._kept |= copy.deepcopy(facts)  # whoever has told it may change it
+            self._tell(guardian_link.KEEP, facts)
 
     def first_cause(self, cause: str) -> None:
         """Tell the guardian of an internal error, in words: this process is about to end. Of a long one the beginning."""

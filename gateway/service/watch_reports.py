@@ -66,9 +66,9 @@ class WatchReports:
     def _hear_worse(self, sentence: str) -> None:
         """Warn while the plant in use makes the force worse; each change is told once."""
         loop, bit = self._loop, WarningBit.COMPENSATION_WORSE
-        if bool(sentence) == bool(loop.warnings & bit):
+        if bool(sentence) == bool(loop.warnings.bits & bit):
             return
-        loop.warnings = loop.warnings | bit if sentence else loop.warnings & ~bit
+        loop.warnings.bits = loop.warnings.bits | bit if sentence else loop.warnings.bits & ~bit
         self._log(
             "compensation", f"A347 {sentence}" if sentence else "the force is no worse than before the plant in use"
         )
@@ -78,10 +78,10 @@ class WatchReports:
         loop = self._loop
         was_none, loop.residual_cause = loop.residual_cause is ResidualCause.NONE, cause
         if cause is ResidualCause.NONE:
-            loop.warnings &= ~WarningBit.MODEL_DIFFERS
+            loop.warnings.bits &= ~WarningBit.MODEL_DIFFERS
             self._log("residual", self._sentence or "the model agrees with the measurements again")
         else:
-            loop.warnings |= WarningBit.MODEL_DIFFERS
+            loop.warnings.bits |= WarningBit.MODEL_DIFFERS
             self._warnings += was_none
             self._log("residual", f"A345 {self._sentence or cause.effect}")
         loop.refresh()

@@ -1,6 +1,6 @@
 """What one does with a rig, done to the twin in virtual time: a staircase of voltages, and steps that settle.
 
-Used by tools/fit_demo, tools/paper and the tests, so that all of them run the same experiment.
+Used where a twin's closed loop is judged, by tools and by the tests, so that all of them run the same experiment.
 """
 
 from collections.abc import Iterable

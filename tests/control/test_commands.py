@@ -257,7 +257,8 @@ def test_a_demand_is_that_of_its_own_command_whatever_came_before(writes, pulls)
         )
         tracker.take(0.1 * number, command)
         alone = demand_of(command, settings())
-        assert tracker.demand == (alone._replace(gravity_n=-alone.gravity_n) if pulls else alone)
+        weight_n = -alone.manner.gravity_n if pulls else alone.manner.gravity_n
+        assert tracker.demand == alone._replace(manner=alone.manner._replace(gravity_n=weight_n))
 
 
 def test_a_number_that_is_none_is_named_and_the_next_command_is_whole_again():
@@ -274,4 +275,4 @@ def test_turning_round_counts_the_weight_of_the_command_in_use_the_other_way_at_
     tracker.take(0.1, Command(number=1, payload_kg=1.0))
     pressing_n = tracker.gravity_n
     tracker.turn(-1.0)
-    assert tracker.gravity_n == tracker.demand.gravity_n == -pressing_n < 0.0
+    assert tracker.gravity_n == tracker.demand.manner.gravity_n == -pressing_n < 0.0

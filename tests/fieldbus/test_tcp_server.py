@@ -193,7 +193,7 @@ def test_a_bug_in_the_bank_reaches_the_loop_and_only_its_connection_ends(run: An
             running.bank.write_bits = lambda *_: 1 // 0
             other_reader, other_writer = await running.connect()
             reader, writer = await running.connect()
-            writer.write(framed(pdu.write_coil_request(0, True)))
+            writer.write(framed(bytes.fromhex("05 0000 ff00")))
             assert await end_of(reader) == b""
             other_writer.write(framed(READ))
             assert await other_reader.readexactly(13) == framed(READ_ANSWER)

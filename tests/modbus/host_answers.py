@@ -4,9 +4,9 @@ never does.
 No transaction logic here: a client compares transaction ids itself.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from gateway.modbus.bits import unpack_bits
+from gateway.modbus.bits import pack_bits, unpack_bits
 from gateway.modbus.diagnostics import RETURN_QUERY_DATA
 from gateway.modbus.errors import ModbusError
 from gateway.modbus.identification import MEI_TYPE
@@ -18,6 +18,7 @@ from gateway.modbus.pdu import (
     READ_WRITE,
     REPORT_SERVER,
     WRITE_COIL,
+    WRITE_COILS,
     WRITE_REGISTER,
 )
 
@@ -104,3 +105,14 @@ def loopback_request(data: bytes) -> bytes:
 def report_request() -> bytes:
     """Ask who the server is and whether it runs."""
     return bytes((REPORT_SERVER,))
+
+
+def write_coil_request(address: int, value: bool) -> bytes:
+    """Switch one coil."""
+    return bytes((WRITE_COIL,)) + address.to_bytes(2) + (b"\xff\x00" if value else b"\x00\x00")
+
+
+def write_coils_request(address: int, values: Sequence[bool]) -> bytes:
+    """Switch several in a row."""
+    data = pack_bits(values)
+    return bytes((WRITE_COILS,)) + address.to_bytes(2) + len(values).to_bytes(2) + bytes((len(data),)) + data

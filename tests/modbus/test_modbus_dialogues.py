@@ -4,7 +4,14 @@ import pytest
 
 from gateway.modbus import Peer, ServerId, answer
 from gateway.modbus import pdu as P  # noqa: N812
-from tests.modbus.host_answers import answer_bits, answer_data, loopback_request, report_request
+from tests.modbus.host_answers import (
+    answer_bits,
+    answer_data,
+    loopback_request,
+    report_request,
+    write_coil_request,
+    write_coils_request,
+)
 from tests.modbus.memory_bank import MemoryBank
 
 PEER = Peer("127.0.0.1", 4711)
@@ -54,11 +61,11 @@ def test_the_host_takes_the_printed_answers_as_its_own(request_hex: str, answer_
     [
         (P.read_request(1, 0x13, 0x13), "01 0013 0013"),
         (P.read_request(3, 0x6B, 3), "03 006b 0003"),
-        (P.write_coil_request(0xAC, True), "05 00ac ff00"),
+        (write_coil_request(0xAC, True), "05 00ac ff00"),
         (P.write_register_request(1, 3), "06 0001 0003"),
         (loopback_request(b"\xa5\x37"), "08 0000 a537"),
         (report_request(), "11"),
-        (P.write_coils_request(0x13, [bool(int(bit)) for bit in "1011001110"]), "0f 0013 000a 02 cd01"),
+        (write_coils_request(0x13, [bool(int(bit)) for bit in "1011001110"]), "0f 0013 000a 02 cd01"),
         (P.write_registers_request(1, bytes.fromhex("000a0102")), "10 0001 0002 04 000a 0102"),
         (P.mask_write_request(4, 0xF2, 0x25), "16 0004 00f2 0025"),
         (P.read_write_request(3, 6, 14, b"\x00\xff" * 3), "17 0003 0006 000e 0003 06 00ff 00ff 00ff"),
@@ -85,7 +92,7 @@ def test_read_write_reads_what_it_has_just_written() -> None:
 
 def test_a_coil_written_is_a_discrete_input_read() -> None:
     served = bank()
-    answer(P.write_coils_request(40, [True, False, True]), served, PEER)
+    answer(write_coils_request(40, [True, False, True]), served, PEER)
     request = P.read_request(P.READ_DISCRETE_INPUTS, 40, 3)
     assert answer_bits(request, answer(request, served, PEER)) == [True, False, True]
 

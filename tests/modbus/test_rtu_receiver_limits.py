@@ -9,7 +9,7 @@ from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus import rtu_receiver
 from gateway.modbus.rtu import encode_adu
 from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuRequest, _is_whole
-from tests.modbus.host_answers import loopback_request, report_request
+from tests.modbus.host_answers import loopback_request, report_request, write_coil_request
 from tests.modbus.rtu_bus import BAUD, CHARACTER_S, SILENCE_S, Bus
 from tests.modbus.test_rtu_receiver import COMMAND, INSIDE, OURS, READ, WRITE, answered
 
@@ -107,7 +107,7 @@ def known(*heard_before: int) -> Bus:
 
 
 def test_a_broadcast_in_two_reads_is_one_frame() -> None:
-    for pdu in (WRITE, MANY, P.write_coil_request(0, True), P.mask_write_request(0, 1, 2)):
+    for pdu in (WRITE, MANY, write_coil_request(0, True), P.mask_write_request(0, 1, 2)):
         frame = encode_adu(0, pdu)
         for cut in range(1, len(frame)):
             assert Bus().send(frame[:cut], frame[cut:], pause_s=0.016).requests() == [RtuRequest(0, pdu, False)], cut

@@ -136,6 +136,25 @@ def test_what_the_line_did_not_take_goes_with_the_next_beat_and_in_order(ends: P
     os.close(memory)
 
 
+def test_a_fact_for_the_next_process_is_told_whenever_it_has_changed_and_not_at_each_tick(ends: Pair) -> None:
+    ports = {"0": 8802}
+
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1])
+        for zero_n in (0.0, 0.0, 8.3, 8.3, 0.0):
+            guardian.keep(zero_n=zero_n)
+        for place in ("0", "1", "1"):
+            ports[place] = 8802
+            guardian.keep(tls_ports=ports)
+        guardian.close()
+
+    asyncio.run(scene())
+    told = [message.body for message in iter(lambda: message_link.receive(ends[0]), None)]
+    both = {"0": 8802, "1": 8802}
+    assert told == [{"zero_n": 0.0}, {"zero_n": 8.3}, {"zero_n": 0.0}, {"tls_ports": {"0": 8802}}, {"tls_ports": both}]
+
+
 @pytest.mark.parametrize("size", [100_000, 1_000_000])
 def test_a_cause_of_any_length_is_told_by_its_beginning(ends: Pair, size: int) -> None:
     """An exception may hold what it could not read; a message that is too long has no end, and was taken for nonsense."""

@@ -1,9 +1,6 @@
 """What the page may do to the force, on a whole gateway in virtual time: as any master, for as long as its browser is there."""
 
 import asyncio
-import json
-from collections.abc import Awaitable, Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,49 +8,12 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.profiles import Rig
 from gateway.registers.words import ControlBit, State
 from gateway.web.commands import RELOAD_S, Commands, RefusedCommand
 from gateway.web.context import WebContext
 from tests.service.requests.test_hostile_requests import Stage
 from tests.service.rigs import demo
-from tests.service.wired import Wired
-
-Scene = Callable[[Commands, Stage], Awaitable[None]]
-
-
-class Link:
-    """Control's socket without the socket."""
-
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
-
-    async def ask(self, request: dict[str, Any]) -> dict[str, Any]:
-        answer = self._stage.ask(json.dumps(request).encode())
-        if not answer.pop("ok"):
-            raise ValueError(answer["error"])
-        return answer
-
-
-def play(tmp_path: Path, scene: Scene, rig: Rig | None = None) -> Stage:
-    stage = Stage(tmp_path, Wired(rig or demo()).ready())
-    context = WebContext(tmp_path, "demo", True, Link(stage))  # type: ignore[arg-type]
-    context.__dict__["profile"] = stage.wired.rig
-
-    async def sleep(seconds: float) -> None:
-        stage.wired.run(seconds)
-        await asyncio.sleep(0)
-
-    async def run() -> None:
-        commands = Commands(context, lambda: stage.wired.now_s, sleep)
-        try:
-            await scene(commands, stage)
-        finally:
-            await commands.close()
-
-    asyncio.run(run())
-    stage.close()
-    return stage
+from tests.web.commanded_gateway import leased, let_turns_pass, play
 
 
 def test_a_force_is_held_changed_and_stopped(tmp_path: Path) -> None:
@@ -130,8 +90,7 @@ def test_a_stop_ends_what_is_still_on_its_way(tmp_path: Path, is_held: bool) -> 
             if is_held:
                 await commands.enable("me", 8.0)
             asked = asyncio.create_task((commands.set_force if is_held else commands.enable)("me", 12.0))
-            for _ in range(turns):
-                await asyncio.sleep(0)
+            await let_turns_pass(turns)
             await commands.stop()
             await asyncio.gather(asked, return_exceptions=True)
             stage.wired.run(0.1)
@@ -180,11 +139,6 @@ def test_a_force_that_is_not_allowed_is_refused_in_the_gateway_s_words(tmp_path:
     play(tmp_path, scene)
 
 
-def leased() -> Rig:
-    rig = demo()
-    return replace(rig, control=replace(rig.control, supervision=replace(rig.control.supervision, lease_s=0.2)))
-
-
 def test_a_lease_is_kept_while_the_browser_is_there_and_not_a_second_longer_than_said(tmp_path: Path) -> None:
     async def scene(commands: Commands, stage: Stage) -> None:
         wired = stage.wired
@@ -192,8 +146,7 @@ def test_a_lease_is_kept_while_the_browser_is_there_and_not_a_second_longer_than
         commands.join("another")  # who only looks on keeps no force
         await commands.enable("me", 12.0)
         for _ in range(20):  # 4 s: longer than the grace
-            for _ in range(4):
-                await asyncio.sleep(0)
+            await let_turns_pass(4)
             commands.note_alive("me")
         assert wired.now_s > 2.0 and wired.state is State.HOLDING
         commands.leave("me")
@@ -218,8 +171,7 @@ def test_behind_a_stop_nobody_beats_any_more(tmp_path: Path) -> None:
     async def scene(commands: Commands, stage: Stage) -> None:
         commands.join("me")
         await commands.enable("me", 12.0)
-        for _ in range(20):
-            await asyncio.sleep(0)
+        await let_turns_pass(20)
         await commands.stop()
         beats = []
         for _ in range(20):
@@ -240,8 +192,7 @@ def test_a_command_that_was_refused_makes_no_commander_and_no_beat(tmp_path: Pat
             with pytest.raises(RefusedCommand):
                 await refused
         told = stage.wired.bank.refusals
-        for _ in range(10):
-            await asyncio.sleep(0)
+        await let_turns_pass(10)
         assert commands.commander == "" and stage.wired.bank.refusals == told
 
     play(tmp_path, scene, leased())
@@ -252,8 +203,7 @@ def test_a_browser_that_was_overtaken_soon_leaves_the_refusal_registers_to_the_n
         wired = stage.wired
         commands.join("me")
         await commands.enable("me", 12.0)
-        for _ in range(8):
-            await asyncio.sleep(0)
+        await let_turns_pass(8)
         wired.write(0, 1 | 8, 1200, 0, 0, 77)
         assert wired.bank.owner == "10.0.0.5"
         for beat in range(40):
@@ -262,8 +212,7 @@ def test_a_browser_that_was_overtaken_soon_leaves_the_refusal_registers_to_the_n
             await asyncio.sleep(0)
         told = wired.bank.refusals
         assert 0 < told < 20 and commands.commander == ""
-        for _ in range(10):
-            await asyncio.sleep(0)
+        await let_turns_pass(10)
         assert wired.bank.refusals == told and wired.state in (State.RAMPING, State.HOLDING)
 
     play(tmp_path, scene, leased())

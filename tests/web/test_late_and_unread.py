@@ -25,7 +25,7 @@ from gateway.web.server import make_app
 from tests.service.requests.test_hostile_requests import Stage
 from tests.web import test_events
 from tests.web.asgi import call
-from tests.web.test_commands import Link, play
+from tests.web.commanded_gateway import Link, play
 from tests.web.test_events import Context, put, read, ring
 
 __all__ = ["ring"]

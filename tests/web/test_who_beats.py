@@ -11,7 +11,7 @@ from gateway.web.commands import Commands
 from gateway.web.context import WebContext
 from tests.service.requests.test_hostile_requests import Stage
 from tests.service.rigs import demo
-from tests.web.test_commands import leased, play
+from tests.web.commanded_gateway import leased, let_turns_pass, play
 
 
 async def until_done(commands: Commands) -> None:
@@ -53,12 +53,10 @@ def test_a_robot_that_enables_right_behind_a_stop_meets_no_beat_of_the_page(tmp_
         wired = stage.wired
         commands.join("me")
         await commands.enable("me", 12.0)
-        for _ in range(20):
-            await asyncio.sleep(0)
+        await let_turns_pass(20)
         await commands.stop()
         wired.write(0, 1, 1000, 0, 0, 77)
-        for _ in range(20):
-            await asyncio.sleep(0)
+        await let_turns_pass(20)
         assert wired.bank.owner == "10.0.0.5" and wired.bank.refusals == 0
 
     play(tmp_path, scene, leased())

@@ -42,15 +42,11 @@ NUMBER: Final = Number()
 class Whole(click.IntRange):
     """A whole number within bounds."""
 
-    def __init__(self, low: int | None = None, high: int | None = None, unit: str = "") -> None:
-        super().__init__(low, high)
-        self._unit = unit
-
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the number; BadParameter with the bounds."""
         number = click.INT.convert(value, param, ctx)
         if (self.min is not None and number < self.min) or (self.max is not None and number > self.max):
-            self.fail(describe_allowed(str(value), self.min, self.max, self._unit), param, ctx)
+            self.fail(describe_allowed(str(value), self.min, self.max), param, ctx)
         return number
 
 

@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
 import click
 
@@ -16,7 +16,6 @@ from gateway.cli.command_line.completion_words import complete_rigs
 from gateway.cli.command_line.known_rigs import check_rig, rigs_with_state
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-HELP: Final = "The rig: a shipped name, a rig file, or one that has run here."
 
 
 def is_terminal() -> bool:
@@ -36,7 +35,7 @@ def tell_rig(rig: str, directory: Path) -> None:
     click.echo(said if os.environ.get("NO_COLOR") else click.style(said, dim=True), err=True)
 
 
-def rig_option(help_text: str = HELP, *, checks: bool = True) -> Callable[[Function], Function]:
+def rig_option(help_text: str, *, checks: bool = True) -> Callable[[Function], Function]:
     """Return --rig as every verb has it. help_text: which rig it is where none is given; checks: whether an unknown one is
     refused here, or later by `choose_rig`, which knows of --state."""
     callback = _known_rig if checks else None

@@ -58,7 +58,7 @@ def port_failure(error: "PortError") -> CliError:
     return CliError(str(error), error.exit_code)
 
 
-def probe_line(line: "AnyLine", others_of_rig: "Iterable[AnyLine]" = ()) -> "PortReport":
+def probe_line(line: "AnyLine", others_of_rig: "Iterable[AnyLine]") -> "PortReport":
     """Ask the port of a rig's line: its own device at its own speed first, then at others, then the rig's other devices, whose
     ports may be exchanged, then every shipped profile of its role."""
     assert line.port

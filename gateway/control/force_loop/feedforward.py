@@ -33,24 +33,24 @@ class ModelError(Exception):
 
 
 class Approach:
-    """Goal and rate of the target by contact. `touched_s` is when the present contact began."""
+    """Goal and rate of the target by contact, and when the present contact began."""
 
     def __init__(self) -> None:
         self._touched_s: float | None = None
 
     def goal(self, now_s: float, demand: Demand, touching: bool, law: "Feedforward") -> tuple[float, float]:
         """Return (goal N, rate N/s) for this step."""
-        applied_n = law.applied_n
+        applied_n, manner = law.applied_n, demand.manner
         if not touching:
             self._touched_s = None
-            return min(demand.force_n, law.approaching_n(demand.precontact_n)), demand.ramp_n_per_s
+            return min(demand.force_n, law.approaching_n(manner.precontact_n)), manner.ramp_n_per_s
         if self._touched_s is None:
             self._touched_s = now_s
-        left_s = demand.contact_ramp_s - (now_s - self._touched_s)
+        left_s = manner.contact_ramp_s - (now_s - self._touched_s)
         rise_n = demand.force_n - applied_n
         if left_s <= 0.0 or rise_n <= 0.0:
-            return demand.force_n, demand.ramp_n_per_s
-        return demand.force_n, min(demand.ramp_n_per_s, rise_n / max(left_s, TICK_S))
+            return demand.force_n, manner.ramp_n_per_s
+        return demand.force_n, min(manner.ramp_n_per_s, rise_n / max(left_s, TICK_S))
 
 
 class Feedforward:

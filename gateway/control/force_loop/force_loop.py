@@ -230,7 +230,7 @@ class ForceLoop:
 
     def _step_down(self, demand: Demand, dt_s: float, given_n: float) -> StateEvent:
         law = self.feedforward
-        law.advance(0.0, demand.ramp_n_per_s, dt_s, given_n)
+        law.advance(0.0, demand.manner.ramp_n_per_s, dt_s, given_n)
         voltage_v, _ = law.compute_voltage(given_n)
         self._drive_by_model(min(voltage_v, self.voltage_v), law.applied_n, law.branch_share, given_n)
         return StateEvent.MOVE
@@ -245,8 +245,8 @@ class ForceLoop:
         law = self.feedforward
         goal_n, rate_n_per_s = self._approach.goal(inputs.now_s, demand, inputs.touching, law)
         if inputs.held_back:
-            goal_n = min(goal_n, law.approaching_n(demand.precontact_n))
-        given_n = demand.gravity_n + inputs.outside_n
+            goal_n = min(goal_n, law.approaching_n(demand.manner.precontact_n))
+        given_n = demand.manner.gravity_n + inputs.outside_n
         if self._was_touching and not inputs.touching:
             law.fall_back(goal_n, given_n)
             self._trim.forget()
@@ -317,7 +317,7 @@ class ForceLoop:
 
     def _step_voltage(self, demand: Demand, inputs: LoopInputs) -> StateEvent:
         self._trim.reset()
-        self.feedforward.take_over(inputs.expected_n, gravity_n=demand.gravity_n + inputs.outside_n)
+        self.feedforward.take_over(inputs.expected_n, gravity_n=demand.manner.gravity_n + inputs.outside_n)
         self.feedforward_v = demand.voltage_v
         self.limited_by = self._limiter.drive(demand.voltage_v)
         return self.settling.judge_voltage(demand, inputs, is_slewing=self.limited_by is LimitedBy.VOLTAGE_SLEW)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Final
 
-from gateway.codes.explanation import BUSY_CURE
+from gateway.codes.explanation import BUSY_CURE, is_cause
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.control.blame_for_silence import cause_of_silence
@@ -67,16 +67,16 @@ def _lateness(line: LineStatus, allowed_s: float) -> StopCause:
     """Return the cause of a late loop: internal error or machine load, whichever made the larger part of the lateness."""
     observation = f"the loop came by {line.late_s * 1e3:.0f} ms late, allowed {allowed_s * 1e3:.0f} ms (stall_s)"
     dropped = "nothing that arrived meanwhile moves it"
-    if line.suspended_s >= 0.5 * line.late_s:
+    if is_cause(line.suspended_s, line.late_s):
         slept = f"this machine was suspended for {line.suspended_s:.1f} s of them"
         return stop_cause(FaultCode.LOOP_STALLED, f"{observation}: {slept}; {_AWAKE}; {dropped}")
     withheld_s, by_whom = line.withheld
-    if withheld_s >= 0.5 * line.late_s:
+    if is_cause(withheld_s, line.late_s):
         return stop_cause(FaultCode.MACHINE_BUSY, f"{observation}; {by_whom}; {dropped}")
     if line.waited_s is None:
         return stop_cause(FaultCode.LOOP_STALLED, f"{observation}: the machine is overloaded; {dropped}")
     waited = f"{line.waited_s * 1e3:.0f} ms of them it waited for a processor"
-    if line.waited_s < 0.5 * line.late_s:
+    if not is_cause(line.waited_s, line.late_s):
         return stop_cause(
             FaultCode.LOOP_STALLED,
             f"{observation}, only {waited}: stopped, or an internal error (please report); {dropped}",

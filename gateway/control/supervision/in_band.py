@@ -116,16 +116,17 @@ class SettlingCheck:
             self._band.restart()
             self._undecided_since_s = inf
             return _WAIT if applied_n <= 0.0 else _MOVE
-        if abs(goal_n - applied_n) > demand.tolerance_n:
+        tolerance_n, in_band_time_s = demand.manner.tolerance_n, demand.manner.in_band_time_s
+        if abs(goal_n - applied_n) > tolerance_n:
             self._smooth_n = None
             self._undecided_since_s = inf
             self._follow_ramp(demand, inputs, applied_n)
             return _MOVE
-        may_be = inputs.touching and abs(demand.force_n - applied_n) <= demand.tolerance_n
-        inside = may_be and abs(inputs.reading.contact_n - demand.force_n) <= demand.tolerance_n
-        out = not may_be or abs(self._smooth(inputs.reading) - demand.force_n) > demand.tolerance_n
-        self._band.update(inputs.now_s, inside, demand.in_band_time_s, is_out=out)
-        self._judge_noise(inputs.now_s, demand.in_band_time_s)
+        may_be = inputs.touching and abs(demand.force_n - applied_n) <= tolerance_n
+        inside = may_be and abs(inputs.reading.contact_n - demand.force_n) <= tolerance_n
+        out = not may_be or abs(self._smooth(inputs.reading) - demand.force_n) > tolerance_n
+        self._band.update(inputs.now_s, inside, in_band_time_s, is_out=out)
+        self._judge_noise(inputs.now_s, in_band_time_s)
         if self._band.in_band:
             return _SETTLE
         return _MOVE if inputs.touching or applied_n != goal_n else _WAIT
@@ -149,7 +150,7 @@ class SettlingCheck:
         if not inputs.touching:
             self._band.restart()
             return
-        most_n = _RAMP_BANDS * demand.tolerance_n + _RAMP_LATE_S * demand.ramp_n_per_s
+        most_n = _RAMP_BANDS * demand.manner.tolerance_n + _RAMP_LATE_S * demand.manner.ramp_n_per_s
         self._band.go_along(inputs.now_s, abs(inputs.reading.contact_n - applied_n) <= most_n)
 
     def judge_voltage(self, demand: Demand, inputs: LoopInputs, *, is_slewing: bool) -> StateEvent:
@@ -166,5 +167,5 @@ class SettlingCheck:
         if is_slewing or demand.voltage_v <= 0.0:
             self._band.restart()
             return _MOVE if is_slewing else _WAIT
-        self._band.update(inputs.now_s, True, demand.in_band_time_s)
+        self._band.update(inputs.now_s, True, demand.manner.in_band_time_s)
         return _SETTLE if self._band.in_band else _MOVE

@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from gateway.codes.explanation import BUSY_CURE
+from gateway.codes.explanation import BUSY_CURE, is_cause
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.units import format_ms
 
 STOPPED_STATES: Final = "Tt"
 _OR_LONGER: Final = ", or a longer stall_s in the rig"
 _CURE: Final = f": {BUSY_CURE}{_OR_LONGER}"
-_WITHHELD_SHARE: Final = 0.5
 
 
 class ProcessorTime(NamedTuple):
@@ -97,7 +96,7 @@ def explain_silence(silence: Silence, load: str) -> Ending:
     if silence.state and silence.state in STOPPED_STATES:
         return Ending(EndCause.STOPPED, f"{observation}; it was stopped by a signal or a debugger")
     withheld_s, by_whom = silence.withheld
-    if withheld_s >= _WITHHELD_SHARE * silence.silent_s:
+    if is_cause(withheld_s, silence.silent_s):
         return Ending(EndCause.MACHINE_BUSY, f"{observation}; {load}; {by_whom}{_OR_LONGER}")
     if silence.used is None:
         cause = EndCause.MACHINE_BUSY if silence.was_late else EndCause.STALLED

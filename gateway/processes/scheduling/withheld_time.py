@@ -8,7 +8,7 @@ own counters that does not stand, or in part: one that waits for a timer sleeps,
 
 import contextlib
 import os
-from math import inf, nan
+from math import inf
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -16,20 +16,34 @@ from gateway.units import format_ms
 
 _EVERY_S: Final = 1.0
 _STEAL: Final = 8  # behind the processor's name, user, nice, system, idle, iowait, irq and softirq
-_LINE_BYTES: Final = 256
+_TICKS_PER_S: Final = os.sysconf("SC_CLK_TCK")
 _UNITS_S: Final = {b"throttled_usec": 1e-6, b"throttled_time": 1e-9}
+
+
+def read_stolen_s(stat: Path = Path("/proc/stat")) -> dict[str, float]:
+    """Return for how long each processor, by its name, has been away since the machine's start, s; none where nobody counts
+    it. One that is offline has no line."""
+    stolen_s: dict[str, float] = {}
+    with contextlib.suppress(OSError), stat.open("rb") as file:
+        for line in file:
+            if line[:3] != b"cpu":
+                break  # processors stand first, and a large machine has long lines behind them
+            words = line.split()
+            if line[3:4].isdigit() and len(words) > _STEAL and words[_STEAL].isdigit():
+                stolen_s[words[0].decode()] = int(words[_STEAL]) / _TICKS_PER_S
+    return stolen_s
+
+
+def most_growth(now: dict[str, float], then: dict[str, float]) -> float:
+    """Return the most that any of them has grown by; one that was not to be read, now or then, has not."""
+    return max((after - then[name] for name, after in now.items() if after > then.get(name, after)), default=0.0)
 
 
 class _Reading(NamedTuple):
     """stolen_s: of each processor since the machine's start; throttled_s: of each of our groups, in sum over processors."""
 
-    stolen_s: list[float]
-    throttled_s: list[float]
-
-
-def _most(now: list[float], then: list[float]) -> float:
-    """Return the most that any of them has grown by; one that was not to be read, nan, has not."""
-    return max((after - before for after, before in zip(now, then, strict=False) if after > before), default=0.0)
+    stolen_s: dict[str, float]
+    throttled_s: dict[str, float]
 
 
 class WithheldTime:
@@ -38,8 +52,6 @@ class WithheldTime:
     def __init__(self, proc: Path = Path("/proc"), groups: Path = Path("/sys/fs/cgroup")) -> None:
         self._stat = proc / "stat"
         self._quotas = _files_of_quotas(proc, groups)
-        self._bytes = _LINE_BYTES * (1 + (os.cpu_count() or 1))
-        self._ticks_per_s = os.sysconf("SC_CLK_TCK")
         self._before = self._noted = self._read()
         self._noted_s = -inf
 
@@ -52,7 +64,7 @@ class WithheldTime:
         """Return how much was withheld within the last second or two, s, and who did it, in words with the cure; 0 where
         nobody counts it. A pause that `note` has just ended is in it."""
         now, then = self._read(), self._before
-        stolen_s, throttled_s = _most(now.stolen_s, then.stolen_s), _most(now.throttled_s, then.throttled_s)
+        stolen_s, throttled_s = most_growth(now.stolen_s, then.stolen_s), most_growth(now.throttled_s, then.throttled_s)
         if throttled_s > stolen_s:
             taken = f"the CPU quota of our container or service withheld {format_ms(throttled_s)} of processor time about then"
             return throttled_s, f"{taken} (cpu.max): give it a larger one, or none"
@@ -60,17 +72,8 @@ class WithheldTime:
         return stolen_s, f"{taken}: give the machine processors of its own, or less to do"
 
     def _read(self) -> _Reading:
-        stolen_s = [int(line.split()[_STEAL]) / self._ticks_per_s for line in self._lines_of_processors()]
-        return _Reading(stolen_s, [nan if (one := _throttled_s(file)) is None else one for file in self._quotas])
-
-    def _lines_of_processors(self) -> list[bytes]:
-        try:
-            with self._stat.open("rb", buffering=0) as file:
-                lines = file.read(self._bytes).split(b"\n")
-        except OSError:
-            return []
-        processors = (line for line in lines if line[:3] == b"cpu" and line[3:4].isdigit())
-        return [line for line in processors if len(words := line.split()) > _STEAL and words[_STEAL].isdigit()]
+        throttled_s = {str(file): one for file in self._quotas if (one := _throttled_s(file)) is not None}
+        return _Reading(read_stolen_s(self._stat), throttled_s)
 
 
 def _files_of_quotas(proc: Path, groups: Path) -> list[Path]:

@@ -40,7 +40,7 @@ def build(kind: type[T], document: Document, path: Path = ()) -> tuple[T | None,
     return None, sorted(_without_echoes(faults))
 
 
-def build_known(kind: type[T], document: Document, path: Path = ()) -> T | None:
+def build_known(kind: type[T], document: Document, path: Path) -> T | None:
     """Return the dataclass at `path`, for cross-checks: keys that mean nothing there are left out, any other fault
     gives None."""
     value, faults = build(kind, document, path)

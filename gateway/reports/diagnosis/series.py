@@ -23,6 +23,11 @@ _LEAST_ALIKE: Final = 0.5  # of the mean product of two directions: 1 for the sa
 _GAP_STEPS: Final = 3.0
 _WELCH_ROWS: Final = 2048
 _CONSTANT: Final = 1e-9
+_MEAN_BINS: Final = 30
+_LEAST_ROWS: Final = 5  # of a bin whose mean is drawn
+_DEPENDENCE_BINS: Final = 20
+_SPECTRUM_BANDS: Final = 140
+_WINDOW_SHARE: Final = 0.08  # of a recording's length
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,17 +181,22 @@ class BinMeans:
     mean: Floats
 
 
-def bin_means(x: Floats, y: Floats, bins: int = 30, least: int = 5) -> BinMeans:
-    """Return the means of y over equal bins of x that hold at least so many rows; NaN is left out."""
+def bin_means(x: Floats, y: Floats) -> BinMeans:
+    """Return the means of y over equal bins of x that hold enough rows; NaN is left out."""
     finite = np.isfinite(x) & np.isfinite(y)
     x, y = x[finite], y[finite]
     if x.size == 0 or is_constant(x):
         return BinMeans(np.zeros(0), np.zeros(0))
-    place = np.minimum(((x - x.min()) / (x.max() - x.min()) * bins).astype(np.int64), bins - 1)
-    count = np.bincount(place, minlength=bins)
-    full = count >= least
-    x_sum, y_sum = np.bincount(place, x, bins), np.bincount(place, y, bins)
+    place, count = _place_in_bins(x, _MEAN_BINS)
+    full = count >= _LEAST_ROWS
+    x_sum, y_sum = np.bincount(place, x, _MEAN_BINS), np.bincount(place, y, _MEAN_BINS)
     return BinMeans(x_sum[full] / count[full], y_sum[full] / count[full])
+
+
+def _place_in_bins(x: Floats, bins: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the number of the bin of each x, of equal bins from the least to the greatest, and how many each of them holds."""
+    place = np.minimum(((x - x.min()) / (x.max() - x.min()) * bins).astype(np.int64), bins - 1)
+    return place, np.bincount(place, minlength=bins)
 
 
 def is_constant(values: Floats) -> bool:
@@ -195,15 +205,14 @@ def is_constant(values: Floats) -> bool:
     return finite.size == 0 or float(np.ptp(finite)) <= _CONSTANT * max(1.0, float(np.abs(finite).max()))
 
 
-def dependence(x: Floats, y: Floats, bins: int = 20) -> float:
-    """Return the share of the variance of y that its mean over bins of x carries, 0..1."""
+def dependence(x: Floats, y: Floats) -> float:
+    """Return the share of the variance of y that its mean over bins of x carries, 0..1; 0 for a few rows."""
     finite = np.isfinite(x) & np.isfinite(y)
     x, y = x[finite], y[finite]
-    if x.size < 2 * bins or is_constant(x) or is_constant(y):
+    if x.size < 2 * _DEPENDENCE_BINS or is_constant(x) or is_constant(y):
         return 0.0
-    place = np.minimum(((x - x.min()) / (x.max() - x.min()) * bins).astype(np.int64), bins - 1)
-    count = np.bincount(place, minlength=bins)
-    mean = np.bincount(place, y, bins) / np.maximum(count, 1)
+    place, count = _place_in_bins(x, _DEPENDENCE_BINS)
+    mean = np.bincount(place, y, _DEPENDENCE_BINS) / np.maximum(count, 1)
     between = float(np.sum(count * (mean - y.mean()) ** 2))
     return between / (float(y.var()) * y.size)
 
@@ -221,10 +230,10 @@ def occupied_cells(
     return np.stack([place // cells[1], place % cells[1]], axis=1)
 
 
-def spectrum(time_s: Floats, values: Floats, points: int = 140) -> tuple[Floats, Floats]:
+def spectrum(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return (frequency Hz, amplitude density N/sqrt(Hz)) by Welch's method over the stretches without gaps.
 
-    The greatest of each of `points` bands that are equally wide on a logarithmic axis: no line is lost. Empty where no
+    The greatest of each of some bands that are equally wide on a logarithmic axis: no line is lost. Empty where no
     stretch is long enough. Rows are brought to equal steps by linear interpolation, which dampens the top of the band.
     """
     if time_s.size < 32:
@@ -241,11 +250,11 @@ def spectrum(time_s: Floats, values: Floats, points: int = 140) -> tuple[Floats,
         return np.zeros(0), np.zeros(0)
     spectra = [signal.welch(stretch, 1.0 / step_s, nperseg=rows, detrend="constant") for stretch in long_enough]
     power = np.average([density for _, density in spectra], axis=0, weights=[stretch.size for stretch in long_enough])
-    return _peak_per_band(np.asarray(spectra[0][0])[1:], np.sqrt(power)[1:], points)
+    return _peak_per_band(np.asarray(spectra[0][0])[1:], np.sqrt(power)[1:])
 
 
-def _peak_per_band(frequency_hz: Floats, density: Floats, points: int) -> tuple[Floats, Floats]:
-    edges = np.geomspace(frequency_hz[0], frequency_hz[-1] * (1.0 + 1e-9), points + 1)
+def _peak_per_band(frequency_hz: Floats, density: Floats) -> tuple[Floats, Floats]:
+    edges = np.geomspace(frequency_hz[0], frequency_hz[-1] * (1.0 + 1e-9), _SPECTRUM_BANDS + 1)
     band = np.searchsorted(edges, frequency_hz, side="right")
     starts = np.flatnonzero(np.diff(band, prepend=-1))
     peaks = np.maximum.reduceat(density, starts)
@@ -253,10 +262,10 @@ def _peak_per_band(frequency_hz: Floats, density: Floats, points: int) -> tuple[
     return frequency_hz[at], peaks
 
 
-def most_improved_window(residuals: TraceResiduals, share: float = 0.08) -> tuple[float, float]:
+def most_improved_window(residuals: TraceResiduals) -> tuple[float, float]:
     """Return (start, end), s, of the stretch in which the extended model gains most, or where the error is greatest."""
     time_s, before_n, after_n = residuals.time_s, residuals.before_n, residuals.after_n
-    span_s = share * float(time_s[-1] - time_s[0])
+    span_s = _WINDOW_SHARE * float(time_s[-1] - time_s[0])
     gain = np.nan_to_num(before_n**2 - after_n**2)
     if not np.any(gain > 0.0):
         gain = np.nan_to_num(before_n**2)

@@ -34,12 +34,11 @@ from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
-from gateway.service.running_rig.rate_warnings import LineNoise, SlowLoop
+from gateway.service.running_rig.rate_warnings import LineNoise, RateWarnings, SlowLoop
 from gateway.service.running_rig.recording.recorded_row import row_of
 from gateway.service.running_rig.recording.recordings import Recordings
 
 _FRESH_PERIODS: Final = 1.05  # a tick decides nothing so soon after a sample or a command; more than 1: a cell's jitter
-_ENDING: Final = int(WarningBit.SERIAL_NOISE | WarningBit.SLOW_LOOP)
 _RESTARTED: Final = int(WarningBit.RESTARTED)
 _LONG_SILENCE_S: Final = 0.03  # a shorter one needs no explanation
 _LONGEST_SILENCE_S: Final = 10.0  # then it is no hiccup any more
@@ -90,7 +89,6 @@ class ControlLoop:
         self.valve: ValveExchange | None = None
         self.cell_lost = False
         self.owner_connected = self.is_watched = True  # is_watched: a loop that stands still is noticed
-        self.warnings = WarningBit(0)
         self.restart_cause = FaultCode.NONE
         self.residual_cause = ResidualCause.NONE
         self.plant_id = 0
@@ -100,8 +98,12 @@ class ControlLoop:
         self.last_tick = LastTick(process.suspended_s)
         self._heard_s = -inf
         self._fresh_s = _FRESH_PERIODS * process.period_s
-        self._slow_loop = SlowLoop(process.period_s, process.lateness.withheld if process.lateness else None)
-        self._cell_noise, self._output_noise = LineNoise("load cell's", cell.unread.explain), LineNoise("output's")
+        self.warnings = RateWarnings(
+            SlowLoop(process.period_s, process.lateness.withheld if process.lateness else None),
+            LineNoise("load cell's", cell.unread.explain),
+            LineNoise("output's"),
+            lambda sentence: process.log("rate", sentence),
+        )
         bank.on_command = self._on_command
         bank.on_asked = self._on_asked
 
@@ -121,8 +123,7 @@ class ControlLoop:
         """Take bytes of the load cell; a complete sample makes control decide at once."""
         fresh = False
         messages = self._cell.receive(chunk, now_s)
-        is_late = self._slow_loop.is_on and not self._cell.is_stream
-        self._begin(WarningBit.SERIAL_NOISE, self._cell_noise.hear(messages, now_s, is_late))
+        self.warnings.hear_cell(messages, now_s, is_stream=self._cell.is_stream)
         for message in messages:
             if isinstance(message, ForceSample):
                 self.sample, fresh = message, True
@@ -138,8 +139,7 @@ class ControlLoop:
 
     def on_output_bytes(self, chunk: bytes, now_s: float) -> None:
         """Take bytes of the output device."""
-        replies = self.output.on_bytes(chunk, now_s)
-        self._begin(WarningBit.SERIAL_NOISE, self._output_noise.hear(replies, now_s, self._slow_loop.is_on))
+        self.warnings.hear_output(self.output.on_bytes(chunk, now_s), now_s)
 
     def on_valve_bytes(self, chunk: bytes, now_s: float) -> None:
         """Take bytes of the valve's relay."""
@@ -164,8 +164,7 @@ class ControlLoop:
         expirations: periods since the last call, more than one when the loop missed some; late_s: lateness of this one."""
         self.health.count(expirations, late_s)
         now_s = self.clock()
-        self._begin(WarningBit.SLOW_LOOP, self._slow_loop.tick(now_s, expirations, late_s, self._used_since_tick))
-        self._end_warnings(now_s)
+        self.warnings.tick(now_s, expirations, late_s, self._used_since_tick)
         if now_s - self._heard_s > self._fresh_s or self.last_tick.suspended_s():
             self._step(now_s)
         self.output.tick(now_s)  # behind the decision: an idle question would hold up its voltage
@@ -181,24 +180,10 @@ class ControlLoop:
         """Time at which the newest sample came of its own accord, s; None of a cell that is asked: it would follow the tick."""
         return self.sample.time_s if self.sample and self._cell.is_stream else None
 
-    def _begin(self, bit: WarningBit, sentence: str) -> None:
-        if sentence:
-            self.warnings |= bit
-            self._log("rate", sentence)
-
-    def _end_warnings(self, now_s: float) -> None:
-        if not int(self.warnings) & _ENDING:
-            return
-        lasts = [line.lasts(now_s) for line in (self._cell_noise, self._output_noise)]
-        if self.warnings & WarningBit.SERIAL_NOISE and not any(lasts):
-            self.warnings &= ~WarningBit.SERIAL_NOISE
-        if self.warnings & WarningBit.SLOW_LOOP and not self._slow_loop.lasts(now_s):
-            self.warnings &= ~WarningBit.SLOW_LOOP
-
     def on_output_opened(self) -> None:
         """Forget what the output said before: the port has been opened again."""
         self.output.reset()
-        self._output_noise.forget()
+        self.warnings.forget_output()
         self.output_lost = FaultCode.NONE
 
     def on_output_closed(self) -> None:
@@ -214,7 +199,7 @@ class ControlLoop:
     def on_cell_opened(self) -> None:
         """Forget what the cell said before: the port has been opened again."""
         self._cell.reset()
-        self._cell_noise.forget()
+        self.warnings.forget_cell()
         self.cell_lost = False
 
     def _used_since_tick(self) -> ProcessorTime | None:
@@ -249,7 +234,7 @@ class ControlLoop:
             waited_s=self._waited_since_tick(late_s),  # for which the machine is to blame
             suspended_s=suspended_s,
             withheld=self._lateness.withheld() if self._lateness and late_s >= _LONG_SILENCE_S else (0.0, ""),
-            warnings=self.warnings,
+            warnings=self.warnings.bits,
             sent_v=output.sent_v,
             wire_s=output.round_trip_s,
             cell_held=self._processor_held(self.sample.time_s if self.sample else None, now_s),

@@ -4,7 +4,7 @@ calibration or a plant that is another one now (their files are gone, say) is to
 start knows only what it finds.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
@@ -52,17 +52,3 @@ class Handover:
             return changed
         off = f"the cell reads {abs(zero_n):.2f} N {'more' if zero_n > 0.0 else 'less'} than before it"
         return (*changed, f"W250 the tare before the restart is forgotten, and {off}: tare again before you press")
-
-
-class KeptZero:
-    """The zero of the last tare, for the process behind this one to tell. keep: with the guardian."""
-
-    def __init__(self, keep: Callable[..., None]) -> None:
-        self._keep = keep
-        self._kept_n: float | None = None
-
-    def follow(self, zero_n: float) -> None:
-        """Keep it where it has changed; at each tick. zero_n: force of the cell that is taken for none."""
-        if zero_n != self._kept_n:
-            self._kept_n = zero_n
-            self._keep(zero_n=zero_n)

@@ -12,6 +12,8 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from gateway.codes.explanation import BUSY_CURE, is_cause
+from gateway.codes.warning_bits import WarningBit
 from gateway.devices.messages import Garbage
 from gateway.processes.scheduling.scheduler_counters import ProcessorTime
 
@@ -26,8 +28,8 @@ _NOISE: Final = (
 _BUSY: Final = (
     "our own loop is late (A342), which tears answers, too: end other programs, or `run --realtime`, then look again"
 )
+_ENDING: Final = int(WarningBit.SERIAL_NOISE | WarningBit.SLOW_LOOP)
 _NONE_READ: Final = "none could be read: another speed, another device or profile? force-gateway check the rig"
-_HALF: Final = 0.5
 
 
 class _RecentSums:
@@ -131,7 +133,7 @@ class SlowLoop(_RateWarning):
         bound = _ms(LATE_PERIODS * self._period_s)
         observation = f"{missed:.0f} of {ticks:.0f} ticks within {WINDOW_S:g} s were missed or over {bound} late"
         withheld_s, by_whom = self._withheld() if self._withheld else (0.0, "")
-        if withheld_s >= _HALF * spent_s[0]:
+        if is_cause(withheld_s, spent_s[0]):
             return f"A342 {observation}, {_ms(spent_s[0])} in all: {by_whom}"
         return f"A342 {observation}, {_cause_of_lateness(*spent_s, is_counted=used is not None)}"
 
@@ -141,12 +143,58 @@ def _cause_of_lateness(late_s: float, waited_s: float, ran_s: float, *, is_count
     if not is_counted:
         return f"{_ms(late_s)} in all, not counted why: end other programs, or `run --realtime`"
     times_text = f"{_ms(late_s)} in all, {_ms(waited_s)} of them waiting for a processor, {_ms(ran_s)} at work"
-    if waited_s >= _HALF * late_s:
-        return f"{times_text}: the machine is too busy; end other programs, or `run --realtime`"
-    if ran_s >= _HALF * late_s:
+    if is_cause(waited_s, late_s):
+        return f"{times_text}: {BUSY_CURE}"
+    if is_cause(ran_s, late_s):
         return f"{times_text}: the gateway's own work takes too long here; a slower loop_hz, fewer clients, or a faster machine"
     return f"{times_text}: this machine stood still or slept (a virtual one on a busy host, a CPU in deep sleep)"
 
 
 def _ms(seconds: float) -> str:
     return f"{seconds * 1e3:.0f} ms"
+
+
+class RateWarnings:
+    """Those of one rig. bits: the warnings that are on, those among them that others have set and that stay; tell: a sentence
+    when one begins; slow_loop, cell, output: where their ticks and messages are counted."""
+
+    def __init__(self, slow_loop: SlowLoop, cell: LineNoise, output: LineNoise, tell: Callable[[str], None]) -> None:
+        self.bits = WarningBit(0)
+        self._slow_loop, self._cell, self._output, self._tell = slow_loop, cell, output, tell
+
+    def hear_cell(self, messages: Sequence[object], now_s: float, *, is_stream: bool) -> None:
+        """Count messages of the load cell. is_stream: they come of their own accord, and a slow loop tears none."""
+        is_late = self._slow_loop.is_on and not is_stream
+        if sentence := self._cell.hear(messages, now_s, is_late):
+            self._begin(WarningBit.SERIAL_NOISE, sentence)
+
+    def hear_output(self, messages: Sequence[object], now_s: float) -> None:
+        """Count answers of the output device."""
+        if sentence := self._output.hear(messages, now_s, self._slow_loop.is_on):
+            self._begin(WarningBit.SERIAL_NOISE, sentence)
+
+    def tick(
+        self, now_s: float, expirations: int, late_s: float, processor_time: Callable[[], ProcessorTime | None]
+    ) -> None:
+        """Count a tick of the loop, as `SlowLoop.tick` has it, and end what is over."""
+        if sentence := self._slow_loop.tick(now_s, expirations, late_s, processor_time):
+            self._begin(WarningBit.SLOW_LOOP, sentence)
+        if not int(self.bits) & _ENDING:
+            return
+        lasts = [line.lasts(now_s) for line in (self._cell, self._output)]
+        if self.bits & WarningBit.SERIAL_NOISE and not any(lasts):
+            self.bits &= ~WarningBit.SERIAL_NOISE
+        if self.bits & WarningBit.SLOW_LOOP and not self._slow_loop.lasts(now_s):
+            self.bits &= ~WarningBit.SLOW_LOOP
+
+    def forget_cell(self) -> None:
+        """Begin anew with the load cell's line."""
+        self._cell.forget()
+
+    def forget_output(self) -> None:
+        """Begin anew with the output's line."""
+        self._output.forget()
+
+    def _begin(self, bit: WarningBit, sentence: str) -> None:
+        self.bits |= bit
+        self._tell(sentence)

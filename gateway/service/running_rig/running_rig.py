@@ -35,7 +35,7 @@ from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
 from gateway.service.running_rig.faces.faces import Faces
-from gateway.service.running_rig.handover import Handover, KeptZero
+from gateway.service.running_rig.handover import Handover
 from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.lines.device_checks import DeviceChecks
 from gateway.service.running_rig.lines.load_cell_line import CellExchange
@@ -71,7 +71,6 @@ class RunningRig:
         self._rig = rig = self._plants.rig
         self._calibration, self._state = rig.calibration, state
         self._guardian, self._log = guardian, log
-        self._zero = KeptZero(guardian.keep)
         self._shutdown_marker = CleanShutdownMarker(state)
         self._spoke = asyncio.Event()
         self._running: dict[str, Any] = {
@@ -167,7 +166,7 @@ class RunningRig:
         self.loop.valve, self.loop.restart_cause = self._valve_line, cause
         self._ports.loop, self.loop.pressure_pa_per_v = self.loop, rig.output.device.pressure_pa_per_v
         self.loop.recordings, self.loop.ring = self._recordings, self.ring
-        self.loop.warnings = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
+        self.loop.warnings.bits = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
 
     async def start(self, bind: list[Any] | None, handover: Handover, *, restarted: Ending | None) -> banner.Ready:
         """Open the ports, greet both devices, then serve Modbus: nobody is answered before there is an answer."""
@@ -292,7 +291,7 @@ class RunningRig:
         self._recordings.flush(now_s)
         self._calibration_runs.flush(now_s)
         self._plants.take_waiting()
-        self._zero.follow(self.controller.zero_n)
+        self._guardian.keep(zero_n=self.controller.zero_n)
         self._audit.flush()
         self._tick.follow(self.loop.streamed_s)
         if self._line.acknowledged_v is not None and self.loop.sample is not None:

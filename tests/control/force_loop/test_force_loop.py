@@ -32,7 +32,8 @@ def loop_of(rig: ControlSettings | None = None, timing: TimingCompensation | Non
 
 
 def wish(force_n: float, **changes: float) -> Demand:
-    return demand_of(Command(force_setpoint_n=force_n), settings())._replace(**changes)  # type: ignore[arg-type]
+    asked = demand_of(Command(force_setpoint_n=force_n), settings())
+    return asked._replace(manner=asked.manner._replace(**changes))
 
 
 def inputs(contact_n: float, **changes: object) -> LoopInputs:

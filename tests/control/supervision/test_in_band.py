@@ -14,9 +14,11 @@ WAIT, MOVE, SETTLE = StateEvent.WAIT, StateEvent.MOVE, StateEvent.SETTLE
 UNREACHABLE_S = 2.0
 
 
-def demand(force_n: float = 10.0, voltage_v: float = 3.0) -> Demand:
+def demand(force_n: float = 10.0, voltage_v: float = 3.0, **manner: float) -> Demand:
     asked = demand_of(Command(force_setpoint_n=force_n), settings())
-    return asked._replace(voltage_v=voltage_v, tolerance_n=1.0, in_band_time_s=0.25)
+    return asked._replace(
+        voltage_v=voltage_v, manner=asked.manner._replace(**{"tolerance_n": 1.0, "in_band_time_s": 0.25} | manner)
+    )
 
 
 def at(now_s: float, contact_n: float = 10.0, *, touching: bool = True, expected_n: float = 10.0) -> LoopInputs:
@@ -96,7 +98,7 @@ def test_a_force_that_does_not_go_along_with_a_long_ramp_is_unreachable_before_i
     contact_n: float, touching: bool, is_unreachable: bool
 ) -> None:
     """Air failed on a ramp of 1 N/s: 30 N short at its end, half a minute later, and nothing was told."""
-    check, slow = SettlingCheck(UNREACHABLE_S), demand(40.0)._replace(ramp_n_per_s=1.0)
+    check, slow = SettlingCheck(UNREACHABLE_S), demand(40.0, ramp_n_per_s=1.0)
     for now_s, applied_n in ((0.0, 5.0), (UNREACHABLE_S, 6.0)):
         check.judge_force(slow, at(now_s, contact_n, touching=touching), 40.0, applied_n)
     assert check.unreachable is is_unreachable
@@ -117,7 +119,7 @@ def test_noise_does_not_hide_a_force_that_is_off_and_makes_none_of_one_that_is_n
 
 
 def test_what_has_gone_along_with_a_ramp_still_has_to_be_held_at_its_end() -> None:
-    check, slow = SettlingCheck(UNREACHABLE_S), demand()._replace(ramp_n_per_s=1.0)
+    check, slow = SettlingCheck(UNREACHABLE_S), demand(ramp_n_per_s=1.0)
     for now_s in (0.0, 1.0):
         assert check.judge_force(slow, at(now_s, 7.0), 10.0, 7.0) is MOVE
     assert check.judge_force(slow, at(2.0), 10.0, 10.0) is MOVE and not check.in_band
@@ -177,7 +179,7 @@ def test_a_voltage_settles_where_it_is_out_and_not_on_its_way_or_at_none() -> No
 def test_a_force_whose_single_readings_leave_the_band_is_noisy_and_one_that_must_stay_in_it_for_long_is_not(
     swing_n: float, in_band_time_s: float, is_noisy: bool
 ) -> None:
-    check, asked = SettlingCheck(UNREACHABLE_S), demand()._replace(in_band_time_s=in_band_time_s)
+    check, asked = SettlingCheck(UNREACHABLE_S), demand(in_band_time_s=in_band_time_s)
     seen = []
     for k in range(700):
         reading = Reading(contact_n=10.0 + (-1) ** k * swing_n, is_new=True, is_usable=True, interval_s=0.01)

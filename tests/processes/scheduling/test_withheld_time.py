@@ -54,6 +54,20 @@ def test_the_processor_that_was_away_longest_counts_and_what_was_before_does_not
     assert counter.lately()[0] == 0.0
 
 
+def test_a_processor_that_is_taken_out_or_put_in_meanwhile_has_taken_nothing_from_the_others(machine: Machine) -> None:
+    """`echo 0 > /sys/devices/system/cpu/cpu1/online`: its line is gone then, and the next one stands in its place."""
+    stat = machine.folder / "stat"
+    all_three = "cpu0 5 0 5 5 0 0 0 700 0 0\ncpu1 4 0 4 4 0 0 0 41 0 0\ncpu2 4 0 4 4 0 0 0 {} 0 0\n"
+    stat.write_text(all_three.format(900))
+    counter = machine.counter()
+    stat.write_text("".join(line for line in all_three.format(905).splitlines(True) if "cpu1" not in line))
+    assert counter.lately()[0] == pytest.approx(0.05), "not the 8.64 s by which cpu2 is ahead of cpu1"
+    counter.note(100.0)
+    counter.note(101.0)
+    stat.write_text(all_three.format(905))
+    assert counter.lately()[0] == 0.0
+
+
 def test_the_kernel_is_asked_once_a_second(machine: Machine) -> None:
     counter = machine.counter()
     for tick in range(150):

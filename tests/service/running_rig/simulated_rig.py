@@ -71,6 +71,7 @@ class Samples:
 
     identity = SimpleNamespace(fault=FaultCode.NONE, said="")
     unread = SimpleNamespace(explain=lambda line: "")
+    is_stream = True
 
     def __init__(self) -> None:
         self.next: ForceSample | None = None

@@ -14,7 +14,7 @@ from gateway.recording import list_recordings
 from gateway.recording.label import RecordingLabel, label_of
 from gateway.registers import Refusal
 from gateway.registers.words import ControlBit, State
-from gateway.service.running_rig.handover import Handover, KeptZero
+from gateway.service.running_rig.handover import Handover
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 from gateway.service.running_rig.running_rig import RunningRig
@@ -144,14 +144,6 @@ def test_a_tare_that_a_restart_has_forgotten_is_told_once(devices: OwnDevices, z
         for line in lines
     )
     assert kept["zero_n"] == 0.0 and Handover(kept, record=False).changes() == ()
-
-
-def test_the_zero_is_kept_whenever_it_changes() -> None:
-    kept: list[float] = []
-    zero = KeptZero(lambda zero_n: kept.append(zero_n))
-    for zero_n in (0.0, 0.0, 8.3, 8.3, 0.0):
-        zero.follow(zero_n)
-    assert kept == [0.0, 8.3, 0.0]
 
 
 def test_the_port_of_each_tls_face_is_left_to_the_next_process(devices: OwnDevices) -> None:

@@ -80,7 +80,7 @@ def test_masters_do_not_wait_after_a_restart_for_a_device_that_is_silent(devices
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         assert rig.loop.restart_cause is FaultCode.MACHINE_BUSY
-        assert rig.loop.warnings & WarningBit.NO_WATCHDOG, "after a restart too"
+        assert rig.loop.warnings.bits & WarningBit.NO_WATCHDOG, "after a restart too"
 
     began_s = time.monotonic()
     with_running_rig(devices, scene, Ending(EndCause.MACHINE_BUSY, "anything"))

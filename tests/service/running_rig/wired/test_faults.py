@@ -107,7 +107,7 @@ class InKilograms:
     def __init__(self, line: CellExchange) -> None:
         self._line = line
         self.tick, self.identity, self.counts = line.tick, line.identity, line.counts
-        self.clear_faults, self.says = line.clear_faults, line.says
+        self.clear_faults, self.says, self.is_stream = line.clear_faults, line.says, line.is_stream
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage]:
         heard = self._line.receive(chunk, now_s)
