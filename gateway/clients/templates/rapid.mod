@@ -502,7 +502,8 @@ ${status_decoding}
     nStatus:=nWords{FG_S_STATUS_WORD};
     fgEnabled:=FgHasBit(nStatus,FG_IS_ENABLED);
     fgReady:=FgHasBit(nStatus,FG_IS_READY);
-    fgInBand:=FgHasBit(nStatus,FG_IS_IN_BAND);
+    ! Not the force that another master holds
+    fgInBand:=FgIsOn() AND FgHasBit(nStatus,FG_IS_IN_BAND);
     fgFault:=FgHasBit(nStatus,FG_HAS_FAULT);
   ENDPROC
 
