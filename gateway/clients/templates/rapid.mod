@@ -299,7 +299,7 @@ ${crc_table}];
       fgTake:=FALSE;
     ENDIF
     ! A reset needs force 0: an enable beside it waits for its answer
-    IF fgEnable AND (NOT FgHasBit(nOnce,FG_RESET_FAULT)) THEN
+    IF fgEnable AND FgMayEnable() THEN
       IF NOT FgIsOn() fgText:="";
       nWant{FG_C_CONTROL_WORD}:=FG_ENABLE;
       IF fgPull nWant{FG_C_CONTROL_WORD}:=FG_ENABLE+FG_VALVE_PULL;
@@ -313,17 +313,27 @@ ${crc_table}];
 
   ! T_ROB1 stands: this task must not keep its force up
   LOCAL PROC FgWatchProgram()
+    VAR num nLongest;
+    nLongest:=FG_QUIET;
+    ! An enable right behind a start waits for the timer of T_ROB1
+    IF fgEnable AND (NOT FgIsOn()) nLongest:=2*FG_QUIET;
     IF fgAlive<>nAlive THEN
       nAlive:=fgAlive;
       nQuiet:=0;
-    ELSEIF nQuiet<FG_QUIET THEN
+    ELSEIF nQuiet<nLongest THEN
       nQuiet:=nQuiet+1;
     ELSEIF fgEnable THEN
+      nQuiet:=FG_QUIET;
       fgEnable:=FALSE;
       fgEnded:=TRUE;
       fgText:="off: T_ROB1 does not count fgAlive";
     ENDIF
   ENDPROC
+
+  LOCAL FUNC bool FgMayEnable()
+    IF FgHasBit(nOnce,FG_RESET_FAULT) RETURN FALSE;
+    RETURN FgIsOn() OR nQuiet<FG_QUIET;
+  ENDFUNC
 
   ! PackRawBytes takes whole numbers of 16 bits only
   LOCAL PROC FgCheckCommand()
