@@ -100,6 +100,7 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   PERS bool fgConnected:=FALSE;
   PERS bool fgEnabled:=FALSE;
   PERS bool fgReady:=FALSE;
+  ! Of the force that this client holds, no other master's
   PERS bool fgInBand:=FALSE;
   PERS bool fgFault:=FALSE;
   PERS bool fgEnded:=FALSE;
@@ -117,6 +118,8 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   ! with  CONST num nRisingB{3}:=[0,20.5,60];
   ! fgUpload:=TRUE sends it, a part per cycle, and goes FALSE when it
   ! is done: fgUploaded, or fgText says why not.
+  ! The sums of a part may take longer than a lease: upload while
+  ! nothing is enabled.
   PERS num fgSet{${set_words}}:=[${set_zeros}];
   PERS num fgSlot:=0;
   PERS bool fgUpload:=FALSE;
@@ -512,7 +515,6 @@ ${status_decoding}
     nStatus:=nWords{FG_S_STATUS_WORD};
     fgEnabled:=FgHasBit(nStatus,FG_IS_ENABLED);
     fgReady:=FgHasBit(nStatus,FG_IS_READY);
-    ! Not the force that another master holds
     fgInBand:=FgIsOn() AND FgHasBit(nStatus,FG_IS_IN_BAND);
     fgFault:=FgHasBit(nStatus,FG_HAS_FAULT);
   ENDPROC
