@@ -72,7 +72,7 @@ def test_a_task_beside_the_motion_program_keeps_no_force_up_when_that_program_st
 def test_a_task_beside_a_motion_program_that_shows_no_life_enables_nothing() -> None:
     gateway = GatewayAtHand(MAP)
     client = Irc5(TEXTS["rapid"], gateway)
-    client.serve(5, lambda: client.enable(12.0))
+    client.serve(20, lambda: client.enable(12.0))
     assert gateway.writes == [] and client.ended and "fgAlive" in client.text
 
 

@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from gateway.modbus import Peer
+from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
-from tests.clients.scenes import cycles
+from tests.clients.scenes import TEXTS, cycles
 
 OTHER = Peer("10.0.0.7", 40001)
 
@@ -184,3 +185,30 @@ def test_a_pull_and_a_tare_go_out_while_the_force_stands(client: Any, gateway: G
     cycles(client)
     assert 21 in [words[0] for words in gateway.words] and gateway.bank.command.force_setpoint_n == 13.0
     assert client.enabled and not client.ended and not gateway.exceptions
+
+
+@pytest.mark.parametrize("language", ["rapid", "urscript"])
+def test_a_force_that_another_master_holds_is_not_in_band_for_a_robot_whose_enable_was_refused(
+    language: str, gateway: GatewayAtHand
+) -> None:
+    """Its program waited for that bit alone, and went to the part under the other one's force."""
+    robot = CONTROLLERS[language](TEXTS[language], gateway)
+    gateway.take_over_from_elsewhere()
+    cycles(robot)
+    robot.enable(12.0)
+    assert not is_in_band(robot), "before its own enable is sent"
+    cycles(robot)
+    assert not is_in_band(robot) and "W210" in robot.text
+    gateway.stop_from_elsewhere()
+    robot.machine.start("fg_take_ownership") if language == "urscript" else robot.set(fgTake=True)
+    cycles(robot)
+    robot.enable(12.0)
+    cycles(robot)
+    assert is_in_band(robot) and gateway.bank.command.force_setpoint_n == 12.0
+
+
+def is_in_band(robot: Any) -> bool:
+    """What its program waits for behind an enable."""
+    if isinstance(robot, Irc5):
+        return bool(robot.get("fgInBand"))
+    return bool(robot.machine.start("fg_wait_in_band", 0.1))

@@ -83,6 +83,20 @@ def test_a_register_of_ones_own_that_a_language_cannot_name_is_told(
             assert name in render_client(own, language, WHERE).lower()
 
 
+@pytest.mark.parametrize(("name", "is_told"), [("written_to_disk_by_now", False), ("written_to_the_disk_now", True)])
+def test_a_value_of_ones_own_that_rapid_cannot_name_is_told(name: str, is_told: bool, tmp_path: Path) -> None:
+    """FG_COMMIT_ and 23 characters: the controller loads no module with an identifier of 33."""
+    own = own_map(tmp_path, "values: commit_status,", f"values: {{2: {name}, 3: committed, 4: failed}},")
+    if is_told:
+        with pytest.raises(
+            UnspeakableNameError, match=f"^map own: {name} has 23 characters, and rapid has room for 22: "
+        ):
+            render_client(own, "rapid", WHERE)
+    else:
+        text = render_client(own, "rapid", WHERE)
+        assert max(map(len, re.findall(r"\bFG_\w+", text))) == len(f"FG_COMMIT_{name}") == 32
+
+
 def test_a_status_block_that_one_request_cannot_read_is_told(tmp_path: Path) -> None:
     """The gateway would refuse each read of it, and the client take that for a loss."""
     text = (PROFILES / "registers" / "force-v1.yaml").read_text()

@@ -146,3 +146,42 @@ def test_a_disable_at_any_place_of_an_exchange_takes_the_force_off(language: str
 
     for client, gateway in every_place(language, prepare, [lambda client: client.disable()]):
         assert gateway.bank.command.control_word == 0 and not client.enabled and not client.ended
+
+
+@pytest.mark.parametrize("late", [1, 3, 5])
+def test_an_enable_right_behind_a_start_of_the_program_waits_for_its_timer(late: int, gateway: GatewayAtHand) -> None:
+    """A breakpoint before it, or a stop: the timer interrupt of T_ROB1 comes up to 0.1 s behind that line, which was told
+    'T_ROB1 does not count fgAlive'. late: pauses of T_FORCE until it comes."""
+    client = CONTROLLERS["rapid"](TEXTS["rapid"], gateway)
+    pauses: list[int] = []
+
+    def go_on_from_a_breakpoint() -> None:
+        pauses.append(int(gateway.bank.command.control_word))
+        if len(pauses) == 30:
+            client.enable(12.0)
+        if len(pauses) >= 30 + late:
+            client.set(fgAlive=(client.get("fgAlive") + 1) % 1000)
+
+    client.serve(45, go_on_from_a_breakpoint)
+    assert not any(pauses[: 30 + late]), "nothing before the program shows that it runs"
+    assert client.enabled and not client.ended and gateway.bank.command.force_setpoint_n == 12.0
+
+
+def test_a_program_that_stands_right_behind_its_enable_begins_nothing_and_one_that_stands_longer_ends(
+    gateway: GatewayAtHand,
+) -> None:
+    client = CONTROLLERS["rapid"](TEXTS["rapid"], gateway)
+    held: list[int] = []
+    told: list[bool] = []
+
+    def stand_but_from_the_60th_to_the_80th_pause() -> None:
+        held.append(int(gateway.bank.command.control_word))
+        told.append(client.ended and not client.get("fgEnable") and "fgAlive" in client.text)
+        if len(held) in (20, 60):
+            client.enable(12.0)
+        if 60 <= len(held) < 80 or len(held) > 110:
+            client.set(fgAlive=(client.get("fgAlive") + 1) % 1000)
+
+    client.serve(130, stand_but_from_the_60th_to_the_80th_pause)
+    assert told[58] and told[-1]
+    assert not any(held[:60]) and all(held[62:80]) and not any(held[95:]), held

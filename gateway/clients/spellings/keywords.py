@@ -1,11 +1,11 @@
-"""Names of registers that a language cannot have: too long, or its own. A map of the user's may have registers of its own."""
+"""Names that a language cannot have: too long, or its own. A map of the user's may have names of its own."""
 
 from collections.abc import Iterator
 from typing import Final
 
 from gateway.clients.exchange import ExchangeTable
 
-_LONGEST: Final = {"rapid": 32 - len("FG_S_")}  # of an identifier, behind what the client sets before it
+_LONGEST: Final = {"rapid": 32}  # of an identifier, with what the client sets before a name
 _KEYWORDS: Final = {
     "st": "abs action and any array at bool by byte case configuration constant date dint do dt dword else "
     "elsif end exit false for from function goto if int interface lint lreal lword method mod not of on "
@@ -25,10 +25,21 @@ _KEYWORDS: Final = {
 
 
 def unspeakable(table: ExchangeTable, language: str) -> Iterator[str]:
-    """Yield in a sentence each register of the command or the status that this language cannot name."""
-    longest, keywords = _LONGEST.get(language), _KEYWORDS.get(language, "").split()
+    """Yield in a sentence each name of the map that this language cannot have."""
+    if longest := _LONGEST.get(language):
+        for before, name in _constants(table):
+            if len(name) > (room := longest - len(before)):
+                yield f"{name} has {len(name)} characters, and {language} has room for {room}"
     for register in (*table.command, *table.status):
-        if longest and len(register.name) > longest:
-            yield f"{register.name} has {len(register.name)} characters, and {language} has room for {longest}"
-        elif register.name in keywords:
+        if register.name in _KEYWORDS.get(language, "").split():
             yield f"{register.name} is a word of {language} itself"
+
+
+def _constants(table: ExchangeTable) -> Iterator[tuple[str, str]]:
+    """Yield each name of the map that becomes a constant, behind what the client sets before it."""
+    yield from (("FG_S_", register.name) for register in (*table.command, *table.status))
+    yield from (("FG_M_", each.name) for each in table.model_fields)
+    yield from (
+        ("FG_", name) for word in ("control_word", "status_word") for name in table.map.find(word).bits.values()
+    )
+    yield from (("FG_COMMIT_", name) for name in table.at("commit_status", "staging").values.values())

@@ -100,6 +100,7 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   PERS bool fgConnected:=FALSE;
   PERS bool fgEnabled:=FALSE;
   PERS bool fgReady:=FALSE;
+  ! Of the force that this client holds, no other master's
   PERS bool fgInBand:=FALSE;
   PERS bool fgFault:=FALSE;
   PERS bool fgEnded:=FALSE;
@@ -117,6 +118,8 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   ! with  CONST num nRisingB{3}:=[0,20.5,60];
   ! fgUpload:=TRUE sends it, a part per cycle, and goes FALSE when it
   ! is done: fgUploaded, or fgText says why not.
+  ! The sums of a part may take longer than a lease: upload while
+  ! nothing is enabled.
   PERS num fgSet{${set_words}}:=[${set_zeros}];
   PERS num fgSlot:=0;
   PERS bool fgUpload:=FALSE;
@@ -299,7 +302,7 @@ ${crc_table}];
       fgTake:=FALSE;
     ENDIF
     ! A reset needs force 0: an enable beside it waits for its answer
-    IF fgEnable AND (NOT FgHasBit(nOnce,FG_RESET_FAULT)) THEN
+    IF fgEnable AND FgMayEnable() THEN
       IF NOT FgIsOn() fgText:="";
       nWant{FG_C_CONTROL_WORD}:=FG_ENABLE;
       IF fgPull nWant{FG_C_CONTROL_WORD}:=FG_ENABLE+FG_VALVE_PULL;
@@ -313,17 +316,27 @@ ${crc_table}];
 
   ! T_ROB1 stands: this task must not keep its force up
   LOCAL PROC FgWatchProgram()
+    VAR num nLongest;
+    nLongest:=FG_QUIET;
+    ! An enable right behind a start waits for the timer of T_ROB1
+    IF fgEnable AND (NOT FgIsOn()) nLongest:=2*FG_QUIET;
     IF fgAlive<>nAlive THEN
       nAlive:=fgAlive;
       nQuiet:=0;
-    ELSEIF nQuiet<FG_QUIET THEN
+    ELSEIF nQuiet<nLongest THEN
       nQuiet:=nQuiet+1;
     ELSEIF fgEnable THEN
+      nQuiet:=FG_QUIET;
       fgEnable:=FALSE;
       fgEnded:=TRUE;
       fgText:="off: T_ROB1 does not count fgAlive";
     ENDIF
   ENDPROC
+
+  LOCAL FUNC bool FgMayEnable()
+    IF FgHasBit(nOnce,FG_RESET_FAULT) RETURN FALSE;
+    RETURN FgIsOn() OR nQuiet<FG_QUIET;
+  ENDFUNC
 
   ! PackRawBytes takes whole numbers of 16 bits only
   LOCAL PROC FgCheckCommand()
@@ -502,7 +515,7 @@ ${status_decoding}
     nStatus:=nWords{FG_S_STATUS_WORD};
     fgEnabled:=FgHasBit(nStatus,FG_IS_ENABLED);
     fgReady:=FgHasBit(nStatus,FG_IS_READY);
-    fgInBand:=FgHasBit(nStatus,FG_IS_IN_BAND);
+    fgInBand:=FgIsOn() AND FgHasBit(nStatus,FG_IS_IN_BAND);
     fgFault:=FgHasBit(nStatus,FG_HAS_FAULT);
   ENDPROC
 
