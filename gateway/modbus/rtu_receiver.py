@@ -316,7 +316,7 @@ class RtuReceiver:
             return at
         if len(frame) == 1 or self._echo.frame.startswith(frame):
             return beyond
-        lengths: list[int | None] = []
+        lengths: list[int | None] = [_DIAGNOSTICS_BYTES] if frame[1] == DIAGNOSTICS and unit != BROADCAST_UNIT else []
         if has_request_length(frame[1]) and (unit != BROADCAST_UNIT or is_broadcast_function(frame[1])):
             lengths.append(request_length(frame))
         if unit not in (self._unit, BROADCAST_UNIT) and has_answer_length(frame[1]):

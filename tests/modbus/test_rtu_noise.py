@@ -8,6 +8,7 @@ from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.crc import crc16
 from gateway.modbus.rtu import encode_adu
 from gateway.modbus.rtu_receiver import MOST_BYTES, RtuReceiver, RtuRequest
+from tests.modbus.host_answers import loopback_request
 from tests.modbus.rtu_bus import SILENCE_S, Bus
 from tests.modbus.test_rtu_receiver import COMMAND, OURS, READ, WRITE, answered, registers_answer
 from tests.modbus.test_rtu_receiver_limits import known
@@ -42,6 +43,13 @@ def test_noise_that_could_have_been_just_as_long_is_not_waited_for() -> None:
 
 def test_the_last_byte_of_noise_may_begin_a_request() -> None:
     assert Bus().send(b"\xfe\xff" + OURS[:1], OURS[1:], pause_s=0.01).requests() == answered()
+
+
+@pytest.mark.parametrize("size", range(1, 8))
+def test_a_loopback_in_two_pieces_is_one_whatever_stands_at_the_end_of_the_first(size: int) -> None:
+    """A byte above 247 begins nothing, so that only the function tells that more is to come."""
+    request = encode_adu(1, loopback_request(b"\xff\xff"))
+    assert Bus().send(request[:size], request[size:], pause_s=0.016).requests() == answered(request[1:-2])
 
 
 def test_an_answer_under_our_own_number_is_no_request() -> None:
