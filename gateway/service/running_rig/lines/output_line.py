@@ -3,17 +3,16 @@
 A serial device at 9600 baud takes 15 ms for a setting and its echo, the loop decides every 4-10 ms: a queue would make the
 wire an ever older past. Setpoints go before polls; polls fill the idle wire and keep a silent device from going unnoticed:
 the pressure where the device measures it, else the setting that stands (both in turn where a setting is answered without its
-number), else, of a device that cannot be asked anything, the same setting once more. Time comes in as an argument, so that
-tests run it in virtual time.
+number), else, of a device that cannot be asked anything, the same setting once more. Time comes in as an argument.
 
 An answer may come after its time has run out, when the next question is already out, and a bare number does not say what
 it answers. Taken for the next question's, each following answer would be one behind for as long as the setpoint moves, and
 an honest device would look like one that alters its settings. So after a time-out an answer that repeats a setting which was
 given up answers that one, and what was asked last is still out. One that repeats neither is believed by nobody: the line is
-left alone for one reply time, then asked anew. A falling voltage never waits.
-After any of them the setting is read or sent anew: the device may have lost its power, and stand where it then begins.
-What a line that stands still has not sent of a given-up question is dropped: no older voltage goes out before the safe one.
-An answer that comes twice has the same effect: where an echo repeats the setting before, the line is left alone as well.
+left alone for one reply time, then asked anew. A falling voltage never waits. After any of them the setting is read or sent
+anew: the device may have lost its power, and stand where it then begins. What a line that stands still has not sent of a
+given-up question is dropped: no older voltage goes out before the safe one. An answer that comes twice has the same effect:
+where an echo repeats the setting before, the line is left alone as well.
 
 Between the first setting, which is the safe one, and any other stand the questions of device_checks. A watchdog is fed by a
 sentence that nobody answers. A device whose watchdog has tripped obeys no setting until it is cleared; it is told the safe
@@ -101,6 +100,7 @@ class OutputExchange:
         self._given_up.forget()
         self._is_overdue = False  # a question was given up, its answer may still come
         self._is_behind = False  # the answer to one of them came, that to the last question is out
+        self._patience_s = self._reply_timeout_s  # shorter where garbage came: behind a round trip that was the answer
         self._refused_v = nan  # a moment ago: perhaps the watchdog has tripped, which is asked before the next try
         self._is_altered = False  # the last echo was another voltage
         self._quiet_until_s = self._sent_s = self._next_poll_s = self._said_s = 0.0
@@ -152,8 +152,8 @@ class OutputExchange:
         return replies
 
     def tick(self, now_s: float) -> None:
-        """Give up waiting for an overdue answer and ask again; unanswered_since_s keeps the age of the silence."""
-        if self._in_flight is not None and now_s - self._sent_s > self._reply_timeout_s:
+        """Give up an answer that is overdue or was garbled, and ask again; unanswered_since_s keeps the age of the silence."""
+        if self._in_flight is not None and now_s - self._sent_s > self._patience_s:
             self._give_up(self._in_flight)
             if self.drop_unsent:
                 self.drop_unsent()
@@ -225,7 +225,7 @@ class OutputExchange:
         return not self.checks.is_tripped or voltage_v != self._asked_v or now_s >= self._next_poll_s
 
     def _send(self, request: OutputRequest, now_s: float) -> None:
-        self._in_flight, self._sent_s, self._is_behind = request, now_s, False
+        self._in_flight, self._sent_s, self._is_behind, self._patience_s = request, now_s, False, self._reply_timeout_s
         self._said_s = now_s if isinstance(request, SetVoltage) else self._said_s
         self.counts.asked += 1
         if self.unanswered_since_s is None:
@@ -236,6 +236,7 @@ class OutputExchange:
     def _on_reply(self, reply: OutputReply, now_s: float) -> None:
         if isinstance(reply, Garbage):
             self.counts.garbled += 1
+            self._patience_s = min(self._reply_timeout_s, self.round_trip_s)
             self._unread = explain_answer(reply.data, self._frame)
             if self._in_flight is None:  # unasked: that was it
                 self._is_overdue = False

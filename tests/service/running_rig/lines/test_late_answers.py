@@ -148,6 +148,21 @@ def test_garbage_before_a_late_answer_makes_it_none_of_the_next_question(wire: W
     assert wire.exchange.acknowledged_v == pytest.approx(200 * 10 / 1023)
 
 
+@pytest.mark.parametrize(("after_s", "is_asked"), [(0.005, False), (0.015, True)])
+def test_a_garbled_answer_is_asked_again_behind_a_round_trip_and_not_before(
+    wire: Wire, after_s: float, is_asked: bool
+) -> None:
+    """Three tries fit into the bound on silence: one spoiled answer and a loop that was 26 ms late dropped a held force."""
+    wire.settle(200)
+    wire.set_voltage(300)
+    wire.answer("3a0", after_s=0.006)
+    written = len(wire.written)
+    wire.tick(after_s)
+    assert len(wire.written) == written + is_asked
+    wire.answer("300", after_s=0.001)
+    assert wire.exchange.acknowledged_v == pytest.approx(300 * 10 / 1023)
+
+
 def test_a_device_that_is_silent_for_long_leaves_no_more_than_its_last_questions(wire: Wire) -> None:
     """Its answers come no more, and the first one behind days without power must not be held against a million."""
     wire.settle(200)
