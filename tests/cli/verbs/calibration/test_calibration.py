@@ -241,3 +241,9 @@ def test_a_slip_in_state_is_told_and_makes_no_directory(tmp_path, call, verb, co
     assert done.exit_code == code
     assert f"E106 {slip}: there is no such state directory; --state DIR names another" in done.stderr
     assert not slip.exists()
+
+
+def test_upload_of_a_number_tells_how_it_becomes_a_file(call):
+    done = call("upload", "2", "--gateway", "127.0.0.1:9")
+    assert done.exit_code == 65
+    assert "`force-gateway calibration export 2 --yaml FILE` makes a file of the stored calibration 2" in done.stderr
