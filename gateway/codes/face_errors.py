@@ -98,8 +98,8 @@ FACE_ERRORS: Final = (
     ),
     Explanation(
         "E172",
-        "private key of another certificate, or open to all",
-        "The key does not belong to the certificate, or everybody on this machine can read it.",
+        "private key of another certificate, or open to others",
+        "The key does not belong to the certificate, or everybody can use it, or its group change it (read it may).",
         "Files of two runs were mixed, or copied without their mode.",
         "Take the .crt and .key that were made together; chmod 600 the key.",
     ),

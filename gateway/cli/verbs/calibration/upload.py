@@ -66,7 +66,8 @@ def _load(file: str) -> "Calibration":
     try:
         return load_calibration(file)
     except ProfileError as error:
-        raise CliError(str(error), exit_codes.DATA) from None
+        cure = f"; `force-gateway calibration export {file} --yaml FILE` makes a file of the stored calibration {file}"
+        raise CliError(f"{error}{cure if file.isdecimal() else ''}", exit_codes.DATA) from None
 
 
 def _upload(calibration: "Calibration", register_map: "RegisterMap", options: dict[str, Any]) -> "UploadFrames":

@@ -141,9 +141,10 @@ def _unreadable(path: str, face: TlsFace) -> Found:
                 f"nobody is there to type it when the gateway starts: openssl pkey -in {file} -out NEW.key takes it off"
             )
             yield f"{path}.key", f"E174 {file} has a password, and {cure}"
-        if name == "key" and file.stat().st_mode & (stat.S_IRWXO | stat.S_IWGRP):
-            mode = f"{stat.S_IMODE(file.stat().st_mode):03o}"
-            yield f"{path}.key", f"E172 {file} can be used by everybody on this machine (mode {mode}): chmod 600 {file}"
+        mode = stat.S_IMODE(file.stat().st_mode)
+        if name == "key" and mode & (stat.S_IRWXO | stat.S_IWGRP):
+            by = "used by everybody on this machine" if mode & stat.S_IRWXO else "changed by its group"
+            yield f"{path}.key", f"E172 {file} can be {by} (mode {mode:03o}): chmod 600 {file}"
 
 
 def _cure(error: OSError) -> str:

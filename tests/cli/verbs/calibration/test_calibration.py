@@ -200,6 +200,7 @@ def test_a_state_of_a_rig_that_cannot_be_read_works_without_its_own_calibration(
 def test_where_the_rigs_own_is_not_known_the_list_says_so_and_whether_it_is_in_use(state, call, tmp_path):
     """A gateway of a file elsewhere was asked, and the answer was an empty line."""
     rig = ("--rig", "nowhere")
+    (tmp_path / "fresh").mkdir()
     nothing = call("calibration", "list", "--state", tmp_path / "fresh", *rig)
     assert (nothing.stdout, nothing.stderr) == (
         "",
@@ -231,3 +232,18 @@ def test_the_users_name_stands_in_the_list_and_in_the_comparison(state, call):
         f"B  calibration {number} (left cell, new seals, "
         in call("calibration", "compare", "1", str(number), "--state", state).output
     )
+
+
+@pytest.mark.parametrize("verb, code", [(["list"], 0), (["use", "1"], 65)])
+def test_a_slip_in_state_is_told_and_makes_no_directory(tmp_path, call, verb, code):
+    slip = tmp_path / "typo"
+    done = call("calibration", *verb, "--state", slip)
+    assert done.exit_code == code
+    assert f"E106 {slip}: there is no such state directory; --state DIR names another" in done.stderr
+    assert not slip.exists()
+
+
+def test_upload_of_a_number_tells_how_it_becomes_a_file(call):
+    done = call("upload", "2", "--gateway", "127.0.0.1:9")
+    assert done.exit_code == 65
+    assert "`force-gateway calibration export 2 --yaml FILE` makes a file of the stored calibration 2" in done.stderr
