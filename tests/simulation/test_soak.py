@@ -26,7 +26,7 @@ from tests.simulation.schedule import Simulation
 PUSH_S, LONG_S = 200.0, float(os.environ.get("SOAK_SECONDS", "86400"))
 HELD_S = 7500.0
 SEED = 15
-DEADLY = frozenset(("kill", "stop", "kill_guardian", "terminate"))
+DEADLY = frozenset(("kill", "stop", "freeze", "kill_guardian", "terminate"))
 MOST_MORE_BYTES = 4_000_000
 PAGE = resource.getpagesize()
 
