@@ -4,7 +4,7 @@ from dataclasses import replace
 from math import isnan, nan
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from gateway.codes.faults import FaultCode
@@ -241,20 +241,20 @@ def test_without_a_lease_a_closed_connection_changes_nothing():
 FIELDS = st.sampled_from((0.0, 0.5, 3.0))
 
 
-@given(st.lists(st.tuples(FIELDS, FIELDS, FIELDS, FIELDS, FIELDS), max_size=8), st.booleans())
+WRITTEN = (
+    "force_setpoint_n", "force_ramp_n_per_s", "payload_kg", "tilt_angle_rad", "in_band_tolerance_n",
+    "precontact_force_n", "contact_ramp_s", "in_band_time_s",
+)  # fmt: skip
+
+
+@given(st.lists(st.dictionaries(st.sampled_from(WRITTEN), FIELDS), max_size=8), st.booleans())
+@example([{name: value} for name in WRITTEN for value in (0.5, 3.0)], False)
 def test_a_demand_is_that_of_its_own_command_whatever_came_before(writes, pulls):
     tracker = CommandTracker(settings())
     if pulls:
         tracker.turn(-1.0)
-    for number, (force_n, ramp_n_per_s, payload_kg, tilt_rad, tolerance_n) in enumerate(writes, 1):
-        command = Command(
-            number=number,
-            force_setpoint_n=force_n,
-            force_ramp_n_per_s=ramp_n_per_s,
-            payload_kg=payload_kg,
-            tilt_angle_rad=tilt_rad,
-            in_band_tolerance_n=tolerance_n,
-        )
+    for number, written in enumerate(writes, 1):
+        command = Command(number=number, **written)
         tracker.take(0.1 * number, command)
         alone = demand_of(command, settings())
         weight_n = -alone.manner.gravity_n if pulls else alone.manner.gravity_n
