@@ -212,3 +212,20 @@ def is_in_band(robot: Any) -> bool:
     if isinstance(robot, Irc5):
         return bool(robot.get("fgInBand"))
     return bool(robot.machine.start("fg_wait_in_band", 0.1))
+
+
+def test_a_force_that_another_master_holds_is_in_band_for_no_program(client: Any, gateway: GatewayAtHand) -> None:
+    """A PLC program that waited for that bit alone went on to the part behind a refused enable."""
+    if isinstance(client, Irc5 | UniversalRobot):
+        pytest.skip("asked above, as its program asks")
+    gateway.take_over_from_elsewhere()
+    cycles(client)
+    client.enable(12.0)
+    cycles(client)
+    assert "W210" in client.text
+    assert client.in_band is False
+    gateway.stop_from_elsewhere()
+    cycles(client)
+    client.enable(12.0)
+    cycles(client)
+    assert client.in_band is True and gateway.bank.command.force_setpoint_n == 12.0

@@ -438,6 +438,7 @@ static void fg_end(fg_client *client) {
 static void fg_follow(fg_client *client) {
     client->seen = 1;
     fg_decode(client->words, &client->status);
+    if (!(client->good[FG_CONTROL_WORD] & FG_ENABLE)) client->status.in_band = 0; /* the force that another master holds */
     if (client->good[FG_CONTROL_WORD] & FG_ENABLE && !client->status.enabled) fg_end(client);
 }
 

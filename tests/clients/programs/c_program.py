@@ -136,5 +136,9 @@ class CProgram:
         return bool(self._library.is_enabled(self._client))
 
     @property
+    def in_band(self) -> bool:
+        return bool(self._library.is_in_band(self._client))
+
+    @property
     def ended(self) -> bool:
         return bool(self._library.has_ended(self._client))

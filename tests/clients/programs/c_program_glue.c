@@ -61,6 +61,7 @@ fg_client *make(int unit) {
     return client;
 }
 int is_enabled(const fg_client *client) { return client->status.enabled; }
+int is_in_band(const fg_client *client) { return client->status.in_band; }
 int has_ended(const fg_client *client) { return client->ended; }
 const char *message(const fg_client *client) { return client->message; }
 const char *fault(const fg_client *client) { return client->status.fault ? fg_fault_text(client->status.fault_code) : ""; }

@@ -428,6 +428,10 @@ class Plc:
         return bool(self.machine.member(self.output("status"), "enabled"))
 
     @property
+    def in_band(self) -> bool:
+        return bool(self.machine.member(self.output("status"), "in_band"))
+
+    @property
     def ended(self) -> bool:
         return bool(self.output("ended"))
 

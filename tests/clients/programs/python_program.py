@@ -103,5 +103,9 @@ class PythonProgram:
         return bool(self.client.status and self.client.status["enabled"])
 
     @property
+    def in_band(self) -> bool:
+        return bool(self.client.status and self.client.status["in_band"])
+
+    @property
     def ended(self) -> bool:
         return bool(self.client.ended)
