@@ -119,6 +119,8 @@ def _touch_line(simulation: "Simulation", event: Event) -> None:
         return  # a rig without a valve
     if event.what == "pull":
         simulation.around.pull(event.whom)
+        if event.whom == "bus":  # what it has asked may have been done, and its answer is lost
+            simulation.masters["rival"].lose()
     elif event.what == "push":
         simulation.around.push(event.whom)
     elif event.what == "deaf":

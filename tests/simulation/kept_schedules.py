@@ -272,5 +272,14 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(18.571, "output", "power", (0.0149, 0.0)),
         ],
     ),
+    (
+        15421,
+        [
+            Event(5.3451, "machine", "kill_guardian", (0.1903, 399070.82264361857)),
+            Event(6.2228, "load_cell", "pace", (2.6,)),
+            Event(7.5082, "rival", "take", (39.95,)),
+            Event(7.6232, "bus", "pull"),
+        ],
+    ),
 ]
 """Schedules that once broke a law, or were said to: the seed of the machine, and what happened to it."""
