@@ -9,12 +9,13 @@ from gateway.codes.refusals import RefusalReason
 from gateway.control.command_edges import CommandTracker
 from gateway.control.edge_checks import EdgeCheck
 from gateway.control.readiness import Situation
-from gateway.control.runs.active_run import ActiveRun
+from gateway.control.runs.active_run import ActiveRun, AnyPlan
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import Reading, SampleConditioner
+from gateway.control.self_test.items import SelfTestPlan
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit, State
+from gateway.registers.words import CalibrationPhase, ControlBit, State
 from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 from tests.control.bench import bsfm, settings
 
@@ -26,13 +27,15 @@ REST = Situation(
 )  # fmt: skip
 
 
-def check(rest_n: float = 0.0) -> EdgeCheck:
+def check(rest_n: float = 0.0, phase: CalibrationPhase = CalibrationPhase.IDLE) -> EdgeCheck:
     """A cell that has read rest_n, steadily."""
     rig = settings()
     conditioner = SampleConditioner(rig.supervision)
     for k in range(20):
         conditioner.read(0.01 * k, ForceSample(rest_n, rest_n, Quality.OK, 0.01 * k), 0.0)
-    return EdgeCheck(CommandTracker(rig), conditioner, ActiveRun(rig, bsfm()))
+    run = ActiveRun(rig, bsfm())
+    run.phase = phase
+    return EdgeCheck(CommandTracker(rig), conditioner, run)
 
 
 def refusal(at: Situation, word: ControlBit, rest_n: float = 0.0, **command: float) -> EdgeRefusal | None:
@@ -127,3 +130,12 @@ def test_a_reset_needs_a_beat_that_came_behind_the_fault_where_there_is_a_lease(
         refused = asked.refusal(ProposedWrite(command), at)
         assert (refused is None) is is_taken
         assert refused is None or refused.reason is RefusalReason.HEARTBEAT_STALE
+
+
+@pytest.mark.parametrize(("plan", "name"), [(CalibrationPlan(), "calibration"), (SelfTestPlan(), "self-test")])
+def test_while_a_ladder_is_fitted_no_run_begins_and_the_refusal_names_which(plan: AnyPlan, name: str) -> None:
+    refused = check(phase=CalibrationPhase.FITTING).of_run(plan, REST)
+    assert refused is not None and refused.reason is RefusalReason.FITTING
+    assert refused.text.startswith(f"{name} refused: the last ladder is being fitted")
+    behind = check().of_run(plan, REST)
+    assert behind is None or behind.reason is not RefusalReason.FITTING

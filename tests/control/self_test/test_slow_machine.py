@@ -24,7 +24,8 @@ def verdicts_behind_a_force(lag_s: float) -> dict[Item, SelfTestVerdict]:
     bench.run(8.0 * lag_s)
     bench.disable()
     bench.run(0.05)
-    bench.write(control_word=ControlBit.START_SELF_TEST)
+    begun = bench.write(control_word=ControlBit.START_SELF_TEST)
+    assert "self-test begun by 10.0.0.5" in begun.events
     assert bench.last.state is State.CALIBRATING
     bench.seconds_until(lambda output: output.state is State.OFF, LONGEST_S)
     return {each.item: each.verdict for each in bench.controller.active_run.self_test.findings}
