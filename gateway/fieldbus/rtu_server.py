@@ -6,19 +6,20 @@ Decisions
   `serial:N`, N the face's place in the rig's `fieldbus`; a port that is lost is a closed connection.
 - The answer follows at once: the receiver has waited for the silence that the line must have before it.
 - What is asked while an answer is still on the wire is executed and not answered: who sends does not listen, and nothing
-  piles up.
+  piles up. Of a master that has not waited for answers for a quarter of a second nothing renews a lease, and nothing begins:
+  what it has sent waits in adapters and drivers, and it may be gone.
 - Without a port of its own the face is a pseudo-terminal, paced like a line at its baud.
 """
 
 import asyncio
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from gateway.devices import SerialSettings
 from gateway.modbus.peer import Peer
-from gateway.modbus.rtu import LONGEST_ADU, encode_adu
+from gateway.modbus.rtu import BROADCAST_UNIT, LONGEST_ADU, encode_adu
 from gateway.modbus.rtu_receiver import RtuReceiver, RtuRequest
 from gateway.modbus.server import DataBank, answer
 from gateway.ports import PacedPty, PortError, PortEvents, SerialPort
@@ -27,6 +28,7 @@ from gateway.ports.port import monotonic_s
 STANDSTILL_S: Final = 0.5
 """So long a process stands still that who asked before has given up: on a bus the answer would be taken for the next one's."""
 _AFTERMATH_S: Final = 0.05  # behind it what has waited is read, and its silence awaited
+_LATE_S: Final = 0.25  # for so long several requests come at once: who has given one up asks again, and waits
 _REPORT_PERIOD_S: Final = 60.0
 _WRONG_LINE_BYTES: Final = 24  # three requests' worth without one that can be read: the line is set otherwise
 
@@ -62,6 +64,8 @@ class ModbusRtuServer:
         self._timer: asyncio.TimerHandle | None = None
         self._due_s = 0.0
         self._mute_until_s = 0.0
+        self._peer_behind = replace(settings.peer, is_behind=True)
+        self._piles_since_s: float | None = None
         self._was_lost = False
         events = PortEvents(self._on_bytes, self._on_lost, self._on_open, self._on_refused, self._on_restored)
         self.port = SerialPort(settings.path, serial, events) if settings.path else None
@@ -151,7 +155,10 @@ class ModbusRtuServer:
         self._timer = None
         if monotonic_s() - self._due_s > STANDSTILL_S:
             self.note_standstill()
-        for request in self._receiver.take(monotonic_s()):
+        requests = self._receiver.take(monotonic_s())
+        if asked := sum(request.unit != BROADCAST_UNIT for request in requests):
+            self._piles_since_s = None if asked == 1 else self._piles_since_s or monotonic_s()
+        for request in requests:
             self._execute(request)
         now_s = monotonic_s()
         if told := self._noise.tell(self._receiver.frames, self._receiver.noise_bytes, now_s):
@@ -159,7 +166,8 @@ class ModbusRtuServer:
         self._wait(now_s)
 
     def _execute(self, request: RtuRequest) -> None:
-        pdu = answer(request.pdu, self._bank, self.settings.peer)
+        has_waited = self._piles_since_s is not None and monotonic_s() - self._piles_since_s >= _LATE_S
+        pdu = answer(request.pdu, self._bank, self._peer_behind if has_waited else self.settings.peer)
         is_late = monotonic_s() < self._mute_until_s
         if not request.is_answered or is_late or self._backlog_bytes > LONGEST_ADU:
             return

@@ -68,7 +68,7 @@ class ControlSocket(JsonLineServer):
             "sim": parts.simulation.answer,
             "residual": parts.watch.answer,
             "state": self.live.state,
-            "modbus": self.live.modbus,
+            "modbus": lambda request: self.live.modbus(request, has_waited=self.has_waited),
         }
         super().__init__(state / "control.sock", parts.audit.watch_handlers(handlers), log)
         self._asked = parts

@@ -88,17 +88,17 @@ class LiveAnswers:
         self._parts = parts
         self._role = plain_role(rig)
 
-    def modbus(self, request: Answer) -> Answer:
+    def modbus(self, request: Answer, *, has_waited: bool = False) -> Answer:
         """Answer one PDU: {"via": "web", "unit": 1, "pdu": hex} gives {"pdu": hex}, of an exception with the sentence that says
         why: {"pdu": hex, "refusal": sentence}. ValueError for no hex, and for what comes too late: others may ask more than
-        their share, and an enable that its page has given up must not press."""
+        their share, and an enable that its page has given up must not press. has_waited: behind others of its caller."""
         asked = parse_request(ModbusRequest, request)
         pdu = bytes.fromhex(asked.pdu)
         if not 1 <= len(pdu) <= _LONGEST_PDU:
             raise ValueError(f"a PDU has 1 to {_LONGEST_PDU} bytes")
         if asked.until_s is not None and self._parts.loop.clock() > asked.until_s:
             raise ValueError("it waited for longer than whoever asked: nothing was done")
-        bank, peer = self._parts.loop.bank, Peer(asked.via, role=self._role)
+        bank, peer = self._parts.loop.bank, Peer(asked.via, role=self._role, is_behind=has_waited)
         units = self._rig.network.units
         given = answer(pdu, bank, peer) if asked.unit in units else refuse_unit((asked.unit, pdu), units, bank, peer)
         refusal = bank.last_refusal if is_exception(given) else None

@@ -1,5 +1,6 @@
 """When the serial face looks at what it has heard, by a loop and a clock of the test's own."""
 
+from struct import pack
 from types import SimpleNamespace
 from typing import Any
 
@@ -102,3 +103,26 @@ def test_what_waited_through_a_standstill_is_executed_for_a_stop_may_be_in_it(sc
     scene.run(scene.now_s + 0.1)
     assert [(address, data) for address, data, _ in scene.bank.writes] == [(0, bytes(2))]
     assert scene.sent == []
+
+
+@pytest.mark.parametrize(("at_once", "has_waited"), [(3, True), (1, False)])
+def test_requests_of_who_waits_for_no_answers_have_waited_after_a_quarter_of_a_second(
+    scene: Scene, at_once: int, has_waited: bool
+) -> None:
+    """Its adapter's pile, a thousand heartbeats, kept a force for four seconds behind the end of its master."""
+    heartbeats = [encode_adu(3, P.write_registers_request(4, pack(">H", beat))) for beat in range(120)]
+    for first in range(0, 120, at_once):
+        scene.hear(b"".join(heartbeats[first : first + at_once]), *[b""] * 2)
+    late = [peer.is_behind for _, _, peer in scene.bank.writes]
+    assert len(late) == 120
+    assert not any(late[:24]) and all(late[30:]) is has_waited
+    scene.hear(heartbeats[0])
+    assert not scene.bank.writes[-1][2].is_behind, "it waits for answers again"
+
+
+def test_a_master_that_asks_again_what_it_has_given_up_has_not_waited(scene: Scene) -> None:
+    heartbeat = encode_adu(3, P.write_registers_request(4, bytes(2)))
+    for _ in range(20):
+        scene.hear(heartbeat * 2, b"", heartbeat, b"")
+    assert len(scene.bank.writes) == 60
+    assert not any(peer.is_behind for _, _, peer in scene.bank.writes)

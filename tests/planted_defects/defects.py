@@ -588,10 +588,16 @@ DEFECTS = (
            ("service/running_rig/ends/test_ways_to_the_end.py",)),
     # -- and: standstills, room that is made, what a death has left
     Defect("a stop that waited through a standstill is not executed", "fieldbus/rtu_server.py",
-           "        pdu = answer(request.pdu, self._bank, self.settings.peer)\n        is_late",
+           "        has_waited = self._piles_since_s is not None",
            "        if monotonic_s() < self._mute_until_s:\n            return\n"
-           "        pdu = answer(request.pdu, self._bank, self.settings.peer)\n        is_late",
+           "        has_waited = self._piles_since_s is not None",
            ("fieldbus/test_rtu_waiting.py",)),
+    Defect("a pile of requests on a serial line is taken for fresh", "fieldbus/rtu_server.py",
+           "self._peer_behind if has_waited else self.settings.peer", "self.settings.peer",
+           ("fieldbus/test_rtu_waiting.py",)),
+    Defect("a pile of lines in the control socket is taken for fresh", "processes/json_socket/connection.py",
+           "self._is_late or self._server.loop.time() - self._read_s >= _LATE_S", "False",
+           ("processes/json_socket/test_waiting_lines.py",)),
     Defect("of several serial faces one is told of a standstill", "service/running_rig/faces/faces.py",
            "            for face in self._serial:\n                face.note_standstill()",
            "            for face in self._serial[:1]:\n                face.note_standstill()",

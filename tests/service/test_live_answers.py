@@ -61,6 +61,25 @@ def test_what_its_caller_has_given_up_presses_nothing_and_what_is_always_wanted_
     assert stage.wired.bank.owner is None
 
 
+def test_nothing_begins_by_a_line_that_has_waited_behind_others_of_its_caller_and_a_stop_is_obeyed(
+    stage: Stage,
+) -> None:
+    """A caller that piled up heartbeats and hung kept its force for ten seconds and more."""
+
+    def send_late(pdu: str) -> dict[str, Any]:
+        line = json.dumps({"do": "modbus", "via": "web", "pdu": pdu}).encode()
+        answer = stage.server.answer(line, has_waited=True)
+        assert isinstance(answer, bytes)
+        return dict(json.loads(answer))
+
+    assert "wait for each answer" in send_late(ENABLE_12_N)["refusal"]
+    assert send(stage, ENABLE_12_N) == "1000000002"
+    stage.wired.run(0.5)
+    assert send_late(DISABLE)["pdu"] == DISABLE
+    stage.wired.run(0.1)
+    assert stage.wired.state is State.OFF
+
+
 def test_who_does_not_own_the_setpoint_may_stop_and_nothing_else(stage: Stage) -> None:
     stage.wired.write(0, 1, 1000)
     assert send(stage, "0600010320") == "8606", "8 N, refused: another master owns the setpoint"

@@ -6,9 +6,13 @@ import socket
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 from gateway.processes.json_socket.messages import encode_answer, error_answer
+
+_LATE_S: Final = (
+    0.25  # so long a line may wait behind others of its caller, which sends them without waiting for answers
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +34,9 @@ class ConnectionServer(Protocol):
     def enqueue(self, turn: Callable[[], None]) -> None:
         """Put something to do at the end of the queue. It must not raise."""
 
-    def answer(self, line: bytes) -> bytes | Future[bytes]:
-        """Return the answer to one line, whatever it is, or a future of it."""
+    def answer(self, line: bytes, *, has_waited: bool) -> bytes | Future[bytes]:
+        """Return the answer to one line, whatever it is, or a future of it. has_waited: behind others, and its caller may be
+        gone."""
         ...
 
     def note_activity(self, caller: "JsonConnection") -> None:
@@ -52,13 +57,22 @@ class JsonConnection:
         self._server = server
         self._peer = peer
         self._unread = bytearray()
+        self._read_s = 0.0  # when the last of it was read
+        self._is_late = False
         self._unsent = b""
         self._is_last = False  # nothing more comes
         self._is_deaf = False  # nothing more is wanted: what comes is dropped until the caller ends
 
     def listen(self) -> None:
         """Wait for the next bytes."""
+        self._is_late = self._is_late and self._has_more()
         self._server.loop.add_reader(self._peer, self._on_readable)
+
+    def _has_more(self) -> bool:
+        try:
+            return bool(self._peer.recv(1, socket.MSG_PEEK))
+        except OSError:  # nothing, or it has left
+            return False
 
     def _on_readable(self) -> None:
         self._server.loop.remove_reader(self._peer)
@@ -75,7 +89,7 @@ class JsonConnection:
         except OSError:
             self.close()
             return
-        self._is_last = not chunk
+        self._is_last, self._read_s = not chunk, self._server.loop.time()
         if not self._is_deaf:
             self._unread += chunk
             self._answer_next()
@@ -95,7 +109,8 @@ class JsonConnection:
         elif end:
             line = bytes(self._unread[:end])
             del self._unread[:end]
-            answer = self._server.answer(line)
+            self._is_late = self._is_late or self._server.loop.time() - self._read_s >= _LATE_S
+            answer = self._server.answer(line, has_waited=self._is_late)
             if isinstance(answer, Future):
                 answer.add_done_callback(lambda done: self._server.enqueue(lambda: self._send(done.result())))
             else:

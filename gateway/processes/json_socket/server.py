@@ -59,6 +59,7 @@ class JsonLineServer:
         limits: SocketLimits | None = None,
     ) -> None:
         self.limits = limits or SocketLimits()
+        self.has_waited = False  # the line that is handled now: behind others of its caller, which may be gone
         self._path = path
         self._handlers = handlers
         self._log = log
@@ -252,8 +253,9 @@ class JsonLineServer:
 
     # -- requests
 
-    def answer(self, line: bytes) -> bytes | Future[bytes]:
+    def answer(self, line: bytes, *, has_waited: bool = False) -> bytes | Future[bytes]:
         """Return the answer to one line, whatever it is, or a future of it."""
+        self.has_waited = has_waited
         answer: Answer | Future[Answer] = {}
 
         def handled() -> Answer:
