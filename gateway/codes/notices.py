@@ -134,9 +134,9 @@ NOTICES: Final = (
     Explanation(
         "W249",
         "the device's watchdog was off",
-        "The output device, looked at once a second, said that its own watchdog does not watch any more. It was armed again at "
-        "once; the force was not touched.",
-        "Its power was away for a moment (a loose plug, a weak supply), or another program on its line has switched it off.",
+        "The output device, looked at once a second, said that its watchdog is off or has another time than it was told. It "
+        "was armed again; the force was not touched.",
+        "Its power was away for a moment (a loose plug, a weak supply), or another program on its line has set it.",
         "Look at the device's plug and supply; let nobody else talk to it. Where it cannot be armed again, A334 says so.",
     ),
     Explanation(

@@ -119,6 +119,7 @@ BOUNDS: tuple[tuple[Check, str, Parts, Parts], ...] = (
         defaults(3.0, precontact_force_n=0.0),
         defaults(3.0, precontact_force_n=0.1),
     ),
+    (checks.check_payload, "defaults.payload_kg", defaults(payload_kg=9.99), defaults(payload_kg=10.0)),
     (
         checks.check_self_test,
         "self_test.force_n",

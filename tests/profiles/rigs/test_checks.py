@@ -42,6 +42,8 @@ def messages(faults: tuple[object, ...]) -> list[str]:
          "defaults.precontact_force_n: 3 N is below limits.smallest_force_n = 5 N: the output stays 0 V, the tool would"),
         ("precontact_force_n: 3", "precontact_force_n: 61",
          "defaults.precontact_force_n: 61 N is above limits.force_max_n = 60 N"),
+        ("precontact_force_n: 3", "payload_kg: 600",
+         "defaults.payload_kg: 600 kg weigh 5884 N, which is beyond the load cell: load_cell.range_n = 98.07 N; are"),
         ("saturation_n: 96", "saturation_n: 99",
          "supervision.saturation_n: 99 N is beyond load_cell.range_n = 98.07 N; 98 % of it is 96.1 N"),
         ("saturation_n: 96", "saturation_n: 60",

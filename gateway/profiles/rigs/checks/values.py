@@ -10,6 +10,7 @@ from gateway.control.settings import (
 from gateway.profiles.rigs.checks.parts import Check, Found, Parts
 from gateway.profiles.rigs.rig import is_own
 from gateway.profiles.strict_yaml.fault_sentences import newton, number, second, volt
+from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
 _SATURATION_SHARE: Final = 0.98  # of the cell's range: what is suggested; an amplifier may clip a little below its end
 _SLOPES: Final = 50  # places of a curve at which its slope is looked at
@@ -74,6 +75,17 @@ def check_defaults(parts: Parts) -> Found:
             "defaults.precontact_force_n",
             f"{newton(precontact)} is below {floor}: the output stays 0 V, the tool would not move",
         )
+
+
+def check_payload(parts: Parts) -> Found:
+    """Yield a fault for a payload whose weight is beyond the load cell: grams, say, where kilograms are meant."""
+    if (defaults := parts.defaults) is None or (load_cell := parts.load_cell) is None:
+        return
+    weight_n = defaults.payload_kg * STANDARD_GRAVITY_M_PER_S2
+    if weight_n > load_cell.range_n:
+        observation = f"{number(defaults.payload_kg)} kg weigh {weight_n:.0f} N"
+        cell = f"load_cell.range_n = {newton(load_cell.range_n)}"
+        yield "defaults.payload_kg", f"{observation}, which is beyond the load cell: {cell}; are these grams?"
 
 
 def check_self_test(parts: Parts) -> Found:
@@ -253,6 +265,7 @@ FAULTS: Final[tuple[Check, ...]] = (
     check_forces,
     check_saturation,
     check_defaults,
+    check_payload,
     check_self_test,
     check_calibration_range,
     check_calibration_against_cell,

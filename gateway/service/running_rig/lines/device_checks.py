@@ -14,6 +14,7 @@ from gateway.devices.messages import DeviceAnswer, DeviceStep
 
 _LOOK_PERIOD_S = 1.0  # between two looks at the watchdog: a device that was off for a moment has forgotten its arming
 _WAITS_S = 0.5  # of a look for an idle wire: on a slow one a setpoint that never rests leaves none
+_STATES_PER_TIME = 9  # looks at the state for one at the time: an armed one may watch with another than ours
 _TRIES = 3  # of arming; then it does not arm
 _READS_OTHERWISE = "it reads back otherwise"
 _MISSES = 5  # of one question in a row, while settings are answered: the device has no words for it
@@ -21,8 +22,9 @@ _MISSES = 5  # of one question in a row, while settings are answered: the device
 
 class DeviceChecks:
     """next_step: the question that is due; fault: what keeps the output from being enabled; said: the device's own words for
-    it; is_done: all is asked and well; times_forgotten: how often a look found an armed watchdog off; unarmed: the
-    device's words where it does not arm and the rig accepts that. is_waived: the rig accepts an output without a watchdog."""
+    it; is_done: all is asked and well; times_forgotten: how often a look found an armed watchdog off, or with another time;
+    unarmed: the device's words where it does not arm and the rig accepts that. is_waived: the rig accepts an output
+    without a watchdog."""
 
     def __init__(self, host: OutputHost, *, is_waived: bool) -> None:
         self._known = host.checks
@@ -32,13 +34,14 @@ class DeviceChecks:
         self._is_proved_by_state = is_timed_apart or DeviceStep.VERIFY not in self._known
         proof = (DeviceStep.VERIFY, DeviceStep.STATUS) if self._is_proved_by_state else (DeviceStep.VERIFY,)
         self._arming = self._known_of(DeviceStep.SET_TIME, DeviceStep.ARM, *proof) if self.has_watchdog else ()
-        self._looks = self._known_of(DeviceStep.STATUS, DeviceStep.VERIFY)[:1]
         self.times_forgotten = 0
         self.begin()
 
     def begin(self) -> None:
         """Begin anew: the port has been opened, or nothing was heard for long, and another device may be behind it."""
         self._waiting = deque(self._known_of(DeviceStep.IDENTITY, DeviceStep.STATUS, *self._arming))
+        known = self._known_of(DeviceStep.STATUS, DeviceStep.VERIFY)
+        self._looks = deque((*_STATES_PER_TIME * known[:1], *known[1:]))
         self._tries = self._misses = 0
         self._next_look_s = 0.0
         self.fault = FaultCode.NONE
@@ -58,6 +61,8 @@ class DeviceChecks:
             return self._waiting[0]
         if self._looks and now_s >= self._next_look_s and self.fault in _GOES_ON:
             self._next_look_s = now_s + _LOOK_PERIOD_S
+            if not self._is_said:
+                self._looks.rotate(-1)
             return self._looks[0]
         return None
 

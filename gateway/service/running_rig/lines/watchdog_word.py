@@ -15,7 +15,7 @@ from gateway.service.running_rig.lines.rig_ports import RigPorts
 # plain integers, for it is asked at every tick
 _GUARDIAN_WATCHES, _DEVICE_ARMED = int(WatchdogBit.GUARDIAN_WATCHES), int(WatchdogBit.DEVICE_ARMED)
 _FORGOTTEN: Final = (
-    "W249 the output device said that its watchdog is off: a moment without power, or somebody switched it off"
+    "W249 the output device said that its watchdog is off or has another time: it had no power, or somebody set it"
 )
 _UNARMED: Final = "W251 the output device's watchdog does not arm, and the rig accepts that"
 _DEVICE_HAS_NONE, _DEVICE_TRIPPED = int(WatchdogBit.DEVICE_HAS_NONE), int(WatchdogBit.DEVICE_TRIPPED)

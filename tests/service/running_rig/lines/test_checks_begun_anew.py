@@ -166,3 +166,19 @@ def test_an_arming_that_nobody_answers_leaves_every_other_turn_to_the_setpoint()
     line.deaf_to = (ARM,)
     assert line.run(2.0, step_v=0.01) < 2.0 * REPLY_TIMEOUT_S
     assert line.exchange.checks.times_forgotten == 1 and line.stands_v > 0.1
+
+
+@pytest.mark.parametrize("device", [DEVICE, "mcu-line"])
+def test_a_watchdog_that_watches_with_another_time_is_armed_anew(device: str) -> None:
+    """Power was away for a moment, or somebody set it: it says armed, and would trip later than the rig was promised."""
+    checks = DeviceChecks(output_host(load_device(device)), is_waived=False)
+    answer_all(checks)
+    assert checks.is_armed and not checks.times_forgotten
+    looks = []
+    for second in range(1, 12):
+        if checks.is_done and (step := checks.next_step(float(second))):
+            looks.append(step)
+            checks.take(DeviceAnswer(step, is_right=step is not VERIFY, text="armed" if step is STATUS else ""))
+    assert looks[0] is STATUS and looks[-1] is VERIFY and looks.count(VERIFY) == 1
+    assert checks.times_forgotten == 1 and ARM in answer_all(checks)
+    assert checks.is_armed and not checks.fault
