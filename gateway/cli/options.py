@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sized
 from dataclasses import dataclass
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, cast, get_args
 
@@ -225,13 +225,19 @@ def state_option(text: str) -> Callable[[Function], Function]:
     return click.option("--state", type=GivenPath(file_okay=False), help=text)
 
 
-def state_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add --state and --rig; the function receives both as one argument, `state`, a StateChoice."""
+def state_options(function: Callable[..., Any] | None = None, *, makes: bool = False) -> Callable[..., Any]:
+    """Add --state and --rig; the function receives both as one argument, `state`, a StateChoice. One that is not there is a
+    slip (E106): it has nothing to tell, and must not come to be by a typing error. makes: it need not be there yet."""
+    if function is None:
+        return partial(state_options, makes=makes)
     from gateway.cli.command_line.known_rigs import choose_rig
     from gateway.cli.command_line.rig_choice import rig_option, tell_rig
+    from gateway.cli.errors import no_state_directory
 
     @wraps(function)
     def with_choice(*, state: Path | None, rig: str | None, **options: Any) -> Any:
+        if state is not None and not makes and not state.exists():
+            raise no_state_directory(state)
         choice = StateChoice(state, rig if state else choose_rig(rig, None))
         if rig is None and state is None:
             tell_rig(choice.rig, choice.directory)

@@ -40,8 +40,13 @@ def hunting_sentence(force_n: float, turns: int) -> str:
     )
 
 
-def swinging_sentence(force_n: float) -> str:
-    """Return W360 for a trim whose gain the rig file says."""
+def swinging_sentence(force_n: float, *, is_trim_off: bool) -> str:
+    """Return W360 for a trim whose gain the rig file says, which may be none: then it is no cause, and goes no slower."""
+    if is_trim_off:
+        return (
+            f"W360 at {force_n:.1f} N the force swings to both sides, and the trim is off: the regulator hunts, the force "
+            "sticks and slips, lead is too large for this rig, or the workpiece moves"
+        )
     return (
         f"W360 at {force_n:.1f} N the force swings to both sides: trim.gain_v_per_n_s or lead is too large for this rig, or "
         "the workpiece moves; the trim goes slower until the output is at rest. `force-gateway calibrate` measures its pace"

@@ -156,9 +156,10 @@ def test_what_cannot_be_read_is_said_and_the_rest_is_packed(tmp_path: Path) -> N
     assert again.exit_code == 1 and "E405" in again.stderr
 
 
-def test_who_packs_a_bundle_is_told_what_is_not_in_it(tmp_path: Path) -> None:
+def test_who_packs_a_bundle_is_told_what_is_not_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a service's state a user who may not read it sent a bundle without events, and the list of files was just empty."""
-    done = gateway("report", tmp_path / "b.tar.gz", "--state", tmp_path / "none", "--rig", "demo")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "none"))
+    done = gateway("report", tmp_path / "b.tar.gz", "--rig", "demo")
     told = {line.split()[0]: line for line in done.stderr.splitlines()}
     assert done.exit_code == 0 and {"live.json", "health.json", "state.txt"} <= told.keys()
     assert told["state.txt"].startswith("state.txt not in it: ") and "No such file" in told["state.txt"]

@@ -12,7 +12,7 @@ from gateway.codes.warning_bits import WarningBit
 from gateway.control import CalibrationInUse, Compensation, Controller
 from gateway.control.compensation.compensation import OutsideForce
 from gateway.control.demand import STOP_S
-from gateway.control.settings import Defaults, LeadSettings, LeaseAction
+from gateway.control.settings import Defaults, LeadSettings, LeaseAction, Trim
 from gateway.control.supervision.one_shot_events import OneShotEvents
 from gateway.registers.words import ControlBit, LimitedBy, Mode, State, StatusBit
 from tests.control.bench import Bench, bsfm, enabled, settings
@@ -222,6 +222,20 @@ def test_that_the_trim_hunts_is_told_once_each_time_it_begins() -> None:
 
 def test_a_trim_with_the_rig_files_gain_names_it_and_a_measured_one_does_not() -> None:
     for is_gain_own in (False, True):
-        loop = SimpleNamespace(is_hunting=True, is_gain_own=is_gain_own, applied_n=20.0)
+        loop = SimpleNamespace(is_hunting=True, is_gain_own=is_gain_own, is_trim_off=False, applied_n=20.0)
         told = OneShotEvents(stuck_n=5.0).hunting_event(loop)  # type: ignore[arg-type]
         assert told.startswith("W360 at 20.0 N ") and ("gain_v_per_n_s" in told) == is_gain_own
+
+
+@pytest.mark.parametrize(("gain_v_per_n_s", "is_named"), [(0.0, False), (0.02, True)])
+def test_a_swinging_force_is_blamed_on_the_trims_gain_only_where_there_is_one(
+    gain_v_per_n_s: float, is_named: bool
+) -> None:
+    bench = enabled(replace(settings(), trim=Trim(gain_v_per_n_s=gain_v_per_n_s)))
+    bench.force(20.0)
+    bench.alter_sample = lambda sample: replace(
+        sample, force_n=sample.force_n + (8.0 if bench.ms % 600 < 300 else -8.0)
+    )
+    bench.run(6.0)
+    told = [one for one in bench.events if one.startswith("W360")]
+    assert [("gain_v_per_n_s" in one) for one in told] == [is_named]

@@ -157,6 +157,11 @@ class ForceLoop:
         return isinstance(self._trim, MeasuredTrim) and not self._trim.is_off
 
     @property
+    def is_trim_off(self) -> bool:
+        """Decide whether the trim has no gain."""
+        return self._trim.is_off
+
+    @property
     def is_trim_at_limit(self) -> bool:
         """Decide whether the trim stands at its limit."""
         return self._trim.limited_by is not _NONE
@@ -213,10 +218,14 @@ class ForceLoop:
     def descend(self, demand: Demand, dt_s: float, given_n: float) -> Moved:
         """Make one step from where a run has left the force to 0, by the model alone: neither trim nor lead, which a plant that
         is being calibrated may not fit, and never up."""
+        law = self.feedforward
         try:
-            return self._step_down(demand, dt_s, given_n)
+            law.advance(0.0, demand.manner.ramp_n_per_s, dt_s, given_n)
+            voltage_v, _ = law.compute_voltage(given_n)
+            self._drive_by_model(min(voltage_v, self.voltage_v), law.applied_n, law.branch_share, given_n)
         except (ModelError, NotFiniteError) as error:
             return _fault_of(error)
+        return StateEvent.MOVE
 
     def drive_run(self, voltage_v: float, branch_share: float) -> None:
         """Put out the voltage of a calibration run, within the limits: nothing learned, nothing judged."""
@@ -227,13 +236,6 @@ class ForceLoop:
         as in `use`."""
         reached_n = min(towards_n, self.expected.force_n(branch_share))
         self.feedforward.take_over(reached_n + given_n, branch_share, given_n)
-
-    def _step_down(self, demand: Demand, dt_s: float, given_n: float) -> StateEvent:
-        law = self.feedforward
-        law.advance(0.0, demand.manner.ramp_n_per_s, dt_s, given_n)
-        voltage_v, _ = law.compute_voltage(given_n)
-        self._drive_by_model(min(voltage_v, self.voltage_v), law.applied_n, law.branch_share, given_n)
-        return StateEvent.MOVE
 
     def _drive_by_model(self, voltage_v: float, expected_n: float, branch_share: float, given_n: float = 0.0) -> None:
         self._trim.reset()

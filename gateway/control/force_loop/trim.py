@@ -55,6 +55,11 @@ class TrimIntegral:
         self.reset()
 
     @property
+    def is_off(self) -> bool:
+        """Decide whether the trim has no gain."""
+        return self._settings.gain_v_per_n_s <= 0.0
+
+    @property
     def has_hunted(self) -> bool:
         """Decide whether the force has swung so often that the trim goes slower."""
         return self._pace < 1.0

@@ -103,7 +103,9 @@ class OneShotEvents:
         is_first, self._was_hunting = is_hunting and not self._was_hunting, is_hunting
         if not is_first:
             return ""
-        return swinging_sentence(loop.applied_n) if loop.is_gain_own else hunting_sentence(loop.applied_n, MOST_TURNS)
+        if loop.is_gain_own:
+            return swinging_sentence(loop.applied_n, is_trim_off=loop.is_trim_off)
+        return hunting_sentence(loop.applied_n, MOST_TURNS)
 
     def stuck_event(self, is_stuck: bool, reading: Reading) -> str:
         """Return a sentence where a force has just been found stuck at the safe voltage. Ask while the output is off."""

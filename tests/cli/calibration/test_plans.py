@@ -79,7 +79,7 @@ def test_the_plan_never_overwrites_the_recording(tmp_path: Path, call: Call, mon
 def test_an_experiment_takes_no_options_of_a_ladder(tmp_path: Path, call: Call) -> None:
     plan = tmp_path / "p.yaml"
     plan.write_text("name: x\nparts:\n  - {name: a, moves: [{do: step, to_v: 1, hold_s: 1}]}\n", encoding="utf-8")
-    answer = call("calibrate", "--plan", str(plan), "--groups", "3", "--state", str(tmp_path / "state"))
+    answer = call("calibrate", "--plan", str(plan), "--groups", "3", "--state", str(tmp_path))
     assert answer.exit_code == 2
     assert "is an experiment" in answer.stderr
 
@@ -87,6 +87,6 @@ def test_an_experiment_takes_no_options_of_a_ladder(tmp_path: Path, call: Call) 
 def test_a_bad_plan_ends_with_its_lines_before_any_gateway_is_asked(tmp_path: Path, call: Call) -> None:
     plan = tmp_path / "p.yaml"
     plan.write_text("name: x\nparts:\n  - {name: a, moves: [{do: jump, to_v: 1}]}\n", encoding="utf-8")
-    answer = call("calibrate", "--plan", str(plan), "--state", str(tmp_path / "state"))
+    answer = call("calibrate", "--plan", str(plan), "--state", str(tmp_path))
     assert answer.exit_code == 78
     assert "p.yaml:3:28 parts[0].moves[0].do: jump is not one of" in answer.stderr

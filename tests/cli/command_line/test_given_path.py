@@ -101,3 +101,18 @@ def test_a_device_is_no_state_directory(words: tuple[str, ...], here: Path, call
     """`run --state /dev/null` said that the file exists, and others that there is no such directory."""
     answer = call(*words, "--state", "/dev/null")
     assert answer.exit_code == 2 and "'/dev/null' is no directory" in answer.stderr, answer.output
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "recordings list", "plant list", "plant rollback", "report for-support.tar.gz", "events", "audit show", "record on",
+        "calibration list", "calibration show", "calibration use 1", "calibration rollback", "sim list",
+    ],
+)  # fmt: skip
+def test_a_slip_in_state_is_told_by_each_verb_and_makes_no_directory(line: str, here: Path, call) -> None:
+    """`recordings list` said nothing, and `report` and `rollback` spoke of a file within it that nobody knows."""
+    answer = call(*line.split(), "--state", "typo")
+    assert answer.exit_code == 65, answer.output
+    assert answer.stderr == "E106 typo: there is no such state directory; --state DIR names another\n"
+    assert not Path("typo").exists() and not Path("for-support.tar.gz").exists()

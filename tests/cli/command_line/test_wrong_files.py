@@ -42,6 +42,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "rig.yaml").write_bytes((PROFILES / "rigs" / "demo.yaml").read_bytes())
     (tmp_path / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(200))
     (tmp_path / "folder").mkdir()
+    (tmp_path / "state").mkdir()
     (tmp_path / "empty").touch()
     (tmp_path / "begun.fgr").write_bytes(whole_recording(tmp_path)[:30])
     (tmp_path / "report.json").write_text(json.dumps({"format": 1, "verdict": "partial", "causes": []}, indent=2))

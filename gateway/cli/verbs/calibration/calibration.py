@@ -15,7 +15,7 @@ from gateway.cli.command_line.completion_words import complete_calibration_numbe
 from gateway.cli.command_line.folding import fold_entry
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.listed_number import ListedNumber
-from gateway.cli.errors import CliError, already_exists, no_state_directory
+from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
 
@@ -70,8 +70,6 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
             entry.number, describe_calibration(entry.document, slots) if entry.document else unusable, mark
         )
     click.echo("\n".join(lines), nl=bool(lines))
-    if _is_missing(state):
-        click.echo(no_state_directory(state.directory).format_message(), err=True)
 
 
 @command.command(name="show")
@@ -100,8 +98,6 @@ def use_command(*, number: int, force: bool, state: StateChoice, as_json: bool) 
     """
     from gateway.cli.calibration.store_access import change_calibration
 
-    if _is_missing(state):
-        raise no_state_directory(state.directory)
     _tell_change(change_calibration(state.directory, state.rig, {"use": number, "force": force}), as_json=as_json)
 
 
@@ -172,11 +168,6 @@ def export_command(
         _write({yaml_file: as_text(calibration)}, force=force)
     else:
         click.echo(as_text(calibration), nl=False)
-
-
-def _is_missing(state: StateChoice) -> bool:
-    """Decide whether --state names nothing that is there, as a slip does; a rig's own directory comes with its first run."""
-    return state.path is not None and not state.path.exists()
 
 
 def _c_source(calibration: "Calibration") -> dict[str, str]:

@@ -138,7 +138,7 @@ def _simulate_both(recording: str, plants: "tuple[PlantProfile, PlantProfile]", 
 
 @command.command(name="add")
 @click.argument("file", metavar="FILE", type=GivenPath(dir_okay=False))
-@state_options
+@state_options(makes=True)
 @json_option
 def add_command(*, file: Path, state: StateChoice, as_json: bool) -> None:
     """Add a plant file as the next number; `diagnose --save` adds what it has found by itself."""

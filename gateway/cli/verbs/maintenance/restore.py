@@ -18,7 +18,7 @@ EXAMPLES = ("restore kept.tar.gz --state elsewhere --dry-run", "restore kept.tar
 @click.argument("file", type=GivenPath(dir_okay=False, exists=True))
 @click.option("--force", is_flag=True, help="Also into a directory that is not empty; its content is kept beside it.")
 @click.option("--dry-run", is_flag=True, help="Check FILE and say what would be restored.")
-@state_options
+@state_options(makes=True)
 def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> None:
     """Unpack a backup into a state directory.
 

@@ -26,6 +26,7 @@ from tests.reports.fake_diagnosis import diagnosis
 
 @pytest.fixture
 def state(tmp_path: Path) -> Path:
+    (tmp_path / "state").mkdir()
     return tmp_path / "state"
 
 
