@@ -123,6 +123,40 @@ def test_a_reload_loses_neither_the_force_nor_the_minute(gateway: RunningGateway
     gateway.wait_until(in_state(OFF))
 
 
+def drawn_of_the_model(page: Any) -> int:
+    """Count the pixels of the loop's chart that have the colour of a branch."""
+    count: int = (
+        page.locator("canvas")
+        .nth(1)
+        .evaluate(
+            """canvas => {
+            const hex = getComputedStyle(document.documentElement).getPropertyValue("--falling").trim();
+            const [red, green, blue] = [1, 3, 5].map((place) => parseInt(hex.slice(place, place + 2), 16));
+            const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+            let count = 0;
+            for (let k = 0; k < data.length; k += 4) {
+                count += data[k] === red && data[k + 1] === green && data[k + 2] === blue && data[k + 3] === 255;
+            }
+            return count;
+        }"""
+        )
+    )
+    return count
+
+
+def test_a_model_that_has_not_come_is_not_drawn_as_one_of_no_force(gateway: RunningGateway, browser: Any) -> None:
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.route("**/api/v1/model", lambda route: route.abort())
+    page.goto(url_of(gateway))
+    shows(page, "#state", "off")
+    page.wait_for_selector("canvas >> nth=1")
+    page.wait_for_timeout(500)
+    assert drawn_of_the_model(page) == 0
+    page.unroute("**/api/v1/model")
+    until(page, lambda: drawn_of_the_model(page) > 0)
+    page.close()
+
+
 @pytest.mark.long
 def test_a_refusal_is_told_in_the_gateway_s_words(gateway: RunningGateway, page: Any) -> None:
     gateway.rest()
