@@ -179,6 +179,21 @@ def test_who_cannot_see_or_point_can_use_the_live_view(page: Any) -> None:
     assert serious_violations(page) == []
 
 
+def test_a_telephone_shows_each_register_s_value_whole(gateway: RunningGateway, browser: Any) -> None:
+    """Beside its name, without a finger that pushes the table aside."""
+    gateway.rest()
+    gateway.write(0, 1, 1000)
+    gateway.wait_until(in_state(HOLDING))
+    with browser.new_context(viewport={"width": 360, "height": 800}) as context:
+        narrow = context.new_page()
+        narrow.goto(url_of(gateway))
+        value = narrow.locator(".registers tbody tr", has_text="status_word").locator("td:nth-child(5)")
+        until(narrow, lambda: "in_band" in (value.text_content() or ""))
+        edges = "cell => [cell.getBoundingClientRect().right, cell.closest('.wide').getBoundingClientRect().right]"
+        ends, seen = value.evaluate(edges)
+        assert ends <= seen
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize(
