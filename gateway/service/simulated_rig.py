@@ -33,6 +33,7 @@ from gateway.service.simulation.kept_settings import KeptSettings
 from gateway.service.simulation.settings import SimulationSettings
 from gateway.service.simulation.world import SimulatedRig
 
+_LAST_WORDS_S: Final = 0.5  # longer than control takes to its last write and the answer
 _UNPLUGS: Final = {"output": "output.unplug", "load_cell": "cell.unplug", "valve": "valve.unplug"}
 
 
@@ -148,8 +149,10 @@ def _in_words(settings: SimulationSettings) -> str:
 
 
 async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog, ended: asyncio.Event) -> None:
-    """Run until the guardian's end of the link closes, or something else has set `ended`; either leaves no socket behind."""
-    loop = asyncio.get_running_loop()
+    """Run until the guardian's end of the link closes, or something else has set `ended`; either leaves no socket behind.
+
+    Of a guardian that was killed, control is still to hear: a real rig stays and takes its last words, and so does this one."""
+    loop, guardian = asyncio.get_running_loop(), os.getppid()
     lines = SimulatedLines(rig)
 
     def tell_ports() -> None:
@@ -168,6 +171,8 @@ async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog
     await ended.wait()
     loop.remove_reader(link.fileno())
     await server.close()
+    if os.getppid() != guardian:
+        await asyncio.sleep(_LAST_WORDS_S)
     lines.close()
 
 
