@@ -152,7 +152,7 @@ async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog
     """Run until the guardian's end of the link closes, or something else has set `ended`; either leaves no socket behind.
 
     Of a guardian that was killed, control is still to hear: a real rig stays and takes its last words, and so does this one."""
-    loop, guardian = asyncio.get_running_loop(), os.getppid()
+    loop = asyncio.get_running_loop()
     lines = SimulatedLines(rig)
 
     def tell_ports() -> None:
@@ -171,9 +171,16 @@ async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog
     await ended.wait()
     loop.remove_reader(link.fileno())
     await server.close()
-    if os.getppid() != guardian:
+    if _is_orphan(link):
         await asyncio.sleep(_LAST_WORDS_S)
     lines.close()
+
+
+def _is_orphan(link: socket.socket) -> bool:
+    """Decide whether the guardian has gone without asking for our end."""
+    with contextlib.suppress(BlockingIOError, guardian_link.ProtocolError):
+        return guardian_link.receive(link) is None
+    return False
 
 
 async def _serve_process(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog) -> None:
