@@ -74,6 +74,13 @@ ALARMS: Final = (
         is_warning=True,
     ),
     Explanation(
+        "A412",
+        "guardian gone",
+        "The process that starts and watches all others was ended. Control sends the safe voltage at once; the gateway ends.",
+        "kill -9 by hand, the out-of-memory killer (dmesg shows it), or systemd's watchdog.",
+        "Look for what ended it, then start again; as a service (force-gateway service install) systemd does that by itself.",
+    ),
+    Explanation(
         "A330",
         "calibration stopped",
         "A calibration run ended before its last stair; the force went to 0 and the data are kept.",

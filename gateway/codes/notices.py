@@ -220,12 +220,4 @@ NOTICES: Final = (
         "or lead is too large for this rig.",
         "Nothing if the force is good enough. Else free and clean the slide, and calibrate, which measures the trim's pace.",
     ),
-    Explanation(
-        "W361",
-        "noise as large as the band",
-        "The mean force is in the band, single readings keep leaving it before in_band_time is over: in_band and the state "
-        "holding come and go, or never come.",
-        "A cell far larger than the forces, a motor cable beside its own, a tool or spindle that shakes, a hunting regulator.",
-        "Write a wider in_band_tolerance, or set in_band_tolerance_n in the rig; a filter on the amplifier adds dead time.",
-    ),
 )

@@ -1,4 +1,4 @@
-"""A, with a bit in warning_word: what deserves a look while work goes on."""
+"""A or W, with a bit in warning_word: what deserves a look while work goes on."""
 
 from enum import IntFlag
 from typing import Self
@@ -130,5 +130,17 @@ class WarningBit(IntFlag):
             "What the plant describes is not what is wrong, or the machine has changed since it was diagnosed.",
             "force-gateway plant rollback; then record, and diagnose anew.",
             is_warning=True,
+        ),
+    )
+    # single readings keep leaving the band, so that the force is neither held nor missed
+    FORCE_UNSTEADY = (
+        1 << 10,
+        Explanation(
+            "W361",
+            "noise as large as the band",
+            "The mean force is in the band, single readings keep leaving it before in_band_time is over: in_band and the state "
+            "holding come and go, or never come.",
+            "A cell far larger than the forces, a motor cable beside its own, a tool that shakes, a hunting regulator.",
+            "Write a wider in_band_tolerance, or set in_band_tolerance_n in the rig; a filter on the amplifier adds dead time.",
         ),
     )

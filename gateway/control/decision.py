@@ -21,6 +21,7 @@ _PULLING, _SWITCHING = 256, 512
 _STATUS_WORDS: Final = tuple(StatusBit(word) for word in range(1024))
 _RESTARTED, _MASTER_LOST = WarningBit.RESTARTED.value, WarningBit.MASTER_LOST.value
 _TARGET_UNREACHABLE, _TRIM_SATURATED = WarningBit.TARGET_UNREACHABLE.value, WarningBit.TRIM_SATURATED.value
+_FORCE_UNSTEADY = WarningBit.FORCE_UNSTEADY.value
 _warning_word = lru_cache(WarningBit)  # to make a flag of an integer costs as much as all of its bits
 _FORCE, _NOT_LIMITED = Mode.FORCE, LimitedBy.NONE
 _IN_FAULT, _CALIBRATING = State.FAULT, State.CALIBRATING
@@ -121,5 +122,6 @@ class OutputComposer:
             | (_RESTARTED if machine.is_restarted else 0)
             | (_TARGET_UNREACHABLE if loop.unreachable else 0)
             | (_TRIM_SATURATED if loop.is_trim_at_limit else 0)
+            | (_FORCE_UNSTEADY if loop.settling.is_noisy else 0)
             | (_MASTER_LOST if machine.is_master_lost else 0)
         )

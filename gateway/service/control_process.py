@@ -15,7 +15,7 @@ import socket
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from gateway.ports import PortError
 from gateway.processes import exit_codes
@@ -37,6 +37,10 @@ from gateway.service.running_rig.handover import Handover
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.service.running_rig.running_rig import RunningRig
 from gateway.service.running_rig.starting import StartError
+
+_GUARDIAN_GONE: Final = (
+    "A412 the guardian is gone (killed, or out of memory): the safe voltage goes out at once, and the gateway ends"
+)
 
 
 def main(arguments: list[str]) -> int:
@@ -171,6 +175,8 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
         if running.failed.is_set():
             return exit_codes.FAILED
         await running.ramp_down()
+        if guardian.is_gone:
+            log("guardian", _GUARDIAN_GONE)
     return exit_codes.OK
 
 

@@ -33,6 +33,7 @@ from gateway.service.simulation.kept_settings import KeptSettings
 from gateway.service.simulation.settings import SimulationSettings
 from gateway.service.simulation.world import SimulatedRig
 
+_LAST_WORDS_S: Final = 0.5  # longer than control takes to its last write and the answer
 _UNPLUGS: Final = {"output": "output.unplug", "load_cell": "cell.unplug", "valve": "valve.unplug"}
 
 
@@ -148,7 +149,9 @@ def _in_words(settings: SimulationSettings) -> str:
 
 
 async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog, ended: asyncio.Event) -> None:
-    """Run until the guardian's end of the link closes, or something else has set `ended`; either leaves no socket behind."""
+    """Run until the guardian's end of the link closes, or something else has set `ended`; either leaves no socket behind.
+
+    Of a guardian that was killed, control is still to hear: a real rig stays and takes its last words, and so does this one."""
     loop = asyncio.get_running_loop()
     lines = SimulatedLines(rig)
 
@@ -168,7 +171,16 @@ async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog
     await ended.wait()
     loop.remove_reader(link.fileno())
     await server.close()
+    if _is_orphan(link):
+        await asyncio.sleep(_LAST_WORDS_S)
     lines.close()
+
+
+def _is_orphan(link: socket.socket) -> bool:
+    """Decide whether the guardian has gone without asking for our end."""
+    with contextlib.suppress(BlockingIOError, guardian_link.ProtocolError):
+        return guardian_link.receive(link) is None
+    return False
 
 
 async def _serve_process(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog) -> None:

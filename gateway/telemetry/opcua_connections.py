@@ -48,6 +48,12 @@ def _judge(transport: asyncio.BaseTransport, peers: Peers) -> tuple[str, str]:
     return host, f"W230 {host}:{port}: {refusal} (OPC UA)" if refusal else ""
 
 
+def _end_session(protocol: Any) -> asyncio.Task[None] | None:
+    """End a lost connection's session: the library keeps what it subscribed to for ten minutes, and publishes to nobody."""
+    session = getattr(getattr(protocol, "processor", None), "session", None)
+    return None if session is None else asyncio.create_task(session.close_session())
+
+
 def bound_connections(wire: Any, log: Log, settings: ServerSettings | None = None) -> None:
     """Have the library refuse connections beyond the most allowed, cut those that are silent, and a client whose request is
     longer than any could be: it waits for as many bytes as a header says, which may be 2 GB. wire: its protocol's module."""
@@ -74,6 +80,7 @@ def bound_connections(wire: Any, log: Log, settings: ServerSettings | None = Non
                 self._silence.close()
                 peers.leave(self._host)
                 super().connection_lost(ex)
+                self._ending = _end_session(self)
 
         def data_received(self, data: bytes) -> None:
             if self._silence is None:

@@ -1,6 +1,7 @@
 """What a step answers of where its parts stand, the parts played: each bit, each force and each wish by itself."""
 
 from math import isnan
+from operator import attrgetter
 from types import SimpleNamespace
 from typing import Any
 
@@ -30,7 +31,7 @@ class Stand:
         )  # fmt: skip
         self.loop = SimpleNamespace(
             voltage_v=1.5, feedforward_v=1.4, trim_v=0.1, limited_by=LimitedBy.NONE, in_band=False, unreachable=False,
-            is_trim_at_limit=False, applied_n=9.0, expected_n=10.0,
+            is_trim_at_limit=False, applied_n=9.0, expected_n=10.0, settling=SimpleNamespace(is_noisy=False),
         )  # fmt: skip
         self.run = SimpleNamespace(phase=CalibrationPhase.IDLE, progress=0.25, eta_s=7.0, target_n=0.0)
         self.command = Command(force_setpoint_n=30.0, heartbeat=5, command_sequence=6)
@@ -80,6 +81,7 @@ WARNINGS = {
     WarningBit.MASTER_LOST: ("machine", "is_master_lost"),
     WarningBit.TARGET_UNREACHABLE: ("loop", "unreachable"),
     WarningBit.TRIM_SATURATED: ("loop", "is_trim_at_limit"),
+    WarningBit.FORCE_UNSTEADY: ("loop.settling", "is_noisy"),
 }
 
 
@@ -88,7 +90,7 @@ def test_each_warning_says_one_thing_beside_those_of_the_line(bit: WarningBit) -
     stand = Stand()
     assert stand.says().warnings == WarningBit(0)
     part, name = WARNINGS[bit]
-    setattr(getattr(stand, part), name, True)
+    setattr(attrgetter(part)(stand), name, True)
     of_line = next(one for one in WarningBit if one not in WARNINGS)
     output = stand.says(warns=of_line)
     assert output.warnings == bit | of_line and output.status & StatusBit.WARNING

@@ -270,8 +270,20 @@ def test_noise_as_large_as_the_band_is_told_once_an_enable_as_what_keeps_the_sta
         told = [one for one in bench.events if one.startswith("W361 at 20.0 N single readings keep leaving the band")]
         assert len(told) == times * enables
         assert (bench.last.state is State.HOLDING) is not bool(times)
+        assert (WarningBit.FORCE_UNSTEADY in bench.last.warnings) is bool(times)
         bench.write(control_word=0)
         bench.run(0.5)
+        assert not bench.last.warnings
+
+
+def test_the_warning_of_noise_ends_with_the_setpoint_that_it_is_of() -> None:
+    bench = enabled(noise_n=1.5)
+    bench.enable(20.0)
+    bench.run(12.0)
+    assert bench.last.warnings == WarningBit.FORCE_UNSTEADY
+    bench.force(30.0)
+    bench.run(0.02)
+    assert (bench.last.state, bench.last.warnings) == (State.RAMPING, WarningBit(0))
 
 
 @pytest.mark.parametrize("frequency_hz", [3.0, 7.0, 11.0])

@@ -123,6 +123,40 @@ def test_a_reload_loses_neither_the_force_nor_the_minute(gateway: RunningGateway
     gateway.wait_until(in_state(OFF))
 
 
+def drawn_of_the_model(page: Any) -> int:
+    """Count the pixels of the loop's chart that have the colour of a branch."""
+    count: int = (
+        page.locator("canvas")
+        .nth(1)
+        .evaluate(
+            """canvas => {
+            const hex = getComputedStyle(document.documentElement).getPropertyValue("--falling").trim();
+            const [red, green, blue] = [1, 3, 5].map((place) => parseInt(hex.slice(place, place + 2), 16));
+            const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+            let count = 0;
+            for (let k = 0; k < data.length; k += 4) {
+                count += data[k] === red && data[k + 1] === green && data[k + 2] === blue && data[k + 3] === 255;
+            }
+            return count;
+        }"""
+        )
+    )
+    return count
+
+
+def test_a_model_that_has_not_come_is_not_drawn_as_one_of_no_force(gateway: RunningGateway, browser: Any) -> None:
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.route("**/api/v1/model", lambda route: route.abort())
+    page.goto(url_of(gateway))
+    shows(page, "#state", "off")
+    page.wait_for_selector("canvas >> nth=1")
+    page.wait_for_timeout(500)
+    assert drawn_of_the_model(page) == 0
+    page.unroute("**/api/v1/model")
+    until(page, lambda: drawn_of_the_model(page) > 0)
+    page.close()
+
+
 @pytest.mark.long
 def test_a_refusal_is_told_in_the_gateway_s_words(gateway: RunningGateway, page: Any) -> None:
     gateway.rest()
@@ -143,6 +177,21 @@ def serious_violations(page: Any) -> list[str]:
 
 def test_who_cannot_see_or_point_can_use_the_live_view(page: Any) -> None:
     assert serious_violations(page) == []
+
+
+def test_a_telephone_shows_each_register_s_value_whole(gateway: RunningGateway, browser: Any) -> None:
+    """Beside its name, without a finger that pushes the table aside."""
+    gateway.rest()
+    gateway.write(0, 1, 1000)
+    gateway.wait_until(in_state(HOLDING))
+    with browser.new_context(viewport={"width": 360, "height": 800}) as context:
+        narrow = context.new_page()
+        narrow.goto(url_of(gateway))
+        value = narrow.locator(".registers tbody tr", has_text="status_word").locator("td:nth-child(5)")
+        until(narrow, lambda: "in_band" in (value.text_content() or ""))
+        edges = "cell => [cell.getBoundingClientRect().right, cell.closest('.wide').getBoundingClientRect().right]"
+        ends, seen = value.evaluate(edges)
+        assert ends <= seen
 
 
 @pytest.mark.long

@@ -82,6 +82,7 @@ FROZEN = {
     "warning_word": """
         0:restarted 1:target_unreachable 2:trim_saturated 3:serial_noise 4:slow_loop 5:no_watchdog
         6:clock_fallback 7:master_lost 8:model_differs 9:compensation_worse
+        10:force_unsteady
     """,
     "refusal_reason": """
         0:none 1:address 2:read_only 3:half_value 4:not_finite 5:out_of_range 6:words_swapped 7:too_small

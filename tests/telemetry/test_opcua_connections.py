@@ -102,6 +102,27 @@ def test_who_is_silent_is_cut_and_who_speaks_is_not(connect: Callable[..., Any])
     asyncio.run(asyncio.wait_for(scene(), 20.0))
 
 
+def test_whose_connection_is_lost_leaves_no_subscription_behind(connect: Callable[..., Any]) -> None:
+    """The library kept it for ten minutes, for a client to come back to: a program that died every second had a whole core
+    publish to nobody, and then no other had a place."""
+    ua = pytest.importorskip("asyncua").ua
+
+    async def scene() -> None:
+        gone, stays = connect(Wire("10.0.0.1")), connect(Wire("10.0.0.2"))
+        server = gone.processor.iserver
+        for one in (gone, stays):
+            session = one.processor.session = server.create_session("far", external=True)
+            session.state = type(session.state).Activated
+            await session.create_subscription(ua.CreateSubscriptionParameters(), None)
+        await leave(gone)
+        await asyncio.sleep(0)
+        left = [one.session_id for one in server.subscription_service.subscriptions.values()]
+        assert left == [stays.processor.session.session_id]
+        await leave(stays)
+
+    asyncio.run(scene())
+
+
 class Timers:
     """A loop of which only the timers count, moved by hand."""
 

@@ -73,7 +73,7 @@ class SettlingCheck:
         self._band = InBandTimer(unreachable_s)
         self._answer = InBandTimer(unreachable_s)
         self._smooth_n: float | None = None  # contact force behind a low-pass, None where it begins anew
-        self._undecided_since_s = inf  # since when the force has been neither in band nor unreachable
+        self._otherwise_since_s = inf  # since when the force has been other than is_noisy says
         self.is_noisy = False
         self._driven_v: float | None = None  # that the band is of; None: it is of a force, or of nothing
 
@@ -103,23 +103,23 @@ class SettlingCheck:
         self._band.restart()
         self._answer.restart()
         self._driven_v = self._smooth_n = None
-        self._undecided_since_s, self.is_noisy = inf, False
+        self._wait_anew()
 
     def judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float, applied_n: float) -> StateEvent:
         """Return the event of a step in force mode. goal_n: where the ramp of the applied force leads."""
         self._answer.restart()
         if self._driven_v is not None:  # what was held was a voltage
             self._band.restart()
-            self._undecided_since_s = inf
+            self._wait_anew()
         self._driven_v = None
         if demand.force_n <= 0.0:
             self._band.restart()
-            self._undecided_since_s = inf
+            self._wait_anew()
             return _WAIT if applied_n <= 0.0 else _MOVE
         tolerance_n, in_band_time_s = demand.manner.tolerance_n, demand.manner.in_band_time_s
         if abs(goal_n - applied_n) > tolerance_n:
             self._smooth_n = None
-            self._undecided_since_s = inf
+            self._wait_anew()
             self._follow_ramp(demand, inputs, applied_n)
             return _MOVE
         may_be = inputs.touching and abs(demand.force_n - applied_n) <= tolerance_n
@@ -131,12 +131,19 @@ class SettlingCheck:
             return _SETTLE
         return _MOVE if inputs.touching or applied_n != goal_n else _WAIT
 
+    def _wait_anew(self) -> None:
+        self._otherwise_since_s, self.is_noisy = inf, False
+
     def _judge_noise(self, now_s: float, in_band_time_s: float) -> None:
         """Of a wide swing the smoothed force crosses the edges of the band, too: it is never missed for long, either."""
         is_undecided = not (self._band.in_band or self._band.unreachable)
-        self._undecided_since_s = min(self._undecided_since_s, now_s) if is_undecided else inf
         longest_s = in_band_time_s + max(_NOISY_S, _NOISY_WAITS * self._unreachable_s)
-        self.is_noisy = now_s - self._undecided_since_s > longest_s
+        if is_undecided is self.is_noisy:
+            self._otherwise_since_s = inf
+        else:  # a moment in the band does not end what has been noisy, or the warning would come and go
+            self._otherwise_since_s = min(self._otherwise_since_s, now_s)
+        if now_s - self._otherwise_since_s > longest_s or self._band.unreachable:
+            self._otherwise_since_s, self.is_noisy = inf, is_undecided
 
     def _smooth(self, reading: Reading) -> float:
         if self._smooth_n is None or not isfinite(self._smooth_n):
@@ -161,6 +168,7 @@ class SettlingCheck:
         is_felt = inputs.touching and inputs.reading.contact_n >= least_n
         answered = is_slewing or is_felt or inputs.expected_n < _ANSWER_N
         self._answer.update(inputs.now_s, answered, inf)
+        self._wait_anew()  # what was unsteady was a force
         if is_slewing or demand.voltage_v != self._driven_v:
             self._driven_v = demand.voltage_v
             self._band.restart()

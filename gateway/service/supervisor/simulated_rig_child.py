@@ -5,6 +5,7 @@ begins without pressure, and its ports have moved. Control is told where to; it 
 Standard library only.
 """
 
+import contextlib
 from collections.abc import Callable
 from math import inf
 from typing import Any, Final
@@ -74,6 +75,8 @@ class RigSupervisor:
     def end(self) -> None:
         """End the simulated rig."""
         if self._child is not None:
+            with contextlib.suppress(OSError):  # it is gone
+                message_link.send(self._child.link, message_link.STOP)
             self._child.end()
             self._child = None
 

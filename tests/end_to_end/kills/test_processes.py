@@ -6,6 +6,7 @@ import time
 
 import psutil
 
+from gateway.processes.event_file import EventReader
 from gateway.profiles import shipped_profiles_folder
 from tests.end_to_end.conftest import POLL_S, start, stop
 
@@ -83,6 +84,9 @@ def test_a_dead_guardian_takes_control_and_rig_with_it(running):
     running.process.kill()
     _, alive = psutil.wait_procs(children, timeout=5)
     assert not alive
+    with EventReader(running.state) as reader:
+        said = [event.code for event in reader.read_stored() if event.severity == "error"]
+    assert said == ["A412"], "no plug of the simulated rig, whose ports went with it"
 
 
 def test_a_rig_file_that_is_edited_meanwhile_is_for_the_next_start(tmp_path):

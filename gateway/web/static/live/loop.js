@@ -8,7 +8,7 @@ export function makeLoop(samples, api) {
   const element = figure("Voltage and force", [
     ["rising", "model, rising"], ["falling", "model, falling"], ["measured dot", "measured"], ["walk dot", "now"],
   ]);
-  let model = { voltage_v: [0, 1], rising_n: [0, 0], falling_n: [0, 0], number: null };
+  let model = { voltage_v: [0, 10], rising_n: [null, null], falling_n: [null, null] }; // none yet
   let shown = null;
   let lowest_n = 0;
 
