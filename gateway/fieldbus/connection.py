@@ -26,7 +26,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final, Protocol, cast
 
 from gateway.fieldbus.peers import Peers, address_of
-from gateway.fieldbus.rate_limits import Backlog, LogLimiter, RequestRate
+from gateway.fieldbus.rate_limits import LATE_S, Backlog, LogLimiter, RequestRate
 from gateway.fieldbus.settings import ServerSettings
 from gateway.fieldbus.waiting_bytes import count_waiting
 from gateway.modbus.fast import READ_FRAME_BYTES, whole_answer, whole_read_answer
@@ -104,6 +104,7 @@ class Connection(asyncio.BufferedProtocol):
         self._rate: RequestRate | None = None
         self._has_place = False  # in the row of those who wait for the rate of one address
         self._backlog = Backlog()
+        self._read_s = 0.0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Admit the peer, or abort the connection where there are too many."""
@@ -211,8 +212,9 @@ class Connection(asyncio.BufferedProtocol):
 
     def _note_backlog(self, size: int) -> None:
         """Say of a client that asks more than is answered, and waits for no answer, that it is late. size: of what has come."""
+        self._read_s = self._shared.clock.time()
         is_more = size == BUFFER_BYTES or self._transport.get_extra_info("modbus_more")
-        if self._backlog.note(self._shared.clock.time(), size, count_waiting(self._transport) if is_more else 0.0):
+        if self._backlog.note(self._read_s, size, count_waiting(self._transport) if is_more else 0.0):
             rate = f"{self._shared.settings.requests_per_s:g} requests/s" if self._rate else "is answered"
             asks = f"asks more than {rate} and waits for no answer"
             self._log("rate", f"W237 {self.peer}: {asks}: what it asks is carried out late, a stop as well")
@@ -249,6 +251,10 @@ class Connection(asyncio.BufferedProtocol):
 
     def _resume_reading(self) -> None:
         self._resume = None
+        if (
+            self._shared.clock.time() - self._read_s >= LATE_S
+        ):  # at a rate that is low, or shared with other connections
+            self._backlog.is_late = True
         self._answer_complete_requests()  # of too many refused writes it pauses again
         if not self._is_paused:
             self._transport.resume_reading()

@@ -132,3 +132,24 @@ def test_what_waits_in_a_pile_is_known_as_asked_for_a_while_ago(stand: Any, deli
     assert all(piled[began:ended]), "as long as it lasts"
     assert began < 0.5 * 200 + 50 and len(piled) - ended < 50
     assert not any(pile_up(20)), "and no longer"
+
+
+def test_what_several_connections_of_one_machine_have_sent_for_more_than_a_second_has_waited(
+    stand: Any, deliver: Any
+) -> None:
+    """None of them fills its buffer: at 50 requests/s they kept a force for four seconds behind the end of their master."""
+    made = stand(requests_per_s=50.0)
+    heartbeat = framed(pdu.write_registers_request(4, bytes(2)))
+    for _ in range(4):
+        connection, far = made.connect(FAR)
+        assert deliver(connection, far, heartbeat * 60) == 60 * len(heartbeat)
+    made.clock.advance(0.9)
+    fresh = len(made.bank.writes)
+    assert 40 < fresh < 70 and not any(peer.is_behind for _, _, peer in made.bank.writes)
+    made.clock.advance(0.2)
+    late = len(made.bank.writes)
+    made.clock.advance(5.0)
+    assert len(made.bank.writes) == 240
+    assert all(peer.is_behind for _, _, peer in made.bank.writes[late:])
+    deliver(connection, far, heartbeat)
+    assert not made.bank.writes[-1][2].is_behind, "it waits for its answers again"
