@@ -10,7 +10,7 @@ from enum import StrEnum
 from math import nan
 from typing import Annotated, Final, Literal
 
-from annotated_types import Gt, MaxLen, MinLen
+from annotated_types import Ge, Gt, MaxLen, MinLen
 
 from gateway.defaults import STRICT
 from gateway.devices.binary.raw_bytes import byte_count
@@ -84,6 +84,9 @@ class DeviceProfile:
     constants: Mapping[str, int | str] = field(
         default_factory=dict
     )  # fields with one fixed value, such as an address; a rig may say another address and channel
+    channels: Annotated[int, Ge(1)] | None = (
+        None  # outputs that a rig's `channel` chooses from, counted from 0; null: unknown
+    )
     reply_timeout_s: Annotated[float, Gt(0)] = 0.1  # an answer later than this is overdue
     watchdog: Literal["none"] | Watchdog = "none"  # none: the device holds its last output when nobody talks to it
     identity: Literal["none"] | Identity = "none"  # none: the device cannot be asked what it is

@@ -43,6 +43,10 @@ def find_unfit_settings(device: DeviceProfile, line: LineFile) -> Settings:
             and not (name == ADDRESS and device.is_modbus)
         ):
             yield name, f"{device.name} has no {name}: leave this line out"
+    channel = getattr(line, CHANNEL, None)
+    if channel is not None and CHANNEL in device.constants and device.channels and channel >= device.channels:
+        yield CHANNEL, f"{device.name} has {device.channels} outputs: 0 to {device.channels - 1}"
+        return
     if not isinstance(line, ValveFile) and line.checksum is not None and device.is_modbus:
         yield "checksum", f"{device.name} speaks Modbus RTU, which has its own: leave this line out"
         return

@@ -73,6 +73,8 @@ def test_raw_counts_are_sized_by_the_rig(tmp_path: Path) -> None:
             "output.address: smc-itv-rc has no address: leave this line out",
         ),
         (", channel: 1", "", ("icpdas-702x", "stream-st-gs"), "output.channel: icpdas-702x has no channel"),
+        (", channel: 4", "", ("icpdas-7024", "stream-st-gs"), "output.channel: icpdas-7024 has 4 outputs: 0 to 3"),
+        (", channel: 7", "", ("adam-4024", "stream-st-gs"), "output.channel: adam-4024 has 4 outputs: 0 to 3"),
         (", address: 300", "", ("icpdas-702x", "stream-st-gs"), "output.address: 0 V: address = 12C: does not fit"),
         (
             ", address: 0",
