@@ -20,7 +20,7 @@ from gateway.modbus import Peer
 from gateway.processes.json_socket.server import Handler, JsonLineServer
 from gateway.profiles import Rig
 from gateway.recording.label import RecordingLabel
-from gateway.service.live_answers import LiveAnswers, LiveParts
+from gateway.service.live_answers import LiveAnswers, LiveParts, clock_sentence
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.control_loop import ControlLoop
 from gateway.service.running_rig.recording.recordings import Recordings
@@ -55,6 +55,7 @@ class ControlSocket(JsonLineServer):
 
     def __init__(self, state: Path, parts: RunningParts, log: Callable[[str, str], None]) -> None:
         self.live = LiveAnswers(parts.rig, _live_parts(parts))
+        self.live.alarm_times.on_set = lambda set_s: log("clock", clock_sentence(set_s))
         handlers: dict[str, Handler] = {
             "record": self._record,
             "calibration": self._calibration,

@@ -39,9 +39,10 @@ Answer = dict[str, Any]
 class AlarmTimes:
     """When the fault and each warning rose, seconds since 1970; to be followed at each tick. A clock that is set, as by a time
     server minutes after a start, takes them along: else an alarm would have stood for years, or not yet. steady: seconds that
-    nobody sets."""
+    nobody sets. on_set: called when that has happened, with how far, s."""
 
     def __init__(self, clock: Callable[[], float] = time.time, steady: Callable[[], float] = awake_or_not_s) -> None:
+        self.on_set: Callable[[float], object] = lambda set_s: None
         self._clock, self._steady = clock, steady
         self._ahead_s = clock() - steady()
         self._fault, self._warnings = FaultCode.NONE, WarningBit(0)
@@ -60,10 +61,17 @@ class AlarmTimes:
         before_s, self._ahead_s = self._ahead_s, self._clock() - self._steady()
         if abs(set_s := self._ahead_s - before_s) > _SET_S:
             self._since = {alarm: since_s + set_s for alarm, since_s in self._since.items()}
+            self.on_set(set_s)
 
     def since(self, alarm: FaultCode | WarningBit) -> float:
         """Return when it rose; now for one that nobody has followed yet."""
         return self._since.get(alarm, self._clock())
+
+
+def clock_sentence(set_s: float) -> str:
+    """Return what the log says of a clock that was set by so many seconds: --since goes by the new one."""
+    which = "forward" if set_s > 0.0 else "back"
+    return f"the clock was set {which} by {abs(set_s):.1f} s: what was said before has the times of the old one"
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from gateway.codes.warning_bits import WarningBit
 from gateway.live.live_state import LiveState
 from gateway.profiles import load_rig
 from gateway.registers.words import ControlBit, State
-from gateway.service.live_answers import AlarmTimes
+from gateway.service.live_answers import AlarmTimes, clock_sentence
 from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.starting import StartError
 from tests.control.bench import bsfm
@@ -163,7 +163,8 @@ def test_an_alarm_has_stood_for_as_long_when_the_clock_is_set(stage: Stage, set_
     steady_s, ahead_s = [50.0], [1.7e9]
     times, decision = AlarmTimes(lambda: steady_s[0] + ahead_s[0], lambda: steady_s[0]), stage.wired.loop.decision
     assert decision is not None
-    warns = decision._replace(warnings=WarningBit.SLOW_LOOP)
+    warns, told = decision._replace(warnings=WarningBit.SLOW_LOOP), list[float]()
+    times.on_set = told.append
     times.follow(warns)
     for _ in range(60):
         steady_s[0] += 1.0
@@ -172,6 +173,15 @@ def test_an_alarm_has_stood_for_as_long_when_the_clock_is_set(stage: Stage, set_
     ahead_s[0] += set_s
     times.follow(warns)
     assert steady_s[0] + ahead_s[0] - times.since(WarningBit.SLOW_LOOP) == pytest.approx(60.0, abs=0.1)
+    times.follow(warns)
+    assert told == [pytest.approx(set_s)], "once, for `events`: what stands above is dated by another clock"
+
+
+def test_a_clock_that_is_set_is_told_with_how_far() -> None:
+    assert [clock_sentence(set_s).split(":")[0] for set_s in (259_200.25, -3600.0)] == [
+        "the clock was set forward by 259200.2 s",
+        "the clock was set back by 3600.0 s",
+    ]
 
 
 def test_a_taken_address_ends_the_start_unless_any_will_do() -> None:
