@@ -104,7 +104,7 @@ class Connection(asyncio.BufferedProtocol):
         self._rate: RequestRate | None = None
         self._has_place = False  # in the row of those who wait for the rate of one address
         self._backlog = Backlog()
-        self._read_s = 0.0
+        self._read_s, self._taken = 0.0, 0
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Admit the peer, or abort the connection where there are too many."""
@@ -212,9 +212,10 @@ class Connection(asyncio.BufferedProtocol):
 
     def _note_backlog(self, size: int) -> None:
         """Say of a client that asks more than is answered, and waits for no answer, that it is late. size: of what has come."""
-        self._read_s = self._shared.clock.time()
+        self._read_s, self._taken = self._shared.clock.time(), self._taken + size
+        of_tls = self._transport.get_extra_info("modbus_taken")  # what waits in the socket is encrypted, too
         is_more = size == BUFFER_BYTES or self._transport.get_extra_info("modbus_more")
-        if self._backlog.note(self._read_s, size, count_waiting(self._transport) if is_more else 0.0):
+        if self._backlog.note(self._read_s, of_tls or self._taken, count_waiting(self._transport) if is_more else 0.0):
             rate = f"{self._shared.settings.requests_per_s:g} requests/s" if self._rate else "is answered"
             asks = f"asks more than {rate} and waits for no answer"
             self._log("rate", f"W237 {self.peer}: {asks}: what it asks is carried out late, a stop as well")

@@ -51,21 +51,21 @@ class Backlog:
     heartbeats are read. is_late: what is taken now has waited for longer than a burst may. One that has always some requests
     under way, but waits for answers, is not late: at the pace at which they are taken, what waits is soon answered."""
 
-    __slots__ = ("_since_s", "_taken", "_told_s", "is_late")
+    __slots__ = ("_before", "_since_s", "_told_s", "is_late")
 
     def __init__(self) -> None:
         self._since_s: float | None = None
-        self._told_s, self._taken = -inf, 0
+        self._told_s, self._before = -inf, 0
         self.is_late = False
 
     def note(self, now_s: float, taken: int, waiting: float) -> bool:
-        """Note how many bytes were taken, and how many wait behind them; return whether to say now that it is late."""
+        """Note how many bytes of the wire have been taken in all, and how many wait behind them; return whether to say now that
+        it is late."""
         if not waiting or self._since_s is None:
-            self._since_s, self._taken, self.is_late = now_s if waiting else None, 0, False
+            self._since_s, self._before, self.is_late = now_s if waiting else None, taken, False
             return False
-        self._taken += taken
         lasts_s = now_s - self._since_s
-        self.is_late = self.is_late or (lasts_s >= _BURST_S and waiting * lasts_s >= self._taken * _BURST_S)
+        self.is_late = self.is_late or (lasts_s >= _BURST_S and waiting * lasts_s >= (taken - self._before) * _BURST_S)
         if not self.is_late or lasts_s < LATE_S or now_s - self._told_s < TOLD_AGAIN_S:
             return False
         self._told_s = now_s

@@ -82,7 +82,7 @@ class TlsStream(asyncio.BufferedProtocol):
         self._view = memoryview(self._buffer)
         self._connection: Connection | None = None
         self._is_paused = self._is_closing = self._is_more = False
-        self._shaken_bytes = 0
+        self._shaken_bytes = self._taken_bytes = 0
         self._allowed_bytes = LONGEST_RECORD
 
     # -- towards the socket
@@ -119,7 +119,7 @@ class TlsStream(asyncio.BufferedProtocol):
         if self._connection is None and not self._is_short(size):
             return
         self._incoming.write(self._view[:size])
-        self._is_more = size == _BUFFER_BYTES
+        self._is_more, self._taken_bytes = size == _BUFFER_BYTES, self._taken_bytes + size
         if self._connection is None:
             self._shake_hands()
         else:
@@ -153,11 +153,13 @@ class TlsStream(asyncio.BufferedProtocol):
     # -- towards the connection
 
     def get_extra_info(self, name: str, default: Any = None) -> Any:
-        """Return what is known of the far end: `socket`, `peername`, as `modbus_peer` who its certificate says that it is, and
-        as `modbus_more` whether more may wait than was read: records of one request each never fill a connection's buffer."""
+        """Return what is known of the far end: `socket`, `peername`, as `modbus_peer` who its certificate says that it is, as
+        `modbus_taken` the bytes of TLS that were read, and as `modbus_more` whether more may wait than that: records of one
+        request each never fill a connection's buffer."""
         if name == "socket":
             return self._socket.get_extra_info(name, default)
-        known = {"peername": self._peername, "modbus_peer": self.peer, "modbus_more": self._is_more}
+        known = {"peername": self._peername, "modbus_peer": self.peer}
+        known |= {"modbus_taken": self._taken_bytes, "modbus_more": self._is_more}
         return known.get(name, default)
 
     def set_write_buffer_limits(self, high: int) -> None:

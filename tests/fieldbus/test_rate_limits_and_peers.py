@@ -134,9 +134,9 @@ def test_only_who_has_more_under_way_than_is_soon_answered_is_late(taken: int, w
     """A client with forty requests always under way has its answers within milliseconds; its heartbeats must count."""
     backlog = Backlog()
     for tick in range(60):
-        backlog.note(0.01 * tick, taken, waiting)
+        backlog.note(0.01 * tick, taken * (tick + 1), waiting)
         assert backlog.is_late is (is_late and tick >= 25)
-    backlog.note(0.6, taken, 0.0)
+    backlog.note(0.6, 100 * taken, 0.0)
     assert not backlog.is_late
 
 

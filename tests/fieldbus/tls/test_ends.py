@@ -178,3 +178,20 @@ def test_what_waits_in_a_pile_of_records_of_one_request_each_is_known_as_asked_f
     behind = [peer.is_behind for _, _, peer in face.bank.writes]
     assert len(behind) == 300
     assert not any(behind[:60]) and all(behind[150:280]) and not behind[-1]
+
+
+def test_a_tls_client_with_forty_requests_under_way_is_not_late(
+    face: Face, folder: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What waits is encrypted, more than half as much again: beside the plain bytes that were taken it was 0.3 s of them."""
+    monkeypatch.setattr("gateway.fieldbus.connection.count_waiting", lambda transport: 40.0 * 61.0)
+    line = Line(face, SocketInHand("192.0.2.7"))
+    line.greet(client(folder, "setpoint"))
+    for _ in range(400):
+        line.tls.write(framed(write_registers_request(0, bytes(26))))
+    stream = line.outgoing.read()
+    while len(stream) > 1024:
+        if line.socket.reading:
+            stream = stream[deliver(line, stream[:1024]) :]
+        face.clock.advance(0.005)
+    assert len(face.bank.writes) > 300 and not any(peer.is_behind for _, _, peer in face.bank.writes)
