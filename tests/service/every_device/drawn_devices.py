@@ -47,6 +47,8 @@ def _about(rng: Random, role: str) -> Profile:
     _maybe(rng, profile, "identity", rng.choice(choices("DeviceProfile", "identity")))
     _maybe(rng, profile, "reply_timeout_s", rng.choice([0.02, 0.1, 0.5, 2.0]), 0.7)
     _maybe(rng, profile, "constants", {"address": rng.choice([1, 2, 255])}, 0.4)
+    if profile.get("constants") == {"address": 2}:
+        profile["channels"] = 4
     return profile
 
 
