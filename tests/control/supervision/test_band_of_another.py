@@ -65,3 +65,13 @@ def test_behind_a_restart_nothing_is_noisy_until_it_is_seen_again() -> None:
     assert not check.is_noisy
     check.judge_force(demand(), at(7.0, 1.0), 10.0, 1.0)
     assert not check.is_noisy
+
+
+def test_what_was_a_noisy_force_is_none_while_a_voltage_is_driven() -> None:
+    check = SettlingCheck(UNREACHABLE_S)
+    for k in range(700):
+        reading = Reading(contact_n=10.0 + 1.5 * (-1.0) ** k, is_new=True, is_usable=True, interval_s=STEP_S)
+        check.judge_force(demand(), at(STEP_S * k)._replace(reading=reading), 10.0, 10.0)
+    assert check.is_noisy
+    check.judge_voltage(demand(), at(7.0, 10.0), is_slewing=False)
+    assert not check.is_noisy
