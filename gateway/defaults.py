@@ -57,6 +57,8 @@ WATCH_SETTLED_S: Final = 1.0
 """From the first reading that is kept until one may be judged."""
 STALL_S: Final = 0.1
 """Silence of the control loop after which the guardian replaces it."""
+PILE_S: Final = 0.25
+"""What has waited for longer in a pile, of a client that waits for no answer, renews no lease and begins nothing."""
 COMMIT_PATIENCE_S: Final = 10.0
 """For which the terminal waits for a commit: a disk may be slow, one that takes longer hangs."""
 LEASE_S: Final = 0.2

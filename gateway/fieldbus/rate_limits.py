@@ -7,6 +7,8 @@ from collections.abc import Callable
 from math import inf
 from typing import Final
 
+from gateway.defaults import PILE_S
+
 _BURST_S: Final = 0.25  # what a client saves up while it is quiet: a poll of several blocks in a row is normal
 LATE_S: Final = 1.0  # so long more may wait of a client than is taken at once, as behind a burst
 TOLD_AGAIN_S: Final = 60.0
@@ -65,7 +67,7 @@ class Backlog:
             self._since_s, self._before, self.is_late = now_s if waiting else None, taken, False
             return False
         lasts_s = now_s - self._since_s
-        self.is_late = self.is_late or (lasts_s >= _BURST_S and waiting * lasts_s >= (taken - self._before) * _BURST_S)
+        self.is_late = self.is_late or (lasts_s >= PILE_S and waiting * lasts_s >= (taken - self._before) * PILE_S)
         if not self.is_late or lasts_s < LATE_S or now_s - self._told_s < TOLD_AGAIN_S:
             return False
         self._told_s = now_s

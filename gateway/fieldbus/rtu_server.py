@@ -17,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
+from gateway.defaults import PILE_S
 from gateway.devices import SerialSettings
 from gateway.modbus.peer import Peer
 from gateway.modbus.rtu import BROADCAST_UNIT, LONGEST_ADU, encode_adu
@@ -28,7 +29,6 @@ from gateway.ports.port import monotonic_s
 STANDSTILL_S: Final = 0.5
 """So long a process stands still that who asked before has given up: on a bus the answer would be taken for the next one's."""
 _AFTERMATH_S: Final = 0.05  # behind it what has waited is read, and its silence awaited
-_LATE_S: Final = 0.25  # for so long several requests come at once: who has given one up asks again, and waits
 _REPORT_PERIOD_S: Final = 60.0
 _WRONG_LINE_BYTES: Final = 24  # three requests' worth without one that can be read: the line is set otherwise
 
@@ -166,7 +166,7 @@ class ModbusRtuServer:
         self._wait(now_s)
 
     def _execute(self, request: RtuRequest) -> None:
-        has_waited = self._piles_since_s is not None and monotonic_s() - self._piles_since_s >= _LATE_S
+        has_waited = self._piles_since_s is not None and monotonic_s() - self._piles_since_s >= PILE_S
         pdu = answer(request.pdu, self._bank, self._peer_behind if has_waited else self.settings.peer)
         is_late = monotonic_s() < self._mute_until_s
         if not request.is_answered or is_late or self._backlog_bytes > LONGEST_ADU:

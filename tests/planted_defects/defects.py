@@ -596,7 +596,7 @@ DEFECTS = (
            "self._peer_behind if has_waited else self.settings.peer", "self.settings.peer",
            ("fieldbus/test_rtu_waiting.py",)),
     Defect("a pile of lines in the control socket is taken for fresh", "processes/json_socket/connection.py",
-           "self._is_late or self._server.loop.time() - self._read_s >= _LATE_S", "False",
+           "self._is_late or self._server.loop.time() - self._read_s >= PILE_S", "False",
            ("processes/json_socket/test_waiting_lines.py",)),
     Defect("of several serial faces one is told of a standstill", "service/running_rig/faces/faces.py",
            "            for face in self._serial:\n                face.note_standstill()",
@@ -686,5 +686,5 @@ DEFECTS = (
     Defect("an enable that has waited in a pile presses", "control/edge_checks.py",
            "    if not command.has_waited or not acts:\n", "    if True:\n", ("service/running_rig/test_takeovers.py",)),
     Defect("who has some requests under way is late", "fieldbus/rate_limits.py",
-           " and waiting * lasts_s >= (taken - self._before) * _BURST_S)", ")", ("fieldbus/test_rate_limits_and_peers.py",)),
+           " and waiting * lasts_s >= (taken - self._before) * PILE_S)", ")", ("fieldbus/test_rate_limits_and_peers.py",)),
 )  # fmt: skip

@@ -6,13 +6,10 @@ import socket
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Protocol
 
+from gateway.defaults import PILE_S
 from gateway.processes.json_socket.messages import encode_answer, error_answer
-
-_LATE_S: Final = (
-    0.25  # so long a line may wait behind others of its caller, which sends them without waiting for answers
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +106,7 @@ class JsonConnection:
         elif end:
             line = bytes(self._unread[:end])
             del self._unread[:end]
-            self._is_late = self._is_late or self._server.loop.time() - self._read_s >= _LATE_S
+            self._is_late = self._is_late or self._server.loop.time() - self._read_s >= PILE_S
             answer = self._server.answer(line, has_waited=self._is_late)
             if isinstance(answer, Future):
                 answer.add_done_callback(lambda done: self._server.enqueue(lambda: self._send(done.result())))

@@ -54,13 +54,19 @@ def test_another_response_bounds_a_force_and_the_answer_to_a_voltage_alike(is_vo
         assert late_s == pytest.approx(bound_s, abs=2.0 * STEP_S)
 
 
-def test_behind_a_restart_nothing_is_noisy_until_it_is_seen_again() -> None:
-    """Else the first ramp of each further enable began with the sentence that single readings leave the band."""
+def noisy() -> SettlingCheck:
+    """One whose single readings keep leaving the band."""
     check = SettlingCheck(UNREACHABLE_S)
     for k in range(700):
         reading = Reading(contact_n=10.0 + 1.5 * (-1.0) ** k, is_new=True, is_usable=True, interval_s=STEP_S)
         check.judge_force(demand(), at(STEP_S * k)._replace(reading=reading), 10.0, 10.0)
     assert check.is_noisy
+    return check
+
+
+def test_behind_a_restart_nothing_is_noisy_until_it_is_seen_again() -> None:
+    """Else the first ramp of each further enable began with the sentence that single readings leave the band."""
+    check = noisy()
     check.restart()
     assert not check.is_noisy
     check.judge_force(demand(), at(7.0, 1.0), 10.0, 1.0)
@@ -68,10 +74,6 @@ def test_behind_a_restart_nothing_is_noisy_until_it_is_seen_again() -> None:
 
 
 def test_what_was_a_noisy_force_is_none_while_a_voltage_is_driven() -> None:
-    check = SettlingCheck(UNREACHABLE_S)
-    for k in range(700):
-        reading = Reading(contact_n=10.0 + 1.5 * (-1.0) ** k, is_new=True, is_usable=True, interval_s=STEP_S)
-        check.judge_force(demand(), at(STEP_S * k)._replace(reading=reading), 10.0, 10.0)
-    assert check.is_noisy
+    check = noisy()
     check.judge_voltage(demand(), at(7.0, 10.0), is_slewing=False)
     assert not check.is_noisy
