@@ -252,10 +252,8 @@ class Connection(asyncio.BufferedProtocol):
 
     def _resume_reading(self) -> None:
         self._resume = None
-        if self._shared.clock.time() - self._read_s >= LATE_S:
-            self._backlog.is_late = (
-                True  # although no buffer is full: the rate is low, or shared with other connections
-            )
+        # although no buffer is full: the rate is low, or shared with other connections
+        self._backlog.is_late |= self._shared.clock.time() - self._read_s >= LATE_S
         self._answer_complete_requests()  # of too many refused writes it pauses again
         if not self._is_paused:
             self._transport.resume_reading()
