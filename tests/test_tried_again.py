@@ -38,13 +38,14 @@ def test_{name}(machine):
     ("each_s", "name", "passes_at", "end"),
     [
         (0.1, "real", 2, "1 passed"),
-        (0.1, "real", 3, "1 failed"),
+        (0.1, "real", 3, "1 passed"),
+        (0.1, "real", 4, "1 failed"),
         (0.04, "real", 2, "1 failed"),
         (0.1, "pure", 2, "1 failed"),
         (0.1, "real", 1, "1 passed"),
     ],
 )
-def test_only_what_has_failed_in_stolen_time_has_a_second_try(
+def test_only_what_has_failed_in_stolen_time_is_tried_again(
     tmp_path: Path, each_s: float, name: str, passes_at: int, end: str
 ) -> None:
     (tmp_path / "conftest.py").write_text(CONFTEST.format(each_s=each_s))

@@ -16,12 +16,27 @@ from tests.end_to_end.own_devices import OwnDevices
 
 OFF, READY, RAMPING, HOLDING, FAULT = range(5)
 STALL_S = 0.1
+PATIENT_STALL_S = 0.4
 
 
 @pytest.fixture
 def devices(tmp_path: Path) -> Iterator[OwnDevices]:
     with OwnDevices(tmp_path) as devices:
         yield devices
+
+
+@pytest.fixture
+def patient_devices(tmp_path: Path) -> Iterator[OwnDevices]:
+    """For what takes seconds: a host takes a processor for 100 ms now and then, which is no test's subject here."""
+    with OwnDevices(tmp_path, stall_s=PATIENT_STALL_S) as devices:
+        yield devices
+
+
+@pytest.fixture
+def patient(patient_devices: OwnDevices) -> Iterator[RunningGateway]:
+    gateway = start(patient_devices.directory / "state", rig=str(patient_devices.rig))
+    yield gateway
+    stop(gateway)
 
 
 @pytest.fixture
@@ -161,37 +176,37 @@ def stopping(gateway: RunningGateway, devices: OwnDevices, signal_number: int, *
     return began_s
 
 
-def test_what_ctrl_c_ramps_a_second_one_cuts(real, devices):
-    began_s = stopping(real, devices, signal.SIGINT)
-    on_the_way = [heard.voltage_v for heard in devices.settings_since(began_s)]
+def test_what_ctrl_c_ramps_a_second_one_cuts(patient, patient_devices):
+    began_s = stopping(patient, patient_devices, signal.SIGINT)
+    on_the_way = [heard.voltage_v for heard in patient_devices.settings_since(began_s)]
     assert all(after <= before for before, after in pairwise(on_the_way))
     assert on_the_way[-1] > 0.5, "still on the ramp"
     cut_s = time.monotonic()
-    real.process.send_signal(signal.SIGINT)
-    assert devices.until_safe(cut_s) < 0.3
-    assert real.process.wait(3) == 0
-    assert devices.heard[-1].voltage_v == 0.0
+    patient.process.send_signal(signal.SIGINT)
+    assert patient_devices.until_safe(cut_s) < 0.3
+    assert patient.process.wait(3) == 0
+    assert patient_devices.heard[-1].voltage_v == 0.0
 
 
-def test_a_stop_that_every_process_is_asked_for_has_its_ramp(real, devices):
+def test_a_stop_that_every_process_is_asked_for_has_its_ramp(patient, patient_devices):
     """As a machine does that shuts down, a session that ends, or `pkill -f`: control died of it, and the force fell at once."""
-    began_s = stopping(real, devices, signal.SIGTERM, *real.ready["pids"].values())
-    assert real.process.wait(8) == 0
-    on_the_way = [heard.voltage_v for heard in devices.settings_since(began_s)]
+    began_s = stopping(patient, patient_devices, signal.SIGTERM, *patient.ready["pids"].values())
+    assert patient.process.wait(8) == 0
+    on_the_way = [heard.voltage_v for heard in patient_devices.settings_since(began_s)]
     assert all(after <= before for before, after in pairwise(on_the_way))
     assert max(before - after for before, after in pairwise(on_the_way)) < 1.0, "a ramp, not a fall"
     assert on_the_way[-1] == 0.0
-    assert "A401" not in real.log.read_text()
+    assert "A401" not in patient.log.read_text()
 
 
-def test_control_that_stands_still_on_the_last_ramp_is_answered_as_at_any_time(real, devices):
+def test_control_that_stands_still_on_the_last_ramp_is_answered_as_at_any_time(patient, patient_devices):
     """The ramp may take seconds; standing still may not."""
-    stopping(real, devices, signal.SIGTERM)
+    stopping(patient, patient_devices, signal.SIGTERM)
     stopped_s = time.monotonic()
-    os.kill(real.ready["pids"]["control"], signal.SIGSTOP)
-    assert devices.until_safe(stopped_s) < 1.0, "140 ms; a busy machine may be late, but not the 5 s of a stop"
-    assert real.process.wait(3) == 0
-    with EventReader(real.state) as reader:
+    os.kill(patient.ready["pids"]["control"], signal.SIGSTOP)
+    assert patient_devices.until_safe(stopped_s) < 1.0, "140 ms; a busy machine may be late, but not the 5 s of a stop"
+    assert patient.process.wait(3) == 0
+    with EventReader(patient.state) as reader:
         (stop_words,) = [event.text for event in reader.read_stored() if "stopped as asked" in event.text]
     assert "without a tick" in stop_words
 
