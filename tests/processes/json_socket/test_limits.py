@@ -78,7 +78,7 @@ def test_more_callers_than_allowed_are_told_so_and_closed(tmp_path: Path) -> Non
         for caller in (*served, fresh):
             caller.close()
 
-    assert with_server(tmp_path, scene) == []
+    assert with_server(tmp_path, scene, SocketLimits(spared_s=60.0)) == []
 
 
 def test_callers_that_say_nothing_make_room_for_one_that_does(tmp_path: Path) -> None:
