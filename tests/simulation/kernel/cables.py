@@ -239,6 +239,7 @@ class SimulatedPort:
     async def write_last(self, data: bytes, deadline_s: float = 0.5) -> None:
         if not self.write(data):
             raise PortError("E102", f"{self.path} is not open")
+        self._cable.on_unheard(self._loop.time())  # what else is said now is not sent
         await asyncio.sleep(len(data) * self._settings.character_s + 1e-3)
 
     def close(self) -> None:
