@@ -281,5 +281,19 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(7.6232, "bus", "pull"),
         ],
     ),
+    (
+        16857,
+        [
+            Event(4.3258, "worker", "take", (29.75,), way="read_and_write"),
+            Event(4.6596, "worker", "fall_silent"),
+            Event(
+                5.1537,
+                "person",
+                "say",
+                data=b'{"do": "modbus", "via": "opcua", "pdu": "100000000204000104b0", "unit": 1}',
+            ),
+            Event(6.871, "machine", "terminate", (0.2421, 978507.8355280932)),
+        ],
+    ),
 ]
 """Schedules that once broke a law, or were said to: the seed of the machine, and what happened to it."""

@@ -51,6 +51,7 @@ class Surroundings:
             cable.adapter_s = adapter_s
         CABLES["load_cell"].on_host = observer.hear_cell
         CABLES["output"].on_unheard = observer.history.cuts.append
+        CABLES["output"].on_dropped = observer.note_dropped
         if cell_s:
             outside.call_later(0.3 * cell_s, self._stream)
 

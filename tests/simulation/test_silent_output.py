@@ -1,14 +1,21 @@
-"""Those who judge what is done while the output is silent, or away: a zero that is taken of a force, and a stop that waits."""
+"""Those who judge what is done while the output is silent, or away: a zero that is taken of a force, a stop that waits, and a
+sentence that is half on the wire when the rest of it is dropped."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from math import inf
 
 import pytest
 
+from tests.service.rigs import demo
 from tests.simulation.draws.sequences import draw_sequences
+from tests.simulation.judges.heard import LineObserver, RtuObserver
 from tests.simulation.judges.observer import Bounds, Observer
 from tests.simulation.judges.zero_witness import MOST_N, UNKNOWN_S, ZeroWitness
+from tests.simulation.kernel.cables import CABLES
+from tests.simulation.kernel.virtual_time import VirtualClock, VirtualLoop
 from tests.simulation.masters.spelling import tells_weight, write_one_pdu, write_pdu
+from tests.simulation.surroundings import Surroundings
 
 BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05, output_timeout_s=0.5, reply_timeout_s=0.1)
 
@@ -70,3 +77,47 @@ def test_few_schedules_have_a_sequence_and_those_that_have_have_it_in_order() ->
     assert 40 < sum(map(bool, drawn)) < 100
     assert all(events == sorted(events, key=lambda event: event.at_s) for events in drawn)
     assert {event.what for events in drawn for event in events} >= {"tare", "pull", "output-cut", "ask", "say"}
+
+
+RTU_0_V, RTU_2_V = bytes.fromhex("010600000000 89ca"), bytes.fromhex("0106000007d0 8a66")
+
+
+@pytest.fixture
+def outside() -> Iterator[VirtualLoop]:
+    loop = VirtualLoop(VirtualClock(), has_tasks=False)
+    yield loop
+    loop.close()
+
+
+@pytest.mark.parametrize(
+    ("kind", "sentence", "next_one", "settings"),
+    [
+        (Observer, b"SET 205\r\n", b"SET 0\r\n", 1),
+        (LineObserver, b"#0102.000\r", b"#0100.000\r", 1),
+        (RtuObserver, RTU_2_V, RTU_0_V, 2),
+    ],
+)
+@pytest.mark.parametrize("sent", [1, 3, 7])
+def test_what_is_left_of_a_dropped_sentence_may_stand_before_the_next_one_and_nothing_else(
+    outside: VirtualLoop, kind: type[Observer], sentence: bytes, next_one: bytes, settings: int, sent: int
+) -> None:
+    """A device that is told lines does not understand the one behind it; by a CRC it is found."""
+    observer = kind(BOUNDS)
+    Surroundings(demo(), outside, observer, None)
+    cable = CABLES["output"]
+
+    def complains(data: bytes, for_s: float = 1.0) -> bool:
+        before = len(observer.broken)
+        cable.send_to_device(data)
+        outside._virtual_clock.run_until(outside.time() + for_s)
+        return len(observer.broken) > before
+
+    assert not complains(next_one), "the first may stand behind anything"
+    assert not complains(sentence, (sent - 0.5) * cable._character_s)
+    cable.drop_unsent()
+    assert not complains(next_one) and observer.settings == settings
+    assert not complains(next_one) and observer.settings == settings + 1
+    assert complains(sentence[:sent] + next_one), "nothing was dropped"
+    assert not complains(sentence, (sent - 0.5) * cable._character_s)
+    cable.drop_unsent()
+    assert complains(b"?" + next_one), "what follows it is garbled"

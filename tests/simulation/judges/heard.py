@@ -51,14 +51,16 @@ class LineObserver(Observer):
 
     def hear(self, chunk: bytes, now_s: float) -> None:
         *lines, self._line = (self._line + chunk).split(self.sentences.end)
-        for line in lines:
+        for heard in lines:
+            line = self._without_dropped(heard)
             before = rb".*?" if self._is_cut else rb""
             if found := re.fullmatch(before + self.sentences.setting, line, re.DOTALL):
-                self._note_setting(float(found[1]) * self.sentences.volt, now_s)
+                if line == heard:
+                    self._note_setting(float(found[1]) * self.sentences.volt, now_s)
             elif (
                 not re.fullmatch(before + rb"(?:" + self.sentences.others + rb")", line, re.DOTALL) and not self._is_cut
             ):
-                self.complain("I7", f"{line!r} is no sentence", now_s)
+                self.complain("I7", f"{heard!r} is no sentence", now_s)
             self._is_cut = False
 
 
@@ -68,7 +70,8 @@ class RtuObserver(Observer):
 
     def hear(self, chunk: bytes, now_s: float) -> None:
         self._line += chunk
-        while len(self._line) >= 8:
+        while len(self._line) >= 8 + len(self._dropped):
+            self._line = self._without_dropped(self._line)  # behind which the device finds the next one by its CRC
             frame = self._line[:8]
             if crc16(frame[:6]) != int.from_bytes(frame[6:], "little") or frame[0] != 1 or frame[1] not in (3, 6):
                 if not self._is_cut:

@@ -82,6 +82,7 @@ class Observer:
     _over: int = 0
     _line: bytes = b""
     _cell_line: bytes = b""
+    _dropped: bytes = b""
     _is_cut: bool = True
     _must_be_safe: bool = True
     _begun_s: float = 0.0
@@ -97,12 +98,23 @@ class Observer:
     def hear(self, chunk: bytes, now_s: float) -> None:
         """Bytes that have reached the output device."""
         *lines, self._line = (self._line + chunk).split(b"\r\n")
-        for line in lines:
+        for heard in lines:
+            line = self._without_dropped(heard)
             if found := re.fullmatch(rb"(.*)SET (\d+)", line) if self._is_cut else re.fullmatch(rb"()SET (\d+)", line):
-                self._note_setting(int(found[2]) * COUNT_V, now_s)
+                if line == heard:
+                    self._note_setting(int(found[2]) * COUNT_V, now_s)
             elif line != b"MON" and not self._is_cut:
-                self.complain("I7", f"{line!r} is no sentence", now_s)
+                self.complain("I7", f"{heard!r} is no sentence", now_s)
             self._is_cut = False
+
+    def note_dropped(self, sent: bytes) -> None:
+        """Its sender has forgotten the rest of a sentence of which this is on the wire: it stands before the next one, which
+        the device then does not understand."""
+        self._dropped += sent
+
+    def _without_dropped(self, heard: bytes) -> bytes:
+        dropped, self._dropped = self._dropped, b""
+        return heard.removeprefix(dropped)
 
     @property
     def is_safe(self) -> bool:
@@ -137,7 +149,7 @@ class Observer:
         now must be safe. until_s: what is on the wire already is through by then."""
         self.history.cuts.append(until_s)
         self._is_cut = self._must_be_safe = True
-        self._begun_s = until_s
+        self._begun_s, self._dropped = until_s, b""
 
     def _note_setting(self, voltage_v: float, now_s: float) -> None:
         if not self.bounds.voltage_min_v - 0.6 * COUNT_V <= voltage_v <= self.bounds.voltage_max_v + COUNT_V:

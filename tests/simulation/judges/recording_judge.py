@@ -36,9 +36,9 @@ Row = dict[str, float]
 @dataclass
 class History:
     """What came from the load cell, N (None where it was no plain reading), what reached the output, V, and when somebody
-    tared, a line was cut, control went on after a standstill, or was about to stand still (a turn before); each with its time,
-    s. is_plain: readings are sentences whose number is the force; has_valve: one that pulls turns its sign; weighed_s: from
-    then on a payload may hang at the cell, whose weight the gateway takes off."""
+    tared, a line was cut or its last sentence sent, control went on after a standstill, or was about to stand still (a turn
+    before); each with its time, s. is_plain: readings are sentences whose number is the force; has_valve: one that pulls turns
+    its sign; weighed_s: from then on a payload may hang at the cell, whose weight the gateway takes off."""
 
     is_plain: bool = True
     has_valve: bool = False

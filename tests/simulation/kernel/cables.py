@@ -49,6 +49,7 @@ class Cable:
         )  # a host has told it something, which it has not heard
         self._spoils: deque[Spoil] = deque()
         self.strange_s = 0.0  # when something strange was said last
+        self.on_dropped: Callable[[bytes], None] = lambda sent: None  # of a message whose rest its host has forgotten
         self.spoiled_s = -inf  # when an answer of the device was spoiled last
         self.answers = 0  # what the device has said so far, in sentences
         self.heard_s = 0.0  # when the host has got something last
@@ -75,6 +76,8 @@ class Cable:
                 self._to_device.through_s = through_s = begin_s + len(sent) * self._character_s
                 self._to_device.waiting.append((begin_s, sent))
                 self._outside.call_at(through_s + 1e-9, self._arrive, self._to_device, sent)
+                if len(sent) < len(data):
+                    self.on_dropped(sent)
 
     @property
     def backlog_s(self) -> float:
@@ -236,6 +239,7 @@ class SimulatedPort:
     async def write_last(self, data: bytes, deadline_s: float = 0.5) -> None:
         if not self.write(data):
             raise PortError("E102", f"{self.path} is not open")
+        self._cable.on_unheard(self._loop.time())  # what else is said now is not sent
         await asyncio.sleep(len(data) * self._settings.character_s + 1e-3)
 
     def close(self) -> None:
