@@ -44,6 +44,7 @@ MODULE ForceGateway
   !
   ! Use in T_ROB1, both cases:
   !    fgForce:=12;                  ! N
+  !    fgInBand:=FALSE;              ! behind each new fgForce
   !    fgEnable:=TRUE;
   !    WaitUntil fgInBand\MaxTime:=3\TimeFlag:=bLate;
   !    IF bLate THEN
@@ -56,8 +57,8 @@ MODULE ForceGateway
   !    CONNECT irEnded WITH MyTrap;  IPers fgEnded,irEnded;
   ! and in MyTrap: IF fgEnded StopMove;
   ! After a fault: fgReset:=TRUE, which goes FALSE when it is sent.
-  ! A new fgForce while enabled: WaitTime 0.2 before fgInBand counts,
-  ! it is still that of the old force.
+  ! fgInBand goes TRUE when what fgForce asks for is held; what was
+  ! held before it forgets with the next cycle only: set it FALSE.
   !
   ! One cycle is one FC23: it writes the command block where
   ! control_word has changed, the words behind that where they have,
@@ -498,6 +499,15 @@ ${crc_table}];
     RETURN FgHasBit(nGood{FG_C_CONTROL_WORD},FG_ENABLE);
   ENDFUNC
 
+  ! Does T_ROB1 ask for just that? Not behind a new fgForce of since
+  LOCAL FUNC bool FgIsAsked()
+    VAR bool bPulls;
+    IF NOT (fgEnable AND FgIsOn()) RETURN FALSE;
+    bPulls:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
+    IF fgPull<>bPulls RETURN FALSE;
+    RETURN Round(fgForce*${force_counts})=nGood{FG_C_FORCE_SETPOINT};
+  ENDFUNC
+
   LOCAL PROC FgForget()
     ! fgForce stays: between T_ROB1's two lines it would hold 0 N
     IF fgEnable OR FgIsOn() THEN
@@ -515,7 +525,7 @@ ${status_decoding}
     nStatus:=nWords{FG_S_STATUS_WORD};
     fgEnabled:=FgHasBit(nStatus,FG_IS_ENABLED);
     fgReady:=FgHasBit(nStatus,FG_IS_READY);
-    fgInBand:=FgIsOn() AND FgHasBit(nStatus,FG_IS_IN_BAND);
+    fgInBand:=FgIsAsked() AND FgHasBit(nStatus,FG_IS_IN_BAND);
     fgFault:=FgHasBit(nStatus,FG_HAS_FAULT);
   ENDPROC
 
