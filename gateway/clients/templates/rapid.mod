@@ -217,7 +217,7 @@ ${crc_table}];
   PROC FgInit()
     IF ERR_FG_FRAME=-1 BookErrNo ERR_FG_FRAME;
     SocketClose sdGateway;
-    fgConnected:=FALSE;
+    FgClearStatus;
     fgReset:=FALSE;
     fgTare:=FALSE;
     fgTake:=FALSE;
@@ -577,15 +577,24 @@ ${status_decoding}
     ClkStop clRetry;
   ENDPROC
 
+  ! What was read last, or before a start, is no longer known
+  LOCAL PROC FgClearStatus()
+    fgConnected:=FALSE;
+    fgEnabled:=FALSE;
+    fgReady:=FALSE;
+    fgInBand:=FALSE;
+    fgFault:=FALSE;
+    fgStatus{FG_S_STATUS_WORD}:=0;
+    fgStatus{FG_S_STATE}:=0;
+    fgStatus{FG_S_FORCE_MEASURED}:=9E9;
+  ENDPROC
+
   LOCAL PROC FgDrop(string stWhy)
     SocketClose sdGateway;
     IF bAsking OR FgIsOn() bOffPending:=TRUE;
     bAsking:=FALSE;
     IF fgConnected ErrWrite\W,"Force gateway: lost",stWhy;
-    fgConnected:=FALSE;
-    fgEnabled:=FALSE;
-    fgReady:=FALSE;
-    fgInBand:=FALSE;
+    FgClearStatus;
     fgUpload:=FALSE;
     nUploadStep:=0;
     nOnce:=0;
