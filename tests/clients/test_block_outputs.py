@@ -1,4 +1,4 @@
-"""What a PLC's block shows its program: nothing of before a loss, a refusal until something else is taken, the end of an enable."""
+"""What a block shows its program: nothing of before a loss, a refusal until something else is asked for, an end."""
 
 from __future__ import annotations
 

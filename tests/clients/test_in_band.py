@@ -9,7 +9,9 @@ import pytest
 from gateway.registers import Command, Status
 from gateway.registers.words import ControlBit, State, StatusBit
 from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
+from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import cycles
 from tests.clients.test_two_tasks import every_place
 
@@ -97,3 +99,27 @@ def test_a_new_force_beside_an_exchange_is_not_in_band_because_the_old_one_was(l
     for client, gateway in every_place(language, prepare, acts):
         assert not in_band(client) and gateway.bank.command.force_setpoint_n == 30.0
     assert len(seen) > 400 and not any(seen)
+
+
+def test_a_force_that_was_refused_is_not_in_band_because_the_last_one_that_was_taken_is(
+    client: Any, gateway: GatewayAtHand
+) -> None:
+    """A robot's program that asked for 65 N of a rig of 60 N, and waited, ground on with 12 N."""
+    client.enable(12.0)
+    cycles(client)
+    ask_for(client, 65.0)
+    told = seen_in_band(client, 8)
+    assert "W204" in client.text and gateway.bank.command.force_setpoint_n == 12.0
+    if isinstance(client, PythonProgram | CProgram):
+        pytest.skip("exchange() itself says that it was refused")
+    assert not any(told)
+    if isinstance(client, UniversalRobot):
+        assert not client.machine.start("fg_wait_in_band", 0.1)
+    ask_for(client, 12.0)
+    cycles(client)
+    assert in_band(client) and client.enabled
+    ask_for(client, 400.0)
+    assert not any(seen_in_band(client)) and "327.67" in client.text
+    ask_for(client, 13.0)
+    cycles(client)
+    assert in_band(client) and gateway.bank.command.force_setpoint_n == 13.0

@@ -67,7 +67,8 @@ MODULE ForceGateway
   ! commanded it is one FC03, which disturbs no other master.
   ! This module never enables by itself:
   !    refused  the last accepted command goes on (a refused write
-  !             would not renew the lease); fgText says why
+  !             would not renew the lease); fgText says why, and
+  !             fgInBand stays FALSE while fgForce asks for it
   !    ended    by a fault, another master or a restart: fgEnable is
   !             FALSE again, until you set it
   !    lost     the same; it connects again, waiting longer each time,
@@ -159,6 +160,8 @@ ${crc_table}];
   LOCAL VAR num nBackoff:=0;
   LOCAL VAR num nTransaction:=0;
   LOCAL VAR num nHeartbeat:=0;
+  ! The force that was refused, in counts: not asked for again
+  LOCAL VAR num nDenied:=-1;
   LOCAL VAR num nException:=0;
   LOCAL VAR num nOnce:=0;
   LOCAL VAR bool bOffPending:=FALSE;
@@ -276,14 +279,6 @@ ${crc_table}];
   ! From the PERS data to the words of the next write
   LOCAL PROC FgCollect()
     VAR num nCounts;
-    nCounts:=Round(fgForce*${force_counts});
-    IF fgForce<${force_min} OR fgForce>${force_max} THEN
-      fgText:="fgForce = "+NumToStr(fgForce,2)+" N, allowed ${force_min} .. ${force_max}";
-      fgForce:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};
-      nCounts:=nGood{FG_C_FORCE_SETPOINT};
-      ! What holds goes on, nothing is begun
-      IF NOT FgIsOn() fgEnable:=FALSE;
-    ENDIF
     FgCheckCommand;
     nWant:=fgCommand;
     nWant{FG_C_CONTROL_WORD}:=0;
@@ -303,7 +298,9 @@ ${crc_table}];
       fgTake:=FALSE;
     ENDIF
     ! A reset needs force 0: an enable beside it waits for its answer
-    IF fgEnable AND FgMayEnable() THEN
+    nCounts:=-1;
+    IF fgEnable AND FgMayEnable() nCounts:=FgForceCounts();
+    IF nCounts>=0 THEN
       IF NOT FgIsOn() fgText:="";
       nWant{FG_C_CONTROL_WORD}:=FG_ENABLE;
       IF fgPull nWant{FG_C_CONTROL_WORD}:=FG_ENABLE+FG_VALVE_PULL;
@@ -314,6 +311,21 @@ ${crc_table}];
     ! for its refusal would be that of OFF
     IF bOffPending nWant:=nGood;
   ENDPROC
+
+  ! What fgForce asks for. Of a force that was refused, or is none, the
+  ! last accepted one goes on; -1 where there is none to go on with
+  LOCAL FUNC num FgForceCounts()
+    VAR num nForce;
+    nForce:=fgForce;
+    IF FgIsOn() AND Round(nForce*${force_counts})=nDenied RETURN nGood{FG_C_FORCE_SETPOINT};
+    nDenied:=-1;
+    IF nForce>=${force_min} AND nForce<=${force_max} RETURN Round(nForce*${force_counts});
+    fgText:="fgForce = "+NumToStr(nForce,2)+" N, allowed ${force_min} .. ${force_max}";
+    nDenied:=Round(nForce*${force_counts});
+    IF FgIsOn() RETURN nGood{FG_C_FORCE_SETPOINT};
+    fgEnable:=FALSE;
+    RETURN -1;
+  ENDFUNC
 
   ! T_ROB1 stands: this task must not keep its force up
   LOCAL PROC FgWatchProgram()
@@ -458,8 +470,8 @@ ${crc_table}];
     ! Never to TRUE: T_ROB1 may have taken it back meanwhile
     IF NOT FgIsOn() fgEnable:=FALSE;
     IF FgIsOn() AND FgHasBit(nWant{FG_C_CONTROL_WORD},FG_ENABLE) THEN
-      IF Round(fgForce*${force_counts})=nWant{FG_C_FORCE_SETPOINT} THEN
-        fgForce:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};
+      IF nWant{FG_C_FORCE_SETPOINT}<>nGood{FG_C_FORCE_SETPOINT} THEN
+        nDenied:=nWant{FG_C_FORCE_SETPOINT};
       ENDIF
       bSent:=FgHasBit(nWant{FG_C_CONTROL_WORD},FG_VALVE_PULL);
       IF fgPull=bSent fgPull:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
