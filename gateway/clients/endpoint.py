@@ -7,6 +7,9 @@ from typing import Final
 from gateway import defaults
 
 _IPV4: Final = 4
+_LAST_PORT_OF_S7: Final = 49151
+_OWN_PORTS_OF_S7: Final = (20, 21, 25, 80, 102, 123, 5001, 34962, 34963, 34964)
+"""TIA Portal help, MODBUS (TCP), CONNECT parameter: the range of RemotePort, and what a connection may not use."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,14 @@ class Endpoint:
     def unit_option(self) -> str:
         """Return what our own verbs need beside the address where the rig answers other units only."""
         return "" if self.unit == defaults.UNIT_ID else f" --unit {self.unit}"
+
+    @property
+    def s7_port_fault(self) -> str:
+        """Return in a sentence that an S7 does not connect to this port; empty where it does."""
+        if self.port <= _LAST_PORT_OF_S7 and self.port not in _OWN_PORTS_OF_S7:
+            return ""
+        own = ", ".join(map(str, _OWN_PORTS_OF_S7))
+        return f"MB_CLIENT takes no port {self.port} ({own}, nor any above {_LAST_PORT_OF_S7})."
 
     def to_fill_in(self, *, from_elsewhere: bool) -> tuple[str, ...]:
         """Return what the integrator has to put in by hand, for no rig can know it. from_elsewhere: on another machine."""

@@ -57,7 +57,9 @@ def render_client(register_map: RegisterMap, language: str, where: Endpoint) -> 
     if odd := list(unspeakable(table, language)):
         raise UnspeakableNameError(f"map {register_map.name}: {'; '.join(odd)}: give it another name")
     text = files("gateway.clients").joinpath("templates", TEMPLATES[language]).read_text("utf-8")
-    remarks = (*where.to_fill_in(from_elsewhere=language not in _BESIDE_THE_GATEWAY), *where.cautions)
+    remarks = [*where.to_fill_in(from_elsewhere=language not in _BESIDE_THE_GATEWAY), *where.cautions]
+    if language == "scl" and where.s7_port_fault:
+        remarks.append(f"FILL IN another port: {where.s7_port_fault}")
     fill_in = "".join(map(_REMARKS[language].format, remarks))
     return Template(text).substitute({**table.values(), **SPELLINGS[language](table), "fill_in": fill_in})
 

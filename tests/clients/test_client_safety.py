@@ -21,7 +21,8 @@ def test_a_reset_ends_the_enable_before_it(client: Any, gateway: GatewayAtHand) 
     cycles(client)
     client.reset()
     cycles(client)
-    assert [words[0] for words in gateway.words][:2] == [1, 2]
+    told = [words[0] for words in gateway.words]
+    assert told[0] == 1 and told[1:] in ([2], [0, 2])  # a PLC's OFF goes ahead, alone
     assert not gateway.bank.command.control_word & 1 and not client.enabled
 
 

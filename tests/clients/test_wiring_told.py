@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from gateway.clients import endpoint_of, render_client
 from gateway.clients.wiring import wiring_page
 from gateway.profiles import load_rig
+from tests.clients.programs.syntax import parse
 from tests.clients.test_wiring import PROFILES, page_of, rows_of
 
 
@@ -106,3 +108,38 @@ def test_why_mbpoll_holds_no_force_and_what_does(lease_s: float | None, why: str
     (told,) = [each for each in section.sentences if "cannot hold" in each]
     (hold,) = [line for line in section.commands if line.startswith("force-gateway hold")]
     assert why in told and ("--rig" in hold) is bool(pace) and pace in hold
+
+
+@pytest.mark.parametrize(
+    ("port", "is_taken"), [(502, True), (5020, True), (5001, False), (34963, False), (49152, False)]
+)
+def test_a_port_that_mb_client_does_not_take_is_told_on_the_page_and_in_its_block(
+    port: int, is_taken: bool, tmp_path: Path
+) -> None:
+    """An S7 keeps some for itself, and its RemotePort ends at 49151: the page gave it 5001, and the block never connected."""
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    (tmp_path / "own.yaml").write_text(text.replace("port: 5020", f"port: {port}"))
+    rig = load_rig(str(tmp_path / "own.yaml"))
+    (section,) = [
+        one for one in page_of(tmp_path / "own.yaml")["sections"] if "connection of MB_CLIENT" in one["title"]
+    ]
+    told = f"MB_CLIENT takes no port {port}"
+    assert any(told in one for one in section["sentences"]) is not is_taken
+    block = render_client(rig.register_map, "scl", endpoint_of(rig))
+    assert (f"// FILL IN another port: {told}" in block) is not is_taken
+    parse(block, "scl")
+    assert "FILL IN" not in render_client(rig.register_map, "st", endpoint_of(rig))
+
+
+@pytest.mark.parametrize(("lease_s", "is_short"), [(0.1, True), (0.2, False)])
+def test_who_wires_a_twincat_or_codesys_controller_is_told_of_the_emergency_stop_and_of_its_pace(
+    lease_s: float, is_short: bool, tmp_path: Path
+) -> None:
+    """It goes on at an emergency stop as an S7 does, of which alone the page said so."""
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    (tmp_path / "own.yaml").write_text(text.replace("lease_s: 0.2", f"lease_s: {lease_s}"))
+    page = page_of(tmp_path / "own.yaml")
+    (section,) = [one for one in page["sections"] if one["title"] == "TwinCAT 3 and CODESYS V3"]
+    assert any("emergency stop: `bEnable`" in one for one in section["sentences"])
+    (pace, other) = rows_of(page, section["title"])["call"]
+    assert "10 ms" in pace and ("set lease_s to 0.12 or more" in other) is is_short

@@ -581,9 +581,19 @@ int fg_set(fg_client *client, int offset, float value, float counts_per_unit) {
     return FG_OK;
 }
 
+/* In band is said of what is asked for, and that waits for the next exchange. */
+static void fg_leave_band(fg_client *client) {
+    if (client->want[FG_CONTROL_WORD] != client->good[FG_CONTROL_WORD] ||
+        client->want[FG_FORCE_SETPOINT] != client->good[FG_FORCE_SETPOINT])
+        client->status.in_band = 0;
+}
+
 int fg_force(fg_client *client, float force_n) {
-    if (!(force_n >= ${force_min}f && force_n <= ${force_max}f)) return FG_RANGE;
-    return fg_set(client, FG_FORCE_SETPOINT, force_n, ${force_counts}.0f);
+    int result = FG_RANGE;
+    if (force_n >= ${force_min}f && force_n <= ${force_max}f)
+        result = fg_set(client, FG_FORCE_SETPOINT, force_n, ${force_counts}.0f);
+    fg_leave_band(client);
+    return result;
 }
 
 int fg_enable(fg_client *client, float force_n) {
@@ -599,12 +609,14 @@ void fg_pull(fg_client *client, int pulls) {
     client->pulls = pulls;
     client->want[FG_CONTROL_WORD] &= (uint16_t)~FG_VALVE_PULL;
     if (pulls && client->want[FG_CONTROL_WORD] & FG_ENABLE) client->want[FG_CONTROL_WORD] |= FG_VALVE_PULL;
+    fg_leave_band(client);
 }
 
 void fg_disable(fg_client *client) {
     client->want[FG_CONTROL_WORD] = 0;
     client->want[FG_FORCE_SETPOINT] = 0;
     client->ended = 0;
+    fg_leave_band(client);
 }
 
 void fg_reset_fault(fg_client *client) {

@@ -44,6 +44,7 @@ MODULE ForceGateway
   !
   ! Use in T_ROB1, both cases:
   !    fgForce:=12;                  ! N
+  !    fgInBand:=FALSE;              ! behind each new fgForce
   !    fgEnable:=TRUE;
   !    WaitUntil fgInBand\MaxTime:=3\TimeFlag:=bLate;
   !    IF bLate THEN
@@ -56,8 +57,8 @@ MODULE ForceGateway
   !    CONNECT irEnded WITH MyTrap;  IPers fgEnded,irEnded;
   ! and in MyTrap: IF fgEnded StopMove;
   ! After a fault: fgReset:=TRUE, which goes FALSE when it is sent.
-  ! A new fgForce while enabled: WaitTime 0.2 before fgInBand counts,
-  ! it is still that of the old force.
+  ! fgInBand goes TRUE when what fgForce asks for is held; what was
+  ! held before it forgets with the next cycle only: set it FALSE.
   !
   ! One cycle is one FC23: it writes the command block where
   ! control_word has changed, the words behind that where they have,
@@ -66,7 +67,8 @@ MODULE ForceGateway
   ! commanded it is one FC03, which disturbs no other master.
   ! This module never enables by itself:
   !    refused  the last accepted command goes on (a refused write
-  !             would not renew the lease); fgText says why
+  !             would not renew the lease); fgText says why, and
+  !             fgInBand stays FALSE while fgForce asks for it
   !    ended    by a fault, another master or a restart: fgEnable is
   !             FALSE again, until you set it
   !    lost     the same; it connects again, waiting longer each time,
@@ -158,6 +160,8 @@ ${crc_table}];
   LOCAL VAR num nBackoff:=0;
   LOCAL VAR num nTransaction:=0;
   LOCAL VAR num nHeartbeat:=0;
+  ! The force that was refused, in counts: not asked for again
+  LOCAL VAR num nDenied:=-1;
   LOCAL VAR num nException:=0;
   LOCAL VAR num nOnce:=0;
   LOCAL VAR bool bOffPending:=FALSE;
@@ -216,7 +220,7 @@ ${crc_table}];
   PROC FgInit()
     IF ERR_FG_FRAME=-1 BookErrNo ERR_FG_FRAME;
     SocketClose sdGateway;
-    fgConnected:=FALSE;
+    FgClearStatus;
     fgReset:=FALSE;
     fgTare:=FALSE;
     fgTake:=FALSE;
@@ -275,14 +279,6 @@ ${crc_table}];
   ! From the PERS data to the words of the next write
   LOCAL PROC FgCollect()
     VAR num nCounts;
-    nCounts:=Round(fgForce*${force_counts});
-    IF fgForce<${force_min} OR fgForce>${force_max} THEN
-      fgText:="fgForce = "+NumToStr(fgForce,2)+" N, allowed ${force_min} .. ${force_max}";
-      fgForce:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};
-      nCounts:=nGood{FG_C_FORCE_SETPOINT};
-      ! What holds goes on, nothing is begun
-      IF NOT FgIsOn() fgEnable:=FALSE;
-    ENDIF
     FgCheckCommand;
     nWant:=fgCommand;
     nWant{FG_C_CONTROL_WORD}:=0;
@@ -302,7 +298,9 @@ ${crc_table}];
       fgTake:=FALSE;
     ENDIF
     ! A reset needs force 0: an enable beside it waits for its answer
-    IF fgEnable AND FgMayEnable() THEN
+    nCounts:=-1;
+    IF fgEnable AND FgMayEnable() nCounts:=FgForceCounts();
+    IF nCounts>=0 THEN
       IF NOT FgIsOn() fgText:="";
       nWant{FG_C_CONTROL_WORD}:=FG_ENABLE;
       IF fgPull nWant{FG_C_CONTROL_WORD}:=FG_ENABLE+FG_VALVE_PULL;
@@ -313,6 +311,21 @@ ${crc_table}];
     ! for its refusal would be that of OFF
     IF bOffPending nWant:=nGood;
   ENDPROC
+
+  ! What fgForce asks for. Of a force that was refused, or is none, the
+  ! last accepted one goes on; -1 where there is none to go on with
+  LOCAL FUNC num FgForceCounts()
+    VAR num nForce;
+    nForce:=fgForce;
+    IF FgIsOn() AND Round(nForce*${force_counts})=nDenied RETURN nGood{FG_C_FORCE_SETPOINT};
+    nDenied:=-1;
+    IF nForce>=${force_min} AND nForce<=${force_max} RETURN Round(nForce*${force_counts});
+    fgText:="fgForce = "+NumToStr(nForce,2)+" N, allowed ${force_min} .. ${force_max}";
+    nDenied:=Round(nForce*${force_counts});
+    IF FgIsOn() RETURN nGood{FG_C_FORCE_SETPOINT};
+    fgEnable:=FALSE;
+    RETURN -1;
+  ENDFUNC
 
   ! T_ROB1 stands: this task must not keep its force up
   LOCAL PROC FgWatchProgram()
@@ -457,8 +470,8 @@ ${crc_table}];
     ! Never to TRUE: T_ROB1 may have taken it back meanwhile
     IF NOT FgIsOn() fgEnable:=FALSE;
     IF FgIsOn() AND FgHasBit(nWant{FG_C_CONTROL_WORD},FG_ENABLE) THEN
-      IF Round(fgForce*${force_counts})=nWant{FG_C_FORCE_SETPOINT} THEN
-        fgForce:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};
+      IF nWant{FG_C_FORCE_SETPOINT}<>nGood{FG_C_FORCE_SETPOINT} THEN
+        nDenied:=nWant{FG_C_FORCE_SETPOINT};
       ENDIF
       bSent:=FgHasBit(nWant{FG_C_CONTROL_WORD},FG_VALVE_PULL);
       IF fgPull=bSent fgPull:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
@@ -498,6 +511,15 @@ ${crc_table}];
     RETURN FgHasBit(nGood{FG_C_CONTROL_WORD},FG_ENABLE);
   ENDFUNC
 
+  ! Does T_ROB1 ask for just that? Not behind a new fgForce of since
+  LOCAL FUNC bool FgIsAsked()
+    VAR bool bPulls;
+    IF NOT (fgEnable AND FgIsOn()) RETURN FALSE;
+    bPulls:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
+    IF fgPull<>bPulls RETURN FALSE;
+    RETURN Round(fgForce*${force_counts})=nGood{FG_C_FORCE_SETPOINT};
+  ENDFUNC
+
   LOCAL PROC FgForget()
     ! fgForce stays: between T_ROB1's two lines it would hold 0 N
     IF fgEnable OR FgIsOn() THEN
@@ -515,7 +537,7 @@ ${status_decoding}
     nStatus:=nWords{FG_S_STATUS_WORD};
     fgEnabled:=FgHasBit(nStatus,FG_IS_ENABLED);
     fgReady:=FgHasBit(nStatus,FG_IS_READY);
-    fgInBand:=FgIsOn() AND FgHasBit(nStatus,FG_IS_IN_BAND);
+    fgInBand:=FgIsAsked() AND FgHasBit(nStatus,FG_IS_IN_BAND);
     fgFault:=FgHasBit(nStatus,FG_HAS_FAULT);
   ENDPROC
 
@@ -567,15 +589,24 @@ ${status_decoding}
     ClkStop clRetry;
   ENDPROC
 
+  ! What was read last, or before a start, is no longer known
+  LOCAL PROC FgClearStatus()
+    fgConnected:=FALSE;
+    fgEnabled:=FALSE;
+    fgReady:=FALSE;
+    fgInBand:=FALSE;
+    fgFault:=FALSE;
+    fgStatus{FG_S_STATUS_WORD}:=0;
+    fgStatus{FG_S_STATE}:=0;
+    fgStatus{FG_S_FORCE_MEASURED}:=9E9;
+  ENDPROC
+
   LOCAL PROC FgDrop(string stWhy)
     SocketClose sdGateway;
     IF bAsking OR FgIsOn() bOffPending:=TRUE;
     bAsking:=FALSE;
     IF fgConnected ErrWrite\W,"Force gateway: lost",stWhy;
-    fgConnected:=FALSE;
-    fgEnabled:=FALSE;
-    fgReady:=FALSE;
-    fgInBand:=FALSE;
+    FgClearStatus;
     fgUpload:=FALSE;
     nUploadStep:=0;
     nOnce:=0;

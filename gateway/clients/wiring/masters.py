@@ -217,7 +217,8 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
         ("call of the block below", calls),
     )
     stop = "A CPU goes on at an emergency stop: `enable` of the block has to fall with it (and with the guard, and the robot)."
-    return Section("Siemens S7-1200/1500: connection of MB_CLIENT", (stop,), rows)
+    sentences = (stop, f"{where.s7_port_fault} Set network.port to another one.") if where.s7_port_fault else (stop,)
+    return Section("Siemens S7-1200/1500: connection of MB_CLIENT", sentences, rows)
 
 
 def _s7_requests(table: ExchangeTable) -> Section:
@@ -254,8 +255,16 @@ def _codesys(rig: Rig, table: ExchangeTable) -> Section:
             f"uiReadStartItem {status}, uiReadQuantity {status_words}",
         ),
         ("library", "Tc2_ModbusSrv, TF6250 on the controller", "ModbusFB"),
+        (
+            "call",
+            "fbGateway, then fbTransport, in a task of 10 ms",
+            f"the same: a heartbeat every 40 ms or more{_short_of_a_cycle(rig.control.supervision.lease_s)}",
+        ),
     )
-    return Section("TwinCAT 3 and CODESYS V3", rows=rows)
+    stop = (
+        "A controller goes on at an emergency stop: `bEnable` has to fall with it (and with the guard, and the robot)."
+    )
+    return Section("TwinCAT 3 and CODESYS V3", (stop,), rows)
 
 
 def _universal_robot(rig: Rig, table: ExchangeTable) -> Section:

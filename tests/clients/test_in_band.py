@@ -1,0 +1,125 @@
+"""In band is said of the force that is asked for now: not of the one before, nor of one that was refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from gateway.registers import Command, Status
+from gateway.registers.words import ControlBit, State, StatusBit
+from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.c_program import CProgram
+from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
+from tests.clients.programs.python_program import PythonProgram
+from tests.clients.scenes import cycles
+from tests.clients.test_two_tasks import every_place
+
+
+def ramp_above(gateway: GatewayAtHand, force_n: float) -> None:
+    """Let each force above this one be on its way for ever, instead of in band at once."""
+
+    def obey(command: Command) -> None:
+        held = StatusBit.ENABLED | StatusBit.READY
+        if command.force_setpoint_n <= force_n:
+            held |= StatusBit.IN_BAND
+        is_on = ControlBit.ENABLE in command.control_word
+        gateway.bank.publish(
+            Status(
+                state=State.RAMPING if is_on else State.OFF,
+                status_word=int(held) if is_on else 0,
+                heartbeat_echo=command.heartbeat,
+            )
+        )
+
+    gateway.bank.on_command = obey
+
+
+def in_band(client: Any) -> bool:
+    if isinstance(client, Irc5):
+        return bool(client.get("fgInBand"))
+    return bool(client.get("fg_in_band") if isinstance(client, UniversalRobot) else client.in_band)
+
+
+def ask_for(client: Any, force_n: float) -> None:
+    """Ask for a new force as the head of the client's text says."""
+    client.force(force_n)
+    if isinstance(client, Irc5):
+        client.set(fgInBand=False)
+
+
+def seen_in_band(client: Any, count: int = 6) -> list[bool]:
+    """What a program sees that looks as often as it can."""
+    seen = []
+    if not isinstance(client, Plc):  # whose program sees nothing between an input and the scan
+        seen.append(in_band(client))
+    for _ in range(count * (12 if isinstance(client, Plc) else 1)):
+        client.scan() if isinstance(client, Plc) else client.cycle()
+        seen.append(in_band(client))
+    return seen
+
+
+def test_a_new_force_is_not_in_band_because_the_old_one_was(client: Any, gateway: GatewayAtHand) -> None:
+    """A program that asks for more and waits for that bit went to the part at once: it had to wait 0.2 s first."""
+    ramp_above(gateway, 12.0)
+    client.enable(12.0)
+    cycles(client)
+    assert in_band(client)
+    ask_for(client, 30.0)
+    assert not any(seen_in_band(client)) and gateway.bank.command.force_setpoint_n == 30.0
+    ask_for(client, 10.0)
+    assert seen_in_band(client)[-1]
+
+
+def test_an_enable_is_not_in_band_because_the_one_before_was(client: Any, gateway: GatewayAtHand) -> None:
+    """Off and on again between two exchanges."""
+    ramp_above(gateway, 12.0)
+    client.enable(12.0)
+    cycles(client)
+    client.disable()
+    if isinstance(client, Plc):
+        client.scan()
+    client.enable(30.0)
+    if isinstance(client, Irc5):
+        client.set(fgInBand=False)
+    assert not any(seen_in_band(client)) and gateway.bank.command.force_setpoint_n == 30.0
+
+
+@pytest.mark.parametrize("language", ["rapid", "urscript"])
+def test_a_new_force_beside_an_exchange_is_not_in_band_because_the_old_one_was(language: str) -> None:
+    """Whatever the other task is doing at that moment."""
+    seen: list[bool] = []
+
+    def prepare(client: Any, gateway: GatewayAtHand) -> None:
+        ramp_above(gateway, 12.0)
+        client.enable(12.0)
+        cycles(client, 2)
+
+    acts = [lambda client: ask_for(client, 30.0), *[lambda client: seen.append(in_band(client))] * 400]
+    for client, gateway in every_place(language, prepare, acts):
+        assert not in_band(client) and gateway.bank.command.force_setpoint_n == 30.0
+    assert len(seen) > 400 and not any(seen)
+
+
+def test_a_force_that_was_refused_is_not_in_band_because_the_last_one_that_was_taken_is(
+    client: Any, gateway: GatewayAtHand
+) -> None:
+    """A robot's program that asked for 65 N of a rig of 60 N, and waited, ground on with 12 N."""
+    client.enable(12.0)
+    cycles(client)
+    ask_for(client, 65.0)
+    told = seen_in_band(client, 8)
+    assert "W204" in client.text and gateway.bank.command.force_setpoint_n == 12.0
+    if isinstance(client, PythonProgram | CProgram):
+        pytest.skip("exchange() itself says that it was refused")
+    assert not any(told)
+    if isinstance(client, UniversalRobot):
+        assert not client.machine.start("fg_wait_in_band", 0.1)
+    ask_for(client, 12.0)
+    cycles(client)
+    assert in_band(client) and client.enabled
+    ask_for(client, 400.0)
+    assert not any(seen_in_band(client)) and "327.67" in client.text
+    ask_for(client, 13.0)
+    cycles(client)
+    assert in_band(client) and gateway.bank.command.force_setpoint_n == 13.0
