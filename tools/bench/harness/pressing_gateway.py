@@ -55,13 +55,14 @@ class Scene:
     def _start(self) -> RunningGateway:
         return start(Path(self._folder.name) / "state", rig=str(self.devices.rig))
 
-    def close(self) -> None:
-        """Stop the gateway, then its devices."""
-        with contextlib.redirect_stdout(io.StringIO()):  # it prints the log, for tests
+    def close(self) -> str:
+        """Stop the gateway, then its devices. Return what it said."""
+        with contextlib.redirect_stdout(io.StringIO()) as said:  # it prints the log, for tests
             stop(self.gateway)
         for devices in (self.devices, *self._passed):
             devices.__exit__()
         self._folder.cleanup()
+        return said.getvalue()
 
     def press(self) -> None:
         """Hold 4 V."""
