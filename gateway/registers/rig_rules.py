@@ -1,6 +1,7 @@
 """What a rig adds to the map: narrower limits, who may command, which bits have something behind them."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Final
 
 from gateway import defaults
@@ -12,6 +13,7 @@ BASIC_BITS: Final = ControlBit.ENABLE | ControlBit.RESET_FAULT | ControlBit.TARE
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BankRules:
     """force_max_n bounds force_setpoint and precontact_force; voltage_setpoint is 0 or within the voltage limits.
+    payload_max_kg bounds payload: what the load cell bears.
 
     setpoint_min_n: smallest force_setpoint beside 0. force_source: who says these two, empty for the rig. owner: the one host
     that may command, None for the first that does.
@@ -23,6 +25,7 @@ class BankRules:
     force_source: str = ""
     voltage_min_v: float = 0.0
     voltage_max_v: float = defaults.VOLTAGE_MAX_V
+    payload_max_kg: float = inf
     supported_bits: ControlBit = BASIC_BITS
     require_byte_order_echo: bool = False
     owner: str | None = None

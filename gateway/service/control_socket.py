@@ -60,7 +60,7 @@ class ControlSocket(JsonLineServer):
             "record": self._record,
             "calibration": self._calibration,
             "plant": parts.plants.answer,
-            "calibrate": parts.calibration_runs.answer,
+            "calibrate": lambda request: parts.calibration_runs.answer(request, has_waited=self.has_waited),
             "self-test": parts.calibration_runs.answer_self_test,
             "last-writer": self._last_writer,
             "last-refusal": self._last_refusal,

@@ -10,7 +10,7 @@ from gateway.registers import BankRules, RegisterBank
 from gateway.registers.map.map_reader import read_map
 from tests.calibrations.coefficients import calibration
 
-FORCE, FORCE_FLOAT, MODE_FLOAT, PRECONTACT, VOLTAGE = 1, 202, 206, 7, 5
+FORCE, FORCE_FLOAT, MODE_FLOAT, PRECONTACT, VOLTAGE, PAYLOAD = 1, 202, 206, 7, 5, 9
 
 
 def test_the_least_force_of_a_rig_and_0_are_taken_in_words_and_floats(make_bank, master_of):
@@ -115,3 +115,18 @@ def test_a_setpoint_that_a_calibration_lowers_may_be_written_as_it_reads(make_ba
         assert f"to {word / 100:.2f} N" in bank.set_active_model(calibration(force_limits_n=(0.0, high_n)))
         assert master.word(FORCE) == word and bank.command.force_setpoint_n == word / 100
         master.write(FORCE, word)
+
+
+def test_a_payload_heavier_than_the_load_cell_bears_is_refused(make_bank, master_of):
+    """32.7 kg on a cell of 10 kg were accepted, and the next reading was an over-force."""
+    master = master_of(make_bank(payload_max_kg=10.0004), "10.0.0.1")
+    master.write(PAYLOAD, 10000)
+    master.write_float(200 + 2 * PAYLOAD, 2500.5)
+    for act, address, grams in ((master.write, PAYLOAD, 10001), (master.write_float, 200 + 2 * PAYLOAD, 32000)):
+        refused = master.refusal(act, address, grams)
+        assert refused.reason is RefusalReason.OUT_OF_RANGE
+        assert f"payload = {grams} g, allowed 0 .. 10000 g (rig demo)" in refused.sentence
+    assert master.float(200 + 2 * PAYLOAD) == 2500.5
+    unbounded = master_of(make_bank(), "10.0.0.1")
+    unbounded.write(PAYLOAD, 32767)
+    assert unbounded.word(PAYLOAD) == 32767

@@ -84,6 +84,7 @@ def test_the_bank_holds_to_the_rigs_limits() -> None:
     limits = rig.control.limits
     assert (rules.rig_name, rules.force_max_n) == ("demo", limits.force_max_n)
     assert (rules.voltage_min_v, rules.voltage_max_v) == (limits.voltage_min_v, limits.voltage_max_v)
+    assert rules.payload_max_kg == pytest.approx(rig.load_cell.range_n / 9.80665)
     assert rules.supported_bits == rig.supported_bits
     assert (rules.owner, rules.require_byte_order_echo) == ("10.0.0.7", True)
 

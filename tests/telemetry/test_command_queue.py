@@ -8,6 +8,7 @@ import pytest
 from gateway.live.standstill import Standstill
 from gateway.telemetry.mqtt.command_queue import ROOM, CommandQueue
 from gateway.telemetry.mqtt.register_commands import is_stop
+from gateway.telemetry.mqtt.round_trips import RoundTrips
 
 
 class Clock:
@@ -25,7 +26,8 @@ def play(scene: Callable[[CommandQueue, Clock], Awaitable[None]]) -> None:
         keeping = asyncio.create_task(standstill.keep_time())
         await asyncio.sleep(0.0)
         async with asyncio.timeout(5.0):
-            await scene(CommandQueue(lambda payload: payload == b"stop", standstill), clock)
+            trips = RoundTrips(clock)
+            await scene(CommandQueue(lambda payload: payload == b"stop", standstill, trips), clock)
         keeping.cancel()
 
     asyncio.run(run())

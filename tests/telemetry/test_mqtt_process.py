@@ -142,3 +142,7 @@ def test_a_password_that_cannot_be_read_is_told_by_its_file_and_not_shown(
     with pytest.raises(OSError, match=rf"^E181 mqtt\.password_file {secret}.*{why}") as raised:
         asyncio.run(publish(options, log))
     assert "gehe" not in str(raised.value)
+
+
+def test_a_password_is_shown_to_nobody() -> None:
+    assert "secret" not in repr(Broker("b", 1883, "me", "secret"))

@@ -9,7 +9,7 @@ less than a least force of 2.3, and neither is what the master means.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite
+from math import floor, inf, isfinite
 from typing import Final
 
 from gateway.codes.refusals import RefusalReason
@@ -141,6 +141,8 @@ def _rig_limits(name: str, rules: BankRules) -> tuple[float, float] | None:
         if name == FORCES[0] and rules.setpoint_min_n > 0.0:
             return rules.setpoint_min_n, rules.force_max_n
         return 0.0, rules.force_max_n
+    if name == "payload":
+        return 0.0, floor(1000.0 * rules.payload_max_kg) if isfinite(rules.payload_max_kg) else inf
     if name != "voltage_setpoint":
         return None
     return _millivolts(rules.voltage_min_v), _millivolts(rules.voltage_max_v)

@@ -4,6 +4,7 @@ from gateway.fieldbus import ServerSettings
 from gateway.modbus import Role
 from gateway.profiles import Rig
 from gateway.registers import BankRules
+from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
 
 def bank_rules(rig: Rig) -> BankRules:
@@ -14,6 +15,7 @@ def bank_rules(rig: Rig) -> BankRules:
         force_max_n=limits.force_max_n,
         voltage_min_v=limits.voltage_min_v,
         voltage_max_v=limits.voltage_max_v,
+        payload_max_kg=rig.load_cell.range_n / STANDARD_GRAVITY_M_PER_S2,
         supported_bits=rig.supported_bits,
         require_byte_order_echo=rig.network.require_byte_order_echo,
         owner=rig.network.owner,

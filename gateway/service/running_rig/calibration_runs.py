@@ -37,6 +37,7 @@ from gateway.service.socket_requests import CalibrateRequest, EmptyRequest, pars
 FOLLOWED_S: Final = 3.0
 _CLOSING_S: Final = 1.0  # without a sample for so long after the last stair the run is recorded as cut there
 _NOTHING_TAKEN: Final = "the disk took no recording"
+_WAITED: Final = "run refused: more is asked here than is answered, so that this has waited: wait for each answer"
 Answer = dict[str, Any]
 
 
@@ -74,14 +75,17 @@ class CalibrationRuns:
 
     # -- asked by this machine
 
-    def answer(self, request: Answer) -> Answer:
+    def answer(self, request: Answer, *, has_waited: bool = False) -> Answer:
         """Start a run, stop it or tell how it is. ValueError refuses.
 
         {"plan": {...}, "continues": [numbers], "name": text} starts, with "dry_run": true it is only tried; {"stop": true}
-        stops; neither tells how it is.
+        stops; neither tells how it is. has_waited: behind others of its caller, which may be gone.
         """
         query = parse_request(CalibrateRequest, request)
-        self._followed_s = self._clock()
+        if not has_waited:
+            self._followed_s = self._clock()
+        elif query.plan is not None and not query.dry_run:
+            raise ValueError(_WAITED)
         if query.dry_run:
             return self._try_plan(_parse_plan(query.plan))
         if query.stop:

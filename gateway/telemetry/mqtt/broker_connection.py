@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, Final
 
 from gateway.extras import import_library
@@ -10,6 +11,7 @@ from gateway.live.standstill import Standstill
 from gateway.plain_file import read_plain, tell_refusal
 from gateway.telemetry.mqtt.broker_session import BrokerMessage, BrokerSession
 from gateway.telemetry.mqtt.command_queue import CommandQueue
+from gateway.telemetry.mqtt.round_trips import ASK_S, SLOW_S, RoundTrips
 
 AGAIN_S: Final = 2.0
 _KEEPALIVE_S: Final = 10
@@ -152,13 +154,15 @@ async def _carry(client: Any, session: BrokerSession) -> None:
     turn = asyncio.Lock()  # messages carry numbers in order: nobody speaks between the making of one and its sending
     for message in session.greet():
         await _publish(client, message)
-    standstill = Standstill()
-    queue = CommandQueue(session.is_stop, standstill)
+    standstill, trips = Standstill(), RoundTrips(asyncio.get_running_loop().time)
+    queue = CommandQueue(session.is_stop, standstill, trips)
     async with asyncio.TaskGroup() as group:
         group.create_task(_speak(client, session, turn))
         group.create_task(_listen(client, queue))
         group.create_task(_answer(client, session, queue, turn))
         group.create_task(standstill.keep_time())
+        if session.may_press:
+            group.create_task(_keep_asking(client, session, trips, queue, turn))
 
 
 async def _speak(client: Any, session: BrokerSession, turn: asyncio.Lock) -> None:
@@ -178,6 +182,25 @@ async def _listen(client: Any, queue: CommandQueue) -> None:
     async for message in client.messages:
         if not message.retain:  # of yesterday: a command that waits in the broker must never be carried out
             queue.put(str(message.topic), bytes(message.payload or b""))
+
+
+async def _keep_asking(
+    client: Any, session: BrokerSession, trips: RoundTrips, queue: CommandQueue, turn: asyncio.Lock
+) -> None:
+    """Ask the broker for what it answers without effect (MQTT 3.1.1, 3.10.4): the end of a subscription that never was. That
+    no answer comes at all is the keepalive's to find."""
+    while True:
+        trips.note_asked()
+        await client.unsubscribe("force-gateway/round-trip", timeout=inf)
+        trips.note_answered()
+        if late := queue.take_late():
+            why = (
+                f"{late} commands were not carried out: the broker took over {SLOW_S:g} s to answer, as old they may be"
+            )
+            async with turn:
+                for answer in await session.answer("", b"", why):
+                    await _publish(client, answer)
+        await asyncio.sleep(ASK_S)
 
 
 async def _answer(client: Any, session: BrokerSession, queue: CommandQueue, turn: asyncio.Lock) -> None:

@@ -19,9 +19,11 @@ class BrokerMessage:
 
 
 class BrokerSession(Protocol):
-    """Makes messages; `broker_connection` sends them. ready: set when `next_message` has one."""
+    """Makes messages; `broker_connection` sends them. ready: set when `next_message` has one.
+    may_press: what is heard at its topics may begin or keep a force, so that it must not be old."""
 
     ready: asyncio.Event
+    may_press: bool
 
     @property
     def name(self) -> str:

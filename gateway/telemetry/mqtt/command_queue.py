@@ -2,7 +2,8 @@
 
 Control takes some ten commands a second by its socket; whoever sends more of them had each one carried out later than the one
 before, and the stop behind them after minutes. So few wait, and of more than that the oldest goes; a stop takes the place of
-all that wait, since it would undo them. What came while this process stood still presses nothing.
+all that wait, since it would undo them. What came while this process stood still presses nothing, nor what the broker brings
+late: that has no place here, and is only counted.
 """
 
 import asyncio
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.live.standstill import Standstill
+from gateway.telemetry.mqtt.round_trips import RoundTrips
 
 ROOM: Final = 10
 
@@ -26,13 +28,13 @@ class HeardMessage:
 
 
 class CommandQueue:
-    """is_stop: of a payload; standstill: of this process."""
+    """is_stop: of a payload; standstill: of this process; trips: to the broker and back."""
 
-    def __init__(self, is_stop: Callable[[bytes], bool], standstill: Standstill) -> None:
-        self._is_stop, self._standstill = is_stop, standstill
+    def __init__(self, is_stop: Callable[[bytes], bool], standstill: Standstill, trips: RoundTrips) -> None:
+        self._is_stop, self._standstill, self._trips = is_stop, standstill, trips
         self._waiting: deque[HeardMessage] = deque()
         self._ready = asyncio.Event()
-        self._dropped = 0
+        self._dropped = self._late = 0
 
     def put(self, topic: str, payload: bytes) -> None:
         """Have a message wait."""
@@ -40,6 +42,9 @@ class CommandQueue:
         if message.is_stop:
             self._dropped += len(self._waiting)
             self._waiting.clear()
+        elif self._trips.is_slow:
+            self._late += 1
+            return
         elif len(self._waiting) >= ROOM:
             del self._waiting[1 if self._waiting[0].is_stop else 0]
             self._dropped += 1
@@ -60,3 +65,8 @@ class CommandQueue:
         """Return how many were dropped since the last call."""
         dropped, self._dropped = self._dropped, 0
         return dropped
+
+    def take_late(self) -> int:
+        """Return how many the broker has brought late since the last call."""
+        late, self._late = self._late, 0
+        return late

@@ -45,7 +45,7 @@ class EdgeNode:
         room: int = ROOM,
         on_connected: Callable[[], object] = lambda: None,
     ) -> None:
-        self.ready = asyncio.Event()
+        self.ready, self.may_press = asyncio.Event(), False
         self._group, self._node = group, node
         self._next_bd_seq, self._bd_seq, self._on_connected = next_bd_seq, 0, on_connected
         self._kept: deque[KeptChange] = deque(maxlen=room)

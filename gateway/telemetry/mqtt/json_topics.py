@@ -39,7 +39,7 @@ class JsonTopics:
 
     def __init__(self, base: str, command: Command | None) -> None:
         self.ready = asyncio.Event()
-        self._base, self._command = base, command
+        self._base, self._command, self.may_press = base, command, command is not None
         self._waiting: deque[BrokerMessage] = deque(maxlen=_ROOM)
         self._offered: BrokerMessage | None = None
         self._is_connected = False
