@@ -11,10 +11,10 @@ come as one piece. So silence only says when to look; what is a frame, its lengt
 - Everything on the bus is followed, requests to other units and their answers too, each skipped as a whole: what is inside
   of a frame is never taken for a request, whatever it looks like. An answer to FC03 is longer than its request, one to FC16
   shorter, and read as a request either would swallow what comes after it.
-- What is no frame is noise. A frame behind noise counts after a silence that was seen; else only where nothing but whole
-  frames follow up to the next silence, and where it cannot lie inside of what the noise may have been the beginning of: by its
-  first three bytes a frame of another unit that was heard on this line. One or two bytes are no such beginning: a line
-  without bias puts them before each frame. In doubt nothing is done, for a master asks again.
+- What is no frame is noise. A frame behind noise counts after a silence that was seen, one that only its checksum ends when
+  nothing longer can still come; else only where nothing but whole frames follow up to the next silence, and where it cannot lie
+  inside of what the noise may have begun: by its first three bytes a frame of another unit that was heard on this line. One or
+  two bytes begin none: a line without bias puts them before each frame. In doubt nothing is done, for a master asks again.
 - Only the last frame is answered: behind an older request its master, or another slave, has spoken since. It is executed all
   the same, as on TCP.
 - An adapter may hear itself: rtu_echo.
@@ -236,7 +236,8 @@ class RtuReceiver:
             if size := self._frame_size(at, is_start=is_marked):
                 is_apart = at <= claimer + _STRAY_BYTES or claimed < at + size
                 is_decided = is_final or longest <= end
-                if is_marked or (is_apart and is_decided and self._is_all_frames(at + size, dead)):
+                is_sure = is_marked and (is_decided or not ends_in_silence(bytes(self._burst[at : at + SHORTEST_ADU])))
+                if is_sure or (is_apart and is_decided and self._is_all_frames(at + size, dead)):
                     return at, False
                 if self._burst[at] in self._units:
                     at += size - 1  # whole, but inside of something else: what is in it is no frame either

@@ -122,3 +122,20 @@ def test_a_frame_that_has_to_make_room_is_measured_anew_and_not_as_long_as_one_t
     inside = encode_adu(7, P.write_registers_request(0, b"\x00" + COMMAND + bytes(9)))
     assert inside.index(COMMAND) == len(OURS)
     assert bus.send(inside + encode_adu(7, READ) * (MOST_BYTES // len(OURS))).requests() == []
+
+
+@pytest.mark.parametrize("behind", [ODD + bytes(9), b"\x2b\x0d\x00"])
+def test_a_checksum_that_fits_by_chance_ends_no_frame_while_a_long_one_comes(behind: bytes) -> None:
+    """Where a slow adapter parts a write of many registers, what comes next may begin as a function that nobody knows: behind
+    the pause a checksum fitted in one of some thousand such writes, and what had come before was dropped as noise."""
+    by_chance = encode_adu(92, behind)
+    pdu = P.write_registers_request(0, bytes(range(40, 80)) + by_chance + b"\xf8" * (200 - len(by_chance)))
+    request, first = encode_adu(1, pdu), 7 + 40
+    cuts = [first, first + len(by_chance) + 3, first + 100]
+    pieces = [request[a:b] for a, b in zip([0, *cuts], [*cuts, len(request)], strict=True)]
+    assert Bus().send(*pieces, pause_s=0.01).requests() == answered(pdu)
+
+
+def test_a_function_that_nobody_knows_is_heard_behind_a_frame_that_was_cut_off() -> None:
+    cut = encode_adu(1, P.write_registers_request(0, bytes(range(100))))[:30]
+    assert Bus().send(cut, encode_adu(1, ODD), pause_s=0.01).requests() == answered(ODD)
