@@ -48,6 +48,7 @@ MOST_BYTES: Final = 512
 """Held without a silence: twice the longest frame. What comes before is dropped, but for the latest requests in it."""
 
 _MOST_PASSED: Final = 8
+_SLOWEST_CHARACTERS: Final = 2.5  # from one character of a frame to the next: it and a pause of 1.5 (section 2.5.1.1)
 _MOST_PIECES: Final = 8  # of a frame, without a look at the time between them: a program may be late, too
 _REST_PER_BYTE_S: Final = 40e-6
 """After looks that left noise, for each byte of it: a look takes an eighth of this at most, and noise no more of a core."""
@@ -156,7 +157,7 @@ class RtuReceiver:
         byte by byte would else be looked through with each byte by the half kilobyte, and took a whole core from control."""
         count, at = len(self._burst), 0
         for mark, end_s in zip(self._marks, self._ends_s, strict=True) if len(self._marks) > _MOST_PIECES else ():
-            if self._last_s - end_s <= SPLIT_S + (count - mark) * self._character_s:
+            if self._last_s - end_s <= SPLIT_S + (count - mark) * _SLOWEST_CHARACTERS * self._character_s:
                 break
             at = mark
         at = min([at, *(place for place, size in found if place < at < place + size)])
@@ -168,9 +169,8 @@ class RtuReceiver:
         return [request._replace(is_answered=False) for request in requests]
 
     def _shorten(self) -> None:
-        """Drop the frames that can be made out, then what is older than the longest frame. Requests among them are kept, the
-        latest: where an adapter hands over a busy bus every 16 ms, each time in the middle of a frame, no silence is seen
-        for long, and a broadcast that stops all units is not said again."""
+        """Drop the frames that can be made out, then what is older than the longest frame. The latest requests among them are
+        kept: where each hand-over of a busy bus ends in a frame no silence is seen, and no broadcast to stop is said again."""
         at, found = 0, list[tuple[int, int]]()
         self._sizes.clear()
         while at < len(self._burst) and (size := self._frame_size(at, is_start=True)):

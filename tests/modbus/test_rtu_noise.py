@@ -139,3 +139,13 @@ def test_a_checksum_that_fits_by_chance_ends_no_frame_while_a_long_one_comes(beh
 def test_a_function_that_nobody_knows_is_heard_behind_a_frame_that_was_cut_off() -> None:
     cut = encode_adu(1, P.write_registers_request(0, bytes(range(100))))[:30]
     assert Bus().send(cut, encode_adu(1, ODD), pause_s=0.01).requests() == answered(ODD)
+
+
+@pytest.mark.parametrize("baud", [4800, 9600, 19200])
+def test_a_master_that_pauses_between_its_characters_is_heard_through_a_slow_adapter(baud: int) -> None:
+    """1.5 characters are silent between any two, as they may be (section 2.5.1.1): a long write was given up in its middle."""
+    long = encode_adu(1, P.write_registers_request(0, bytes(240)))
+    byte_s = 2.5 * 11 / baud
+    size = int(0.016 / byte_s)
+    bus = Bus(baud=baud).send(*(long[at : at + size] for at in range(0, len(long), size)), pause_s=size * byte_s)
+    assert bus.requests() == answered(long[1:-2])
