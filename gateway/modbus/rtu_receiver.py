@@ -6,11 +6,10 @@ come as one piece. So silence only says when to look; what is a frame, its lengt
 
 - Nothing is executed before the line has been silent for 3.5 characters since the last read: the answer must wait that long
   anyway, and what follows a request may show that its master has given up.
-- A frame whose length is known and that is incomplete gets 20 ms for its rest, unless a whole one begins after a silence. A
-  frame in many pieces has these 20 ms once: an adapter delays them all alike. What is older is noise.
-- Everything on the bus is followed, requests to other units and their answers too, each skipped as a whole: what is inside
-  of a frame is never taken for a request, whatever it looks like. An answer to FC03 is longer than its request, one to FC16
-  shorter, and read as a request either would swallow what comes after it.
+- A frame whose length is known and that is incomplete gets 20 ms for its rest, unless a whole one that cannot lie inside of it
+  begins after a silence. In many pieces it has these 20 ms once: an adapter delays them all alike. What is older is noise.
+- Everything on the bus is followed, requests to other units and their answers, each skipped as a whole: what is inside of one
+  is never taken for a request. An answer is longer (FC03) or shorter (FC16) than a request of its function would be.
 - What is no frame is noise. A frame behind noise counts after a silence that was seen, one that only its checksum ends when
   nothing longer can still come; else only where nothing but whole frames follow up to the next silence, and where it cannot lie
   inside of what the noise may have begun: by its first three bytes a frame of another unit that was heard on this line. One or
@@ -236,7 +235,8 @@ class RtuReceiver:
             if size := self._frame_size(at, is_start=is_marked):
                 is_apart = at <= claimer + _STRAY_BYTES or claimed < at + size
                 is_decided = is_final or longest <= end
-                is_sure = is_marked and (is_decided or not ends_in_silence(bytes(self._burst[at : at + SHORTEST_ADU])))
+                has_length = not ends_in_silence(bytes(self._burst[at : at + SHORTEST_ADU]))
+                is_sure = is_marked and (is_decided or (is_apart and has_length))
                 if is_sure or (is_apart and is_decided and self._is_all_frames(at + size, dead)):
                     return at, False
                 if self._burst[at] in self._units:

@@ -7,10 +7,10 @@ import pytest
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.crc import crc16
 from gateway.modbus.rtu import encode_adu
-from gateway.modbus.rtu_receiver import MOST_BYTES, RtuReceiver, RtuRequest
+from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuRequest
 from tests.modbus.host_answers import loopback_request
 from tests.modbus.rtu_bus import SILENCE_S, Bus
-from tests.modbus.test_rtu_receiver import COMMAND, OURS, READ, WRITE, answered, registers_answer
+from tests.modbus.test_rtu_receiver import COMMAND, INSIDE, OURS, READ, WRITE, answered, registers_answer
 from tests.modbus.test_rtu_receiver_limits import known
 
 ODD = b"\x41\x01\x02"  # of a function that nobody knows: its checksum alone tells its end
@@ -149,3 +149,16 @@ def test_a_master_that_pauses_between_its_characters_is_heard_through_a_slow_ada
     size = int(0.016 / byte_s)
     bus = Bus(baud=baud).send(*(long[at : at + size] for at in range(0, len(long), size)), pause_s=size * byte_s)
     assert bus.requests() == answered(long[1:-2])
+
+
+@pytest.mark.parametrize("around", [INSIDE, encode_adu(7, P.write_registers_request(0, bytes(2) + COMMAND + bytes(2)))])
+def test_a_request_that_an_adapter_parts_from_the_frame_around_it_on_both_sides_is_none(around: bytes) -> None:
+    at = around.index(COMMAND)
+    end = at + len(COMMAND)
+    assert known(7).send(around[:at], around[at:end], around[end:], pause_s=0.015).requests() == []
+
+
+def test_a_request_behind_a_frame_of_another_that_was_cut_off_waits_for_its_rest_and_is_answered() -> None:
+    bus = known(7).send(INSIDE[:5], pause_s=0.005)
+    begin_s = bus.now_s
+    assert bus.send(OURS).pause(1.0).heard == [(begin_s + SPLIT_S, RtuRequest(1, READ, True))]
