@@ -55,7 +55,7 @@ class ForceReading:
     frame: template with the number {force:...}, perhaps a word {status:...}, a word {unit:...}, and a word {sign:...} where
     the minus stands apart from the digits. Where the frame says its unit, that unit counts; `unit` is what the simulated
     device is set to, and what a frame without one means. Raw counts of a converter have no unit but newton_per_count and
-    zero_count, which a rig has measured. before: a sentence that is sent ahead of each question and not answered. modbus:
+    zero_count, which a rig has measured. before: a sentence that is sent ahead of each question, or of the start. modbus:
     registers, in place of frame and ask. overload, underload: what the device says in place of the frame where it has no
     number to show; words in them change, and the profile's constants.
     """
@@ -64,7 +64,8 @@ class ForceReading:
     frame: str = ""  # template of the reading, with the number {force:...}
     ask: str = ""  # empty for a stream
     start: str = ""  # of a stream that begins when it is told to: sent at each opening, and again while nothing comes
-    before: str = ""  # sent ahead of ask, unanswered: such as the command to all devices to sample
+    before: str = ""  # sent ahead of ask or start: such as the command to all devices to sample, or to one to listen
+    before_answer: str = ""  # what is said to `before`, and read over; empty: nothing
     modbus: WeightRegisters | None = None  # of a Modbus device, instead of frame and ask
     unit: ForceUnit | None = None  # absent: the frame says it, or the rig must
     newton_per_count: Annotated[float, Gt(0)] | None = None  # of raw counts: one count in newtons, usually the rig's
@@ -87,8 +88,10 @@ class ForceReading:
             object.__setattr__(self, "frame", self.modbus.templates()[1])
         elif not self.frame:
             raise ValueError("`frame` is missing: the sentence with {force:...}, or `modbus` with the registers")
-        if self.before and not self.ask:
-            raise ValueError("`before` is sent ahead of a question: there is no `ask`")
+        if self.before and not (self.ask or self.start):
+            raise ValueError("`before` is sent ahead of a question: there is no `ask`, nor a `start`")
+        if self.before_answer and not self.before:
+            raise ValueError("`before_answer` answers `before`: there is none")
         if self.start and self.ask:
             raise ValueError("`start` begins a stream: a cell that is asked needs none")
         if self.unit and self.newton_per_count:
@@ -97,7 +100,8 @@ class ForceReading:
             raise ValueError(
                 "`overload` and `underload` are sentences: beside `modbus` say the bits in `modbus.overload`"
             )
-        for text in (*filter(None, (self.ask, self.before, self.start)), *self.overload, *self.underload):
+        said = filter(None, (self.ask, self.before, self.before_answer, self.start))
+        for text in (*said, *self.overload, *self.underload):
             compile_template(text)
         _check_reading(compile_template(self.frame), self)
 

@@ -151,11 +151,14 @@ def _cell(profile: DeviceProfile) -> Found:
     if told := _read_over(profile):
         yield (*place, "frame"), told
         return
+    if _is_reading(profile, reading.before_answer):
+        yield (*place, "before_answer"), f"{quote(reading.before_answer)} is a reading of {quote(reading.frame)}, too"
+        return
     unit = None if reading.unit or reading.template.field(UNIT) else "N"
     host, device = cell_host(profile, unit=unit), cell_device(profile, unit)
     try:
         question = host.poll() or host.start
-        if reading.ask and device.receive(question, _NOW_S) != 1:
+        if device.receive(question, _NOW_S) != bool(reading.ask):
             yield place, f"the device does not know its own question {_line(question)}{_too_long(question)}"
             return
         if complaints := list(_beyond_range(profile, unit, place)):
@@ -170,6 +173,11 @@ def _cell(profile: DeviceProfile) -> Found:
             yield (*place, "frame"), told
     except (ValueRefused, UnicodeEncodeError) as error:
         yield place, str(error)
+
+
+def _is_reading(profile: DeviceProfile, text: str) -> bool:
+    grammar = Grammar(profile)
+    return bool(text) and grammar.read(profile.reading.frame, grammar.encode(text)) is not None
 
 
 def _shown(host: CellHost, device: CellDevice, reading: ForceReading, counts: int) -> str:

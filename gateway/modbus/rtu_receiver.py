@@ -6,15 +6,14 @@ come as one piece. So silence only says when to look; what is a frame, its lengt
 
 - Nothing is executed before the line has been silent for 3.5 characters since the last read: the answer must wait that long
   anyway, and what follows a request may show that its master has given up.
-- A frame whose length is known and that is incomplete gets 20 ms for its rest, unless a whole one begins after a silence. A
-  frame in many pieces has these 20 ms once: an adapter delays them all alike. What is older is noise.
-- Everything on the bus is followed, requests to other units and their answers too, each skipped as a whole: what is inside
-  of a frame is never taken for a request, whatever it looks like. An answer to FC03 is longer than its request, one to FC16
-  shorter, and read as a request either would swallow what comes after it.
-- What is no frame is noise. A frame behind noise counts after a silence that was seen; else only where nothing but whole
-  frames follow up to the next silence, and where it cannot lie inside of what the noise may have been the beginning of: by its
-  first three bytes a frame of another unit that was heard on this line. One or two bytes are no such beginning: a line
-  without bias puts them before each frame. In doubt nothing is done, for a master asks again.
+- A frame whose length is known and that is incomplete gets 20 ms for its rest, unless a whole one that cannot lie inside of it
+  begins after a silence. In many pieces it has these 20 ms once: an adapter delays them all alike. What is older is noise.
+- Everything on the bus is followed, requests to other units and their answers, each skipped as a whole: what is inside of one
+  is never taken for a request. An answer is longer (FC03) or shorter (FC16) than a request of its function would be.
+- What is no frame is noise. A frame behind noise counts after a silence that was seen, one that only its checksum ends when
+  nothing longer can still come; else only where nothing but whole frames follow up to the next silence, and where it cannot lie
+  inside of what the noise may have begun: by its first three bytes a frame of another unit that was heard on this line. One or
+  two bytes begin none: a line without bias puts them before each frame. In doubt nothing is done, for a master asks again.
 - Only the last frame is answered: behind an older request its master, or another slave, has spoken since. It is executed all
   the same, as on TCP.
 - An adapter may hear itself: rtu_echo.
@@ -48,6 +47,7 @@ MOST_BYTES: Final = 512
 """Held without a silence: twice the longest frame. What comes before is dropped, but for the latest requests in it."""
 
 _MOST_PASSED: Final = 8
+_SLOWEST_CHARACTERS: Final = 2.5  # from one character of a frame to the next: it and a pause of 1.5 (section 2.5.1.1)
 _MOST_PIECES: Final = 8  # of a frame, without a look at the time between them: a program may be late, too
 _REST_PER_BYTE_S: Final = 40e-6
 """After looks that left noise, for each byte of it: a look takes an eighth of this at most, and noise no more of a core."""
@@ -156,7 +156,7 @@ class RtuReceiver:
         byte by byte would else be looked through with each byte by the half kilobyte, and took a whole core from control."""
         count, at = len(self._burst), 0
         for mark, end_s in zip(self._marks, self._ends_s, strict=True) if len(self._marks) > _MOST_PIECES else ():
-            if self._last_s - end_s <= SPLIT_S + (count - mark) * self._character_s:
+            if self._last_s - end_s <= SPLIT_S + (count - mark) * _SLOWEST_CHARACTERS * self._character_s:
                 break
             at = mark
         at = min([at, *(place for place, size in found if place < at < place + size)])
@@ -168,9 +168,8 @@ class RtuReceiver:
         return [request._replace(is_answered=False) for request in requests]
 
     def _shorten(self) -> None:
-        """Drop the frames that can be made out, then what is older than the longest frame. Requests among them are kept, the
-        latest: where an adapter hands over a busy bus every 16 ms, each time in the middle of a frame, no silence is seen
-        for long, and a broadcast that stops all units is not said again."""
+        """Drop the frames that can be made out, then what is older than the longest frame. The latest requests among them are
+        kept: where each hand-over of a busy bus ends in a frame no silence is seen, and no broadcast to stop is said again."""
         at, found = 0, list[tuple[int, int]]()
         self._sizes.clear()
         while at < len(self._burst) and (size := self._frame_size(at, is_start=True)):
@@ -236,7 +235,9 @@ class RtuReceiver:
             if size := self._frame_size(at, is_start=is_marked):
                 is_apart = at <= claimer + _STRAY_BYTES or claimed < at + size
                 is_decided = is_final or longest <= end
-                if is_marked or (is_apart and is_decided and self._is_all_frames(at + size, dead)):
+                has_length = not ends_in_silence(bytes(self._burst[at : at + SHORTEST_ADU]))
+                is_sure = is_marked and (is_decided or (is_apart and has_length))
+                if is_sure or (is_apart and is_decided and self._is_all_frames(at + size, dead)):
                     return at, False
                 if self._burst[at] in self._units:
                     at += size - 1  # whole, but inside of something else: what is in it is no frame either

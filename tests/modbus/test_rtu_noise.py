@@ -7,10 +7,10 @@ import pytest
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.crc import crc16
 from gateway.modbus.rtu import encode_adu
-from gateway.modbus.rtu_receiver import MOST_BYTES, RtuReceiver, RtuRequest
+from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuRequest
 from tests.modbus.host_answers import loopback_request
 from tests.modbus.rtu_bus import SILENCE_S, Bus
-from tests.modbus.test_rtu_receiver import COMMAND, OURS, READ, WRITE, answered, registers_answer
+from tests.modbus.test_rtu_receiver import COMMAND, INSIDE, OURS, READ, WRITE, answered, registers_answer
 from tests.modbus.test_rtu_receiver_limits import known
 
 ODD = b"\x41\x01\x02"  # of a function that nobody knows: its checksum alone tells its end
@@ -122,3 +122,43 @@ def test_a_frame_that_has_to_make_room_is_measured_anew_and_not_as_long_as_one_t
     inside = encode_adu(7, P.write_registers_request(0, b"\x00" + COMMAND + bytes(9)))
     assert inside.index(COMMAND) == len(OURS)
     assert bus.send(inside + encode_adu(7, READ) * (MOST_BYTES // len(OURS))).requests() == []
+
+
+@pytest.mark.parametrize("behind", [ODD + bytes(9), b"\x2b\x0d\x00"])
+def test_a_checksum_that_fits_by_chance_ends_no_frame_while_a_long_one_comes(behind: bytes) -> None:
+    """Where a slow adapter parts a write of many registers, what comes next may begin as a function that nobody knows: behind
+    the pause a checksum fitted in one of some thousand such writes, and what had come before was dropped as noise."""
+    by_chance = encode_adu(92, behind)
+    pdu = P.write_registers_request(0, bytes(range(40, 80)) + by_chance + b"\xf8" * (200 - len(by_chance)))
+    request, first = encode_adu(1, pdu), 7 + 40
+    cuts = [first, first + len(by_chance) + 3, first + 100]
+    pieces = [request[a:b] for a, b in zip([0, *cuts], [*cuts, len(request)], strict=True)]
+    assert Bus().send(*pieces, pause_s=0.01).requests() == answered(pdu)
+
+
+def test_a_function_that_nobody_knows_is_heard_behind_a_frame_that_was_cut_off() -> None:
+    cut = encode_adu(1, P.write_registers_request(0, bytes(range(100))))[:30]
+    assert Bus().send(cut, encode_adu(1, ODD), pause_s=0.01).requests() == answered(ODD)
+
+
+@pytest.mark.parametrize("baud", [4800, 9600, 19200])
+def test_a_master_that_pauses_between_its_characters_is_heard_through_a_slow_adapter(baud: int) -> None:
+    """1.5 characters are silent between any two, as they may be (section 2.5.1.1): a long write was given up in its middle."""
+    long = encode_adu(1, P.write_registers_request(0, bytes(240)))
+    byte_s = 2.5 * 11 / baud
+    size = int(0.016 / byte_s)
+    bus = Bus(baud=baud).send(*(long[at : at + size] for at in range(0, len(long), size)), pause_s=size * byte_s)
+    assert bus.requests() == answered(long[1:-2])
+
+
+@pytest.mark.parametrize("around", [INSIDE, encode_adu(7, P.write_registers_request(0, bytes(2) + COMMAND + bytes(2)))])
+def test_a_request_that_an_adapter_parts_from_the_frame_around_it_on_both_sides_is_none(around: bytes) -> None:
+    at = around.index(COMMAND)
+    end = at + len(COMMAND)
+    assert known(7).send(around[:at], around[at:end], around[end:], pause_s=0.015).requests() == []
+
+
+def test_a_request_behind_a_frame_of_another_that_was_cut_off_waits_for_its_rest_and_is_answered() -> None:
+    bus = known(7).send(INSIDE[:5], pause_s=0.005)
+    begin_s = bus.now_s
+    assert bus.send(OURS).pause(1.0).heard == [(begin_s + SPLIT_S, RtuRequest(1, READ, True))]

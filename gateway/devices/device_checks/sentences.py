@@ -15,7 +15,18 @@ Found = Iterator[tuple[Place, str]]
 """(place in the profile, sentence)."""
 
 _SAID_BY_US: Final = ("ask", "before", "start", "feed")
-_SAID: Final = (*_SAID_BY_US, "answer", "or_answer", "frame", "text", "unknown", "refusal", "overload", "underload")
+_SAID: Final = (
+    *_SAID_BY_US,
+    "answer",
+    "before_answer",
+    "or_answer",
+    "frame",
+    "text",
+    "unknown",
+    "refusal",
+    "overload",
+    "underload",
+)
 _DIGITS: Final = frozenset("0123456789ABCDEF")
 _LEAST_FRAME: Final = 4  # bytes: unit, function, checksum
 

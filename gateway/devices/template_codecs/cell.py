@@ -43,9 +43,9 @@ def _nothing(field: Field) -> Value:
     return "-" if isinstance(field, Text) else 0
 
 
-def _question(grammar: Grammar, reading: ForceReading) -> bytes:
-    """What asks for a reading, with the sentence ahead of it; empty for a stream."""
-    texts = filter(None, (reading.before, reading.ask)) if reading.ask else ()
+def _question(grammar: Grammar, text: str) -> bytes:
+    """What asks for a reading or begins a stream, with the sentence ahead of it; nothing without it."""
+    texts = filter(None, (grammar.profile.reading.before, text)) if text else ()
     return b"".join(grammar.question_line(grammar.encode(text)) for text in texts)
 
 
@@ -76,7 +76,7 @@ class TemplateCellHost:
         self._newton_per_unit = newton_per_unit(profile, unit)
         self._sign, self._end = sign, self._reading.end
         self._lines = self._grammar.answers()
-        self._asked, self._own_lines = b"", frozenset[bytes]()
+        self._asked, self._read_over = b"", frozenset[bytes]()
         self._known: dict[bytes, _KnownReading] = {}  # a force at rest says the same few sentences
         self._beyond_range = tuple(
             (text, _KnownReading(raw, self._newtons(raw, {}), Quality.OVERLOAD))
@@ -87,17 +87,18 @@ class TemplateCellHost:
 
     def poll(self) -> bytes:
         """Return the question for one sample, empty for a cell that streams."""
-        return self._remember(_question(self._grammar, self._reading))
+        return self._remember(_question(self._grammar, self._reading.ask))
 
     @property
     def start(self) -> bytes:
         """The sentence that begins the stream, empty where it needs none."""
-        start = self._reading.start
-        return self._remember(self._grammar.question_line(self._grammar.encode(start))) if start else b""
+        return self._remember(_question(self._grammar, self._reading.start))
 
     def _remember(self, asked: bytes) -> bytes:
         if asked:
-            self._asked, self._own_lines = asked, self._grammar.own_lines(asked)
+            opened = self._reading.before_answer
+            acknowledged = {self._grammar.line(self._grammar.encode(opened))} if opened else set[bytes]()
+            self._asked, self._read_over = asked, self._grammar.own_lines(asked) | acknowledged
             self._grammar.expect_own_words(self._lines, asked)
         return asked
 
@@ -110,12 +111,12 @@ class TemplateCellHost:
             self._lines.skip()
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
-        """Return the samples and the garbage that these bytes complete, without our own words, which an adapter may hear.
-        now_s: time of their arrival."""
+        """Return the samples and the garbage that these bytes complete, without our own words, which an adapter may hear, and
+        the answer to `before`. now_s: time of their arrival."""
         known = self._known.get(chunk)
         if known is not None and self._lines.is_between_lines:
             return [known.at(now_s)]  # one whole sentence, and one of the few
-        return [self._sample(line, now_s) for line in self._lines.feed(chunk) if line.data not in self._own_lines]
+        return [self._sample(line, now_s) for line in self._lines.feed(chunk) if line.data not in self._read_over]
 
     def _sample(self, line: Line, now_s: float) -> ForceSample | Garbage | RepeatedSample:
         if not line.is_whole:
@@ -180,14 +181,16 @@ class TemplateCellDevice:
 
     def receive(self, chunk: bytes, now_s: float) -> int:
         """Return how many questions these bytes complete."""
-        if not self._reading.ask:
+        reading, encode = self._reading, self._grammar.encode
+        if not (reading.ask or reading.before_answer):
             return 0
         bodies = [self._grammar.body(line) for line in self._lines.feed(chunk)]
         for body in bodies:
+            if reading.before_answer and body == encode(reading.before):
+                self._answers += self._grammar.line(encode(reading.before_answer))
             if asked := self._checks.asked(body):
                 self._answers += self._grammar.line(self._checks.reply(asked.step, WatchdogState.OFF, 0))
-        ask = self._grammar.encode(self._reading.ask)
-        return sum(body == ask for body in bodies)
+        return bodies.count(encode(reading.ask)) if reading.ask else 0
 
     def take_answers(self) -> bytes:
         """Return the answers to questions that are none for a reading, such as for its identity; each once."""
