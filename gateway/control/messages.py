@@ -3,7 +3,7 @@
 from typing import Final
 
 from gateway.codes.faults import FaultCode
-from gateway.control.supervision.unreachable_force import Evidence, unreachable_words
+from gateway.control.supervision.unreachable_force import Evidence, defective_words, unreachable_words
 
 _PRESSES_N: Final = 2.0  # less is what friction keeps of a vented tool
 
@@ -53,12 +53,15 @@ def swinging_sentence(force_n: float, *, is_trim_off: bool) -> str:
     )
 
 
-def noisy_sentence(force_n: float) -> str:
-    """Return W361, which says why the state does not become holding."""
-    return (
-        f"W361 at {force_n:.1f} N single readings keep leaving the band that their mean is in, so nothing counts as holding: "
+def noisy_sentence(force_n: float, two_values: str) -> str:
+    """Return W361, which says why the state does not become holding. two_values: as of `Evidence`."""
+    why = (
         "the noise is as large as the band, the tool shakes or the regulator hunts; a wider in_band_tolerance, or a filter on "
         "the amplifier"
+    )
+    return (
+        f"W361 at {force_n:.1f} N single readings keep leaving the band that their mean is in, so nothing counts as holding: "
+        f"{defective_words(two_values) if two_values else why}"
     )
 
 
