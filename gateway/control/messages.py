@@ -3,6 +3,7 @@
 from typing import Final
 
 from gateway.codes.faults import FaultCode
+from gateway.control.inputs import LineStatus
 from gateway.control.supervision.unreachable_force import Evidence, defective_words, unreachable_words
 
 _PRESSES_N: Final = 2.0  # less is what friction keeps of a vented tool
@@ -120,10 +121,12 @@ def tare_sentence(zero_n: float, rest_n: float) -> str:
     return f"tare: zero at {zero_n:.2f} N{hint}"
 
 
-def master_lost_sentence(connected: bool, lease_age_s: float, *, is_behind: bool = False) -> str:
+def master_lost_sentence(line: LineStatus, lease_age_s: float, *, is_behind: bool = False) -> str:
     """Return how the loss of the master was seen. lease_age_s: since its heartbeat last changed; is_behind: it changes, but has
     waited in a pile of requests."""
-    if connected and is_behind:
+    if line.owner_connected and is_behind:
         return "master lost: its heartbeats wait behind its other requests, and it may be gone: let it wait for each answer"
-    closed = "" if connected else "connection closed, "
-    return f"master lost: {closed}heartbeat unchanged for {lease_age_s * 1e3:.0f} ms"
+    why = "" if line.owner_connected else "connection closed, "
+    if line.owner_connected and line.owner_refused:
+        why = f"its last write was refused, and a heartbeat in it too ({line.owner_refused}); "
+    return f"master lost: {why}heartbeat unchanged for {lease_age_s * 1e3:.0f} ms"
