@@ -220,24 +220,35 @@ class StateChoice:
         return state_directory(self.path, self.named)
 
 
-def state_option(text: str) -> Callable[[Function], Function]:
-    """Return --state with this help. One that cannot be read is told by E105, which ends with 77."""
-    return click.option("--state", type=GivenPath(file_okay=False), help=text)
+def check_state(state: Path | None) -> None:
+    """Check that the directory of --state is there: E106 where it is not."""
+    if state is not None and not state.exists():
+        from gateway.cli.errors import no_state_directory
+
+        raise no_state_directory(state)
+
+
+def _checked_state(context: click.Context, parameter: click.Parameter, value: Path | None) -> Path | None:
+    check_state(value)
+    return value
+
+
+def state_option(text: str, *, makes: bool = False) -> Callable[[Function], Function]:
+    """Return --state with this help. One that cannot be read is told by E105, which ends with 77. One that is not there is a
+    slip (E106): it has nothing to tell, and must not come to be by a typing error. makes: it need not be there yet."""
+    callback = None if makes else _checked_state
+    return click.option("--state", type=GivenPath(file_okay=False), callback=callback, help=text)
 
 
 def state_options(function: Callable[..., Any] | None = None, *, makes: bool = False) -> Callable[..., Any]:
-    """Add --state and --rig; the function receives both as one argument, `state`, a StateChoice. One that is not there is a
-    slip (E106): it has nothing to tell, and must not come to be by a typing error. makes: it need not be there yet."""
+    """Add --state and --rig; the function receives both as one argument, `state`, a StateChoice. makes: see `state_option`."""
     if function is None:
         return partial(state_options, makes=makes)
     from gateway.cli.command_line.known_rigs import choose_rig
     from gateway.cli.command_line.rig_choice import rig_option, tell_rig
-    from gateway.cli.errors import no_state_directory
 
     @wraps(function)
     def with_choice(*, state: Path | None, rig: str | None, **options: Any) -> Any:
-        if state is not None and not makes and not state.exists():
-            raise no_state_directory(state)
         choice = StateChoice(state, rig if state else choose_rig(rig, None))
         if rig is None and state is None:
             tell_rig(choice.rig, choice.directory)
@@ -245,7 +256,7 @@ def state_options(function: Callable[..., Any] | None = None, *, makes: bool = F
 
     for option in (
         rig_option(f"The rig that is meant  [default: the one that runs here, else {defaults.RIG}]", checks=False),
-        state_option("State directory of the gateway  [default: the rig's]"),
+        state_option("State directory of the gateway  [default: the rig's]", makes=makes),
     ):
         option(with_choice)
     return with_choice

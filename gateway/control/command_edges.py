@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 
 from gateway.bsfm import Bsfm
 from gateway.control.demand import Demand, Manner, demand_of, is_same_manner, manner_of
+from gateway.control.inputs import LineStatus
 from gateway.control.limits import NotFiniteError, narrow_limits
 from gateway.control.messages import master_lost_sentence
 from gateway.control.settings import ControlSettings
@@ -117,9 +118,9 @@ class CommandTracker:
         """Return whether the master is lost: disconnected, or without a heartbeat for one length of the lease."""
         return self._lease.is_lost(now_s, owner_connected)
 
-    def lost_sentence(self, now_s: float, owner_connected: bool) -> str:
+    def lost_sentence(self, now_s: float, line: LineStatus) -> str:
         """Return how the loss of the master was seen."""
-        return master_lost_sentence(owner_connected, self.lease_age_s(now_s), is_behind=self.command.has_waited)
+        return master_lost_sentence(line, self.lease_age_s(now_s), is_behind=self.command.has_waited)
 
     def lease_age_s(self, now_s: float) -> float:
         """Return the time since the lease was renewed, s."""

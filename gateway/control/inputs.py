@@ -58,20 +58,21 @@ class ValveStatus(NamedTuple):
 class LineStatus(NamedTuple):
     """What the output line and the process know, at the time of a step.
 
-    acknowledged_v: voltage that the device confirmed last, None before the first; standing_v: that surely stands there, None
-    while another one is on its way, and where nobody knows; sent_v: voltage that went out last on the wire, which carries one
-    at a time, None where nobody knows; wire_s: how long one setting keeps it, nan if not known; unanswered_since_s: monotonic
-    time of the oldest write without an answer, None if all are answered; answer_late_s: what the last answer took, where it
-    came after its time, else 0; fault: what the line itself reports (refused, altered, lost), said: in the device's own words,
-    where it has said something to it;
-    pressure_pa_per_v: of the output device by the ranges in its profile; owner_connected: False once the owning master's last
-    connection has closed; late_s: how late this step runs; waited_s: so much of it the process could have run and was not
-    let, None where the machine does not count that; suspended_s: so much of it the whole machine was suspended; withheld:
-    processor time that was kept from us from outside about then, s, and by whom, in words; cell_held, output_held: what kept
-    us from hearing a device that has not been heard for a while; temperature_c, feed_mm_s: of the load cell and under the
-    tool, for compensation; nan: nobody knows. output_counts, cell_counts: of the two lines, growing; None where nobody
-    counts. valve: of the directional valve, None on a rig without one. cell_says: what the cell says in place of readings,
-    empty where nothing.
+    acknowledged_v: voltage that the device confirmed last, None before the first; standing_v: that surely stands
+    there, None while another one is on its way, and where nobody knows; sent_v: voltage that went out last on the
+    wire, which carries one at a time, None where nobody knows; wire_s: how long one setting keeps it, nan if not
+    known; unanswered_since_s: monotonic time of the oldest write without an answer, None if all are answered;
+    answer_late_s: what the last answer took, where it came after its time, else 0; fault: what the line itself
+    reports (refused, altered, lost), said: in the device's own words, where it has said something to it;
+    pressure_pa_per_v: of the output device by the ranges in its profile; owner_connected: False once the owning
+    master's last connection has closed; owner_refused: why its last write was refused, empty where it was taken;
+    late_s: how late this step runs; waited_s: so much of it the process could have run and was not let, None where
+    the machine does not count that; suspended_s: so much of it the whole machine was suspended; withheld: processor
+    time that was kept from us from outside about then, s, and by whom, in words; cell_held, output_held: what kept us
+    from hearing a device that has not been heard for a while; temperature_c, feed_mm_s: of the load cell and under
+    the tool, for compensation; nan: nobody knows. output_counts, cell_counts: of the two lines, growing; None where
+    nobody counts. valve: of the directional valve, None on a rig without one. cell_says: what the cell says in place
+    of readings, empty where nothing.
     """
 
     acknowledged_v: float | None = None
@@ -99,6 +100,7 @@ class LineStatus(NamedTuple):
     answer_late_s: float = 0.0
     suspended_s: float = 0.0
     withheld: tuple[float, str] = 0.0, ""
+    owner_refused: str = ""
 
 
 class LoopInputs(NamedTuple):

@@ -3,7 +3,8 @@
 from typing import Final
 
 from gateway.codes.faults import FaultCode
-from gateway.control.supervision.unreachable_force import Evidence, unreachable_words
+from gateway.control.inputs import LineStatus
+from gateway.control.supervision.unreachable_force import Evidence, defective_words, unreachable_words
 
 _PRESSES_N: Final = 2.0  # less is what friction keeps of a vented tool
 
@@ -53,12 +54,15 @@ def swinging_sentence(force_n: float, *, is_trim_off: bool) -> str:
     )
 
 
-def noisy_sentence(force_n: float) -> str:
-    """Return W361, which says why the state does not become holding."""
-    return (
-        f"W361 at {force_n:.1f} N single readings keep leaving the band that their mean is in, so nothing counts as holding: "
+def noisy_sentence(force_n: float, two_values: str) -> str:
+    """Return W361, which says why the state does not become holding. two_values: as of `Evidence`."""
+    why = (
         "the noise is as large as the band, the tool shakes or the regulator hunts; a wider in_band_tolerance, or a filter on "
         "the amplifier"
+    )
+    return (
+        f"W361 at {force_n:.1f} N single readings keep leaving the band that their mean is in, so nothing counts as holding: "
+        f"{defective_words(two_values) if two_values else why}"
     )
 
 
@@ -117,10 +121,12 @@ def tare_sentence(zero_n: float, rest_n: float) -> str:
     return f"tare: zero at {zero_n:.2f} N{hint}"
 
 
-def master_lost_sentence(connected: bool, lease_age_s: float, *, is_behind: bool = False) -> str:
+def master_lost_sentence(line: LineStatus, lease_age_s: float, *, is_behind: bool = False) -> str:
     """Return how the loss of the master was seen. lease_age_s: since its heartbeat last changed; is_behind: it changes, but has
     waited in a pile of requests."""
-    if connected and is_behind:
+    if line.owner_connected and is_behind:
         return "master lost: its heartbeats wait behind its other requests, and it may be gone: let it wait for each answer"
-    closed = "" if connected else "connection closed, "
-    return f"master lost: {closed}heartbeat unchanged for {lease_age_s * 1e3:.0f} ms"
+    why = "" if line.owner_connected else "connection closed, "
+    if line.owner_connected and line.owner_refused:
+        why = f"its last write was refused, and a heartbeat in it too ({line.owner_refused}); "
+    return f"master lost: {why}heartbeat unchanged for {lease_age_s * 1e3:.0f} ms"

@@ -83,7 +83,7 @@ class RegisterBank:
         self._watchdogs = next((one for one in register_map.registers if one.name == "watchdogs"), None)
         self._image.put(register_map.find("map_hash"), register_map.map_hash)
         self._bits = (register_map.find("control_word").address, register_map.find("status_word").address)
-        self._owner_peer = NOBODY
+        self._owner_peer, self.owner_refused = NOBODY, ""  # the last write of who owns, where it was refused
         self._show_owner()
         self.publish(Status())
 
@@ -96,8 +96,7 @@ class RegisterBank:
     def server_id(self) -> ServerId:
         """The identity for FC17. It runs unless a fault is latched: whether a force is held is in status_word."""
         self._catch_up()
-        is_fault = self._image.word(self._bits[1]) & StatusBit.FAULT
-        return build_server_id(self.identity, is_running=not is_fault)
+        return build_server_id(self.identity, is_running=not self._image.word(self._bits[1]) & StatusBit.FAULT)
 
     def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """Note the reason of what the framing has refused, as all others do."""
@@ -238,6 +237,7 @@ class RegisterBank:
         return refusal
 
     def _note_refused_write(self, refusal: Refusal, peer: Peer) -> Refusal:
+        self.owner_refused = refusal.sentence if peer.identity == self.owner else self.owner_refused
         self.on_refused_write(refusal, peer)
         return self._note_refusal(refusal, peer)
 
@@ -319,7 +319,7 @@ class RegisterBank:
         if not asks or ownership.owner != host or admitted.is_stop or admitted.is_taken_over:  # else it stays
             ownership.settle(host, takes_over=admitted.is_taken_over, stops=admitted.is_stop, asks=asks)
         if ownership.owner == host:
-            self._owner_peer = peer
+            self._owner_peer, self.owner_refused = peer, ""
         self._show_owner()
 
     def _show_owner(self) -> None:

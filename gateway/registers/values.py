@@ -6,7 +6,7 @@ move. A number that is not available is NaN in float32 and 0x8000 in int16, whic
 
 from array import array
 from enum import StrEnum
-from math import inf, isfinite, nan
+from math import inf, isfinite, isinf, nan
 from struct import Struct
 from typing import Final
 
@@ -59,9 +59,12 @@ def words_swapped_from_little_endian(data: bytes) -> bytes:
 
 
 def pack_number(kind: str, order: WordOrder, number: float) -> bytes:
-    """Return words of one raw number. ValueError when the type cannot carry it (float32: overflow becomes infinite)."""
+    """Return words of one raw number. ValueError when the type cannot carry it."""
     if kind == "float32":
-        data = _STRUCTS[kind].pack(float32(number))
+        carried = float32(number)
+        if isinf(carried) and abs(number) != inf:
+            raise ValueError(f"{number:g} does not fit in float32")
+        data = _STRUCTS[kind].pack(carried)
     else:
         low, high = RAW_LIMITS[kind]
         if number != number and kind == "int16":
@@ -83,9 +86,9 @@ def unpack_number(kind: str, order: WordOrder, data: bytes) -> float | int:
 
 
 def float32(number: float) -> float:
-    """Return the nearest float32; infinite beyond its range."""
+    """Return the nearest float32; infinite beyond its range. A whole number may have any length."""
     try:
-        return float(_STRUCTS["float32"].unpack(_STRUCTS["float32"].pack(number))[0])
+        return float(_STRUCTS["float32"].unpack(_STRUCTS["float32"].pack(float(number)))[0])
     except OverflowError:
         return inf if number > 0 else -inf
 

@@ -57,6 +57,10 @@ def test_what_does_not_fit_is_said_not_wrapped():
                 pack_number(kind, WordOrder.ABCD, number)
     with pytest.raises(ValueError, match="does not fit"):
         pack_number("uint16", WordOrder.ABCD, math.nan)
+    for number in (1e39, -1e300):  # it went out as infinite, and the gateway called a number of somebody's no number
+        with pytest.raises(ValueError, match="does not fit"):
+            pack_number("float32", WordOrder.ABCD, number)
+    assert pack_number("float32", WordOrder.ABCD, math.inf) == bytes.fromhex("7F800000")
     with pytest.raises(ValueError, match="takes 2 registers"):
         unpack_number("float32", WordOrder.ABCD, b"\0\0")
 

@@ -214,12 +214,16 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
         (b'{"no_such": 1}', None, []),
         (b"[" * 100_000, None, []),
         (b"[" * 10_000, None, []),
-        (b'{"force_setpoint": NaN}', None, []),
         (b'{"force_setpoint": -Infinity}', None, []),
         (b'{"force_setpoint": 1e999}', None, []),
         (
             b'{"force_setpoint": 1' + b"0" * 400 + b"}",
             {"ok": False, "written": [], "error": "force_setpoint: a finite number is wanted"},
+            [],
+        ),
+        (
+            b'{"force_setpoint@float_abcd": 1' + b"0" * 39 + b"}",
+            {"ok": False, "written": [], "error": "force_setpoint: 1e+39 does not fit in float32"},
             [],
         ),
         (

@@ -9,6 +9,21 @@ from gateway.cli.command_line.duration import parse_duration_s
 from gateway.processes.event import utc_text
 
 
+class YoungerRecords:
+    """Told of the records of a file in their order. Behind a first one of between then and now all are younger, whatever
+    their times say: a clock that was set back gives them earlier ones. One of later than now is of a clock that was ahead
+    once, and says nothing of those behind it. after: as the option gives it."""
+
+    def __init__(self, after: str) -> None:
+        self._after, self._now = after, utc_text(time.time())
+        self._reads_on = False
+
+    def includes(self, written: str) -> bool:
+        """Decide whether a record of this time is younger."""
+        self._reads_on = self._reads_on or self._after <= written <= self._now
+        return self._reads_on or written >= self._after
+
+
 def _parse_since(context: click.Context, parameter: click.Parameter, value: str | None) -> str:
     """Return the time that the option means, as events write it; empty where it is not given.
 

@@ -33,6 +33,8 @@ def encode_within(register: Register, number: float) -> bytes:
         return register.encode(number)
     except ValueError:
         low, high = limits_of(register)
+        if low is None and high is None:
+            raise
         raise ValueError(describe_allowed(f"{number:.10g}", low, high, register.unit)) from None
 
 

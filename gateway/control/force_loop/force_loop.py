@@ -45,7 +45,7 @@ class ForceLoop:
 
     def __init__(self, settings: ControlSettings, model: Bsfm, timing: TimingCompensation | None = None) -> None:
         self._timing, self._is_retimed = timing, False
-        self._coming, self._transient, self._leaps = ComingThrust(), TransientEstimate(), LeapCheck()
+        self._coming, self._transient, self.leaps = ComingThrust(), TransientEstimate(), LeapCheck()
         self._lead: LeadCompensator | LinearizedLagInverse
         self._trim: TrimIntegral | MeasuredTrim = TrimIntegral(settings.trim)
         self._tune(settings, model)
@@ -201,7 +201,7 @@ class ForceLoop:
         self._limiter.make_safe()
         self.feedforward.reset()
         self._trim.reset()
-        self._leaps.forget()
+        self.leaps.forget()
         self.settling.restart()
         self._approach, self.feedforward_v, self.limited_by = Approach(), 0.0, LimitedBy.NONE
         self._was_touching = False  # or the next contact, which is still to come, would count as lost
@@ -286,7 +286,7 @@ class ForceLoop:
         trim.blocked_way = blocked_way(self.limited_by, trim.value_v, is_lowest=self.is_lowest, is_low=law.is_low)
         trim.travel(moved_n)
         if inputs.reading.is_new and inputs.reading.is_usable:
-            self._has_leapt = self._leaps.passes_over(inputs.reading.contact_n)
+            self._has_leapt = self.leaps.passes_over(inputs.reading.contact_n, inputs.reading.raw_n)
         if law.applied_n <= 0.0:
             trim.reset()
         elif isinstance(trim, MeasuredTrim):

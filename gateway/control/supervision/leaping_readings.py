@@ -8,13 +8,20 @@ from, take the part: there one false reading was a wrong sign, span or gain. Ove
 
 Two false readings in a row seldom say the same. So behind one that was passed over the trim passes one more that agrees neither
 with it nor with those before; not where readings leapt shortly before, for of a force that shakes none agree.
+
+Readings that leap between the same two values, bit for bit, are of no force: noise and friction show others between. They are a
+defective amplifier's, and nothing is learned from them; which of the two is the force, if any, nobody knows.
 """
 
+from collections import deque
+from itertools import pairwise
 from math import inf
 from typing import Final
 
 LEAP_N: Final = 3.0  # more than usual noise, and than a force that is held moves from one reading to the next
 CALM_READINGS: Final = 5  # that did not leap, behind which two leaps in a row are doubted
+_TWO_READINGS: Final = 8  # of two values, which change ...
+_TWO_LEAPS: Final = 4  # ... so often: a force that has fallen once, without noise, is of two values, too
 
 
 class LeapLimit:
@@ -39,16 +46,31 @@ class LeapCheck:
 
     def __init__(self) -> None:
         self._limit, self._believed_n = LeapLimit(), 0.0
+        self._said_n: deque[float] = deque(maxlen=_TWO_READINGS)
         self.forget()
 
     def forget(self) -> None:
         """Forget what was read before: the next one is believed whole."""
         self._limit.forget()
+        self._said_n.clear()
         self._calm = CALM_READINGS
         self._leapt_n: float | None = None  # by the reading before, behind calm ones
 
-    def passes_over(self, force_n: float) -> bool:
-        """Decide whether nothing may be learned from this reading, N."""
+    @property
+    def two_values(self) -> str:
+        """Observation of readings that leap between the same two values; empty where they do not."""
+        low_n, high_n = min(self._said_n, default=0.0), max(self._said_n, default=0.0)
+        leaps = sum(before_n != after_n for before_n, after_n in pairwise(self._said_n))
+        if not high_n - low_n > LEAP_N or leaps < _TWO_LEAPS or not {low_n, high_n}.issuperset(self._said_n):
+            return ""
+        return f"the cell says nothing but {low_n:.2f} N and {high_n:.2f} N by turns"
+
+    def passes_over(self, force_n: float, said_n: float) -> bool:
+        """Decide whether nothing may be learned from this reading, N. said_n: the same as the cell said it."""
+        self._said_n.append(said_n)
+        return self._is_alone(force_n) or bool(self.two_values)
+
+    def _is_alone(self, force_n: float) -> bool:
         leapt_n, self._leapt_n = self._leapt_n, None
         if self._limit.take(force_n) != force_n:
             self._leapt_n, self._calm = (force_n if self._calm >= CALM_READINGS else None), 0

@@ -49,7 +49,11 @@ class OneShotEvents:
 
     def movement_events(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> tuple[str, ...]:
         """Return what a step in force or voltage mode is the first to show. measured_n: contact force, smoothed."""
-        noisy = "" if self._has_told_noise or not loop.settling.is_noisy else noisy_sentence(loop.applied_n)
+        noisy = (
+            ""
+            if self._has_told_noise or not loop.settling.is_noisy
+            else noisy_sentence(loop.applied_n, loop.leaps.two_values)
+        )
         self._has_told_noise = self._has_told_noise or loop.settling.is_noisy
         saturated = self.saturated_event(loop, measured_n, inputs)
         return self.unreachable_event(loop, measured_n, inputs), self.hunting_event(loop), noisy, saturated
@@ -94,6 +98,7 @@ class OneShotEvents:
             was_in_band=self._was_in_band,
             target_n=loop.applied_n,
             is_lowest=loop.is_lowest,
+            two_values=loop.leaps.two_values,
         )
         return unreachable_sentence(evidence, self.direction)
 

@@ -32,7 +32,8 @@ _OFF: Final = "trim at its limit, calibration or the load cell's span off"  # a 
 class Evidence:
     """What is seen. pressure_pa: measured, expected_pa: at this voltage; nan: nobody knows. learned: expected_pa was seen while
     the force was right; was_in_band: the force has been in band since the last enable; target_n: what is gone for, nan where
-    nobody knows; is_lowest: no less voltage can be out."""
+    nobody knows; is_lowest: no less voltage can be out; two_values: of readings
+    that are no force, what was seen."""
 
     voltage_v: float
     measured_n: float
@@ -43,6 +44,7 @@ class Evidence:
     was_in_band: bool = False
     target_n: float = nan
     is_lowest: bool = False
+    two_values: str = ""
 
     @property
     def is_too_much(self) -> bool:
@@ -102,6 +104,8 @@ class Evidence:
 
 def unreachable_words(evidence: Evidence) -> str:
     """Return what it probably is, and one thing to do."""
+    if evidence.two_values:
+        return defective_words(evidence.two_values)
     pressure = _pressure(evidence)
     if evidence.is_near and not evidence.no_air:
         off_n = abs(evidence.measured_n - evidence.target_n)
@@ -118,6 +122,13 @@ def unreachable_words(evidence: Evidence) -> str:
     if evidence.factor < 0.5 and not pressure:
         return f"no air or too little of it, valve closed, {_OFF}"
     return f"{clause}target not reached: supply pressure too low, {_OFF}"
+
+
+def defective_words(two_values: str) -> str:
+    """Return what readings are that leap between the same two values, and what to do."""
+    return (
+        f"{two_values}: its amplifier or its cable is defective, and nobody knows the force; disable, and look at both"
+    )
 
 
 def _too_much_words(evidence: Evidence) -> str:

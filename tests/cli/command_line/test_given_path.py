@@ -108,6 +108,7 @@ def test_a_device_is_no_state_directory(words: tuple[str, ...], here: Path, call
     [
         "recordings list", "plant list", "plant rollback", "report for-support.tar.gz", "events", "audit show", "record on",
         "calibration list", "calibration show", "calibration use 1", "calibration rollback", "sim list",
+        "monitor --once", "write force_setpoint=1", "diagnose 1", "simulate 1 --rig demo", "fit 1",
     ],
 )  # fmt: skip
 def test_a_slip_in_state_is_told_by_each_verb_and_makes_no_directory(line: str, here: Path, call) -> None:

@@ -1,5 +1,6 @@
 """One reading that is false, by a disturbed digit or a spike, moves no force that is held, and blames nobody."""
 
+import itertools
 from dataclasses import replace
 
 import pytest
@@ -106,7 +107,7 @@ def test_behind_a_rest_the_first_reading_is_believed_whatever_was_before() -> No
 
 def passed_over(*forces_n: float) -> list[bool]:
     check = LeapCheck()
-    return [check.passes_over(force_n) for force_n in (20.0, *forces_n)][1:]
+    return [check.passes_over(force_n, force_n) for force_n in (20.0, *forces_n)][1:]
 
 
 def test_a_second_leap_that_agrees_with_nothing_is_passed_over_and_the_third_is_believed() -> None:
@@ -119,3 +120,37 @@ def test_of_a_force_that_shakes_no_second_leap_is_passed_over() -> None:
     assert shaken == [True, False, True, False]
     calm_again = passed_over(60.0, 20.0, *[20.0] * CALM_READINGS, 60.0, 45.0)
     assert calm_again[-2:] == [True, True]
+
+
+@pytest.mark.parametrize(
+    ("said_n", "every_ms", "code"),
+    [
+        ((28.2, 31.8), 10, "W361"),
+        ((24.0, 28.0), 10, "A301"),
+        ((31.0, 35.0), 10, "A301"),
+        ((25.0, 35.0), 100, "W361"),
+        ((26.4, 30.0), 100, "A301"),
+    ],
+)
+def test_readings_of_two_values_by_turns_are_told_and_not_followed(
+    said_n: tuple[float, float], every_ms: int, code: str
+) -> None:
+    """A defective amplifier: supply pressure, calibration, span or noise were named, and of some the trim went to its limit."""
+    bench = held(every_ms)
+    by_turns = itertools.cycle(said_n)
+    bench.alter_sample = lambda sample: replace(sample, raw=(force_n := next(by_turns)), force_n=force_n)
+    before_n = bench.plant.force_n
+    bench.run(15.0)
+    (told,) = (event for event in bench.events if event.startswith(code))
+    assert f"nothing but {said_n[0]:.2f} N and {said_n[1]:.2f} N by turns" in told
+    assert "amplifier or its cable is defective" in told and "supply" not in told
+    assert abs(bench.plant.force_n - before_n) < MOST_MOVED_N
+
+
+@pytest.mark.parametrize("said_n", [(29.9, 30.0), (30.0,) * 30 + (20.0,)])
+def test_two_neighbouring_counts_and_a_force_that_falls_once_are_no_defect(said_n: tuple[float, ...]) -> None:
+    check = LeapCheck()
+    for _ in range(3):
+        for force_n in said_n:
+            check.passes_over(force_n, force_n)
+    assert check.two_values == ""

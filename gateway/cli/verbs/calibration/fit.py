@@ -12,7 +12,7 @@ from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.errors import CliError, no_such_recording
-from gateway.cli.options import json_option, name_option, state_directory, state_option
+from gateway.cli.options import check_state, json_option, name_option, state_directory, state_option
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ EXAMPLES = ("fit ladder.csv --models bsfm --orders 1-3", "fit ladder.csv --model
 @click.option("--no-report", is_flag=True, help="Write no report.")
 @click.option("--store", is_flag=True, help="Store the chosen fit as a numbered calibration (it is not activated).")
 @name_option
-@state_option("State directory of the gateway.")
+@state_option("State directory of the gateway.", makes=True)
 @rig_option("The rig it must be from  [default: the recording's own]")
 @json_option
 def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> None:
@@ -83,6 +83,8 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
 
     if options["report"] and options["no_report"]:
         raise click.UsageError("--report or --no-report, not both")
+    if not store:
+        check_state(options["state"])
     path = _source(recording, options)
     target = None if options["no_report"] else options["report"] or _beside(path)
     named = [Path(options[name]) for name in ("rig", "columns") if options[name]]

@@ -17,7 +17,7 @@ from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
-from gateway.cli.options import state_directory, state_option
+from gateway.cli.options import check_state, state_directory, state_option
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def _not_an_option(context: click.Context, parameter: click.Parameter, value: Pa
 )
 @table_options
 @click.option("--fail-on", type=click.Choice(list(_FAILS)), help="Exit 1 on this verdict or a worse one.")
-@state_option("State directory, for numbers.")
+@state_option("State directory, for numbers.", makes=True)
 @click.option(
     "--against",
     metavar="OLD",
@@ -112,6 +112,8 @@ def command(**options: Any) -> None:
     pressure_kpa. Several are explained by one model.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads would only wait for each other
+    if not options["save"]:
+        check_state(options["state"])
     if options["before"] or options["after"]:
         _show_before_after(options)
         return

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from gateway.audit.audit_reader import read_audit, verify_audit
-from gateway.cli.command_line.since_option import since_option
+from gateway.cli.command_line.since_option import YoungerRecords, since_option
 from gateway.cli.errors import CliError, no_state_directory
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
@@ -32,8 +32,9 @@ def show_command(*, after: str, peer: str | None, as_json: bool, state: StateCho
     """
     _directory_of(state)
     left_out: list[None] = []
+    younger = YoungerRecords(after)
     for record in read_audit(state.directory, lambda: left_out.append(None)):
-        if str(record.get("time", "")) >= after and (peer is None or peer in str(record.get("peer", ""))):
+        if younger.includes(str(record.get("time", ""))) and (peer is None or peer in str(record.get("peer", ""))):
             click.echo(json.dumps(record) if as_json else format_record(record))
     if left_out:
         lines = "1 line was" if len(left_out) == 1 else f"{len(left_out)} lines were"

@@ -43,7 +43,7 @@ EXAMPLES = ("run demo --sim", "run irc5-cell --sim --bind 127.0.0.1:0 --record")
     metavar="HOST:PORT",
     help="Serve figures for Prometheus here; port 0: any free one.",
 )
-@state_option("State directory (default: $XDG_STATE_HOME/force-gateway/RIG).")
+@state_option("State directory (default: $XDG_STATE_HOME/force-gateway/RIG).", makes=True)
 @click.option("--record", is_flag=True, help="Record from the start.")
 @click.option("--realtime", is_flag=True, help="SCHED_FIFO and locked memory for the control process.")
 @click.option("--json", is_flag=True, help="At READY, print one JSON line: ports, ptys and process ids.")

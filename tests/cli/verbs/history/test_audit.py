@@ -47,6 +47,16 @@ def test_only_who_and_what_was_asked_for_is_shown(state: Path, call, words: tupl
     assert answer.exit_code == 0 and numbers(answer.output) == shown
 
 
+def test_behind_a_clock_that_was_set_back_it_is_read_on(state: Path, call) -> None:
+    file = AuditFile(state, 1 << 20)
+    file.append(
+        [{"time": "2026-11-22T09:00:00.000Z", "peer": "10.0.0.5:1", "what": "force_setpoint", "old": 2, "new": 3}]
+    )
+    file.close()
+    answer = call("audit", "show", "--json", "--since", "2026-11-22T10:02", "--state", state)
+    assert numbers(answer.output) == [3, 4]
+
+
 def test_a_broken_record_is_said_to_hold_nowhere(state: Path, call) -> None:
     (path,) = (state / "audit").glob("*.jsonl")
     path.write_bytes(path.read_bytes().replace(b"10.0.0.6", b"10.0.0.8"))

@@ -121,6 +121,35 @@ def test_following_shows_what_comes(state: Path, call, monkeypatch) -> None:
     assert codes(answer.output) == ["A401", "A313"]
 
 
+@pytest.mark.parametrize("since", ["10m", "2026-11-22T11:50"])
+def test_behind_a_clock_that_was_set_back_it_is_read_on(since: str, state: Path, call, monkeypatch) -> None:
+    """A fault of after it had the time of an hour before: `--since` showed neither it nor, with `--follow`, what came."""
+    file, slept = EventFile(state), threading.Event()
+
+    def append(before_s: float, sentence: str) -> None:
+        file.append(encode_event(make_event(NOON_S - before_s, "control", "x", sentence)))
+
+    def meanwhile(seconds: float) -> None:
+        if slept.is_set():
+            raise KeyboardInterrupt
+        slept.set()
+        append(3500.0, "A313 too much force")
+
+    append(3600.0, "A310 master lost")
+    monkeypatch.setattr(verb.time, "sleep", meanwhile)
+    answer = call("events", "--state", state, "--json", "--severity", "error", "--since", since, "--follow")
+    file.close()
+    assert codes(answer.output) == ["A401", "A310", "A313"]
+
+
+def test_a_clock_that_was_far_ahead_once_makes_nothing_young(state: Path, call) -> None:
+    file = EventFile(state)
+    for at_s, code in ((86400.0, "A310"), (-7200.0, "A311"), (-1.0, "A312")):
+        file.append(encode_event(make_event(NOON_S + at_s, "control", "x", f"{code} so it was")))
+    file.close()
+    assert codes(call("events", "--state", state, "--json", "--since", "30s").output) == ["A310", "A312"]
+
+
 def test_a_backup_has_the_events_while_they_are_written(state: Path, call, tmp_path: Path) -> None:
     (state / "events.jsonl.1").write_bytes((state / "events.jsonl").read_bytes())
     assert call("backup", tmp_path / "b.tar.gz", "--state", state).exit_code == 0
