@@ -45,7 +45,7 @@ class ForceLoop:
 
     def __init__(self, settings: ControlSettings, model: Bsfm, timing: TimingCompensation | None = None) -> None:
         self._timing, self._is_retimed = timing, False
-        self._coming, self._transient, self.leaps = ComingThrust(), TransientEstimate(), LeapCheck()
+        self._coming, self._transient = ComingThrust(), TransientEstimate()
         self._lead: LeadCompensator | LinearizedLagInverse
         self._trim: TrimIntegral | MeasuredTrim = TrimIntegral(settings.trim)
         self._tune(settings, model)
@@ -53,10 +53,9 @@ class ForceLoop:
         self.expected = ExpectedForce(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
         self.left = LeftForce(model, settings.supervision.response_lag_s, settings.limits.safe_voltage_v)
         self._limiter = VoltageLimiter(settings.limits)
-        self.feedforward_v = 0.0
-        self.limited_by = LimitedBy.NONE
-        self._approach = Approach()
+        self._approach, self.feedforward_v, self.limited_by = Approach(), 0.0, LimitedBy.NONE
         self.settling = SettlingCheck(settings.supervision.unreachable_s)
+        self.leaps = LeapCheck(settings.supervision.sample_quantum_n)
         self._was_touching = self._has_leapt = False
         self._wanted_v = 0.0
 

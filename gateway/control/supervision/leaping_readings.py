@@ -9,8 +9,9 @@ from, take the part: there one false reading was a wrong sign, span or gain. Ove
 Two false readings in a row seldom say the same. So behind one that was passed over the trim passes one more that agrees neither
 with it nor with those before; not where readings leapt shortly before, for of a force that shakes none agree.
 
-Readings that leap between the same two values, bit for bit, are of no force: noise and friction show others between. They are a
-defective amplifier's, and nothing is learned from them; which of the two is the force, if any, nobody knows.
+Readings that leap between the same two values, bit for bit, are of no force, but for two neighbouring counts of a coarse cell:
+noise and friction show others between. They are a defective amplifier's, and nothing is learned from them; which of the two is
+the force, if any, nobody knows.
 """
 
 from collections import deque
@@ -42,9 +43,10 @@ class LeapLimit:
 
 
 class LeapCheck:
-    """Told of each usable reading in its order."""
+    """Told of each usable reading in its order. quantum_n: as of `supervision.sample_quantum_n` of the rig."""
 
-    def __init__(self) -> None:
+    def __init__(self, quantum_n: float) -> None:
+        self._two_values_n = max(LEAP_N, 3.0 * quantum_n)  # a rig may write half a count
         self._limit, self._believed_n = LeapLimit(), 0.0
         self._said_n: deque[float] = deque(maxlen=_TWO_READINGS)
         self.forget()
@@ -60,8 +62,9 @@ class LeapCheck:
     def two_values(self) -> str:
         """Observation of readings that leap between the same two values; empty where they do not."""
         low_n, high_n = min(self._said_n, default=0.0), max(self._said_n, default=0.0)
-        leaps = sum(before_n != after_n for before_n, after_n in pairwise(self._said_n))
-        if not high_n - low_n > LEAP_N or leaps < _TWO_LEAPS or not {low_n, high_n}.issuperset(self._said_n):
+        if not high_n - low_n > self._two_values_n or not {low_n, high_n}.issuperset(self._said_n):
+            return ""
+        if sum(before_n != after_n for before_n, after_n in pairwise(self._said_n)) < _TWO_LEAPS:
             return ""
         return f"the cell says nothing but {low_n:.2f} N and {high_n:.2f} N by turns"
 

@@ -106,7 +106,7 @@ def test_behind_a_rest_the_first_reading_is_believed_whatever_was_before() -> No
 
 
 def passed_over(*forces_n: float) -> list[bool]:
-    check = LeapCheck()
+    check = LeapCheck(0.1)
     return [check.passes_over(force_n, force_n) for force_n in (20.0, *forces_n)][1:]
 
 
@@ -147,9 +147,13 @@ def test_readings_of_two_values_by_turns_are_told_and_not_followed(
     assert abs(bench.plant.force_n - before_n) < MOST_MOVED_N
 
 
-@pytest.mark.parametrize("said_n", [(29.9, 30.0), (30.0,) * 30 + (20.0,)])
-def test_two_neighbouring_counts_and_a_force_that_falls_once_are_no_defect(said_n: tuple[float, ...]) -> None:
-    check = LeapCheck()
+@pytest.mark.parametrize(
+    ("said_n", "quantum_n"), [((29.9, 30.0), 0.1), ((30.0,) * 30 + (20.0,), 0.1), ((995.0, 1000.0), 5.0)]
+)
+def test_two_neighbouring_counts_and_a_force_that_falls_once_are_no_defect(
+    said_n: tuple[float, ...], quantum_n: float
+) -> None:
+    check = LeapCheck(quantum_n)
     for _ in range(3):
         for force_n in said_n:
             check.passes_over(force_n, force_n)
