@@ -15,6 +15,7 @@ import hypothesis
 import pytest
 
 from tests.tried_again import TriedAgain
+from tests.workers import FewMessages, GroupsStayTogether, schedule_groups
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosis' matrices are small
 
@@ -22,9 +23,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosi
 def pytest_configure(config: pytest.Config) -> None:
     """A shell's background job inherits an ignored SIGINT, and so would every process under test."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    config.pluginmanager.register(GroupsStayTogether())
+    config.pluginmanager.register(GroupsStayTogether(group_of))
     config.pluginmanager.register(TriedAgain(lambda nodeid: "tests/web/" in nodeid or group_of(nodeid) in IN_REAL_TIME))
     draw_examples(at_random=config.getoption("--long"))
+    if hasattr(config, "workerinput"):
+        config.pluginmanager.register(FewMessages(config.pluginmanager))
     gc.disable()  # until all tests are collected, of which none is garbage
     if hasattr(config, "workerinput") and config.args_source is pytest.Config.ArgsSource.TESTPATHS:
         config.args = places_from_another_one_on(config.workerinput)
@@ -174,37 +177,7 @@ def begun_at(nodeid: str) -> int:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Our own groups: xdist 3.8 passes its `xdist_group` through a field that pytest 9.2 no longer has, and in silence
-    groups nothing (pytest-xdist issue 1386)."""
-    from xdist.scheduler import LoadScopeScheduling
-
-    class ByGroup(LoadScopeScheduling):
-        def _split_scope(self, nodeid: str) -> str:
-            return group_of(nodeid)
-
-    config.option.loadscopereorder = False  # not by the number of tests: our order
-    return ByGroup(config, log)
-
-
-class GroupsStayTogether:
-    """Fails a run in which a group was spread over workers: everything would pass, only slower and less surely."""
-
-    def __init__(self) -> None:
-        self.workers: dict[str, set[str]] = {}
-        self.lost_one = False
-
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        if worker := getattr(report, "worker_id", None):
-            self.workers.setdefault(group_of(report.nodeid), set()).add(worker)
-
-    @pytest.hookimpl(optionalhook=True)
-    def pytest_testnodedown(self, error: object) -> None:
-        self.lost_one |= bool(error)  # its work went to another one
-
-    def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        spread = [] if self.lost_one else [group for group, workers in self.workers.items() if len(workers) > 1]
-        if spread:
-            raise pytest.UsageError(f"not kept on one worker: {spread[:5]}")
+    return schedule_groups(group_of, config, log)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -244,7 +217,7 @@ def tracker_process() -> None:
 
 
 def open_descriptors() -> dict[str, str]:
-    """By `os`, not by `pathlib`: this is asked twice at each of nine thousand tests."""
+    """By `os`, not by `pathlib`, for a test may wait for its threads."""
     found = {}
     for name in os.listdir(DESCRIPTORS):  # noqa: PTH208
         try:
@@ -254,28 +227,47 @@ def open_descriptors() -> dict[str, str]:
     return {name: target for name, target in found.items() if not target.startswith("/proc/")}
 
 
-@pytest.fixture(autouse=True)
-def nothing_leaks(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """asyncio.run cancels left-over tasks silently; here they fail the test, and so do left-over descriptors."""
-    left_over: list[str] = []
+left_over: list[str] = []
+"""Tasks that were cancelled in the running test."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cancelled_tasks_are_noted() -> Iterator[None]:
+    """asyncio.run cancels left-over tasks silently."""
     cancel_all_tasks = asyncio.runners._cancel_all_tasks  # type: ignore[attr-defined]
 
-    def cancel_and_tell(loop: asyncio.AbstractEventLoop) -> None:
+    def cancel_and_note(loop: asyncio.AbstractEventLoop) -> None:
         left_over.extend(repr(task) for task in asyncio.all_tasks(loop))
         cancel_all_tasks(loop)
 
-    monkeypatch.setattr(asyncio.runners, "_cancel_all_tasks", cancel_and_tell)
-    before = open_descriptors()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(asyncio.runners, "_cancel_all_tasks", cancel_and_note)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def nothing_leaks() -> Iterator[None]:
+    yield from find_leaks()
+
+
+def find_leaks() -> Iterator[None]:
+    """Left-over tasks fail the test, and so do left-over descriptors. These are counted, at each of fifteen thousand tests;
+    what they are is asked for where there are more."""
+    left_over.clear()
+    before = len(os.listdir(DESCRIPTORS))  # noqa: PTH208  # with the listing's own
     yield
     assert not left_over, f"tasks left behind: {left_over}"
-    after = open_descriptors()
-    if len(after) > len(before):
-        gc.collect()
-        after = open_descriptors()
-    for _ in range(200):  # a thread that syncs a file beside the loop may be a moment behind
-        if len(after) <= len(before):
+    if len(os.listdir(DESCRIPTORS)) > before:  # noqa: PTH208
+        after = wait_for_closing(before)
+        assert len(after) < before, f"descriptors left behind: {len(after) - before + 1} of {after}"
+
+
+def wait_for_closing(before: int) -> dict[str, str]:
+    """What is open once garbage is collected and threads had two seconds, or there are less than before: one that syncs a file
+    beside the loop may be a moment behind."""
+    gc.collect()
+    for _ in range(200):
+        if len(open_descriptors()) < before:
             break
         time.sleep(0.01)
-        after = open_descriptors()
-    leaked = {name: target for name, target in after.items() if before.get(name) != target}
-    assert len(after) <= len(before), f"descriptors left behind: {leaked}"
+    return open_descriptors()

@@ -1,8 +1,16 @@
-"""How the gate shares its tests among workers: what must stay together does, and no name in the lists is out of date."""
+"""How the gate shares its tests among workers: what must stay together does, and no name in the lists is out of date. What
+workers tell of a test, and that none leaves anything behind."""
 
+import asyncio
+import os
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
-from tests.conftest import LONG_WAITS, REAL_TIME, SLOW, SPREAD, begun_at, group_of
+import pytest
+
+from tests.conftest import LONG_WAITS, REAL_TIME, SLOW, SPREAD, begun_at, find_leaks, group_of
+from tests.workers import FewMessages, schedule_groups
 
 TESTS = Path(__file__).parent
 
@@ -41,3 +49,87 @@ def test_every_place_that_the_lists_name_is_there() -> None:
     for prefix in SPREAD:
         file, _, name = prefix.partition("::")
         assert f"def {name.removesuffix('[')}(" in (TESTS / file).read_text(encoding="utf-8")
+
+
+class WorkerInteractor:
+    """Stands for xdist's."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[str, Any]] = []
+
+    def sendevent(self, name: str, **contents: Any) -> None:
+        self.told.append((name, contents))
+
+
+def report(when: str, outcome: str, duration_s: float = 0.0, said: tuple[tuple[str, str], ...] = ()) -> Any:
+    place = ("a.py", 1, "test_a")
+    return pytest.TestReport("a.py::test_a", place, {}, outcome, None, when, user_properties=said, duration=duration_s)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("one", "is_told"),
+    [
+        (report("call", "passed"), True),
+        (report("setup", "passed"), False),
+        (report("teardown", "passed"), False),
+        (report("setup", "failed"), True),
+        (report("setup", "skipped"), True),
+        (report("teardown", "failed"), True),
+        (report("setup", "passed", 0.2), True),
+        (report("teardown", "passed", said=(("tried again", "stolen"),)), True),
+    ],
+)
+def test_the_master_is_told_of_all_but_a_fixture_that_went_well(one: Any, is_told: bool) -> None:
+    plugins, worker = pytest.PytestPluginManager(), WorkerInteractor()
+    plugins.register(worker)
+    few = FewMessages(plugins)
+    data = few.pytest_report_to_serializable(one) or {"outcome": one.outcome}
+    worker.sendevent("testreport", data=data | {"item_index": 3})
+    worker.sendevent("logstart", nodeid=one.nodeid)
+    worker.sendevent("runtest_protocol_complete", item_index=3)
+    told = [("testreport", {"data": {"outcome": one.outcome, "item_index": 3}})] if is_told else []
+    assert worker.told == [*told, ("runtest_protocol_complete", {"item_index": 3})]
+
+
+def test_a_group_is_handed_on_by_the_places_of_its_tests() -> None:
+    class Node:
+        shutting_down = False
+
+        def __init__(self) -> None:
+            self.given: list[int] = []
+
+        def send_runtest_some(self, places: list[int]) -> None:
+            self.given += places
+
+    node: Any = Node()
+    config: Any = SimpleNamespace(getvalue=lambda name: ["popen"], option=SimpleNamespace())
+    shared = schedule_groups(lambda nodeid: nodeid[0], config, None)
+    shared.add_node(node)
+    shared.registered_collections[node] = ["a1", "b1", "a2", "b2", "a3"]
+    shared.workqueue.update({"b": {"b1": True, "b2": False}, "a": {"a1": False, "a2": False, "a3": False}})
+    shared._assign_work_unit(node)
+    assert node.given == [3]
+    shared._assign_work_unit(node)
+    assert node.given == [3, 0, 2, 4] and not shared.workqueue
+
+
+def test_a_descriptor_that_is_left_fails_its_test_and_one_that_is_closed_does_not() -> None:
+    check = find_leaks()
+    next(check)
+    number = os.open("/dev/null", os.O_RDONLY)
+    with pytest.raises(AssertionError, match=r"descriptors left behind: .*/dev/null"):
+        next(check)
+    os.close(number)
+    assert list(find_leaks()) == [None]
+
+
+def test_a_task_that_is_left_fails_its_test() -> None:
+    async def leave_one() -> None:
+        asyncio.get_running_loop().create_task(asyncio.sleep(60.0), name="left")
+
+    check = find_leaks()
+    next(check)
+    asyncio.run(leave_one())
+    with pytest.raises(AssertionError, match=r"tasks left behind: .*left"):
+        next(check)
+    assert list(find_leaks()) == [None]
