@@ -222,7 +222,7 @@ class Controller:
         if not reading.is_new:
             return
         touching = self._contact.update(reading)
-        self._loop.expected.outside_n = self._outside_n
+        self._loop.expected.note_around(self._outside_n, lacks_air=self._one_shot.lacks_air(self._loop.voltage_v))
         self._faults.observe(reading, self._loop.expected, self._loop.branch_share, touching)
         if not self._machine.is_enabled:
             self._faults.observe_rest(reading)

@@ -19,7 +19,7 @@ from gateway.control.messages import (
     unreachable_sentence,
 )
 from gateway.control.sample_conditioning import Reading
-from gateway.control.supervision.unreachable_force import Evidence
+from gateway.control.supervision.unreachable_force import Evidence, lacks_air
 
 _LEARNING: Final = 0.02  # of each new ratio of pressure to voltage
 _AT_LIMIT_S: Final = 3.0  # that a trim stands at its limit until it is told
@@ -46,6 +46,14 @@ class OneShotEvents:
     def observe_line(self, line: LineStatus) -> None:
         """Take over the pressure that the output device measures."""
         self._pressure_pa, self._profile_pa_per_v = line.pressure_pa, line.pressure_pa_per_v
+
+    def lacks_air(self, voltage_v: float) -> bool:
+        """Decide whether the pressure is too low to move the tool at this voltage, as far as it is measured."""
+        return lacks_air(self._pressure_pa, self._expected_pa(voltage_v), learned=isfinite(self._learned_pa_per_v))
+
+    def _expected_pa(self, voltage_v: float) -> float:
+        learned = isfinite(self._learned_pa_per_v)
+        return voltage_v * (self._learned_pa_per_v if learned else self._profile_pa_per_v)
 
     def movement_events(self, loop: ForceLoop, measured_n: float, inputs: LoopInputs) -> tuple[str, ...]:
         """Return what a step in force or voltage mode is the first to show. measured_n: contact force, smoothed."""
@@ -87,14 +95,13 @@ class OneShotEvents:
             self._learned_pa_per_v = known + _LEARNING * (ratio - known) if isfinite(known) else ratio
 
     def _unreachable_sentence(self, loop: ForceLoop, measured_n: float, expected_n: float) -> str:
-        learned, voltage_v = isfinite(self._learned_pa_per_v), loop.voltage_v
         evidence = Evidence(
-            voltage_v=voltage_v,
+            voltage_v=loop.voltage_v,
             measured_n=measured_n,
             expected_n=expected_n,
             pressure_pa=self._pressure_pa,
-            expected_pa=voltage_v * (self._learned_pa_per_v if learned else self._profile_pa_per_v),
-            learned=learned,
+            expected_pa=self._expected_pa(loop.voltage_v),
+            learned=isfinite(self._learned_pa_per_v),
             was_in_band=self._was_in_band,
             target_n=loop.applied_n,
             is_lowest=loop.is_lowest,

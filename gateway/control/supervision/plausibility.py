@@ -42,7 +42,10 @@ _RIGHT, _WRONG_GAIN = FaultCode.NONE, FaultCode.GAIN_WRONG
 
 class ExpectedForce:
     """What the model expects now: both branches at the lagged voltage, N of cell force above rest. lag_s: dead time too.
-    outside_n: known force that something else brings onto the workpiece (compensation), beside the model's."""
+    outside_n: known force that something else brings onto the workpiece (compensation), beside the model's; lacks_air: the
+    output device measures too little pressure for its voltage, so that nothing moves the tool."""
+
+    lacks_air = False
 
     def __init__(self, model: Bsfm, lag_s: float, rest_v: float, stands_v: float | None = None) -> None:
         """stands_v: voltage whose pressure stands at the beginning, None for rest_v."""
@@ -54,6 +57,10 @@ class ExpectedForce:
     def retime(self, lag_s: float) -> None:
         """Replace the lag, s."""
         self.lag_s = lag_s
+
+    def note_around(self, outside_n: float, *, lacks_air: bool) -> None:
+        """Note what is known beside the voltage, from now on."""
+        self.outside_n, self.lacks_air = outside_n, lacks_air
 
     def use(self, model: Bsfm) -> None:
         """Expect by another model from now on; the lagged voltage stays."""

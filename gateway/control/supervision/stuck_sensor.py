@@ -4,8 +4,9 @@ Two ways to tell. While the force changes: since the value last changed, the ris
 leave) has somewhere been above the falling branch (the most it can leave) of another time, by more than five quanta. That is
 friction-proof; a single number would trip on every small reversal, where friction really holds the force. It must have been so
 for a good part of frozen_s: the model begins to move with the voltage, the machine a dead time later, and a quiet cell has
-repeated itself for long before. Only in contact: in free air a quiet cell rightly repeats itself. While the force stands still:
-more equal samples than the cell's own noise allows (repeated_readings), or than the rig says (frozen_equal_samples).
+repeated itself for long before. Only in contact, and where the output device measures no lack of air: in free air, or without
+any, a quiet cell rightly repeats itself. While the force stands still: more equal samples than the cell's own noise allows
+(repeated_readings), or than the rig says (frozen_equal_samples).
 """
 
 from math import ceil, inf
@@ -32,7 +33,7 @@ class StuckSensorCheck:
         self._reported_limit = supervision.frozen_equal_samples
         self._noise = RepeatedReadings()
         self._value_n = inf
-        self._slack_n = self._answer_s = 0.0
+        self._slack_n = self._answer_s = self._airless_s = 0.0
         self.start()
 
     def expect_noise(self, noise_n: float) -> None:
@@ -66,7 +67,10 @@ class StuckSensorCheck:
         least_n, most_n = response.bounds_n()
         self._least_n = max(self._least_n, least_n + response.outside_n)
         self._most_n = min(self._most_n, most_n + response.outside_n)
-        if self._least_n - self._most_n > self._least_change_n + self._slack_n:  # the force must have moved
+        self._airless_s = self._airless_s + reading.interval_s if response.lacks_air else 0.0
+        if self._airless_s >= _DEAD_SHARE * self._frozen_s:  # a pressure that rises comes behind its voltage, too
+            self._moved_s = 0.0
+        elif self._least_n - self._most_n > self._least_change_n + self._slack_n:  # the force must have moved
             self._moved_s += reading.interval_s
 
     @property

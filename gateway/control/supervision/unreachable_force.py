@@ -57,20 +57,14 @@ class Evidence:
         return self.measured_n >= _PRESSED_N and abs(self.measured_n - self.target_n) <= _NEAR_N
 
     @property
-    def _pressure_share(self) -> float:
-        """Of the expected pressure; nan where it cannot be told."""
-        known = isfinite(self.pressure_pa) and self.expected_pa >= _LEAST_EXPECTED_PA
-        return self.pressure_pa / self.expected_pa if known else nan
-
-    @property
     def no_air(self) -> bool:
         """Decide whether the pressure is too low to move the tool."""
-        return self._pressure_share < (_LITTLE if self.learned else _VERY_LITTLE)
+        return lacks_air(self.pressure_pa, self.expected_pa, learned=self.learned)
 
     @property
     def has_air(self) -> bool:
         """Decide whether the pressure is high enough to press."""
-        return self._pressure_share >= (_ENOUGH if self.learned else _PLENTY)
+        return _share(self.pressure_pa, self.expected_pa) >= (_ENOUGH if self.learned else _PLENTY)
 
     @property
     def is_silent(self) -> bool:
@@ -100,6 +94,16 @@ class Evidence:
             return self.measured_n > _LEAST_N and self._is_a_tenth
         off_n = abs(self.measured_n / STANDARD_GRAVITY_M_PER_S2 - self.expected_n)
         return self.factor > _TIMES and off_n < (_UNIT_SLACK - 1.0) * self.expected_n + _FRICTION_N
+
+
+def lacks_air(pressure_pa: float, expected_pa: float, *, learned: bool) -> bool:
+    """Decide whether a pressure is too low to move the tool, as far as it can be told. Arguments: as of Evidence."""
+    return _share(pressure_pa, expected_pa) < (_LITTLE if learned else _VERY_LITTLE)
+
+
+def _share(pressure_pa: float, expected_pa: float) -> float:
+    """Of the expected pressure; nan where it cannot be told."""
+    return pressure_pa / expected_pa if isfinite(pressure_pa) and expected_pa >= _LEAST_EXPECTED_PA else nan
 
 
 def unreachable_words(evidence: Evidence) -> str:

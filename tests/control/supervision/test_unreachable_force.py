@@ -5,10 +5,11 @@ from math import nan
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control.supervision.unreachable_force import Evidence, unreachable_words
 from gateway.registers.words import State, StatusBit
-from tests.control.bench import Bench, settings
+from tests.control.bench import Bench, has_fault, settings
 
 PASCAL_PER_V = 0.09e6
 
@@ -95,6 +96,30 @@ def test_air_that_fails_under_a_voltage_is_told_though_friction_keeps_the_tool_i
     said = told(bench)
     assert bench.last.status & StatusBit.CONTACT
     assert "0 kPa measured, 270 kPa expected: no air, or a closed valve" in said
+
+
+@pytest.mark.parametrize("freezes", [False, True])
+def test_a_quiet_cell_is_not_dead_where_there_is_no_air_to_move_it(freezes: bool) -> None:
+    """It repeats the force that friction keeps, whatever voltage is out. When the air is back it must move."""
+    bench = holding(Measured(seed=1, noise_n=0.0))
+    bench.alter_sample = lambda sample: replace(sample, force_n=max(sample.force_n, 1.0))
+    bench.plant.air = False
+    assert "no air, or a closed valve" in told(bench)
+    for force_n in (30.0, 8.0, 20.0):
+        bench.force(force_n)
+        bench.run(2.0)
+        assert bench.last.fault is FaultCode.NONE and bench.last.status & StatusBit.CONTACT
+    bench.cell_frozen, bench.plant.air = freezes, True
+    bench.run(1.0)
+    assert bench.last.fault is (FaultCode.SAMPLE_FROZEN if freezes else FaultCode.NONE)
+
+
+@pytest.mark.parametrize("force_n", [3.0, 10.0])
+def test_a_dead_cell_is_found_while_the_pressure_still_rises(force_n: float) -> None:
+    bench = holding(Measured(seed=1, noise_n=0.0), force_n)
+    bench.cell_frozen = True
+    bench.force(35.0)
+    assert bench.seconds_until(has_fault(FaultCode.SAMPLE_FROZEN), 2.0) <= 0.5
 
 
 def test_without_a_pressure_what_was_right_before_counts_and_no_more_is_claimed() -> None:
