@@ -14,7 +14,7 @@ from gateway import defaults
 from gateway.clients.endpoint import Endpoint
 from gateway.clients.exchange import ExchangeTable
 from gateway.clients.spellings import SPELLINGS
-from gateway.clients.spellings.keywords import unspeakable
+from gateway.clients.spellings.keywords import doubled, unspeakable
 from gateway.control.settings import LeaseAction
 from gateway.profiles import Rig
 from gateway.registers.map.register_map import RegisterMap
@@ -54,14 +54,20 @@ def render_client(register_map: RegisterMap, language: str, where: Endpoint) -> 
     if language not in TEMPLATES:
         raise ValueError(f"{language} is not one of {', '.join(LANGUAGES)}")
     table = ExchangeTable(register_map, where)
-    if odd := list(unspeakable(table, language)):
-        raise UnspeakableNameError(f"map {register_map.name}: {'; '.join(odd)}: give it another name")
+    _check_names(register_map, unspeakable(table, language))
     text = files("gateway.clients").joinpath("templates", TEMPLATES[language]).read_text("utf-8")
     remarks = [*where.to_fill_in(from_elsewhere=language not in _BESIDE_THE_GATEWAY), *where.cautions]
     if language == "scl" and where.s7_port_fault:
         remarks.append(f"FILL IN another port: {where.s7_port_fault}")
     fill_in = "".join(map(_REMARKS[language].format, remarks))
-    return Template(text).substitute({**table.values(), **SPELLINGS[language](table), "fill_in": fill_in})
+    client = Template(text).substitute({**table.values(), **SPELLINGS[language](table), "fill_in": fill_in})
+    _check_names(register_map, doubled(client, language))
+    return client
+
+
+def _check_names(register_map: RegisterMap, odd: Iterator[str]) -> None:
+    if found := list(odd):
+        raise UnspeakableNameError(f"map {register_map.name}: {'; '.join(found)}: give it another name")
 
 
 def endpoint_of(rig: Rig | None) -> Endpoint:

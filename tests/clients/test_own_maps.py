@@ -19,7 +19,7 @@ from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.controllers import S7, Codesys, Irc5
 from tests.clients.programs.python_program import PythonProgram
-from tests.clients.scenes import WHERE, cycles
+from tests.clients.scenes import MAP, WHERE, cycles
 from tests.clients.test_controller_rules import LANGUAGES, PROFILES, own_map
 
 TENTHS = (
@@ -195,3 +195,40 @@ def test_the_limits_of_a_finer_scale_are_said_whole(tmp_path: Path) -> None:
     client.enable(math.floor(32.767 * 8) / 8)
     cycles(client)
     assert struct.pack(">H", 32750) in gateway.requests[-6] + gateway.requests[-5]
+
+
+@pytest.mark.parametrize(
+    ("name", "languages"),
+    [
+        ("host", {"rapid", "urscript"}),
+        ("ok", {"c"}),
+        ("is_in_band", {"rapid", "urscript", "c"}),
+        ("grinding", set[str]()),
+    ],
+)
+def test_a_bit_of_ones_own_whose_constant_a_client_has_already_is_told(
+    name: str, languages: set[str], tmp_path: Path
+) -> None:
+    """FG_HOST twice: an IRC5 loads no such module, and a Universal Robot connected to the bit's number."""
+    bits = ", ".join(f"{bit}: {each}" for bit, each in MAP.find("control_word").bits.items())
+    own = own_map(tmp_path, "bits: control_word", f"bits: {{{bits}, 9: {name}}}")
+    for language in LANGUAGES:
+        if language in languages:
+            with pytest.raises(
+                UnspeakableNameError, match=f"^map own: FG_{name.upper()} stands twice .*: give it another"
+            ):
+                render_client(own, language, WHERE)
+        else:
+            assert render_client(own, language, WHERE)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_status_register_of_ones_own_that_is_named_as_a_flag_is_told(language: str, tmp_path: Path) -> None:
+    """A structure with `contact` twice, the register and the bit of status_word, is no text that a compiler takes."""
+    known = '      - {name: plant_id, address: 131, type: uint16, text: "Number of the plant in use'
+    own = own_map(tmp_path, known, known.replace("plant_id", "contact"))
+    if language in ("scl", "st", "c"):
+        with pytest.raises(UnspeakableNameError, match=r"^map own: contact .*: give it another name$"):
+            render_client(own, language, WHERE)
+    else:
+        assert "contact" in render_client(own, language, WHERE).lower()

@@ -143,3 +143,11 @@ def test_who_wires_a_twincat_or_codesys_controller_is_told_of_the_emergency_stop
     assert any("emergency stop: `bEnable`" in one for one in section["sentences"])
     (pace, other) = rows_of(page, section["title"])["call"]
     assert "10 ms" in pace and ("set lease_s to 0.12 or more" in other) is is_short
+
+
+def test_which_mb_client_the_block_needs_is_told_on_the_page_and_in_its_head() -> None:
+    """A project keeps the version that it was made with: V3.1 of an S7-1200 has no CONNECT, and the source does not compile."""
+    rig = load_rig("irc5-cell")
+    (version,) = rows_of(page_of("irc5-cell"), "Siemens S7-1200/1500: connection of MB_CLIENT")["instruction"]
+    for told in (version, render_client(rig.register_map, "scl", endpoint_of(rig))):
+        assert "MODBUS (TCP) V4.0" in told and "V3.0" in told

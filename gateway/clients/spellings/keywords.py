@@ -1,9 +1,11 @@
 """Names that a language cannot have: too long, or its own. A map of the user's may have names of its own."""
 
+import re
+from collections import Counter
 from collections.abc import Iterator
 from typing import Final
 
-from gateway.clients.exchange import ExchangeTable
+from gateway.clients.exchange import STATUS_BITS, ExchangeTable
 
 _LONGEST: Final = {"rapid": 32}  # of an identifier, with what the client sets before a name
 _KEYWORDS: Final = {
@@ -22,6 +24,12 @@ _KEYWORDS: Final = {
     "typename union unsigned using virtual void volatile while",
 }
 """Of Structured Text and SCL, whose structures have the registers as members; of C with those of C++."""
+_CONSTANT: Final = {
+    "rapid": re.compile(r"^  (?:LOCAL )?CONST \w+ (FG_\w+)", re.M),
+    "urscript": re.compile(r"^global (FG_\w+) =", re.M),
+    "c": re.compile(r"\b(FG_[A-Z0-9_]+) = [0-9]"),
+}
+"""Where a text has a constant of its own, or one of the map's names."""
 
 
 def unspeakable(table: ExchangeTable, language: str) -> Iterator[str]:
@@ -33,6 +41,18 @@ def unspeakable(table: ExchangeTable, language: str) -> Iterator[str]:
     for register in (*table.command, *table.status):
         if register.name in _KEYWORDS.get(language, "").split():
             yield f"{register.name} is a word of {language} itself"
+    if language in _KEYWORDS:
+        for register in table.status:
+            if register.name in STATUS_BITS:
+                yield f"{register.name} is the name of a bit in the client's status"
+
+
+def doubled(text: str, language: str) -> Iterator[str]:
+    """Yield in a sentence each constant that a client's text has twice: its own, and one of the map's names."""
+    if pattern := _CONSTANT.get(language):
+        yield from (
+            f"{name} stands twice in {language}" for name, count in Counter(pattern.findall(text)).items() if count > 1
+        )
 
 
 def _constants(table: ExchangeTable) -> Iterator[tuple[str, str]]:

@@ -20,7 +20,7 @@ def spell_rapid(table: ExchangeTable) -> dict[str, str]:
         "command_constants": _constants({f"FG_C_{r.name}": r.address - first + 1 for r in table.command}),
         "status_constants": _constants({f"FG_S_{r.name}": r.address - status_first + 1 for r in table.status}),
         "set_constants": _constants({f"FG_M_{each.name}": each.offset + 1 for each in table.model_fields}),
-        "bit_constants": _constants(control | shown | commit),
+        "bit_constants": "\n".join(map(_constants, (control, shown, commit))),
         "crc_table": _rows(crc_table(4)),
         "status_decoding": "\n".join(_decode(register, status_first) for register in table.status),
         "fault_cases": _cases(table.texts("fault_code")),

@@ -19,7 +19,9 @@ def spell_urscript(table: ExchangeTable) -> dict[str, str]:
         "command_constants": _globals({f"FG_C_{r.name}": r.address - first for r in table.command}),
         "status_constants": _globals({f"FG_S_{r.name}": r.address - status_first for r in table.status}),
         "set_constants": _globals({f"FG_M_{each.name}": each.offset for each in table.model_fields}),
-        "bit_constants": _globals({f"FG_{name}": mask for name, mask in (control | shown | commit).items()}),
+        "bit_constants": "".join(
+            _globals({f"FG_{name}": mask for name, mask in each.items()}) for each in (control, shown, commit)
+        ),
         "command_zeros": _zeros(words),
         "status_zeros": _zeros(table.status_span[1]),
         "answer_zeros": _zeros(2 * table.status_span[1] + 3),

@@ -214,6 +214,7 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
         ("LocalPort", "0"),
         ("MB_Unit_ID", f"{where.unit}: static of the MB_CLIENT instance, 255 as it comes; the block below sets it"),
         ("MB_DATA_PTR", "an Array of Word in a DB without optimized access, at least MB_DATA_LEN long"),
+        ("instruction", "MODBUS (TCP) V4.0 (S7-1200), V3.0 (S7-1500) or newer: an older one has no CONNECT"),
         ("call of the block below", calls),
     )
     stop = "A CPU goes on at an emergency stop: `enable` of the block has to fall with it (and with the guard, and the robot)."
