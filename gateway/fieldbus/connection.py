@@ -29,7 +29,7 @@ from gateway.fieldbus.rate_limits import LATE_S, Backlog, LogLimiter, RequestRat
 from gateway.fieldbus.settings import ServerSettings
 from gateway.fieldbus.socket_transport import READ_BYTES
 from gateway.fieldbus.waiting_bytes import count_waiting
-from gateway.modbus.fast import READ_FRAME_BYTES, whole_answer, whole_read_answer
+from gateway.modbus.fast import READ_FRAME_BYTES, TRANSACTION_BYTES, whole_answer, whole_read_answer
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer, encode
 from gateway.modbus.peer import Peer
 from gateway.modbus.server import DataBank, answer, refuse_unit
@@ -132,15 +132,20 @@ class Connection(asyncio.Protocol):
         self._rate = shared.peers.rate(self.peer.host, now_s)
         self._fast_units = frozenset(shared.settings.units if self._rate is None else ())
         self._peer_behind = replace(self.peer, is_behind=True)
-        self._read_registers = shared.bank.read_registers
+        self._known_answers = shared.bank.known_answers if self._fast_units else {}
         self._transport.set_write_buffer_limits(high=shared.settings.write_buffer_bytes)
 
     def data_received(self, data: bytes) -> None:
         """Answer what has come, READ_BYTES at most: the one call per request."""
         if self._partial_since_s is None:
+            known = self._known_answers.get(data[TRANSACTION_BYTES:])
+            if known is not None:
+                self._write(data[:TRANSACTION_BYTES] + known)
+                self._answered = True
+                return
             frame = None
             if len(data) == READ_FRAME_BYTES:
-                frame = whole_read_answer(data, self._fast_units, self._read_registers, self.peer)
+                frame = whole_read_answer(data, self._fast_units, self._shared.bank, self.peer)
             if frame is None:
                 frame = whole_answer(data, self._fast_units, self._shared.bank, self.peer)
             if frame is not None:
@@ -297,7 +302,7 @@ class Connection(asyncio.Protocol):
 
     def _stop(self) -> None:
         self._closing_since_s = self._shared.clock.time()
-        self._fast_units = frozenset()
+        self._fast_units, self._known_answers = frozenset(), {}
         if self._rate is not None and self._has_place:
             self._rate.give_back()
         self._has_place = False

@@ -50,7 +50,7 @@ nearly = st.tuples(
 @example(pack(">HHHBBHH", 1, 0, 6, 1, 2, 0, 8))
 @example(pack(">HHHBBHH", 1, 7, 6, 1, 3, 0, 8))  # another protocol
 def test_a_read_is_answered_as_the_long_way_or_left_to_it(frame: bytes) -> None:
-    quick = whole_read_answer(frame, UNITS, bank().read_registers, PEER)
+    quick = whole_read_answer(frame, UNITS, bank(), PEER)
     assert quick is None or quick == the_long_way(frame)
 
 
@@ -65,7 +65,7 @@ def test_every_plain_read_takes_the_short_cut(
     transaction: int, unit: int, function: int, address: int, count: int
 ) -> None:
     frame = pack(">HHHBBHH", transaction, 0, 6, unit, function, address, count)
-    assert whole_read_answer(frame, UNITS, bank().read_registers, PEER) == the_long_way(frame) is not None
+    assert whole_read_answer(frame, UNITS, bank(), PEER) == the_long_way(frame) is not None
 
 
 frames = st.builds(Adu, st.integers(0, 0xFFFF), st.sampled_from([1, 2]), st.binary(min_size=1, max_size=253)).map(
