@@ -1,15 +1,14 @@
 """One Modbus TCP connection on asyncio: bytes to requests, answers back in order, and no peer can hurt the others.
 
 Decisions:
-- BufferedProtocol with a small own buffer: what one wake-up can bring is bounded (the stock 256 KiB of asyncio and
-  uvloop would be 20 000 requests in a row, 100 ms without control), and it is as fast as data_received on uvloop,
-  faster on plain asyncio.
-- A peer that fills the whole buffer, or has had its requests of one turn, gives way: reading pauses until the loop has been
-  round once.
+- What one wake-up can bring is bounded, by a transport that reads no more at once: the 256 KiB of asyncio's and uvloop's own
+  would be 20 000 requests in a row, 100 ms without control.
+- A peer that sends as much as is read at once, or has had its requests of one turn, gives way: reading pauses until the loop
+  has been round once.
 - Who waits for the rate of its address has its place in the row: one that pipelines would else be there first each time, and
   a heartbeat of the same machine waited until its lease was over.
 - Answers of one wake-up are joined into one write. Requests that must wait stay in the framer while reading is paused,
-  so what is held for a peer is at most one buffer and one partial frame.
+  so what is held for a peer is at most one read and one partial frame.
 - A peer that does not read is closed when the transport asks to pause writing (its high-water mark is the cap).
 - A master that sends a request in single bytes (URScript has nothing else) and lets TCP gather them (Nagle) sends the rest when
   the first is acknowledged, which TCP puts off by 40 ms: so half a frame is acknowledged at once, where the system can (Linux).
@@ -28,13 +27,13 @@ from typing import Final, Protocol, cast
 from gateway.fieldbus.peers import Peers, address_of
 from gateway.fieldbus.rate_limits import LATE_S, Backlog, LogLimiter, RequestRate
 from gateway.fieldbus.settings import ServerSettings
+from gateway.fieldbus.socket_transport import READ_BYTES
 from gateway.fieldbus.waiting_bytes import count_waiting
-from gateway.modbus.fast import READ_FRAME_BYTES, whole_answer, whole_read_answer
+from gateway.modbus.fast import READ_FRAME_BYTES, TRANSACTION_BYTES, whole_answer, whole_read_answer
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer, encode
 from gateway.modbus.peer import Peer
 from gateway.modbus.server import DataBank, answer, refuse_unit
 
-BUFFER_BYTES: Final = 1024  # 85 reads, or four of the longest requests
 GIVES_WAY_S: Final = 10.0
 """So long a connection was silent that gives way where there is no room: most often its master has lost power or network, of
 which nobody is told, and begins anew. A few of these would keep it out until they have been idle for long enough."""
@@ -87,13 +86,11 @@ class ServerState:
         return max(silent, key=lambda each: (each.silent_s(now_s), -each.peer.port), default=None)
 
 
-class Connection(asyncio.BufferedProtocol):
+class Connection(asyncio.Protocol):
     """Made by the server for each accepted socket. The server calls sweep() and abort(), the transport the rest."""
 
     def __init__(self, shared: ServerState) -> None:
         self._shared = shared
-        self._buffer = bytearray(BUFFER_BYTES)
-        self._view = memoryview(self._buffer)
         self._framer = MbapFramer()
         self._partial_since_s: float | None = None  # while reading: set exactly when the framer holds something
         self._closing_since_s: float | None = None
@@ -135,35 +132,36 @@ class Connection(asyncio.BufferedProtocol):
         self._rate = shared.peers.rate(self.peer.host, now_s)
         self._fast_units = frozenset(shared.settings.units if self._rate is None else ())
         self._peer_behind = replace(self.peer, is_behind=True)
-        self._read_registers = shared.bank.read_registers
+        self._known_answers = shared.bank.known_answers if self._fast_units else {}
         self._transport.set_write_buffer_limits(high=shared.settings.write_buffer_bytes)
 
-    def get_buffer(self, _size_hint: int) -> memoryview:
-        """Lend the transport this connection's own buffer."""
-        return self._view
-
-    def buffer_updated(self, size: int) -> None:
-        """Answer the size bytes that have been put into the buffer: the one call per request."""
+    def data_received(self, data: bytes) -> None:
+        """Answer what has come, READ_BYTES at most: the one call per request."""
         if self._partial_since_s is None:
+            known = self._known_answers.get(data[TRANSACTION_BYTES:])
+            if known is not None:
+                self._write(data[:TRANSACTION_BYTES] + known)
+                self._answered = True
+                return
             frame = None
-            if size == READ_FRAME_BYTES:
-                frame = whole_read_answer(self._buffer, self._fast_units, self._read_registers, self.peer)
+            if len(data) == READ_FRAME_BYTES:
+                frame = whole_read_answer(data, self._fast_units, self._shared.bank, self.peer)
             if frame is None:
-                frame = whole_answer(self._buffer, size, self._fast_units, self._shared.bank, self.peer)
+                frame = whole_answer(data, self._fast_units, self._shared.bank, self.peer)
             if frame is not None:
                 self._write(frame)
                 self._answered = True
                 return
-        self._receive(size)
+        self._receive(data)
 
-    def _receive(self, size: int) -> None:
+    def _receive(self, data: bytes) -> None:
         """Whatever is not exactly one frame from an unlimited peer."""
         if self._is_closing:
             return
-        self._note_backlog(size)
-        self._framer.push(self._view[:size])
+        self._note_backlog(len(data))
+        self._framer.push(data)
         self._answer_complete_requests()
-        if size == BUFFER_BYTES and not (self._is_paused or self._is_closing):
+        if len(data) == READ_BYTES and not (self._is_paused or self._is_closing):
             self._pause(0.0)
 
     def _answer_complete_requests(self) -> None:
@@ -214,7 +212,7 @@ class Connection(asyncio.BufferedProtocol):
         """Say of a client that asks more than is answered, and waits for no answer, that it is late. size: of what has come."""
         self._read_s, self._taken = self._shared.clock.time(), self._taken + size
         of_tls = self._transport.get_extra_info("modbus_taken")  # what waits in the socket is encrypted, too
-        is_more = size == BUFFER_BYTES or self._transport.get_extra_info("modbus_more")
+        is_more = size == READ_BYTES or self._transport.get_extra_info("modbus_more")
         if self._backlog.note(self._read_s, of_tls or self._taken, count_waiting(self._transport) if is_more else 0.0):
             rate = f"{self._shared.settings.requests_per_s:g} requests/s" if self._rate else "is answered"
             asks = f"asks more than {rate} and waits for no answer"
@@ -304,7 +302,7 @@ class Connection(asyncio.BufferedProtocol):
 
     def _stop(self) -> None:
         self._closing_since_s = self._shared.clock.time()
-        self._fast_units = frozenset()
+        self._fast_units, self._known_answers = frozenset(), {}
         if self._rate is not None and self._has_place:
             self._rate.give_back()
         self._has_place = False

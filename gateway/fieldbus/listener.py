@@ -16,12 +16,14 @@ from functools import partial
 from math import inf
 from typing import Any, Final, Self
 
+from gateway.fieldbus.socket_transport import ReadySockets
+
 _BACKLOG: Final = 100
 _PAUSE_S: Final = 0.25
 _QUIET_S: Final = 60.0  # a shortage that comes back within this is the one that was told
 _SHORTAGES: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 
-MakeProtocol = Callable[[], asyncio.BaseProtocol]
+MakeProtocol = Callable[[], asyncio.Protocol]
 
 
 class Listener:
@@ -30,7 +32,7 @@ class Listener:
     def __init__(self, sockets: list[socket.socket], make: MakeProtocol, on_shortage: Callable[[str], None]) -> None:
         self._loop = asyncio.get_running_loop()
         self._sockets, self._make, self._on_shortage = sockets, make, on_shortage
-        self._arriving: set[asyncio.Task[None]] = set()
+        self._ready = ReadySockets()
         self._pauses: set[asyncio.TimerHandle] = set()
         self._short_s = -inf
         for each in sockets:
@@ -55,11 +57,7 @@ class Listener:
             self._loop.remove_reader(each)
             each.close()
         self._sockets.clear()
-
-    async def wait_closed(self) -> None:
-        """Wait until what was being accepted has got its protocol."""
-        while self._arriving:
-            await asyncio.wait(self._arriving)
+        self._ready.close()
 
     def _await_connection(self, listening: socket.socket) -> None:
         if listening.fileno() >= 0:
@@ -72,16 +70,7 @@ class Listener:
             if error.errno in _SHORTAGES:
                 self._pause(listening, error)
             return  # else a connection that is gone already, or never was one
-        accepted.setblocking(False)
-        arriving = self._loop.create_task(self._attach(accepted))
-        self._arriving.add(arriving)
-        arriving.add_done_callback(self._arriving.discard)
-
-    async def _attach(self, accepted: socket.socket) -> None:
-        try:
-            await self._loop.connect_accepted_socket(self._make, accepted)
-        except OSError:  # it has gone meanwhile
-            accepted.close()
+        self._ready.add(accepted, self._make())
 
     def _pause(self, listening: socket.socket, error: OSError) -> None:
         """The waiting connection would wake us again at once: leave it alone for a moment."""

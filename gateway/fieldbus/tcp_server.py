@@ -81,11 +81,10 @@ class ModbusTcpServer:
         self._shared.closing = True
         if self._sweep_timer is not None:
             self._sweep_timer.cancel()
-        await listener.wait_closed()
         if self._shared.connections:
             await self._end_connections(self._shared)
 
-    def _make_protocol(self, shared: ServerState) -> Callable[[], asyncio.BaseProtocol]:
+    def _make_protocol(self, shared: ServerState) -> Callable[[], asyncio.Protocol]:
         return lambda: Connection(shared)
 
     def _sweep_handshakes(self, now_s: float) -> None:

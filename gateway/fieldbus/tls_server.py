@@ -37,7 +37,7 @@ class ModbusTlsServer(ModbusTcpServer):
         soon = _utc(SOON_DAYS)
         self._to_tell = [(ends, told) for ends, told in _ends(settings) if ends > soon]
 
-    def _make_protocol(self, shared: ServerState) -> Callable[[], asyncio.BaseProtocol]:
+    def _make_protocol(self, shared: ServerState) -> Callable[[], asyncio.Protocol]:
         return lambda: TlsStream(shared, self._handshakes)
 
     def _sweep_handshakes(self, now_s: float) -> None:

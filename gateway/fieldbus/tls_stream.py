@@ -14,6 +14,7 @@ from typing import Any, Final, cast
 from gateway.fieldbus.connection import Connection, ServerState
 from gateway.fieldbus.peers import address_of
 from gateway.fieldbus.rate_limits import RequestRate
+from gateway.fieldbus.socket_transport import READ_BYTES
 from gateway.fieldbus.tls_settings import (
     HANDSHAKE_BYTES,
     HANDSHAKE_S,
@@ -27,7 +28,6 @@ from gateway.fieldbus.tls_settings import (
 from gateway.modbus.certificate import ROLES, read_certificate
 from gateway.modbus.peer import Peer
 
-_BUFFER_BYTES: Final = 1024
 LONGEST_RECORD: Final = (1 << 14) + 2048
 """Bytes of TLS that may come before a byte of Modbus is in them (RFC 5246, 6.2.3)."""
 _BYTES_FOR_ONE: Final = 100
@@ -73,13 +73,11 @@ class Handshakes:
             del self.rates[host]
 
 
-class TlsStream(asyncio.BufferedProtocol):
+class TlsStream(asyncio.Protocol):
     """Made for each accepted socket."""
 
     def __init__(self, shared: ServerState, handshakes: Handshakes) -> None:
         self._shared, self._handshakes = shared, handshakes
-        self._buffer = bytearray(_BUFFER_BYTES)
-        self._view = memoryview(self._buffer)
         self._connection: Connection | None = None
         self._is_paused = self._is_closing = self._is_more = False
         self._shaken_bytes = self._taken_bytes = 0
@@ -108,18 +106,15 @@ class TlsStream(asyncio.BufferedProtocol):
         self._tls = self._handshakes.context.wrap_bio(self._incoming, self._outgoing, server_side=True)
         self._handshakes.pending.add(self)
 
-    def get_buffer(self, _size_hint: int) -> memoryview:
-        """Lend the socket this stream's own buffer."""
-        return self._view
-
-    def buffer_updated(self, size: int) -> None:
+    def data_received(self, data: bytes) -> None:
         """Take encrypted bytes on."""
+        size = len(data)
         if self._is_closing:
             return
         if self._connection is None and not self._is_short(size):
             return
-        self._incoming.write(self._view[:size])
-        self._is_more, self._taken_bytes = size == _BUFFER_BYTES, self._taken_bytes + size
+        self._incoming.write(data)
+        self._is_more, self._taken_bytes = size == READ_BYTES, self._taken_bytes + size
         if self._connection is None:
             self._shake_hands()
         else:
@@ -249,9 +244,8 @@ class TlsStream(asyncio.BufferedProtocol):
         """Hand decrypted bytes to the connection, until there are none or it pauses. Each record is a turn: by records of one
         request each its own bound of a turn was none, and 120 refused writes were 7 ms of the control loop."""
         while not self._is_paused and not self._is_closing and (connection := self._connection) is not None:
-            buffer = connection.get_buffer(-1)
             try:
-                size = cast(int, self._tls.read(len(buffer), cast(bytearray, buffer)))
+                data = self._tls.read(READ_BYTES)
             except ssl.SSLWantReadError:
                 break
             except ssl.SSLError as error:
@@ -262,11 +256,11 @@ class TlsStream(asyncio.BufferedProtocol):
                 self._shared.log("framing", sentence, self._shared.clock.time())
                 self.close()
                 return
-            if not size:  # a goodbye
+            if not data:  # a goodbye
                 self.close()
                 return
-            self._allowed_bytes = min(LONGEST_RECORD, self._allowed_bytes + _BYTES_FOR_ONE * size)
-            connection.buffer_updated(size)
+            self._allowed_bytes = min(LONGEST_RECORD, self._allowed_bytes + _BYTES_FOR_ONE * len(data))
+            connection.data_received(data)
             if self._incoming.pending and not (self._is_paused or self._is_closing):
                 self.pause_reading()
                 self._shared.clock.call_later(0.0, self.resume_reading)

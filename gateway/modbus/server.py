@@ -23,6 +23,10 @@ _ONE_WORD: Final = Struct(">H")
 class DataBank(Protocol):
     """What a server needs from behind it. Methods raise ModbusError to refuse; a refused write changes nothing."""
 
+    known_answers: dict[bytes, bytes]
+    """Of reads that were answered: request -> answer, both without their transaction. The bank empties it when a register may
+    read otherwise than before."""
+
     @property
     def identity(self) -> Mapping[int, bytes]:
         """Objects of FC43/14: number to text."""

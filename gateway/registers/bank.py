@@ -66,9 +66,9 @@ class RegisterBank:
         self._writers, self._now, self.refusals = LastWriters(), now, 0  # refused since the start
         self.last_refusal: Refusal | None = None
         self.identity: Mapping[int, bytes] = build_identity(register_map.name, rules.rig_name)
-        self._map, self._image = register_map, RegisterImage(register_map)
         self._roles = write_roles(register_map.blocks)
-        self._words, self._room = memoryview(self._image.data), self._image.room
+        self._map, self._image = register_map, (image := RegisterImage(register_map))
+        self._words, self._room, self.known_answers = memoryview(image.data), image.room, image.known_answers
         self._command_block, self._command_role = register_map.block("command"), self._roles["command"]
         self._commands = CommandBlock(register_map, rules, self._image)
         self._status = StatusBlock(register_map, self._image)
@@ -183,7 +183,7 @@ class RegisterBank:
         """Show what `tell` says when somebody reads next: most that is published, nobody reads. state: of control."""
         self._admission.is_calibrating = state is State.CALIBRATING
         self._tell_status = tell
-        self._image.is_behind = True
+        self._image.fall_behind()
 
     def _catch_up(self) -> None:
         """Pack what has been accepted and published since the last read: most of it is never read."""

@@ -8,11 +8,13 @@ from gateway.registers.map.register_map import Register, RegisterMap
 
 class RegisterImage:
     """`data[2 * address]` is the high byte of a word. room, writable, block_at and register_at: of the map (AddressTables).
-    is_behind: more has been accepted or published than is packed here: whoever reads has that done first."""
+    is_behind: more has been accepted or published than is packed here: whoever reads has that done first. known_answers: see
+    DataBank."""
 
     def __init__(self, register_map: RegisterMap) -> None:
         last = max((block.last for block in register_map.blocks), default=-1)
         self.is_behind = False
+        self.known_answers: dict[bytes, bytes] = {}
         self.data = bytearray(2 * (last + 1))
         tables = register_map.by_address
         self.room, self.writable = tables.room, tables.writable
@@ -25,8 +27,14 @@ class RegisterImage:
         """Return words without any check."""
         return bytes(self.data[2 * address : 2 * (address + count)])
 
+    def fall_behind(self) -> None:
+        """Note that more has been accepted or published than is packed here."""
+        self.is_behind = True
+        self.known_answers.clear()
+
     def write(self, address: int, words: bytes) -> None:
         """Write words without any check."""
+        self.known_answers.clear()
         self.data[2 * address : 2 * address + len(words)] = words
 
     def put(self, register: Register, value: float) -> None:

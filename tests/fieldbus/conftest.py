@@ -12,6 +12,7 @@ from gateway.fieldbus import ModbusTcpServer, ServerSettings
 from gateway.fieldbus.connection import Connection, ServerState
 from gateway.fieldbus.peers import Peers
 from gateway.fieldbus.rate_limits import LogLimiter
+from gateway.fieldbus.socket_transport import READ_BYTES
 from gateway.modbus import Peer
 from tests.certificates import Folder, store_all
 from tests.modbus.memory_bank import MemoryBank
@@ -152,14 +153,12 @@ class Stand:
 
 
 def put(connection: Connection, transport: HandTransport, data: bytes) -> int:
-    """Deliver as much as the connection reads now, in segments as large as its buffer; returns how much that was."""
+    """Deliver as much as the connection reads now, in segments as large as a read; returns how much that was."""
     taken = 0
     while taken < len(data) and transport.reading:
-        view = connection.get_buffer(-1)
-        size = min(len(view), len(data) - taken)
-        view[:size] = data[taken : taken + size]
-        taken += size
-        connection.buffer_updated(size)
+        segment = data[taken : taken + READ_BYTES]
+        taken += len(segment)
+        connection.data_received(segment)
     return taken
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.fieldbus.connection import BUFFER_BYTES
+from gateway.fieldbus.socket_transport import READ_BYTES
 from gateway.modbus import Adu, RequestFault, answer, pdu
 from gateway.modbus.mbap import encode
 from tests.fieldbus.by_hand import READ, framed
@@ -36,7 +36,7 @@ requests = st.one_of(
 adus = st.builds(Adu, st.integers(0, 0xFFFF), st.sampled_from([0, 1, 255, 9]), requests)
 
 
-@given(st.lists(adus, max_size=30), st.lists(st.integers(1, BUFFER_BYTES), max_size=40))
+@given(st.lists(adus, max_size=30), st.lists(st.integers(1, READ_BYTES), max_size=40))
 def test_cutting_the_stream_elsewhere_changes_no_answer(
     stand: Any, deliver: Any, sent: list[Adu], sizes: list[int]
 ) -> None:
@@ -124,7 +124,7 @@ def test_what_waits_for_the_rate_is_one_buffer_at_most(stand: Any, deliver: Any)
     for _ in range(50):
         stream = stream[deliver(connection, far, stream) :]
         assert not far.reading
-        assert len(connection._framer) <= BUFFER_BYTES
+        assert len(connection._framer) <= READ_BYTES
         made.clock.advance(0.1)
 
 
@@ -168,7 +168,7 @@ def test_a_full_buffer_gives_way_however_few_requests_it_holds(stand: Any, deliv
     made = stand()
     connection, far = made.connect()
     longest = framed(pdu.write_registers_request(0, bytes(246)))
-    assert deliver(connection, far, 5 * longest) == BUFFER_BYTES and not far.reading
+    assert deliver(connection, far, 5 * longest) == READ_BYTES and not far.reading
     made.clock.advance(0.0)
     assert far.reading
 
@@ -179,11 +179,11 @@ def test_a_flood_gives_way_after_each_buffer_and_loses_nothing(stand: Any, deliv
     stream, rounds = reads(1000), 0
     while stream:
         taken = deliver(connection, far, stream)
-        assert taken <= BUFFER_BYTES
+        assert taken <= READ_BYTES
         stream, rounds = stream[taken:], rounds + 1
         made.clock.advance(0.0)
     assert answered(far) == list(range(1000))
-    assert rounds == -(-12000 // BUFFER_BYTES)
+    assert rounds == -(-12000 // READ_BYTES)
 
 
 def test_a_client_that_does_not_read_is_cut_at_the_cap(stand: Any, deliver: Any) -> None:
@@ -212,7 +212,7 @@ def test_nothing_after_lost_framing_is_executed(stand: Any, deliver: Any) -> Non
     made = stand()
     connection, far = made.connect(stuck=True)
     deliver(connection, far, framed(READ) + b"\x00\x01\x00\x07\x00\x06" + framed(pdu.write_register_request(0, 1)))
-    connection.buffer_updated(12)
+    connection.data_received(framed(READ))
     assert (answered(far), made.bank.writes) == ([1], [])
 
 

@@ -4,8 +4,9 @@ from dataclasses import replace
 from ipaddress import ip_network
 from typing import Any
 
-from gateway.fieldbus.connection import BUFFER_BYTES, GIVES_WAY_S
+from gateway.fieldbus.connection import GIVES_WAY_S
 from gateway.fieldbus.peers import Peers
+from gateway.fieldbus.socket_transport import READ_BYTES
 from gateway.modbus import Role, pdu
 from tests.fieldbus.by_hand import READ, framed
 
@@ -201,7 +202,7 @@ def test_what_waited_for_its_rate_is_not_executed_behind_the_end(stand: Any, del
 def test_lost_framing_is_told_once_also_where_it_fills_the_buffer(stand: Any, deliver: Any) -> None:
     made = stand()
     connection, far = made.connect(stuck=True)
-    deliver(connection, far, framed(READ) + b"\x00\x01\x00\x07" * (BUFFER_BYTES // 4))
+    deliver(connection, far, framed(READ) + b"\x00\x01\x00\x07" * (READ_BYTES // 4))
     made.clock.advance(1.0)
     assert [cause for cause, _ in made.log] == ["framing"]
 

@@ -5,6 +5,7 @@ import errno
 import os
 import resource
 import socket
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -130,18 +131,18 @@ def test_a_connection_that_was_lost_before_it_was_taken_is_no_defect(run: Any, s
 def test_a_connection_that_is_lost_while_it_is_taken_keeps_no_descriptor(run: Any, serve: Any) -> None:
     async def main() -> None:
         async with serve() as running:
-
-            class Losing:
-                async def connect_accepted_socket(self, _make: Any, accepted: socket.socket) -> None:
-                    raise OSError(errno.ENOTCONN, "gone")
-
-            taking = running.server._listener
-            loop, taking._loop = taking._loop, Losing()
-            accepted, far = socket.socketpair()
-            await taking._attach(accepted)
-            taking._loop = loop
-            assert accepted.fileno() < 0
-            far.close()
+            with socket.create_server(("127.0.0.1", 0)) as elsewhere:
+                far = socket.create_connection(elsewhere.getsockname())
+                far.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                accepted, _ = elsewhere.accept()
+                far.close()
+            with pytest.raises(OSError, match="not connected"):
+                accepted.getpeername()
+            running.server._listener._ready.add(accepted, running.server._listener._make())
+            async with asyncio.timeout(10):
+                while accepted.fileno() >= 0:
+                    await asyncio.sleep(0)
+            assert running.server.peers == ()
 
     run(main())
 

@@ -138,8 +138,7 @@ def test_the_short_way_answers_as_the_long_one() -> None:
     (one, _), (two, _) = bank_and_model(), bank_and_model()
     for k in range(1500):
         pdu = request(chance)[:253]
-        frame = bytearray(struct.pack(">HHHB", k, 0, len(pdu) + 1, 1) + pdu)
-        fast = whole_answer(frame, len(frame), (1,), one, PEERS[0])
+        fast = whole_answer(struct.pack(">HHHB", k, 0, len(pdu) + 1, 1) + pdu, (1,), one, PEERS[0])
         assert fast is not None and fast[7:] == server.answer(pdu, two, PEERS[0])
 
 

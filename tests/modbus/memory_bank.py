@@ -19,6 +19,7 @@ class MemoryBank:
         self.bits = [False] * bits
         self.identity: Mapping[int, bytes] = identity or {}
         self.server_id = ServerId(0, True, b"")
+        self.known_answers: dict[bytes, bytes] = {}
 
     def read_registers(self, address: int, count: int, _peer: Peer = NOBODY) -> bytes:
         self.check_registers_readable(address, count)
@@ -31,6 +32,7 @@ class MemoryBank:
     def write_registers(self, address: int, data: bytes, _peer: Peer) -> None:
         self.check_registers_readable(address, len(data) // 2)
         self.image[2 * address : 2 * address + len(data)] = data
+        self.known_answers.clear()
 
     def mask_write(self, address: int, and_mask: int, or_mask: int, peer: Peer) -> None:
         word = int.from_bytes(self.read_registers(address, 1), "big")

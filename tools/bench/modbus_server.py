@@ -48,8 +48,9 @@ def real_bank() -> object:
 
 
 async def serve_ours(bank: str) -> None:
-    """Serve the bank by the gateway's own server."""
+    """Serve the bank by the gateway's own server; the real one is published into 100 times a second, as by control."""
     from gateway.fieldbus import ModbusTcpServer, ServerSettings
+    from gateway.registers import RegisterBank, Status
     from tests.modbus.memory_bank import MemoryBank
 
     data = real_bank() if bank == "real" else MemoryBank(2000)
@@ -58,7 +59,10 @@ async def serve_ours(bank: str) -> None:
     )
     _host, port = await server.start("127.0.0.1", 0)
     print(port, flush=True)
-    await asyncio.Event().wait()
+    while True:
+        await asyncio.sleep(0.01)
+        if isinstance(data, RegisterBank):
+            data.publish(Status(force_measured_n=monotonic() % 10.0))
 
 
 async def serve_pymodbus() -> None:

@@ -178,7 +178,7 @@ class CommandBlock:
         """Accept: from now on these are the values. control_word: without its edge bits."""
         candidate[CONTROL_WORD] = control_word
         self.values = candidate
-        self._image.is_behind = True
+        self._image.fall_behind()
 
     def show(self) -> None:
         """Pack what has been accepted since the last time into all three faces."""

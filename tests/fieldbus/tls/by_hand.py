@@ -14,6 +14,7 @@ from gateway.fieldbus.connection import ServerState
 from gateway.fieldbus.peers import Peers
 from gateway.fieldbus.rate_limits import LogLimiter
 from gateway.fieldbus.settings import ServerSettings
+from gateway.fieldbus.socket_transport import READ_BYTES
 from gateway.fieldbus.tls_settings import TlsSettings, context_maker
 from gateway.fieldbus.tls_stream import Handshakes, TlsStream
 from gateway.modbus import Peer
@@ -114,10 +115,8 @@ class Line:
         while data and not self.socket.ended:
             if not self.socket.reading:
                 self.face.clock.advance(0.0)  # who gave way goes on
-            room = self.stream.get_buffer(-1)
-            part, data = data[: min(step, len(room))], data[min(step, len(room)) :]
-            room[: len(part)] = part
-            self.stream.buffer_updated(len(part))
+            part, data = data[: min(step, READ_BYTES)], data[min(step, READ_BYTES) :]
+            self.stream.data_received(part)
 
     def ask(self, data: bytes, step: int = 4096) -> bytes:
         self.tls.write(data)

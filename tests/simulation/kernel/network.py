@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from gateway.fieldbus.socket_transport import READ_BYTES
 from gateway.modbus import Peer, Role
 from tests.simulation.kernel.virtual_time import VirtualLoop
 
@@ -27,9 +28,6 @@ class MemoryListener:
 
     def close(self) -> None:
         self._loop.servers.pop(self.port, None)
-
-    async def wait_closed(self) -> None:
-        return
 
 
 @dataclass(frozen=True)
@@ -110,11 +108,9 @@ class MemoryTransport(asyncio.Transport):
 
     def _deliver(self) -> None:
         while self._waiting and not self._is_paused and not self._is_closing:
-            room = self._protocol.get_buffer(-1)
-            piece = self._waiting[: len(room)]
-            room[: len(piece)] = piece
-            del self._waiting[: len(piece)]
-            self._protocol.buffer_updated(len(piece))
+            piece = bytes(self._waiting[:READ_BYTES])
+            del self._waiting[:READ_BYTES]
+            self._protocol.data_received(piece)
 
 
 class Line:
