@@ -7,11 +7,14 @@ import asyncio
 from collections.abc import Callable
 from typing import Any, Final
 
+from gateway.extras import import_library
 from gateway.fieldbus.peers import Peers
 from gateway.fieldbus.settings import ServerSettings
 
 LONGEST_REQUEST: Final = 1 << 20
 """Bytes: a request for every variable has a hundredth of that."""
+MOST_SUBSCRIPTIONS: Final = 20
+"""Of one session; a client has one, or one for each rate that it wants."""
 
 Log = Callable[[str, str], None]
 
@@ -97,11 +100,13 @@ def bound_connections(wire: Any, log: Log, settings: ServerSettings | None = Non
 
 def bound_publishing(service: Any, least_s: float) -> None:
     """Have no client be told more often than there is something new: by an interval of a microsecond one took a whole core.
-    service: the library's, for subscriptions."""
+    Nor have one take the places of all: the library has a thousand. service: the library's, for subscriptions."""
     create = service.create_subscription
 
-    async def create_bounded(params: Any, *more: Any, **options: Any) -> Any:
+    async def create_bounded(params: Any, callback: Any, session_id: Any, **options: Any) -> Any:
+        if sum(one.session_id == session_id for one in service.subscriptions.values()) >= MOST_SUBSCRIPTIONS:
+            raise import_library("asyncua").ua.uaerrors.BadTooManySubscriptions
         params.RequestedPublishingInterval = max(1000.0 * least_s, params.RequestedPublishingInterval)
-        return await create(params, *more, **options)
+        return await create(params, callback, session_id, **options)
 
     service.create_subscription = create_bounded

@@ -10,16 +10,18 @@ Decisions
   It holds for as long as the token does: where the page's process was started anew, Esc stops, and leads to no login.
 - A failed login costs a second, one at a time: a token of 16 characters is not guessed.
 - What came while this process stood still is refused, but for what stops: an enable of then pressed seconds after its browser
-  had given it up.
+  had given it up. So is what a line has held up for as long: the page says by this machine's clock when it asks.
 """
 
 import asyncio
 import contextlib
 import hmac
 import secrets
+import time
 from dataclasses import dataclass, field
 from hashlib import sha256
 from ipaddress import ip_address
+from math import nan
 from socket import gethostname
 from typing import Final
 
@@ -31,6 +33,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from gateway.live.standstill import Standstill
 
 CSRF_HEADER: Final = "x-csrf-token"
+ASKED_HEADER: Final = "x-asked-s"
+"""Monotonic seconds of this machine, as `clock_s` of the event `state` told them."""
+GIVEN_UP_S: Final = 5.0  # COMMAND_MS in static/api.js
 LONGEST_BODY: Final = 1 << 16
 _OPEN: Final = ("/login", "/healthz", "/static/style.css", "/static/page.css", "/static/login.js")
 """Reached without a session: what the login itself needs."""
@@ -127,9 +132,15 @@ class Guard:
             await (refusal or self._app)(scope, receive, send_with_headers)
 
     def _lateness(self, request: Request) -> Response | None:
-        if request.method in _SAFE_METHODS or request.url.path in _STOPS or not self._standstill.is_aftermath():
+        if request.method in _SAFE_METHODS or request.url.path in _STOPS:
             return None
-        return refuse(503, "the page's process stood still for a while, and this may have waited: ask again", "late")
+        if self._standstill.is_aftermath():
+            return refuse(
+                503, "the page's process stood still for a while, and this may have waited: ask again", "late"
+            )
+        if not _age_s(request.headers) <= GIVEN_UP_S:
+            return refuse(503, f"this was on its way for more than {GIVEN_UP_S:g} s: ask again", "late")
+        return None
 
     def _refusal(self, request: Request) -> Response | None:
         """Return why a request is not let through, None where it is."""
@@ -198,6 +209,15 @@ def _is_small(headers: Headers) -> bool:
         return False
     length = headers.get("content-length", "0")
     return length.isdecimal() and int(length) <= LONGEST_BODY
+
+
+def _age_s(headers: Headers) -> float:
+    """How long ago it was asked, by the clock of this machine; 0 where that is not said, NaN where it is not understood."""
+    try:
+        asked_s = headers.get(ASKED_HEADER)
+        return 0.0 if asked_s is None else time.monotonic() - float(asked_s)
+    except ValueError:
+        return nan
 
 
 def _is_own_origin(headers: Headers) -> bool:

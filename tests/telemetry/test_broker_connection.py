@@ -67,7 +67,8 @@ class Library:
 
     def Will(self, *words: Any, **more: Any) -> None: ...  # noqa: N802  the library's name
 
-    def Client(self, *words: Any, **more: Any) -> "Library":  # noqa: N802
+    def Client(self, *words: Any, queue_type: Any, **more: Any) -> "Library":  # noqa: N802
+        self._queue = queue_type()
         return self
 
     async def __aenter__(self) -> "Library":
@@ -88,7 +89,7 @@ class Library:
     @property
     async def messages(self) -> AsyncIterator[Any]:
         while True:
-            yield await self.heard.get()
+            yield self._queue.put_nowait(await self.heard.get())
 
     def bring(self, payload: bytes, *, retain: bool) -> None:
         self.heard.put_nowait(SimpleNamespace(topic="cell/command", payload=payload, retain=retain))

@@ -6,7 +6,8 @@ import pytest
 
 from gateway.live.standstill import Standstill
 from gateway.telemetry.mqtt import broker_connection
-from gateway.telemetry.mqtt.command_queue import CommandQueue
+from gateway.telemetry.mqtt.broker_session import BrokerMessage
+from gateway.telemetry.mqtt.command_queue import ROOM, CommandQueue
 from gateway.telemetry.mqtt.round_trips import SLOW_S, RoundTrips
 from tests.telemetry.test_broker_connection import Library, Session, play, turns
 
@@ -91,3 +92,25 @@ def test_an_enable_that_the_broker_has_held_up_is_told_and_not_carried_out(
         assert session.answered[1:] == [b"now"]
 
     play(monkeypatch, scene)
+
+
+def test_nothing_waits_in_the_library_where_nobody_sees_how_old_it_is() -> None:
+    """Its own queue has no bound: 60 000 heartbeats of a publisher that was gone waited there for five minutes."""
+    aiomqtt = pytest.importorskip("aiomqtt")
+    paho = pytest.importorskip("paho.mqtt.client")
+    clock = Clock()
+
+    async def scene() -> None:
+        queue = CommandQueue(lambda payload: payload == b"stop", Standstill(clock), RoundTrips(clock))
+        will, kind = BrokerMessage("cell/online", b"false"), broker_connection._queue_type(queue)
+        client = broker_connection._client(aiomqtt, broker_connection.Broker("b", 1883), "cell", will, kind)
+        for payload, retain in ((b"yesterday", True), *((b"%d" % number, False) for number in range(5000))):
+            message = paho.MQTTMessage(topic=b"cell/command")
+            message.payload, message.retain = payload, retain
+            client._on_message(None, None, message)
+        assert len(client.messages) == 0
+        heard = [(await queue.get())[0] for _ in range(ROOM)]
+        assert [one.payload for one in heard] == [b"%d" % number for number in range(5000 - ROOM, 5000)]
+        assert heard[0].topic == "cell/command" and queue.take_dropped() == 5000 - ROOM
+
+    asyncio.run(scene())

@@ -130,7 +130,7 @@ def test_nobody_is_told_more_often_than_there_is_something_new(wanted_ms: float,
         bound_publishing(service, opcua_process.LOOK_S)
         wanted = ua.CreateSubscriptionParameters()
         wanted.RequestedPublishingInterval = wanted_ms
-        made = await service.create_subscription(wanted, None, session_id=ua.NodeId())
+        made = await service.create_subscription(wanted, None, ua.NodeId())
         await service.delete_subscriptions([made.SubscriptionId])
         return float(made.RevisedPublishingInterval)
 

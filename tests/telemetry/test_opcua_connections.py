@@ -5,11 +5,12 @@ from collections.abc import Callable
 from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import AsyncMock
 
 import pytest
 
 from gateway.fieldbus.settings import ServerSettings
-from gateway.telemetry.opcua_connections import SilenceTimer, bound_connections
+from gateway.telemetry.opcua_connections import MOST_SUBSCRIPTIONS, SilenceTimer, bound_connections, bound_publishing
 
 
 class Wire(asyncio.Transport):
@@ -119,6 +120,30 @@ def test_whose_connection_is_lost_leaves_no_subscription_behind(connect: Callabl
         left = [one.session_id for one in server.subscription_service.subscriptions.values()]
         assert left == [stays.processor.session.session_id]
         await leave(stays)
+
+    asyncio.run(scene())
+
+
+def test_no_session_takes_the_subscriptions_of_all(connect: Callable[..., Any]) -> None:
+    """By a thousand of them one client shut all others out, and each was published to five times a second."""
+    asyncua = pytest.importorskip("asyncua")
+
+    async def scene() -> None:
+        greedy, other = connect(Wire("10.0.0.1")), connect(Wire("10.0.0.2"))
+        server = greedy.processor.iserver
+        bound_publishing(server.subscription_service, 0.2)
+        for one in (greedy, other):
+            one.processor.session = server.create_session("far", external=True)
+            one.processor.session.state = type(one.processor.session.state).Activated
+        published, wanted = AsyncMock(), asyncua.ua.CreateSubscriptionParameters()
+        for _ in range(MOST_SUBSCRIPTIONS):
+            await greedy.processor.session.create_subscription(wanted, published)
+        with pytest.raises(asyncua.ua.uaerrors.BadTooManySubscriptions):
+            await greedy.processor.session.create_subscription(wanted, published)
+        await other.processor.session.create_subscription(wanted, published)
+        assert len(server.subscription_service.subscriptions) == MOST_SUBSCRIPTIONS + 1
+        await leave(greedy, other)
+        await asyncio.gather(greedy._ending, other._ending)
 
     asyncio.run(scene())
 

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import threading
+import time
 import weakref
 from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
@@ -24,7 +25,7 @@ from gateway.web.security import PageAccess
 from gateway.web.server import make_app
 from tests.service.requests.test_hostile_requests import Stage
 from tests.web import test_events
-from tests.web.asgi import call
+from tests.web.asgi import call, page
 from tests.web.commanded_gateway import Link, play
 from tests.web.test_events import Context, put, read, ring
 
@@ -216,3 +217,27 @@ def test_a_stop_waits_neither_for_a_recording_whose_disk_hangs_nor_for_what_othe
         return is_first
 
     assert asyncio.run(asyncio.wait_for(scene(), 10.0))
+
+
+@pytest.mark.parametrize(
+    ("path", "asked_before_s", "reason"),
+    [
+        ("/api/v1/command/enable", "5.5", "late"),
+        ("/api/v1/calibrate/start", "60", "late"),
+        ("/api/v1/command/enable", "nan", "late"),
+        ("/api/v1/command/enable", "1", "gone"),  # nobody is behind this page
+        ("/api/v1/command/enable", "-1", "gone"),
+        ("/api/v1/command/stop", "60", "gone"),
+    ],
+)
+def test_what_a_line_has_held_up_presses_nothing_and_a_stop_stops(
+    tmp_path: Path, path: str, asked_before_s: str, reason: str
+) -> None:
+    """A browser gave its enable up after five seconds without a network; three later it came, and the tool pressed."""
+    app, asked_s = page(tmp_path, TOKEN), time.monotonic() - float(asked_before_s)
+    headers = {"authorization": f"Bearer {TOKEN}", "x-asked-s": str(asked_s)}
+    told = asyncio.run(call(app, "POST", path, headers, b'{"force_n": 12}'))
+    assert (told.status, told.json["reason"]) == (503, reason)
+    headers["x-asked-s"] = "yesterday"
+    told = asyncio.run(call(app, "POST", "/api/v1/command/enable", headers, b'{"force_n": 12}'))
+    assert told.json["reason"] == "late"

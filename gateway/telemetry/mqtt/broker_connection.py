@@ -44,12 +44,12 @@ async def keep_connected(
     _tell_no_loss_twice(loop, aiomqtt.MqttError)
     news = BrokerNews(f"the MQTT broker {broker.host}:{broker.port}", _name_at_broker(session.name), say, loop.time)
     while True:
-        will = session.begin()
+        will, queue = session.begin(), CommandQueue(session.is_stop, Standstill(), RoundTrips(loop.time))
         try:
-            async with _client(aiomqtt, broker, session.name, will) as client:
+            async with _client(aiomqtt, broker, session.name, will, _queue_type(queue)) as client:
                 news.note_connected()
                 news.note_unheard(await _subscribe(client, session))
-                await _carry(client, session)
+                await _carry(client, session, queue)
         except* (aiomqtt.MqttError, OSError, UnicodeError) as lost:
             news.note_lost(_reason(lost))
         finally:
@@ -117,7 +117,19 @@ def _name_at_broker(name: str) -> str:
     return f"force-gateway {name}"
 
 
-def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage) -> Any:
+def _queue_type(queue: CommandQueue) -> type[asyncio.Queue[Any]]:
+    """Return the kind of queue that the library is to have for what it hears: one that hands all on at once. In its own, which
+    has no bound, the heartbeats of a publisher that had hung waited for minutes, and none of them was late."""
+
+    class Handed(asyncio.Queue[Any]):
+        def put_nowait(self, message: Any) -> None:
+            if not message.retain:  # of yesterday: a command that waits in the broker must never be carried out
+                queue.put(str(message.topic), bytes(message.payload or b""))
+
+    return Handed
+
+
+def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage, queue_type: type[asyncio.Queue[Any]]) -> Any:
     for file in filter(None, (broker.ca, broker.certificate, broker.key)):
         _check_readable(file)
     return aiomqtt.Client(
@@ -129,6 +141,7 @@ def _client(aiomqtt: Any, broker: Broker, name: str, will: BrokerMessage) -> Any
         password=broker.password,
         keepalive=_KEEPALIVE_S,
         clean_session=True,
+        queue_type=queue_type,
         will=aiomqtt.Will(will.topic, will.payload, qos=will.qos, retain=will.retain),
     )
 
@@ -149,20 +162,18 @@ async def _subscribe(client: Any, session: BrokerSession) -> list[str]:
     return [topic for topic, codes in answers if any(code.is_failure for code in codes)]
 
 
-async def _carry(client: Any, session: BrokerSession) -> None:
+async def _carry(client: Any, session: BrokerSession, queue: CommandQueue) -> None:
     """Say what the session has, and have it answer, until the connection is lost."""
     turn = asyncio.Lock()  # messages carry numbers in order: nobody speaks between the making of one and its sending
     for message in session.greet():
         await _publish(client, message)
-    standstill, trips = Standstill(), RoundTrips(asyncio.get_running_loop().time)
-    queue = CommandQueue(session.is_stop, standstill, trips)
     async with asyncio.TaskGroup() as group:
         group.create_task(_speak(client, session, turn))
-        group.create_task(_listen(client, queue))
+        group.create_task(_listen(client))
         group.create_task(_answer(client, session, queue, turn))
-        group.create_task(standstill.keep_time())
+        group.create_task(queue.standstill.keep_time())
         if session.may_press:
-            group.create_task(_keep_asking(client, session, trips, queue, turn))
+            group.create_task(_keep_asking(client, session, queue, turn))
 
 
 async def _speak(client: Any, session: BrokerSession, turn: asyncio.Lock) -> None:
@@ -178,21 +189,19 @@ async def _speak(client: Any, session: BrokerSession, turn: asyncio.Lock) -> Non
         await session.ready.wait()
 
 
-async def _listen(client: Any, queue: CommandQueue) -> None:
-    async for message in client.messages:
-        if not message.retain:  # of yesterday: a command that waits in the broker must never be carried out
-            queue.put(str(message.topic), bytes(message.payload or b""))
+async def _listen(client: Any) -> None:
+    """Wait for the end of the connection, which is told here; the messages have gone another way."""
+    async for _ in client.messages:
+        pass
 
 
-async def _keep_asking(
-    client: Any, session: BrokerSession, trips: RoundTrips, queue: CommandQueue, turn: asyncio.Lock
-) -> None:
+async def _keep_asking(client: Any, session: BrokerSession, queue: CommandQueue, turn: asyncio.Lock) -> None:
     """Ask the broker for what it answers without effect (MQTT 3.1.1, 3.10.4): the end of a subscription that never was. That
     no answer comes at all is the keepalive's to find."""
     while True:
-        trips.note_asked()
+        queue.trips.note_asked()
         await client.unsubscribe("force-gateway/round-trip", timeout=inf)
-        trips.note_answered()
+        queue.trips.note_answered()
         if late := queue.take_late():
             why = (
                 f"{late} commands were not carried out: the broker took over {SLOW_S:g} s to answer, as old they may be"

@@ -31,7 +31,7 @@ class CommandQueue:
     """is_stop: of a payload; standstill: of this process; trips: to the broker and back."""
 
     def __init__(self, is_stop: Callable[[bytes], bool], standstill: Standstill, trips: RoundTrips) -> None:
-        self._is_stop, self._standstill, self._trips = is_stop, standstill, trips
+        self._is_stop, self.standstill, self.trips = is_stop, standstill, trips
         self._waiting: deque[HeardMessage] = deque()
         self._ready = asyncio.Event()
         self._dropped = self._late = 0
@@ -42,7 +42,7 @@ class CommandQueue:
         if message.is_stop:
             self._dropped += len(self._waiting)
             self._waiting.clear()
-        elif self._trips.is_slow:
+        elif self.trips.is_slow:
             self._late += 1
             return
         elif len(self._waiting) >= ROOM:
@@ -57,7 +57,7 @@ class CommandQueue:
             self._ready.clear()
             await self._ready.wait()
         message = self._waiting.popleft()
-        if message.is_stop or not self._standstill.is_aftermath():
+        if message.is_stop or not self.standstill.is_aftermath():
             return message, ""
         return message, "the gateway's MQTT process stood still: what came meanwhile is not carried out"
 

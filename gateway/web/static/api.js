@@ -17,6 +17,7 @@ const PRESSES = /^\/api\/v1\/(command\/(?!stop)|calibrate\/start)/;
 let csrf = "";
 let source = null;
 let heardAt = 0; // of the page's own start
+let clock = null; // the gateway's, as the last state told it, and when that came
 let openedAt = 0;
 let isGone = false;
 let comeBack = 0;
@@ -57,12 +58,18 @@ function givenUp(path) {
   return { signal: giving.signal };
 }
 
+/** When this is asked, by the gateway's clock: a line may hold a command up, and bring it when it was given up long ago. */
+function askedNow() {
+  return clock ? { "x-asked-s": String(clock.told_s + (performance.now() - clock.at) / 1000) } : {};
+}
+
 async function post(path, body) {
   const giving = givenUp(path);
+  const asked = askedNow();
   const send = () =>
     request(path, {
       method: "POST",
-      headers: { "content-type": "application/json", "x-csrf-token": csrf, "x-viewer": viewer },
+      headers: { "content-type": "application/json", "x-csrf-token": csrf, "x-viewer": viewer, ...asked },
       body: JSON.stringify(body ?? {}),
       ...giving,
     });
@@ -89,7 +96,9 @@ export function listen() {
   for (const name of ["history", "samples", "state", "note", "gone"]) {
     stream.addEventListener(name, (event) => {
       heardAt = performance.now();
-      tell(name, JSON.parse(event.data));
+      const data = JSON.parse(event.data);
+      if (name === "state") clock = { told_s: data.clock_s, at: heardAt };
+      tell(name, data);
     });
   }
   stream.onopen = () => tell("open", true);

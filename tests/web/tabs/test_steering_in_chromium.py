@@ -1,11 +1,13 @@
 """The big figures of the page and its trend: they say what is measured now, also where no sample of the ring comes."""
 
+import time
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from gateway.live.live_state import LiveForce, LiveState
+from tests.web.tabs.scripted_control import ScriptedControl
 from tests.web.tabs.test_tabs_in_chromium import open_tab
 
 FIGURES = """async (state) => {
@@ -121,3 +123,20 @@ def test_a_plan_of_ones_own_takes_numbers_as_they_are_typed_and_no_others(page, 
     window.locator("#tab-calibrate .told.bad").get_by_text("Stair (V): a number, such as 0.2.").wait_for()
     assert [plan["step_v"] for plan in asked] == [0.05]
     window.close()
+
+
+def test_a_command_says_by_the_gateways_clock_when_it_is_asked(page, served: ScriptedControl, chromium) -> None:
+    """A line that had held an enable up brought it when the page had given it up, and the tool pressed."""
+    window = open_tab(chromium.new_context(), page.address, "live")
+    enable = """async () => {
+      const { api } = await import("/static/api.js");
+      await new Promise((told) => api.on("state", told));
+      await api.post("/api/v1/command/enable", { force_n: 12 }).catch(() => {});
+    }"""
+    began_s = time.monotonic()
+    with window.expect_request("**/api/v1/command/enable") as request:
+        window.evaluate(enable)
+    asked_s = float(request.value.headers["x-asked-s"])
+    assert began_s - 5.0 < asked_s <= time.monotonic() + 0.1
+    asked = [one["pdu"] for one in served.asked if one["do"] == "modbus" and one["pdu"].startswith("10")]
+    assert len(asked) == 1, "in time it is carried out"
