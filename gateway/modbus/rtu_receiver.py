@@ -225,10 +225,8 @@ class RtuReceiver:
     def _resume(self, noise_at: int, *, is_final: bool) -> tuple[int | None, bool]:
         """Return where the first frame behind noise begins, None for none, and whether the noise may yet become one."""
         end, at, start = len(self._burst), noise_at, noise_at
-        claimer = at
-        claimed = longest = self._claimed_end(at)  # what the noise may be a frame of, and up to where
-        if self._burst[at] not in self._units:
-            claimed = at
+        longest = self._claimed_end(at)
+        claimer, claimed = at, longest if self._burst[at] in self._units else at  # a frame that the noise may be of
         dead = set[int]()
         while (at := self._next_beginning(at + 1)) < end:
             is_marked = at in self._marks
@@ -246,7 +244,8 @@ class RtuReceiver:
             longest = max(longest, end_here)
             start = at if is_marked else start
             is_known = self._burst[at] in self._units
-            if is_marked or (is_known and at <= start + _STRAY_BYTES and end_here > claimed):
+            is_anew = is_marked and (is_final or claimed <= end)
+            if is_anew or (is_known and at <= start + _STRAY_BYTES and end_here > claimed):
                 claimer, claimed = at, end_here if is_known else at
         return None, longest > end
 
