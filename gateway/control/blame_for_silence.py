@@ -50,13 +50,13 @@ def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: st
         )
     if is_cause(held.rig_waited_s, silent_s):
         evidence = f"the simulated rig's process waited {format_ms(held.rig_waited_s)} of them for a processor"
-        return FaultCode.MACHINE_BUSY, f"{evidence}: {_cure(held, held.rig_waited_s)}"
+        return FaultCode.MACHINE_BUSY, f"{evidence}: {cure_for_waiting(held, held.rig_waited_s)}"
     if not is_cause(held.loop_late_s, silent_s):
         return fault, f"{ours}: {suspects}" if held.loop_late_s >= _WORTH_TELLING_S and suspects else suspects
     if waited_s is not None and is_cause(waited_s, held.loop_late_s):
         return (
             FaultCode.MACHINE_BUSY,
-            f"{ours}, {format_ms(waited_s)} of them waiting for a processor: {_cure(held, waited_s)}",
+            f"{ours}, {format_ms(waited_s)} of them waiting for a processor: {cure_for_waiting(held, waited_s)}",
         )
     if is_cause(held.withheld[0], held.loop_late_s):
         return FaultCode.MACHINE_BUSY, f"{ours}: {held.withheld[1]}"
@@ -69,7 +69,7 @@ def cause_of_silence(fault: FaultCode, silent_s: float, held: Held, suspects: st
     )
 
 
-def _cure(held: Held, part_s: float) -> str:
+def cure_for_waiting(held: Held, part_s: float) -> str:
     """Return what to do against that part of a silence, s: where time was withheld from outside no program here is to blame."""
     withheld_s, by_whom = held.withheld
     return by_whom if is_cause(withheld_s, part_s) else BUSY_CURE

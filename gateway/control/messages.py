@@ -1,11 +1,13 @@
 """The sentences of control: a code, what was seen in numbers, what it probably is, one thing to do."""
 
+from math import inf
 from typing import Final
 
 from gateway.codes.faults import FaultCode
 from gateway.control.inputs import LineStatus
 from gateway.control.supervision.unreachable_force import Evidence, defective_words, unreachable_words
 
+_UNLOADED_SHARE: Final = 0.25  # of a force that is gone, up to which a cell that carries nothing reads beside 0
 _PRESSES_N: Final = 2.0  # less is what friction keeps of a vented tool
 
 
@@ -66,11 +68,17 @@ def noisy_sentence(force_n: float, two_values: str) -> str:
     )
 
 
-def sign_sentence(rise_n: float, expected_n: float, *, was_right: bool = False) -> str:
-    """Return A302 in numbers, and what to do. was_right: the force has risen as it should since the enable."""
+def sign_sentence(rise_n: float, expected_n: float, *, was_right: bool = False, untared_n: float = inf) -> str:
+    """Return A302 in numbers, and what to do. was_right: the force has risen as it should since the enable; untared_n: what the
+    cell reads now without its tare, inf where that is not known: near 0, the tare was of a force."""
     cure = "swap the cell's signal wires or set sign: -1"
     if was_right:
         cure = "it was right before in this enable: a tilt that tilt_angle does not tell, or something that pulls on the tool"
+    if abs(untared_n) < _UNLOADED_SHARE * abs(rise_n):
+        cure = (
+            f"without its tare the cell reads {untared_n:.1f} N, so a force was taken for its zero, and has left: "
+            "free the tool and tare again"
+        )
     return fault_sentence(
         FaultCode.SIGN_INVERTED, f"force went {rise_n:+.1f} N where {expected_n:+.1f} N were expected: {cure}"
     )

@@ -234,6 +234,22 @@ def test_a_rig_whose_regulator_rests_above_0_v_is_tared_at_force_0_and_nothing_l
     assert bench.refused and "disable the output or set the force to 0 first" in bench.refused.text
 
 
+def test_what_a_tare_under_force_makes_of_a_force_that_leaves_is_no_wrong_sign():
+    """The wires, a tilt or something that pulls were blamed: what pressed at the safe voltage was taken for the zero."""
+    rig = settings()
+    bench = Bench(replace(rig, limits=replace(rig.limits, voltage_min_v=2.0, safe_voltage_v=2.0)))
+    bench.run(3.0)
+    bench.write(control_word=ControlBit.TARE)
+    bench.run(0.5)
+    bench.enable(20.0, precontact_force_n=18.0)
+    bench.run(2.0)
+    bench.plant.contact = False
+    bench.run(2.0)
+    (told,) = (event for event in bench.events if event.startswith("A302"))
+    assert "without its tare the cell reads" in told and "free the tool and tare again" in told
+    assert "tilt" not in told
+
+
 NOISE_N = 0.2
 
 

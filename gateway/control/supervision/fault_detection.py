@@ -276,7 +276,7 @@ class FaultDetector:
             return stop_cause(FaultCode.SAMPLE_FROZEN, observation)
         if self._response_fault is _WRONG_SIGN:
             rise_n, model_n = self.direction * self._rise.measured_rise_n, self.direction * expected_n()
-            sentence = sign_sentence(rise_n, model_n, was_right=self._rise.is_proven)
+            sentence = sign_sentence(rise_n, model_n, was_right=self._rise.is_proven, untared_n=reading.raw_n)
             return StopCause(FaultCode.SIGN_INVERTED, sentence)
         if self._response_fault is _WRONG_GAIN:
             return StopCause(

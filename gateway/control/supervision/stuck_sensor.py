@@ -34,6 +34,7 @@ class StuckSensorCheck:
         self._noise = RepeatedReadings()
         self._value_n = inf
         self._slack_n = self._answer_s = self._airless_s = 0.0
+        self._equal, self._equal_s, self._earlier, self._earlier_s = 1, 0.0, 0, 0.0
         self.start()
 
     def expect_noise(self, noise_n: float) -> None:
@@ -41,9 +42,11 @@ class StuckSensorCheck:
         self._noise.expect(noise_n)
 
     def start(self) -> None:
-        """Begin anew at an enable: what happened before does not count."""
-        self._equal = 1
-        self._equal_s = 0.0
+        """Begin a new enable: the model's moves before do not count, and equal samples only where the cell stays dead for
+        SLOW_S more. One that is quiet in free air has moved until then."""
+        self._earlier += self._equal
+        self._earlier_s += self._equal_s
+        self._equal, self._equal_s = 1, 0.0
         self._watch_model()
 
     def _watch_model(self) -> None:
@@ -57,6 +60,7 @@ class StuckSensorCheck:
         if reading.raw_n != self._value_n:
             self._value_n = reading.raw_n
             self.start()
+            self._earlier, self._earlier_s = 0, 0.0
         else:
             self._equal += 1
             self._equal_s += reading.interval_s
@@ -79,8 +83,15 @@ class StuckSensorCheck:
         if self._same_s >= self._frozen_s and self._moved_s >= max(_DEAD_SHARE * self._frozen_s, self._answer_s):
             return f"repeated for {self._same_s:.2f} s while the force must have changed"
         if self._reported_limit is not None or self._equal_s >= self._frozen_s:
-            return self.repeats
+            return self.repeats or self._repeats_since_earlier
         return ""
+
+    @property
+    def _repeats_since_earlier(self) -> str:
+        is_dead = self._equal_s >= SLOW_S and self._earlier + self._equal >= self._noise.limit
+        if self._reported_limit is not None or not is_dead:
+            return ""
+        return f"repeated for {self._earlier_s + self._equal_s:.0f} s, since before the enable"
 
     @property
     def repeats(self) -> str:

@@ -89,9 +89,7 @@ class ControlLoop:
         self.valve: ValveExchange | None = None
         self.cell_lost = False
         self.owner_connected = self.is_watched = True  # is_watched: a loop that stands still is noticed
-        self.restart_cause = FaultCode.NONE
-        self.residual_cause = ResidualCause.NONE
-        self.plant_id = 0
+        self.restart_cause, self.residual_cause, self.plant_id = FaultCode.NONE, ResidualCause.NONE, 0
         self._shown_self_test = controller.active_run.self_test
         self.clock, self._log = process.clock, process.log
         self.processor_time, self._lateness = process.processor_time, process.lateness
@@ -104,6 +102,8 @@ class ControlLoop:
             LineNoise("output's"),
             lambda sentence: process.log("rate", sentence),
         )
+        if lateness := process.lateness:
+            self.warnings.held = lambda then_s, now_s: lateness.since(then_s, now_s, waited_s_of(self.processor_time()))
         bank.on_command = self._on_command
         bank.on_asked = self._on_asked
 

@@ -2,6 +2,7 @@
 
 The loop notes each tick; of a simulated rig the kernel's counters are read with it (1.5 us). The wait that still lasts is in
 no counter: a process whose counters stand still is runnable or stopped by its state, which is asked only when it matters.
+A stop is in none of them, either: it is remembered from having been seen.
 """
 
 from collections import deque
@@ -12,6 +13,7 @@ from gateway.processes.scheduling.scheduler_counters import STOPPED_STATES, Proc
 from gateway.processes.scheduling.withheld_time import WithheldTime
 
 _WORTH_S: Final = 0.005  # shorter pauses explain nothing
+_STILL_S: Final = 0.05  # longer than a simulated rig ever sleeps
 _KEPT: Final = 256
 
 
@@ -41,18 +43,18 @@ class Lateness:
 
     def __init__(self, period_s: float, withheld: WithheldTime) -> None:
         self._period_s, self._withheld = period_s, withheld
-        self._ours, self._of_rig = _Pauses(), _Pauses()
+        self._ours, self._of_rig, self._stops = _Pauses(), _Pauses(), _Pauses()
         self._tick_s: float | None = None
         self._waited_s: float | None = None
         self._rig: SchedulerCounters | None = None
         self._rig_turns: ProcessorTime | None = None
-        self._rig_ran_s = 0.0
+        self._rig_ran_s, self._is_rig_stopped = 0.0, False
 
     def follow_rig(self, rig: SchedulerCounters | None) -> None:
         """Count the turns of the process behind a simulated rig, or the one that took its place."""
         if self._rig:
             self._rig.close()
-        self._rig, self._rig_turns = rig, None
+        self._rig, self._rig_turns, self._is_rig_stopped = rig, None, False
 
     def tick(self, now_s: float, waited_s: float | None) -> None:
         """Count the lateness of one tick.
@@ -68,7 +70,12 @@ class Lateness:
         turns = self._rig.read() if self._rig else None
         known, self._rig_turns = self._rig_turns, turns
         if turns is None or turns == known:
+            if self._rig and turns and now_s - self._rig_ran_s >= _STILL_S:
+                self._is_rig_stopped = self._rig.state() in STOPPED_STATES
             return
+        if self._is_rig_stopped:
+            self._is_rig_stopped = False
+            self._stops.add(now_s, now_s - self._rig_ran_s, 0.0)
         if known is not None:
             waited_s = min(turns.waited_s - known.waited_s, now_s - self._rig_ran_s)
             self._of_rig.add(now_s, waited_s, waited_s)
@@ -84,6 +91,7 @@ class Lateness:
         self._look_at_rig(now_s)
         rig_waited_s, _ = self._of_rig.since(then_s)
         still_s = now_s - max(self._rig_ran_s, then_s) if self._rig_turns else 0.0
+        stopped_s, _ = self._stops.since(then_s)
         state = self._rig.state() if self._rig and still_s >= _WORTH_S else ""
         rig_waited_s += still_s if state == "R" else 0.0
         return Held(
@@ -91,7 +99,7 @@ class Lateness:
             loop_waited_s=late_waited_s if waited_s is not None else None,
             withheld=self.withheld() if max(late_s, rig_waited_s) >= _WORTH_S else (0.0, ""),
             rig_waited_s=rig_waited_s,
-            rig_stopped_s=still_s if state and state in STOPPED_STATES else 0.0,
+            rig_stopped_s=stopped_s + (still_s if state and state in STOPPED_STATES else 0.0),
         )
 
     def withheld(self) -> tuple[float, str]:

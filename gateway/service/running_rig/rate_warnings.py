@@ -14,6 +14,7 @@ from typing import Final
 
 from gateway.codes.explanation import BUSY_CURE, is_cause
 from gateway.codes.warning_bits import WarningBit
+from gateway.control.blame_for_silence import NOT_HELD, Held, cure_for_waiting
 from gateway.devices.messages import Garbage
 from gateway.processes.scheduling.scheduler_counters import ProcessorTime
 
@@ -22,6 +23,7 @@ LEAST: Final = 3
 SHARE: Final = 0.01
 LATE_PERIODS: Final = 0.5  # a tick this late is nearer to the next one's time than to its own
 _BIN_S: Final = 1.0
+_TORN_S: Final = 0.1  # that a simulated rig was late in sum: from there on answers are overdue again and again
 _NOISE: Final = (
     "a motor cable beside it, no ground, a marginal baud rate? separate the cables, ground the shield at one end"
 )
@@ -79,9 +81,9 @@ class LineNoise(_RateWarning):
         """Begin anew: another device may be behind the port, and what the one before said well says nothing of this one."""
         self.is_on, self._recent = False, _RecentSums(3)
 
-    def hear(self, messages: Sequence[object], now_s: float, is_late: bool = False) -> str:
-        """Return a sentence where noise begins with these messages, else an empty one. is_late: they are answers, and our loop
-        is slow: what it gave up as overdue, and comes then, is read from its middle on.
+    def hear(self, messages: Sequence[object], now_s: float, late_words: Callable[[], str] = lambda: "") -> str:
+        """Return a sentence where noise begins with these messages, else an empty one. late_words: of answers, who was late:
+        what our loop gave up as overdue, and comes then, is read from its middle on; empty where nobody was.
         """
         dropped = [one.data for one in messages if isinstance(one, Garbage)]
         if messages:
@@ -94,7 +96,7 @@ class LineNoise(_RateWarning):
             return ""
         self.is_on = True
         observation = f"{count:.0f} of {total:.0f} messages ({size:.0f} bytes) within {WINDOW_S:g} s could not be read"
-        cause = _BUSY if is_late else self._cause(total - count, dropped[-1])
+        cause = late_words() or self._cause(total - count, dropped[-1])
         return f"A341 {self._line} line: {observation} and were dropped; {cause}"
 
     def _cause(self, whole: float, line: bytes) -> str:
@@ -150,28 +152,45 @@ def _cause_of_lateness(late_s: float, waited_s: float, ran_s: float, *, is_count
     return f"{times_text}: this machine stood still or slept (a virtual one on a busy host, a CPU in deep sleep)"
 
 
+def _late_rig_words(held: Held) -> str:
+    """Why the process behind a simulated rig has answered late, empty where it has not, or where the rig is a real one."""
+    rig = "the simulated rig's process"
+    if held.rig_stopped_s >= _TORN_S:
+        return (
+            f"{rig} was stopped for {_ms(held.rig_stopped_s)} in that time (a signal, a debugger), which tears answers"
+        )
+    if held.rig_waited_s >= _TORN_S:
+        waited = f"{rig} waited {_ms(held.rig_waited_s)} for a processor in that time, which tears answers"
+        return f"{waited}: {cure_for_waiting(held, held.rig_waited_s)}"
+    return ""
+
+
 def _ms(seconds: float) -> str:
     return f"{seconds * 1e3:.0f} ms"
 
 
 class RateWarnings:
     """Those of one rig. bits: the warnings that are on, those among them that others have set and that stay; tell: a sentence
-    when one begins; slow_loop, cell, output: where their ticks and messages are counted."""
+    when one begins; slow_loop, cell, output: where their ticks and messages are counted; held: what kept processes from
+    running between two times, as of `Lateness`."""
 
     def __init__(self, slow_loop: SlowLoop, cell: LineNoise, output: LineNoise, tell: Callable[[str], None]) -> None:
         self.bits = WarningBit(0)
+        self.held: Callable[[float, float], Held] = lambda then_s, now_s: NOT_HELD
         self._slow_loop, self._cell, self._output, self._tell = slow_loop, cell, output, tell
 
     def hear_cell(self, messages: Sequence[object], now_s: float, *, is_stream: bool) -> None:
         """Count messages of the load cell. is_stream: they come of their own accord, and a slow loop tears none."""
-        is_late = self._slow_loop.is_on and not is_stream
-        if sentence := self._cell.hear(messages, now_s, is_late):
+        if sentence := self._cell.hear(messages, now_s, lambda: "" if is_stream else self._late_words(now_s)):
             self._begin(WarningBit.SERIAL_NOISE, sentence)
 
     def hear_output(self, messages: Sequence[object], now_s: float) -> None:
         """Count answers of the output device."""
-        if sentence := self._output.hear(messages, now_s, self._slow_loop.is_on):
+        if sentence := self._output.hear(messages, now_s, lambda: self._late_words(now_s)):
             self._begin(WarningBit.SERIAL_NOISE, sentence)
+
+    def _late_words(self, now_s: float) -> str:
+        return _BUSY if self._slow_loop.is_on else _late_rig_words(self.held(now_s - WINDOW_S, now_s))
 
     def tick(
         self, now_s: float, expirations: int, late_s: float, processor_time: Callable[[], ProcessorTime | None]

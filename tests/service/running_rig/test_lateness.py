@@ -111,6 +111,18 @@ def test_a_rig_that_sleeps_is_silent_of_its_own(kernel: Kernel, state: str, stop
     assert held.rig_waited_s == 0.0
 
 
+@pytest.mark.parametrize(("state", "stopped_s"), [("T", 0.2), ("S", 0.0)])
+def test_a_stop_of_the_rig_is_remembered_when_it_has_ended(kernel: Kernel, state: str, stopped_s: float) -> None:
+    """What it answers then is torn, and a motor's cable was blamed."""
+    for _ in range(20):
+        kernel.now_s += TICK_S
+        kernel.write(state)
+        kernel.lateness.tick(kernel.now_s, kernel.waited_s)
+    kernel.ticks(30)
+    assert kernel.held(1.0).rig_stopped_s == pytest.approx(stopped_s, abs=0.015)
+    assert kernel.held(0.25).rig_stopped_s == 0.0
+
+
 def test_a_stopped_process_is_told_from_a_silent_one() -> None:
     process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
     lateness = Lateness(TICK_S, WithheldTime())

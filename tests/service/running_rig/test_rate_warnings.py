@@ -6,6 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from gateway.codes.warning_bits import WarningBit
+from gateway.control.blame_for_silence import Held
 from gateway.devices.messages import Garbage
 from gateway.processes.scheduling.scheduler_counters import ProcessorTime
 from gateway.profiles import load_device, load_rig
@@ -224,6 +225,24 @@ def test_answers_that_a_slow_loop_has_torn_are_not_blamed_on_cables(cell: str, h
     (sentence,) = wired.said("A341")
     assert ("our own loop is late (A342)" in sentence) is is_answer
     assert ("cable" not in sentence) is is_answer
+
+
+@pytest.mark.parametrize(
+    ("held", "said"),
+    [
+        (Held(rig_waited_s=0.4), "the simulated rig's process waited 400 ms for a processor in that time"),
+        (Held(rig_waited_s=0.4, withheld=(0.3, "a quota did it")), "a quota did it"),
+        (Held(rig_stopped_s=0.4), "the simulated rig's process was stopped for 400 ms in that time"),
+        (Held(rig_waited_s=0.05), "a motor cable"),
+    ],
+)
+def test_answers_that_a_late_simulated_rig_has_torn_are_not_blamed_on_cables(held: Held, said: str) -> None:
+    """On a busy machine, or behind a debugger: there is no cable at all."""
+    wired = Wired().pressing(20.0)
+    wired.loop.warnings.held = lambda then_s, now_s: held
+    broken(wired, on_output, 8, 0.1)
+    (sentence,) = wired.said("A341")
+    assert said in sentence and ("cable" in sentence) is ("cable" in said)
 
 
 # -- A343
