@@ -102,11 +102,14 @@ def nobody_changes_what_all_share() -> Iterator[None]:
     assert not changed, f"somebody has changed what was read of {changed}"
 
 
-def pytest_collection_finish(session: pytest.Session) -> None:
+def pytest_collection() -> None:
+    """Before test files are read, of which many ask for profiles at their import. xdist's master collects none."""
+    keep_parsed_profiles()
+
+
+def pytest_collection_finish() -> None:
     """The thousands of tests stay until the end: they are not walked through at each collection of garbage, of which there is
     one for every so many new things. At Python's own 700 it takes a thirtieth of a simulated schedule."""
-    if session.items:
-        keep_parsed_profiles()
     gc.freeze()
     gc.set_threshold(*COLLECT_AT)
     gc.enable()
