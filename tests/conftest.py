@@ -15,7 +15,7 @@ import hypothesis
 import pytest
 
 from tests.tried_again import TriedAgain
-from tests.workers import FewMessages, GroupsStayTogether, schedule_groups
+from tests.workers import FewMessages, GroupsStayTogether, OneCompiler, schedule_groups
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosis' matrices are small
 
@@ -102,11 +102,18 @@ def nobody_changes_what_all_share() -> Iterator[None]:
     assert not changed, f"somebody has changed what was read of {changed}"
 
 
+def pytest_collection() -> None:
+    """Before test files are read, of which many ask for profiles at their import. xdist's master collects none."""
+    keep_parsed_profiles()
+
+
 def pytest_collection_finish(session: pytest.Session) -> None:
     """The thousands of tests stay until the end: they are not walked through at each collection of garbage, of which there is
     one for every so many new things. At Python's own 700 it takes a thirtieth of a simulated schedule."""
-    if session.items:
-        keep_parsed_profiles()
+    if hasattr(session.config, "workerinput"):
+        from numba.core.dispatcher import Dispatcher  # which test files have imported by now
+
+        OneCompiler(HERE / "conftest.py").take_turns(Dispatcher)
     gc.freeze()
     gc.set_threshold(*COLLECT_AT)
     gc.enable()

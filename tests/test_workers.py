@@ -2,6 +2,7 @@
 workers tell of a test, and that none leaves anything behind."""
 
 import asyncio
+import fcntl
 import os
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,7 +11,7 @@ from typing import Any
 import pytest
 
 from tests.conftest import LONG_WAITS, REAL_TIME, SLOW, SPREAD, begun_at, find_leaks, group_of
-from tests.workers import FewMessages, schedule_groups
+from tests.workers import FewMessages, OneCompiler, schedule_groups
 
 TESTS = Path(__file__).parent
 
@@ -133,3 +134,31 @@ def test_a_task_that_is_left_fails_its_test() -> None:
     with pytest.raises(AssertionError, match=r"tasks left behind: .*left"):
         next(check)
     assert list(find_leaks()) == [None]
+
+
+def test_one_worker_compiles_at_a_time_and_a_loop_within_another_waits_for_nobody(tmp_path: Path) -> None:
+    lock, held = tmp_path / "lock", list[bool]()
+    lock.touch()
+
+    def is_free() -> bool:
+        with lock.open("rb") as other:
+            try:
+                fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return False
+            return True
+
+    class Dispatcher:
+        def __init__(self, *calls: Any) -> None:
+            self.calls = calls
+
+        def compile(self, types: object) -> object:
+            held.append(not is_free())
+            for loop in self.calls:
+                loop.compile(types)
+            held.append(not is_free())
+            return types
+
+    OneCompiler(lock).take_turns(Dispatcher)
+    assert Dispatcher(Dispatcher(), Dispatcher()).compile("floats") == "floats"
+    assert held == [True] * 6 and is_free()

@@ -9,7 +9,6 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from paper.figures.all_figures import FIGURES
 from paper.verdicts.tracking import judge_roughness
 
 COMMAND = Path(__file__).parents[2] / "tools" / "paper" / "reproduce"
@@ -22,6 +21,14 @@ def reproduce() -> ModuleType:
     module = module_from_spec(spec)
     loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def figures() -> set[str]:
+    """matplotlib is imported by the worker that runs this file, not by all."""
+    from paper.figures.all_figures import FIGURES
+
+    return set(FIGURES)
 
 
 def pictures_in(page: str) -> set[str]:
@@ -45,7 +52,9 @@ sys.exit(runpy.run_path(sys.argv[1] + "/paper/reproduce", run_name="small")["mai
 
 
 @pytest.mark.long
-def test_the_report_is_one_file_with_every_figure_and_the_terminal_shows_the_same_verdicts(tmp_path: Path) -> None:
+def test_the_report_is_one_file_with_every_figure_and_the_terminal_shows_the_same_verdicts(
+    tmp_path: Path, figures: set[str]
+) -> None:
     """In a process of its own, where a warning is an error: matplotlib keeps its fonts open for ever."""
     page_file, folder = tmp_path / "report.html", tmp_path / "figures"
     words = [str(COMMAND.parents[1]), "--quick", "--seeds", "2", "--output", str(page_file), "--figures", str(folder)]
@@ -54,7 +63,7 @@ def test_the_report_is_one_file_with_every_figure_and_the_terminal_shows_the_sam
     )
     assert done.returncode == 0, done.stderr
     page = page_file.read_text(encoding="utf-8")
-    assert pictures_in(page) == set(FIGURES) == {path.stem for path in folder.iterdir()}
+    assert pictures_in(page) == figures == {path.stem for path in folder.iterdir()}
     assert not re.search(r'(src|href)="(?!data:)', page)
     for word in ("reproduced", "not reproduced", "outside software"):
         assert f">{word}</td>" in page
@@ -80,7 +89,7 @@ def test_a_wish_that_cannot_be_met_is_refused_before_anything_runs(
 
 
 @pytest.mark.long
-def test_the_whole_study_says_what_the_readme_may_claim(tmp_path: Path) -> None:
+def test_the_whole_study_says_what_the_readme_may_claim(tmp_path: Path, figures: set[str]) -> None:
     page_file = tmp_path / "report.html"
     done = subprocess.run(
         [sys.executable, str(COMMAND), "--output", str(page_file)], capture_output=True, text=True, check=False
@@ -88,4 +97,4 @@ def test_the_whole_study_says_what_the_readme_may_claim(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "14 reproduced, 10 not reproduced, 1 outside software" in done.stdout
     assert "Goal at most 0.7 of the settling time: the gateway's controller meets it in 4 of 4" in done.stdout
-    assert pictures_in(page_file.read_text(encoding="utf-8")) == set(FIGURES)
+    assert pictures_in(page_file.read_text(encoding="utf-8")) == figures

@@ -14,11 +14,16 @@ from gateway.telemetry.sparkplug_metrics import ANSWERS, NODE_METRICS
 from gateway.telemetry.sparkplug_payload import DataType
 from tests.telemetry.readings import holding
 
-ua = pytest.importorskip("asyncua").ua
 _TYPES = {DataType.UINT64: "UInt64", DataType.DOUBLE: "Double", DataType.BOOLEAN: "Boolean", DataType.STRING: "String"}
 
 
-def shown(*states: Any) -> dict[str, Any]:
+@pytest.fixture(scope="module", autouse=True)
+def ua() -> Any:
+    """Not at the file's import: all workers would read this library."""
+    return pytest.importorskip("asyncua").ua
+
+
+def shown(ua: Any, *states: Any) -> dict[str, Any]:
     """What stands in each variable behind the last of these."""
     stands: dict[str, Any] = {}
 
@@ -32,8 +37,8 @@ def shown(*states: Any) -> dict[str, Any]:
     return stands
 
 
-def test_each_variable_has_its_type_its_time_and_where_control_is_silent_no_value() -> None:
-    there, gone = shown(holding()), shown(holding(), None)
+def test_each_variable_has_its_type_its_time_and_where_control_is_silent_no_value(ua: Any) -> None:
+    there, gone = shown(ua, holding()), shown(ua, holding(), None)
     for metric in NODE_METRICS:
         for told in (there[metric.name], gone[metric.name]):
             assert told.Value.VariantType.name == _TYPES[metric.datatype], metric.name
@@ -105,7 +110,7 @@ def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(m
         async def show(self, state: object) -> None:
             did.append(state)
 
-    monkeypatch.setattr(opcua_process, "import_library", lambda _name: SimpleNamespace(ua=ua, Server=Server))
+    monkeypatch.setattr(opcua_process, "import_library", lambda _name: SimpleNamespace(ua=None, Server=Server))
     monkeypatch.setattr(opcua_process, "bound_connections", lambda wire, log: did.append(wire.__name__))
     monkeypatch.setattr(opcua_process, "bound_publishing", lambda service, least_s: did.append((service, least_s)))
     monkeypatch.setattr(opcua_process, "GatewayNodes", Nodes)
@@ -121,7 +126,7 @@ def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(m
 @pytest.mark.parametrize(
     ("wanted_ms", "given_ms"), [(1e-3, 200.0), (0.0, 200.0), (float("nan"), 200.0), (500.0, 500.0)]
 )
-def test_nobody_is_told_more_often_than_there_is_something_new(wanted_ms: float, given_ms: float) -> None:
+def test_nobody_is_told_more_often_than_there_is_something_new(ua: Any, wanted_ms: float, given_ms: float) -> None:
     """By an interval of a microsecond a client without any right took a whole core."""
     from asyncua.server.subscription_service import SubscriptionService
 

@@ -1,6 +1,7 @@
 """What is left is told in words and numbers, each thing once, and no more than three of them."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -16,10 +17,15 @@ from tests.diagnosis.machine import MACHINE, Floats, command_v, measurement, rea
 
 TIME_S = times_s(40.0, 100.0)
 VOLTS = command_v(TIME_S)
-CLEAN_N = readings_n(MACHINE, TIME_S, VOLTS, {})
 NOISE_N = 0.1
 TEMPERATURE = 23.0 + np.sin(0.5 * TIME_S)
 HUMIDITY = 40.0 + 5.0 * np.sin(0.83 * TIME_S + 1.0)
+
+
+@cache
+def clean_n() -> Floats:
+    """Not at the file's import: each worker would compile the twin for it."""
+    return readings_n(MACHINE, TIME_S, VOLTS, {})
 
 
 def left(*residuals_n: Floats, columns: dict[str, Floats] | None = None) -> tuple[Leftover, ...]:
@@ -27,11 +33,11 @@ def left(*residuals_n: Floats, columns: dict[str, Floats] | None = None) -> tupl
     rng = np.random.default_rng(11)
     measurements: list[Measurement] = []
     for k, residual_n in enumerate(residuals_n):
-        noisy_n = CLEAN_N + residual_n + rng.normal(0.0, NOISE_N, TIME_S.size)
+        noisy_n = clean_n() + residual_n + rng.normal(0.0, NOISE_N, TIME_S.size)
         one = measurement(TIME_S, VOLTS, noisy_n, columns or {})
         measurements.append(Measurement(**{name: getattr(one, name) for name in one.__slots__} | {"name": f"run {k}"}))
     bench = bench_of(measurements)
-    fitted, whiten = _known_model(bench, np.tile(CLEAN_N, len(residuals_n)))
+    fitted, whiten = _known_model(bench, np.tile(clean_n(), len(residuals_n)))
     return find_dependences(bench, fitted, whiten, ())
 
 
@@ -58,8 +64,8 @@ def test_a_strong_line_s_share_is_that_of_its_power() -> None:
     """0.5 N of 0.38 N RMS were `2 % of what is left`: noise with the line in it had whitened the line away."""
     line_n = 0.5 * np.sin(2.0 * np.pi * 1.3 * TIME_S)
     noise_n = np.random.default_rng(12).normal(0.0, NOISE_N, TIME_S.size)
-    bench = bench_of([measurement(TIME_S, VOLTS, CLEAN_N + line_n + noise_n, {})])
-    fitted, whiten = _known_model(bench, CLEAN_N)
+    bench = bench_of([measurement(TIME_S, VOLTS, clean_n() + line_n + noise_n, {})])
+    fitted, whiten = _known_model(bench, clean_n())
     (noise,) = whiten.noises
     hertz = np.arange(noise.weights.size) * 100.0 / noise.length
     weights = noise.weights * np.where(np.abs(hertz - 1.3) < 0.1, 0.08, 1.0)
