@@ -144,3 +144,16 @@ def test_a_push_is_not_in_band_for_who_asked_for_a_pull_that_was_refused(client:
     ask_for(client, 13.0)
     cycles(client)
     assert in_band(client) and gateway.bank.command.force_setpoint_n == 13.0
+
+
+def test_a_force_that_another_master_takes_over_is_in_band_for_nobody_else(client: Any, gateway: GatewayAtHand) -> None:
+    """The refused heartbeat was explained by a status that is the other one's, and its band stood for a cycle."""
+    client.enable(12.0)
+    cycles(client)
+    assert in_band(client)
+    gateway.take_over_from_elsewhere()
+    if isinstance(client, Plc):
+        cycles(client)
+    else:
+        client.cycle()
+    assert client.ended and not any([in_band(client), *seen_in_band(client, 2)])

@@ -425,8 +425,9 @@ ${crc_table}];
       bGivesUp:=nFrom=nTo OR (bOffRefused AND nWant{FG_C_CONTROL_WORD}=0);
       bOffRefused:=nWant{FG_C_CONTROL_WORD}=0;
       FgGoOn;
-      FgExplain;
+      ! First: the status that explains it may be of that one's force
       IF bGivesUp FgForget;
+      FgExplain;
       RETURN;
     ENDIF
     FgTakeWords STATUS_WORDS;
