@@ -13,6 +13,7 @@ from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
 from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import cycles
+from tests.clients.test_edges_and_losses import control_word_of
 from tests.clients.test_two_tasks import every_place
 
 
@@ -123,3 +124,36 @@ def test_a_force_that_was_refused_is_not_in_band_because_the_last_one_that_was_t
     ask_for(client, 13.0)
     cycles(client)
     assert in_band(client) and gateway.bank.command.force_setpoint_n == 13.0
+
+
+def test_a_push_is_not_in_band_for_who_asked_for_a_pull_that_was_refused(client: Any, gateway: GatewayAtHand) -> None:
+    """W307, the valve cannot follow: the program waited for that bit, and lifted a part that was pushed."""
+    if isinstance(client, PythonProgram | CProgram):
+        pytest.skip("exchange() itself says that it was refused")
+    client.enable(12.0)
+    cycles(client)
+    answer = gateway.answer
+    gateway.answer = lambda request: (  # type: ignore[method-assign]
+        bytes((request[0] | 0x80, 3)) if control_word_of(request) & 0x10 else answer(request)
+    )
+    client.pull(pulls=True)
+    if isinstance(client, Irc5):
+        client.set(fgInBand=False)
+    assert not any(seen_in_band(client, 8)) and client.enabled
+    client.pull(pulls=False)
+    ask_for(client, 13.0)
+    cycles(client)
+    assert in_band(client) and gateway.bank.command.force_setpoint_n == 13.0
+
+
+def test_a_force_that_another_master_takes_over_is_in_band_for_nobody_else(client: Any, gateway: GatewayAtHand) -> None:
+    """The refused heartbeat was explained by a status that is the other one's, and its band stood for a cycle."""
+    client.enable(12.0)
+    cycles(client)
+    assert in_band(client)
+    gateway.take_over_from_elsewhere()
+    if isinstance(client, Plc):
+        cycles(client)
+    else:
+        client.cycle()
+    assert client.ended and not any([in_band(client), *seen_in_band(client, 2)])

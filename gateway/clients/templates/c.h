@@ -559,9 +559,8 @@ int fg_exchange(fg_client *client) {
         exception = client->exception;
         client->off_pending = client->asked = 0;
         if (fg_go_on(client) == FG_LOST) return FG_LOST;
-        result = fg_explain(client, exception);
-        if (!changed && result == FG_REFUSED) fg_end(client); /* not even the heartbeat: another master owns the setpoint */
-        return result;
+        if (!changed) fg_end(client); /* not even the heartbeat: another master owns the setpoint, and the status is of its force */
+        return fg_explain(client, exception);
     }
     if (result == FG_OK) result = fg_take_words(client, frame, FG_STATUS_WORDS, client->words);
     if (result != FG_OK) return result;

@@ -162,6 +162,8 @@ ${crc_table}];
   LOCAL VAR num nHeartbeat:=0;
   ! The force that was refused, in counts: not asked for again
   LOCAL VAR num nDenied:=-1;
+  ! fgPull was refused, and nothing else has been taken since
+  LOCAL VAR bool bPullDenied:=FALSE;
   LOCAL VAR num nException:=0;
   LOCAL VAR num nOnce:=0;
   LOCAL VAR bool bOffPending:=FALSE;
@@ -423,12 +425,14 @@ ${crc_table}];
       bGivesUp:=nFrom=nTo OR (bOffRefused AND nWant{FG_C_CONTROL_WORD}=0);
       bOffRefused:=nWant{FG_C_CONTROL_WORD}=0;
       FgGoOn;
-      FgExplain;
+      ! First: the status that explains it may be of that one's force
       IF bGivesUp FgForget;
+      FgExplain;
       RETURN;
     ENDIF
     FgTakeWords STATUS_WORDS;
     bOffRefused:=FALSE;
+    IF nFrom<>nTo bPullDenied:=FALSE;
     nGood:=nWant;
     IF NOT bOff nOnce:=0;
     bAsking:=FALSE;
@@ -466,6 +470,7 @@ ${crc_table}];
   ! in the refused one, or was set meanwhile, stays
   LOCAL PROC FgGoOn()
     VAR bool bSent;
+    VAR bool bPulls;
     nOnce:=0;
     ! Never to TRUE: T_ROB1 may have taken it back meanwhile
     IF NOT FgIsOn() fgEnable:=FALSE;
@@ -474,7 +479,9 @@ ${crc_table}];
         nDenied:=nWant{FG_C_FORCE_SETPOINT};
       ENDIF
       bSent:=FgHasBit(nWant{FG_C_CONTROL_WORD},FG_VALVE_PULL);
-      IF fgPull=bSent fgPull:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
+      bPulls:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
+      IF bSent<>bPulls bPullDenied:=TRUE;
+      IF fgPull=bSent fgPull:=bPulls;
     ENDIF
     FOR i FROM 1 TO COMMAND_WORDS DO
       IF fgCommand{i}=nWant{i} fgCommand{i}:=nGood{i};
@@ -515,6 +522,7 @@ ${crc_table}];
   LOCAL FUNC bool FgIsAsked()
     VAR bool bPulls;
     IF NOT (fgEnable AND FgIsOn()) RETURN FALSE;
+    IF bPullDenied RETURN FALSE;
     bPulls:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
     IF fgPull<>bPulls RETURN FALSE;
     RETURN Round(fgForce*${force_counts})=nGood{FG_C_FORCE_SETPOINT};

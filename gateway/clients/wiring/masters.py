@@ -31,8 +31,8 @@ SHORTEST_TIMER_LEASE_S: Final = 0.3
 """Three periods of RAPID's shortest cyclic timer, 0.1 s: two lost ones are not a loss of the master."""
 SHORTEST_CYCLE_LEASE_S: Final = 0.12
 """Three exchanges of a task of RAPID or a thread of URScript, with their pause of 0.04 s."""
-SHORTEST_S7_LEASE_S: Final = 0.36
-"""Three heartbeats of MB_CLIENT, one request at a time: 8 to 12 calls of the block of 10 ms each."""
+SHORTEST_PLC_LEASE_S: Final = 0.36
+"""Three heartbeats of 8 to 12 calls of 10 ms: two requests of MB_CLIENT, one of ModbusFB, which took 8 calls on a bench."""
 
 
 def network_sections(rig: Rig, called: str) -> Iterator[Section]:
@@ -196,12 +196,7 @@ def _requests(table: ExchangeTable) -> Iterator[tuple[str, bool, int, int]]:
 def _s7(rig: Rig, table: ExchangeTable) -> Section:
     where = table.where
     octets = where.host.split(".")
-    calls, lease_s = "a cyclic interrupt of 10 ms: a heartbeat every 80 to 120 ms", rig.control.supervision.lease_s
-    if lease_s is not None and lease_s < SHORTEST_S7_LEASE_S:
-        late = (
-            "is a loss of the master" if rig.control.supervision.lease_action is LeaseAction.HOLD else "ends the force"
-        )
-        calls += f" (lease {lease_s:g} s: one that is late {late}; set lease_s to {SHORTEST_S7_LEASE_S:g} or more)"
+    calls = f"a cyclic interrupt of 10 ms: a heartbeat every 80 to 120 ms{_short_of_a_plc(rig)}"
     shown = f"ADDR[1] .. ADDR[4] = {', '.join(octets)}" if len(octets) == 4 else where.host
     rows = (
         ("CONNECT (TCON_IP_v4)", "value"),
@@ -220,6 +215,15 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
     stop = "A CPU goes on at an emergency stop: `enable` of the block has to fall with it (and with the guard, and the robot)."
     sentences = (stop, f"{where.s7_port_fault} Set network.port to another one.") if where.s7_port_fault else (stop,)
     return Section("Siemens S7-1200/1500: connection of MB_CLIENT", sentences, rows)
+
+
+def _short_of_a_plc(rig: Rig) -> str:
+    """Return what a lease means for whose requests take some calls each, empty where it is long enough."""
+    lease_s, is_kept = rig.control.supervision.lease_s, rig.control.supervision.lease_action is LeaseAction.HOLD
+    if lease_s is None or lease_s >= SHORTEST_PLC_LEASE_S:
+        return ""
+    late = "is a loss of the master" if is_kept else "ends the force"
+    return f" (lease {lease_s:g} s: one that is late {late}; set lease_s to {SHORTEST_PLC_LEASE_S:g} or more)"
 
 
 def _s7_requests(table: ExchangeTable) -> Section:
@@ -256,11 +260,7 @@ def _codesys(rig: Rig, table: ExchangeTable) -> Section:
             f"uiReadStartItem {status}, uiReadQuantity {status_words}",
         ),
         ("library", "Tc2_ModbusSrv, TF6250 on the controller", "ModbusFB"),
-        (
-            "call",
-            "fbGateway, then fbTransport, in a task of 10 ms",
-            f"the same: a heartbeat every 40 ms or more{_short_of_a_cycle(rig.control.supervision.lease_s)}",
-        ),
+        ("call", "fbGateway, then fbTransport: task of 10 ms", f"a heartbeat every 40 to 120 ms{_short_of_a_plc(rig)}"),
     )
     stop = (
         "A controller goes on at an emergency stop: `bEnable` has to fall with it (and with the guard, and the robot)."
