@@ -316,8 +316,10 @@ class RegisterBank:
     def _settle_owner(self, admitted: AdmittedWrite, host: str, peer: Peer) -> None:
         ownership, values = self._ownership, admitted.values
         asks = bool(admitted.kept or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT])
-        if not asks or ownership.owner != host or admitted.is_stop or admitted.is_taken_over:  # else it stays
+        if ownership.owner != (host if asks else None) or admitted.is_stop or admitted.is_taken_over:
             ownership.settle(host, takes_over=admitted.is_taken_over, stops=admitted.is_stop, asks=asks)
+        elif not asks or peer is self._owner_peer:
+            return  # nothing of it is another
         if ownership.owner == host:
             self._owner_peer = peer
         self._show_owner()
