@@ -74,7 +74,7 @@ class RegisterBank:
         self._status = StatusBlock(register_map, self._image)
         self._tell_status: Callable[[], Status] | None = None
         self.self_test = SelfTestWords(register_map, self._image)
-        self._ownership = Ownership(rules.owner)
+        self._ownership, self._owner_peer = Ownership(rules.owner), NOBODY
         self._echo = ByteOrderEcho(register_map.find("byte_order_echo"), self._image)
         self._admission = Admission(self._commands, self._ownership, self._echo, rules)
         self.held_runs = self._admission.held_runs
@@ -83,7 +83,6 @@ class RegisterBank:
         self._watchdogs = next((one for one in register_map.registers if one.name == "watchdogs"), None)
         self._image.put(register_map.find("map_hash"), register_map.map_hash)
         self._bits = (register_map.find("control_word").address, register_map.find("status_word").address)
-        self._owner_peer = NOBODY
         self._show_owner()
         self.publish(Status())
 
@@ -96,8 +95,7 @@ class RegisterBank:
     def server_id(self) -> ServerId:
         """The identity for FC17. It runs unless a fault is latched: whether a force is held is in status_word."""
         self._catch_up()
-        is_fault = self._image.word(self._bits[1]) & StatusBit.FAULT
-        return build_server_id(self.identity, is_running=not is_fault)
+        return build_server_id(self.identity, is_running=not self._image.word(self._bits[1]) & StatusBit.FAULT)
 
     def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """Note the reason of what the framing has refused, as all others do."""
