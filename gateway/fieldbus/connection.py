@@ -138,14 +138,13 @@ class Connection(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Answer what has come, READ_BYTES at most: the one call per request."""
         if self._partial_since_s is None:
-            known = self._known_answers.get(data[TRANSACTION_BYTES:])
-            if known is not None:
-                self._write(data[:TRANSACTION_BYTES] + known)
-                self._answered = True
-                return
             frame = None
             if len(data) == READ_FRAME_BYTES:
-                frame = whole_read_answer(data, self._fast_units, self._shared.bank, self.peer)
+                known = self._known_answers.get(data[TRANSACTION_BYTES:])
+                if known is not None:
+                    frame = data[:TRANSACTION_BYTES] + known
+                else:
+                    frame = whole_read_answer(data, self._fast_units, self._shared.bank, self.peer)
             if frame is None:
                 frame = whole_answer(data, self._fast_units, self._shared.bank, self.peer)
             if frame is not None:

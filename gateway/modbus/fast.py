@@ -22,7 +22,12 @@ _FRAME: Final = Struct(">HHHBBHH")  # transaction, protocol, length, unit, funct
 _WRITE: Final = Struct(">HHHBBHHB")  # the same of FC16, and the bytes that follow
 _REFUSED: Final = Struct(">HHHBBB")  # transaction, protocol, length, unit, function, exception
 _ANSWER: Final = Struct(">HHHBBB")  # transaction, protocol, length, unit, function, bytes that follow
-_unpack_frame, _pack_answer = _FRAME.unpack, _ANSWER.pack  # looked up once: here alone that shows
+_LENGTH_WRITTEN: Final = b"\x00\x06"
+_unpack_frame, _unpack_write, _pack_answer = (
+    _FRAME.unpack,
+    _WRITE.unpack_from,
+    _ANSWER.pack,
+)  # looked up once: here alone that shows
 
 
 def whole_read_answer(
@@ -51,18 +56,19 @@ def whole_read_answer(
 def whole_answer(data: bytes, units: Container[int], bank: DataBank, peer: Peer) -> bytes | None:
     """Return the answer to these bytes; None when they are not one whole frame for a served unit."""
     size = len(data)
+    if size > _WRITE.size and data[7] == WRITE_REGISTERS:
+        transaction, protocol, length, unit, function, address, count, data_bytes = _unpack_write(data)
+        is_whole = not protocol and length + 6 == size and unit in units
+        if is_whole and data_bytes == count + count == size - _WRITE.size and 0 < count <= MOST_REGISTERS_WRITTEN:
+            try:
+                bank.write_registers(address, data[_WRITE.size :], peer)
+            except ModbusError as refusal:
+                return _REFUSED.pack(transaction, 0, 3, unit, function | 0x80, refusal.code)
+            return data[:4] + _LENGTH_WRITTEN + data[6:12]  # of the request all but its data, and how long that is
     if size <= HEADER.size:
         return None
     transaction, protocol, length, unit = HEADER.unpack_from(data)
     if protocol or length + 6 != size or not 2 <= length <= 254 or unit not in units:
         return None
-    if data[7] == WRITE_REGISTERS and size > _WRITE.size:
-        _, _, _, _, function, address, count, data_bytes = _WRITE.unpack_from(data)
-        if data_bytes == count + count == size - _WRITE.size and 0 < count <= MOST_REGISTERS_WRITTEN:
-            try:
-                bank.write_registers(address, data[_WRITE.size :], peer)
-            except ModbusError as refusal:
-                return _REFUSED.pack(transaction, 0, 3, unit, function | 0x80, refusal.code)
-            return _FRAME.pack(transaction, 0, 6, unit, function, address, count)
     pdu = answer(data[7:], bank, peer)
     return HEADER.pack(transaction, 0, len(pdu) + 1, unit) + pdu

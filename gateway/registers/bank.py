@@ -74,7 +74,8 @@ class RegisterBank:
         self._status = StatusBlock(register_map, self._image)
         self._tell_status: Callable[[], Status] | None = None
         self.self_test = SelfTestWords(register_map, self._image)
-        self._ownership = Ownership(rules.owner)
+        self._ownership, self._owner_peer = Ownership(rules.owner), NOBODY
+        self.owner_refused = ""  # the last write of who owns, where it was refused
         self._echo = ByteOrderEcho(register_map.find("byte_order_echo"), self._image)
         self._admission = Admission(self._commands, self._ownership, self._echo, rules)
         self.held_runs = self._admission.held_runs
@@ -83,7 +84,6 @@ class RegisterBank:
         self._watchdogs = next((one for one in register_map.registers if one.name == "watchdogs"), None)
         self._image.put(register_map.find("map_hash"), register_map.map_hash)
         self._bits = (register_map.find("control_word").address, register_map.find("status_word").address)
-        self._owner_peer, self.owner_refused = NOBODY, ""  # the last write of who owns, where it was refused
         self._show_owner()
         self.publish(Status())
 
@@ -316,8 +316,11 @@ class RegisterBank:
     def _settle_owner(self, admitted: AdmittedWrite, host: str, peer: Peer) -> None:
         ownership, values = self._ownership, admitted.values
         asks = bool(admitted.kept or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT])
-        if not asks or ownership.owner != host or admitted.is_stop or admitted.is_taken_over:  # else it stays
+        if ownership.owner != (host if asks else None) or admitted.is_stop or admitted.is_taken_over:
             ownership.settle(host, takes_over=admitted.is_taken_over, stops=admitted.is_stop, asks=asks)
+        elif not asks or peer is self._owner_peer:
+            self.owner_refused = ""
+            return  # nothing else of it is another
         if ownership.owner == host:
             self._owner_peer, self.owner_refused = peer, ""
         self._show_owner()

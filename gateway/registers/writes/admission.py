@@ -24,6 +24,7 @@ from gateway.registers.writes.command_block import (
     CONTROL_WORD,
     FORCE_SETPOINT,
     HEARTBEAT,
+    MODE,
     NAMES,
     SEQUENCE,
     VOLTAGE_SETPOINT,
@@ -106,13 +107,13 @@ class Admission:
         """Return what a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
         commands, before = self._commands, self._commands.values
         values = commands.decode(write.block, write.address, write.data)
-        commands.check_known(values, write.block)
-        if values[CONTROL_WORD] == before[CONTROL_WORD] and self._is_plain(write, int(values[CONTROL_WORD])):
-            word = int(values[CONTROL_WORD])
-            command = commands.command(values, word, number, now_s, write.host)
-            self._ask(command, values, write)
-            return AdmittedWrite(values, word, command, False, False, 0)
         asked = int(values[CONTROL_WORD])
+        if asked != before[CONTROL_WORD] or values[MODE] != before[MODE]:  # else they have been found good
+            commands.check_known(values, write.block)
+        if asked == before[CONTROL_WORD] and self._is_plain(write, asked):
+            command = commands.command(values, asked, number, now_s, write.host)
+            self._ask(command, values, write)
+            return AdmittedWrite(values, asked, command, False, False, 0)
         permitted = self._permit(write, values)
         if permitted is None:
             self.held_runs.keep(write.host, self._held_by(write, asked, asked))
@@ -139,7 +140,8 @@ class Admission:
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered."""
-        self.held_runs.keep(admitted.command.peer, admitted.held)
+        if admitted.held or self.held_runs.by_host:
+            self.held_runs.keep(admitted.command.peer, admitted.held)
         self.lowered_from_n = admitted.command.lowered_from_n
 
     def _is_plain(self, write: Write, word: int) -> bool:

@@ -109,6 +109,8 @@ class CommandBlock:
 
     def names(self, block: Block, address: int, count: int) -> Sequence[str]:
         """Return the registers that a write of these words sets."""
+        if not block.repeats:
+            return NAMES[address - self._first : address - self._first + count]
         offsets = self.offsets(block, address, count)
         return NAMES[offsets.start : offsets.stop]
 
