@@ -197,8 +197,9 @@ def _refuse_blocked(at: Situation, bit: ControlBit, what: str = "enable") -> Edg
 
 
 def _old(command: Command, edges: Edges) -> EdgeRefusal | None:
-    """Why nothing begins by a command that has waited in a pile: its master may be gone, or expect no force any more."""
-    acts = edges.rises & ~_TAKE
+    """Why nothing begins, and nobody takes over, by a command that has waited in a pile: its master may be gone, or expect no
+    force any more, and somebody else may hold one."""
+    acts = edges.rises
     if not command.has_waited or not acts:
         return None
     bit = ControlBit(acts & -acts)

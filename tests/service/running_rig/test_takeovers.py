@@ -8,9 +8,10 @@ import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.control import CalibrationInUse
+from gateway.modbus import Peer
 from gateway.modbus.pdu import write_registers_request
 from gateway.profiles import load_calibration
-from gateway.registers.words import State
+from gateway.registers.words import ControlBit, State
 from tests.fieldbus.by_hand import framed
 from tests.fieldbus.conftest import Stand, put
 from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S, leased, locally
@@ -157,6 +158,17 @@ def test_nothing_begins_by_a_command_that_has_waited_in_a_pile_and_a_stop_is_obe
     rig = SmallRig().holding()
     rig.write(0, 0, peer=behind)
     assert rig.until(State.OFF, 0.1)
+
+
+def test_nobody_takes_over_by_a_command_that_has_waited_in_a_pile() -> None:
+    """A master that had hung took the setpoint from the one that had come after it, and whose force fell with its lease."""
+    rig = leased().holding()
+    refused = rig.answer(0, ControlBit.ENABLE | ControlBit.TAKE_OWNERSHIP, 500, peer=Peer("10.0.0.9", is_behind=True))
+    assert refused is not None and refused.reason is RefusalReason.NOT_READY
+    rig.run(2.0 * LEASE_S)
+    assert rig.state is State.HOLDING and rig.bank.owner == OWNER.host
+    assert rig.answer(0, ControlBit.ENABLE | ControlBit.TAKE_OWNERSHIP, 500, peer=Peer("10.0.0.9")) is None
+    assert rig.bank.owner == "10.0.0.9"
 
 
 def test_a_force_that_is_still_leaving_cannot_become_the_zero() -> None:
