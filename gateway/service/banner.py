@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from ipaddress import ip_address
-from math import isfinite
+from math import inf, isfinite
 from shlex import quote
 from typing import Any, Final
 
 from gateway import VERSION, defaults
+from gateway.devices.messages import ForceSample, Quality
 from gateway.extras import is_installed, missing_note
 from gateway.fieldbus.peers import is_loopback
 from gateway.profiles import Rig
@@ -198,6 +199,13 @@ def _is_this_machine(owner: str) -> bool:
 
 def _in_url(host: str) -> str:
     return f"[{host}]" if ":" in host else host
+
+
+def shown_force(sample: ForceSample | None) -> float | None:
+    """Return the force that a sample is shown with, N: inf where it is beyond the cell's range, None without a sample."""
+    if sample is None:
+        return None
+    return inf if sample.quality is Quality.OVERLOAD else sample.force_n
 
 
 def _reading(value: float | None, unit: str, digits: int) -> str:

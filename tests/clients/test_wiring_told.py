@@ -32,6 +32,17 @@ def test_an_electrician_is_told_the_checksum_that_the_module_is_to_be_set_to(tmp
     assert rows_of(page, "Serial line: output")["line"] == ["9600 8N1, address 1, channel 0, checksum dcon-sum"]
 
 
+def test_an_electrician_is_told_the_unit_that_a_modbus_device_is_to_be_set_to(tmp_path: Path) -> None:
+    """A profile without `address` speaks to unit 1, and the page named none."""
+    weigher = (PROFILES / "devices" / "laumas-tlb.yaml").read_text().replace("name: laumas-tlb", "name: my-weigher")
+    (tmp_path / "my-weigher.yaml").write_text(weigher.replace("constants: {address: 1} #", "#"))
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("device: stream-st-gs", "device: my-weigher")
+    for said, unit in (("", 1), ("\n  address: 7", 7)):
+        (tmp_path / "own.yaml").write_text(text.replace("device: my-weigher", f"device: my-weigher{said}"))
+        line = rows_of(page_of(tmp_path / "own.yaml"), "Serial line: load cell")["line"]
+        assert line == [f"115200 8N1, address {unit}"]
+
+
 def test_who_binds_ipv6_is_told_that_robots_and_plcs_know_ipv4_alone(tmp_path: Path) -> None:
     """The clients said so; the page gave an S7 `fd00::5` for the four bytes of its TCON_IP_v4, and an IRC5 the same."""
     text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()

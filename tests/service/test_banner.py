@@ -10,11 +10,12 @@ from pathlib import Path
 import pytest
 
 from gateway.control.settings import LeaseAction
+from gateway.devices.messages import ForceSample, Quality
 from gateway.profiles import load_register_map, load_rig
 from gateway.profiles.http_sections import OpcUa
 from gateway.profiles.telemetry_sections import Mqtt, SparkplugNode
 from gateway.service import banner
-from gateway.service.banner import Ready, ServedFace, format_banner, ready_fields, tcp_face, try_lines
+from gateway.service.banner import Ready, ServedFace, format_banner, ready_fields, shown_force, tcp_face, try_lines
 from tests.service.rigs import demo, with_supervision
 
 PROFILES = Path(__file__).parents[2] / "profiles"
@@ -53,6 +54,13 @@ def test_a_silent_device_is_not_shown_as_zero() -> None:
     text = format_banner(ready(voltage_v=None, force_n=None, notes=("E111 /dev/pts/6: silence at every speed",)))
     assert text.count("silent") == 2
     assert "  note         E111 /dev/pts/6" in text
+
+
+def test_a_cell_that_tells_an_overload_beside_its_digits_is_not_shown_as_well() -> None:
+    """1210 N of a Modbus amplifier whose overload bit was set stood there as ok."""
+    line = format_banner(ready(force_n=shown_force(ForceSample(123.45, 1210.63, Quality.OVERLOAD, 0.0))))
+    assert "stream-st-gs 115200  beyond its range\n" in line
+    assert shown_force(ForceSample(0.4, 4.0, Quality.UNSTABLE, 0.0)) == 4.0 and shown_force(None) is None
 
 
 @pytest.mark.parametrize("force_n", [nan, inf, -inf])

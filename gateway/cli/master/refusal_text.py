@@ -11,10 +11,13 @@ from typing import Final
 
 from gateway.cli.errors import CliError
 from gateway.cli.master.client import Frame, GatewayClient, RefusedError, RegisterReading
+from gateway.cli.master.value_text import format_value
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus.errors import NAMES, TARGET_SILENT
 from gateway.registers.refusal import NO_ADDRESS
+from gateway.registers.words import State
 
+_OF_RUNS: Final = (RefusalReason.SELF_TEST_REFUSED, RefusalReason.CALIBRATION_REFUSED)
 _LAST_REFUSAL: Final = ("refusal_address", "refusal_reason", "refusal_value")
 
 
@@ -36,7 +39,8 @@ def _message(client: GatewayClient, refused: RefusedError, frames: list[Frame], 
     if reason is RefusalReason.NONE:
         return f"{exception} to {refused.request}"
     entry = reason.explanation
-    own = _own_sentence(client, at, reason, state).removeprefix(f"{entry.code} ") or _known_limit(client, at, reason)
+    own = _own_sentence(client, at, reason, state).removeprefix(f"{entry.code} ")
+    own = own or _known_limit(client, at, reason) or _known_state(client, reason)
     values = f"{entry.title}: {exception} to {refused.request}; {where}"
     cure = f"{entry.do} (force-gateway explain {entry.code})"
     return "\n  ".join([f"{entry.code} {own}", values, cure] if own else [f"{entry.code} {values}", cure])
@@ -57,6 +61,18 @@ def _known_limit(client: GatewayClient, address: int, reason: RefusalReason) -> 
     if not 0.0 <= value.value <= high.value:
         return f"{asked}: allowed 0 .. {high.value:.4g} N by the calibration in use; the rig's own limit may be lower"
     return f"{asked}: beyond the rig's own limit, which no register tells; the calibration in use goes to {high.value:.4g} N"
+
+
+def _known_state(client: GatewayClient, reason: RefusalReason) -> str:
+    """Return which state keeps a run from beginning, where the gateway is elsewhere; empty where it is not the state."""
+    if reason not in _OF_RUNS:
+        return ""
+    try:
+        (state,) = client.read_values([client.register_map.find("state")])
+    except (CliError, RefusedError, LookupError):
+        return ""
+    is_told = state.is_available and state.value != State.OFF
+    return f"{reason.explanation.title}: state {format_value(state)}" if is_told else ""
 
 
 def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, state: Path | None) -> str:

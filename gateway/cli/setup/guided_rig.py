@@ -135,8 +135,13 @@ def _speed(answer: str) -> int:
 
 
 def _probe(port: str, profiles: "list[DeviceProfile]") -> tuple[str, int] | None:
+    from gateway.cli.diagnosis.progress_line import show_progress
+
+    words = f"in the words of {len(profiles)} profiles at their own speeds, then at others"
+    click.echo(f"  listens, then asks {words}: 10 s or so where nothing answers")
     try:
-        report = probing.probe_path(port, profiles)
+        with show_progress("probing"):
+            report = probing.probe_path(port, profiles)
     except CliError as error:
         click.echo(f"  {error.message}")
         return None

@@ -44,7 +44,8 @@ def _lines(rig: Rig) -> Iterator[tuple[str, object]]:
 def _device_section(name: str, line: object) -> Section:
     device, settings, port = getattr(line, "device"), getattr(line, "settings"), getattr(line, "port")  # noqa: B009
     wires = wires_of(device.name, is_modbus=device.is_modbus)
-    constants = "".join(f", {name} {device.constants[name]}" for name in (ADDRESS, CHANNEL) if name in device.constants)
+    set_to = {**({ADDRESS: device.unit_id} if device.is_modbus else {}), **device.constants}
+    constants = "".join(f", {name} {set_to[name]}" for name in (ADDRESS, CHANNEL) if name in set_to)
     constants += "" if device.checksum == "none" else f", checksum {device.checksum}"
     rows = [
         ("what", "value"),

@@ -198,7 +198,7 @@ class RunningRig:
             output_port=self._ports.output.path,
             cell_port=self._ports.cell.path,
             voltage_v=self._line.acknowledged_v,
-            force_n=self.loop.sample.force_n if self.loop.sample else None,
+            force_n=banner.shown_force(self.loop.sample),
             notes=notes,
             faces=faces,
             valve_port=self._ports.valve.path if self._ports.valve else "",

@@ -11,7 +11,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.devices.line_settings import SerialSettings
 from gateway.modbus import ModbusError, Peer, Role
 from gateway.registers import BankRules, RegisterBank, RegisterMap
-from gateway.registers.words import ControlBit
+from gateway.registers.words import ControlBit, State
 from gateway.registers.writes.proposed_write import EdgeRefusal
 from tests.cli.conftest import PlainBank
 
@@ -160,3 +160,22 @@ def test_what_no_gateway_can_take_is_refused_with_what_is_allowed(words: tuple[s
     answer = call(*words)
     assert answer.exit_code == 2
     assert said in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("state", "said"),
+    [
+        (State.HOLDING, "W306 self-test refused: state holding\n"),
+        (State.FAULT, "W306 self-test refused: state fault\n"),
+        (State.OFF, "W306 self-test refused: exception 04"),
+    ],
+)
+def test_a_state_that_lets_no_run_begin_is_told_by_the_registers(
+    state: State, said: str, fake, call, monkeypatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    fake.bank.refuse[0] = (4, RefusalReason.SELF_TEST_REFUSED)
+    fake.bank.set("state", state)
+    answer = call("write", "control_word=start_self_test", "--gateway", fake.address)
+    assert answer.exit_code == 1
+    assert answer.stderr.startswith(said)

@@ -33,7 +33,10 @@ def test_the_devices_say_what_they_are_and_the_file_is_accepted(folder: Path) ->
     with behind_ptys(module, indicator) as (output, cell):
         result = answered(output, "y", "", "", cell, "y", "", "", "98.07", "40")
     assert result.exit_code == 0, result.output
-    assert "icpdas-702x answers at 9600 8N1: it says that it is 7021" in result.output
+    answer = "icpdas-702x answers at 9600 8N1: it says that it is 7021"
+    assert answer in result.output
+    told = f"listens, then asks in the words of {len(known_profiles('output'))} profiles at their own speeds, then at others"
+    assert f"{told}: 10 s or so where nothing answers" in result.output.partition(answer)[0]
     found = check_report("own.yaml")
     assert found.rig, [str(fault) for fault in found.faults]
     assert (found.rig.output.device.name, found.rig.load_cell.device.name) == ("icpdas-702x", "stream-st-gs")
