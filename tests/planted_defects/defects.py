@@ -351,7 +351,7 @@ DEFECTS = (
            "                self._stands, self._next_s = self._asked, now_s\n",
            ("service/running_rig/lines/test_valve_line.py",)),
     Defect("the valve switches under pressure", "control/valve/valve_switch.py",
-           "return now_s - self._vented_s >= self.settings.dwell_s", "return True", ("control/valve",)),
+           "return now_s - max(self._vented_s, self._told_s) >= self.settings.dwell_s", "return True", ("control/valve",)),
     Defect("the valve is told under pressure", "control/valve/valve_switch.py",
            "return self.commanded if self._vented_s < inf else None", "return self.commanded", ("control/valve",)),
     Defect("the valve switches before the force has left", "control/valve/turning.py",

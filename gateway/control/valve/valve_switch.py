@@ -78,7 +78,7 @@ class ValveSwitch:
         return True
 
     def _may_switch(self, now_s: float) -> bool:
-        return now_s - self._vented_s >= self.settings.dwell_s
+        return now_s - max(self._vented_s, self._told_s) >= self.settings.dwell_s
 
     def blame(self, now_s: float, cause: StopCause | None) -> StopCause | None:
         """Return the first cause, where the valve counts as well. cause: what others have found goes before, but for a force

@@ -1,5 +1,7 @@
 """The switch of the valve by itself: what it takes for a fault, and what it does not."""
 
+from itertools import pairwise
+
 import pytest
 
 from gateway.codes.faults import FaultCode
@@ -44,6 +46,19 @@ def test_a_valve_that_is_told_to_and_fro_has_its_time_for_each_word() -> None:
         switch.step(0.01 * k, wanted, ValveStatus(stands), is_vented=True)
         faults.append(switch.first_cause(0.01 * k) is not None)
     assert faults.index(True) == pytest.approx(296 + 50, abs=2)
+
+
+def test_a_bit_that_flickers_moves_a_valve_at_rest_no_oftener_than_its_dwell() -> None:
+    """The dwell was kept to the venting alone: a valve that was vented long ago was turned at each write of the bit."""
+    switch, told_at = ValveSwitch(ValveControl(pull_area_share=0.75, dwell_s=0.25, timeout_s=0.5)), []
+    for k in range(200):
+        before = switch.commanded
+        stands = switch.commanded or PUSH
+        switch.step(0.01 * k, PULL if k // 2 % 2 else PUSH, ValveStatus(stands), is_vented=True)
+        if switch.commanded is not before:
+            told_at.append(0.01 * k)
+    apart_s = [after_s - before_s for before_s, after_s in pairwise(told_at)]
+    assert len(told_at) > 3 and min(apart_s) >= 0.25
 
 
 @pytest.mark.parametrize(
