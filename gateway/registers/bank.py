@@ -15,7 +15,6 @@ write that disables holds. byte_order_echo takes 1234.5 in both word orders and 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final
 
 from gateway.bsfm.model import Calibration
 from gateway.codes.refusals import RefusalReason
@@ -26,6 +25,7 @@ from gateway.registers.command import Command, Status
 from gateway.registers.identity import build_identity, build_server_id
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.addresses import no_such_address
+from gateway.registers.map.bit_words import BitWords
 from gateway.registers.map.register_map import Block, RegisterMap
 from gateway.registers.refusal import Refusal, request_refusal
 from gateway.registers.rig_rules import BankRules
@@ -45,8 +45,6 @@ from gateway.registers.writes.command_block import (
 )
 from gateway.registers.writes.ownership import LastWriters, Ownership
 from gateway.registers.writes.proposed_write import Decide
-
-BITS: Final = 16
 
 
 class RegisterBank:
@@ -75,7 +73,7 @@ class RegisterBank:
         self._tell_status: Callable[[], Status] | None = None
         self.self_test = SelfTestWords(register_map, self._image)
         self._ownership, self._owner_peer = Ownership(rules.owner), NOBODY
-        self.owner_refused = ""  # the last write of who owns, where it was refused
+        self.owner_refused = ""  # why the last write of who owns was, empty where it was taken
         self._echo = ByteOrderEcho(register_map.find("byte_order_echo"), self._image)
         self._admission = Admission(self._commands, self._ownership, self._echo, rules)
         self.held_runs = self._admission.held_runs
@@ -83,7 +81,7 @@ class RegisterBank:
         self._image.put(register_map.find("map_version"), register_map.version)
         self._watchdogs = next((one for one in register_map.registers if one.name == "watchdogs"), None)
         self._image.put(register_map.find("map_hash"), register_map.map_hash)
-        self._bits = (register_map.find("control_word").address, register_map.find("status_word").address)
+        self._bit_words = BitWords(register_map)
         self._show_owner()
         self.publish(Status())
 
@@ -96,7 +94,8 @@ class RegisterBank:
     def server_id(self) -> ServerId:
         """The identity for FC17. It runs unless a fault is latched: whether a force is held is in status_word."""
         self._catch_up()
-        return build_server_id(self.identity, is_running=not self._image.word(self._bits[1]) & StatusBit.FAULT)
+        is_fault = self._image.word(self._bit_words.status.first) & StatusBit.FAULT
+        return build_server_id(self.identity, is_running=not is_fault)
 
     def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """Note the reason of what the framing has refused, as all others do."""
@@ -119,12 +118,12 @@ class RegisterBank:
     def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Return bits of control_word (0-15) or status_word (100-115), packed."""
         try:
-            first = self._bit_word(address, count)
+            first = self._bit_words.find(address, count).first
         except Refusal as refusal:
             raise self._note_refusal(refusal, peer) from None
         self._catch_up()
-        word = self._image.word(first)
-        return pack_bits([bool(word >> (address - first + k) & 1) for k in range(count)])
+        bits = self._image.word(first) >> (address - first)
+        return pack_bits([bool(bits >> k & 1) for k in range(count)])
 
     def write_registers(self, address: int, data: bytes, peer: Peer) -> None:
         """Write all or nothing. Refusal says why not; nothing but the last-refusal registers has changed then."""
@@ -145,15 +144,15 @@ class RegisterBank:
     def write_bits(self, address: int, values: Sequence[bool], peer: Peer) -> None:
         """Write coils 0-15: the control word is read, changed and written under the same checks as by register."""
         try:
-            first = self._bit_word(address, len(values))
-            if first != self._bits[0]:
-                raise Refusal(
-                    RefusalReason.READ_ONLY, address, f"bits {first} .. {first + BITS - 1} are status_word, read only"
-                )
+            of = self._bit_words.find(address, len(values))
+            if of is not self._bit_words.control:
+                why = f"bits {of.first} .. {of.last} are {of.name}, read only"
+                raise Refusal(RefusalReason.READ_ONLY, address, why)
             self._catch_up()
-            mask = sum(1 << (address - first + k) for k in range(len(values)))
-            bits = sum(bool(value) << (address - first + k) for k, value in enumerate(values))
-            self._write(first, (self._image.word(first) & ~mask | bits).to_bytes(2, "big"), peer, mask)
+            shift = address - of.first
+            mask = ((1 << len(values)) - 1) << shift
+            bits = sum(bool(value) << k for k, value in enumerate(values)) << shift
+            self._write(of.first, (self._image.word(of.first) & ~mask | bits).to_bytes(2, "big"), peer, mask)
         except Refusal as refusal:
             raise self._note_refused_write(refusal, peer) from None
 
@@ -240,15 +239,6 @@ class RegisterBank:
         self.owner_refused = refusal.sentence if peer.identity == self.owner else self.owner_refused
         self.on_refused_write(refusal, peer)
         return self._note_refusal(refusal, peer)
-
-    def _bit_word(self, address: int, count: int) -> int:
-        """Return the first address of the word that holds all of these bits."""
-        for first in self._bits:
-            if count > 0 and first <= address and address + count <= first + BITS:
-                return first
-        names = zip(("control_word", "status_word"), self._bits, strict=True)
-        words = [Block(name, first, first + BITS - 1) for name, first in names]
-        raise no_such_address(words, address, count)
 
     def _write(self, address: int, data: bytes, peer: Peer, touched: int = ALL_BITS) -> None:
         count = len(data) // 2
