@@ -188,14 +188,22 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if hasattr(config, "workerinput"):
+    is_worker = hasattr(config, "workerinput")
+    if is_worker:
         items.sort(key=lambda item: (begun_at(item.nodeid), item.path))  # stable: within a file nothing moves
-    if config.getoption("--long"):
-        return
+    if not config.getoption("--long"):
+        leave_out_long(items, in_silence=is_worker)
+
+
+def leave_out_long(items: list[pytest.Item], *, in_silence: bool) -> None:
+    """Skip what needs the bigger budget. in_silence: drop it, for to skip a test takes as long as a short one runs."""
     skip = pytest.mark.skip(reason="needs the bigger budget: ./tools/test --long")
-    for item in items:
-        if "long" in item.keywords:
-            item.add_marker(skip)
+    long = [item for item in items if "long" in item.keywords]
+    for item in long:
+        item.add_marker(skip)
+    if in_silence:
+        left_out = set(long)
+        items[:] = [item for item in items if item not in left_out]
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import LONG_WAITS, REAL_TIME, SLOW, SPREAD, begun_at, find_leaks, group_of
+from tests.conftest import LONG_WAITS, REAL_TIME, SLOW, SPREAD, begun_at, find_leaks, group_of, leave_out_long
 from tests.workers import FewMessages, OneCompiler, schedule_groups
 
 TESTS = Path(__file__).parent
@@ -162,3 +162,19 @@ def test_one_worker_compiles_at_a_time_and_a_loop_within_another_waits_for_nobod
     OneCompiler(lock).take_turns(Dispatcher)
     assert Dispatcher(Dispatcher(), Dispatcher()).compile("floats") == "floats"
     assert held == [True] * 6 and is_free()
+
+
+@pytest.mark.parametrize(("in_silence", "left"), [(False, ["short", "long"]), (True, ["short"])])
+def test_what_needs_the_bigger_budget_does_not_run_without_it(in_silence: bool, left: list[str]) -> None:
+    class Item:
+        def __init__(self, name: str, *keywords: str) -> None:
+            self.name, self.keywords, self.marks = name, keywords, list[str]()
+
+        def add_marker(self, mark: pytest.MarkDecorator) -> None:
+            self.marks.append(mark.name)
+
+    items: list[Any] = [Item("short"), Item("long", "long")]
+    short, long = items
+    leave_out_long(items, in_silence=in_silence)
+    assert [item.name for item in items] == left
+    assert (short.marks, long.marks) == ([], ["skip"])

@@ -69,14 +69,18 @@ def request_child(server: socket.socket, module: str, arguments: dict[str, Any],
 
 
 def prepare(options: dict[str, Any]) -> None:
-    """Import what the children need and read the rig once, so that nothing is left to build. Faults are theirs to tell."""
+    """Import what the children need and read the rig once, so that nothing is left to build. Faults are theirs to tell.
+
+    Almost nothing of it is garbage, and to look for that takes an eighth of a start.
+    """
+    gc.disable()
     was = os.environ.setdefault(_ONE_THREAD, "1")
     import_module(RIG)
     import_module(CONTROL).prepare(options)
     if was == "1":
         del os.environ[_ONE_THREAD]  # what control starts later may have more
-    gc.collect()
     gc.freeze()  # a collection in a child would write to every page and so unshare it
+    gc.enable()
 
 
 def serve(link: socket.socket) -> None:

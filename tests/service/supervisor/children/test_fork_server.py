@@ -198,3 +198,18 @@ def test_what_a_child_imports_may_use_all_processors_and_the_server_one_thread(m
     gc.unfreeze()
     assert seen == ["1"]
     assert "OPENBLAS_NUM_THREADS" not in os.environ
+
+
+def test_no_garbage_is_looked_for_until_all_is_read_and_then_in_what_is_new_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looked, frozen = list[bool](), list[bool]()
+
+    def read(*_: object) -> SimpleNamespace:
+        looked.append(gc.isenabled())
+        return SimpleNamespace(prepare=read)
+
+    monkeypatch.setattr(fork_server, "import_module", read)
+    monkeypatch.setattr(gc, "freeze", lambda: frozen.append(gc.isenabled()))
+    fork_server.prepare({})
+    assert looked == [False, False, False] and frozen == [False] and gc.isenabled()
