@@ -14,6 +14,7 @@ from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
 from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import cycles
 from tests.clients.test_edges_and_losses import control_word_of
+from tests.clients.test_guests import set_ramp
 from tests.clients.test_two_tasks import every_place
 
 
@@ -157,3 +158,18 @@ def test_a_force_that_another_master_takes_over_is_in_band_for_nobody_else(clien
     else:
         client.cycle()
     assert client.ended and not any([in_band(client), *seen_in_band(client, 2)])
+
+
+def test_a_command_with_another_word_is_in_band_once_it_is_taken(client: Any, gateway: GatewayAtHand) -> None:
+    """Another voltage, or a narrower band: in band was what stood there before."""
+    if isinstance(client, Irc5):
+        pytest.skip("its program sets fgInBand FALSE itself")
+    client.enable(12.0)
+    cycles(client)
+    assert in_band(client)
+    set_ramp(client)
+    if isinstance(client, Plc):
+        client.scan()
+    assert not in_band(client)
+    cycles(client)
+    assert in_band(client) and gateway.bank.command.force_ramp_n_per_s == 50.0

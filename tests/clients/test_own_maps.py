@@ -232,3 +232,14 @@ def test_a_status_register_of_ones_own_that_is_named_as_a_flag_is_told(language:
             render_client(own, language, WHERE)
     else:
         assert "contact" in render_client(own, language, WHERE).lower()
+
+
+def test_a_force_below_0_that_a_map_of_ones_own_allows_is_asked_for(tmp_path: Path) -> None:
+    """RAPID's own sign for no force is no force that anybody could mean."""
+    force = "name: force_setpoint, address: 1, type: int16, scale: 0.01, unit: N, access: RW, min: 0, max: 327.67"
+    below = own_map(tmp_path, force, force.replace("min: 0", "min: -50"))
+    gateway = GatewayAtHand(below)
+    client = Irc5(render_client(below, "rapid", WHERE), gateway)
+    client.enable(-0.01)
+    cycles(client)
+    assert gateway.requests[-1][:1] == b"\x03" and any(b"\x00\x01\xff\xff" in each for each in gateway.requests)

@@ -573,26 +573,22 @@ int fg_exchange(fg_client *client) {
     return FG_OK;
 }
 
+/* In band is said of what is asked for, and that waits for the next exchange. */
+static void fg_leave_band(fg_client *client) {
+    if (memcmp(client->want, client->good, sizeof client->want) != 0) client->status.in_band = 0;
+}
+
 int fg_set(fg_client *client, int offset, float value, float counts_per_unit) {
     float counts = value * counts_per_unit;
     if (offset < 0 || offset >= FG_COMMAND_WORDS || !(counts >= -32767.5f && counts < 32767.5f)) return FG_RANGE;
     client->want[offset] = (uint16_t)(int16_t)(counts < 0 ? counts - 0.5f : counts + 0.5f);
+    fg_leave_band(client);
     return FG_OK;
 }
 
-/* In band is said of what is asked for, and that waits for the next exchange. */
-static void fg_leave_band(fg_client *client) {
-    if (client->want[FG_CONTROL_WORD] != client->good[FG_CONTROL_WORD] ||
-        client->want[FG_FORCE_SETPOINT] != client->good[FG_FORCE_SETPOINT])
-        client->status.in_band = 0;
-}
-
 int fg_force(fg_client *client, float force_n) {
-    int result = FG_RANGE;
-    if (force_n >= ${force_min}f && force_n <= ${force_max}f)
-        result = fg_set(client, FG_FORCE_SETPOINT, force_n, ${force_counts}.0f);
-    fg_leave_band(client);
-    return result;
+    if (!(force_n >= ${force_min}f && force_n <= ${force_max}f)) return FG_RANGE;
+    return fg_set(client, FG_FORCE_SETPOINT, force_n, ${force_counts}.0f);
 }
 
 int fg_enable(fg_client *client, float force_n) {

@@ -146,6 +146,8 @@ ${bit_constants}
   LOCAL CONST num STATUS_WORDS:=${status_words};
   LOCAL CONST num BACKOFF_FIRST:=0.25;
   LOCAL CONST num BACKOFF_LAST:=4;
+  ! No force: beyond 16 bits
+  LOCAL CONST num NO_COUNTS:=99999;
   LOCAL CONST dnum CRC_START:=4294967295;
   ! CRC-32 of zlib, half a byte at a time
   LOCAL CONST dnum CRC_TABLE{16}:=[
@@ -161,7 +163,7 @@ ${crc_table}];
   LOCAL VAR num nTransaction:=0;
   LOCAL VAR num nHeartbeat:=0;
   ! The force that was refused, in counts: not asked for again
-  LOCAL VAR num nDenied:=-1;
+  LOCAL VAR num nDenied:=NO_COUNTS;
   ! fgPull was refused, and nothing else has been taken since
   LOCAL VAR bool bPullDenied:=FALSE;
   LOCAL VAR num nException:=0;
@@ -300,9 +302,9 @@ ${crc_table}];
       fgTake:=FALSE;
     ENDIF
     ! A reset needs force 0: an enable beside it waits for its answer
-    nCounts:=-1;
+    nCounts:=NO_COUNTS;
     IF fgEnable AND FgMayEnable() nCounts:=FgForceCounts();
-    IF nCounts>=0 THEN
+    IF nCounts<>NO_COUNTS THEN
       IF NOT FgIsOn() fgText:="";
       nWant{FG_C_CONTROL_WORD}:=FG_ENABLE;
       IF fgPull nWant{FG_C_CONTROL_WORD}:=FG_ENABLE+FG_VALVE_PULL;
@@ -315,18 +317,18 @@ ${crc_table}];
   ENDPROC
 
   ! What fgForce asks for. Of a force that was refused, or is none, the
-  ! last accepted one goes on; -1 where there is none to go on with
+  ! last accepted one goes on; NO_COUNTS where there is none
   LOCAL FUNC num FgForceCounts()
     VAR num nForce;
     nForce:=fgForce;
     IF FgIsOn() AND Round(nForce*${force_counts})=nDenied RETURN nGood{FG_C_FORCE_SETPOINT};
-    nDenied:=-1;
+    nDenied:=NO_COUNTS;
     IF nForce>=${force_min} AND nForce<=${force_max} RETURN Round(nForce*${force_counts});
     fgText:="fgForce = "+NumToStr(nForce,2)+" N, allowed ${force_min} .. ${force_max}";
     nDenied:=Round(nForce*${force_counts});
     IF FgIsOn() RETURN nGood{FG_C_FORCE_SETPOINT};
     fgEnable:=FALSE;
-    RETURN -1;
+    RETURN NO_COUNTS;
   ENDFUNC
 
   ! T_ROB1 stands: this task must not keep its force up
