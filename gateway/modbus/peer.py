@@ -27,12 +27,12 @@ class Peer:
     name: str = ""
     role: Role = Role.SETPOINT
     is_behind: bool = field(default=False, compare=False)
+    identity: str = field(init=False, compare=False, repr=False)
+    """Name of the owner when this peer owns the setpoint: the certificate where there is one, else the address. No address
+    reads like a certificate's, so that none can be taken for another."""
 
-    @property
-    def identity(self) -> str:
-        """Name of the owner when this peer owns the setpoint: the certificate where there is one, else the address. No
-        address reads like a certificate's, so that none can be taken for another."""
-        return f"certificate {self.name}" if self.name else self.host
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "identity", f"certificate {self.name}" if self.name else self.host)
 
     def __str__(self) -> str:
         host = f"[{self.host}]" if ":" in self.host and self.port else self.host

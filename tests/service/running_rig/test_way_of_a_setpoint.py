@@ -31,8 +31,9 @@ _STATIONS: Final = {
     "ports/serial_port.py": "write",  # the characters go to the wire
 }
 """File and function (None: any) at which the stack of calls is noted."""
-_WIRING: Final = "service/running_rig/lines/rig_ports.py"
-"""On the way of a real rig, too: its `write_output` stands between the output's exchange and the port."""
+_WIRING: Final = frozenset(("service/running_rig/lines/rig_ports.py", "fieldbus/socket_transport.py"))
+"""On the way of a real rig, too: its `write_output` stands between the output's exchange and the port, and the request comes by
+a socket."""
 
 
 @dataclass
@@ -40,8 +41,8 @@ class Trace:
     """Files of the gateway, relative to its folder. entered: those of all calls; on_the_way: those on the stack of calls
     when the setpoint becomes a voltage, the voltage a frame, and the frame bytes on the wire."""
 
-    entered: set[str] = field(default_factory=lambda: {_WIRING})
-    on_the_way: set[str] = field(default_factory=lambda: {_WIRING})
+    entered: set[str] = field(default_factory=lambda: {*_WIRING})
+    on_the_way: set[str] = field(default_factory=lambda: {*_WIRING})
     stations: set[str] = field(default_factory=set)
 
     def note_call(self, frame: FrameType, event: str, _: object) -> None:
