@@ -130,7 +130,8 @@ class Connection(asyncio.Protocol):
         shared.peers.join(self.peer.host)
         shared.connections.add(self)
         self._rate = shared.peers.rate(self.peer.host, now_s)
-        self._fast_units = frozenset(shared.settings.units if self._rate is None else ())
+        is_plain = self._transport.get_extra_info("modbus_taken") is None  # of TLS one whole frame may be one of a pile
+        self._fast_units = frozenset(shared.settings.units if self._rate is None and is_plain else ())
         self._peer_behind = replace(self.peer, is_behind=True)
         self._known_answers = shared.bank.known_answers if self._fast_units else {}
         self._transport.set_write_buffer_limits(high=shared.settings.write_buffer_bytes)

@@ -178,6 +178,23 @@ def test_what_waits_in_a_pile_of_records_of_one_request_each_is_known_as_asked_f
     assert not any(behind[:60]) and all(behind[150:280]) and not behind[-1]
 
 
+def test_that_is_known_of_a_client_of_this_machine_too(face: Face, folder: Folder) -> None:
+    """One behind a tunnel, say, has no rate; its records went the way of a plain request that comes alone, and the force of one
+    that had hung was kept for 13 s."""
+    line = Line(face, SocketInHand("127.0.0.1"))
+    line.greet(client(folder, "setpoint"))
+    for _ in range(600):
+        line.tls.write(framed(write_registers_request(0, bytes(26))))
+    stream = line.outgoing.read()
+    while stream:
+        if line.socket.reading:
+            stream = stream[deliver(line, stream[:1024]) :]
+        face.clock.advance(0.02)
+    behind = [peer.is_behind for _, _, peer in face.bank.writes]
+    assert len(behind) == 600
+    assert not any(behind[:100]) and all(behind[250:560])
+
+
 def test_a_tls_client_with_forty_requests_under_way_is_not_late(
     face: Face, folder: Folder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
