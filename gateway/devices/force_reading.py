@@ -268,6 +268,12 @@ def _check_signs(template: Template, number: Field, reading: ForceReading) -> No
     says_itself = isinstance(number, Decimals | WholeNumber | Scientific | Plain) and number.sign
     if (sign and reading.negative) or (reading.has_sign_apart and says_itself):
         raise TemplateError(f"{quote(template.text)}: the sign of the force stands here twice")
+    ahead = next((text for text, one in pairwise(template.pieces) if one is number), "")
+    if isinstance(ahead, str) and ahead[-1:] in ("+", MINUS):
+        raise TemplateError(
+            f"{quote(template.text)}: the sign of the force is text here, {ahead[-1]!r}, and always that one: write it into "
+            "the number, such as {force:+07.2f}"
+        )
     for one in template.fields:
         signs = {word.strip() for word in one.words} if isinstance(one, Choice) else set()
         if one.name != SIGN and MINUS in signs and signs <= {MINUS, "+", ""}:

@@ -88,3 +88,30 @@ def test_what_is_read_is_never_said_to_be_in_another_unit() -> None:
     for unit in ("kg", "lb", "g", "N"):
         (message,) = host.receive(f"ST,GS,+0012.34{unit}\r\n".encode(), 0.0)
         assert isinstance(message, ForceSample)
+
+
+@pytest.mark.parametrize(
+    ("name", "exchange", "changes", "hint"),
+    [
+        (
+            "laumas-tlb",
+            "read_force",
+            {"first": 40007, "last": 40011, "weight": 40008},
+            "; a manual's 40008 is 7 on the wire",
+        ),
+        ("waveshare-ao8b", "set_voltage", {"register": 40001}, "; a manual's 40001 is 0 on the wire"),
+        ("waveshare-ao8b", "read_voltage", {"register": 30100, "function": 4}, "; a manual's 30100 is 99 on the wire"),
+        ("waveshare-ao8b", "set_voltage", {"register": 99}, ""),
+    ],
+)
+def test_a_number_that_a_manual_has_is_told_as_one_on_the_wire(
+    name: str, exchange: str, changes: dict[str, object], hint: str
+) -> None:
+    shipped = load_device(name)
+    asked = getattr(shipped, exchange)
+    is_cell = exchange == "read_force"
+    registers = replace(asked.modbus, **changes, **({"negative": None, "overload": ()} if is_cell else {}))
+    said = replace(asked, modbus=registers, ask="", **{"frame" if is_cell else "answer": ""})
+    profile = replace(shipped, **{exchange: said})
+    told = explain_unread(profile, rtu_frame(1, b"8302"))
+    assert told == f"it answers exception 2 (illegal data address): are registers and function those of {name}?{hint}"

@@ -203,6 +203,8 @@ def test_the_simulated_one_is_read_as_what_it_shows(profile: DeviceProfile) -> N
         ("{sign:P|M}{force:8.2f}", "{sign:...} is the sign of the force: one of its words is a minus"),
         ("{sign:1s}{force:8.2f}", "{sign:...} is the sign of the force"),
         ("{sign: |-}{force:+08.2f}", "the sign of the force stands here twice"),
+        ("G+{force:06.2f}", "the sign of the force is text here, '+', and always that one: write it into the number"),
+        ("{count:d},-{force:d}", "the sign of the force is text here, '-', and always that one: write it"),
         ("{force:8.2f}{units:kg|lb}", "the words of {units:...} are units, and would be read over: call it {unit:...}"),
         ("{force:8.2f}{u: kg|  g}", "the words of {u:...} are units"),
         ("{state:ST|US|OL},{force:8.2f}", "{state:...} is read over, and nothing here tells an overload"),

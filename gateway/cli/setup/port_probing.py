@@ -151,6 +151,12 @@ def _tell_heard(report: "PortReport") -> str:
     heard = {settings: data for settings, data in report.heard.items() if data}
     if not heard:
         return f"not one byte at {', '.join(report.heard)}: power, crossed wires, another port?"
+    if refused := next(
+        (f"{words} at {settings}" for settings, data in heard.items() if (words := _exception_of(data))), ""
+    ):
+        return (
+            f"{refused}: it is there, and has no such register or function; a manual's 40008 is register 7 on the wire"
+        )
     settings, data = max(
         heard.items(), key=lambda one: (is_text(one[1]), len(one[1]))
     )  # noise comes at every other speed
@@ -161,6 +167,15 @@ def _tell_heard(report: "PortReport") -> str:
             f"{len(data)} bytes at {settings} that are text of 7 data bits and {parity} parity: {text}; {_IN_A_PROFILE}"
         )
     return f"{len(data)} bytes at {settings} that no profile understands: {show_bytes(data)}"
+
+
+def _exception_of(data: bytes) -> str:
+    """Return what a Modbus device says to a register that it does not have; empty for any other bytes."""
+    from gateway.devices.binary.rtu_framing import answers, exception_text
+
+    frame = next(iter(answers(data[0]).feed(data)), None)
+    text = exception_text(frame.body) if frame and frame.is_whole else ""
+    return f"a Modbus unit {data[0]} answers {text}" if text else ""
 
 
 def _tell_latency(report: "PortReport") -> "Iterator[str]":

@@ -5,9 +5,11 @@ What another speed or noise makes of a line is no text, and nothing is said of i
 """
 
 import re
+from collections.abc import Iterator
 from typing import Final
 
 from gateway.devices.binary.rtu_framing import answers, exception_text
+from gateway.devices.binary.weight_registers import WeightRegisters
 from gateway.devices.fields import Field
 from gateway.devices.force_reading import FORCE, UNIT, units_of
 from gateway.devices.profile import TEMPLATE, DeviceProfile, DeviceRole
@@ -49,7 +51,19 @@ def _explain_exception(profile: DeviceProfile, frame: bytes) -> str:
     """A Modbus device that has no such register says so, and has power and wires."""
     answer = next(iter(answers(profile.unit_id).feed(frame)), None)
     text = exception_text(answer.body) if answer and answer.is_whole else ""
-    return f"it answers {text}: are registers and function those of {profile.name}?" if text else ""
+    hint = next(
+        (f"; a manual's {one} is {(one - 1) % 10_000} on the wire" for one in _numbered_as_in_manuals(profile)), ""
+    )
+    return f"it answers {text}: are registers and function those of {profile.name}?{hint}" if text else ""
+
+
+def _numbered_as_in_manuals(profile: DeviceProfile) -> Iterator[int]:
+    """Yield the registers that are numbers as manuals print them, 30001 and 40001 the first of their kinds."""
+    for exchange in (profile.read_force, profile.set_voltage, profile.read_voltage, profile.read_pressure):
+        access = exchange.modbus if exchange else None
+        register = access.weight if isinstance(access, WeightRegisters) else access.register if access else 0
+        if any(first <= register < first + 10_000 for first in (30_001, 40_001)):
+            yield register
 
 
 def _other_unit(frame: Template, body: bytes) -> tuple[str, str] | None:

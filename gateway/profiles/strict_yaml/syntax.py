@@ -44,6 +44,7 @@ _MEANINGS: Final = tuple(
         ("undefined tag handle", "tags (`!...`) are not used here; quote the text"),
         ("control characters are not allowed", "a control character that no text editor shows: delete it"),
         ("special characters are not allowed", "a control character that no text editor shows: delete it"),
+        ("expected alphabetic", "`*` and `&` name a value of YAML: quote the text that begins so", True),
         ("that cannot start any token", "a value cannot begin with this character: quote the text"),
         ("<document start>", "nothing can follow here: check the spaces before the keys"),
     )

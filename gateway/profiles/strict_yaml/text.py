@@ -151,7 +151,7 @@ class _Reader:
         return self._sequence(events, path)
 
     def _scalar(self, event: Any, path: Path) -> Any:
-        if event.tag not in (None, "!", _TEXT_TAG):
+        if event.tag not in (None, _TEXT_TAG):
             return self._fault(event, path, f"tag `{event.tag}`: tags are not used here; quote the text")
         if event.style in _BLOCKS and not event.value:
             sentence = "begins text on the lines below it, and none is there: quote it where it is meant itself"

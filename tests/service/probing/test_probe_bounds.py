@@ -9,6 +9,7 @@ import pytest
 from gateway.cli.setup.port_probing import tell_report
 from gateway.devices import DeviceProfile, ValveDevice, ValveDirection, cell_device, output_device
 from gateway.devices.binary.register_access import RegisterAccess
+from gateway.devices.binary.rtu_framing import rtu_frame
 from gateway.devices.device_checks.identity import Identity
 from gateway.devices.messages import DeviceAnswer, DeviceStep, ReadPressure
 from gateway.devices.profile import DeviceRole
@@ -98,6 +99,17 @@ def test_what_has_no_harmless_question_is_not_said_to_have_been_silent(heard: by
     (said,) = tell_report(replace(report, heard={"9600 8N1": heard}))
     assert "own has no question that changes nothing, so it was not asked" in said
     assert told in said and "wires" not in said
+
+
+def test_a_modbus_device_that_refuses_is_there_and_what_it_says_is_told_in_words() -> None:
+    report = port_probe.PortReport("/dev/ttyS9", heard={"9600 8N1": rtu_frame(3, b"8302"), "19200 8N1": b"\xff" * 9})
+    (said,) = tell_report(report)
+    told = (
+        "a Modbus unit 3 answers exception 2 (illegal data address) at 9600 8N1: it is there, and has no such register"
+    )
+    assert said.endswith(f"{told} or function; a manual's 40008 is register 7 on the wire")
+    (said,) = tell_report(replace(report, heard={"9600 8N1": rtu_frame(3, b"8302")[:4]}))
+    assert "4 bytes at 9600 8N1 that no profile understands" in said
 
 
 @pytest.mark.parametrize("baud", [300, 9600])
