@@ -7,12 +7,14 @@ effect, with the rules of every search, judged by the new recordings only; what 
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import hypot
 from typing import Final
 
 from gateway import progress
 from gateway.diagnosis.changes.change_effects import change_effects
 from gateway.diagnosis.changes.machine import JointModel, MachineModel, describe_machine, join_recordings
 from gateway.diagnosis.changes.new_evidence import take_new_evidence
+from gateway.diagnosis.changes.other_machine import doubt_machine
 from gateway.diagnosis.diagnose import Options, diagnosis_of_wrong_columns, with_readings_of
 from gateway.diagnosis.excerpt import MOST_ROWS, take_excerpt
 from gateway.diagnosis.input_checks import find_suspects
@@ -52,8 +54,11 @@ def find_changes(
     if any(each.is_sure for each in suspected):
         return diagnosis_of_wrong_columns(new, given, suspected)
     progress.report("describing the machine by its older recordings")
-    result = compare_with_machine(new, describe_machine(old, given, options), given, options)
-    return replace(result, suspects=suspected)
+    machine = describe_machine(old, given, options)
+    result = compare_with_machine(new, machine, given, options)
+    of_old = doubt_machine(old, hypot(machine.error.common_n, machine.error.left_n))
+    doubts = of_old or doubt_machine(new, result.baseline.rms_n)
+    return replace(result, suspects=suspected, notes=(*doubts, *result.notes))
 
 
 @one_blas_thread()

@@ -187,7 +187,7 @@ def test_bounds_that_follow_the_band_grow_with_it() -> None:
 
 def test_what_friction_may_keep_at_rest_is_told_beside_the_bound_of_a_zero() -> None:
     keeping = Bsfm(Branches(CURVE, RationalBezier(0.0, 8.0, [4.0, 34.0, 57.0], [1.0, 1.0, 1.0])), LinearBlend(6.0))
-    assert "that friction may keep" in judge_zero(0.1, replace(RIG, model=keeping)).text
+    assert ", both beyond the 5.2 N that friction may keep" in judge_zero(0.1, replace(RIG, model=keeping)).text
     assert "friction" not in judge_zero(0.1, RIG).text
 
 

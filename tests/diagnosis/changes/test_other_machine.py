@@ -1,0 +1,51 @@
+"""A recording of something else, given for one of the same machine: it is doubted, and what has only changed is not."""
+
+import numpy as np
+import pytest
+
+from gateway.diagnosis import Measurement, Options, find_changes
+from gateway.diagnosis.changes.other_machine import doubt_machine
+from tests.diagnosis.changes.foreign_rig import Wish, record
+
+DURATION_S = 10.0
+
+
+def unrelated() -> Measurement:
+    """A force that goes its own way."""
+    time_s, rng = 0.01 * np.arange(3000), np.random.default_rng(3)
+    wander_n = sum(2.5 * np.sin(rate * time_s + rate) for rate in (0.91, 1.73, 3.1, 5.3))
+    return Measurement(
+        name="unrelated.csv",
+        time_s=time_s,
+        force_n=20.0 + wander_n + rng.normal(0.0, 0.3, time_s.size),
+        usable=np.ones(time_s.size, dtype=bool),
+        repeated=np.zeros(time_s.size, dtype=bool),
+        command_v=3.0 + 2.0 * np.sin(2.7 * time_s),
+    )
+
+
+@pytest.mark.parametrize("is_old", [True, False], ids=["given as the old one", "given as the new one"])
+def test_a_file_of_something_else_is_doubted(is_old: bool) -> None:
+    """`Something has changed on this machine` was all that its answer said."""
+    own, _ = record(Wish(seed=3, duration_s=DURATION_S))
+    new, old = (own, unrelated()) if is_old else (unrelated(), own)
+    found = find_changes([new], [old], None, Options())
+    assert found.notes and found.notes[0].startswith("unrelated.csv: drive and model explain ")
+
+
+def test_a_machine_that_has_changed_is_not_doubted() -> None:
+    old, _ = record(Wish(seed=103, duration_s=DURATION_S))
+    new, _ = record(Wish(seed=3, effect="leak", size=2.0, duration_s=DURATION_S))
+    found = find_changes([new], [old], None, Options())
+    assert not any("same machine" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("left_n", "doubts"), [(2.0, 0), (3.0, 1)])
+def test_from_half_of_the_variance_on_it_is_the_machines(left_n: float, doubts: int) -> None:
+    assert len(doubt_machine([unrelated()], left_n)) == doubts
+
+
+def test_a_force_that_is_held_moves_by_its_noise_alone() -> None:
+    held = unrelated()
+    held.force_n[:] = 12.0 + np.random.default_rng(5).normal(0.0, 0.1, held.rows)
+    assert doubt_machine([held], 0.1) == () == doubt_machine([], 1.0)
