@@ -288,12 +288,12 @@ class Simulation:
         if is_watched or self._was_watched:
             self._follow_person(is_watched)
             self.lease.note_local_run(self.clock.now_s)
-        if self.service.is_serving:
+        if is_serving := self.service.is_serving:
             self.observer.note_serving(self.clock.now_s)
         self.around.look()
         self.around.tell_reasons(self.reasons)
         self.zeros.note_settings(self.around.world.settings.values, self.clock.now_s)
-        if self.service.is_standing:
+        if not is_serving:
             self.reasons.note(MACHINE, self.clock.now_s)
         self.observer.look(self.clock.now_s)
         self.lease.look(self.clock.now_s)
@@ -330,8 +330,7 @@ class Simulation:
 
     def _judge_unheard(self) -> None:
         """Who only reads is answered at once, whatever the others do, as long as the process stands still for nobody."""
-        is_there = self.service.is_serving and not self.service.is_standing
-        self._unheard = 0 if self.reader.heard or not is_there else self._unheard + 1
+        self._unheard = 0 if self.reader.heard or not self.service.is_serving else self._unheard + 1
         if self._unheard > MOST_UNHEARD:
             self.observer.complain("I12", "a master that only reads is not answered", self.clock.now_s)
             self._unheard = 0

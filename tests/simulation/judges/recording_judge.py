@@ -127,12 +127,15 @@ def _judge_laid(
             zeros_n, before_n = _zeros(row["force_n"], force_n, history), zeros_n
             same_n = tuple(one for one in before_n if any(abs(one - other) < COUNT_N for other in zeros_n))
             since_s, known_s = at_s - known_s + NEW_ZERO_S, at_s  # what came between was no plain reading
-            is_new = at_s >= history.weighed_s or _is_near(history.tares, at_s + HEARD_S, since_s + HEARD_S)
-            if before_n and not same_n and not is_new:
+            if before_n and not same_n and not _is_zero_new(history, at_s, since_s):
                 yield f"{force_n:.2f} N came at {at_s:.4f}, and it tells {row['force_n']:.2f} N, the zero at {before_n} N"
             zeros_n = same_n or zeros_n
         if isfinite(row["sent_v"]) and not _was_sent(row, at_s - row["sent_age_s"], settings, history):
             yield f"{row['sent_v']:.3f} V at {at_s - row['sent_age_s']:.4f} never came to the output"
+
+
+def _is_zero_new(history: History, at_s: float, since_s: float) -> bool:
+    return at_s >= history.weighed_s or _is_near(history.tares, at_s + HEARD_S, since_s + HEARD_S)
 
 
 def _zeros(told_n: float, force_n: float, history: History) -> tuple[float, ...]:

@@ -97,9 +97,10 @@ class Cable:
     @property
     def is_disturbed(self) -> bool:
         """Whether what its device says does not arrive as it says it, or has not a moment ago."""
-        is_strange = self._outside.time() - self.falsified_s < STRANGE_S
+        strange_since_s = self._outside.time() - STRANGE_S
         return (
-            is_strange
+            self.strange_s > strange_since_s
+            or self.spoiled_s > strange_since_s
             or bool(self._spoils)
             or not self.is_plugged
             or self.is_deaf

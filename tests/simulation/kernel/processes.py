@@ -169,12 +169,8 @@ class SimulatedService:
 
     @property
     def is_serving(self) -> bool:
+        """Whether control works: it is there, listens, and is not stopped."""
         return self.inside is not None and bool(self.inside.servers) and not self.inside.is_halted
-
-    @property
-    def is_standing(self) -> bool:
-        """Whether control does nothing now: it is gone, not there yet, or stopped."""
-        return not self.is_serving or self._processes[-1].loop.is_halted
 
     @property
     def is_guarded(self) -> bool:

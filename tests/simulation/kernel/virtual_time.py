@@ -80,7 +80,8 @@ class VirtualClock:
                     handle = ready.popleft()
                 elif timers and timers[0][0] <= end_s:
                     when_s, _, handle = heappop(timers)
-                    self.now_s = max(self.now_s, when_s)
+                    if when_s > self.now_s:
+                        self.now_s = when_s
                 else:
                     self.now_s = max(self.now_s, end_s)
                     return
