@@ -35,7 +35,7 @@ def test_a_round_in_which_the_host_took_a_processor_decides_nothing(fails: bool)
             raise ConnectionResetError
         return 0.01, 0.2
 
-    fault, scene = Fault("any", act, None, None), Any
+    fault, scene = Fault("any", act, 0.005, None), Any
     assert undisturbed(fault, scene, iter([{"cpu0": 1.0}, {"cpu0": 1.0 + STOLEN_S}]).__next__) is None
     calm = iter([{"cpu0": 1.0}, {"cpu0": 1.01}]).__next__
     if fails:
