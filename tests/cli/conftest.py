@@ -32,6 +32,11 @@ class PlainBank:
     refuse: dict[int, tuple[int, RefusalReason]] = field(default_factory=dict)
     identity: Mapping[int, bytes] = field(default_factory=dict)
 
+    @property
+    def known_answers(self) -> dict[bytes, bytes]:
+        """None is known: each read is counted."""
+        return {}
+
     def __post_init__(self) -> None:
         self.set("map_hash", self.register_map.map_hash)
 

@@ -79,7 +79,9 @@ def test_it_looks_five_times_a_second_however_long_a_look_takes(monkeypatch: pyt
     assert slept == [pytest.approx(0.15), 0.0]
 
 
-def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(
+    ua: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     did = list[Any]()
 
     class Server:
@@ -110,7 +112,7 @@ def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(m
         async def show(self, state: object) -> None:
             did.append(state)
 
-    monkeypatch.setattr(opcua_process, "import_library", lambda _name: SimpleNamespace(ua=None, Server=Server))
+    monkeypatch.setattr(opcua_process, "import_library", lambda _name: SimpleNamespace(ua=ua, Server=Server))
     monkeypatch.setattr(opcua_process, "bound_connections", lambda wire, log: did.append(wire.__name__))
     monkeypatch.setattr(opcua_process, "bound_publishing", lambda service, least_s: did.append((service, least_s)))
     monkeypatch.setattr(opcua_process, "GatewayNodes", Nodes)

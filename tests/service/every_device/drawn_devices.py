@@ -186,4 +186,6 @@ def drawn_counts(rng: Random) -> Profile:
     profile = _about(rng, "load cell") | {"terminator": "\r\n", "question_terminator": ";", "checksum": "none"}
     reading = {"frame": "{force:d}", "ask": "MSV?", "before": "STP", "newton_per_count": 0.01, "zero_count": 840.0}
     reading["end_count"] = 8388607
+    if rng.random() < 0.5:
+        reading["before_answer"] = "OK"
     return profile | {"read_force": reading}
