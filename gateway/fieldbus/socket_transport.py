@@ -10,12 +10,15 @@ import select
 import socket
 from collections.abc import Callable
 from contextlib import suppress
+from time import monotonic
 from typing import Any, Final
 
 READ_BYTES: Final = 1024  # of one socket at once: 85 reads of registers, or four of the longest requests
 _READABLE: Final = 1  # EPOLLIN; with it come EPOLLERR and EPOLLHUP, which a read explains
 _WRITABLE: Final = 4  # EPOLLOUT
 _MOST_AT_ONCE: Final = 64
+_BUSY: Final = 8  # at once: others have something by then, and a turn of the loop costs as much as a request
+IN_A_ROW_S: Final = 500e-6  # so long at most: control waits meanwhile
 _MOST_WAITING_BYTES: Final = 65536
 
 
@@ -69,9 +72,13 @@ class ReadySockets:
         loop.add_writer(descriptor, serve, _WRITABLE) if events & _WRITABLE else loop.remove_writer(descriptor)
 
     def _serve(self, poll: Callable[[float, int], list[tuple[int, int]]]) -> None:
-        serve_by_descriptor = self._serve_by_descriptor
-        for descriptor, events in poll(0, _MOST_AT_ONCE):
-            serve_by_descriptor[descriptor](events)
+        serve_by_descriptor, ends_s = self._serve_by_descriptor, monotonic() + IN_A_ROW_S
+        while True:
+            ready = poll(0, _MOST_AT_ONCE)
+            for descriptor, events in ready:
+                serve_by_descriptor[descriptor](events)
+            if len(ready) < _BUSY or monotonic() >= ends_s:
+                return
 
 
 class SocketTransport:
@@ -100,7 +107,7 @@ class SocketTransport:
 
     def serve(self, events: int) -> None:
         """Read once, and send what waits: called when one of these events has come."""
-        if events & ~_READABLE and self._waiting:
+        if events != _READABLE and self._waiting:
             self._flush()
         if not self._is_reading:
             return

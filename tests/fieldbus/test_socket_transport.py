@@ -1,13 +1,15 @@
 """Accepted sockets under one epoll, and each by itself as off Linux; on both loops."""
 
 import asyncio
+import itertools
 import socket
 from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 
-from gateway.fieldbus.socket_transport import READ_BYTES, ReadySockets, SocketTransport
+from gateway.fieldbus import socket_transport
+from gateway.fieldbus.socket_transport import IN_A_ROW_S, READ_BYTES, ReadySockets, SocketTransport
 
 EITHER = pytest.mark.parametrize("has_epoll", [True, False])
 
@@ -101,6 +103,31 @@ def test_all_that_have_something_are_served_in_one_turn_of_the_loop(run: Any) ->
         assert all(protocol.heard == [b"x"] for protocol in scene.ends)
         await scene.end()
 
+    run(main())
+
+
+@pytest.mark.parametrize(("sockets", "rounds"), [(7, 1), (8, 3)])
+def test_many_that_have_more_at_once_are_served_again_for_so_long_at_most(
+    run: Any, monkeypatch: pytest.MonkeyPatch, sockets: int, rounds: int
+) -> None:
+    clock_s = itertools.count(0.0, 1.01 / 3 * IN_A_ROW_S)
+    monkeypatch.setattr(socket_transport, "monotonic", lambda: next(clock_s))
+
+    def ask_again(transport: SocketTransport, _: bytes) -> None:
+        number = [protocol.transport for protocol in scene.ends].index(transport)
+        if len(scene.ends[number].heard) < 50:  # or a loop that never gets its turn would be none for the test, either
+            scene.far[number].send(b"x")
+
+    async def main() -> None:
+        nonlocal scene
+        scene = Scene([ask_again] * sockets)
+        for far in scene.far:
+            far.send(b"x")
+        await scene.until(lambda: any(protocol.heard for protocol in scene.ends))
+        assert [len(protocol.heard) for protocol in scene.ends] == [rounds] * sockets
+        await scene.end()
+
+    scene: Scene
     run(main())
 
 
