@@ -156,8 +156,9 @@ class ModbusRtuServer:
         if monotonic_s() - self._due_s > STANDSTILL_S:
             self.note_standstill()
         requests = self._receiver.take(monotonic_s())
-        if asked := sum(request.unit != BROADCAST_UNIT for request in requests):
-            self._piles_since_s = None if asked == 1 else self._piles_since_s or monotonic_s()
+        if requests:  # nobody waits for the answer to a broadcast: one may have another request right behind it
+            most = 2 if any(request.unit == BROADCAST_UNIT for request in requests) else 1
+            self._piles_since_s = None if len(requests) <= most else self._piles_since_s or monotonic_s()
         for request in requests:
             self._execute(request)
         now_s = monotonic_s()

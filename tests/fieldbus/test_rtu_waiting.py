@@ -11,7 +11,7 @@ from gateway.fieldbus import ModbusRtuServer, RtuSettings, rtu_server
 from gateway.fieldbus.rtu_server import STANDSTILL_S
 from gateway.modbus import Peer
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.modbus.rtu import encode_adu
+from gateway.modbus.rtu import BROADCAST_UNIT, encode_adu
 from gateway.modbus.rtu_receiver import RtuRequest, silence_s
 from tests.fieldbus.conftest import NotingBank
 
@@ -106,11 +106,12 @@ def test_what_waited_through_a_standstill_is_executed_for_a_stop_may_be_in_it(sc
 
 
 @pytest.mark.parametrize(("at_once", "has_waited"), [(3, True), (1, False)])
+@pytest.mark.parametrize("unit", [3, BROADCAST_UNIT])
 def test_requests_of_who_waits_for_no_answers_have_waited_after_a_quarter_of_a_second(
-    scene: Scene, at_once: int, has_waited: bool
+    scene: Scene, unit: int, at_once: int, has_waited: bool
 ) -> None:
-    """Its adapter's pile, a thousand heartbeats, kept a force for four seconds behind the end of its master."""
-    heartbeats = [encode_adu(3, P.write_registers_request(4, pack(">H", beat))) for beat in range(120)]
+    """Its adapter's pile, a thousand heartbeats, kept a force for four seconds behind its master; ten by broadcast."""
+    heartbeats = [encode_adu(unit, P.write_registers_request(4, pack(">H", beat))) for beat in range(120)]
     for first in range(0, 120, at_once):
         scene.hear(b"".join(heartbeats[first : first + at_once]), *[b""] * 2)
     late = [peer.is_behind for _, _, peer in scene.bank.writes]
@@ -118,6 +119,15 @@ def test_requests_of_who_waits_for_no_answers_have_waited_after_a_quarter_of_a_s
     assert not any(late[:24]) and all(late[30:]) is has_waited
     scene.hear(heartbeats[0])
     assert not scene.bank.writes[-1][2].is_behind, "it waits for answers again"
+
+
+def test_a_request_right_behind_a_broadcast_is_no_pile(scene: Scene) -> None:
+    """Nobody answers a broadcast, so nobody waits for that."""
+    heartbeat = P.write_registers_request(4, bytes(2))
+    for _ in range(60):
+        scene.hear(encode_adu(BROADCAST_UNIT, heartbeat) + encode_adu(3, heartbeat), b"")
+    assert len(scene.bank.writes) == 120
+    assert not any(peer.is_behind for _, _, peer in scene.bank.writes)
 
 
 def test_a_master_that_asks_again_what_it_has_given_up_has_not_waited(scene: Scene) -> None:
