@@ -159,19 +159,24 @@ def test_certificates_are_judged_by_utc_wherever_the_machine_stands() -> None:
     assert f"{time.strftime('%Y%m%d%H%M%S', before)}Z" <= now <= f"{time.strftime('%Y%m%d%H%M%S', after)}Z"
 
 
-def test_what_waits_in_a_pile_of_records_of_one_request_each_is_known_as_asked_for_a_while_ago(
-    face: Face, folder: Folder
-) -> None:
-    """None of them fills a connection's buffer: of a master that was long gone each heartbeat counted."""
-    line = Line(face, SocketInHand("192.0.2.7"))
+def send_pile(face: Face, folder: Folder, host: str, records: int, turn_s: float) -> None:
+    """Have records of one request each wait in the socket, and the loop turn once in so long."""
+    line = Line(face, SocketInHand(host))
     line.greet(client(folder, "setpoint"))
-    for _ in range(300):
+    for _ in range(records):
         line.tls.write(framed(write_registers_request(0, bytes(26))))
     stream = line.outgoing.read()
     while stream:
         if line.socket.reading:
             stream = stream[deliver(line, stream[:1024]) :]
-        face.clock.advance(0.005)
+        face.clock.advance(turn_s)
+
+
+def test_what_waits_in_a_pile_of_records_of_one_request_each_is_known_as_asked_for_a_while_ago(
+    face: Face, folder: Folder
+) -> None:
+    """None of them fills a connection's buffer: of a master that was long gone each heartbeat counted."""
+    send_pile(face, folder, "192.0.2.7", 300, 0.005)
     face.clock.advance(1.0)
     behind = [peer.is_behind for _, _, peer in face.bank.writes]
     assert len(behind) == 300
@@ -181,15 +186,7 @@ def test_what_waits_in_a_pile_of_records_of_one_request_each_is_known_as_asked_f
 def test_that_is_known_of_a_client_of_this_machine_too(face: Face, folder: Folder) -> None:
     """One behind a tunnel, say, has no rate; its records went the way of a plain request that comes alone, and the force of one
     that had hung was kept for 13 s."""
-    line = Line(face, SocketInHand("127.0.0.1"))
-    line.greet(client(folder, "setpoint"))
-    for _ in range(600):
-        line.tls.write(framed(write_registers_request(0, bytes(26))))
-    stream = line.outgoing.read()
-    while stream:
-        if line.socket.reading:
-            stream = stream[deliver(line, stream[:1024]) :]
-        face.clock.advance(0.02)
+    send_pile(face, folder, "127.0.0.1", 600, 0.02)
     behind = [peer.is_behind for _, _, peer in face.bank.writes]
     assert len(behind) == 600
     assert not any(behind[:100]) and all(behind[250:560])
