@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 COMPILE = [sys.executable, str(ROOT / "tools" / "compile_wheel")]
 WHERE = "from gateway.modbus import fast; from gateway.registers import bank; print(bank.__file__, fast.__file__)"
 ROOMS = ("tests/modbus", "tests/fieldbus", "tests/registers", "tests/simulation")
-REPLACES_A_METHOD = "the_short_way_of_a_plain_write"  # machine code has its methods for good
+REPLACES_A_METHOD = "(the_short_way_of_a_plain_write or repeated_writes)"  # machine code has its methods for good
 
 
 def test_without_a_compiler_it_says_so_and_writes_nothing(tmp_path: Path) -> None:

@@ -24,8 +24,8 @@ from gateway.modbus.peer import NOBODY
 from gateway.registers.command import Command, Status
 from gateway.registers.identity import build_identity, build_server_id
 from gateway.registers.image import RegisterImage
-from gateway.registers.map.addresses import no_such_address
-from gateway.registers.map.bit_words import BitWords
+from gateway.registers.map.addresses import no_such_address, read_only
+from gateway.registers.map.bit_words import BitWords, mask_of_bits
 from gateway.registers.map.register_map import Block, RegisterMap
 from gateway.registers.refusal import Refusal, request_refusal
 from gateway.registers.rig_rules import BankRules
@@ -50,8 +50,8 @@ from gateway.registers.writes.proposed_write import Decide
 class RegisterBank:
     """Implements gateway.modbus.DataBank. Single-threaded; callbacks run inside the write or read that causes them.
 
-    on_command: each accepted command write; on_refusal: each refusal; on_accepted: a sentence for each write that changed
-    something besides heartbeat and sequence; on_write, on_refused_write: each, for the audit. now: monotonic clock in s.
+    on_command: each accepted command write; on_refusal: each refusal; on_accepted: a sentence for each write that changed more
+    than heartbeat and sequence; on_write (none that repeats the last), on_refused_write: each, for the audit. now: s.
     """
 
     def __init__(self, register_map: RegisterMap, rules: BankRules, *, now: Callable[[], float]) -> None:
@@ -70,16 +70,17 @@ class RegisterBank:
         self._command_block, self._command_role = register_map.block("command"), self._roles["command"]
         self._commands = CommandBlock(register_map, rules, self._image)
         self._status = StatusBlock(register_map, self._image)
+        self.show_watchdogs = self._status.show_watchdogs
         self._tell_status: Callable[[], Status] | None = None
         self.self_test = SelfTestWords(register_map, self._image)
         self._ownership, self._owner_peer = Ownership(rules.owner), NOBODY
         self.owner_refused = ""  # why the last write of who owns was, empty where it was taken
         self._echo = ByteOrderEcho(register_map.find("byte_order_echo"), self._image)
         self._admission = Admission(self._commands, self._ownership, self._echo, rules)
+        self._repeated = self._admission.repeated
         self.held_runs = self._admission.held_runs
         self.staging = StagingBlock(register_map, self._image)
         self._image.put(register_map.find("map_version"), register_map.version)
-        self._watchdogs = next((one for one in register_map.registers if one.name == "watchdogs"), None)
         self._image.put(register_map.find("map_hash"), register_map.map_hash)
         self._bit_words = BitWords(register_map)
         self._show_owner()
@@ -128,12 +129,27 @@ class RegisterBank:
     def write_registers(self, address: int, data: bytes, peer: Peer) -> None:
         """Write all or nothing. Refusal says why not; nothing but the last-refusal registers has changed then."""
         try:
-            if self._is_command(address, len(data) // 2, peer):
+            if address == self._command_block.first and self._repeat(data, peer):
+                pass
+            elif self._is_command(address, len(data) // 2, peer):
                 self._write_command(self._command_block, address, data, peer)
             else:
                 self._write(address, data, peer)
         except Refusal as refusal:
             raise self._note_refused_write(refusal, peer) from None
+
+    def _repeat(self, data: bytes, peer: Peer) -> bool:
+        """Take a write that repeats the last one with another heartbeat; False where it is another one."""
+        now_s = self._now()
+        if (again := self._repeated.take(data, peer, self.command, now_s)) is None:
+            return False
+        self.command, self.owner_refused = again, ""
+        if peer is not self._owner_peer and peer.identity == self._ownership.owner:
+            self._owner_peer = peer
+            self._show_owner()
+        self.on_command(again)
+        self._writers.note(self._repeated.names, peer, now_s)
+        return True
 
     def _is_command(self, address: int, count: int, peer: Peer) -> bool:
         """Whether `_write` would hand this to the command block: the commonest write, found out in one look."""
@@ -149,9 +165,7 @@ class RegisterBank:
                 why = f"bits {of.first} .. {of.last} are {of.name}, read only"
                 raise Refusal(RefusalReason.READ_ONLY, address, why)
             self._catch_up()
-            shift = address - of.first
-            mask = ((1 << len(values)) - 1) << shift
-            bits = sum(bool(value) << k for k, value in enumerate(values)) << shift
+            mask, bits = mask_of_bits(address - of.first, values)
             self._write(of.first, (self._image.word(of.first) & ~mask | bits).to_bytes(2, "big"), peer, mask)
         except Refusal as refusal:
             raise self._note_refused_write(refusal, peer) from None
@@ -245,7 +259,7 @@ class RegisterBank:
         if not 0 < count <= self._room[address]:
             raise no_such_address(self._map.blocks, address, count)
         if count > self._image.writable[address]:
-            raise self._read_only(address + self._image.writable[address])
+            raise read_only(self._image.register_at[address + self._image.writable[address]])
         block = self._image.block_at[address]
         if peer.role < (needed := self._roles[block.name]):
             raise role_refusal(peer, block, needed, address)
@@ -263,16 +277,6 @@ class RegisterBank:
         else:
             check_zeros(address, data)
 
-    def _read_only(self, address: int) -> Refusal:
-        register = self._image.register_at[address]
-        text = f"{register.name}@{register.block} at {register.address} is read only"
-        return Refusal(RefusalReason.READ_ONLY, address, text)
-
-    def show_watchdogs(self, word: int) -> None:
-        """Show which watchdogs watch the output (WatchdogBit); a map of one's own may leave the register out."""
-        if self._watchdogs is not None:
-            self._image.put(self._watchdogs, word)
-
     def _write_echo(self, address: int, data: bytes, peer: Peer) -> None:
         if (order := self._echo.write(address, data, peer.identity)) is not None:
             self._writers.note(("byte_order_echo",), peer, self._now())
@@ -287,9 +291,11 @@ class RegisterBank:
         self._commands.store(admitted.values, admitted.kept)
         self._admission.note_stored(admitted)
         self._settle_owner(admitted, write.host, peer)
+        names = self._commands.names(write.block, write.address, len(write.data) // 2)
+        if admitted.is_plain and address == self._command_block.first:
+            self._repeated.note(data, peer, admitted.command, names)
         self.command = admitted.command
         self.on_command(self.command)
-        names = self._commands.names(write.block, write.address, len(write.data) // 2)
         is_guest = owner not in (None, write.host) and not admitted.is_taken_over  # nothing else of its write was taken
         self._writers.note(names[:1] if is_guest else names, peer, now_s)
         if self.on_write is not None:

@@ -108,6 +108,7 @@ class StatusBlock:
         self._runs = tuple(_runs(register_map, published))
         self._own = {name: _faces(register_map, name) for name in BANK_REGISTERS}
         self._shown_owner: tuple[str | None, str] | None = None
+        self._watchdogs = next((one for one in register_map.registers if one.name == "watchdogs"), None)
 
     def publish(self, status: Status) -> None:
         """Write everything that control and service know into all three faces."""
@@ -144,6 +145,11 @@ class StatusBlock:
         self._shown_owner = shown
         is_known = commander.identity == owner  # else the rig names it, and it has not commanded
         self._put("owner_ip", ip_number(commander.host if is_known else owner))
+
+    def show_watchdogs(self, word: int) -> None:
+        """Show which watchdogs watch the output (WatchdogBit); a map of one's own may leave the register out."""
+        if self._watchdogs is not None:
+            self._image.put(self._watchdogs, word)
 
     def show_refusal(self, refusal: Refusal) -> None:
         """Show the last refused write: its address, reason and value."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from gateway.codes.refusals import OFF_BY_ONE, RefusalReason
-from gateway.registers.map.register_map import Block
+from gateway.registers.map.register_map import Block, Register
 from gateway.registers.refusal import Refusal
 
 _BEFORE_THE_FIRST: Final = 0xFFFF
@@ -23,6 +23,12 @@ def no_such_address(blocks: Sequence[Block], address: int, count: int) -> Refusa
     verb = "is" if count == 1 else "are"
     elsewhere = f"{_range(address, count)} {verb} not in one block; blocks are {ranges}"
     return Refusal(RefusalReason.ADDRESS, address, _explain_name_as_address(address) or elsewhere)
+
+
+def read_only(register: Register) -> Refusal:
+    """Return the refusal of a write to a register that can only be read."""
+    text = f"{register.name}@{register.block} at {register.address} is read only"
+    return Refusal(RefusalReason.READ_ONLY, register.address, text)
 
 
 def _range(address: int, count: int) -> str:

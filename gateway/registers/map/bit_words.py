@@ -1,5 +1,6 @@
 """The two words whose bits can be read, and of one written, one by one: as coils and discrete inputs."""
 
+from collections.abc import Sequence
 from typing import Final
 
 from gateway.registers.map.addresses import no_such_address
@@ -22,3 +23,9 @@ class BitWords:
             if count > 0 and word.first <= address and address + count - 1 <= word.last:
                 return word
         raise no_such_address(words, address, count)
+
+
+def mask_of_bits(shift: int, values: Sequence[bool]) -> tuple[int, int]:
+    """Return which bits of a word these values from bit `shift` on are, and what they make of them."""
+    mask = ((1 << len(values)) - 1) << shift
+    return mask, sum(bool(value) << k for k, value in enumerate(values)) << shift

@@ -9,11 +9,12 @@ alone keeps the output: then the bit takes enable's place. Of who owns nothing a
 with it: taken for a stop alone, a guest's tare would be the end of the force, and its answer a lie.
 """
 
-from collections.abc import Callable
-from typing import Final, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, Final, NamedTuple
 
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
+from gateway.modbus.peer import NOBODY
 from gateway.registers.command import Command
 from gateway.registers.map.register_map import Block
 from gateway.registers.refusal import Refusal
@@ -41,6 +42,11 @@ STARTS: Final = ENABLE | RUN_BITS
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
 ALL_BITS: Final = 0xFFFF
+_BEFORE: Final = 2 * HEARTBEAT
+_BEHIND: Final = _BEFORE + 2
+_AT_HEARTBEAT: Final = Command._fields.index("heartbeat")
+_AT_NUMBER: Final = Command._fields.index("number")
+_AT_RECEIVED: Final = Command._fields.index("received_s")
 _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
 
 
@@ -58,7 +64,8 @@ class Write(NamedTuple):
 
 class AdmittedWrite(NamedTuple):
     """values: to store; kept: control word that reads back; command: what control gets, edge bits included; is_stop: the
-    output goes off; is_taken_over: this host owns from now on, explicitly; held: bits of runs that this host keeps at 1."""
+    output goes off; is_taken_over: this host owns from now on, explicitly; held: bits of runs that this host keeps at 1;
+    is_plain: no bit rises or falls."""
 
     values: Values
     kept: int
@@ -66,6 +73,7 @@ class AdmittedWrite(NamedTuple):
     is_stop: bool
     is_taken_over: bool
     held: int
+    is_plain: bool = False
 
 
 OnWrite = Callable[[Peer, Values, AdmittedWrite, tuple[str | None, str | None]], None]
@@ -102,6 +110,7 @@ class Admission:
         self._ownership = ownership
         self._echo = echo
         self._rules = rules
+        self.repeated = RepeatedWrite(self, commands, ownership)
 
     def admit(self, write: Write, number: int, now_s: float) -> AdmittedWrite | None:
         """Return what a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
@@ -113,7 +122,7 @@ class Admission:
         if asked == before[CONTROL_WORD] and self._is_plain(write, asked):
             command = commands.command(values, asked, number, now_s, write.host)
             self._ask(command, values, write)
-            return AdmittedWrite(values, asked, command, False, False, 0)
+            return AdmittedWrite(values, asked, command, False, False, 0, is_plain=True)
         permitted = self._permit(write, values)
         if permitted is None:
             self.held_runs.keep(write.host, self._held_by(write, asked, asked))
@@ -147,9 +156,12 @@ class Admission:
     def _is_plain(self, write: Write, word: int) -> bool:
         """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, it held none, nothing
         was lowered, no run has the output, it has not waited. What the checks below would find is known."""
-        is_special = write.has_waited or write.host in self.held_runs.by_host
-        is_usual = not (is_special or self.lowered_from_n or self.is_calibrating or word & RUN_BITS_OR_EDGES)
+        is_usual = not (write.has_waited or word & RUN_BITS_OR_EDGES) and self.is_usual(write.host)
         return is_usual and self._ownership.admits(write.host)
+
+    def is_usual(self, host: str) -> bool:
+        """Return whether nothing makes a host's writes special: no bit that it held, no lowered setpoint, no run."""
+        return not (self.lowered_from_n or self.is_calibrating or host in self.held_runs.by_host)
 
     # -- what the write asks for
 
@@ -238,3 +250,52 @@ class Admission:
             name = str(ControlBit(rises & STARTS & -(rises & STARTS)).name).lower()
             text = f"{name} refused: this rig wants 1234.5 in byte_order_echo first, in your client's word order"
             raise Refusal(RefusalReason.BYTE_ORDER_UNPROVEN, word_at, text, value=float(written))
+
+
+class RepeatedWrite:
+    """The commonest write of a master that writes in cycles: its last plain one once more, with another heartbeat.
+
+    All that was found good about the last one still is when the same master sends the same words of the int16 block and nothing
+    that they were judged by has changed; control is asked as of any write. Whatever is not plainly this case, or is refused, is
+    judged as all others are.
+    """
+
+    def __init__(self, admission: Admission, commands: CommandBlock, ownership: Ownership) -> None:
+        self._admission, self._commands, self._ownership = admission, commands, ownership
+        self.note(b"", NOBODY, Command(), ())
+
+    def note(self, data: bytes, peer: Peer, command: Command, names: Sequence[str]) -> None:
+        """Note a plain write of the words from the first on that was accepted: what it became, which registers it set."""
+        self._data, self._command, self._peer, self.names = data, command, peer, names
+        self._owner, self._fields = self._ownership.owner, self._commands.fields  # by these it was judged
+
+    def take(self, data: bytes, peer: Peer, current: Command, received_s: float) -> Command | None:
+        """Store these words from the first on, and return what they become; None, and nothing is stored, where they do not
+        repeat the last write or control refuses them. current: the command in use. Refusal (03) for a bad heartbeat."""
+        last = self._data
+        is_repeated = (
+            data[:_BEFORE] == last[:_BEFORE] and data[_BEHIND:] == last[_BEHIND:] and len(data) == len(last) > _BEFORE
+        )
+        if not is_repeated or current is not self._command or not self._is_judged_alike(peer):
+            return None
+        heartbeat = self._commands.judge_heartbeat(data[_BEFORE] << 8 | data[_BEFORE + 1])
+        values: list[Any] = list(current)
+        values[_AT_HEARTBEAT] = heartbeat
+        values[_AT_NUMBER] += 1
+        values[_AT_RECEIVED] = received_s
+        command = Command._make(values)
+        if self._admission.decide(ProposedWrite(command)):
+            return None
+        if heartbeat != current.heartbeat:
+            self._commands.store_heartbeat(heartbeat)
+        self._command = command
+        return command
+
+    def _is_judged_alike(self, peer: Peer) -> bool:
+        its_peer = self._peer
+        if peer is not its_peer:  # another connection of the same master
+            is_same_master = peer.identity == its_peer.identity and peer.role is its_peer.role
+            if not is_same_master or peer.is_behind:
+                return False
+        is_unchanged = self._owner == self._ownership.owner and self._fields is self._commands.fields
+        return is_unchanged and self._admission.is_usual(peer.identity)

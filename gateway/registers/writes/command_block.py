@@ -176,6 +176,17 @@ class CommandBlock:
             text = f"mode = {values[MODE]:g}, known are {known}"
             raise Refusal(RefusalReason.UNSUPPORTED_BIT, self.address(block, MODE), text, value=values[MODE])
 
+    def judge_heartbeat(self, word: int) -> int:
+        """Return the value of this word as heartbeat in the int16 block. Refusal (03) for one that the map does not allow."""
+        field = self.fields[HEARTBEAT]
+        return word if field is None else int(field.of_word(word, self._first + HEARTBEAT))
+
+    def store_heartbeat(self, heartbeat: int) -> None:
+        """Accept a write that changes no value but this."""
+        self.values = self.values.copy()
+        self.values[HEARTBEAT] = heartbeat
+        self._image.fall_behind()
+
     def store(self, candidate: Values, control_word: int) -> None:
         """Accept: from now on these are the values. control_word: without its edge bits."""
         candidate[CONTROL_WORD] = control_word

@@ -83,10 +83,13 @@ class LastWriters:
 
     def __init__(self) -> None:
         self._writes: dict[Sequence[str], tuple[Peer, float]] = {}
+        self._latest: Sequence[str] = ()
 
     def note(self, names: Sequence[str], peer: Peer, now_s: float) -> None:
         """Note that these registers have been written."""
-        self._writes.pop(names, None)
+        if names != self._latest:
+            self._writes.pop(names, None)
+            self._latest = names
         self._writes[names] = peer, now_s
 
     def by_name(self) -> dict[str, tuple[Peer, float]]:

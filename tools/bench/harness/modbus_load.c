@@ -2,7 +2,7 @@
  *
  *   modbus_load PORT SECONDS CONNECTIONS read|write
  *
- * read: FC03, 32 registers from address 100. write: FC16, 13 registers from address 0.
+ * read: FC03, 32 registers from address 100. write: FC16, 13 registers from address 0, the heartbeat another one in each.
  * Prints: answered requests, elapsed seconds, faulty answers (wrong transaction id, length or function).
  */
 #include <arpa/inet.h>
@@ -17,7 +17,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { MOST = 256, READ_COUNT = 32, WRITE_COUNT = 13 };
+enum { MOST = 256, READ_COUNT = 32, WRITE_COUNT = 13, HEARTBEAT_AT = 13 + 2 * 4 };
 
 struct connection {
     int fd;
@@ -53,13 +53,15 @@ static void make_request(int write_run) {
     request[9] = write_run ? 0 : 100;
     request[11] = count;
     if (write_run)
-        request[12] = data; /* the words stay 0: "output disabled, no force" is accepted by every bank */
+        request[12] = data; /* all but the heartbeat stay 0: "output disabled, no force" is accepted by every bank */
 }
 
 static void send_request(struct connection *c) {
     c->transaction++;
     request[0] = c->transaction >> 8;
     request[1] = c->transaction & 0xFF;
+    if (function == 16)
+        memcpy(request + HEARTBEAT_AT, request, 2);
     c->filled = 0;
     if (send(c->fd, request, request_size, MSG_NOSIGNAL) != request_size)
         die("send");
