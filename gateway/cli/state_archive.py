@@ -63,6 +63,11 @@ def pack_state(state: Path, target: Path) -> list[str]:
     return [str(path.relative_to(state)) for path in files if not path.is_dir()]
 
 
+def links_in(state: Path) -> list[str]:
+    """Return the names of the links below a state directory, which a backup leaves out; OSError where it cannot be read."""
+    return sorted(str(path.relative_to(state)) for path in state.rglob("*") if path.is_symlink())
+
+
 def names_in(source: Path) -> list[str]:
     """Return the files of an archive, after every check that `unpack` makes; ArchiveError with the reason."""
     check_plain(source)

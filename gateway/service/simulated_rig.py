@@ -185,8 +185,8 @@ def _is_orphan(link: socket.socket) -> bool:
 
 async def _serve_process(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog) -> None:
     """The same as a process of its own. Who stops the gateway may tell every process so (systemd, `pkill`): the force is ramped
-    down on us then, and the guardian ends our line behind that."""
-    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, lambda: None)
+    down on us then, and the guardian ends us behind that, by a signal, too: a loop that heard it would be half closed."""
+    signal.signal(signal.SIGTERM, lambda *_: None)
     await serve(rig, link, kept, log, asyncio.Event())
 
 

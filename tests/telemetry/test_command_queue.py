@@ -2,12 +2,14 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from typing import Any
 
 import pytest
 
 from gateway.live.standstill import Standstill
+from gateway.profiles import load_rig
 from gateway.telemetry.mqtt.command_queue import ROOM, CommandQueue
-from gateway.telemetry.mqtt.register_commands import is_stop
+from gateway.telemetry.mqtt.register_commands import RegisterCommands, is_stop
 from gateway.telemetry.mqtt.round_trips import RoundTrips
 
 
@@ -132,3 +134,51 @@ def test_who_waits_for_the_next_message_lets_others_run() -> None:
         assert (await waiting)[0].payload == b"2"
 
     play(scene)
+
+
+class Control:
+    """Refuses each write that enables; of the block it reads 0.01 N, ramp 0x0102, mode 0 and so on."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    async def ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        pdu = request["pdu"]
+        self.asked.append(pdu)
+        if pdu.startswith("03"):
+            count = int(pdu[6:10], 16)
+            return {"pdu": f"03{2 * count:02x}" + "".join(f"01{place:02x}" for place in range(count))}
+        return {"pdu": "9004", "refusal": "W212 a fault is latched"} if pdu.endswith("020001") else {"pdu": pdu[:10]}
+
+
+@pytest.mark.parametrize(
+    ("payload", "written", "pdus"),
+    [
+        (b'{"force_setpoint": 12.0, "control_word": 1}', True, ["100000000204" + "0001" + "04b0"]),
+        (b'{"control_word": 1, "force_setpoint": 12.0}', True, ["100000000204" + "0001" + "04b0"]),
+        (
+            b'{"control_word@float_abcd": 1, "force_setpoint@float_abcd": 12}',
+            True,
+            ["1000c8000408" + "3f800000" + "41400000"],
+        ),
+        (  # what lies between them stays as it is
+            b'{"force_setpoint": 12, "heartbeat": 7, "control_word": 1}',
+            True,
+            ["0300000005", "10000000050a" + "0001" + "04b0" + "0102" + "0103" + "0007"],
+        ),
+        (  # a proof of byte order goes before the enable that wants it, wherever the setpoint stands
+            b'{"force_setpoint": 12, "byte_order_echo": 1234.5, "control_word": 1}',
+            True,
+            ["1001a0000204" + "449a5000", "100000000204" + "0001" + "04b0"],
+        ),
+        (b'{"control_word": 1}', False, ["100000000102" + "0001"]),
+        (b'{"force_setpoint": 12, "no_such": 1}', False, []),
+        (b'{"force_setpoint": 12, "force_setpoint@command": 30}', False, []),
+    ],
+)
+def test_a_command_is_taken_as_a_whole_or_leaves_nothing_behind(payload: bytes, written: bool, pdus: list[str]) -> None:
+    """Word by word a refused enable left its setpoint, and with it the owner: no robot could reset the fault (06)."""
+    control = Control()
+    commands = RegisterCommands(load_rig("demo").register_map, control, 1)  # type: ignore[arg-type]
+    answer = asyncio.run(commands.carry_out(payload))
+    assert (answer["ok"], control.asked) == (written, pdus)

@@ -139,10 +139,10 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
         (
             b'{"force_setpoint": 12.0, "control_word": 1}',
             {"ok": True, "written": ["force_setpoint", "control_word"]},
-            ["100001000102" + "04b0", "100000000102" + "0001"],
+            ["100000000204" + "0001" + "04b0"],
         ),
         (
-            b'{"force_ramp": 5, "control_word": 1}',
+            b'{"force_ramp": 5, "control_word@float_abcd": 1}',
             {"ok": False, "written": [], "error": "force_ramp: E999 not now"},
             ["100002000102" + "0032"],
         ),

@@ -19,7 +19,8 @@ target has moved by more than NEW_TARGET_N, and says so. A correction that has s
 of air that failed and came back, or the like: the count begins anew. One that only touched it counts, for a trim may swing
 from limit to limit. And where the trim turned round it may stand wrong: an error of one sign for STOOD_S, wider than the zone
 has become, is corrected again. Fewer turns may have been disturbances that came and went: behind them an error of one sign
-for STOOD_S need only be wider than the zone was at first. Either takes twice as long each further time at one target.
+for STOOD_S need only be wider than the zone was at first. Either takes twice as long each further time at one target, until it
+takes LONGEST_PATIENCE_S.
 """
 
 from math import exp, sqrt
@@ -45,6 +46,7 @@ WIDER: Final = 1.5  # zone after each turn
 SLOWER: Final = 0.6  # pace after each turn
 MOST_TURNS: Final = 5
 STOOD_S: Final = 2.0
+LONGEST_PATIENCE_S: Final = 30.0  # a constant force is one target for hours, and much disturbs it meanwhile
 AT_LIMIT_S: Final = (
     0.5  # and AT_LIMIT_PACES times what the trim takes for a correction: longer than a swing stays there
 )
@@ -201,7 +203,7 @@ class MeasuredTrim:
         is_offset = abs(self._smooth_n) > WIDER * zone_n and way * self._stood_s >= 0.0
         self._stood_s = self._stood_s + way * interval_s if is_offset else 0.0
         if abs(self._stood_s) > self._patience_s:
-            patience_s = 2.0 * self._patience_s
+            patience_s = min(LONGEST_PATIENCE_S, 2.0 * self._patience_s)
             self._calm()
             self._patience_s = patience_s
 

@@ -1,7 +1,9 @@
 """Commands by MQTT: JSON with registers by name, written in the order that they are given, by the rules of any master.
 
 `{"force_setpoint": 12.0, "control_word": 1}` asks for 12 N and enables; `{"control_word": 0}` stops. The first refusal ends
-a command; the answer says what was written. A rig with a lease wants `heartbeat` from whoever commands, as from every master.
+a command; the answer says what was written. What it names of the command block goes in one write, at the place of the last of
+it: a setpoint whose enable is refused would stay, and its owner with it, and keep the robot out. A rig with a lease wants
+`heartbeat` from whoever commands, as from every master.
 A stop, the control word as 0, is written first, wherever it stands: it is granted to every master, and what a master without
 the setpoint is refused before it would be the end of the stop. A force beside it is refused: behind a stop it would stand for
 the next enable.
@@ -9,7 +11,7 @@ the next enable.
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from math import isfinite
 from typing import Any, Final
 
@@ -40,28 +42,53 @@ class RegisterCommands:
         try:
             registers = _registers(payload)
             stops = _does_stop(registers)
-            for name, value in _in_order(registers):
+            for names in _stop_first(registers) if stops else self._together(registers):
                 if stops:  # what else is wrong must not be its end
-                    _check_number(name, value)
-                if stops and value and _is(name, *_SETPOINTS):
-                    raise ValueError(
-                        f"{name}: {value:g} is not written beside control_word 0, which stops and clears it"
-                    )
-                await self._write(name, value, at_any_time=stops and (not value or _is(name, "heartbeat")))
-                written.append(name)
+                    _check_beside_stop(names[0], registers[names[0]])
+                await self._write({name: registers[name] for name in names}, stops=stops)
+                written += names
         except (OSError, ValueError, LookupError, OverflowError) as error:
             return {"ok": False, "written": written, "error": str(error) or type(error).__name__}
         return {"ok": True, "written": written}
 
-    async def _write(self, name: str, value: float, *, at_any_time: bool) -> None:
-        register = self._map.find(name)
-        register.check_meant(value)
-        request = P.write_registers_request(register.address, _encoded(register, value))
-        asked = {"do": "modbus", "via": "mqtt", "unit": self._unit, "pdu": request.hex()}
+    def _together(self, registers: dict[str, float]) -> list[list[str]]:
+        """Return the names that go in one write each. LookupError for one that is no register."""
+        writes: dict[str, list[str]] = {}
+        for name in registers:
+            block = self._map.block(self._map.find(name).block)
+            key = block.name if "command" in (block.name, *block.repeats) else name
+            writes[key] = [*writes.pop(key, ()), name]
+        return list(writes.values())
+
+    async def _write(self, values: dict[str, float], *, stops: bool) -> None:
+        """Write registers of one block, and what lies between them as it is. stops: a 0 and a heartbeat are wanted however
+        late."""
+        words = dict[int, bytes]()
+        for name, value in values.items():
+            register = self._map.find(name)
+            register.check_meant(value)
+            if register.address in words:  # by its name alone, and with its block
+                raise ValueError(f"{name} stands twice")
+            words[register.address] = _encoded(register, value)
+        at_any_time = stops and all(not value or _is(name, "heartbeat") for name, value in values.items())
         until = {} if at_any_time else {"until_s": self._clock() + ANSWER_S}
+        first = min(words)
+        count = max(address + len(data) // 2 for address, data in words.items()) - first
+        block = bytearray(2 * count)
+        if count > sum(len(data) // 2 for data in words.values()):
+            request = P.read_request(P.READ_HOLDING_REGISTERS, first, count)
+            block = bytearray((await self._ask(request, values, until))[2:])
+        for address, data in words.items():
+            block[2 * (address - first) : 2 * (address - first) + len(data)] = data
+        await self._ask(P.write_registers_request(first, bytes(block)), values, until)
+
+    async def _ask(self, request: bytes, names: Iterable[str], until: dict[str, float]) -> bytes:
+        asked = {"do": "modbus", "via": "mqtt", "unit": self._unit, "pdu": request.hex()}
         answer = await self._link.ask(asked | until)
-        if P.is_exception(bytes.fromhex(answer["pdu"])):
-            raise ValueError(f"{name}: {answer.get('refusal') or 'refused'}")
+        pdu = bytes.fromhex(answer["pdu"])
+        if P.is_exception(pdu):
+            raise ValueError(f"{', '.join(names)}: {answer.get('refusal') or 'refused'}")
+        return pdu
 
 
 def is_stop(payload: bytes) -> bool:
@@ -83,11 +110,9 @@ def _is(name: str, *registers: str) -> bool:
     return name.partition("@")[0] in registers
 
 
-def _in_order(registers: dict[str, float]) -> list[tuple[str, float]]:
-    """Return them as they are to be written."""
-    if not _does_stop(registers):
-        return list(registers.items())
-    return sorted(registers.items(), key=lambda register: not _is(register[0], "control_word"))
+def _stop_first(registers: dict[str, float]) -> list[list[str]]:
+    """Return each name alone, that of the stop first."""
+    return [[name] for name in sorted(registers, key=lambda name: not _is(name, "control_word"))]
 
 
 def _registers(payload: bytes) -> dict[str, float]:
@@ -117,6 +142,12 @@ def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         else:
             content[name] = 0 if _is(name, "control_word") and 0 in (content[name], value) else _TWICE
     return content
+
+
+def _check_beside_stop(name: str, value: Any) -> None:
+    _check_number(name, value)
+    if value and _is(name, *_SETPOINTS):
+        raise ValueError(f"{name}: {value:g} is not written beside control_word 0, which stops and clears it")
 
 
 def _check_number(name: str, value: Any) -> None:

@@ -277,3 +277,13 @@ def test_no_backup_goes_into_the_directory_that_it_packs(state: Path, call, tmp_
         answer = call("backup", target, "--state", state, "--force")
         assert answer.exit_code == 2 and "name a file elsewhere" in answer.stderr
     assert not list(state.rglob("*.tar.gz"))
+
+
+def test_what_a_backup_leaves_out_for_it_is_a_link_is_said(state: Path, call, tmp_path: Path) -> None:
+    """Recordings on a data disk: 'packed 2 files', and the restored cell had none."""
+    (state / "recordings").rename(tmp_path / "disk")
+    (state / "recordings").symlink_to(tmp_path / "disk")
+    (state / "calibrations" / "link").symlink_to("/dev/zero")
+    answer = call("backup", tmp_path / "b.tar.gz", "--state", state)
+    assert answer.exit_code == 0 and "calibrations/link, recordings" in answer.stderr
+    assert call("backup", tmp_path / "c.tar.gz", "--state", tmp_path / "disk").stderr == ""

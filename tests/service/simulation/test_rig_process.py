@@ -68,19 +68,37 @@ def test_a_stop_that_every_process_is_told_leaves_it_to_the_ramp_and_the_end_of_
 
     monkeypatch.setattr(simulated_rig, "serve", until_ended)
 
-    async def scene() -> None:
-        try:
-            await simulated_rig._serve_process(None, None, None, None)  # type: ignore[arg-type]
-        finally:
-            asyncio.get_running_loop().remove_signal_handler(signal.SIGTERM)
-
     unheard: list[int] = []
     before = signal.signal(signal.SIGTERM, lambda number, _frame: unheard.append(number))
     try:
-        asyncio.run(scene())
+        asyncio.run(simulated_rig._serve_process(None, None, None, None))  # type: ignore[arg-type]
     finally:
         signal.signal(signal.SIGTERM, before)
     assert (unheard, told) == ([], [False]), "it would have been ended without a word"
+
+
+def test_the_guardians_word_behind_the_end_of_its_line_leaves_no_trace_in_the_terminal(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Of a Ctrl-C now and then the last thing seen was a traceback: the guardian's SIGTERM met a loop that was half closed."""
+
+    class Told(asyncio.SelectorEventLoop):
+        def _close_self_pipe(self) -> None:
+            super()._close_self_pipe()  # type: ignore[misc]
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    async def at_once(*given: Any) -> None:
+        told.append(len(given))
+
+    told: list[int] = []
+    monkeypatch.setattr(simulated_rig, "serve", at_once)
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        with asyncio.Runner(loop_factory=Told) as runner:
+            runner.run(simulated_rig._serve_process(None, None, None, None))  # type: ignore[arg-type]
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert told and capfd.readouterr().err == ""
 
 
 def test_each_line_hears_its_own_bytes_at_its_own_frame() -> None:

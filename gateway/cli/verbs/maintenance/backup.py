@@ -20,7 +20,7 @@ def command(*, file: Path, force: bool, state: StateChoice) -> None:
 
     Calibrations, recordings, events. The gateway may be running.
     """
-    from gateway.cli.state_archive import pack_state
+    from gateway.cli.state_archive import links_in, pack_state
 
     directory = state.directory
     if not directory.is_dir():
@@ -33,3 +33,7 @@ def command(*, file: Path, force: bool, state: StateChoice) -> None:
         raise already_exists(file)
     names = pack_state(directory, file)
     click.echo(f"packed {count_of(names, 'file')} of {directory} into {file}, {file.stat().st_size / 1e3:.1f} kB")
+    if links := links_in(directory):
+        click.echo(
+            f"left out, for a backup holds no links: {', '.join(links)}; copy what they lead to as well", err=True
+        )
