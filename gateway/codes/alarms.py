@@ -16,8 +16,10 @@ ALARMS: Final = (
         "A404",
         "control loop stalled",
         "The control loop was later than the rig's stall_s although the machine let it run: it calculated, or slept.",
-        "An internal error, or a disk or driver that held it (the line says `in the kernel`).",
-        "Report it with the line, which has the times; look at the kernel's log (dmesg) for a disk or driver.",
+        "An internal error, a disk or driver that held it (the line says `in the kernel`), or a machine that stood still (a "
+        "virtual one on a busy host).",
+        "Where the line doubts the machine, give it processors of its own. Else report it with the line, and look at the "
+        "kernel's log (dmesg).",
     ),
     Explanation(
         "A405",

@@ -231,9 +231,9 @@ class RefusalReason(IntEnum):
         Explanation(
             "W219",
             "busy",
-            "A write to staging while a commit is under way.",
-            "The commit is answered at once and done a little later.",
-            "Wait until commit_status is committed or failed.",
+            "A write to staging while a commit is under way, or a commit or slot that has waited in a pile of requests.",
+            "The commit is answered at once and done a little later; or a master sends faster than it is answered.",
+            "Wait until commit_status is committed or failed, and for the answer to each request.",
         ),
     )
     QUANTITY = (

@@ -16,6 +16,7 @@ _MOVING_RATIO: Final = 30.0  # times the noise, from which a force moves
 _RESTING_RATIO: Final = 8.0  # times the noise, below which nearly all readings of a force lie that stands
 _IMPLAUSIBLE_RATIO: Final = 30.0  # times larger or smaller than the start: a unit, more likely than a machine
 _OFFSETS_APART_RATIO: Final = 10.0  # times the floor, from which offsets are told
+_IMPOSSIBLE_RATIO: Final = 10.0  # times the largest reading: no amplifier shows one with such a zero
 _NO_AREA_M2: Final = 5.0e-6
 """What is left of the model's area where no force answers; a small signal leaves it whole."""
 
@@ -26,7 +27,13 @@ def recording_notes(measurements: Sequence[Measurement], offsets_n: Sequence[flo
         yield from each.notes
         yield from _dead_drive_notes(each)
         yield from _unseen_setting_notes(each)
-    if max(offsets_n) - min(offsets_n) > _OFFSETS_APART_RATIO * floor_n:
+    impossible = [pair for pair in zip(measurements, offsets_n, strict=True) if _is_impossible(*pair)]
+    for each, offset_n in impossible:
+        yield (
+            f"{each.name}: the model needs a zero of {offset_n:.3g} N for it, far beyond its readings, so nothing found here "
+            "holds: is it of the same machine, and are its columns what they say?"
+        )
+    if not impossible and max(offsets_n) - min(offsets_n) > _OFFSETS_APART_RATIO * floor_n:
         offsets = ", ".join(
             f"{each.name} {offset_n:.3g} N" for each, offset_n in zip(measurements, offsets_n, strict=True)
         )
@@ -34,6 +41,11 @@ def recording_notes(measurements: Sequence[Measurement], offsets_n: Sequence[flo
             f"the recordings have offsets of their own ({offsets}); the extended plant has their mean: "
             "a simulation of one of them is off by the difference"
         )
+
+
+def _is_impossible(measurement: Measurement, offset_n: float) -> bool:
+    readings_n = np.abs(measurement.force_n[measurement.usable])
+    return bool(0.0 < _IMPOSSIBLE_RATIO * np.max(readings_n, initial=0.0) < abs(offset_n))
 
 
 def uninformative_force(measurements: Sequence[Measurement]) -> str:

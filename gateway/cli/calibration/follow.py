@@ -42,8 +42,16 @@ def follow_run(run: Run) -> dict[str, Any]:
     """Begin the run and wait for its end; how it ended."""
     with signals_as_ctrl_c():
         if not watch_to_the_end(run.begin, lambda: _watch(run), run.stop):
+            _leave_fit(run)
             _watch(run)  # on its way to 0
     return run.end()
+
+
+def _leave_fit(run: Run) -> None:
+    """Leave a run of which only the fit is left: nothing presses, and nobody is needed for it."""
+    if run.look().phase == "fitting":
+        goes_on = "the ladder is done, nothing presses, and the gateway goes on fitting"
+        raise CliError(f"left: {goes_on}; force-gateway calibration list has the calibration then")
 
 
 def _watch(run: Run) -> None:

@@ -17,11 +17,8 @@ from gateway.control.self_test.measurements import (
     Intervals,
     Slope,
     Trace,
-    count_n,
     fit_slope,
-    is_constant,
     mean_n,
-    noise_n,
     time_to_share_s,
 )
 from gateway.control.settings import ControlSettings
@@ -94,17 +91,6 @@ class Known:
         return self.settings.supervision.response_lag_s
 
 
-def judge_rest(rest: Trace, known: Known, weight_n: float = 0.0, outside_n: float = 0.0) -> tuple[Finding, ...]:
-    """Judge the readings without a force: noise, resolution, zero. weight_n, outside_n: as of `judge_zero`."""
-    is_silent = is_constant(rest)
-    noise = Finding(Item.NOISE, NOT_TESTED, "all readings are the same")
-    return (
-        noise if is_silent else judge_noise(noise_n(rest), known),
-        judge_resolution(count_n(rest), len(rest), known),
-        judge_zero(mean_n(rest), known, weight_n, outside_n),
-    )
-
-
 def judge_noise(noise_n: float, known: Known) -> Finding:
     """Judge the noise of the cell at rest against what the calibration has measured."""
     tolerance_n = known.tolerance_n
@@ -115,8 +101,8 @@ def judge_noise(noise_n: float, known: Known) -> Finding:
     else:
         warns_n, fails_n = _UNKNOWN_WARNS * tolerance_n, _UNKNOWN_FAILS * tolerance_n
         origin = f"in_band_tolerance_n {tolerance_n:g} N"
-    text = f"{noise_n:.3f} N rms at rest, {_bounds(warns_n, fails_n, 'N', 3)} ({origin})"
-    return Finding(Item.NOISE, _above(noise_n, warns_n, fails_n), text)
+    text = f"{noise_n:.3f} N rms at rest, {bounds(warns_n, fails_n, 'N', 3)} ({origin})"
+    return Finding(Item.NOISE, above(noise_n, warns_n, fails_n), text)
 
 
 def judge_resolution(count_n: float, readings: int, known: Known) -> Finding:
@@ -126,8 +112,8 @@ def judge_resolution(count_n: float, readings: int, known: Known) -> Finding:
         return _judge_constant(readings, known)
     warns_n = _COUNTS_WARN * settings.supervision.sample_quantum_n
     fails_n = max(warns_n, _COUNT_FAILS * known.tolerance_n)
-    bounds = _bounds(warns_n, fails_n, "N", 3)
-    return Finding(Item.RESOLUTION, _above(count_n, warns_n, fails_n), f"counts of {count_n:.3g} N, {bounds}")
+    text = f"counts of {count_n:.3g} N, {bounds(warns_n, fails_n, 'N', 3)}"
+    return Finding(Item.RESOLUTION, above(count_n, warns_n, fails_n), text)
 
 
 def _judge_constant(readings: int, known: Known) -> Finding:
@@ -158,9 +144,9 @@ def judge_zero(rest_n: float, known: Known, weight_n: float = 0.0, outside_n: fl
     kept = f", both beyond the {kept_n:.1f} N that {what} may keep" if kept_n > 0.05 else ""
     kept += f" and the payload's {abs(weight_n):.1f} N" if abs(weight_n) > 0.05 else ""
     kept += f" and the {abs(outside_n):.1f} N that tilt and feed bring" if abs(outside_n) > 0.05 else ""
-    text = f"{rest_n:+.2f} N at rest, {_bounds(0.5 * fails_n, fails_n, 'N', 2)}{kept}"
+    text = f"{rest_n:+.2f} N at rest, {bounds(0.5 * fails_n, fails_n, 'N', 2)}{kept}"
     cure = "; lift the tool and tare" if off_n > 0.5 * fails_n else ""
-    return Finding(Item.ZERO, _above(off_n, 0.5 * fails_n, fails_n), text + cure)
+    return Finding(Item.ZERO, above(off_n, 0.5 * fails_n, fails_n), text + cure)
 
 
 def judge_scale(change_n: float, span_n: float, error_n: float, friction_n: float) -> Finding:
@@ -200,7 +186,7 @@ def judge_step(trace: Trace, first_n: float, second_n: float, noise_n: float, kn
 
 def still_rising(waited_s: float) -> Finding:
     """Return the verdict on a force that has not settled."""
-    text = f"the force still rises {waited_s:g} s after a step: regulator, hose or throttle"
+    text = f"the force still rises {waited_s:g} s after a step: regulator, hose or throttle, or a cell that drifts"
     return Finding(Item.RESPONSE, FAILED, text)
 
 
@@ -212,10 +198,10 @@ def judge_response(time_s: float, known: Known) -> Finding:
         warns, fails, origin = _GUESS_WARNS, _GUESS_FAILS, "supervision.response_lag_s"
     warns_s, fails_s = (share * known.response_s + _GRACE_S for share in (warns, fails))
     text = (
-        f"{1e3 * time_s:.0f} ms to 63 % of a step, {_bounds(1e3 * warns_s, 1e3 * fails_s, 'ms', 0)} "
+        f"{1e3 * time_s:.0f} ms to 63 % of a step, {bounds(1e3 * warns_s, 1e3 * fails_s, 'ms', 0)} "
         f"({1e3 * known.response_s:.0f} ms {origin})"
     )
-    return Finding(Item.RESPONSE, _above(time_s, warns_s, fails_s), text)
+    return Finding(Item.RESPONSE, above(time_s, warns_s, fails_s), text)
 
 
 def judge_hold(held: Trace, pressures: Trace) -> Finding:
@@ -232,13 +218,13 @@ def judge_leak(slope: Slope, force_n: float, hold_s: float, pressure_per_s: floa
     lost_per_s = -slope.n_per_s / force_n
     unsure_per_s = 3.0 * slope.error_n_per_s / force_n
     warns, fails = LEAK_WARNS + unsure_per_s, LEAK_FAILS + unsure_per_s
-    verdict = _above(lost_per_s, warns, fails)
+    verdict = above(lost_per_s, warns, fails)
     text = f"{-slope.n_per_s:+.3f} N/s lost at {force_n:.1f} N over {hold_s:.0f} s, "
-    text += _bounds(warns * force_n, fails * force_n, "N/s", 3)
+    text += bounds(warns * force_n, fails * force_n, "N/s", 3)
     if pressure_per_s == pressure_per_s:
         warns, fails = LEAK_WARNS + _PRESSURE_NOISE, LEAK_FAILS + _PRESSURE_NOISE
-        verdict = max(verdict, _above(pressure_per_s, warns, fails))
-        text += f"; pressure {100.0 * pressure_per_s:+.1f} % per second lost, " + _bounds(
+        verdict = max(verdict, above(pressure_per_s, warns, fails))
+        text += f"; pressure {100.0 * pressure_per_s:+.1f} % per second lost, " + bounds(
             100 * warns, 100 * fails, "%", 1
         )
     return Finding(Item.LEAK, verdict, text)
@@ -250,7 +236,7 @@ def judge_output_line(counts: WireCounts | None, slowest_s: float, known: Known)
         return Finding(Item.OUTPUT_LINE, NOT_TESTED, "no exchange was counted")
     lost = max(0, counts.asked - counts.heard - 1)  # one may be out
     bound_s = known.settings.supervision.output_timeout_s
-    verdict = max(_of_lost(max(lost, counts.garbled), counts.asked), _above(slowest_s, _SLOW_SHARE * bound_s, bound_s))
+    verdict = max(_of_lost(max(lost, counts.garbled), counts.asked), above(slowest_s, _SLOW_SHARE * bound_s, bound_s))
     took = f", the slowest within {1e3 * slowest_s:.0f} ms of {1e3 * bound_s:.0f} ms" if slowest_s > 0.0 else ""
     text = f"{lost} of {counts.asked} questions without an answer, {counts.garbled} answers unreadable{took}"
     return Finding(Item.OUTPUT_LINE, verdict, f"{text}, {_LOST_BOUNDS}")
@@ -270,7 +256,7 @@ def judge_cell_line(intervals: Intervals, counts: WireCounts | None, known: Know
     late = intervals.longest_s - intervals.median_s
     verdict = max(
         _of_lost(max(garbled, missing), max(total, 1)),
-        _above(late, _SLOW_SHARE * bound_s + intervals.median_s, bound_s),
+        above(late, _SLOW_SHARE * bound_s + intervals.median_s, bound_s),
     )
     text = (
         f"{1.0 / intervals.median_s:.0f} readings per second, {missing} missing, {garbled} unreadable, longest gap "
@@ -283,16 +269,18 @@ _LOST_BOUNDS: Final = f"allowed {100.0 * LOST_WARNS:g} % lost, fails above {100.
 
 
 def _of_lost(lost: int, total: int) -> SelfTestVerdict:
-    return _above(lost / total, LOST_WARNS, LOST_FAILS) if lost >= _LEAST_LOST else PASSED
+    return above(lost / total, LOST_WARNS, LOST_FAILS) if lost >= _LEAST_LOST else PASSED
 
 
-def _above(value: float, warns: float, fails: float) -> SelfTestVerdict:
+def above(value: float, warns: float, fails: float) -> SelfTestVerdict:
+    """Return the verdict on a value that two bounds limit from above."""
     if value > fails:
         return FAILED
     return WARNED if value > warns else PASSED
 
 
-def _bounds(warns: float, fails: float, unit: str, digits: int) -> str:
+def bounds(warns: float, fails: float, unit: str, digits: int) -> str:
+    """Return the words for two bounds."""
     return f"allowed {warns:.{digits}f} {unit}, fails above {fails:.{digits}f} {unit}"
 
 

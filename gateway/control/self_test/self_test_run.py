@@ -44,6 +44,7 @@ from gateway.control.self_test.measurements import (
     still_rises,
     without_lone_reading,
 )
+from gateway.control.self_test.rest import judge_rest, why_no_force
 from gateway.control.supervision.fault_detection import StopCause
 from gateway.control.supervision.leaping_readings import LeapLimit
 from gateway.registers.words import CalibrationPhase
@@ -211,16 +212,10 @@ class SelfTestRun:
             self._end()
             return
         self.noise_n, self._rest_n = noise_n(rest), mean_n(rest)
-        for finding in judgement.judge_rest(rest, known, self._weight_n, self.outside_n):
+        for finding in judge_rest(rest, known, self._weight_n, self.outside_n):
             self._set(finding)
-        if self._force_n <= 0.0:
-            self._leave_force("self_test.force_n is 0: nothing moves")
-            return
-        if self.findings[Item.RESOLUTION].verdict is FAILED:
-            self._leave_force("the cell repeats itself" if is_constant(rest) else "the cell's counts are too coarse")
-            return
-        if self.findings[Item.ZERO].verdict is FAILED and self._rest_n > 0.0:
-            self._leave_force("the zero is off: tare first")  # below 0 it may be the sign
+        if why := why_no_force(self.findings, rest, known):
+            self._leave_force(why)
             return
         self._begin_rise()
 

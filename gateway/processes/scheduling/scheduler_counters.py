@@ -108,8 +108,22 @@ def explain_silence(silence: Silence, load: str) -> Ending:
     parts = f"it waited {format_ms(waited_s)} for a processor, ran {format_ms(ran_s)} and slept {format_ms(slept_s)}; {load}"
     if waited_s >= max(ran_s, slept_s):
         return Ending(EndCause.MACHINE_BUSY, f"{observation}; {parts}{_CURE}")
-    where = ", in the kernel, for a disk or a driver" if silence.state == "D" else ""
-    return Ending(EndCause.STALLED, f"{observation}; {parts}: not the machine's load{where}")
+    return Ending(EndCause.STALLED, f"{observation}; {parts}: {_what_else(silence, slept_s)}")
+
+
+def _what_else(silence: Silence, slept_s: float) -> str:
+    """What it may have been, where waiting for a processor was not: nobody counts a machine that stands still as a whole."""
+    if silence.state == "D":
+        return "not the machine's load, in the kernel, for a disk or a driver"
+    withheld_s, by_whom = silence.withheld
+    if not is_cause(slept_s, silence.silent_s) or not (silence.was_late or withheld_s > 0.0):
+        return "not the machine's load"
+    doubt = (
+        by_whom
+        if withheld_s > 0.0
+        else "the guardian came late, too: a virtual machine on a busy host, a CPU in deep sleep"
+    )
+    return f"perhaps the machine stood still: {doubt}"
 
 
 def load_of_machine(proc: Path = Path("/proc")) -> str:

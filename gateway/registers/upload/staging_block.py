@@ -127,6 +127,8 @@ class StagingBlock:
         if word and self.on_commit is None:
             text = "this gateway takes no coefficients; the active set is unchanged"
             raise Refusal(RefusalReason.COEFFICIENTS, self._commit, text, value=word)
+        if word and word != CommitAction.DRY_RUN:
+            _check_in_time("commit", self._commit, peer)
         self._image.write(self._commit, b"\0\0")
         if word and self.on_commit is not None:
             staged = self._image.read(self._first, BLOCK_BYTES // 2)
@@ -140,8 +142,16 @@ class StagingBlock:
         if self.on_select is None:
             text = "this gateway has no slots; the active set is unchanged"
             raise Refusal(RefusalReason.COEFFICIENTS, self._select, text, value=slot)
+        _check_in_time("slot_select", self._select, peer)
         self.on_select(slot, peer)
         self.on_act("slot_select", f"slot {slot}", peer)
+
+
+def _check_in_time(name: str, address: int, peer: Peer) -> None:
+    """Check that a change of the set in use has not waited in a pile: its master may be gone, or want another one by now."""
+    if peer.is_behind:
+        text = f"{name} refused: {peer} asks more than is answered, so that this has waited: wait for each answer"
+        raise Refusal(RefusalReason.BUSY, address, text)
 
 
 def _check_number(register: Register) -> None:

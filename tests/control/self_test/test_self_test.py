@@ -101,6 +101,21 @@ def test_a_machine_that_is_stronger_than_its_calibration_stays_below_the_stated_
     assert report.result in (SelfTestResult.WARNED, SelfTestResult.FAILED)
 
 
+@pytest.mark.parametrize("force_n", [FORCE_N, 0.0])
+@pytest.mark.parametrize(
+    ("drift_n_per_s", "verdict"), [(0.02, PASSED), (0.15, WARNED), (-0.15, WARNED), (0.5, FAILED), (-0.5, FAILED)]
+)
+def test_a_cell_that_drifts_is_found_at_rest(drift_n_per_s: float, verdict: SelfTestVerdict, force_n: float) -> None:
+    """One that gained 9 N a minute passed, or its regulator was blamed."""
+    rig = SelfTestRig(5, force_n)
+    begun_s = rig.now_s + 1.0
+    rig.reading = lambda force_n: force_n + drift_n_per_s * (rig.now_s - begun_s)
+    report = rig.tested()
+    assert verdict_on(report, Item.ZERO) is verdict, report.sentences
+    (zero,) = (found for found in report.findings if found.item is Item.ZERO)
+    assert (f"moves by {drift_n_per_s:+.1f}"[:-1] in zero.text) is (verdict is not PASSED), zero.text
+
+
 def test_what_the_pressure_loses_counts_from_where_it_is_held() -> None:
     """Its rise to there would hide a leak."""
     report = SelfTestRig(5, FORCE_N, leak_per_s=0.1, pressure_pa_per_v=1e5).tested()

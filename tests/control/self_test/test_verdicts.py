@@ -25,12 +25,12 @@ from gateway.control.self_test.judgement import (
     judge_output_line,
     judge_resolution,
     judge_response,
-    judge_rest,
     judge_scale,
     judge_zero,
 )
 from gateway.control.self_test.line_watch import LineWatch
 from gateway.control.self_test.measurements import Slope, intervals_of
+from gateway.control.self_test.rest import judge_rest
 from gateway.control.settings import SelfTestSettings
 from gateway.registers.words import SelfTestResult, SelfTestVerdict
 from tests.control.bench import bsfm, settings

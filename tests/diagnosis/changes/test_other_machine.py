@@ -1,10 +1,13 @@
 """A recording of something else, given for one of the same machine: it is doubted, and what has only changed is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gateway.diagnosis import Measurement, Options, find_changes
 from gateway.diagnosis.changes.other_machine import doubt_machine
+from gateway.diagnosis.notes import recording_notes
 from tests.diagnosis.changes.foreign_rig import Wish, record
 
 DURATION_S = 10.0
@@ -31,6 +34,30 @@ def test_a_file_of_something_else_is_doubted(is_old: bool) -> None:
     new, old = (own, unrelated()) if is_old else (unrelated(), own)
     found = find_changes([new], [old], None, Options())
     assert found.notes and found.notes[0].startswith("unrelated.csv: drive and model explain ")
+
+
+def test_a_short_file_of_something_else_is_doubted_by_the_zero_that_its_model_needs() -> None:
+    """In four seconds three effects explained it, with a zero of -68 million newtons, and that was told as an offset of it."""
+    own, _ = record(Wish(seed=3, duration_s=DURATION_S))
+    time_s, rng = 0.01 * np.arange(400), np.random.default_rng(3)
+    short = replace(
+        unrelated(),
+        time_s=time_s,
+        force_n=40.0 - 5.0 * time_s + rng.normal(0.0, 0.1, time_s.size),
+        usable=np.ones(time_s.size, dtype=bool),
+        repeated=np.zeros(time_s.size, dtype=bool),
+        command_v=2.0 + 2.0 * np.sin(2.0 * time_s),
+    )
+    found = find_changes([own], [short], None, Options())
+    assert any("unrelated.csv" in note and "same machine" in note for note in found.notes), found.notes
+
+
+@pytest.mark.parametrize(("zero_n", "doubts"), [(390.0, 0), (420.0, 1), (-420.0, 1)])
+def test_a_zero_far_beyond_all_readings_is_no_machines(zero_n: float, doubts: int) -> None:
+    short = unrelated()
+    short.force_n[:] = np.linspace(0.0, 40.0, short.rows)
+    notes = list(recording_notes([short], [zero_n], 0.1))
+    assert sum("same machine" in note for note in notes) == doubts
 
 
 def test_a_machine_that_has_changed_is_not_doubted() -> None:

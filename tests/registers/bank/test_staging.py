@@ -141,6 +141,25 @@ def test_a_commit_that_its_server_refuses_changes_nothing(bank, master):
     assert master.refusal(master.write, 1144, 5, 1).code == 6
 
 
+@pytest.mark.parametrize(
+    ("words", "is_taken"), [((1145, 1), False), ((1145, 3), False), ((1149, 3), False), ((1145, 2), True)]
+)
+def test_a_set_is_not_changed_by_what_has_waited_in_a_pile(bank, master, words, is_taken):
+    """Its master may be gone, or have put another set to use since then; a dry run changes nothing."""
+    seen = []
+    bank.staging.on_commit = bank.staging.on_select = lambda *given: seen.append(given)
+    master.peer = replace(master.peer, is_behind=True)
+    if is_taken:
+        master.write(*words)
+    else:
+        refusal = master.refusal(master.write, *words)
+        assert (refusal.code, refusal.reason) == (6, RefusalReason.BUSY) and "wait for each answer" in refusal.sentence
+    assert len(seen) == is_taken
+    master.peer = replace(master.peer, is_behind=False)
+    master.write(*words)
+    assert len(seen) == 1 + is_taken
+
+
 def test_staging_is_locked_while_a_commit_is_under_way(bank, master):
     for status in (CommitStatus.CHECKING, CommitStatus.WRITING):
         bank.staging.show_commit(status)
