@@ -12,7 +12,7 @@ from gateway.modbus.server import refuse_unit
 from gateway.profiles import load_register_map
 from gateway.registers import BankRules, RegisterBank
 from gateway.registers.command import Status
-from gateway.registers.words import State
+from gateway.registers.words import ControlBit, State
 
 ROBOT, OTHER = Peer("10.0.0.5", 4711, "robot", Role.SETPOINT), Peer("10.0.0.6", 4712)
 
@@ -20,11 +20,11 @@ ROBOT, OTHER = Peer("10.0.0.5", 4711, "robot", Role.SETPOINT), Peer("10.0.0.6", 
 class Watched:
     """A bank under audit, in virtual time."""
 
-    def __init__(self) -> None:
+    def __init__(self, **rules: Any) -> None:
         self.now_s = 0.0
         self.kept: list[dict[str, Any]] = []
         self.bank = RegisterBank(
-            load_register_map("force-v1"), BankRules(rig_name="demo", force_max_n=60.0), now=self.clock
+            load_register_map("force-v1"), BankRules(rig_name="demo", force_max_n=60.0, **rules), now=self.clock
         )
         self.audit = WriteAudit(lambda fields: self.kept.append(dict(fields)), self.clock)
         self.bank.on_write, self.bank.on_refused_write = self.audit.note_command, self.audit.note_refusal
@@ -92,6 +92,24 @@ def test_a_stop_of_a_run_that_this_machine_has_begun_is_kept_although_no_bit_fal
     watched.bank.publish(Status(state=State.CALIBRATING))
     watched.write(OTHER, 0, 0)
     assert watched.told("peer", "what", "result") == [("10.0.0.6:4712", "stop", "accepted")]
+
+
+def test_a_bit_that_falls_is_named_by_what_its_fall_does() -> None:
+    """Who reads that a calibration was started twice looks for a second one."""
+    watched = Watched(supported_bits=ControlBit(127))
+    for word in (32, 0, 1, 0):
+        watched.write(ROBOT, 0, word)
+    told = [(what, new) for what, new in watched.told("what", "new") if what != "owner"]
+    assert told == [("start_calibration", 1.0), ("stop_calibration", 0.0), ("enable", 1.0), ("disable", 0.0)]
+
+
+@pytest.mark.parametrize(("note", "length"), [(380, 392), (600, 404)])
+def test_a_request_of_the_control_socket_is_kept_whole_up_to_400_characters(
+    watched: Watched, note: int, length: int
+) -> None:
+    watched.audit.note_local("record", {"do": "record", "note": "x" * note}, "accepted")
+    ((asked,),) = watched.told("new")
+    assert len(asked) == length and asked.endswith(" ..." if note > 400 else '"}')
 
 
 def test_a_value_is_kept_in_the_unit_of_its_register(watched: Watched) -> None:

@@ -5,11 +5,12 @@ from pathlib import Path
 import pytest
 
 from gateway.recording import ColumnMapping, ColumnSource, RecordingError
+from gateway.recording.foreign.unit_names import unit_of
 from gateway.recording.tables.column_mapping import quantity_of, select_columns
 from gateway.recording.tables.column_names import CONTRACT, DERIVED
 from gateway.recording.tables.mapping_file import column_mapping, read_mapping
 from gateway.twin.surroundings import COLUMNS
-from gateway.units import LINEAR, linear_conversion
+from gateway.units import LINEAR, NEWTON_PER_UNIT, linear_conversion
 
 
 def test_text_names_number_header_and_unit() -> None:
@@ -110,11 +111,31 @@ def test_a_column_that_is_not_there_is_told(text: str, words: str) -> None:
         ("turning", "hz", "rpm", 200.0, 12000.0),
         ("speed", "m_min", "mm_s", 6.0, 100.0),
         ("angle", "rad", "deg", 3.141592653589793, 180.0),
+        ("time", "h", "s", 0.5, 1800.0),
+        ("time", "us", "ms", 250.0, 0.25),
+        ("force", "gf", "n", 1000.0, 9.80665),
+        ("force", "kn", "mn", 1.0, 1.0e6),
+        ("voltage", "percent", "v", 50.0, 5.0),
+        ("voltage", "mv", "v", 2500.0, 2.5),
+        ("pressure", "mpa", "pa", 0.6, 6.0e5),
+        ("speed", "mm_min", "mm_s", 60.0, 1.0),
     ],
 )
 def test_units_by_their_definitions(quantity: str, given: str, wanted: str, value: float, expected: float) -> None:
     factor, offset = linear_conversion(quantity, given, wanted)
     assert factor * value + offset == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize(("unit", "newton"), [("N", 1.0), ("kg", 9.80665), ("g", 0.00980665), ("lb", 4.4482216152605)])
+def test_units_of_amplifiers_by_their_definitions(unit: str, newton: float) -> None:
+    assert NEWTON_PER_UNIT[unit] == pytest.approx(newton, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("written", "quantity", "unit"), [("hPa", "pressure", "mbar"), ("U/min", "turning", "rpm"), ("Sek", "time", "s")]
+)
+def test_a_unit_by_another_name_is_that_unit(written: str, quantity: str, unit: str) -> None:
+    assert unit_of(written, quantity) == unit
 
 
 def test_the_same_unit_changes_no_bit() -> None:

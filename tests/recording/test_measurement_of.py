@@ -56,6 +56,12 @@ def test_a_clean_table_is_taken_as_it_is() -> None:
     assert (found.pressure_pa, found.position_m, found.covariates, found.notes) == (None, None, {}, ())
 
 
+def test_a_command_beyond_any_regulator_is_asked_for_its_unit() -> None:
+    found = measured(command_v=1000.0 * columns()["command_v"])
+    assert noted(found, "command_v goes to 3000: is it in mV? then --columns command_v=...:mv")
+    assert not noted(measured(), "in mV")
+
+
 def test_units_are_si() -> None:
     found = measured(pressure_kpa=TIME_S + 100.0, position_mm=TIME_S + 0.5)
     assert found.pressure_pa is not None and found.position_m is not None

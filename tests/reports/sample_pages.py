@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gateway.bsfm.fit.evaluation import FitRequest, evaluate
+from gateway.bsfm.fit.evaluation import Evaluation, FitRequest, evaluate
 from gateway.bsfm.fit.model_error import Error, measured_error_n
 from gateway.bsfm.fit.result import ModelName
 from gateway.bsfm.ladder.check import CheckedLadder, check_ladder
@@ -48,10 +48,15 @@ def checked_ladder() -> CheckedLadder:
 
 
 @cache
+def fit_evaluation() -> Evaluation:
+    """What the fit of the ladder has found."""
+    return evaluate(checked_ladder(), FitRequest(models=(ModelName.PSFM, ModelName.BSFM), orders=(1, 2)))
+
+
+@cache
 def fit_sample() -> tuple[str, dict[str, Any]]:
     """The page of a fit, and its document."""
-    models = (ModelName.PSFM, ModelName.BSFM)
-    evaluation = evaluate(checked_ladder(), FitRequest(models=models, orders=(1, 2)))
+    evaluation = fit_evaluation()
     document = fit_document(evaluation, Path("/recordings/ladder.csv"), {"rig": "demo"})
     error = asdict(Error.of(measured_error_n(evaluation.model, evaluation.checked)))
     document |= {"name": "left cell", "measured": {**error, "reversals": True, "rejected": ""}}

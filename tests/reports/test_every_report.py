@@ -1,12 +1,17 @@
 """What every report promises: the answer first, its provenance last, nothing loaded, and no place where it breaks a page."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from itertools import pairwise
+from pathlib import Path
 
+import numpy as np
 import pytest
 
-from tests.reports.sample_pages import PAGES, fit_sample
+from gateway.reports.fit.document import fit_document, residual_of
+from gateway.reports.fit.headline import answer_sentence
+from tests.reports.sample_pages import PAGES, fit_evaluation, fit_sample
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 EMPTY = frozenset(("meta", "br", "img"))
@@ -113,3 +118,32 @@ def test_a_comparison_draws_the_points_and_says_how_far_both_are_off() -> None:
     )
     assert "measured for A" in html and "No measured points of B: it names no data." in html
     assert "<img" not in html and "&lt;img" in html
+
+
+def test_the_document_of_a_fit_has_each_number_under_its_own_name() -> None:
+    """Rising and falling are alike enough that neither the page nor a reader sees them exchanged."""
+    found, (_, document) = fit_evaluation(), fit_sample()
+    rising = found.checked.ladder.direction > 0
+    ladder, reversal, chosen = document["ladder"], document["reversal"], document["chosen"]
+    assert (ladder["rising"], ladder["falling"], ladder["voltage_v"]) == (rising.sum(), (~rising).sum(), [0.0, 6.0])
+    left_n = residual_of(found)
+    assert left_n[0] == found.checked.ladder.force_n[0] - found.chosen.result.branches.rising.handles[0]
+    assert chosen["rising_rms_n"] == pytest.approx(np.sqrt(np.mean(left_n[rising] ** 2)))
+    assert chosen["falling_rms_n"] == pytest.approx(np.sqrt(np.mean(left_n[~rising] ** 2)))
+    for part, model in ((chosen, found.chosen.result.branches), (document["model"], found.model.branches)):
+        told = [part[f"{branch}_{what}"] for branch in ("rising", "falling") for what in ("handles_n", "weights")]
+        assert told == [list(values) for one in (model.rising, model.falling) for values in (one.handles, one.weights)]
+    assert reversal["rms_n"] <= reversal["slip_heldout_n"] < reversal["blend_heldout_n"] == reversal["switched_rms_n"]
+    assert answer_sentence(document).endswith(
+        f"to {document['measured']['rms_n']:.3f} N RMS, {document['measured']['max_n']:.2f} N at most"
+    )
+
+
+@pytest.mark.parametrize("branch", ["rising_monotone", "falling_monotone"])
+def test_a_fit_is_monotone_where_both_of_its_branches_are(branch: str) -> None:
+    found = fit_evaluation()
+    score = found.scores[0]
+    verdicts = replace(score.result.verdicts, **{branch: False})
+    broken = replace(score, result=replace(score.result, verdicts=verdicts))
+    told = fit_document(replace(found, scores=[score, broken]), Path("ladder.csv"), {})["fits"]
+    assert [fit["monotone"] for fit in told] == [True, False]

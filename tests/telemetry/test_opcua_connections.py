@@ -94,6 +94,7 @@ def test_who_is_silent_is_cut_and_who_speaks_is_not(connect: Callable[..., Any])
     async def scene() -> None:
         silent, speaking = Wire("10.0.0.1"), Wire("10.0.0.2")
         first, second = connect(silent), connect(speaking)
+        assert first._silence._longest_s == 0.02, "as the settings say"
         while not silent.is_cut:
             second.data_received(b"H")
             await asyncio.sleep(0.001)

@@ -6,7 +6,8 @@ from dataclasses import replace
 import jsonschema
 import pytest
 
-from gateway.diagnosis.result import Extended, Gain, Verdict
+from gateway.diagnosis.input_checks import Suspect
+from gateway.diagnosis.result import Estimate, Extended, Gain, Leftover, Machine, OwnEffect, Verdict
 from gateway.reports.diagnosis.document import diagnosis_document
 from tests.reports.fake_diagnosis import FRICTION, WARMTH, diagnosis
 
@@ -91,6 +92,33 @@ def test_values_are_those_of_the_answer_and_causes_keep_their_order() -> None:
     assert result == {"value": 0.0497, "unit": "N/N", "ci95": [0.0482, 0.0511]}
     assert document["causes"][1]["group"] == ["thermal-zero-drift", "warm-up", "linear-drift"]
     assert document["runtime_s"] == 1.5
+
+
+def test_each_number_of_the_answer_stands_under_its_own_name() -> None:
+    """Programs read them: a gain whose before and after are exchanged is a loss, and of the right type."""
+    suspect = Suspect("E521", "a.csv", "command_v", 1.5, other="force_n", is_sure=False, option="--columns x")
+    rest = Leftover("time_s", "wanders", 0.4, ("time_s",), 2.0, 3.0, 4.0, "a.csv", "a rest")
+    size = {"zero_n": Estimate("cell", 0.5, "N", (0.4, 0.6))}
+    machine = Machine(("old.fgr",), (OwnEffect("creep", size),), 0.3, 0.2)
+    answer = diagnosis(suspects=(suspect,), leftover=(rest,), machine=machine, extended=Extended(0.25, True))
+    document = diagnosis_document(answer, 1.5)
+    assert document["suspects"] == [{
+        "code": "E521", "recording": "a.csv", "column": "command_v", "swapped_with": "force_n", "unit": None, "factor": 1.5,
+        "is_sure": False, "option": "--columns x", "sentence": suspect.sentence,
+    }]  # fmt: skip
+    assert document["leftover"] == [{
+        "depends_on": "time_s", "shape": "wanders", "share": 0.4, "columns": ["time_s"], "frequency_hz": 2.0,
+        "amplitude_n": 3.0, "period_s": 4.0, "file": "a.csv", "experiment": "a rest",
+    }]  # fmt: skip
+    own = [{"name": "creep", "parameters": {"zero_n": {"value": 0.5, "unit": "N", "ci95": [0.4, 0.6]}}}]
+    assert document["machine"] == {"against": ["old.fgr"], "effects": own, "common_error_n": 0.3, "left_n": 0.2}
+    (cause,) = document["causes"]
+    assert cause["before"] == {"load_dependent_n_per_n": answer.base.friction.load_dependent_n_per_n}
+    assert cause["gain"] == {
+        "held_out_rms_before_n": 1.186, "held_out_rms_after_n": 0.257, "ci95": [0.871, 0.986], "share_of_excess": 0.962,
+    }  # fmt: skip
+    assert document["extended"] == {"held_out_rms_n": 0.25, "reaches_noise_floor": True}
+    assert (document["baseline"]["rms_n"], document["baseline"]["noise_floor_n"]) == (1.186, 0.12)
 
 
 def test_what_is_no_number_is_null() -> None:

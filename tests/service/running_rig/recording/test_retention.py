@@ -98,6 +98,13 @@ def test_the_rigs_reference_stays_however_old_it_is(
     assert [one.path for one in gone] == ([] if is_reference else [path])
 
 
+def test_what_has_gone_is_told_in_megabytes(tmp_path: Path) -> None:
+    said = Said()
+    gone = [keeping.Prunable(tmp_path / f"000{k}.fgr", 1_250_000 * k, "older than 30 days") for k in (1, 2)]
+    RecordingRetention(tmp_path, Retention(days=30.0), said)._tell(gone)
+    assert [line.split(":")[0] for line in said.lines] == ["pruned 2 recordings (3.8 MB)"]
+
+
 def test_without_a_limit_and_behind_its_end_a_recording_that_has_ended_begins_nothing(tmp_path: Path) -> None:
     begun: list[object] = []
     for limit in (Retention(), Retention(days=30.0)):
