@@ -55,9 +55,9 @@ class ForceReading:
     frame: template with the number {force:...}, perhaps a word {status:...}, a word {unit:...}, and a word {sign:...} where
     the minus stands apart from the digits. Where the frame says its unit, that unit counts; `unit` is what the simulated
     device is set to, and what a frame without one means. Raw counts of a converter have no unit but newton_per_count and
-    zero_count, which a rig has measured. before: a sentence that is sent ahead of each question, or of the start. modbus:
-    registers, in place of frame and ask. overload, underload: what the device says in place of the frame where it has no
-    number to show; words in them change, and the profile's constants.
+    zero_count, which a rig has measured. before: a sentence that is sent ahead of each question, that of identity too, or of
+    the start. modbus: registers, in place of frame and ask. overload, underload: what the device says in place of the frame
+    where it has no number to show; words in them change, and the profile's constants.
     """
 
     __pydantic_config__ = STRICT

@@ -74,6 +74,17 @@ class Grammar:
         """Return a sentence to the device with its checksum and terminator."""
         return self._framed(body, self.profile.question_terminator_bytes)
 
+    def cell_question(self, text: str) -> bytes:
+        """Return a sentence to a load cell with the one ahead of it, which opens it on its bus; nothing without it."""
+        texts = filter(None, (self.profile.reading.before, text)) if text else ()
+        return b"".join(self.question_line(self.encode(one)) for one in texts)
+
+    def no_answers(self, asked: bytes) -> frozenset[bytes]:
+        """Return the lines that come behind a question to a load cell and are no noise: our own words, and what is said to the
+        sentence ahead of it."""
+        acknowledged = self.profile.reading.before_answer
+        return self.own_lines(asked) | ({self.line(self.encode(acknowledged))} if acknowledged else set())
+
     @property
     def is_bare(self) -> bool:
         """Decide whether a sentence is followed by its terminator, and has neither checksum nor frame."""

@@ -6,9 +6,12 @@ from dataclasses import replace
 import pytest
 
 from gateway.devices import DeviceProfile, cell_device, cell_host
+from gateway.devices.device_checks.identity import Identity
 from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample, Garbage, Quality
 from gateway.devices.rehearsal import rehearse
+from gateway.service.probing.harmless_questions import harmless_questions
+from gateway.service.running_rig.lines.load_cell_line import CellExchange
 from tests.dialogues.test_overload_dialogue import cell
 
 OPENED = {"before": "OP {address:d}", "before_answer": "OK", "frame": "G{force:+07.2f}", "unit": "N"}
@@ -17,6 +20,7 @@ STREAMING = cell(
     terminator="\r", constants={"address": 1}, read_force=None,
     stream=ForceReading(start="SG", rate_hz=100.0, **OPENED),  # type: ignore[arg-type]
 )  # fmt: skip
+NAMED = replace(ASKED, identity=Identity(ask="ID", answer="{model:s} 1.2", models=("EZE30",)))
 READING = ForceSample(123.45, 123.45, Quality.OK, 0.0)
 
 
@@ -59,3 +63,20 @@ def test_an_acknowledgement_that_is_a_reading_is_told() -> None:
 def test_an_acknowledgement_of_nothing_is_refused() -> None:
     with pytest.raises(ValueError, match="`before_answer` answers `before`"):
         replace(ASKED.reading, before="")
+
+
+@pytest.mark.parametrize(("said", "garbage"), [(b"OK\r", []), (b"ERR\r", [Garbage(b"ERR\r")]), (b"OP 1\rID\rOK\r", [])])
+def test_it_is_opened_before_it_is_asked_what_it_is(said: bytes, garbage: list[Garbage]) -> None:
+    asked: list[bytes] = []
+    exchange = CellExchange(cell_host(NAMED), asked.append, NAMED)
+    exchange.tick(1.0)
+    assert asked == [b"OP 1\rID\r"]
+    assert exchange.receive(said + b"EZE30 1.2\r", 1.0) == garbage
+    assert asked[1:] == [b"OP 1\rGG\r"]
+    assert [one.data for one in harmless_questions(NAMED)] == asked
+
+
+def test_the_simulated_one_says_what_it_is_once_it_is_opened() -> None:
+    device = cell_device(NAMED)
+    assert device.receive(b"OP 1\rID\r", 0.0) == 0
+    assert device.take_answers() == b"OK\rEZE30 1.2\r"

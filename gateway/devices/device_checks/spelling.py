@@ -42,6 +42,11 @@ class CheckSpelling:
             raise ValueRefused(f"{self.grammar.profile.name} has no words for its {step}")
         return self.grammar.encode(self._ask(step), self._time())
 
+    def ask_cell_identity(self) -> bytes:
+        """Return what asks a load cell what it is, behind the sentence that opens it on its bus."""
+        identity = self.grammar.profile.own_identity
+        return self.grammar.cell_question(identity.ask) if identity else b""
+
     def answer(self, step: DeviceStep, body: bytes | None) -> DeviceAnswer | None:
         """Return what an answer says, None where it is none of this question's."""
         read = self.grammar.read

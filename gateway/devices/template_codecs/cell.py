@@ -43,12 +43,6 @@ def _nothing(field: Field) -> Value:
     return "-" if isinstance(field, Text) else 0
 
 
-def _question(grammar: Grammar, text: str) -> bytes:
-    """What asks for a reading or begins a stream, with the sentence ahead of it; nothing without it."""
-    texts = filter(None, (grammar.profile.reading.before, text)) if text else ()
-    return b"".join(grammar.question_line(grammar.encode(text)) for text in texts)
-
-
 _MOST_KNOWN: Final = 64  # sentences
 
 
@@ -87,18 +81,17 @@ class TemplateCellHost:
 
     def poll(self) -> bytes:
         """Return the question for one sample, empty for a cell that streams."""
-        return self._remember(_question(self._grammar, self._reading.ask))
+        return self._remember(self._reading.ask)
 
     @property
     def start(self) -> bytes:
         """The sentence that begins the stream, empty where it needs none."""
-        return self._remember(_question(self._grammar, self._reading.start))
+        return self._remember(self._reading.start)
 
-    def _remember(self, asked: bytes) -> bytes:
+    def _remember(self, text: str) -> bytes:
+        asked = self._grammar.cell_question(text)
         if asked:
-            opened = self._reading.before_answer
-            acknowledged = {self._grammar.line(self._grammar.encode(opened))} if opened else set[bytes]()
-            self._asked, self._read_over = asked, self._grammar.own_lines(asked) | acknowledged
+            self._asked, self._read_over = asked, self._grammar.no_answers(asked)
             self._grammar.expect_own_words(self._lines, asked)
         return asked
 

@@ -82,7 +82,8 @@ def _who_it_is(profile: DeviceProfile, *, is_enough: bool) -> HarmlessQuestion:
         found = answer(received)
         return found.text if found and not found.is_right else ""
 
-    data = grammar.question_line(spelling.ask(DeviceStep.IDENTITY))
+    is_cell = profile.role is DeviceRole.LOAD_CELL
+    data = spelling.ask_cell_identity() if is_cell else grammar.question_line(spelling.ask(DeviceStep.IDENTITY))
     return HarmlessQuestion(data, understands, stranger, is_enough)
 
 

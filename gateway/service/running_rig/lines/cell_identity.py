@@ -16,7 +16,8 @@ class CellIdentity:
         self._checks = CheckSpelling(self._grammar)
         self._lines = self._grammar.answers()
         can_ask = profile.own_identity is not None and profile.read_force is not None
-        self.question = self._grammar.question_line(self._checks.ask(DeviceStep.IDENTITY)) if can_ask else b""
+        self.question = self._checks.ask_cell_identity() if can_ask else b""
+        self._no_answers = self._grammar.no_answers(self.question)
         self.begin()
 
     def begin(self) -> None:
@@ -32,7 +33,7 @@ class CellIdentity:
         for line in self._lines.feed(chunk):
             answer = self._checks.answer(DeviceStep.IDENTITY, self._grammar.body(line, self.question))
             if answer is None:
-                garbage += [] if line.data == self.question else [Garbage(line.data)]
+                garbage += [] if line.data in self._no_answers else [Garbage(line.data)]
                 continue
             self.is_due = False
             if not answer.is_right:

@@ -223,7 +223,7 @@ def test_of_a_cell_that_can_be_asked_what_it_is_no_reading_is_asked() -> None:
     """`$014` asks an ADAM-4016 for its sample; an I-7021 on the wrong adapter keeps its output as its power-on value by it."""
     ask, receive = _question_and_receiver(replace(demo().load_cell, device=load_device("adam-4016"), unit=None), 0.0)
     for model, is_right in ((b"4016", True), (b"7021", False)):
-        assert ask() == b"$01M\r"
+        assert ask() == b"#**\r$01M\r"
         assert receive(b"!01", 0.0) == []
         assert receive(model + b"\r", 0.0) == [DeviceAnswer(DeviceStep.IDENTITY, is_right=is_right)]
 
