@@ -315,7 +315,8 @@ class RefusalReason(IntEnum):
             "A calibration was asked for (control_word bit 5, or calibrate) and not begun; the force stays.",
             "The output is enabled with a force, a setpoint is not 0, a fault is latched, or the rig allows no "
             "such ladder.",
-            "Write control_word 0 and force_setpoint 0 (and reset a fault), wait for state off, then ask again.",
+            "Write control_word 0 and force_setpoint 0 (and reset a fault), wait for state off, ask again. Of a valve that "
+            "rests pulling: beside `force-gateway hold 0`.",
         ),
     )
     # a calibration or an experiment has the output
@@ -389,7 +390,8 @@ class RefusalReason(IntEnum):
             "A self-test was asked for (control_word bit 6, or self-test) and not begun; the force stays.",
             "The output is enabled with a force, a setpoint is not 0, a fault is latched, or a calibration was asked for "
             "in the same write.",
-            "Write control_word 0 and force_setpoint 0 (and reset a fault), wait for state off, then ask again.",
+            "Write control_word 0 and force_setpoint 0 (and reset a fault), wait for state off, ask again. Of a valve that "
+            "rests pulling: beside `force-gateway hold 0`.",
         ),
     )
     # bit 4, or a run, where the valve cannot follow now

@@ -28,7 +28,9 @@ from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
 _TAKE = int(ControlBit.TAKE_OWNERSHIP)
 _WHOLE: Final = ControlBit(0)
-_PUSHING: Final = "and a run is made pushing (bit 4 0, enable, wait until status bits 8, 9 are 0)"
+_PUSHING: Final = (
+    "and a run is made pushing (bit 4 0, enable, wait until status bits 8, 9 are 0: `force-gateway hold 0`)"
+)
 _UNKNOWN: Final = "whether air still presses is not known"
 
 

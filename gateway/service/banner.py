@@ -8,6 +8,7 @@ from shlex import quote
 from typing import Any, Final
 
 from gateway import VERSION, defaults
+from gateway.devices import ValveDirection
 from gateway.devices.messages import ForceSample, Quality
 from gateway.extras import is_installed, missing_note
 from gateway.fieldbus.peers import is_loopback
@@ -52,6 +53,7 @@ class Ready:
     notes: tuple[str, ...] = ()
     faces: tuple[ServedFace, ...] = ()
     valve_port: str = ""
+    valve_stands: ValveDirection | None = None
     http: dict[str, tuple[str, int]] = field(default_factory=dict)  # where page and metrics listen, by name
 
 
@@ -85,7 +87,7 @@ def format_banner(ready: Ready) -> str:
         *(f"  modbus {face.type:<5} {face.where}   {face.note}" for face in ready.faces),
         f"  output       {ready.output_port:<16} {output.device.name} {output.baud}  {_reading(ready.voltage_v, 'V', 3)}",
         f"  load cell    {ready.cell_port:<16} {cell.device.name} {cell.baud}  {_reading(ready.force_n, 'N', 2)}",
-        *([f"  valve        {ready.valve_port:<16} {rig.valve.device.name} {rig.valve.baud}"] if rig.valve else []),
+        *_valve_lines(ready),
         f"  lease        {_lease(rig)}",
         *_http_lines(ready),
         *_telemetry_lines(rig),
@@ -212,6 +214,13 @@ def _reading(value: float | None, unit: str, digits: int) -> str:
     if value is None:
         return "silent"
     return f"ok   {value:.{digits}f} {unit}" if isfinite(value) else "beyond its range"
+
+
+def _valve_lines(ready: Ready) -> list[str]:
+    if (valve := ready.rig.valve) is None:
+        return []
+    stands = f"ok   {ready.valve_stands}" if ready.valve_stands else "silent"
+    return [f"  valve        {ready.valve_port:<16} {valve.device.name} {valve.baud}  {stands}"]
 
 
 def _lease(rig: Rig) -> str:

@@ -17,6 +17,8 @@ class LineWatch:
         self._line = LineStatus()
         self._slowest_s = 0.0
         self._times_s: list[float] = []
+        self._beside: list[int] = []
+        self._heard = 0
 
     @property
     def pressure_pa(self) -> float:
@@ -33,7 +35,10 @@ class LineWatch:
 
     def note_reading(self, at_s: float) -> None:
         """Note the time of a usable reading."""
+        counts = self._line.cell_counts
+        before, self._heard = self._heard, counts.heard if counts else 0
         self._times_s.append(at_s)
+        self._beside.append(max(0, self._heard - before - 1))
 
     def findings(self, known: Known, elapsed_s: float) -> tuple[Finding, ...]:
         """Return the verdicts on both lines. elapsed_s: for which the test has run."""
@@ -43,5 +48,5 @@ class LineWatch:
         heard = now.cell_counts.since(cells) if now.cell_counts and cells else None
         return (
             judgement.judge_output_line(counted, self._slowest_s, known),
-            judgement.judge_cell_line(intervals_of(self._times_s), heard, known, elapsed_s),
+            judgement.judge_cell_line(intervals_of(self._times_s, self._beside), heard, known, elapsed_s),
         )

@@ -1,7 +1,7 @@
 """What the readings of a self-test say, as numbers: pure functions of (seconds, N) pairs in the order of time."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, repeat
 from math import ceil, inf, sqrt
 from statistics import fmean, median
 from typing import Final, NamedTuple
@@ -29,7 +29,8 @@ class Slope(NamedTuple):
 
 
 class Intervals(NamedTuple):
-    """Of the times of readings. missing: messages that did not come, by the median interval."""
+    """Of the times of readings, without what others that came with them have filled. missing: messages that did not come, by
+    the median interval."""
 
     median_s: float
     longest_s: float
@@ -129,11 +130,13 @@ def readings_to_know(noise_n: float, within_n: float) -> int:
     return max(_SMOOTHED, min(_MOST_SMOOTHED, ceil((3.0 * noise_n / within_n) ** 2)))
 
 
-def intervals_of(times_s: Sequence[float]) -> Intervals:
-    """Return how regularly readings came; zeros for fewer than two."""
-    steps = [b - a for a, b in pairwise(times_s)]
+def intervals_of(times_s: Sequence[float], beside: Sequence[int] = ()) -> Intervals:
+    """Return how regularly readings came; zeros for fewer than two. beside: how many others each has brought, which waited for
+    a loop that came late; none where it is left out."""
+    steps = list(zip((b - a for a, b in pairwise(times_s)), beside[1:] or repeat(0), strict=False))
     if not steps:
         return Intervals(0.0, 0.0, 0)
-    usual_s = median(steps)
-    missing = sum(round(step / usual_s) - 1 for step in steps if step > _MISSED * usual_s) if usual_s > 0.0 else 0
-    return Intervals(usual_s, max(steps), missing)
+    usual_s = median(step / (1 + others) for step, others in steps)
+    gaps_s = [max(min(step, usual_s), step - others * usual_s) for step, others in steps]
+    missing = sum(round(gap_s / usual_s) - 1 for gap_s in gaps_s if gap_s > _MISSED * usual_s) if usual_s > 0.0 else 0
+    return Intervals(usual_s, max(gaps_s), missing)

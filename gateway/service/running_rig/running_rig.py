@@ -31,6 +31,7 @@ from gateway.service import banner
 from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.service.control_socket import ControlSocket, RunningParts
 from gateway.service.guardian_line import GuardianLine
+from gateway.service.running_rig import starting
 from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
@@ -46,13 +47,6 @@ from gateway.service.running_rig.lines.watchdog_word import WatchdogRegister, de
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.rig_calibrations import RigCalibrations
 from gateway.service.running_rig.rig_plants import PlantEdges, RigPlants
-from gateway.service.running_rig.starting import (
-    cause_of_restart,
-    lasting_warnings,
-    waiting_s,
-    warning_notes,
-    why_silent,
-)
 from gateway.service.simulation.requests import SimulationRequests
 from gateway.service.watch_reports import WatchReports
 
@@ -166,16 +160,16 @@ class RunningRig:
         self.loop.valve, self.loop.restart_cause = self._valve_line, cause
         self._ports.loop, self.loop.pressure_pa_per_v = self.loop, rig.output.device.pressure_pa_per_v
         self.loop.recordings, self.loop.ring = self._recordings, self.ring
-        self.loop.warnings.bits = lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
+        self.loop.warnings.bits = starting.lasting_warnings(rig, is_coarse_clock=self._tick.is_fallback)
 
     async def start(self, bind: list[Any] | None, handover: Handover, *, restarted: Ending | None) -> banner.Ready:
         """Open the ports, greet both devices, then serve Modbus: nobody is answered before there is an answer."""
-        self._wire(cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
+        self._wire(starting.cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
         self.bank.held_runs.restore(handover.held_runs)
         await self._ports.open(is_restart=bool(restarted))
         self._tick.start()
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._spoke.wait(), waiting_s(is_restart=bool(restarted)))
+            await asyncio.wait_for(self._spoke.wait(), starting.waiting_s(is_restart=bool(restarted)))
         for change in handover.changes(**self._in_use()):
             self._log("start", change)
         self._guardian.keep(**self._in_use())
@@ -202,6 +196,7 @@ class RunningRig:
             notes=notes,
             faces=faces,
             valve_port=self._ports.valve.path if self._ports.valve else "",
+            valve_stands=self._valve_line.status.stands if self._valve_line else None,
         )
 
     def _show_faces(self) -> None:
@@ -233,7 +228,7 @@ class RunningRig:
         if restarted:
             notes.append(f"restarted in OFF after: {restarted.sentence}")
         else:
-            notes += warning_notes(self._rig)
+            notes += starting.warning_notes(self._rig)
         if self._line.checks.fault:
             notes.append(device_fault_note(self._line.checks))
         elif self._line.acknowledged_v is None:
@@ -242,15 +237,18 @@ class RunningRig:
             notes.append(device_fault_note(self._cell_line.identity))
         elif self.loop.sample is None:
             notes.append(await self._why_silent(self._ports.cell, self._rig.load_cell, is_restart=bool(restarted)))
+        notes += starting.silent_valve_notes(self._valve_line, self._ports.valve, is_restart=bool(restarted))
         return tuple(notes)
 
     async def _why_silent(self, port: SerialPort, line: OutputLine | CellLine, *, is_restart: bool) -> str:
         if is_restart and port.path in self._ports.not_opened:
             return str(self._ports.not_opened[port.path])
-        waited_s, now_s = waiting_s(is_restart=is_restart), time.monotonic()
+        waited_s, now_s = starting.waiting_s(is_restart=is_restart), time.monotonic()
         held = self._lateness.since(now_s - waited_s, now_s, self._counters.waited_s())
         _, blamed = cause_of_silence(FaultCode.OUTPUT_SILENT, waited_s, held, "")
-        return await why_silent(port, line, blamed, self._rig.control.limits.safe_voltage_v, is_restart=is_restart)
+        return await starting.why_silent(
+            port, line, blamed, self._rig.control.limits.safe_voltage_v, is_restart=is_restart
+        )
 
     async def ramp_down(self) -> None:
         """Ramp the force to 0, then send the safe voltage (at most 4.5 s); at once where nobody guards it, or it fails."""
@@ -294,7 +292,7 @@ class RunningRig:
         self._guardian.keep(zero_n=self.controller.zero_n)
         self._audit.flush()
         self._tick.follow(self.loop.streamed_s)
-        if self._line.acknowledged_v is not None and self.loop.sample is not None:
+        if starting.have_spoken(self._line, self.loop.sample, self._valve_line):
             self._spoke.set()
 
     def _on_calibration(self, active: ActiveCalibration) -> None:

@@ -9,12 +9,15 @@ from typing import Final
 from gateway import defaults
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
+from gateway.devices.messages import ForceSample
 from gateway.fieldbus import BindError, ModbusTcpServer
 from gateway.ports import PortError, SerialPort
 from gateway.processes import exit_codes
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.service.running_rig.lines.baud_probe import explain_silent_device
+from gateway.service.running_rig.lines.output_line import OutputExchange
+from gateway.service.running_rig.lines.valve_line import ValveExchange
 
 _HELD_BOUND_S: Final = 0.5
 """How long a restart waits for a port that somebody holds who is about to end, and any start for a permission: udev gives it a
@@ -113,6 +116,26 @@ async def why_silent(
     sentence = await explain_silent_device(line, port.path, safe_v)
     await port.open()
     return sentence
+
+
+def have_spoken(output: OutputExchange, sample: ForceSample | None, valve: ValveExchange | None) -> bool:
+    """Decide whether every device has said its first words."""
+    return output.acknowledged_v is not None and sample is not None and not (valve and valve.status.stands is None)
+
+
+def silent_valve_notes(valve: ValveExchange | None, port: SerialPort | None, *, is_restart: bool) -> tuple[str, ...]:
+    """Return what a start says of a valve that nobody knows the place of; nothing of one that has told it, or that is none."""
+    if valve is None or port is None or (status := valve.status).lost or status.stands is not None:
+        return ()
+    start = f"within {waiting_s(is_restart=is_restart):g} s of the {'restart' if is_restart else 'start'}"
+    why = (
+        f"it says {status.said}; address, channel or profile of the relay?"
+        if status.said
+        else "power, wires or address?"
+    )
+    return (
+        f"E111 {port.path}: the valve's relay has not said where it stands {start}: {why} Until then enable is refused",
+    )
 
 
 async def listen(server: ModbusTcpServer, host: str, port: int, instead: str = "") -> tuple[str, int]:

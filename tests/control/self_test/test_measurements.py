@@ -122,5 +122,9 @@ def test_as_many_readings_are_taken_as_three_standard_errors_ask_for(
 def test_a_gap_of_two_intervals_is_one_that_is_missing_and_a_late_one_is_none() -> None:
     assert intervals_of([0.0, 1.0, 2.0, 4.0, 5.0, 8.0, 9.0]) == Intervals(1.0, 3.0, 3)
     assert intervals_of([0.0, 1.0, 2.0, 3.75, 4.75]) == Intervals(1.0, 1.75, 0)
+    assert intervals_of([0.0, 1.0, 2.0, 6.0, 7.0], [0, 0, 0, 3, 0]) == Intervals(1.0, 1.0, 0), (
+        "four at once, none missing"
+    )
+    assert intervals_of([0.0, 1.0, 2.0, 6.0, 7.0], [0, 0, 0, 1, 0]) == Intervals(1.0, 3.0, 2)
     assert intervals_of([1.0]) == intervals_of([]) == Intervals(0.0, 0.0, 0)
     assert intervals_of([1.0, 1.0, 1.0]) == Intervals(0.0, 0.0, 0)

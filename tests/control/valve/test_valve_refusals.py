@@ -9,6 +9,7 @@ from gateway.bsfm import Bsfm
 from gateway.codes.refusals import RefusalReason
 from gateway.control.inputs import CalibrationInUse, ValveStatus
 from gateway.control.runs.ladder_stairs import CalibrationPlan
+from gateway.control.settings import SafeDirection
 from gateway.registers.words import ControlBit, State, StatusBit
 from gateway.registers.writes.proposed_write import ProposedWrite
 from tests.control.bench import bsfm
@@ -36,6 +37,19 @@ def test_no_run_begins_before_the_valve_has_read_back() -> None:
     assert "is switching" in bench.controller.refusal_of_run(bench.now_s, CalibrationPlan())
     bench.obeys = True
     bench.run(1.0)
+    assert bench.controller.refusal_of_run(bench.now_s, CalibrationPlan()) == ""
+
+
+@pytest.mark.parametrize("reason", [RefusalReason.CALIBRATION_REFUSED, RefusalReason.SELF_TEST_REFUSED])
+def test_where_the_valve_rests_pulling_the_cure_is_no_state_that_it_is_in_already(reason: RefusalReason) -> None:
+    """`Write control_word 0, wait for state off, then ask again` was never taken, however often."""
+    bench = ValveBench(safe=SafeDirection.PULL)
+    bench.run(2.0)
+    assert bench.last.state is State.OFF and bench.stands is PULL
+    refused = bench.controller.refusal_of_run(bench.now_s, CalibrationPlan())
+    assert "`force-gateway hold 0`" in refused and "hold 0" in reason.explanation.do
+    bench.write(control_word=ENABLE)
+    bench.run(2.0)
     assert bench.controller.refusal_of_run(bench.now_s, CalibrationPlan()) == ""
 
 
