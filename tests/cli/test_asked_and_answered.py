@@ -17,6 +17,7 @@ from gateway.cli.errors import CliError, NoAnswerError
 from gateway.cli.master.client import Assignment, GatewayClient
 from gateway.cli.system_service.installation import plan_installation
 from gateway.cli.system_service.unit_file import STOP_S
+from gateway.cli.verbs.operation import sim
 from gateway.processes import exit_codes
 from gateway.profiles import load_register_map, load_rig
 from gateway.registers.words import UploadReason
@@ -191,3 +192,12 @@ def test_what_is_gone_of_a_ladder_is_climbed_again_and_no_zero_is_taken_under_fo
         assert rest.plan["tare"] is False and rest.plan["v_max_v"] == 7.0
         assert (rest.groups, rest.finished) == (2 if is_whole else 1, is_whole)
         assert rest.is_whole(rest.plan_with({})) is is_whole
+
+
+def test_what_is_set_on_a_simulated_rig_is_told_in_its_unit_and_a_share_in_none(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    answer = {"rig": "demo", "set": {"creep.creep_share": 0.05, "cell.noise": 0.5, "cell.silent": True}, "notes": ["x"]}
+    sim._tell(answer, as_json=False)
+    told = ["rig demo: set now", "  creep.creep_share=0.05", "  cell.noise=0.5 N", "  cell.silent=on", "note: x"]
+    assert capsys.readouterr().out.splitlines() == told

@@ -202,3 +202,15 @@ def test_who_has_packed_a_bundle_is_told_how_to_see_what_is_in_it_not_what_would
     state, target = with_events(tmp_path / "state", "A310 master lost"), tmp_path / "b.tar.gz"
     done = gateway("report", target, "--state", state, "--rig", "demo")
     assert f"`tar -xzOf {target}` prints what is in it" in done.stdout
+
+
+def test_the_newest_events_go_in_and_what_each_part_is_named_by(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a log of months the oldest ones tell nothing of what is wrong today."""
+    monkeypatch.setattr("gateway.cli.support_bundle.EVENT_LINES", 2)
+    monkeypatch.setattr("gateway.cli.control_socket.ask", lambda state, request: {"asked": request["do"]})
+    parts = collect_parts(with_events(tmp_path / "state", "first", "second", "third"), lambda: ())
+    assert [json.loads(line)["text"] for line in parts["events.jsonl"].splitlines()] == ["second", "third"]
+    asked = {name: json.loads(parts[name])["asked"] for name in ("live.json", "health.json")}
+    assert asked == {"live.json": "state", "health.json": "health"}

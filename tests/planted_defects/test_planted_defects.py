@@ -9,12 +9,14 @@ import pytest
 
 from tests.planted_defects.copied_tree import ROOT, copy_tree, failing_test, planted
 from tests.planted_defects.defects import DEFECTS, Defect
+from tests.planted_defects.defects_told import TOLD
 
+ALL = (*DEFECTS, *TOLD)
 IN_GATE = ("the slew limit is dropped", "a damaged calibration is read")
 
 
 def every_defect() -> list[object]:
-    return [pytest.param(one, id=one.name, marks=() if one.name in IN_GATE else pytest.mark.long) for one in DEFECTS]
+    return [pytest.param(one, id=one.name, marks=() if one.name in IN_GATE else pytest.mark.long) for one in ALL]
 
 
 @pytest.fixture(scope="module")
@@ -32,15 +34,13 @@ def test_a_planted_defect_is_seen(tree: Path, defect: Defect) -> None:
 
 @pytest.mark.long
 def test_without_a_defect_the_same_tests_pass(tree: Path) -> None:
-    asked = tuple(dict.fromkeys(place for one in DEFECTS for place in one.tests))
+    asked = tuple(dict.fromkeys(place for one in ALL for place in one.tests))
     assert failing_test(tree, asked) is None
 
 
 def test_every_defect_has_its_place_and_its_tests() -> None:
     """A change of the source takes the place of a defect away in silence."""
-    lost = [
-        one.name for one in DEFECTS if (ROOT / "gateway" / one.file).read_text(encoding="utf-8").count(one.before) != 1
-    ]
+    lost = [one.name for one in ALL if (ROOT / "gateway" / one.file).read_text(encoding="utf-8").count(one.before) != 1]
     assert lost == []
-    assert [place for one in DEFECTS for place in one.tests if not (ROOT / "tests" / place).exists()] == []
-    assert len({one.name for one in DEFECTS}) == len(DEFECTS) >= 40
+    assert [place for one in ALL for place in one.tests if not (ROOT / "tests" / place).exists()] == []
+    assert len({one.name for one in ALL}) == len(ALL) >= 40

@@ -12,6 +12,7 @@ from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.words import State
 from gateway.web.commands import Commands, RefusedCommand
 from gateway.web.context import WebContext
+from gateway.web.register_table import register_table
 from tests.service.requests.test_hostile_requests import Stage
 from tests.service.rigs import demo
 from tests.web.test_commands import leased, play
@@ -31,6 +32,21 @@ def test_the_page_takes_over_and_tares_by_the_bits_that_say_so(tmp_path: Path) -
         assert any(sentence.startswith("tare") for _, sentence in wired.log)
 
     play(tmp_path, scene)
+
+
+def test_the_page_asks_for_a_unit_that_the_rig_answers(tmp_path: Path) -> None:
+    """On one that answers 7 alone each of its commands was none of ours, a Stop among them."""
+    rig = replace(demo(), network=replace(demo().network, units=(7, 9)))
+
+    async def scene(commands: Commands, stage: Stage) -> None:
+        await commands.enable("me", 12.0)
+        stage.wired.until(lambda: stage.wired.state is State.HOLDING, 3.0)
+        await commands.stop()
+        assert stage.wired.word("control_word") == 0
+
+    play(tmp_path, scene, rig)
+    assert register_table(rig, 5020)["unit"] == 7
+    assert register_table(demo(), 5020)["unit"] == 1, "for which mbpoll needs no option, though 0 stands first"
 
 
 def test_a_reset_takes_a_setpoint_back_that_somebody_has_left(tmp_path: Path) -> None:

@@ -131,3 +131,17 @@ def test_in_band_is_said_where_it_is_so() -> None:
     inside = replace(PRESSING, bits=StatusBit.IN_BAND)
     assert document(inside, 1.0)["in_band"] is True and document(PRESSING, 1.0)["in_band"] is False
     assert "  in band" in describe_state(inside) and "  not in band" in describe_state(PRESSING)
+
+
+def test_each_number_of_a_line_of_json_stands_under_its_name_in_the_unit_of_that() -> None:
+    told = document(replace(PRESSING, force_n=11.98, setpoint_n=12.5, voltage_v=1.512, warnings=1 << 2), 1.0)
+    numbers = {name: told[name] for name in ("force_n", "setpoint_n", "applied_n", "voltage_v")}
+    assert numbers == {"force_n": 11.98, "setpoint_n": 12.5, "applied_n": 12.0, "voltage_v": 1.512}
+    assert (told["state"], told["warnings"], told["fault"]) == ("holding", ["A340"], None)
+
+
+@pytest.mark.parametrize("time", ["0s", "0", "soon"])
+def test_no_time_is_no_press_of_a_moment(time: str, call: Any) -> None:
+    """Nothing is asked of anybody: there is no gateway."""
+    done = call("hold", "12", "--for", time, "--gateway", "127.0.0.1:1")
+    assert done.exit_code == 2 and f"{time} is no time such as 10s" in done.output

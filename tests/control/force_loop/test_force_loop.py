@@ -130,6 +130,8 @@ def test_a_voltage_goes_out_as_it_is_and_leaves_no_trim() -> None:
     asked = wish(0.0)._replace(mode=Mode.VOLTAGE, voltage_v=2.0)
     assert loop.step(asked, inputs(12.0)) is StateEvent.MOVE
     assert (loop.voltage_v, loop.feedforward_v, loop.trim_v, loop.applied_n) == (2.0, 2.0, 0.0, 12.0)
+    loop.step(asked._replace(manner=asked.manner._replace(gravity_n=1.5)), inputs(12.0, outside_n=2.0))
+    assert loop.feedforward._given_n == 3.5, "weight, and what comes from outside, is not the slide's to give"
 
 
 def test_what_cannot_be_calculated_is_a_fault_and_names_its_kind() -> None:
