@@ -325,7 +325,7 @@ class RefusalReason(IntEnum):
         modbus.BUSY,
         Explanation(
             "W310",
-            "busy: a calibration runs",
+            "busy: a run has the output",
             "A command came while a calibration, an experiment or a self-test has the output (state calibrating).",
             "What bit 5 or 6 or somebody at the gateway's machine has begun is not done; calibration_time_left says how "
             "long.",

@@ -52,17 +52,22 @@ class PacedPty:
         self._outward = _Flow(PacedWire(self._baud, self._bits_per_character), self._write)
         asyncio.get_running_loop().add_reader(self._pty.fd, self._on_readable)
 
-    def send(self, data: bytes) -> None:
-        """Put bytes on the wire to the client, behind those that are still on it; nowhere, while the plug is out."""
+    def send(self, data: bytes, at_s: float | None = None) -> None:
+        """Put bytes on the wire to the client, behind those that are still on it; nowhere, while the plug is out. at_s: when,
+        monotonic s, where that is a while ago; None: now."""
         if self._pty is None:
             return
-        self._outward.put(resample_at_baud(data, self._baud, self._open_pty.client_baud()))
+        self._outward.put(resample_at_baud(data, self._baud, self._open_pty.client_baud()), at_s)
 
     @property
     def backlog_s(self) -> float:
         """Time until everything sent is through the wire."""
+        return self.backlog_at(monotonic_s())
+
+    def backlog_at(self, at_s: float) -> float:
+        """Return how long what was sent before kept the wire, s, at at_s, monotonic s."""
         last_s = self._outward.wire.last_through_s
-        return 0.0 if last_s is None else max(0.0, last_s - monotonic_s())
+        return 0.0 if last_s is None else max(0.0, last_s - at_s)
 
     def close(self) -> None:
         """Pull the plug; what is still on the wire is lost."""
@@ -104,8 +109,8 @@ class _Flow:
         self._take = take
         self._timer: asyncio.TimerHandle | None = None
 
-    def put(self, data: bytes) -> None:
-        self.wire.send(data, monotonic_s())
+    def put(self, data: bytes, at_s: float | None = None) -> None:
+        self.wire.send(data, monotonic_s() if at_s is None else at_s)
         if self._timer is None:
             self._wait()
 

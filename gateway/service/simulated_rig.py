@@ -33,6 +33,7 @@ from gateway.service.simulation.kept_settings import KeptSettings
 from gateway.service.simulation.settings import SimulationSettings
 from gateway.service.simulation.world import SimulatedRig
 
+_KEPT_S: Final = 1.0  # of a stream that nobody reads, in a driver
 _LAST_WORDS_S: Final = 0.5  # longer than control takes to its last write and the answer
 _UNPLUGS: Final = {"output": "output.unplug", "load_cell": "cell.unplug", "valve": "valve.unplug"}
 
@@ -44,7 +45,7 @@ class SimulatedLines:
         self.world = SimulatedRig(
             rig,
             send_output=lambda data: self._ptys["output"].send(data),
-            send_cell=lambda data: self._ptys["load_cell"].send(data),
+            send_cell=lambda data: self._ptys["load_cell"].send(data, self._frame_s),
             now_s=time.monotonic(),
         )
         self._ptys = {
@@ -54,6 +55,7 @@ class SimulatedLines:
         if rig.valve:
             self._ptys["valve"] = _make_pty(rig.valve.device, self._on_valve_bytes)
         self._paths: dict[str, str] = {}
+        self._frame_s: float | None = None  # when the amplifier sends, where that is not now
         self._rate_hz = rig.load_cell.device.rate_hz
         self._tick = ClockTick(1.0 / self._rate_hz, self._on_tick) if self._rate_hz else None
 
@@ -92,10 +94,14 @@ class SimulatedLines:
         self._ptys["valve"].send(self.world.on_valve_bytes(chunk, now_s))
 
     def _on_tick(self, expirations: int, late_s: float) -> None:
-        """A stream, whose amplifier leaves out what its wire has no time for."""
-        pty = self._ptys["load_cell"]
-        if pty.is_open and pty.backlog_s * self._rate_hz < 1.0:
-            self.world.stream(time.monotonic())
+        """A stream, whose amplifier leaves out what its wire has no time for. It has not waited for a process that comes late:
+        its frames are on the wire at their times, as many as a driver keeps."""
+        pty, now_s = self._ptys["load_cell"], time.monotonic()
+        for behind in reversed(range(min(expirations, round(self._rate_hz * _KEPT_S)))):
+            self._frame_s = now_s - late_s - behind / self._rate_hz
+            if pty.is_open and pty.backlog_at(self._frame_s) * self._rate_hz < 1.0:
+                self.world.stream(self._frame_s)
+        self._frame_s = None
 
 
 def _make_pty(device: DeviceProfile, on_bytes: Callable[[bytes, float], None]) -> PacedPty:

@@ -18,6 +18,7 @@ _MOST_SMOOTHED: Final = 30
 _SMOOTHED: Final = 3  # readings whose mean is compared with a level: one spike is no crossing
 _SAME_N: Final = 1.0e-9  # two readings nearer than this are equal but for arithmetic
 _LONE_N: Final = 1.5  # off the median: of one false reading LeapLimit believes 3 N
+_CLOSE: Final = 0.5  # median intervals, below which a reading is nearer to the one before than it was sent
 _MISSED: Final = 1.75  # median intervals from which on a message is missing
 
 
@@ -138,5 +139,16 @@ def intervals_of(times_s: Sequence[float], beside: Sequence[int] = ()) -> Interv
         return Intervals(0.0, 0.0, 0)
     usual_s = median(step / (1 + others) for step, others in steps)
     gaps_s = [max(min(step, usual_s), step - others * usual_s) for step, others in steps]
-    missing = sum(round(gap_s / usual_s) - 1 for gap_s in gaps_s if gap_s > _MISSED * usual_s) if usual_s > 0.0 else 0
-    return Intervals(usual_s, max(gaps_s), missing)
+    return Intervals(usual_s, max(gaps_s), _missing([gap_s / usual_s for gap_s in gaps_s]) if usual_s > 0.0 else 0)
+
+
+def _missing(gaps: Sequence[float]) -> int:
+    """Count what did not come, by gaps in usual ones: what only came late follows close behind its gap."""
+    missing, owed, made_up = 0, 0, 0.0
+    for gap in (*gaps, 1.0):
+        if gap < _CLOSE:
+            made_up += 1.0 - gap
+            continue
+        missing += max(0, owed - round(made_up))
+        owed, made_up = (round(gap) - 1 if gap > _MISSED else 0), 0.0
+    return missing

@@ -77,8 +77,9 @@ class SimulatedRig:
         self.valve = SimulatedValve(rig)
 
     def advance(self, now_s: float) -> None:
-        """Advance the twin to now_s; after a long pause by a limited time only."""
-        self.twin.advance(min(max(0.0, now_s - self._now_s), _LONGEST_LEAP_S))
+        """Advance the twin to now_s; after a long pause by a limited time only, and never back."""
+        now_s = max(now_s, self._now_s)
+        self.twin.advance(min(now_s - self._now_s, _LONGEST_LEAP_S))
         self._now_s = now_s
         if self.valve.move(now_s):
             self._swap_chambers()

@@ -158,6 +158,12 @@ def test_an_enable_that_is_refused_says_why(block: RefusalReason, code: str, ban
     assert answer.stderr.startswith(f"{code} "), answer.stderr
 
 
+def test_what_a_self_test_keeps_busy_is_not_told_as_a_calibration(bank, gateway: str, call) -> None:
+    bank.on_asked = lambda requests: EdgeRefusal(RefusalReason.CALIBRATING, ControlBit(0), "a self-test has the output")
+    said = call("write", "control_word=enable", "--gateway", gateway).stderr
+    assert said.startswith("W310 busy: a run has the output: exception 06") and "a calibration" not in said
+
+
 def test_every_register_of_the_map_can_be_read_by_its_name(register_map: RegisterMap, gateway: str, call) -> None:
     names = [f"{register.name}@{register.block}" for register in register_map.registers]
     answer = call("read", *names, "--json", "--gateway", gateway)

@@ -126,5 +126,10 @@ def test_a_gap_of_two_intervals_is_one_that_is_missing_and_a_late_one_is_none() 
         "four at once, none missing"
     )
     assert intervals_of([0.0, 1.0, 2.0, 6.0, 7.0], [0, 0, 0, 1, 0]) == Intervals(1.0, 3.0, 2)
+    assert intervals_of([0.0, 1.0, 2.0, 3.9, 4.0, 5.0]).missing == 0, "late, with the next one close behind"
+    assert intervals_of([0.0, 1.0, 2.0, 4.6, 4.8, 5.0, 6.0, 8.0, 9.0]).missing == 1, (
+        "two late, and later one that never came"
+    )
+    assert intervals_of([0.0, 0.1, 1.0, 2.0, 4.0, 5.0]).missing == 1, "what was close before a gap does not fill it"
     assert intervals_of([1.0]) == intervals_of([]) == Intervals(0.0, 0.0, 0)
     assert intervals_of([1.0, 1.0, 1.0]) == Intervals(0.0, 0.0, 0)
