@@ -17,10 +17,11 @@ A supervisor watches for hunting: corrections that change sign again and again a
 world's), not the model's. Each makes the zone wider and the pace slower; after MOST_TURNS the trim stands still until the
 target has moved by more than NEW_TARGET_N, and says so. A correction that has stood at its limit was not friction's, but that
 of air that failed and came back, or the like: the count begins anew. One that only touched it counts, for a trim may swing
-from limit to limit. And where the trim turned round it may stand wrong: an error of one sign for STOOD_S, wider than the zone
-has become, is corrected again. Fewer turns may have been disturbances that came and went: behind them an error of one sign
-for STOOD_S need only be wider than the zone was at first. Either takes twice as long each further time at one target, until it
-takes LONGEST_PATIENCE_S.
+from limit to limit. The same behind a turn that has come later than a trim of that pace takes to go round: supply air that
+comes and goes once a minute, or the warmth of a day. And where the trim turned round it may stand wrong: an error of one sign
+for STOOD_S, wider than the zone has become, is corrected again. Fewer turns may have been disturbances that came and went:
+behind them an error of one sign for STOOD_S need only be wider than the zone was at first. Either takes twice as long each
+further time at one target, until it takes LONGEST_PATIENCE_S.
 """
 
 from math import exp, sqrt
@@ -45,6 +46,7 @@ CEASED: Final = 3.0  # times what the last samples had, squared
 WIDER: Final = 1.5  # zone after each turn
 SLOWER: Final = 0.6  # pace after each turn
 MOST_TURNS: Final = 5
+HUNTS_S: Final = 10.0  # at full pace: between two turns of what hunts
 STOOD_S: Final = 2.0
 LONGEST_PATIENCE_S: Final = 30.0  # a constant force is one target for hours, and much disturbs it meanwhile
 AT_LIMIT_S: Final = (
@@ -70,6 +72,7 @@ class MeasuredTrim:
         self._smooth_n = self._seen_s = self._interval_s = 0.0
         self._way = self._last_way = self._turns = 0
         self._at_limit_s, self._stood_s, self._patience_s = 0.0, 0.0, STOOD_S  # at_limit_s: since it turned last
+        self._since_turn_s = 0.0
         self.reset()
 
     @property
@@ -163,6 +166,7 @@ class MeasuredTrim:
         if self.is_off:
             return
         self._smooth(error_n, interval_s)
+        self._since_turn_s += interval_s
         zone_n = self._zone_n()
         if self.has_hunted:
             self._stand(zone_n, interval_s)
@@ -189,9 +193,11 @@ class MeasuredTrim:
         return 1.0 / (1.0 / self._timing.integral_per_s + max(0.0, interval_s - HELD_S))
 
     def _turn(self, way: int) -> None:
-        if self._last_way and way != self._last_way:
-            self._turns = 0 if self._has_stood_at_limit() else self._turns + 1
-            self._at_limit_s = 0.0
+        if way != self._last_way:
+            is_slow = self._since_turn_s > HUNTS_S / SLOWER**self._turns
+            is_first = not self._last_way or is_slow or self._has_stood_at_limit()
+            self._turns = 0 if is_first else self._turns + 1
+            self._at_limit_s = self._since_turn_s = 0.0
         self._way = self._last_way = way
 
     def _has_stood_at_limit(self) -> bool:

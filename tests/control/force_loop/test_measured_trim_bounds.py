@@ -1,12 +1,13 @@
 """Bounds of the measured rig's trim: what is hunting and what an offset, how slow samples are followed, what noise counts."""
 
+from math import pi, sin
 from random import Random
 
 import pytest
 
 from gateway.bsfm.response.second_order import SecondOrder
 from gateway.control import Trim
-from gateway.control.force_loop.measured_trim import MOST_TURNS, STOOD_S, MeasuredTrim
+from gateway.control.force_loop.measured_trim import HUNTS_S, MOST_TURNS, SLOWER, STOOD_S, MeasuredTrim
 from gateway.control.settings import LoopTiming
 from gateway.registers.words import LimitedBy
 from tests.control.force_loop.test_measured_trim import SAMPLE_S, SLOPE_N_PER_V, TIMING, held, hunt, trim
@@ -55,6 +56,30 @@ def test_who_stands_at_its_limit_for_longer_than_a_swing_does_is_not_hunting(
 ) -> None:
     """Twice what the trim takes for a correction, and half a second at least."""
     assert swung(integral_per_s, stands_s).has_hunted is is_hunting
+
+
+@pytest.mark.parametrize("period_s", [60.0, 600.0])
+def test_what_comes_and_goes_slowly_is_followed_all_day(period_s: float) -> None:
+    """Supply air goes round once a minute, warmth once a day: of five turns one after the other the trim stood still where it
+    was wrong the most, 2.9 N beside a force that was disturbed by 1.5 N."""
+    one, interval_s, worst_n = trim(), 0.1, 0.0
+    for sample in range(round(20.0 * period_s / interval_s)):
+        left_n = 1.5 * sin(2.0 * pi * sample * interval_s / period_s) - one.value_n
+        one.integrate(left_n, SLOPE_N_PER_V, interval_s)
+        worst_n = max(worst_n, abs(left_n))
+    assert worst_n < 0.2 and not one.has_hunted
+
+
+@pytest.mark.parametrize(("share", "is_hunting"), [(0.8, True), (1.2, False)])
+def test_hunting_is_as_slow_as_the_trim_has_become(share: float, is_hunting: bool) -> None:
+    one, way = trim(limit_v=50.0), 1.0
+    for _ in range(MOST_TURNS + 1):
+        turns_s = share * HUNTS_S / SLOWER**one._turns
+        held(one, 2.0 * way, 1.0)
+        for _ in range(round((turns_s - 1.0) / SAMPLE_S)):
+            one.integrate(0.0, SLOPE_N_PER_V, SAMPLE_S)
+        way = -way
+    assert one.has_hunted is is_hunting
 
 
 @pytest.mark.parametrize(("error_n", "is_corrected"), [(0.75, False), (1.1, True)])
