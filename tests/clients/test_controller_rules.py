@@ -92,14 +92,14 @@ def test_an_input_that_is_true_when_a_controller_starts_enables_nothing(kind: ty
 
 @pytest.mark.parametrize("kind", [S7, TwinCat, Codesys])
 def test_a_reset_disables_though_its_input_still_asks_for_the_force(kind: type[Plc]) -> None:
-    """Else it would be refused, for it needs force 0."""
+    """Else it would be refused, for it needs force 0. OFF goes ahead: it has to stand where the reset is refused."""
     gateway = GatewayAtHand(MAP)
     client = kind(TEXTS["scl" if kind is S7 else "st"], gateway)
     client.enable(12.0)
     cycles(client)
     client.inputs[client.NAMES["reset"]] = True
     cycles(client)
-    assert [words[:2] for words in gateway.words if words[0] != 1] == [(2, 0)] and not gateway.exceptions
+    assert [words[:2] for words in gateway.words if words[0] != 1] == [(0, 0), (2, 0)] and not gateway.exceptions
     assert not client.enabled
 
 

@@ -6,6 +6,9 @@ from typing import Any
 
 import pytest
 
+from gateway.codes.refusals import RefusalReason
+from gateway.registers.words import ControlBit
+from gateway.registers.writes.proposed_write import EdgeRefusal
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.controllers import MbClient, Plc
@@ -81,3 +84,22 @@ def test_a_write_that_ends_with_the_connection_is_a_loss_and_no_refusal(
     client.cycle(3.0)
     assert failed and commands(gateway) == [command(1, 1200), command(0, 0)]
     assert client.ended and not client.enabled and "lost" in client.text
+
+
+@pytest.mark.parametrize("language", BLOCKS)
+@pytest.mark.parametrize("scans", range(12))
+def test_a_reset_while_enabled_stops_with_the_next_request(language: str, scans: int, gateway: GatewayAtHand) -> None:
+    """With nothing to reset the gateway refused it, and the stop beside it: the force stood for two requests more, 150 ms."""
+    nothing = EdgeRefusal(RefusalReason.NOTHING_TO_RESET, ControlBit.RESET_FAULT, "no fault is latched")
+    gateway.bank.on_asked = lambda proposal: (
+        nothing if ControlBit.RESET_FAULT in proposal.command.control_word else None
+    )
+    client: Plc = CONTROLLERS[language](TEXTS[language], gateway)
+    client.enable(12.0)
+    cycles(client)
+    for _ in range(scans):
+        client.scan()
+    client.inputs[client.NAMES["reset"]] = True
+    cycles(client)
+    assert commands(gateway)[:2] == [command(1, 1200), command(0, 0)]
+    assert client.ended and not client.enabled and gateway.bank.command.control_word == 0

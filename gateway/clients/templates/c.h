@@ -29,7 +29,8 @@ ${fill_in} *     static fg_client gateway;
  * After a refusal, a fault, a loss or a restart of the gateway this client never enables again by itself:
  *     refused   the last accepted command goes on (a refused write would not renew the lease), `message` says why
  *     ended     the gateway is not enabled any more: enable and force are 0 here, too; `ended` is 1 until fg_enable
- *     lost      the same, and if it was enabled, the first write after the reconnection is OFF
+ *     lost      the same, and if it was enabled, the first write after the reconnection is OFF. Each FG_LOST, while it waits to
+ *               connect again too, drops what was asked for: call fg_enable, fg_tare and the like again behind an FG_OK
  */
 #ifndef FORCE_GATEWAY_H
 #define FORCE_GATEWAY_H
@@ -309,7 +310,10 @@ static int fg_connect(fg_client *client) {
     int error;
     char service[8];
     if (client->socket >= 0) return FG_OK;
-    if (fg_now_ms() < client->retry_at_ms) return FG_LOST;
+    if (fg_now_ms() < client->retry_at_ms) {
+        fg_forget(client); /* what is asked for meanwhile: nobody expects it any more when the connection is there */
+        return FG_LOST;
+    }
     memset(&hints, 0, sizeof hints);
     hints.ai_socktype = SOCK_STREAM;
     snprintf(service, sizeof service, "%u", (unsigned)client->port);

@@ -72,7 +72,9 @@ MODULE ForceGateway
   !    ended    by a fault, another master or a restart: fgEnable is
   !             FALSE again, until you set it
   !    lost     the same; it connects again, waiting longer each time,
-  !             and if it was enabled its first write is OFF
+  !             and if it was enabled its first write is OFF. What is
+  !             set meanwhile goes FALSE: set it when fgConnected is
+  !             TRUE again
   !*******************************************************************
 
   ! ---- where the gateway is: EDIT -----------------------------------
@@ -225,15 +227,9 @@ ${crc_table}];
     IF ERR_FG_FRAME=-1 BookErrNo ERR_FG_FRAME;
     SocketClose sdGateway;
     FgClearStatus;
-    fgReset:=FALSE;
-    fgTare:=FALSE;
-    fgTake:=FALSE;
-    fgUpload:=FALSE;
-    nUploadStep:=0;
-    nOnce:=0;
     nBackoff:=0;
     fgEnded:=FALSE;
-    FgForget;
+    FgForgetAsked;
     bOffPending:=FALSE;
     bOffRefused:=FALSE;
     bAsking:=FALSE;
@@ -247,7 +243,11 @@ ${crc_table}];
   PROC FgCycle()
     IF bWatch FgWatchProgram;
     IF NOT fgConnected THEN
-      IF ClkRead(clRetry)<nBackoff RETURN;
+      IF ClkRead(clRetry)<nBackoff THEN
+        ! Nobody expects it any more when the connection is there
+        FgForgetAsked;
+        RETURN;
+      ENDIF
       FgConnect;
       IF NOT fgConnected RETURN;
     ENDIF
@@ -611,16 +611,24 @@ ${status_decoding}
     fgStatus{FG_S_FORCE_MEASURED}:=9E9;
   ENDPROC
 
+  ! What is asked for without a connection is not done later
+  LOCAL PROC FgForgetAsked()
+    fgReset:=FALSE;
+    fgTare:=FALSE;
+    fgTake:=FALSE;
+    fgUpload:=FALSE;
+    nUploadStep:=0;
+    nOnce:=0;
+    FgForget;
+  ENDPROC
+
   LOCAL PROC FgDrop(string stWhy)
     SocketClose sdGateway;
     IF bAsking OR FgIsOn() bOffPending:=TRUE;
     bAsking:=FALSE;
     IF fgConnected ErrWrite\W,"Force gateway: lost",stWhy;
     FgClearStatus;
-    fgUpload:=FALSE;
-    nUploadStep:=0;
-    nOnce:=0;
-    FgForget;
+    FgForgetAsked;
     fgText:="lost: "+stWhy;
     nBackoff:=nBackoff*2;
     IF nBackoff=0 nBackoff:=BACKOFF_FIRST;

@@ -280,7 +280,7 @@ class UniversalRobot:
         return self.machine.global_names[name]
 
     def enable(self, force_n: float) -> None:
-        assert self.machine.start("fg_enable", force_n)
+        self.machine.start("fg_enable", force_n)
 
     def force(self, force_n: float) -> None:
         self.machine.start("fg_force", force_n)

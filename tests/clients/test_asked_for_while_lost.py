@@ -1,0 +1,97 @@
+"""What a program asks for while nobody is there is not done when somebody comes: nobody expects it any more."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.c_program import CProgram
+from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
+from tests.clients.programs.python_program import PythonProgram
+from tests.clients.scenes import MODEL, cycles
+
+
+def reset(client: Any) -> None:
+    client.reset()
+
+
+def tare(client: Any) -> None:
+    client.tare()
+
+
+def take(client: Any) -> None:
+    if isinstance(client, Irc5):
+        client.set(fgTake=True)
+    elif isinstance(client, UniversalRobot):
+        client.machine.start("fg_take_ownership")
+    elif isinstance(client, Plc):
+        client.inputs[client.NAMES["take"]] = True
+        client.scan()
+        client.inputs[client.NAMES["take"]] = False
+    elif isinstance(client, PythonProgram):
+        client.client.take_ownership()
+    elif isinstance(client, CProgram):
+        client._library.fg_take_ownership(client._client)
+
+
+def enable(client: Any) -> None:
+    client.enable(12.0)
+
+
+def be_lost(client: Any, gateway: GatewayAtHand) -> None:
+    """A wire that is cut, until the pause between two attempts is the longest."""
+    cycles(client, 2)
+    gateway.is_cut = True
+    for _ in range(10):
+        client.cycle(5.0)
+
+
+@pytest.mark.parametrize("ask", [enable, tare, reset, take])
+@pytest.mark.parametrize("attempts", [0, 3])
+def test_what_is_asked_for_between_two_attempts_does_not_go_out_with_the_next_connection(
+    client: Any, gateway: GatewayAtHand, ask: Any, attempts: int
+) -> None:
+    """A force began up to 4 s behind the enable, when the program had long gone on to its fault; a tare of any time before
+    took the tool's force for zero. attempts: that fail behind it."""
+    be_lost(client, gateway)
+    ask(client)
+    client.cycle(0.04)
+    assert "lost" in client.text
+    for _ in range(attempts):
+        client.cycle(5.0)
+    gateway.is_cut = False
+    for _ in range(8):
+        client.cycle(1.0)
+    assert gateway.requests and gateway.words == []
+    assert client.ended or ask is not enable
+
+
+def test_an_enable_behind_the_new_connection_goes_out(client: Any, gateway: GatewayAtHand) -> None:
+    be_lost(client, gateway)
+    enable(client)
+    client.cycle(0.04)
+    gateway.is_cut = False
+    for _ in range(8):
+        client.cycle(1.0)
+    client.disable()
+    cycles(client)
+    assert gateway.bank.command.control_word == 0
+    enable(client)
+    cycles(client)
+    assert gateway.bank.command.force_setpoint_n == 12.0 and client.enabled and not client.ended
+
+
+def test_an_upload_that_is_asked_for_between_two_attempts_is_not_sent_later(
+    client: Any, gateway: GatewayAtHand
+) -> None:
+    be_lost(client, gateway)
+    if isinstance(client, CProgram | PythonProgram):
+        pytest.skip("its stage() says so itself")
+    client.begin_upload(MODEL, 3)
+    client.cycle(0.04)
+    gateway.is_cut = False
+    for _ in range(8):
+        client.cycle(1.0)
+    assert gateway.requests and not gateway.uploads and not client.uploaded

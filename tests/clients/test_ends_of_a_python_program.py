@@ -1,0 +1,102 @@
+"""How a Python program may end: Ctrl-C in the middle of a request, an error of its own. Its force ends with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.programs.python_program import PythonProgram, SocketAtHand
+from tests.clients.scenes import TEXTS, command, commands, cycles
+
+
+@pytest.fixture
+def program(gateway: GatewayAtHand) -> PythonProgram:
+    return PythonProgram(TEXTS["python"], gateway)
+
+
+@pytest.mark.parametrize("reads", range(1, 7))
+def test_an_off_behind_an_interrupted_request_goes_out(
+    program: PythonProgram, gateway: GatewayAtHand, reads: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The answer that nobody had read was taken for that of OFF: Lost, and a rig without a lease pressed on. reads: which of
+    the connection's reads Ctrl-C comes in."""
+    plain, left = SocketAtHand.recv, iter(range(1, 100))
+
+    def interrupted(self: SocketAtHand, count: int) -> bytes:
+        if next(left) == reads:
+            raise KeyboardInterrupt
+        return plain(self, count)
+
+    monkeypatch.setattr(SocketAtHand, "recv", interrupted)
+    program.enable(12.0)
+    with pytest.raises(KeyboardInterrupt):
+        cycles(program)
+    program.client.disable()
+    program.client.exchange()
+    assert gateway.bank.command.control_word == 0
+    program.enable(13.0)
+    cycles(program, 2)
+    assert program.enabled and gateway.bank.command.force_setpoint_n == 13.0
+
+
+def working(seconds: int) -> Iterator[int]:
+    yield from range(seconds)
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt, None])
+def test_a_force_ends_with_its_with_block(program: PythonProgram, gateway: GatewayAtHand, error: Any) -> None:
+    """An error between two exchanges ended the program, and left its force to the lease, which not every rig has."""
+    with pytest.raises(error or StopIteration), program.client as client:
+        client.enable(12.0)
+        for _ in working(3):
+            client.exchange()
+        raise error or StopIteration
+    assert commands(gateway) == [command(1, 1200), command(0, 0)]
+    assert gateway.bank.command.control_word == 0
+
+
+def test_a_with_block_of_a_guest_stops_nobody(program: PythonProgram, gateway: GatewayAtHand) -> None:
+    gateway.take_over_from_elsewhere()
+    with program.client as client:
+        client.exchange()
+    assert gateway.requests and gateway.writes == [] and gateway.bank.command.force_setpoint_n == 7.0
+
+
+@pytest.mark.parametrize("is_cut", [False, True])
+def test_a_with_block_ends_with_its_own_error_where_nobody_answers_or_off_is_refused(
+    program: PythonProgram, gateway: GatewayAtHand, is_cut: bool
+) -> None:
+    with pytest.raises(ZeroDivisionError), program.client as client:
+        client.enable(12.0)
+        client.exchange()
+        gateway.is_cut = is_cut
+        gateway.answer = (lambda _request: b"\x97\x06") if not is_cut else gateway.answer  # type: ignore[method-assign]
+        raise ZeroDivisionError
+    assert commands(gateway)[0] == command(1, 1200)
+
+
+def test_a_with_block_tries_once_more_where_the_connection_was_lost(
+    program: PythonProgram, gateway: GatewayAtHand
+) -> None:
+    """Its last answer was late, say, and the pause before the next attempt would outlive the program."""
+    with program.client as client:
+        client.enable(12.0)
+        client.exchange()
+        answer, gateway.answer = gateway.answer, lambda _request: b"\x83\x0b"  # type: ignore[method-assign]
+        with pytest.raises(program.module["Lost"]):
+            client.exchange()
+        gateway.answer = answer  # type: ignore[method-assign]
+    assert gateway.bank.command.control_word == 0
+
+
+def test_a_with_block_that_ends_well_says_that_its_off_did_not_get_out(
+    program: PythonProgram, gateway: GatewayAtHand
+) -> None:
+    with pytest.raises(program.module["Lost"]), program.client as client:
+        client.enable(12.0)
+        client.exchange()
+        gateway.is_cut = True
+    assert gateway.bank.command.control_word == 1
