@@ -112,6 +112,10 @@ def test_a_group_is_handed_on_by_the_places_of_its_tests() -> None:
     assert node.given == [3]
     shared._assign_work_unit(node)
     assert node.given == [3, 0, 2, 4] and not shared.workqueue
+    shared.assigned_work[node]["b"]["b2"] = True
+    shared.workqueue["c"] = {"b1": False}
+    shared._assign_work_unit(node)
+    assert list(shared.assigned_work[node]) == ["a", "c"], "what is done is counted no more"
 
 
 def test_a_descriptor_that_is_left_fails_its_test_and_one_that_is_closed_does_not() -> None:

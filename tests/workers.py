@@ -52,11 +52,13 @@ def schedule_groups(group_of: Callable[[str], str], config: pytest.Config, log: 
             return group_of(nodeid)
 
         def _assign_work_unit(self, node: Any) -> None:
-            """As xdist does, which walks through all tests for the place of each."""
+            """As xdist does, which walks through all tests for the place of each, and at each test's end through all that its
+            worker has ever had: groups that are done are forgotten."""
             if not places:
                 places.update((nodeid, place) for place, nodeid in enumerate(self.registered_collections[node]))
             group, tests = self.workqueue.popitem(last=False)
-            self.assigned_work.setdefault(node, {})[group] = tests
+            left = {name: had for name, had in self.assigned_work.get(node, {}).items() if not all(had.values())}
+            self.assigned_work[node] = {**left, group: tests}
             node.send_runtest_some([places[nodeid] for nodeid, is_done in tests.items() if not is_done])
 
     config.option.loadscopereorder = False  # not by the number of tests: our order

@@ -1,21 +1,37 @@
 """A recording of something else, given for one of the same machine: it is doubted, and what has only changed is not."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
 
+from gateway.catalogue.effect import Effect
 from gateway.diagnosis import Measurement, Options, find_changes
 from gateway.diagnosis.changes.other_machine import doubt_machine
 from gateway.diagnosis.notes import recording_notes
 from tests.diagnosis.changes.foreign_rig import Wish, record
 
-DURATION_S = 10.0
+DURATION_S = 6.0
+FEW = ("leak", "presliding", "creep", "slew-limit", "dead-band", "sensor-quadratic", "coulomb-friction")
+"""Effects that there may be: to search for all takes seconds, and is not asked about here."""
+
+
+@pytest.fixture(autouse=True)
+def few_effects_are_searched_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    for place, name in (("diagnose", "effects_to_search"), ("changes.compare_recordings", "change_effects")):
+        module = import_module(f"gateway.diagnosis.{place}")
+        monkeypatch.setattr(module, name, few_of(getattr(module, name)))
+
+
+def few_of(effects: Callable[..., tuple[Effect, ...]]) -> Callable[..., tuple[Effect, ...]]:
+    return lambda *given: tuple(effect for effect in effects(*given) if effect.name in FEW)
 
 
 def unrelated() -> Measurement:
     """A force that goes its own way."""
-    time_s, rng = 0.01 * np.arange(3000), np.random.default_rng(3)
+    time_s, rng = 0.01 * np.arange(1500), np.random.default_rng(3)
     wander_n = sum(2.5 * np.sin(rate * time_s + rate) for rate in (0.91, 1.73, 3.1, 5.3))
     return Measurement(
         name="unrelated.csv",

@@ -170,7 +170,8 @@ class SimulatedService:
     @property
     def is_serving(self) -> bool:
         """Whether control works: it is there, listens, and is not stopped."""
-        return self.inside is not None and bool(self.inside.servers) and not self.inside.is_halted
+        inside = self.inside
+        return inside is not None and bool(inside.servers) and not inside.is_halted
 
     @property
     def is_guarded(self) -> bool:

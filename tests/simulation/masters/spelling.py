@@ -7,6 +7,7 @@ import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import isfinite, nan
+from typing import NamedTuple
 
 WRITES = frozenset((5, 6, 15, 16, 22, 23))
 ENABLE = 1
@@ -59,8 +60,7 @@ def floats_pdu(address: int, *numbers: float, is_swapped: bool) -> bytes:
     return write_pdu(address, *words)
 
 
-@dataclass(frozen=True)
-class Wish:
+class Wish(NamedTuple):
     """What a master commands. voltage_v: drive this instead of a force, None for a force; beat: its heartbeat;
     program: of one that writes its whole block, in counts: ramp, force before contact, ramp from the contact on, width of the
     band and time in it."""

@@ -6,7 +6,7 @@ They spell frames themselves. Each checks its own answers: the right transaction
 import struct
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from tests.simulation.kernel.network import Caller, Line
 from tests.simulation.kernel.virtual_time import VirtualLoop
@@ -171,7 +171,7 @@ class Master:
         frames = []
         for number in range(int(count) if self.connect() else 0):
             self._beat += 1
-            self._wish = replace(self._wish, beat=self._beat)
+            self._wish = self._wish._replace(beat=self._beat)
             first = 90 if is_read_wrong and number % 2 else 100
             frames.append(self._frame(read_and_write_pdu(first, 11, 0, *self._wish.words)))
         if frames:
@@ -197,7 +197,7 @@ class Master:
     def program(self, force_n: float, *numbers: float) -> None:
         """Command by the whole block from now on."""
         self.hold(force_n, ENABLE)
-        self._wish = replace(self._wish, program=tuple(map(int, numbers)))
+        self._wish = self._wish._replace(program=tuple(map(int, numbers)))
 
     def hang(self) -> None:
         """Go on with the last frame, whose heartbeat stays as it was."""
@@ -220,7 +220,7 @@ class Master:
     def let_go(self) -> None:
         """Disable in words."""
         self._beating += 1
-        self._wish = replace(self._wish, control=0)
+        self._wish = self._wish._replace(control=0)
         self._beat += 1
         self.ask(write_pdu(0, 0, 0, 0, 0, self._beat))
 
@@ -231,7 +231,7 @@ class Master:
     def reset(self, take: bool = False) -> None:
         """Reset faults, with a heartbeat of its own, and whatever somebody else has left in the other words of the block; take
         over, if asked."""
-        self._wish = replace(self._wish, control=0)
+        self._wish = self._wish._replace(control=0)
         for control in (TAKE if take else 0, RESET):
             self._beat += 1
             self.ask(write_pdu(0, control, 0, 0, 0, self._beat, *[0] * 8))
@@ -239,7 +239,7 @@ class Master:
     def _keep_beating(self, number: int) -> None:
         if number == self._beating:
             self._beat += not self._is_hung
-            wish = self._wish = replace(self._wish, beat=self._beat)
+            wish = self._wish = self._wish._replace(beat=self._beat)
             for pdu in (self._way.beat(wish),) if self._way.beat else self._way.begin(wish):
                 self.ask(pdu)
             self._outside.call_later(self._beat_s, self._keep_beating, number)
