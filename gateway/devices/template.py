@@ -139,8 +139,8 @@ def _pieces(text: str) -> list[str | Field]:
 def _check(text: str, pieces: list[str | Field]) -> None:
     if not _TEXT.fullmatch(text):
         raise TemplateError(
-            f"{text!r} is not printable text, SOH, STX, ETX, EOT, ENQ, ACK, NAK, ESC or tab (the terminator at its end is a "
-            "setting of its own)"
+            f"{text!r} is not printable text, SOH, STX, ETX, EOT, ENQ, ACK, NAK, ESC or tab (CR and LF at its end belong to "
+            '`terminator`, ahead of an ETX too: "\\r\\x03")'
         )
     if spelt := _SPELT.search(text):
         raise TemplateError(

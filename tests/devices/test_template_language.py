@@ -213,7 +213,7 @@ def test_blanks_are_a_value_only_where_they_may_be() -> None:
         ("", "not printable"),
         ("µ{x:d}", "not printable"),
         ("\x00{x:d}", "not printable text, SOH, STX, ETX, EOT, ENQ, ACK, NAK, ESC or tab"),
-        ("{x:d}\n", "the terminator at its end is a setting of its own"),
+        ("{x:d}\n", '(CR and LF at its end belong to `terminator`, ahead of an ETX too: "\\r\\x03")'),
         ("<STX>{x:d}", '<STX> would be 5 characters on the wire. Between double quotes STX is "\\x02"'),
         (r"\x02{x:d}", "\\x02 would be 4 characters on the wire"),
         (r"{x:d}\r\n", "\\r would be 2 characters on the wire"),

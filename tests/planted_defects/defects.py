@@ -258,7 +258,7 @@ DEFECTS = (
            "any(self.read(text, body) is not None for text", "any(self.words(text).encode() == body for text",
            ("dialogues/test_unshipped_outputs_dialogue.py",)),
     Defect("for the guardian every line ends with CR LF", "service/supervisor/safe_line.py",
-           "received.split(self.end)", 'received.split(b"\\r\\n")', ("service/supervisor/test_safe_line.py",)),
+           "heard.split(self.end)", 'heard.split(b"\\r\\n")', ("service/supervisor/test_safe_line.py",)),
     Defect("a load cell behind a replugged port is not asked again", "service/running_rig/lines/load_cell_line.py",
            "        self.identity.begin()\n        self._sent_s", "        self._sent_s",
            ("service/running_rig/lines/test_load_cell_line.py",)),
@@ -334,7 +334,7 @@ DEFECTS = (
            "if rejected and not force:", "if False:", ("calibrations", "cli/calibration", "service/fitting")),
     # -- processes
     Defect("the guardian believes half an acknowledgement", "service/supervisor/safe_line.py",
-           "split(self.end)[:-1]\n", "split(self.end)\n", ("service/supervisor/test_safe_line.py",)),
+           "split(self.end)[:-1] for", "split(self.end) for", ("service/supervisor/test_safe_line.py",)),
     Defect("the guardian says it once", "service/supervisor/safe_line.py",
            "for _ in range(_REPEATS):", "for _ in range(1):", ("service/supervisor/test_safe_line.py",)),
     Defect("a death is no reason for the safe voltage", "service/supervisor/guardian.py",

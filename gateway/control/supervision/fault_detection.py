@@ -36,7 +36,7 @@ class StopCause:
 
 
 _LINE_WORDS: Final = {
-    FaultCode.OUTPUT_REFUSED: "the output device refused a voltage: check its range and its profile",
+    FaultCode.OUTPUT_REFUSED: "the output device refused a voltage: check its range, its channel and its profile",
     FaultCode.OUTPUT_ALTERED: "the output device accepted another voltage than asked: check wire and profile",
     FaultCode.OUTPUT_LOST: "the output's port went away: check the plug; it reopens by itself",
     FaultCode.WATCHDOG_TRIPPED: "the output device's own watchdog has tripped, it obeys nothing: look at the tool, then reset",

@@ -110,7 +110,9 @@ def _of_cell(profile: DeviceProfile) -> Iterator[HarmlessQuestion]:
         yield _who_it_is(profile, is_enough=False)
 
     def understands(received: bytes) -> str:
-        return _first_words(_cell_host(profile).receive(received, 0.0), knows_unit=_knows_unit(profile))
+        host = _cell_host(profile)
+        host.poll()
+        return _first_words(host.receive(received, 0.0), knows_unit=_knows_unit(profile))
 
     yield HarmlessQuestion(_cell_host(profile).poll(), understands)
 

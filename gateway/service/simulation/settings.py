@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Final
 
-from gateway.catalogue.all_effects import BY_NAME
+from gateway.catalogue.all_effects import BY_NAME, EFFECTS
+from gateway.catalogue.effect import Effect
 from gateway.profiles import Rig
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import adapter, build
@@ -12,6 +13,7 @@ from gateway.service.simulation.setting_names import Value, find_parameter, list
 from gateway.service.socket_requests import SimulationRequest
 from gateway.twin import Plant, Surroundings
 from gateway.twin.plant import with_value
+from gateway.twin.surroundings import COLUMNS
 
 adapter(Plant)  # with this module, not with the first request: it takes milliseconds
 _SURROUNDING: Final = "around."
@@ -75,6 +77,16 @@ class SimulationSettings:
             if _SURROUNDING + column not in self.values
         )
 
+    def idle_notes(self, plant: Plant) -> tuple[str, ...]:
+        """Return what is set around the tool and moves nothing: no effect of this plant acts by it."""
+        set_plant = self.plant_of(plant)
+        acting = {column: [one for one in EFFECTS if column in one.columns] for column in COLUMNS}
+        return tuple(
+            f"{_SURROUNDING}{column} moves no force: nothing that acts by it is on ({', '.join(one.name for one in effects)})"
+            for column, effects in acting.items()
+            if _SURROUNDING + column in self.values and not any(_is_in(set_plant, one) for one in effects)
+        )
+
     def check(self, rig: Rig) -> None:
         """Refuse what this rig does not have. ValueError: E133."""
         if rig.valve is None and (named := [name for name in self.values if name.startswith("valve.")]):
@@ -84,12 +96,18 @@ class SimulationSettings:
 
     def as_answer(self, rig: Rig) -> dict[str, Any]:
         """Return what a caller is told."""
-        return {"rig": rig.name, "set": dict(self.values), "notes": list(self.notes())}
+        idle = self.idle_notes(rig.plant) if rig.plant else ()
+        return {"rig": rig.name, "set": dict(self.values), "notes": [*self.notes(), *idle]}
 
 
 def restore_settings(document: Mapping[str, Any]) -> SimulationSettings:
     """Return settings that were kept. ValueError, TypeError where they are none."""
     return SimulationSettings().changed(SimulationRequest(set=dict(document)))
+
+
+def _is_in(plant: Plant, effect: Effect) -> bool:
+    sizes = (one for one in effect.parameters if not one.shape)
+    return any(getattr(getattr(plant, one.section), one.name) != one.null for one in sizes)
 
 
 def _check_plant(plant: Plant) -> None:

@@ -166,6 +166,12 @@ def test_a_silence_is_told_with_its_length_and_what_the_answer_before_took() -> 
     assert from_the_start and "for 250 ms" in from_the_start.sentence
 
 
+def test_a_refused_voltage_may_be_a_channel_that_is_not_there() -> None:
+    """An I-7022 answers each setting of `channel: 2` so: it has two, and shares its profile with the I-7024, which has four."""
+    told = detector().first_cause(NOW_S, WELL, READY._replace(fault=FaultCode.OUTPUT_REFUSED), lambda: 0.0)
+    assert told and "its channel" in told.sentence
+
+
 @pytest.mark.parametrize(
     ("line", "reading", "reason"),
     [

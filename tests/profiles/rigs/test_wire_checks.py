@@ -80,7 +80,8 @@ def test_what_could_not_work_is_a_fault_in_numbers(
     [
         ({"cell__stream": None, "cell__read_force": POLLED, "rig__supervision__sample_timeout_s": 0.09},
          "supervision.sample_timeout_s", "0.09 s: one lost answer leaves a gap of 0.101 s"),
-        ({"cell__stream__rate_hz": 10}, "load_cell.baud", "115200: stream-st-gs gives 10 readings/s; the pneumatics need 20"),
+        ({"cell__stream__rate_hz": 10}, "load_cell.baud",
+         "115200: stream-st-gs gives 10 readings/s by its `rate_hz`, at any baud; the pneumatics need 20"),
         ({"cell__stream__rate_hz": 10}, "load_cell.device",
          "stream-st-gs gives 10 readings/s: at a force that stands still a frozen cell is found within 2 s by noise of 0.88"),
         ({"rig__output__baud": 4800, "rig__supervision__output_timeout_s": 0.11}, "supervision.output_timeout_s",

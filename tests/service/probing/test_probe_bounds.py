@@ -201,6 +201,14 @@ def test_what_an_adapter_hears_of_us_ahead_of_a_name_is_read_over(profile: Devic
     assert "it says that it is" in question.understands(question.data + answer)
 
 
+def test_what_an_adapter_hears_of_us_ahead_of_a_reading_is_read_over() -> None:
+    """On one line with the answer where a question ends otherwise: `W`, CR and `0.2328`, CR LF."""
+    profile = replace(load_device("mantracourt-dsc"), terminator="\r\n", question_terminator="\r")
+    (question,) = harmless_questions(profile)
+    answer = cell_device(profile, "N").frame(20.0)
+    assert question.understands(question.data + answer) == question.understands(answer) != ""
+
+
 @pytest.mark.parametrize("direction", list(ValveDirection))
 @pytest.mark.parametrize("name", list_shipped("device"))
 def test_a_valve_is_known_by_how_it_stands(name: str, direction: ValveDirection) -> None:

@@ -114,6 +114,13 @@ def test_an_effect_without_its_column_says_so() -> None:
     assert setting(**{"feed-drag": "on"}, around__feed_mm_s=10).notes() == ()
 
 
+@pytest.mark.parametrize(("effect", "is_told"), [(None, True), ("feed-drag", True), ("supply-droop", False)])
+def test_surroundings_by_which_nothing_acts_say_so(effect: str | None, *, is_told: bool) -> None:
+    alone = setting(around__supply_kpa=200, around__feed_mm_s=5, **({effect: "on"} if effect else {}))
+    told = "around.supply_kpa moves no force: nothing that acts by it is on (supply-droop)"
+    assert (told in alone.as_answer(demo())["notes"]) is is_told
+
+
 def test_zero_is_a_temperature_and_not_one_that_nobody_has_told() -> None:
     cold = setting(**{"thermal-zero-drift": "on"}, around__temperature_c="0")
     assert cold.surroundings().temperature_c == 0.0

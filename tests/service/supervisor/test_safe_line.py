@@ -116,6 +116,25 @@ def test_the_answer_to_an_older_question_may_come_before_the_acknowledgement(pty
     assert len(device.heard) == 1
 
 
+@pytest.mark.parametrize(
+    ("reply", "is_acknowledged"), [(b"V1 0.000\r\n", True), (b"", False), (b"V1 5.000\r\n", False)]
+)
+def test_our_own_words_may_come_ahead_of_it_on_its_line(
+    pty: Pty, client: int, reply: bytes, is_acknowledged: bool
+) -> None:
+    """A question ends with LF, its answer with CR LF, and the adapter hears itself (TTi PL: `V1 0.000`, then `V1?`)."""
+    frame = b"V1 0.000\nV1?\n"
+    heard: list[bool] = []
+    line = SafeLine(client, frame, b"V1 0.000\r\n", END)
+    writer = threading.Thread(target=lambda: heard.append(line.write_safe(PATIENT_S if is_acknowledged else SHORT_S)))
+    writer.start()
+    while writer.is_alive():
+        if said := _heard(pty):
+            os.write(pty.fd, said + reply)
+        writer.join(0.001)
+    assert heard == [is_acknowledged]
+
+
 def test_what_was_said_before_the_frame_acknowledges_nothing(pty: Pty, client: int) -> None:
     """A pressure of 0 that nobody has read yet looks like the echo of SET 0."""
     os.write(pty.fd, b"0\r\n")

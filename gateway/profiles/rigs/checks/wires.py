@@ -182,7 +182,8 @@ def check_sample_rate(parts: Parts) -> Found:
                 f"{reading.baud} carries {possible_hz:.0f} readings/s, {reading.device.name} sends {number(rate_hz)}",
             )
         elif reading.period_s > 1.0 / _SLOWEST_HZ:
-            reason = f"{reading.device.name} gives {1.0 / reading.period_s:.3g} readings/s"
+            own = "" if reading.period_s <= reading.wire_s else " by its `rate_hz`, at any baud"
+            reason = f"{reading.device.name} gives {1.0 / reading.period_s:.3g} readings/s{own}"
             yield "load_cell.baud", f"{reading.baud}: {reason}; the pneumatics need {number(_SLOWEST_HZ)}"
 
 

@@ -1,20 +1,31 @@
-"""Load cells that are asked by a bare character: Sauter's gauges FK and FH by `9`, scales of Toledo's protocol 8217 by `W`."""
+"""Load cells whose sentences end otherwise than in CR LF. Questions that have no end: Sauter's gauges FK and FH, asked by `9`,
+scales of Toledo's protocol 8217 by `W`. Answers with a longer one: NCI's protocol SCP-01 of Weigh-Tronix in CR and ETX behind
+two lines of text, a transducer interface like Loadstar's DI-100U in a prompt."""
 
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from gateway.devices import cell_device, cell_host
+from gateway.devices import DeviceProfile, cell_device, cell_host
 from gateway.devices.device_checks.identity import Identity
 from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample, Quality
 from gateway.devices.rehearsal import rehearse
+from gateway.units import NEWTON_PER_UNIT
 from tests.dialogues.test_overload_dialogue import cell
 
 SAUTER = replace(
     cell(terminator="\r", read_force=ForceReading(ask="9", frame="{force:8.2f}", unit="N")), question_terminator=""
 )
+NCI = cell(
+    terminator="\r\x03",
+    read_force=ForceReading(
+        ask="W", frame="\n{force:07.2f}LB\r\nS{status:00|10}", unit="lb",
+        quality={"00": Quality.OK, "10": Quality.UNSTABLE}, overload=("\n^^^^^^^LB\r\nS{state:00|02}",),
+    ),
+)  # fmt: skip
+PROMPTING = cell(terminator="\r\n> ", read_force=ForceReading(ask="W", frame="{force:.4f}", unit="lb"))
 
 
 def test_a_question_without_an_end_goes_out_bare() -> None:
@@ -46,3 +57,22 @@ def test_a_number_that_an_echo_would_lengthen_needs_a_width() -> None:
 def test_it_is_the_only_sentence_of_its_device(beside: dict[str, Any]) -> None:
     (found,) = rehearse(replace(SAUTER, **beside))
     assert found[0] == ("question_terminator",) and "one sentence" in found[1]
+
+
+@pytest.mark.parametrize(
+    ("profile", "said", "pounds", "quality"),
+    [
+        (NCI, b"\n0012.34LB\r\nS10\r\x03", 12.34, Quality.UNSTABLE),
+        (NCI, b"\n-002.50LB\r\nS00\r\x03", -2.5, Quality.OK),
+        (NCI, b"\n^^^^^^^LB\r\nS02\r\x03", float("inf"), Quality.OVERLOAD),
+        (PROMPTING, b"-2.5000\r\n> ", -2.5, Quality.OK),
+    ],
+)
+def test_each_answer_is_one_line(profile: DeviceProfile, said: bytes, pounds: float, quality: Quality) -> None:
+    host = cell_host(profile)
+    host.poll()
+    assert list(rehearse(profile)) == []
+    for _ in range(2):
+        (sample,) = host.receive(said, 0.0)
+        assert isinstance(sample, ForceSample) and sample.quality is quality
+        assert sample.force_n == pytest.approx(pounds * NEWTON_PER_UNIT["lb"])
