@@ -4,6 +4,8 @@ Files go below a root, which is `/` on a running machine, and a folder where an 
 for anything.
 """
 
+import os
+import pwd
 import re
 import shlex
 import subprocess
@@ -17,7 +19,7 @@ from typing import TYPE_CHECKING, Final
 from gateway.cli.errors import CliError
 from gateway.cli.system_service import unit_file
 from gateway.processes import exit_codes
-from gateway.profiles.find import list_shipped, locate
+from gateway.profiles.find import list_shipped, locate, shipped_profiles_folder
 from gateway.profiles.http_sections import split_listen
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
 from gateway.service.supervisor.run_options import stem_of
@@ -25,6 +27,7 @@ from gateway.service.supervisor.run_options import stem_of
 if TYPE_CHECKING:
     from gateway.profiles import Rig
 
+USER: Final = unit_file.USER
 UNITS: Final = "etc/systemd/system"
 _HIDDEN: Final = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")
 _STEM: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -34,12 +37,14 @@ _NAMED_NETWORKS: Final = ("any", "localhost", "link-local", "multicast")
 
 @dataclass(frozen=True, slots=True)
 class Installation:
-    """files: path below the root -> text; commands: what is run behind them, in order; notes: what to know of it besides."""
+    """files: path below the root -> text; commands: what is run behind them, in order; notes: what to know of it besides;
+    reads: files that the service's user must be able to read."""
 
     unit: str
     files: dict[str, str]
     commands: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
 
 
 def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], command: Path | None) -> Installation:
@@ -47,21 +52,20 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
     program = (command or _own_command()).absolute()
     is_file = rig_name not in list_shipped("rig")
     named = _path_of(rig_name) if is_file else rig_name
-    for path in (str(program), *([named] if is_file else []), *_files_of(rig)):
-        _refuse_hidden(path)
+    _refuse_hidden(
+        str(program if command else sys.executable), str(program), *([named] if is_file else []), *_files_of(rig)
+    )
     if not _NOT_OF_PROGRAMS.isdisjoint(str(program)):
         raise CliError(f"E107 {program}: systemd starts no program with such a path", exit_codes.CONFIGURATION)
     if not _STEM.fullmatch(stem := stem_of(named)):
         raise CliError(f"E107 {named}: its name names the unit: letters, digits, _ . - only", exit_codes.CONFIGURATION)
     _refuse_no_networks(networks)
-    lines = (rig.output, rig.load_cell, *([rig.valve] if rig.valve else []))
-    ports = [line.port for line in lines] + [face.port for face in rig.fieldbus if isinstance(face, RtuFace)]
     options = unit_file.UnitOptions(
         command=program,
         rig=named,
         stem=stem,
         ports=_ports_of(rig),
-        devices=() if rig.simulated else tuple(dict.fromkeys(port for port in ports if port)),
+        devices=_devices_of(rig),
         networks=_networks_of(rig, networks),
         compiles=rig.is_watched or rig.web is not None,
         waits_for_network=any(map(_is_own_address, _addresses_of(rig))),
@@ -81,6 +85,7 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
             ("systemctl", "enable", "--now", options.name),
         ),
         (*_faces_cut_off(rig, () if networks else options.networks), *_unbounded(rig)),
+        tuple(_files_of(rig)),
     )
 
 
@@ -106,6 +111,8 @@ def install_service(plan: Installation, root: Path) -> tuple[list[Path], bool]:
     if root == Path("/"):
         ran = run_command(("systemctl", "is-active", plan.unit), quiet=True).strip() == "active"
         for words in plan.commands:
+            if words[:2] == ("systemctl", "enable"):  # its user is there by now
+                _refuse_unreadable(plan.reads)
             run_command(words)
     return written, ran
 
@@ -149,17 +156,44 @@ def _own_command() -> Path:
     return beside if beside.exists() else Path(sys.argv[0])
 
 
-def _refuse_hidden(path: str) -> None:
-    if hidden := next((home for home in _HIDDEN if path.startswith(f"{home}/")), None):
+def _refuse_unreadable(paths: Sequence[str]) -> None:
+    """Root may read everything: that its check finds no fault says nothing of the service's user."""
+    files = [Path(path) for path in paths]
+    on_the_way = dict.fromkeys(part for file in files for part in (*reversed(file.parents), file))
+    closed = [str(part) for part in on_the_way if not _may_read(part)]
+    if closed:
+        these = shlex.join(closed)
         raise CliError(
-            f"E107 {path}: the service sees nothing below {hidden}; install into /opt/force-gateway (python3 -m venv, "
-            "pip install) and keep the rig in /etc/force-gateway, or give --command",
-            exit_codes.CONFIGURATION,
+            f"E107 {closed[-1]}: the service's user, {USER}, may not read it: sudo chgrp {USER} {these} && sudo chmod g+rX "
+            f"{these}, then install again; nothing was started",
+            exit_codes.PERMISSION,
         )
-    if not path.isprintable():
-        raise CliError(f"E107 {path!r}: a unit has no such characters in a path", exit_codes.CONFIGURATION)
-    if not Path(path).is_absolute():
-        raise CliError(f"E107 {path}: the service needs an absolute path", exit_codes.CONFIGURATION)
+
+
+def _may_read(path: Path) -> bool:
+    """Decide whether the service's user may read a file, or go through a folder."""
+    words = ("test", "-x" if path.is_dir() else "-r", str(path))
+    group = pwd.getpwnam(USER).pw_gid
+    done = subprocess.run(
+        words, user=USER, group=group, extra_groups=os.getgrouplist(USER, group), cwd="/", check=False
+    )
+    return not done.returncode
+
+
+def _refuse_hidden(*paths: str) -> None:
+    for path in paths:
+        real = os.path.realpath(path)
+        if hidden := next((home for home in _HIDDEN for way in (path, real) if way.startswith(f"{home}/")), None):
+            leads = f" leads to {real}" if not path.startswith(f"{hidden}/") else ""
+            raise CliError(
+                f"E107 {path}{leads}: the service sees nothing below {hidden}; install into /opt/force-gateway (python3 "
+                "-m venv, pip install) and keep the rig in /etc/force-gateway, or give --command",
+                exit_codes.CONFIGURATION,
+            )
+        if not path.isprintable():
+            raise CliError(f"E107 {path!r}: a unit has no such characters in a path", exit_codes.CONFIGURATION)
+        if not Path(path).is_absolute():
+            raise CliError(f"E107 {path}: the service needs an absolute path", exit_codes.CONFIGURATION)
 
 
 def _refuse_link(path: Path) -> None:
@@ -190,6 +224,12 @@ def _ports_of(rig: "Rig") -> tuple[int, ...]:
     secure = [face.port for face in rig.fieldbus if isinstance(face, TlsFace)]
     for_people = [split_listen(face.listen)[1] for face in (rig.web, rig.metrics, rig.opcua) if face]
     return (*([rig.network.port] if rig.network.plain else []), *secure, *for_people)
+
+
+def _devices_of(rig: "Rig") -> tuple[str, ...]:
+    lines = (rig.output, rig.load_cell, *([rig.valve] if rig.valve else []))
+    ports = [line.port for line in lines] + [face.port for face in rig.fieldbus if isinstance(face, RtuFace)]
+    return () if rig.simulated else tuple(dict.fromkeys(port for port in ports if port))
 
 
 def _addresses_of(rig: "Rig") -> list[str]:
@@ -254,10 +294,12 @@ def _path_of(rig_name: str) -> str:
 
 
 def _files_of(rig: "Rig") -> list[str]:
-    """Return the files that the rig names besides profiles: the service must see them, too."""
+    """Return the rig's file, and those that it names, but for shipped profiles: the service must see and read them."""
+    shipped, texts = shipped_profiles_folder().absolute(), [Path(name).absolute() for name in rig.texts]
+    own = [path for path in texts if not path.is_relative_to(shipped)]
     secure = [
         path for face in rig.fieldbus if isinstance(face, TlsFace) for path in (face.certificate, face.key, face.ca)
     ]
     mqtt, tls = rig.mqtt, rig.mqtt and rig.mqtt.tls
     broker = (mqtt and mqtt.password_file, *((tls.ca, tls.certificate, tls.key) if tls else ()))
-    return [str(Path(path).absolute()) for path in (*secure, *broker) if path]
+    return [str(Path(path).absolute()) for path in (*own, *secure, *broker) if path]
