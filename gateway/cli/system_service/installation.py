@@ -32,6 +32,7 @@ UNITS: Final = "etc/systemd/system"
 _HIDDEN: Final = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")
 _STEM: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _NOT_OF_PROGRAMS: Final = frozenset("'\"\\$*?[")  # what systemd takes in no path of a program
+_RIG_OF_UNIT: Final = re.compile(r"^ExecStart=.* run (.+) --state ", re.M)
 _NAMED_NETWORKS: Final = ("any", "localhost", "link-local", "multicast")
 
 
@@ -95,6 +96,7 @@ def install_service(plan: Installation, root: Path) -> tuple[list[Path], bool]:
     written, ran = [], False
     for name in plan.files:
         _refuse_link(root / name)
+    _refuse_other_rig(root / UNITS / plan.unit, plan.files.get(f"{UNITS}/{plan.unit}", ""))
     for name, text in plan.files.items():
         path = root / name
         try:
@@ -203,6 +205,20 @@ def _refuse_link(path: Path) -> None:
         masked = f"the unit is masked; sudo systemctl unmask {path.name} allows it again"
         words = masked if str(target) == "/dev/null" else f"a link to {target}; remove it, then install again"
         raise CliError(f"E107 {path}: {words}", exit_codes.CONFIGURATION)
+
+
+def _refuse_other_rig(path: Path, text: str) -> None:
+    """Unit and state directory go by the name of the rig's file: of two `cell.yaml` the later one would get the calibrations,
+    and at the next start the place, of the other's machine."""
+    there = _RIG_OF_UNIT.search(path.read_text(encoding="utf-8", errors="replace")) if path.exists() else None
+    ours = _RIG_OF_UNIT.search(text)
+    if there and ours and there[1] != ours[1]:
+        stem = path.name.removeprefix(f"{unit_file.NAME}-").removesuffix(".service")
+        raise CliError(
+            f"E107 {path} is of {there[1]}: give {ours[1]} another name, or, where it takes that one's place, force-gateway "
+            f"service uninstall {stem} first",
+            exit_codes.CONFIGURATION,
+        )
 
 
 def _refuse_no_networks(networks: Sequence[str]) -> None:

@@ -91,3 +91,21 @@ def test_another_user_is_asked_and_not_root(tmp_path: Path, monkeypatch: pytest.
     secret.touch(0o600)
     assert installation._may_read(Path("/etc/passwd")) and installation._may_read(Path("/etc"))
     assert not installation._may_read(secret)
+
+
+def test_the_unit_of_another_rig_of_that_name_is_left_alone(tmp_path: Path) -> None:
+    """The second cell.yaml took the first one's unit, and at the next boot its state: the calibration of another machine."""
+    program, image = Path("/opt/50% x/force-gateway"), tmp_path / "image"
+    plan_of = {
+        place: plan_installation(f"/etc/{place}/cell.yaml", load_rig("demo"), networks=(), command=program)
+        for place in ("line 1", "line 2")
+    }
+    first = plan_of["line 1"]
+    written, _ = installation.install_service(first, image)
+    assert installation.install_service(first, image)[0] == written, "its own may be written anew"
+    with pytest.raises(
+        CliError, match=r'E107 .*cell\.service is of "/etc/line 1/cell\.yaml": .*another name'
+    ) as refused:
+        installation.install_service(plan_of["line 2"], image)
+    assert refused.value.exit_code == exit_codes.CONFIGURATION and "uninstall cell" in refused.value.message
+    assert (image / "etc/systemd/system" / first.unit).read_text() == first.files[f"etc/systemd/system/{first.unit}"]
