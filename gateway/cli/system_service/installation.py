@@ -5,7 +5,6 @@ for anything.
 """
 
 import os
-import pwd
 import re
 import shlex
 import subprocess
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 from gateway.cli.errors import CliError
 from gateway.cli.system_service import unit_file
+from gateway.cli.system_service.user_access import refuse_closed_program, refuse_unreadable
 from gateway.processes import exit_codes
 from gateway.profiles.find import list_shipped, locate, shipped_profiles_folder
 from gateway.profiles.http_sections import split_listen
@@ -27,8 +27,13 @@ from gateway.service.supervisor.run_options import stem_of
 if TYPE_CHECKING:
     from gateway.profiles import Rig
 
-USER: Final = unit_file.USER
 UNITS: Final = "etc/systemd/system"
+_BEFORE_ENABLE: Final = (
+    ("systemd-sysusers", "force-gateway.conf"),
+    ("udevadm", "control", "--reload"),
+    ("udevadm", "trigger", "--subsystem-match=tty"),
+    ("systemctl", "daemon-reload"),
+)
 _HIDDEN: Final = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")
 _STEM: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _NOT_OF_PROGRAMS: Final = frozenset("'\"\\$*?[")  # what systemd takes in no path of a program
@@ -39,13 +44,14 @@ _NAMED_NETWORKS: Final = ("any", "localhost", "link-local", "multicast")
 @dataclass(frozen=True, slots=True)
 class Installation:
     """files: path below the root -> text; commands: what is run behind them, in order; notes: what to know of it besides;
-    reads: files that the service's user must be able to read."""
+    reads: files that the service's user must be able to read; program: what it must be able to run."""
 
     unit: str
     files: dict[str, str]
     commands: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
     reads: tuple[str, ...] = ()
+    program: Path | None = None
 
 
 def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], command: Path | None) -> Installation:
@@ -78,15 +84,10 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
             "etc/sysusers.d/force-gateway.conf": unit_file.sysusers_text(),
             "etc/udev/rules.d/70-force-gateway.rules": unit_file.udev_text(),
         },
-        (
-            ("systemd-sysusers", "force-gateway.conf"),
-            ("udevadm", "control", "--reload"),
-            ("udevadm", "trigger", "--subsystem-match=tty"),
-            ("systemctl", "daemon-reload"),
-            ("systemctl", "enable", "--now", options.name),
-        ),
+        (*_BEFORE_ENABLE, ("systemctl", "enable", "--now", options.name)),
         (*_faces_cut_off(rig, () if networks else options.networks), *_unbounded(rig)),
         tuple(_files_of(rig)),
+        program,
     )
 
 
@@ -114,7 +115,9 @@ def install_service(plan: Installation, root: Path) -> tuple[list[Path], bool]:
         ran = run_command(("systemctl", "is-active", plan.unit), quiet=True).strip() == "active"
         for words in plan.commands:
             if words[:2] == ("systemctl", "enable"):  # its user is there by now
-                _refuse_unreadable(plan.reads)
+                if plan.program:
+                    refuse_closed_program(plan.program)
+                refuse_unreadable(plan.reads)
             run_command(words)
     return written, ran
 
@@ -156,30 +159,6 @@ def run_command(words: Sequence[str], *, quiet: bool = False) -> str:
 def _own_command() -> Path:
     beside = Path(sys.executable).with_name("force-gateway")
     return beside if beside.exists() else Path(sys.argv[0])
-
-
-def _refuse_unreadable(paths: Sequence[str]) -> None:
-    """Root may read everything: that its check finds no fault says nothing of the service's user."""
-    files = [Path(path) for path in paths]
-    on_the_way = dict.fromkeys(part for file in files for part in (*reversed(file.parents), file))
-    closed = [str(part) for part in on_the_way if not _may_read(part)]
-    if closed:
-        these = shlex.join(closed)
-        raise CliError(
-            f"E107 {closed[-1]}: the service's user, {USER}, may not read it: sudo chgrp {USER} {these} && sudo chmod g+rX "
-            f"{these}, then install again; nothing was started",
-            exit_codes.PERMISSION,
-        )
-
-
-def _may_read(path: Path) -> bool:
-    """Decide whether the service's user may read a file, or go through a folder."""
-    words = ("test", "-x" if path.is_dir() else "-r", str(path))
-    group = pwd.getpwnam(USER).pw_gid
-    done = subprocess.run(
-        words, user=USER, group=group, extra_groups=os.getgrouplist(USER, group), cwd="/", check=False
-    )
-    return not done.returncode
 
 
 def _refuse_hidden(*paths: str) -> None:

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from gateway.cli.errors import CliError
-from gateway.cli.system_service import installation
+from gateway.cli.system_service import installation, user_access
 from gateway.cli.system_service.installation import Installation, plan_installation
+from gateway.cli.system_service.user_access import refuse_closed_program, refuse_unreadable
 from gateway.processes import exit_codes
 from gateway.profiles import Rig, load_rig
 from gateway.profiles.rigs.faces import TlsFace
@@ -70,7 +71,7 @@ def test_a_key_of_roots_is_told_before_the_service_starts(tmp_path: Path, monkey
     asked: list[str] = []
     monkeypatch.setattr(installation, "run_command", lambda words, **_: asked.append(" ".join(words)) or "")
     may_not = {str(folder), str(key)}
-    monkeypatch.setattr(installation, "_may_read", lambda path: str(path) not in may_not)
+    monkeypatch.setattr(user_access, "_may", lambda path, way: str(path) not in may_not)
     commands = (("systemd-sysusers", "x"), ("systemctl", "enable", "--now", "u"))
     plan = Installation("u", {}, commands, reads=(str(key),))
     with pytest.raises(CliError) as refused:
@@ -86,11 +87,31 @@ def test_a_key_of_roots_is_told_before_the_service_starts(tmp_path: Path, monkey
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can ask for another user")
 def test_another_user_is_asked_and_not_root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(installation, "USER", "nobody")
+    monkeypatch.setattr(user_access, "USER", "nobody")
     secret = tmp_path / "key"
     secret.touch(0o600)
-    assert installation._may_read(Path("/etc/passwd")) and installation._may_read(Path("/etc"))
-    assert not installation._may_read(secret)
+    refuse_unreadable(("/etc/passwd",))
+    refuse_closed_program(Path("/bin/sh"))
+    with pytest.raises(CliError, match=r"E107 .*key: the service's user, nobody, may not read it"):
+        refuse_unreadable((str(secret),))
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can ask for another user")
+def test_a_program_that_the_service_cannot_run_is_told_before_it_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A root of umask 077 made the virtual environment, or --command had a typing error: systemd tried it again for ever."""
+    monkeypatch.setattr(user_access, "USER", "nobody")
+    monkeypatch.setattr(installation, "run_command", lambda words, **_: "")
+    program = tmp_path / "bin" / "force-gateway"
+    plan = Installation("u", {}, (("systemctl", "enable", "--now", "u"),), program=program)
+    with pytest.raises(CliError, match=r"E107 .*force-gateway: there is no such program") as missing:
+        installation.install_service(plan, Path("/"))
+    program.parent.mkdir()
+    program.touch(0o700)
+    with pytest.raises(CliError, match=rf"may not run it: sudo chmod -R go\+rX {tmp_path}, then") as closed:
+        installation.install_service(plan, Path("/"))
+    assert (missing.value.exit_code, closed.value.exit_code) == (exit_codes.CONFIGURATION, exit_codes.PERMISSION)
 
 
 def test_the_unit_of_another_rig_of_that_name_is_left_alone(tmp_path: Path) -> None:
