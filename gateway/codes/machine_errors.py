@@ -53,8 +53,8 @@ MACHINE_ERRORS: Final = (
         "E107",
         "the service cannot be installed",
         "A systemd unit for this rig could not be written, or would not work.",
-        "Only root may write /etc, the program or the rig lies below /home, which the service does not see, or there is "
-        "no such unit.",
+        "Only root may write /etc, program or rig lie below /home, which the service does not see, its user may not read "
+        "a file, or there is no such unit.",
         "Do what the message says; force-gateway service install RIG --dry-run shows everything without changing anything.",
     ),
     Explanation(

@@ -19,7 +19,7 @@ from functools import partial
 from typing import Final
 
 from gateway.fieldbus.settings import ServerSettings
-from gateway.modbus.certificate import ROLES, PeerCertificate
+from gateway.modbus.certificate import ROLE_OID, ROLES, PeerCertificate
 from gateway.plain_file import read_plain
 
 HANDSHAKE_S: Final = 5.0
@@ -108,6 +108,9 @@ def certificate_refusal(shown: PeerCertificate, revoked: frozenset[str], now: st
     known = ", ".join(ROLES)
     if shown.role is None:
         return f"W242 {who} names no role: make one with force-gateway certs --client NAME:ROLE (ROLE: {known})"
+    if not shown.role:
+        cure = f"{ROLE_OID} = ASN1:UTF8String:ROLE in the extensions of openssl, once"
+        return f"W242 {who} has a role that is not one UTF8String ({cure}; ROLE: {known})"
     if shown.role not in ROLES:
         return f"W242 {who} names the role {shown.role!r}, known are {known}"
     return None

@@ -26,9 +26,9 @@ _VERSION, _EXTENSIONS = 0xA0, 0xA3
 
 
 class PeerCertificate(NamedTuple):
-    """name: the subject's common name; role: what the extension says, None without one; serial: in hex, as `openssl x509
-    -serial` has it; begins, ends: UTC as YYYYMMDDHHMMSSZ, which sort as the times do; subject, issuer: the whole names as the
-    bytes stand there, to see which of several has signed which."""
+    """name: the subject's common name; role: what the extension says, empty where that is not one UTF8String, None without
+    one; serial: in hex, as `openssl x509 -serial` has it; begins, ends: UTC as YYYYMMDDHHMMSSZ, which sort as the times do;
+    subject, issuer: the whole names as the bytes stand there, to see which of several has signed which."""
 
     name: str
     role: str | None
@@ -105,12 +105,13 @@ def _common_name(subject: bytes) -> str:
 
 
 def _role(extensions: bytes) -> str | None:
+    found = []
     for _, listed in _parts(extensions):
         for _, extension in _parts(listed):
             (_, kind), *rest = _parts(extension)
             if kind == _ROLE_OID_BYTES:
-                return _utf8_string(rest[-1][1])
-    return None
+                found.append(_utf8_string(rest[-1][1]))
+    return found[0] if len(found) == 1 else "" if found else None  # each may stand there once (RFC 5280, 4.2)
 
 
 def _utf8_string(der: bytes) -> str:

@@ -130,6 +130,13 @@ def test_a_ca_that_cannot_sign_is_told_apart(
     assert said.output.startswith(f"E174 the CA in {tmp_path} cannot be used: {sentence}")
 
 
+def test_it_is_said_when_a_client_is_shut_out(tmp_path: Path) -> None:
+    """A serial number written into the rig file shut nobody out until somebody came to start the gateway anew."""
+    said = CliRunner().invoke(command, ["certs", str(tmp_path / "keys")]).output
+    shut_out = said[said.index("To shut a client out") :]
+    assert "`revoked:`" in shut_out and "start the gateway anew" in shut_out and "stays connected" in shut_out
+
+
 def test_what_to_do_next_can_be_pasted(tmp_path: Path) -> None:
     folder = tmp_path / "my keys"
     said = CliRunner().invoke(command, ["certs", str(folder), "--host", "fd00::5", "--client", "robot:setpoint"])

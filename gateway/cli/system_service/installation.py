@@ -4,6 +4,7 @@ Files go below a root, which is `/` on a running machine, and a folder where an 
 for anything.
 """
 
+import os
 import re
 import shlex
 import subprocess
@@ -16,8 +17,9 @@ from typing import TYPE_CHECKING, Final
 
 from gateway.cli.errors import CliError
 from gateway.cli.system_service import unit_file
+from gateway.cli.system_service.user_access import refuse_closed_program, refuse_unreadable
 from gateway.processes import exit_codes
-from gateway.profiles.find import list_shipped, locate
+from gateway.profiles.find import list_shipped, locate, shipped_profiles_folder
 from gateway.profiles.http_sections import split_listen
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
 from gateway.service.supervisor.run_options import stem_of
@@ -26,20 +28,30 @@ if TYPE_CHECKING:
     from gateway.profiles import Rig
 
 UNITS: Final = "etc/systemd/system"
+_BEFORE_ENABLE: Final = (
+    ("systemd-sysusers", "force-gateway.conf"),
+    ("udevadm", "control", "--reload"),
+    ("udevadm", "trigger", "--subsystem-match=tty"),
+    ("systemctl", "daemon-reload"),
+)
 _HIDDEN: Final = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")
 _STEM: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _NOT_OF_PROGRAMS: Final = frozenset("'\"\\$*?[")  # what systemd takes in no path of a program
+_RIG_OF_UNIT: Final = re.compile(r"^ExecStart=.* run (.+) --state ", re.M)
 _NAMED_NETWORKS: Final = ("any", "localhost", "link-local", "multicast")
 
 
 @dataclass(frozen=True, slots=True)
 class Installation:
-    """files: path below the root -> text; commands: what is run behind them, in order; notes: what to know of it besides."""
+    """files: path below the root -> text; commands: what is run behind them, in order; notes: what to know of it besides;
+    reads: files that the service's user must be able to read; program: what it must be able to run."""
 
     unit: str
     files: dict[str, str]
     commands: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
+    program: Path | None = None
 
 
 def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], command: Path | None) -> Installation:
@@ -47,21 +59,20 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
     program = (command or _own_command()).absolute()
     is_file = rig_name not in list_shipped("rig")
     named = _path_of(rig_name) if is_file else rig_name
-    for path in (str(program), *([named] if is_file else []), *_files_of(rig)):
-        _refuse_hidden(path)
+    _refuse_hidden(
+        str(program if command else sys.executable), str(program), *([named] if is_file else []), *_files_of(rig)
+    )
     if not _NOT_OF_PROGRAMS.isdisjoint(str(program)):
         raise CliError(f"E107 {program}: systemd starts no program with such a path", exit_codes.CONFIGURATION)
     if not _STEM.fullmatch(stem := stem_of(named)):
         raise CliError(f"E107 {named}: its name names the unit: letters, digits, _ . - only", exit_codes.CONFIGURATION)
     _refuse_no_networks(networks)
-    lines = (rig.output, rig.load_cell, *([rig.valve] if rig.valve else []))
-    ports = [line.port for line in lines] + [face.port for face in rig.fieldbus if isinstance(face, RtuFace)]
     options = unit_file.UnitOptions(
         command=program,
         rig=named,
         stem=stem,
         ports=_ports_of(rig),
-        devices=() if rig.simulated else tuple(dict.fromkeys(port for port in ports if port)),
+        devices=_devices_of(rig),
         networks=_networks_of(rig, networks),
         compiles=rig.is_watched or rig.web is not None,
         waits_for_network=any(map(_is_own_address, _addresses_of(rig))),
@@ -73,14 +84,10 @@ def plan_installation(rig_name: str, rig: "Rig", *, networks: Sequence[str], com
             "etc/sysusers.d/force-gateway.conf": unit_file.sysusers_text(),
             "etc/udev/rules.d/70-force-gateway.rules": unit_file.udev_text(),
         },
-        (
-            ("systemd-sysusers", "force-gateway.conf"),
-            ("udevadm", "control", "--reload"),
-            ("udevadm", "trigger", "--subsystem-match=tty"),
-            ("systemctl", "daemon-reload"),
-            ("systemctl", "enable", "--now", options.name),
-        ),
+        (*_BEFORE_ENABLE, ("systemctl", "enable", "--now", options.name)),
         (*_faces_cut_off(rig, () if networks else options.networks), *_unbounded(rig)),
+        tuple(_files_of(rig)),
+        program,
     )
 
 
@@ -90,6 +97,7 @@ def install_service(plan: Installation, root: Path) -> tuple[list[Path], bool]:
     written, ran = [], False
     for name in plan.files:
         _refuse_link(root / name)
+    _refuse_other_rig(root / UNITS / plan.unit, plan.files.get(f"{UNITS}/{plan.unit}", ""))
     for name, text in plan.files.items():
         path = root / name
         try:
@@ -106,6 +114,10 @@ def install_service(plan: Installation, root: Path) -> tuple[list[Path], bool]:
     if root == Path("/"):
         ran = run_command(("systemctl", "is-active", plan.unit), quiet=True).strip() == "active"
         for words in plan.commands:
+            if words[:2] == ("systemctl", "enable"):  # its user is there by now
+                if plan.program:
+                    refuse_closed_program(plan.program)
+                refuse_unreadable(plan.reads)
             run_command(words)
     return written, ran
 
@@ -149,17 +161,20 @@ def _own_command() -> Path:
     return beside if beside.exists() else Path(sys.argv[0])
 
 
-def _refuse_hidden(path: str) -> None:
-    if hidden := next((home for home in _HIDDEN if path.startswith(f"{home}/")), None):
-        raise CliError(
-            f"E107 {path}: the service sees nothing below {hidden}; install into /opt/force-gateway (python3 -m venv, "
-            "pip install) and keep the rig in /etc/force-gateway, or give --command",
-            exit_codes.CONFIGURATION,
-        )
-    if not path.isprintable():
-        raise CliError(f"E107 {path!r}: a unit has no such characters in a path", exit_codes.CONFIGURATION)
-    if not Path(path).is_absolute():
-        raise CliError(f"E107 {path}: the service needs an absolute path", exit_codes.CONFIGURATION)
+def _refuse_hidden(*paths: str) -> None:
+    for path in paths:
+        real = os.path.realpath(path)
+        if hidden := next((home for home in _HIDDEN for way in (path, real) if way.startswith(f"{home}/")), None):
+            leads = f" leads to {real}" if not path.startswith(f"{hidden}/") else ""
+            raise CliError(
+                f"E107 {path}{leads}: the service sees nothing below {hidden}; install into /opt/force-gateway (python3 "
+                "-m venv, pip install) and keep the rig in /etc/force-gateway, or give --command",
+                exit_codes.CONFIGURATION,
+            )
+        if not path.isprintable():
+            raise CliError(f"E107 {path!r}: a unit has no such characters in a path", exit_codes.CONFIGURATION)
+        if not Path(path).is_absolute():
+            raise CliError(f"E107 {path}: the service needs an absolute path", exit_codes.CONFIGURATION)
 
 
 def _refuse_link(path: Path) -> None:
@@ -169,6 +184,20 @@ def _refuse_link(path: Path) -> None:
         masked = f"the unit is masked; sudo systemctl unmask {path.name} allows it again"
         words = masked if str(target) == "/dev/null" else f"a link to {target}; remove it, then install again"
         raise CliError(f"E107 {path}: {words}", exit_codes.CONFIGURATION)
+
+
+def _refuse_other_rig(path: Path, text: str) -> None:
+    """Unit and state directory go by the name of the rig's file: of two `cell.yaml` the later one would get the calibrations,
+    and at the next start the place, of the other's machine."""
+    there = _RIG_OF_UNIT.search(path.read_text(encoding="utf-8", errors="replace")) if path.exists() else None
+    ours = _RIG_OF_UNIT.search(text)
+    if there and ours and there[1] != ours[1]:
+        stem = path.name.removeprefix(f"{unit_file.NAME}-").removesuffix(".service")
+        raise CliError(
+            f"E107 {path} is of {there[1]}: give {ours[1]} another name, or, where it takes that one's place, force-gateway "
+            f"service uninstall {stem} first",
+            exit_codes.CONFIGURATION,
+        )
 
 
 def _refuse_no_networks(networks: Sequence[str]) -> None:
@@ -190,6 +219,12 @@ def _ports_of(rig: "Rig") -> tuple[int, ...]:
     secure = [face.port for face in rig.fieldbus if isinstance(face, TlsFace)]
     for_people = [split_listen(face.listen)[1] for face in (rig.web, rig.metrics, rig.opcua) if face]
     return (*([rig.network.port] if rig.network.plain else []), *secure, *for_people)
+
+
+def _devices_of(rig: "Rig") -> tuple[str, ...]:
+    lines = (rig.output, rig.load_cell, *([rig.valve] if rig.valve else []))
+    ports = [line.port for line in lines] + [face.port for face in rig.fieldbus if isinstance(face, RtuFace)]
+    return () if rig.simulated else tuple(dict.fromkeys(port for port in ports if port))
 
 
 def _addresses_of(rig: "Rig") -> list[str]:
@@ -254,10 +289,12 @@ def _path_of(rig_name: str) -> str:
 
 
 def _files_of(rig: "Rig") -> list[str]:
-    """Return the files that the rig names besides profiles: the service must see them, too."""
+    """Return the rig's file, and those that it names, but for shipped profiles: the service must see and read them."""
+    shipped, texts = shipped_profiles_folder().absolute(), [Path(name).absolute() for name in rig.texts]
+    own = [path for path in texts if not path.is_relative_to(shipped)]
     secure = [
         path for face in rig.fieldbus if isinstance(face, TlsFace) for path in (face.certificate, face.key, face.ca)
     ]
     mqtt, tls = rig.mqtt, rig.mqtt and rig.mqtt.tls
     broker = (mqtt and mqtt.password_file, *((tls.ca, tls.certificate, tls.key) if tls else ()))
-    return [str(Path(path).absolute()) for path in (*secure, *broker) if path]
+    return [str(Path(path).absolute()) for path in (*own, *secure, *broker) if path]

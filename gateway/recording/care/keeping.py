@@ -17,7 +17,7 @@ from typing import Final
 
 from gateway.processes.durable_file import lock_directory, remove_if_possible, replace_durably
 from gateway.profiles.recordings_section import Retention
-from gateway.recording.layout import number_in
+from gateway.recording.layout import SUFFIX, number_in
 from gateway.recording.reader import recording_paths
 
 _MARK: Final = ".keep"
@@ -137,7 +137,7 @@ def delete_recording(path: Path, reference: str) -> str:
     if why := why_protected(path, reference):
         return why
     with lock_directory(path.parent) as descriptor:
-        is_highest = int(path.stem) == max(_numbers(path.parent))
+        is_highest = not _has_next(path) and int(path.stem) == max(_numbers(path.parent))
         if is_highest:
             replace_durably(descriptor, path.with_suffix(_GONE).name, b"")
         path.unlink()
@@ -146,6 +146,12 @@ def delete_recording(path: Path, reference: str) -> str:
         if is_highest:
             _keep_highest_mark(path.parent, descriptor)
     return ""
+
+
+def _has_next(path: Path) -> bool:
+    """Decide it for all but a few at once: to look through 100 000 names for each took turns of control's process."""
+    following = f"{int(path.stem) + 1:04d}"
+    return any(path.with_name(following + suffix).exists() for suffix in (SUFFIX, _GONE))
 
 
 def _numbers(folder: Path) -> list[int]:

@@ -160,5 +160,6 @@ Then try it (port 802 is the standard's, and needs a privilege; 8802 does not):
   openssl s_client -connect {there}:8802 -CAfile {ca} -cert {client}.crt -key {client}.key
 
 A robot or PLC gets ca.crt, its own .crt and its own .key, nothing else; ca.key stays here, readable by you alone.
-To shut a client out, put its serial number (openssl x509 -noout -serial -in FILE) under `revoked:` of the face."""
+To shut a client out, put its serial number (openssl x509 -noout -serial -in FILE) under `revoked:` of the face,
+and start the gateway anew: until then it stays connected, and may connect again. So it is with renewed files."""
     )

@@ -180,8 +180,17 @@ def _over(path: str, face: TlsFace) -> Found:
 
 
 def _unwanted(face: TlsFace, code: int) -> str:
-    why = _REFUSALS.get(code, "is not signed by the CA of this face")
+    why = _REFUSALS.get(code) or _why_unsigned(face)
     return f"E175 {face.certificate} {why}: no client that trusts {face.ca} would connect; {_MAKE}"
+
+
+def _why_unsigned(face: TlsFace) -> str:
+    own = _certificates(face.certificate)  # none of one that OpenSSL alone can read
+    above = {each.subject for each in (*own[1:], *_certificates(face.ca))}
+    if not own or own[0].issuer in above:
+        return "is not signed by the CA of this face"
+    cure = "if it is one between the two, put its certificate behind this one, in the same file"
+    return f"is of a CA that is not in the file of `ca` ({cure})"
 
 
 def _is_in_its_days(face: TlsFace) -> bool:

@@ -1,0 +1,53 @@
+"""The role extension as a plant's own CA may have written it: what is not one UTF8String is no role, and is told as such."""
+
+import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+
+from gateway.fieldbus.tls_settings import certificate_refusal
+from gateway.modbus.certificate import ROLE_OID, read_certificate
+from tests.certificates import signed
+
+
+def refusal_of(*roles: bytes) -> str | None:
+    """Return what is said of a certificate with these values of the extension."""
+    key, ca = ec.generate_private_key(ec.SECP256R1()), signed()["ca"]
+    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "cell-7")])
+    builder = x509.CertificateBuilder(name, name, key.public_key(), x509.random_serial_number())
+    builder = builder.not_valid_before(ca.certificate.not_valid_before_utc)
+    builder = builder.not_valid_after(ca.certificate.not_valid_after_utc)
+    oid = x509.ObjectIdentifier(ROLE_OID)
+    values = [x509.Extension(oid, False, x509.UnrecognizedExtension(oid, role)) for role in roles]
+    builder._extensions = values  # `add_extension` refuses a second one; other CAs do not
+    shown = read_certificate(builder.sign(key, hashes.SHA256()).public_bytes(serialization.Encoding.DER))
+    return certificate_refusal(shown, frozenset(), shown.ends)
+
+
+def test_one_role_as_the_specification_has_it_is_taken() -> None:
+    assert refusal_of(b"\x0c\x08setpoint") is None
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        (b"\x0c\x07monitor", b"\x0c\x05admin"),
+        (b"\x0c\x05admin", b"\x0c\x05admin"),
+        (b"\x13\x05admin",),
+        (b"\x16\x05admin",),
+        (b"\x1e\x0a\0a\0d\0m\0i\0n",),
+        (b"admin",),
+        (b"\x0c\x06admin",),
+        (b"",),
+    ],
+)
+def test_two_roles_or_one_in_another_encoding_are_told_as_such(values: tuple[bytes, ...]) -> None:
+    """Of two the first one counted; of a PrintableString it was said that the certificate names the role ''."""
+    told = str(refusal_of(*values))
+    assert told.startswith("W242 the certificate of 'cell-7' has a role that is not one UTF8String")
+    assert "''" not in told and f"{ROLE_OID} = ASN1:UTF8String:ROLE" in told
+
+
+def test_an_unknown_role_is_named() -> None:
+    assert "names the role 'Admin'" in str(refusal_of(b"\x0c\x05Admin"))
+    assert "names no role" in str(refusal_of())
