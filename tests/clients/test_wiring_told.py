@@ -202,3 +202,24 @@ def test_the_requests_of_an_s7_and_the_lines_to_try_have_the_function_and_the_ad
 def test_an_s7_keeps_some_ports_for_itself(port: int, is_taken: bool) -> None:
     """102 is its own: MB_CLIENT never connects there, and says a number of four digits."""
     assert (Endpoint("10.0.0.1", port, 1).s7_port_fault == "") is is_taken
+
+
+@pytest.mark.parametrize(("port", "is_told"), [(5020, True), (502, False)])
+def test_a_universal_robot_is_told_that_its_own_client_asks_one_port_alone(
+    port: int, is_told: bool, tmp_path: Path
+) -> None:
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("port: 5020", f"port: {port}")
+    (tmp_path / "own.yaml").write_text(text)
+    (section,) = [each for each in page_of(tmp_path / "own.yaml")["sections"] if "Universal" in each["title"]]
+    assert any("It asks port 502 always" in sentence for sentence in section["sentences"]) is is_told
+
+
+def test_a_role_of_a_serial_face_is_told_by_what_it_allows(tmp_path: Path) -> None:
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    told = {}
+    for role in ("monitor", "setpoint", "calibration"):
+        face = f"fieldbus:\n  - {{type: rtu, port: /dev/serial/by-id/usb-x, role: {role}}}\n"
+        (tmp_path / "own.yaml").write_text(text + face)
+        (told[role],) = rows_of(page_of(tmp_path / "own.yaml"), "Serial face 1: Modbus RTU, masters ask here")["role"]
+    assert "each write is refused" in told["monitor"]
+    assert "commands, uploads no model" in told["setpoint"] and "and uploads models" in told["calibration"]
