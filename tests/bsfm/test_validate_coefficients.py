@@ -16,6 +16,7 @@ from gateway.bsfm import (
     RationalBezier,
     validate_coefficients,
 )
+from gateway.bsfm.branches import Crossing
 from gateway.bsfm.model import Response
 from gateway.bsfm.slip.slip_stops import half_width_bound_v
 from tests.calibrations.coefficients import calibration
@@ -160,3 +161,7 @@ def test_the_forces_of_both_branches_are_those_at_their_shares():
     model = Bsfm(branches((0.0, 10.0, 20.0), (0.0, 12.0, 20.0)), LinearBlend(3.0))
     for voltage_v in (0.5, 2.5, 4.5):
         assert model.branch_forces_n(voltage_v) == (model.force_n(voltage_v, 1.0), model.force_n(voltage_v, -1.0))
+
+
+def test_a_crossing_says_by_how_much_the_falling_branch_is_below() -> None:
+    assert str(Crossing(1.5, -0.25)) == "the falling branch is 0.25 N below the rising one at 1.500 V"

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from gateway.catalogue.effect import By
 from gateway.diagnosis import BY_NAME, EFFECTS, Effect, Parameter
 from gateway.twin.plant import Plant, values
 from tests.diagnosis.hidden import BY_NAME as EXAMPLES
@@ -30,7 +31,23 @@ INDISTINGUISHABLE = (
     ("end-stop", "supply-saturation"),
     ("stribeck-friction", "presliding"),
     ("leak", "warm-up"),
+    ("backlash", "sign-loss"),
 )
+COMPENSATED = {
+    By.TIMING: "transport-delay extra-lag",
+    By.COMMAND: "command-nonlinearity",
+    By.MODEL: "regulator-hysteresis coulomb-friction presliding load-dependent-friction asymmetric-friction "
+    "contact-nonlinearity backlash",
+    By.CELL: "thermal-zero-drift thermal-span-drift sensor-quadratic sensor-cubic valve-crosstalk",
+    By.OUTSIDE: "tilt-gravity feed-drag",
+}
+SIZES = """
+delay_s second_lag_s dead_band_pa hysteresis_pa command_step_v supply_pa ceiling_pa leak_per_s leak_flow_pa hunting_pa
+slew_pa_per_s coulomb_n stribeck_n dwell_stiction_n viscous_n_s_per_m presliding_m load_dependent_n_per_n stroke_m
+stop_stiffness_n_per_mm side_load_n_s_per_mm side_load_n_per_n side_load_tilt_n side_load_n_per_mm tilt_n spindle_n
+spindle_n_per_krpm2 ripple_n lost_n hum_n sign_lost chamber_lag_s
+""".split()
+"""Widths, times, amplitudes and bounds, of which there is none below 0; all else may be one way or the other."""
 WORDS = ("family", "what", "signature", "excitation", "experiment")
 UNITS = {
     "_pa": "Pa", "_s": "s", "_v": "V", "_hz": "Hz", "_rad": "rad", "_deg": "deg", "_m": "m", "_m2": "m2", "_n": "N",
@@ -51,6 +68,18 @@ def test_the_names_are_those_of_the_contract() -> None:
     assert sorted(effect.name for effect in EFFECTS) == sorted(NAMES)
     assert len(EFFECTS) == 45
     assert [BY_NAME[name].name for name in NAMES] == NAMES
+
+
+def test_each_effect_is_compensated_by_the_part_of_control_that_can() -> None:
+    """A bent contact that is counted with the cell bends the readings of a good one."""
+    found = {by: {one.name for one in EFFECTS for each in one.treatments if each.by is by} for by in COMPENSATED}
+    assert found == {by: set(names.split()) for by, names in COMPENSATED.items()}
+
+
+def test_what_is_no_size_is_tried_either_way() -> None:
+    """A cable that couples the command in with its wires exchanged takes from the reading."""
+    fitted = {one.name: one for effect in EFFECTS for form in effect.forms for one in form.parameters if not one.shape}
+    assert {name for name, one in fitted.items() if one.low != -one.high} == set(SIZES)
 
 
 def test_families_have_the_size_of_the_contract() -> None:

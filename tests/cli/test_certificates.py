@@ -4,6 +4,7 @@ import os
 import shlex
 import stat
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -75,6 +76,13 @@ def test_a_client_s_certificate_is_no_server_s_and_the_other_way_round(ca: Signe
     made = [make_server(ca, ["127.0.0.1"], 30), make_client(ca, "robot", Role.SETPOINT, 30)]
     uses = [list(each.certificate.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value) for each in made]
     assert uses == [[ExtendedKeyUsageOID.SERVER_AUTH], [ExtendedKeyUsageOID.CLIENT_AUTH]]
+
+
+def test_a_clock_that_is_half_an_hour_behind_takes_a_new_certificate(ca: Signed) -> None:
+    """A robot controller's clock is set by hand."""
+    half_an_hour_ago = datetime.now(UTC) - timedelta(minutes=30)
+    made = [ca, make_server(ca, ["127.0.0.1"], 30), make_client(ca, "robot", Role.SETPOINT, 30)]
+    assert all(each.certificate.not_valid_before_utc < half_an_hour_ago for each in made)
 
 
 def test_a_ca_with_another_s_key_signs_nothing(ca: Signed, tmp_path: Path) -> None:

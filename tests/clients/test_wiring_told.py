@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.clients import endpoint_of, render_client
+from gateway.clients import Endpoint, endpoint_of, render_client
 from gateway.clients.wiring import wiring_page
 from gateway.profiles import load_rig
 from tests.clients.programs.syntax import parse
@@ -166,3 +166,60 @@ def test_which_mb_client_the_block_needs_is_told_on_the_page_and_in_its_head() -
     (version,) = rows_of(page_of("irc5-cell"), "Siemens S7-1200/1500: connection of MB_CLIENT")["instruction"]
     for told in (version, render_client(rig.register_map, "scl", endpoint_of(rig))):
         assert "MODBUS (TCP) V4.0" in told and "V3.0" in told
+
+
+@pytest.mark.parametrize(
+    ("lease", "told"),
+    [
+        ("lease_action: fault", "0.2 s without a new heartbeat, then the safe voltage, and fault A310"),
+        ("lease_action: hold", "0.2 s without a new heartbeat, then a warning, and the force is kept (hold)"),
+        ("lease_action: ramp", "0.2 s without a new heartbeat, then along the ramp to 0 N, and off"),
+    ],
+)
+def test_an_integrator_is_told_what_becomes_of_the_force_when_the_master_falls_silent(
+    lease: str, told: str, tmp_path: Path
+) -> None:
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("lease_action: fault", lease)
+    (tmp_path / "own.yaml").write_text(text)
+    assert rows_of(page_of(tmp_path / "own.yaml"), "Network: Modbus TCP")["lease"] == [told]
+
+
+def test_the_requests_of_an_s7_and_the_lines_to_try_have_the_function_and_the_address_of_what_they_name() -> None:
+    page = page_of("irc5-cell")
+    requests = rows_of(page, "Siemens S7-1200/1500: requests")
+    assert requests["status"] == ["0", "40101", "32", "103", "100", "FC03"]
+    assert requests["heartbeat alone"] == ["1", "40005", "1", "106", "4", "FC06"]
+    assert requests["byte_order_echo, 1234.5 once a connection"] == ["1", "40417", "2", "116", "416", "FC16"]
+    (lines,) = [section["commands"] for section in page["sections"] if section["title"].startswith("mbpoll")]
+    floats = [line.split("    # ") for line in lines if "4:float" in line]
+    assert floats == [
+        ["mbpoll -1 -p 5020 -t 4:float -B -r 237 192.168.125.20", "force_measured in N, float_abcd"],
+        ["mbpoll -1 -p 5020 -t 4:float -r 337 192.168.125.20", "force_measured in N, float_cdab"],
+    ]
+
+
+@pytest.mark.parametrize(("port", "is_taken"), [(502, True), (5020, True), (102, False), (5001, False), (49152, False)])
+def test_an_s7_keeps_some_ports_for_itself(port: int, is_taken: bool) -> None:
+    """102 is its own: MB_CLIENT never connects there, and says a number of four digits."""
+    assert (Endpoint("10.0.0.1", port, 1).s7_port_fault == "") is is_taken
+
+
+@pytest.mark.parametrize(("port", "is_told"), [(5020, True), (502, False)])
+def test_a_universal_robot_is_told_that_its_own_client_asks_one_port_alone(
+    port: int, is_told: bool, tmp_path: Path
+) -> None:
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("port: 5020", f"port: {port}")
+    (tmp_path / "own.yaml").write_text(text)
+    (section,) = [each for each in page_of(tmp_path / "own.yaml")["sections"] if "Universal" in each["title"]]
+    assert any("It asks port 502 always" in sentence for sentence in section["sentences"]) is is_told
+
+
+def test_a_role_of_a_serial_face_is_told_by_what_it_allows(tmp_path: Path) -> None:
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    told = {}
+    for role in ("monitor", "setpoint", "calibration"):
+        face = f"fieldbus:\n  - {{type: rtu, port: /dev/serial/by-id/usb-x, role: {role}}}\n"
+        (tmp_path / "own.yaml").write_text(text + face)
+        (told[role],) = rows_of(page_of(tmp_path / "own.yaml"), "Serial face 1: Modbus RTU, masters ask here")["role"]
+    assert "each write is refused" in told["monitor"]
+    assert "commands, uploads no model" in told["setpoint"] and "and uploads models" in told["calibration"]

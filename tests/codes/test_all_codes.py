@@ -85,6 +85,23 @@ def test_a_code_stands_once_in_the_table() -> None:
         assert by_code.setdefault(explanation.code, explanation) is explanation, explanation.code
 
 
+FROZEN = {
+    FaultCode: "1:A310 2:A311 3:A312 4:A313 5:A302 6:A303 7:A314 8:A315 9:A316 10:A317 11:A318 12:A319 13:A320 14:A499 "
+    "15:A321 16:A403 17:A355 18:A356 20:A332 21:A333 22:A334",
+    WarningBit: "1:A401 2:A301 4:A340 8:A341 16:A342 32:A343 64:A344 128:A310 256:A345 512:A347 1024:W361",
+    RefusalReason: "1:W202 2:W205 3:W206 4:W207 5:W204 6:W201 7:W208 8:W209 9:W210 10:W211 11:W212 12:W213 13:W214 14:W215 "
+    "15:W216 16:W217 17:W218 18:W219 19:W220 20:W221 21:E401 22:W302 23:W312 24:W303 25:W305 26:W310 27:W311 28:W313 "
+    "29:W315 30:W331 31:W306 32:W307 33:W308 34:W309 40:W222",
+}
+"""What the numbers in the registers are called: masters' programs, alarm lists and people know them so. Only new ones come."""
+
+
+@pytest.mark.parametrize("kind", FROZEN, ids=lambda kind: kind.__name__)
+def test_a_number_keeps_its_code(kind: type[FaultCode] | type[WarningBit] | type[RefusalReason]) -> None:
+    codes = {f"{int(member)}:{member.explanation.code}" for member in kind if member.explanation.code}
+    assert set(FROZEN[kind].split()) <= codes
+
+
 def test_every_number_in_the_registers_but_none_has_a_code() -> None:
     for number in NUMBERED:
         assert bool(number.code) == (number.name != "NONE"), number

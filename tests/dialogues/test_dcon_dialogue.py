@@ -190,3 +190,14 @@ def test_a_simulated_watchdog_that_has_tripped_says_so_in_the_words_of_the_modul
     host.request(SetVoltage(5.0))
     said = output_device(I7021).reply(WatchdogTripped())
     assert (said, host.receive(said, 0.0)) == (b"!\r", [WatchdogTripped()])
+
+
+@pytest.mark.parametrize("name", ["icpdas-702x", "icpdas-7024"])
+@pytest.mark.parametrize(("state", "word"), [("00", "off"), ("80", "armed"), ("04", "tripped"), ("84", "tripped")])
+def test_a_module_that_has_tripped_says_so_whether_it_is_armed_again_or_not(name: str, state: str, word: str) -> None:
+    """Taken for armed it ignores each setting, and nobody knows why."""
+    host = output_host(load_device(name))
+    assert host.request(AskDevice(DeviceStep.STATUS)) == b"~010\r"
+    (answer,) = host.receive(f"!01{state}\r".encode(), 0.0)
+    assert isinstance(answer, DeviceAnswer) and answer.step is DeviceStep.STATUS
+    assert answer.text == word

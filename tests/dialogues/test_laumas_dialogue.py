@@ -36,6 +36,7 @@ def test_one_request_asks_for_all_that_a_weight_is_made_of(profile: DeviceProfil
         (0x0001, 1234, 12.34, Quality.OVERLOAD),  # load cell error
         (0x0002, 1234, 12.34, Quality.OVERLOAD),  # converter
         (0x0004, 999999, 9999.99, Quality.OVERLOAD),  # over the maximum
+        (0x0010, 999999, 9999.99, Quality.OVERLOAD),  # beyond what it can tell
         (0x0088, 999999, -9999.99, Quality.OVERLOAD),  # over 110 %
     ],
 )

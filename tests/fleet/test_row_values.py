@@ -76,6 +76,7 @@ def test_behind_the_first_cell_that_drifts_the_next_is_judged_among_the_others()
     """Holm's procedure: by Bonferroni's the second one would have to be twice as sure."""
     assert _holm({"a": 0.004, "b": 0.009, "c": 0.5}) == set()
     assert _holm({"a": 0.003, "b": 0.0049, "c": 0.5}) == {"a", "b"}
+    assert _holm({"a": 0.003, "b": 0.009, "c": 0.5}) == {"a"}
 
 
 def test_a_day_is_its_median_and_its_trend_is_drawn_the_way_that_it_goes() -> None:

@@ -69,5 +69,5 @@ TOLD = (
            ("web/tabs/test_register_table_in_chromium.py",)),
     Defect("samples that overlap are drawn twice", "web/static/live/samples.js",
            "rows.time_s.findIndex((time) => time > known_s)", "rows.time_s.findIndex((time) => time >= 0)",
-           ("web/tabs/test_live_in_chromium.py",)),
+           ("web/tabs/test_steering_in_chromium.py",)),
 )  # fmt: skip

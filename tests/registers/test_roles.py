@@ -22,6 +22,10 @@ ZERO_WORD = {
 """A word of each block to which 0 may be written, for who may at all; the last two are read only."""
 
 
+def test_a_monitor_may_write_no_block_and_who_commands_no_coefficients() -> None:
+    assert min(WRITE_ROLES.values()) is Role.SETPOINT and WRITE_ROLES["staging"] is Role.CALIBRATION
+
+
 def requests(address: int) -> dict[int, bytes]:
     """Function: a request that writes two words of 0 at the address, or one where the function knows no more."""
     return {

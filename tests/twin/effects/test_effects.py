@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gateway.twin import Contact, Friction, LoadCell, Plant, Regulator, Surroundings, Twin
+from gateway.twin.effects.regulator import apply_leak
 from gateway.twin.experiment import Floats
 from tests.twin.traces import trace
 
@@ -37,6 +38,7 @@ STATIC: list[tuple[Any, float]] = [
     (Regulator(droop_pa_per_pa=0.1), 0.1 * 5.0e4 * 1.0e-4),
     (Regulator(droop_share_per_pa=1.0e-6), 0.05 * THRUST_N),
     (Regulator(leak_per_s=0.5), THRUST_N * (math.exp(-0.5 * 0.9995) - 1.0)),
+    (Regulator(leak_flow_pa=2.0e4), -2.0 * (3.6e5 + 1.0e5) / 4.0e5),  # choked: in proportion to the absolute pressure
     (Friction(coulomb_n=1.0, asymmetry_n=0.4), -1.4),
     (Friction(coulomb_n=1.0, asymmetry_n=-3.0), 0.0),  # never below 0
     (Friction(side_load_n_s_per_mm=0.05), -1.0),
@@ -51,7 +53,7 @@ STATIC: list[tuple[Any, float]] = [
     (Contact(hardening=0.05), 0.05 * THRUST_N * math.sqrt(3.6)),
     (Contact(wear_per_m=0.02), -0.1 * THRUST_N),
     (Contact(wear_n_per_m=0.3), 1.5),
-    (Contact(tilt_n=2.0, tilt_zero_deg=15.0), 2.0 * math.cos(math.radians(45.0))),
+    (Contact(tilt_n=2.0, tilt_zero_deg=30.0), 2.0 * math.cos(math.radians(30.0))),
     (Contact(feed_drag_n_s_per_mm=0.05), -1.0),
     (Contact(feed_drag_n=0.7), -0.7),
     (Contact(feed_drag_abs_n_s_per_mm=0.05), 1.0),
@@ -118,6 +120,15 @@ def test_filling_is_slower_than_emptying_by_its_share() -> None:
     twin.command(0.0)
     twin.advance(0.1)
     assert twin.force_n == pytest.approx(THRUST_N * math.exp(-1.0), rel=1.0e-9)
+
+
+@pytest.mark.parametrize(
+    ("pressure_pa", "flow"),
+    [(3.0e5, 1.0), (2.0e5, 0.75), (0.95e5, 0.4875), (5.0e4, 0.375 * math.sqrt(1.0 - ((1 / 1.5 - 0.528) / 0.472) ** 2))],
+)
+def test_a_hole_is_choked_down_to_nearly_twice_the_atmosphere(pressure_pa: float, flow: float) -> None:
+    """ISO 6358: below a ratio of 0.528 nothing but the pressure before it counts."""
+    assert apply_leak(Regulator(leak_flow_pa=1.0e4), pressure_pa) == pytest.approx(pressure_pa - 1.0e4 * flow, rel=1e-9)
 
 
 def test_a_leak_starts_anew_with_a_command_that_is_noticed_only() -> None:
