@@ -28,4 +28,11 @@ KEPT: list[tuple[int, list[Event]]] = [
     ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (864683, [Event(0.1336, "worker", "hold_on", (37.07,)), Event(3.7748, "worker", "hold_on", (8.61,))]),
+    (
+        21547,
+        [
+            Event(0.1, "worker", "hold_on", (30.23,), way="singles"),
+            Event(2.779, "worker", "hold_on", (9.05,), way="read_and_write"),
+        ],
+    ),
 ]
