@@ -35,4 +35,13 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(2.779, "worker", "hold_on", (9.05,), way="read_and_write"),
         ],
     ),
+    (
+        20826,
+        [
+            Event(1.8573, "worker", "take", (45.57,), way="swapped"),
+            Event(8.6304, "world", "no-air", (1.0,)),
+            Event(10.4067, "worker", "pull", (39.62,)),
+            Event(11.1192, "rival", "ask", (1,), b"\x16\x00\x0b0\xffI\x00"),
+        ],
+    ),
 ]
