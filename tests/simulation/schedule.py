@@ -212,7 +212,7 @@ class Simulation:
     def _note_pdu(self, host: str, pdu: bytes, is_answered: bool) -> None:
         self.status.note_write(host if is_answered else "", pdu, self._done_s(is_answered))
         self.explained.note_write(host, self.clock.now_s)
-        self.target.note_write(host)
+        self.target.note_write(host, pdu, self._done_s(is_answered))
         self.cell.note_mode(word_of(pdu, MODE))
         self.lease.note_write(pdu, self._done_s(is_answered), is_answered=is_answered)
         self.commands.note_write(pdu, self._done_s(is_answered))
@@ -308,7 +308,7 @@ class Simulation:
             if pdu[:2] == COMMAND_BLOCK:
                 self.commands.note(pdu[2:], at_s - DELAY_S)
                 *_, band, band_ms = struct.unpack(f">{WORDS}h", pdu[2:])
-                self.target.band_n, self.target.band_s = 0.01 * band, 0.001 * band_ms
+                self.target.note_band(band, band_ms, at_s - DELAY_S)
                 self.status.note_control_word(int.from_bytes(pdu[2:4]), at_s - DELAY_S)
             if pdu[:2] == FLOAT_BLOCK:
                 self.status.note_floats(pdu[2:], at_s - DELAY_S)

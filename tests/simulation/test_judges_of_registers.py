@@ -123,8 +123,33 @@ def test_two_masters_who_take_a_target_from_each_other_have_none(masters: int, i
     observer = Observer(BOUNDS)
     witness = TargetWitness(observer)
     for number in range(9):
-        witness.note_write(f"10.0.0.{1 + number % masters}")
+        witness.note_write(f"10.0.0.{1 + number % masters}", write_pdu(1, 2000), 1000.0 + 0.5 * number)
         look_at_target(witness, 0.5, 1000.0 + 0.5 * number, measured=1700)
+    assert bool(observer.broken) is is_seen
+
+
+@pytest.mark.parametrize(
+    ("band", "registers", "seconds", "is_seen"),
+    [
+        (400, {"measured": 1700}, 4.5, False),
+        (400, {"measured": 1400}, 4.5, True),
+        (400, {"measured": 1700, "word": 9}, 1.0, False),
+        (400, {"measured": 1400, "word": 9}, 1.0, True),
+        (0, {"measured": 1700, "word": 9}, 1.0, True),
+    ],
+)
+def test_a_target_is_judged_by_the_band_that_its_master_has_written(
+    band: int, registers: dict[str, int], seconds: float, is_seen: bool
+) -> None:
+    """Not by the one before, as long as nobody has read which one counts."""
+    observer = Observer(BOUNDS)
+    witness = TargetWitness(observer)
+    witness.note_write("10.0.0.1", write_pdu(11, band), 999.0)
+    if band:
+        look_at_target(witness, seconds, 990.0, **registers)
+        assert not observer.broken
+    witness.note_band(band, 0, 999.5)
+    look_at_target(witness, seconds, **registers)
     assert bool(observer.broken) is is_seen
 
 

@@ -1,7 +1,7 @@
 """Schedules of masters, faults and accidents, from seeds, against the whole control process in virtual time.
 
 Another range: SIMULATION_SEEDS=1000:1200 (and SIMULATION_SECONDS=10). What a seed breaks is shrunk before it is told; what was
-found so and mended stays in kept_schedules.py.
+found so and mended stays in kept/, by theme.
 """
 
 import gc
@@ -13,7 +13,7 @@ import pytest
 from tests.simulation.draws.event import Event
 from tests.simulation.draws.events import draw_events
 from tests.simulation.draws.harmless_events import draw_harmless_events
-from tests.simulation.kept_schedules import KEPT
+from tests.simulation.kept import load_cell, masters, output_line, people_at_the_machine, stopped_processes
 from tests.simulation.schedule import Outcome, run_schedule
 from tests.simulation.shrinking import shrink
 
@@ -26,8 +26,12 @@ SHRUNK = 3
 """Of a shard's broken seeds so many are shrunk, which takes a minute each; the others are told as they are."""
 SECONDS = float(os.environ.get("SIMULATION_SECONDS", "23"))
 """Of events; with its start and its healing a schedule is one of 30 s."""
+KEPT = [
+    kept for theme in (masters, output_line, load_cell, people_at_the_machine, stopped_processes) for kept in theme.KEPT
+]
+"""Those that were found and kept: the seed of the machine, and what happened to it."""
 KEPT_SECONDS = 24.0
-"""Of those that were found and kept."""
+"""Of each of them."""
 
 
 def laws(outcome: Outcome) -> set[str]:

@@ -8,7 +8,6 @@ import pytest
 
 from tests.simulation.draws.event import Event
 from tests.simulation.draws.rare_events import draw_rare_events
-from tests.simulation.judges.held_force import HeldForce
 from tests.simulation.judges.observer import STATUS_WORDS, Bounds, Observer
 from tests.simulation.judges.status_witness import StatusWitness
 from tests.simulation.kernel.edges import Log
@@ -99,53 +98,6 @@ def test_a_fault_that_goes_without_a_reset_is_seen_however_late_it_is_read(
         words = [0, state, *[0] * 8, fault, *[0] * (STATUS_WORDS - 11)]
         observer.note_status(struct.pack(f">2x{STATUS_WORDS}H", *words), read_s)
     assert [line.partition(" at ")[0] for line in observer.broken] == ["I5"] * is_broken
-
-
-HELD_N = 20.0
-
-
-def look_at_held(observer: Observer, begun_s: float, *looks: tuple[int, float]) -> None:
-    """A force is held from 1 s on, settled at 4.5 s. looks: state and force, every second from 4 s on."""
-    held = HeldForce(observer, begun_s)
-    held.expect(HELD_N, 1.0)
-    for number, (state, force_n) in enumerate(looks):
-        words = [0, state, round(100 * force_n)] + [0] * (STATUS_WORDS - 3)
-        held.note(struct.pack(f">{STATUS_WORDS}h", *words), 4.0 + number)
-    held.end()
-    held.note(struct.pack(f">{STATUS_WORDS}h", *[0] * STATUS_WORDS), 9.0)
-
-
-@pytest.mark.parametrize(
-    "looks",
-    [
-        ((3, HELD_N), (4, HELD_N), (3, HELD_N)),
-        ((3, HELD_N), (0, HELD_N), (3, HELD_N)),
-        ((3, HELD_N), (3, HELD_N + 1.1), (3, HELD_N)),
-        ((3, HELD_N), (3, HELD_N), (3, HELD_N - 1.1)),
-    ],
-)
-def test_a_force_that_is_dropped_without_a_cause_is_seen(
-    observer: Observer, looks: tuple[tuple[int, float], ...]
-) -> None:
-    look_at_held(observer, 2.0, *looks)
-    assert [line.partition(" at ")[0] for line in observer.broken] == ["held force"]
-
-
-def test_a_held_force_in_its_band_is_left_alone_and_so_is_one_that_has_begun_late(observer: Observer) -> None:
-    look_at_held(observer, 2.0, (2, 1.0), (2, HELD_N - 0.9), (3, -HELD_N + 0.9))
-    look_at_held(observer, 0.5, (4, 0.0), (0, 0.0))
-    assert observer.broken == []
-
-
-@pytest.mark.parametrize(("late_s", "state", "is_seen"), [(0.1, 3, False), (0.5, 3, True), (0.1, 4, True)])
-def test_a_look_at_a_false_reading_tells_nothing_of_the_force_but_a_fault_is_seen(
-    observer: Observer, late_s: float, state: int, is_seen: bool
-) -> None:
-    held = HeldForce(observer, 2.0)
-    held.expect(HELD_N, 1.0)
-    words = [0, state, 6000] + [0] * (STATUS_WORDS - 3)
-    held.note(struct.pack(f">{STATUS_WORDS}h", *words), 5.0 + late_s, 5.0)
-    assert bool(observer.broken) is is_seen
 
 
 def test_true_registers_are_left_alone(observer: Observer) -> None:

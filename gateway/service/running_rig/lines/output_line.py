@@ -98,8 +98,7 @@ class OutputExchange:
         self._sent_v = self._setting_s = self.pressure_pa = nan
         self.standing_v: float | None = None
         self._given_up.forget()
-        self._is_overdue = False  # a question was given up, its answer may still come
-        self._is_behind = False  # the answer to one of them came, that to the last question is out
+        self._is_overdue = self._is_behind = False  # a question was given up; its answer came, that to the last is out
         self._patience_s = self._reply_timeout_s  # shorter where garbage came: behind a round trip that was the answer
         self._refused_v = nan  # a moment ago: perhaps the watchdog has tripped, which is asked before the next try
         self._is_altered = False  # the last echo was another voltage
@@ -249,6 +248,7 @@ class OutputExchange:
             return
         if self.unanswered_since_s is not None and now_s - self.unanswered_since_s > _AWAY_S:
             self.checks.begin()
+            self.standing_v = None  # a watchdog has put out its own, say: what is read back was commanded before
         self.unanswered_since_s, self._unread = None, ""
         if self._is_overdue and not self._is_echo(request, reply):
             self._given_up.note_strange(now_s)

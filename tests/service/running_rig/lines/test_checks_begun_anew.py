@@ -109,6 +109,7 @@ class PlayedLine:
         self.deaf_to: tuple[DeviceStep, ...] = ()
         self.is_silent = False
         self.asked: list[DeviceStep] = []
+        self.settings: list[float] = []
         self.written: list[bytes] = []
         self.exchange = OutputExchange(output_host(profile), self.written.append, REPLY_TIMEOUT_S)
 
@@ -133,7 +134,9 @@ class PlayedLine:
             self.asked.append(asked.step)
             self.exchange.on_bytes(self.device.reply(DeviceAnswer(asked.step, is_right=True)), self.now_s)
         elif isinstance(asked, SetVoltage | ReadVoltage):
-            self.stands_v = asked.voltage_v if isinstance(asked, SetVoltage) else self.stands_v
+            if isinstance(asked, SetVoltage):
+                self.stands_v = asked.voltage_v
+                self.settings.append(asked.voltage_v)
             self.exchange.on_bytes(self.device.reply(Accepted(self.stands_v), to=asked), self.now_s)
 
 
@@ -155,6 +158,19 @@ def test_a_device_that_was_silent_for_long_is_asked_anew_what_it_is_and_armed_an
     assert IDENTITY in line.asked, "perhaps behind a look that was under way"
     assert line.asked[line.asked.index(IDENTITY) :][:4] == [IDENTITY, STATUS, ARM, VERIFY]
     assert line.exchange.checks.is_done
+
+
+@pytest.mark.parametrize("begun_s", [0.5, 0.75, 1.0, 1.25, 1.5])
+def test_a_device_that_was_silent_for_long_hears_the_safe_voltage_anew(begun_s: float) -> None:
+    """Its watchdog may have tripped, or its supply: what was commanded last, which it reads back, need not be what is out."""
+    line = PlayedLine()
+    line.run(begun_s)
+    line.is_silent = True
+    line.run(0.7)
+    line.is_silent = False
+    del line.settings[:]
+    line.run(0.5)
+    assert line.settings and set(line.settings) == {0.0}
 
 
 def test_an_arming_that_nobody_answers_leaves_every_other_turn_to_the_setpoint() -> None:

@@ -1,0 +1,24 @@
+"""Schedules that once broke a law, or were said to: a load cell that is cut, frozen, scaled, or talks in other units."""
+
+from tests.simulation.draws.event import Event
+
+KEPT: list[tuple[int, list[Event]]] = [
+    (
+        74244,
+        [
+            Event(10.3898, "world", "valve-stuck", (1.0,)),
+            Event(20.265, "worker", "take", (43.39,), way="floats"),
+            Event(20.4137, "worker", "hold", (55.62,)),
+        ],
+    ),
+    (
+        11927,
+        [
+            Event(3.779, "rival", "take", (57.21,), way="read_and_write"),
+            Event(8.6198, "world", "sim", data=b'{"do": "sim", "set": {"wire.noise": 0.03135}}'),
+            Event(9.3032, "world", "sim", data=b'{"do": "sim", "set": {"cell.scale": 4.65}}'),
+            Event(9.4556, "worker", "take", (52.25,), way="read_and_write"),
+            Event(9.6263, "rival", "reset"),
+        ],
+    ),
+]

@@ -1,0 +1,47 @@
+"""Schedules that once broke a law, or were said to: masters, what they take from each other, and the runs that they start."""
+
+from tests.simulation.draws.event import Event
+
+KEPT: list[tuple[int, list[Event]]] = [
+    (15547, [Event(0.0097, "worker", "hold", (25.51,)), Event(0.011, "worker", "disconnect")]),
+    (435, [Event(21.2182, "rival", "hold", (54.84,))]),
+    (
+        17561,
+        [
+            Event(5.792, "rival", "pull", (18.66,), way="mask"),
+            Event(7.1986, "rival", "ask", (0,), b"\x10\x00\x00\x00\x01\x02\x00\x01"),
+        ],
+    ),
+    (38582, [Event(9.7026, "worker", "take", (3.53,)), Event(15.05, "rival", "self_test")]),
+    (5017, [Event(4.2694, "worker", "ask", (0,), b"\x10\x00\t\x00\x01\x02\x00!")]),
+    (
+        12546,
+        [Event(0.7313, "worker", "take", (55.03,), way="block"), Event(2.2032, "rival", "take", (19.03,), way="block")],
+    ),
+    (42249, [Event(1.2933, "worker", "tare")]),
+    (
+        41760,
+        [
+            Event(4.6985, "worker", "hold", (8.31,)),
+            Event(5.8719, "worker", "ask", (1,), b"\x10\x00\x08\x00\x02\x04\x00!l\x08"),
+        ],
+    ),
+    (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
+    (864683, [Event(0.1336, "worker", "hold_on", (37.07,)), Event(3.7748, "worker", "hold_on", (8.61,))]),
+    (
+        21547,
+        [
+            Event(0.1, "worker", "hold_on", (30.23,), way="singles"),
+            Event(2.779, "worker", "hold_on", (9.05,), way="read_and_write"),
+        ],
+    ),
+    (
+        20826,
+        [
+            Event(1.8573, "worker", "take", (45.57,), way="swapped"),
+            Event(8.6304, "world", "no-air", (1.0,)),
+            Event(10.4067, "worker", "pull", (39.62,)),
+            Event(11.1192, "rival", "ask", (1,), b"\x16\x00\x0b0\xffI\x00"),
+        ],
+    ),
+]
