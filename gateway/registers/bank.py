@@ -140,15 +140,14 @@ class RegisterBank:
 
     def _repeat(self, data: bytes, peer: Peer) -> bool:
         """Take a write that repeats the last one with another heartbeat; False where it is another one."""
-        now_s = self._now()
-        if (again := self._repeated.take(data, peer, self.command, now_s)) is None:
+        if (again := self._repeated.take(data, peer, self.command, self._now)) is None:
             return False
         self.command, self.owner_refused = again, ""
         if peer is not self._owner_peer and peer.identity == self._ownership.owner:
             self._owner_peer = peer
             self._show_owner()
         self.on_command(again)
-        self._writers.note(self._repeated.names, peer, now_s)
+        self._writers.note(self._repeated.names, peer, again.received_s)
         return True
 
     def _is_command(self, address: int, count: int, peer: Peer) -> bool:

@@ -446,7 +446,7 @@ DEFECTS = (
            "        self._expected.clear()\n        return told", "        return told",
            ("devices/test_valve.py",)),
     Defect("a cycle of before counts although control has cleared it", "registers/writes/admission.py",
-           "if not is_repeated or current is not self._command or", "if not is_repeated or",
+           "if data[:_BEFORE] != last[:_BEFORE] or command is not current:", "if data[:_BEFORE] != last[:_BEFORE]:",
            ("registers/bank/test_repeated_writes.py",)),
     Defect("a cycle is not asked of control", "registers/writes/admission.py",
            "if self._admission.decide(ProposedWrite(command)):", "if False:",

@@ -126,7 +126,7 @@ class Admission:
         if asked == before[CONTROL_WORD] and self._is_plain(write, asked):
             command = commands.command(values, asked, number, now_s, write.host)
             self._ask(command, values, write)
-            return AdmittedWrite(values, asked, command, False, False, 0, is_plain=True)
+            return AdmittedWrite(values, asked, command, False, False, 0, True)
         permitted = self._permit(write, values)
         if permitted is None:
             self.held_runs.keep(write.host, self._held_by(write, asked, asked))
@@ -270,36 +270,38 @@ class RepeatedWrite:
 
     def note(self, data: bytes, peer: Peer, command: Command, names: Sequence[str]) -> None:
         """Note a plain write of the words from the first on that was accepted: what it became, which registers it set."""
-        self._data, self._command, self._peer, self.names = data, command, peer, names
-        self._owner, self._fields = self._ownership.owner, self._commands.fields  # by these it was judged
+        self._last = data, peer, command, names, self._ownership.owner, self._commands.fields
 
-    def take(self, data: bytes, peer: Peer, current: Command, received_s: float) -> Command | None:
+    def take(self, data: bytes, peer: Peer, current: Command, now: Callable[[], float]) -> Command | None:
         """Store these words from the first on, and return what they become; None, and nothing is stored, where they do not
         repeat the last write or control refuses them. current: the command in use. Refusal (03) for a bad heartbeat."""
-        last = self._data
-        is_repeated = (
-            data[:_BEFORE] == last[:_BEFORE] and data[_BEHIND:] == last[_BEHIND:] and len(data) == len(last) > _BEFORE
-        )
-        if not is_repeated or current is not self._command or not self._is_judged_alike(peer):
+        last, its_peer, command, names, owner, fields = self._last
+        if data[:_BEFORE] != last[:_BEFORE] or command is not current:
+            return None
+        is_repeated = data[_BEHIND:] == last[_BEHIND:] and len(data) == len(last) > _BEFORE
+        if not is_repeated or owner != self._ownership.owner or fields is not self._commands.fields:
+            return None
+        if not (peer is its_peer or _is_same_master(peer, its_peer)) or not self._admission.is_usual(peer.identity):
             return None
         heartbeat = self._commands.judge_heartbeat(data[_BEFORE] << 8 | data[_BEFORE + 1])
         values: list[Any] = list(current)
         values[_AT_HEARTBEAT] = heartbeat
         values[_AT_NUMBER] += 1
-        values[_AT_RECEIVED] = received_s
+        values[_AT_RECEIVED] = now()
         command = Command._make(values)
         if self._admission.decide(ProposedWrite(command)):
             return None
         if heartbeat != current.heartbeat:
             self._commands.store_heartbeat(heartbeat)
-        self._command = command
+        self._last = last, its_peer, command, names, owner, fields
         return command
 
-    def _is_judged_alike(self, peer: Peer) -> bool:
-        its_peer = self._peer
-        if peer is not its_peer:  # another connection of the same master
-            is_same_master = peer.identity == its_peer.identity and peer.role is its_peer.role
-            if not is_same_master or peer.is_behind:
-                return False
-        is_unchanged = self._owner == self._ownership.owner and self._fields is self._commands.fields
-        return is_unchanged and self._admission.is_usual(peer.identity)
+    @property
+    def names(self) -> Sequence[str]:
+        """The registers that the last write set."""
+        return self._last[3]
+
+
+def _is_same_master(peer: Peer, other: Peer) -> bool:
+    """Whether this is another connection of the same master, and what it asks has not waited."""
+    return peer.identity == other.identity and peer.role is other.role and not peer.is_behind

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Final
 
-from gateway.modbus.peer import Peer
+from gateway.modbus.peer import NOBODY, Peer
 
 NOT_IPV4: Final = 0xFFFFFFFF
 """Shown in owner_ip for an owner without an IPv4 address (IPv6)."""
@@ -83,18 +83,23 @@ class LastWriters:
 
     def __init__(self) -> None:
         self._writes: dict[Sequence[str], tuple[Peer, float]] = {}
-        self._latest: Sequence[str] = ()
+        self._latest: tuple[Sequence[str], Peer, float] = (), NOBODY, 0.0  # a cycle's take its place, unhashed
 
     def note(self, names: Sequence[str], peer: Peer, now_s: float) -> None:
         """Note that these registers have been written."""
-        if names != self._latest:
-            self._writes.pop(names, None)
-            self._latest = names
-        self._writes[names] = peer, now_s
+        if names is not self._latest[0]:
+            self._keep_latest()
+        self._latest = names, peer, now_s
 
     def by_name(self) -> dict[str, tuple[Peer, float]]:
         """Return register name -> (peer, time in s)."""
+        self._keep_latest()
         return {name: written for names, written in self._writes.items() for name in names}
+
+    def _keep_latest(self) -> None:
+        names, peer, now_s = self._latest
+        self._writes.pop(names, None)
+        self._writes[names] = peer, now_s
 
 
 def ip_number(host: str | None) -> int:

@@ -1,8 +1,9 @@
 /* Load for a Modbus TCP server: N connections, one outstanding request on each, for a fixed time, over one epoll.
  *
- *   modbus_load PORT SECONDS CONNECTIONS read|write
+ *   modbus_load PORT SECONDS CONNECTIONS read|write|setpoints
  *
- * read: FC03, 32 registers from address 100. write: FC16, 13 registers from address 0, the heartbeat another one in each.
+ * read: FC03, 32 registers from address 100. write: FC16, 13 registers from address 0, the heartbeat another one in each, as
+ * of a PLC that holds a force. setpoints: the force as well, as of a robot on its way.
  * Prints: answered requests, elapsed seconds, faulty answers (wrong transaction id, length or function).
  */
 #include <arpa/inet.h>
@@ -17,7 +18,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { MOST = 256, READ_COUNT = 32, WRITE_COUNT = 13, HEARTBEAT_AT = 13 + 2 * 4 };
+enum { MOST = 256, READ_COUNT = 32, WRITE_COUNT = 13, FORCE_AT = 13 + 2 * 1, HEARTBEAT_AT = 13 + 2 * 4 };
 
 struct connection {
     int fd;
@@ -27,7 +28,7 @@ struct connection {
 };
 
 static uint8_t request[300];
-static int request_size, answer_size, function;
+static int request_size, answer_size, function, is_of_setpoints;
 static long answered, faulty;
 
 static double now_s(void) {
@@ -53,7 +54,7 @@ static void make_request(int write_run) {
     request[9] = write_run ? 0 : 100;
     request[11] = count;
     if (write_run)
-        request[12] = data; /* all but the heartbeat stay 0: "output disabled, no force" is accepted by every bank */
+        request[12] = data; /* the other words stay 0: "output disabled" is accepted by every bank */
 }
 
 static void send_request(struct connection *c) {
@@ -62,6 +63,10 @@ static void send_request(struct connection *c) {
     request[1] = c->transaction & 0xFF;
     if (function == 16)
         memcpy(request + HEARTBEAT_AT, request, 2);
+    if (is_of_setpoints) { /* 7.68 N to 10.23 N, which every bank accepts */
+        request[FORCE_AT] = 3;
+        request[FORCE_AT + 1] = request[1];
+    }
     c->filled = 0;
     if (send(c->fd, request, request_size, MSG_NOSIGNAL) != request_size)
         die("send");
@@ -94,9 +99,10 @@ int main(int argc, char **argv) {
     static struct connection connections[MOST];
     struct epoll_event events[MOST];
     if (argc != 5 || atoi(argv[3]) < 1 || atoi(argv[3]) > MOST)
-        return fprintf(stderr, "usage: modbus_load PORT SECONDS CONNECTIONS read|write\n"), 2;
+        return fprintf(stderr, "usage: modbus_load PORT SECONDS CONNECTIONS read|write|setpoints\n"), 2;
     int count = atoi(argv[3]), poll_fd = epoll_create1(0);
-    make_request(strcmp(argv[4], "write") == 0);
+    is_of_setpoints = strcmp(argv[4], "setpoints") == 0;
+    make_request(is_of_setpoints || strcmp(argv[4], "write") == 0);
     for (int i = 0; i < count; i++) {
         struct epoll_event event = {.events = EPOLLIN, .data.ptr = &connections[i]};
         open_connection(&connections[i], atoi(argv[1]));
