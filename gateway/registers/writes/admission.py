@@ -283,7 +283,9 @@ class RepeatedWrite:
             return None
         if not (peer is its_peer or _is_same_master(peer, its_peer)) or not self._admission.is_usual(peer.identity):
             return None
-        heartbeat = self._commands.judge_heartbeat(data[_BEFORE] << 8 | data[_BEFORE + 1])
+        if (field := fields[HEARTBEAT]) is None:
+            return None
+        heartbeat = int(field.of_word(data[_BEFORE] << 8 | data[_BEFORE + 1], self._commands.first + HEARTBEAT))
         values: list[Any] = list(current)
         values[_AT_HEARTBEAT] = heartbeat
         values[_AT_NUMBER] += 1

@@ -61,7 +61,7 @@ class CommandBlock:
         self._counts = [field.counts_per_unit if field else 1 for field in self.fields]
         self._image = image
         self._rules = rules
-        self._first = block.first
+        self.first = block.first
         self._floats = [(b, b.repeats["command"]) for b in register_map.blocks if "command" in b.repeats]
 
     def allow_force(self, limits_n: Sequence[float], source: str) -> None:
@@ -94,23 +94,23 @@ class CommandBlock:
     def holds(self, block: Block, address: int) -> bool:
         """Return whether this address is in a face of the command block, named or reserved."""
         base = block.repeats.get("command")
-        return block.first == self._first if base is None else base <= address < base + 2 * len(self.values)
+        return block.first == self.first if base is None else base <= address < base + 2 * len(self.values)
 
     def address(self, block: Block, offset: int) -> int:
         """Return where a word of the command block is in this face."""
-        return self._first + offset if not block.repeats else block.repeats["command"] + 2 * offset
+        return self.first + offset if not block.repeats else block.repeats["command"] + 2 * offset
 
     def offsets(self, block: Block, address: int, count: int) -> range:
         """Return which words of the command block a write of these words sets, reserved ones among them."""
         if not block.repeats:
-            return range(address - self._first, address - self._first + count)
+            return range(address - self.first, address - self.first + count)
         start = (address - block.repeats["command"] + 1) // 2
         return range(start, start + count // 2)
 
     def names(self, block: Block, address: int, count: int) -> Sequence[str]:
         """Return the registers that a write of these words sets."""
         if not block.repeats:
-            return NAMES[address - self._first : address - self._first + count]
+            return NAMES[address - self.first : address - self.first + count]
         offsets = self.offsets(block, address, count)
         return NAMES[offsets.start : offsets.stop]
 
@@ -121,7 +121,7 @@ class CommandBlock:
         return self._decode_floats(block, address, data)
 
     def _decode_words(self, address: int, data: bytes) -> Values:
-        offset = address - self._first
+        offset = address - self.first
         known_offset, known_data, values = self._last_words
         if data != known_data or offset != known_offset:  # many masters write the same words over and over
             values = self._judge_words(offset, data)
@@ -137,9 +137,9 @@ class CommandBlock:
             if not word:
                 values.append(0.0)  # most are
             elif (field := self.fields[at]) is not None:
-                values.append(field.of_word(word, self._first + at))
+                values.append(field.of_word(word, self.first + at))
             else:
-                raise reserved_word_refusal(self._first + at, word)
+                raise reserved_word_refusal(self.first + at, word)
         return values
 
     def _decode_floats(self, block: Block, address: int, data: bytes) -> Values:
@@ -176,11 +176,6 @@ class CommandBlock:
             text = f"mode = {values[MODE]:g}, known are {known}"
             raise Refusal(RefusalReason.UNSUPPORTED_BIT, self.address(block, MODE), text, value=values[MODE])
 
-    def judge_heartbeat(self, word: int) -> int:
-        """Return the value of this word as heartbeat in the int16 block. Refusal (03) for one that the map does not allow."""
-        field = self.fields[HEARTBEAT]
-        return word if field is None else int(field.of_word(word, self._first + HEARTBEAT))
-
     def store_heartbeat(self, heartbeat: int) -> None:
         """Accept a write that changes no value but this."""
         self.values = self.values.copy()
@@ -202,7 +197,7 @@ class CommandBlock:
 
     def _show(self, offset: int, value: float) -> None:
         count = round(value * self._counts[offset]) & 0xFFFF
-        self._image.write(self._first + offset, _WORD_STRUCTS[1].pack(count))
+        self._image.write(self.first + offset, _WORD_STRUCTS[1].pack(count))
         for block, base in self._floats:
             high_first = _FLOAT_STRUCTS[1].pack(value)
             words = high_first if block.word_order is WordOrder.ABCD else swap_words(high_first)
