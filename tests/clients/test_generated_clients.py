@@ -207,14 +207,16 @@ def test_a_robot_waits_longer_before_each_attempt(gateway: GatewayAtHand) -> Non
 
 def test_words_are_signed_and_unavailable_values_are_told_from_numbers(gateway: GatewayAtHand) -> None:
     gateway.bank.publish(Status(force_measured_n=-1.25, trim_v=math.nan))
+    gateway.answer(struct.pack(">BHH", 3, 5000, 1))  # refused, without a value: not a number
     irc5, robot = Irc5(TEXTS["rapid"], gateway), UniversalRobot(TEXTS["urscript"], gateway)
     irc5.cycle()
     robot.cycle()
     status = irc5.get("fgStatus")
-    assert (status[irc5.get("FG_S_FORCE_MEASURED") - 1], status[irc5.get("FG_S_TRIM") - 1]) == (-1.25, 9e9)
+    names = ("FG_S_FORCE_MEASURED", "FG_S_TRIM", "FG_S_REFUSAL_VALUE")
+    assert [status[irc5.get(name) - 1] for name in names] == [-1.25, 9e9, 9e9]
     assert (robot.get("fg_force_measured"), robot.machine.start("fg_scaled", robot.get("FG_S_TRIM"), 1)) == (-1.25, 9e9)
     for plc in (S7(TEXTS["scl"], gateway), Codesys(TEXTS["st"], gateway)):
-        gateway.answer(struct.pack(">BHH", 3, 5000, 1))  # refused, without a value: not a number
+        gateway.answer(struct.pack(">BHH", 3, 5000, 1))
         plc.cycle()
         shown = plc.output("status")
         assert (shown["FORCE_MEASURED"], shown["TRIM"], shown["REFUSAL_VALUE"]) == (-1.25, 9e9, 9e9)
