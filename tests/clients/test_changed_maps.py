@@ -90,3 +90,17 @@ def test_a_gateway_that_has_its_hash_elsewhere_or_answers_another_unit_is_not_co
     client.cycle(5.0)
     assert gateway.requests == [] and client.ended
     assert "map_hash is refused: another map or unit" in client.text
+
+
+def test_a_hash_that_differs_in_one_byte_is_another_map_s(client: Any, gateway: GatewayAtHand) -> None:
+    answer = gateway.answer
+    right = answer(HASH)
+    for place in range(2, len(right)):
+        other = right[:place] + bytes([right[place] ^ 1]) + right[place + 1 :]
+        gateway.answer = lambda request, other=other: other if request == HASH else answer(request)  # type: ignore[method-assign]
+        client.enable(12.0)
+        client.cycle(5.0)
+        cycles(client, 3)
+        assert gateway.writes == [] and client.ended, place
+        client.disable()
+        client.cycle(5.0)
