@@ -32,6 +32,7 @@ class Surroundings:
     _is_cell_cut = False
     _dark_until_s = 0.0
     _freed_s = -LOOSE_S
+    _is_stuck = False
     _back_s = 0.0  # when a line that was lost has brought its first byte
     _unwatched_s: float | None = None
 
@@ -60,8 +61,6 @@ class Surroundings:
     def set_fault(self, name: str, *, on: bool) -> None:
         """By the verb `fault` of rig.sock."""
         self.world.fault({"do": "fault", "name": name, "on": on})
-        if name == "valve-stuck" and not on:
-            self._freed_s = self._outside.time()
         self._judge()
 
     def simulate(self, request: dict[str, Any]) -> None:
@@ -133,6 +132,9 @@ class Surroundings:
         observer.cell_lost_s = _since(observer.cell_lost_s, is_cell_lost, now_s)
         is_silent = settings.is_on("output.silent") or now_s < self._dark_until_s
         observer.answers_lost_s = _since(observer.answers_lost_s, is_silent, now_s)
+        if self._is_stuck and not settings.is_on("valve.stuck"):
+            self._freed_s = now_s
+        self._is_stuck = settings.is_on("valve.stuck")
 
     def look(self) -> None:
         """A sentence that fits is a sample, or an answer, whoever says it: cell and output are lost from then on."""

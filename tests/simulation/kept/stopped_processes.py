@@ -108,4 +108,17 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(7.6232, "bus", "pull"),
         ],
     ),
+    (
+        25896,
+        [
+            Event(3.5767, "worker", "take", (36.27,)),
+            Event(4.6896, "worker", "take", (15.38,), way="coil"),
+            Event(6.7899, "world", "valve-stuck", (1.0,)),
+            Event(7.4727, "machine", "kill_guardian", (0.2149, 936832.7139383415)),
+            Event(11.9452, "worker", "hold", (41.92,), way="swapped"),
+            Event(12.8137, "machine", "terminate", (0.2184, 169719.5163286503)),
+            Event(13.4331, "rival", "take", (20.65,)),
+            Event(18.0136, "world", "sim", data=b'{"do": "sim", "clear_all": true}'),
+        ],
+    ),
 ]
