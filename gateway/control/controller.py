@@ -24,7 +24,6 @@ from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.sample_conditioning import NO_READING, SampleConditioner, at_time, turned
 from gateway.control.self_test.items import SelfTestPlan
 from gateway.control.settings import ControlSettings
-from gateway.control.state_table import StateEvent
 from gateway.control.supervision.contact_detection import ContactDetector
 from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
 from gateway.control.supervision.one_shot_events import OneShotEvents
@@ -311,7 +310,7 @@ class Controller:
         stop = self.active_run.step(now_s, self._reading, self._loop, line)
         self._machine.tell(self.active_run.take_message())
         if stop is None:
-            self._machine.fire(StateEvent.MOVE)
+            self._machine.go_on_with_run()
         elif stop.fault:
             self._machine.fail(now_s, stop)
         else:

@@ -93,6 +93,13 @@ class Transitions:
         self._parts.commands.start_lease(now_s)
         self.tell(sentence)
 
+    def go_on_with_run(self) -> None:
+        """Let the run go on. Until it rises the force of now is the rest that its rise is judged from: what was there at its
+        begin may still leave, or come back."""
+        self.fire(StateEvent.MOVE)
+        if not self._parts.run.has_risen:
+            self._parts.faults.start_rise()
+
     def end_run(self, sentence: str, given_n: float) -> None:
         """Ramp the force to 0 along the rig's ramp after a run, then switch the output off.
         However the run ended, but by a fault or a disable. given_n: contact force that the slide need not give."""

@@ -39,8 +39,8 @@ _PHASES: Final = {phase: phase.name.lower().replace("_", " ") for phase in Calib
 class ActiveRun:
     """phase and progress stay after the end. model: what the check of the next run compares with; cell_n: cell force of the
     last step, without the payload's weight; target_n: what the model expects of the voltage that the run wants; is_local
-    stays until the output is off; said: a sentence for the log; refused: why the last plan asked for was not begun;
-    self_test: the last one's report, or that one runs."""
+    stays until the output is off; has_risen: this run has left the safe voltage; said: a sentence for the log; refused: why
+    the last plan asked for was not begun; self_test: the last one's report, or that one runs."""
 
     def __init__(self, settings: ControlSettings, model: Bsfm, given_n: Callable[[], float] = lambda: 0.0) -> None:
         """given_n: contact force of now that the slide need not give."""
@@ -50,7 +50,7 @@ class ActiveRun:
         self.cell_n = nan
         self.target_n = 0.0
         self.message = self.refused = ""
-        self.is_local = False
+        self.is_local = self.has_risen = False
         self.run: AnyRun | None = None
         self.last_row: LadderRow | None = None
         self.self_test = SelfTestReport()
@@ -137,7 +137,7 @@ class ActiveRun:
     def begin(self, plan: AnyPlan, *, is_local: bool) -> None:
         """Begin the run of this plan. ValueError for a plan that the rig does not allow."""
         self.run = self.build(plan)
-        self.is_local, self._stop_asked = is_local, ""
+        self.is_local, self.has_risen, self._stop_asked = is_local, False, ""
         self.phase, self.progress, self.last_row = CalibrationPhase.ZERO, 0.0, None
         self.eta_s, self.target_n = self.run.eta_s, 0.0
         if isinstance(self.run, SelfTestRun):
@@ -167,6 +167,7 @@ class ActiveRun:
         voltage_v = self._below_ceiling(now_s, reading, step, loop.voltage_v)
         if voltage_v is None:
             return StopCause(FaultCode.NONE, self._too_high(step.highest_v, "the run is stopped"))
+        self.has_risen = self.has_risen or voltage_v > self._settings.limits.safe_voltage_v
         self.target_n = max(0.0, run.model.force_n(voltage_v, run.branch_share))
         loop.drive_run(voltage_v, run.branch_share)
         return None

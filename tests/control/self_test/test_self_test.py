@@ -193,3 +193,15 @@ def test_one_reading_that_was_disturbed_on_its_wire_fails_no_machine(at_s: float
     rig.reading = read
     report = rig.tested()
     assert said and report.result is SelfTestResult.PASSED, report.sentences
+
+
+def test_a_force_that_still_leaves_when_the_test_begins_is_no_rest_to_rise_from() -> None:
+    rig = SelfTestRig(5, FORCE_N)
+    rig.reading = lambda force_n: force_n - 16.0
+    rig.run(1.0)
+    rig.write(ControlBit.START_SELF_TEST)
+    rig.reading = lambda force_n: force_n  # the cell is back while the test is at rest still
+    while rig.controller.state is State.CALIBRATING:
+        rig.run(0.05)
+    assert rig.output and rig.output.fault is FaultCode.NONE, rig.events
+    assert verdict_on(rig.controller.active_run.self_test, Item.SCALE) is PASSED

@@ -65,4 +65,13 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(6.871, "machine", "terminate", (0.2421, 978507.8355280932)),
         ],
     ),
+    (
+        23732,
+        [
+            Event(0.8606, "worker", "hold", (30.43,)),
+            Event(1.173, "world", "sim", data=b'{"do": "sim", "set": {"cell.inverted": true}}'),
+            Event(1.3275, "worker", "self_test"),
+            Event(1.7575, "world", "sim", data=b'{"do": "sim", "clear": ["cell.inverted"]}'),
+        ],
+    ),
 ]
