@@ -270,16 +270,17 @@ class RefusalReason(IntEnum):
             "Read failing_index and failing_reason; the active set is unchanged, so there is no hurry.",
         ),
     )
-    # a reset where there is a lease, without a new heartbeat
+    # a reset, or an enable behind a master that was lost, where there is a lease, without a new heartbeat
     HEARTBEAT_STALE = (
         22,
         modbus.ILLEGAL_VALUE,
         Explanation(
             "W302",
-            "fault reset without a new heartbeat",
-            "The reset bit was written where the rig has a lease, and the heartbeat is the one of the fault.",
-            "The master writes the reset without its heartbeat, or its program stands still.",
-            "Write control_word 2, force_setpoint 0 and another heartbeat value in one request.",
+            "fault reset, or enable behind a lost master, without a new heartbeat",
+            "The reset bit was written where the rig has a lease, and the heartbeat is the one of the fault; or an enable, "
+            "and it is the one that the last master was lost with.",
+            "The master writes the bit without its heartbeat, or its program stands still and its last frame is repeated.",
+            "Write the bit and another heartbeat value in one request; with a reset force_setpoint 0, too.",
         ),
     )
     NOTHING_TO_RESET = (

@@ -126,6 +126,10 @@ class CommandTracker:
         """Return the time since the lease was renewed, s."""
         return self._lease.age_s(now_s)
 
+    def would_have_beaten_since(self, since_s: float, command: Command) -> bool:
+        """Return whether the heartbeat has changed since then, however long ago, were this command taken now."""
+        return self._lease.would_have_beaten_since(since_s, command.heartbeat)
+
     def would_beat_since(self, since_s: float, now_s: float, command: Command) -> bool:
         """Return whether the heartbeat has changed since then and within one length of the lease, were this command taken
         now."""

@@ -105,7 +105,7 @@ class EdgeCheck:
         if edges.rises & _TARE:
             yield from _some(self._tare(command, state, at))
         if edges.rises & _ENABLE and state not in ENABLED_STATES:
-            yield from _some(_refuse_blocked(_in(state, at), ControlBit.ENABLE))
+            yield from _some(_refuse_blocked(_in(state, at), ControlBit.ENABLE) or self._repeated(command, at))
         plans = [plan for plan in (CalibrationPlan(), SelfTestPlan()) if edges.rises & _bit_of(plan)]
         for plan in plans:
             if self._valve is not None and command.control_word & ControlBit.VALVE_PULL:  # it would turn under the run
@@ -147,6 +147,14 @@ class EdgeCheck:
             text = f"reset refused: heartbeat = {command.heartbeat} as at the fault: write another value with the reset"
             return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.RESET_FAULT, text)
         return None
+
+    def _repeated(self, command: Command, at: Situation) -> EdgeRefusal | None:
+        """A program that stands still, whose last frame is sent on and on, would press anew each time it is lost."""
+        if self._commands.would_have_beaten_since(at.lost_s, command):
+            return None
+        beat = f"heartbeat = {command.heartbeat} as when the master was lost"
+        text = f"enable refused: {beat}: write another value with it"
+        return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.ENABLE, text)
 
     def _tare(self, command: Command, state: State, at: Situation) -> EdgeRefusal | None:
         why = self._forbids_tare(command, state, at)

@@ -21,7 +21,8 @@ _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """Where the controller stands at the moment of the question. block: why an enable would be refused in OFF; excuse: the
+    """Where the controller stands at the moment of the question. faulted_s, lost_s: of the last
+    fault and of the last master's loss; block: why an enable would be refused in OFF; excuse: the
     machine, where that is the cause of it, or what the valve does; line_fault: what the output line reports, with its code;
     is_output_known: that the output answers, so that its voltage is ours; is_output_heard: that it answers at all;
     is_lowest: no less voltage can be out; leaving_n: force that the voltages of late still make, or one that the output may
@@ -31,6 +32,7 @@ class Situation:
     now_s: float
     state: State
     faulted_s: float
+    lost_s: float
     reading: Reading
     block: RefusalReason
     excuse: str
@@ -64,6 +66,7 @@ class Readiness:
             now_s=now_s,
             state=machine.state,
             faulted_s=machine.faulted_s,
+            lost_s=machine.lost_s,
             reading=reading,
             block=block,
             excuse=self._excuse(block, now_s, reading, line),

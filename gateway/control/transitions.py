@@ -54,7 +54,7 @@ class Transitions:
     def __init__(self, parts: ControllerParts, *, is_restarted: bool) -> None:
         self.state, self.is_enabled = State.OFF, False
         self.fault = FaultCode.NONE
-        self.faulted_s = -inf
+        self.faulted_s = self.lost_s = -inf
         self.is_ramping_down = self.is_master_lost = self.is_stopping = False
         self.is_restarted = is_restarted
         self.outcome = StepOutcome()
@@ -142,6 +142,7 @@ class Transitions:
     def lose_master(self, now_s: float, observation: str, action: LeaseAction) -> None:
         """Act as the rig says where the lease is over. observation: how it was noticed."""
         self.outcome.release_owner = True
+        self.lost_s = now_s
         if action is LeaseAction.FAULT:
             self.fail(now_s, stop_cause(FaultCode.MASTER_LOST, f"{observation}, safe voltage"))
             return

@@ -21,7 +21,7 @@ from tests.control.bench import bsfm, settings
 
 TARE, ENABLE = ControlBit.TARE, ControlBit.ENABLE
 REST = Situation(
-    now_s=1.0, state=State.OFF, faulted_s=-inf, reading=Reading(0.0, 0.0, 0.0, 0.01, True, True, True),
+    now_s=1.0, state=State.OFF, faulted_s=-inf, lost_s=-inf, reading=Reading(0.0, 0.0, 0.0, 0.01, True, True, True),
     block=RefusalReason.NONE, excuse="", line_fault="", is_output_known=True, is_output_heard=True, voltage_v=0.0,
     is_lowest=True, applied_n=0.0, leaving_n=0.0, repeats="", ramps_down=False,
 )  # fmt: skip
@@ -130,6 +130,22 @@ def test_a_reset_needs_a_beat_that_came_behind_the_fault_where_there_is_a_lease(
         refused = asked.refusal(ProposedWrite(command), at)
         assert (refused is None) is is_taken
         assert refused is None or refused.reason is RefusalReason.HEARTBEAT_STALE
+
+
+def test_the_frame_that_a_master_was_lost_with_enables_nothing_anew_and_its_next_beat_does() -> None:
+    commands, bit = CommandTracker(settings(lease_s=1.0)), ControlBit.ENABLE
+    commands = CommandTracker(settings(lease_s=1.0))
+    commands.take(0.0, Command(heartbeat=7, number=1))
+    asked = EdgeCheck(commands, SampleConditioner(settings().supervision), ActiveRun(settings(), bsfm()))
+    at = replace(REST, lost_s=0.5)
+    repeated = asked.refusal(ProposedWrite(Command(control_word=bit, heartbeat=7, number=2)), at)
+    assert repeated and (repeated.reason, repeated.bit) == (RefusalReason.HEARTBEAT_STALE, bit)
+    assert "heartbeat = 7 as when the master was lost" in repeated.text
+    beating = asked.refusal(ProposedWrite(Command(control_word=bit, heartbeat=8, number=2)), at)
+    assert beating is None
+    commands.take(0.6, Command(heartbeat=8, number=2))
+    later = asked.refusal(ProposedWrite(Command(control_word=bit, heartbeat=8, number=3)), replace(at, now_s=99.0))
+    assert later is None
 
 
 @pytest.mark.parametrize(("plan", "name"), [(CalibrationPlan(), "calibration"), (SelfTestPlan(), "self-test")])

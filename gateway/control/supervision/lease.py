@@ -46,6 +46,10 @@ class Lease:
             return True
         return self._changed_s > since_s and now_s - self._changed_s <= self._length_s
 
+    def would_have_beaten_since(self, since_s: float, heartbeat: int) -> bool:
+        """Return whether the heartbeat has changed since then, were this value observed now; true without a lease."""
+        return self._length_s is None or heartbeat != self._heartbeat or self._changed_s >= since_s
+
     def would_be_fresh_since(self, since_s: float, now_s: float, heartbeat: int) -> bool:
         """Return the same, were this value observed now."""
         return heartbeat != self._heartbeat or self.is_fresh_since(since_s, now_s)

@@ -78,10 +78,19 @@ def abandoned(action: LeaseAction) -> SmallRig:
     return begun.run(LEASE_S + 0.2)
 
 
+def given_up(leased: bool) -> SmallRig:
+    """The same behind the ramp: the output is off."""
+    begun = SmallRig(control(leased, lease_action=LeaseAction.RAMP)).holding()
+    begun.beats = False
+    begun.until(State.OFF).run(1.5).beats = True  # of who owns it then
+    return begun
+
+
 @dataclass(frozen=True)
 class Place:
     """stands: bits of the control word that are 1; force_n: the setpoint that stands; presses: a voltage is out; runs: a run
-    has the output, or its end; is_going: the force is on its way to 0 for good; leases: with which kinds of rig."""
+    has the output, or its end; is_going: the force is on its way to 0 for good; is_given_up: the
+    master was lost, and has not beaten since; leases: with which kinds of rig."""
 
     name: str
     make: Callable[[bool], SmallRig]
@@ -93,6 +102,7 @@ class Place:
     is_going: bool = False
     is_fitting: bool = False
     is_stopped: bool = False
+    is_given_up: bool = False
     leases: tuple[bool, ...] = (False, True)
 
 
@@ -101,6 +111,7 @@ PLACES: Final = (
     Place("off", rig, State.OFF),
     Place("off, last ladder being fitted", fitting, State.OFF, is_fitting=True),
     Place("off, gateway stopping", stopped, State.OFF, is_stopped=True),
+    Place("off, master lost", given_up, State.OFF, is_given_up=True, leases=(True,)),
     Place("ready", ready, State.READY, ENABLE),
     Place("ramping to 30 N", slow, State.RAMPING, ENABLE, 30.0, presses=True),
     Place("holding 12 N", lambda leased: rig(leased).holding(), State.HOLDING, ENABLE, 12.0, presses=True),

@@ -95,6 +95,8 @@ class Verdict:
             return Reason.NONE
         if self._state is State.FAULT:
             return Reason.FAULT_LATCHED
+        if self._place.is_given_up and self._is_stale:
+            return Reason.HEARTBEAT_STALE
         return Reason.NOT_READY if self._place.is_stopped else Reason.NONE
 
     def _of_runs(self) -> list[Reason]:

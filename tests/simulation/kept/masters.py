@@ -44,4 +44,5 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(11.1192, "rival", "ask", (1,), b"\x16\x00\x0b0\xffI\x00"),
         ],
     ),
+    (24577, [Event(12.9101, "rival", "take", (20.64,)), Event(14.2472, "rival", "hang")]),
 ]

@@ -1,0 +1,50 @@
+"""A master whose program stands still while its last frame is sent on and on, as a PLC's communication module does."""
+
+from dataclasses import replace
+
+import pytest
+
+from gateway.codes.refusals import RefusalReason
+from gateway.control import LeaseAction
+from gateway.control.settings import SelfTestSettings
+from gateway.registers.words import State
+from tests.control.bench import settings
+from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, SmallRig
+
+LEASE_S, CYCLE_S = 0.35, 0.1
+SELF_TEST = 1 << 6
+
+
+@pytest.mark.parametrize(
+    ("word", "force_n", "reason"),
+    [
+        (ENABLE, 12.0, RefusalReason.HEARTBEAT_STALE),
+        (CALIBRATE, 0.0, RefusalReason.CALIBRATION_HELD),
+        (SELF_TEST, 0.0, RefusalReason.CALIBRATION_HELD),
+    ],
+)
+def test_the_last_frame_of_a_program_that_stands_still_presses_once(
+    word: int, force_n: float, reason: RefusalReason
+) -> None:
+    control = settings(lease_s=LEASE_S, lease_action=LeaseAction.RAMP)
+    rig = SmallRig(replace(control, self_test=SelfTestSettings()))
+    frame = rig.block(word, force_n, beat=rig.beat + 1)
+    rig.write(0, *frame)
+    rig.beats = False
+    for _ in range(100):
+        rig.run(CYCLE_S).answer(0, *frame)
+    late = rig.trace[-800:]
+    assert not any(state is not State.OFF or volts for state, volts, _ in late), "pressed again"
+    refused = rig.answer(0, *frame)
+    assert refused and refused.reason is reason
+    assert rig.bank.owner is None, "somebody else may take the machine"
+
+
+def test_a_program_that_goes_on_enables_with_its_next_beat() -> None:
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=LeaseAction.RAMP))
+    frame = rig.block(ENABLE, 12.0, beat=7)
+    rig.write(0, *frame)
+    rig.beats = False
+    rig.run(0.1).until(State.OFF).run(1.0)
+    rig.write(0, *frame[:4], 8, *frame[5:])
+    assert rig.run(0.05).state is not State.OFF
