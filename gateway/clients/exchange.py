@@ -15,6 +15,7 @@ from gateway.clients.endpoint import Endpoint
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
+from gateway.modbus.pdu import MOST_REGISTERS_READ
 from gateway.registers.map.register_map import Register, RegisterMap, UnknownRegister
 from gateway.registers.values import WordOrder, pack_number
 from gateway.registers.writes.byte_order_echo import PROOF
@@ -37,8 +38,6 @@ NEEDED: Final = {"command": COMMAND, "status": STATUS, "staging": STAGING, "acti
 NAMED: Final = ("fault_code", "refusal_reason", "warning_word", "state", "failing_reason", "commit_status")
 """Registers whose numbers or bits the clients say in words."""
 COMMIT_ENDS: Final = ("committed", "failed")
-_MOST_READ: Final = 125
-"""Words of one read, by the Modbus specification."""
 
 _WITH_NUMBERS: Final = ("status", "staging", "active")
 """Blocks with numbers of two words that the clients read or write, all high word first."""
@@ -93,8 +92,8 @@ class ExchangeTable:
         yield from self._find_missing_bits("control_word", CONTROL_BITS)
         yield from self._find_missing_bits("status_word", STATUS_BITS)
         yield from self._find_missing_names()
-        if self.status and self.status_span[1] > _MOST_READ:
-            yield f"a status block of at most {_MOST_READ} words"
+        if self.status and self.status_span[1] > MOST_REGISTERS_READ:
+            yield f"a status block of at most {MOST_REGISTERS_READ} words"
 
     def _find_missing_bits(self, word: str, names: Mapping[str, str] | tuple[str, ...]) -> Iterator[str]:
         try:

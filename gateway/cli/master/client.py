@@ -11,19 +11,17 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gateway.cli.errors import CliError
 from gateway.cli.master.wires import Wire
 from gateway.modbus.errors import ILLEGAL_ADDRESS
+from gateway.modbus.pdu import MOST_REGISTERS_READ, MOST_REGISTERS_WRITTEN
 from gateway.processes import exit_codes
 from gateway.registers import Register, RegisterMap
 
 if TYPE_CHECKING:
     from pymodbus.client import ModbusSerialClient, ModbusTcpClient
-
-_MOST_READ: Final = 125
-_MOST_WRITTEN: Final = 123
 
 
 class RefusedError(Exception):
@@ -94,7 +92,7 @@ class GatewayClient:
         """Return `count` words from `address` (0-based), in as many requests as Modbus needs."""
         words: list[int] = []
         while len(words) < count:
-            at, most = address + len(words), min(count - len(words), _MOST_READ)
+            at, most = address + len(words), min(count - len(words), MOST_REGISTERS_READ)
             found = self._ask("read_holding_registers", f"read {most} at {at}", at, count=most).registers
             if len(found) != most:  # none of them would be asked for again without end
                 text = f"E131 {self.where} answered {len(found)} registers to read {most} at {at}: no gateway of ours"
@@ -156,7 +154,7 @@ class GatewayClient:
         return frames
 
     def _can_join(self, first: Register, last: Register, following: Register) -> bool:
-        if first.block != following.block or following.address + following.words - first.address > _MOST_WRITTEN:
+        if first.block != following.block or _count_words(first, following) > MOST_REGISTERS_WRITTEN:
             return False
         between = range(last.address + last.words, following.address)
         return all(register.is_writable for register in self._registers_at(between))
@@ -214,12 +212,17 @@ def _words(data: bytes) -> list[int]:
     return [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2)]
 
 
+def _count_words(first: Register, last: Register) -> int:
+    """From the first word of one register to the last of another."""
+    return last.address + last.words - first.address
+
+
 def _groups(registers: Sequence[Register]) -> list[list[Register]]:
     """By address, those of one block that one request can carry together."""
     groups: list[list[Register]] = []
     for register in sorted(registers, key=lambda register: register.address):
         first = groups[-1][0] if groups else None
-        if first and first.block == register.block and register.address + register.words - first.address <= _MOST_READ:
+        if first and first.block == register.block and _count_words(first, register) <= MOST_REGISTERS_READ:
             groups[-1].append(register)
         else:
             groups.append([register])
