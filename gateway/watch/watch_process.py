@@ -73,11 +73,11 @@ def make_comparison(rig: "Rig", state: Path) -> "WindowComparison":
     from gateway.calibrations.store import calibration_in_use
     from gateway.recording import RecordingError
     from gateway.watch.described_machine import described_machine, is_straightened_alike
+    from gateway.watch.force_watch import TOLERANCE_SHARE
     from gateway.watch.machine_comparison import MachineComparison
     from gateway.watch.plant_comparison import PlantComparison
     from gateway.watch.reference import WatchReference
     from gateway.watch.reference_recording import read_reference_recording
-    from gateway.watch.residual_watch import TOLERANCE_SHARE
 
     assert rig.reference_plant is not None  # or nobody had started us
     least_n = TOLERANCE_SHARE * rig.control.defaults.in_band_tolerance_n

@@ -47,11 +47,11 @@ from gateway.control.self_test.measurements import (
 from gateway.control.self_test.rest import judge_rest, why_no_force
 from gateway.control.supervision.fault_detection import StopCause
 from gateway.control.supervision.leaping_readings import LeapLimit
+from gateway.control.tare import LEAVING_LAGS
 from gateway.registers.words import CalibrationPhase
 
 REST_S: Final = 3.0  # the first of which lets a force from before leave, or as many response lags as it needs
 _LEAVES_S: Final = 1.0
-_LEAVING_LAGS: Final = 5.0  # then 150 times less is left of it
 _LONGEST_LEAVING_S: Final = 4.0  # with both settlings the whole takes less than 20 s, whatever the lag is
 RISE_S: Final = 1.0  # to the first level: less than half of the stated force: a second is slow
 HOLD_S: Final = 4.0  # in which a leak of 1 % per second is 4 % of the force
@@ -128,7 +128,7 @@ class SelfTestRun:
     @property
     def _standing_s(self) -> float:
         """How long nothing moves at the beginning."""
-        return REST_S + max(0.0, min(_LONGEST_LEAVING_S, _LEAVING_LAGS * self._known.response_s) - _LEAVES_S)
+        return REST_S + max(0.0, min(_LONGEST_LEAVING_S, LEAVING_LAGS * self._known.response_s) - _LEAVES_S)
 
     @property
     def _elapsed_s(self) -> float:
