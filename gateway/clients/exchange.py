@@ -16,7 +16,7 @@ from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.modbus.pdu import MOST_REGISTERS_READ
-from gateway.registers.map.register_map import Register, RegisterMap, UnknownRegister
+from gateway.registers.map.register_map import Register, RegisterMap, UnknownRegister, span_of
 from gateway.registers.values import WordOrder, pack_number
 from gateway.registers.writes.byte_order_echo import PROOF
 
@@ -133,7 +133,7 @@ class ExchangeTable:
     @property
     def command_span(self) -> tuple[int, int]:
         """(first address, words) of what one write carries: all named registers of the command block."""
-        return _span(self.command)
+        return span_of(self.command)
 
     @cached_property
     def values_first(self) -> int:
@@ -145,7 +145,7 @@ class ExchangeTable:
     @property
     def status_span(self) -> tuple[int, int]:
         """(first address, words) of what one read brings."""
-        return _span(self.status)
+        return span_of(self.status)
 
     @cached_property
     def parts(self) -> tuple[int, int, int]:
@@ -268,16 +268,6 @@ class ExchangeTable:
         for prefix, word in (("bit", "control_word"), ("flag", "status_word")):
             masks |= {f"{prefix}_{name}": 1 << bit for bit, name in self.map.find(word).bits.items()}
         return masks
-
-
-def s7_address(address: int) -> str:
-    """Return MB_DATA_ADDR of a holding register: five digits up to 49999, six from 410000 on."""
-    return f"4{address + 1:04d}"
-
-
-def _span(registers: tuple[Register, ...]) -> tuple[int, int]:
-    first, last = registers[0], registers[-1]
-    return first.address, last.address + last.words - first.address
 
 
 def _limit(newton: float) -> str:

@@ -19,6 +19,7 @@ from gateway.modbus.errors import ILLEGAL_ADDRESS
 from gateway.modbus.pdu import MOST_REGISTERS_READ, MOST_REGISTERS_WRITTEN
 from gateway.processes import exit_codes
 from gateway.registers import Register, RegisterMap
+from gateway.registers.map.register_map import span_of
 
 if TYPE_CHECKING:
     from pymodbus.client import ModbusSerialClient, ModbusTcpClient
@@ -154,7 +155,7 @@ class GatewayClient:
         return frames
 
     def _can_join(self, first: Register, last: Register, following: Register) -> bool:
-        if first.block != following.block or _count_words(first, following) > MOST_REGISTERS_WRITTEN:
+        if first.block != following.block or span_of((first, following))[1] > MOST_REGISTERS_WRITTEN:
             return False
         between = range(last.address + last.words, following.address)
         return all(register.is_writable for register in self._registers_at(between))
@@ -212,17 +213,12 @@ def _words(data: bytes) -> list[int]:
     return [int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2)]
 
 
-def _count_words(first: Register, last: Register) -> int:
-    """From the first word of one register to the last of another."""
-    return last.address + last.words - first.address
-
-
 def _groups(registers: Sequence[Register]) -> list[list[Register]]:
     """By address, those of one block that one request can carry together."""
     groups: list[list[Register]] = []
     for register in sorted(registers, key=lambda register: register.address):
         first = groups[-1][0] if groups else None
-        if first and first.block == register.block and _count_words(first, register) <= MOST_REGISTERS_READ:
+        if first and first.block == register.block and span_of((first, register))[1] <= MOST_REGISTERS_READ:
             groups[-1].append(register)
         else:
             groups.append([register])

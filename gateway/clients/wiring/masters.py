@@ -10,12 +10,13 @@ from typing import Final
 
 from gateway import defaults
 from gateway.clients.endpoint import Endpoint
-from gateway.clients.exchange import ExchangeTable, s7_address
+from gateway.clients.exchange import ExchangeTable
 from gateway.clients.rendering import endpoint_of, is_no_address
 from gateway.clients.wiring.network import network_section
 from gateway.clients.wiring.section import Row, Section
 from gateway.control.settings import LeaseAction
 from gateway.profiles import Rig
+from gateway.registers.map.register_map import holding_number
 
 _SHOWN: Final = ("status_word", "state", "force_measured", "fault_code", "refusal_reason")
 """What a robot wants to see that reads register by register."""
@@ -143,7 +144,7 @@ def _s7_requests(table: ExchangeTable) -> Section:
     ]
     for what, writes, address, words in _requests(table):
         function = 6 if writes and words == 1 else 16 if writes else 3
-        numbers = (int(writes), s7_address(address), words, 100 + function, address)
+        numbers = (int(writes), holding_number(address), words, 100 + function, address)
         rows.append((what, *map(str, numbers), f"FC{function:02d}"))
     once = "One MB_CLIENT instance, one request at a time: REQ stays TRUE until DONE or ERROR, then FALSE for a call."
     other = "The second pair of MB_MODE and MB_DATA_ADDR counts from 0, and needs an MB_CLIENT that has it (S7-1200: FW 4.2)."

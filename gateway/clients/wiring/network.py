@@ -10,6 +10,7 @@ from gateway.clients.rendering import is_no_address
 from gateway.clients.wiring.section import Section
 from gateway.control.settings import LeaseAction
 from gateway.profiles import Rig
+from gateway.registers.map.register_map import holding_number
 
 _LOST: Final = {
     LeaseAction.FAULT: "the safe voltage, and fault A310",
@@ -75,13 +76,13 @@ def _sentences(rig: Rig, table: ExchangeTable) -> tuple[str, ...]:
     generated = " The generated clients do so." if network.plain else ""
     sentences.append(
         "A program of your own that writes control_word in each cycle, enable in it, undoes another master's stop: write it "
-        f"only when you want it changed, else from address {values} (4{values + 1:04d}) on.{generated}"
+        f"only when you want it changed, else from address {values} ({holding_number(values)}) on.{generated}"
     )
     if network.require_byte_order_echo:
         echo = table.map.find("byte_order_echo").address
         sentences.append(
             f"Before the first enable write 1234.5 to byte_order_echo: words 16#449A, 16#5000 to address {echo} "
-            f"(4{echo + 1:04d}), once a connection.{generated}"
+            f"({holding_number(echo)}), once a connection.{generated}"
         )
     return tuple(sentences)
 
