@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.processes.json_socket.messages import LONGEST_ANSWER
+from gateway.processes.state_directory import CONTROL_SOCKET
 
 ANSWER_S: Final = 2.0
 """A control that is being restarted answers nobody; its callers must be able to say so. What they ask of the force says until
@@ -20,7 +21,7 @@ class ControlLink:
     """A connection to the gateway that runs on this state directory; opened when it is needed, and anew after a loss."""
 
     def __init__(self, state_directory: Path) -> None:
-        self._path = state_directory / "control.sock"
+        self._path = state_directory / CONTROL_SOCKET
         self._turn = asyncio.Lock()
         self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
         self._is_sent = False  # the question that is asked now

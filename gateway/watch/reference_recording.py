@@ -23,6 +23,7 @@ from gateway.processes.durable_file import (
     replace_durably,
     sync_path,
 )
+from gateway.processes.state_directory import CALIBRATIONS
 from gateway.recording import RecordingError, read_header, read_table
 from gateway.recording.care.keeping import CLOSED_S
 from gateway.recording.reader import Recording, recording_paths
@@ -173,7 +174,7 @@ def _why_it_says_little(recording: Recording) -> str:
 
 def _calibration_in_use(state: Path) -> tuple[int, float] | None:
     """Number of the calibration that somebody has taken into use, and when, s of the epoch; None for the rig's own."""
-    folder = state / "calibrations"
+    folder = state / CALIBRATIONS
     selection, _ = read_selection(folder, "calibration")
     if not selection.active.number:
         return None

@@ -17,6 +17,7 @@ from gateway import defaults
 from gateway.control.runs.ladder_stairs import QUICK, CalibrationPlan
 from gateway.control.runs.preconditions import preconditions
 from gateway.processes.durable_file import read_object
+from gateway.processes.state_directory import CALIBRATIONS
 from gateway.web.context import WebContext
 from gateway.web.tabs.answers import Nothing, TabRefusedError, answers, read_body
 from gateway.web.tabs.run_follower import RunFollower
@@ -96,7 +97,7 @@ def _number_of(recording: str | None) -> int | None:
 
 def _read_fit(state: Path, document: str) -> dict[str, Any] | None:
     """Return the fit's document; None for one that is gone, or is not in this state directory."""
-    path = state / "calibrations" / Path(document).name
+    path = state / CALIBRATIONS / Path(document).name
     try:
         fit: dict[str, Any] = read_object(path)
     except (OSError, ValueError):
