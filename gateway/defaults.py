@@ -63,8 +63,10 @@ COMMIT_PATIENCE_S: Final = 10.0
 """For which the terminal waits for a commit: a disk may be slow, one that takes longer hangs."""
 LEASE_S: Final = 0.2
 """Of a starter rig; and what `hold` keeps where the rig's is unknown."""
+BEATS_PER_LEASE: Final = 4.0
+"""Of `hold` and of the page: several may be late before one is missed."""
 SHORTEST_UNTOLD_LEASE_S: Final = round(0.75 * LEASE_S, 3)
-"""`hold` keeps it without knowing the lease: it beats four times in the usual one, so three times in this."""
+"""`hold` keeps it without knowing the lease: it beats three times in this."""
 
 LADDER_STEP_V: Final = 0.2
 LADDER_GROUPS: Final = 5

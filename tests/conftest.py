@@ -231,6 +231,14 @@ def tracker_process() -> None:
     resource_tracker.ensure_running()
 
 
+@pytest.fixture
+def generous_umask() -> Iterator[None]:
+    """Takes nothing away: what is seen is what was asked for."""
+    previous = os.umask(0)
+    yield
+    os.umask(previous)
+
+
 def open_descriptors() -> dict[str, str]:
     """By `os`, not by `pathlib`, for a test may wait for its threads."""
     found = {}

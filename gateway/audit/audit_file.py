@@ -23,8 +23,8 @@ from gateway.audit.chain import NO_HASH, BrokenLine, ChainEnd, open_line, seal_l
 from gateway.audit.file_lines import count_lines, read_end, read_line
 from gateway.plain_file import open_plain, open_plain_stream, other_kind
 from gateway.processes.durable_file import make_directory, read_object, sync_path
+from gateway.processes.state_directory import AUDIT
 
-FOLDER: Final = "audit"
 HEAD: Final = "head"
 LONGEST_BYTES: Final = 8 << 20
 KEPT: Final = 32
@@ -69,7 +69,7 @@ class AuditFile:
     """The writer of one state directory; not for two threads at once. `start` before `append`."""
 
     def __init__(self, state: Path, longest_bytes: int = LONGEST_BYTES, kept: int = KEPT) -> None:
-        self._folder = state / FOLDER
+        self._folder = state / AUDIT
         self._longest_bytes, self._kept = longest_bytes, kept
         self._end = ChainEnd()
         self._path, self._descriptor = self._folder, -1

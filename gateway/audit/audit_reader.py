@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gateway.audit.audit_file import BROKEN, FOLDER, HEAD, audit_files, first_number, read_head
+from gateway.audit.audit_file import BROKEN, HEAD, audit_files, first_number, read_head
 from gateway.audit.chain import BrokenLine, ChainEnd, check_link, open_line
 from gateway.audit.file_lines import iterate_lines
+from gateway.processes.state_directory import AUDIT
 
 
 class AuditBreak(NamedTuple):
@@ -32,7 +33,7 @@ class AuditVerdict(NamedTuple):
 def read_audit(state: Path, on_left_out: Callable[[], None] = lambda: None) -> Iterator[dict[str, Any]]:
     """Yield what the lines say, oldest first, whether or not the chain holds; what is no line is passed over. on_left_out:
     called at each whole line that is none of ours, such as one that was changed."""
-    for path in audit_files(state / FOLDER):
+    for path in audit_files(state / AUDIT):
         for line in iterate_lines(path):
             try:
                 fields, _ = open_line(line.text)
@@ -45,7 +46,7 @@ def read_audit(state: Path, on_left_out: Callable[[], None] = lambda: None) -> I
 
 def verify_audit(state: Path) -> AuditVerdict:
     """Follow the chain to its first break. FileNotFoundError where there is no audit."""
-    folder = state / FOLDER
+    folder = state / AUDIT
     head = read_head(folder)  # before the files, which may grow meanwhile
     files = audit_files(folder)
     if not files and head is None:
@@ -54,7 +55,7 @@ def verify_audit(state: Path) -> AuditVerdict:
     try:
         for path in files:
             walk.read(path, is_last=path == files[-1])
-        walk.check_ends(files[0].name if files else FOLDER)
+        walk.check_ends(files[0].name if files else AUDIT)
     except BrokenLine as broken:
         return AuditVerdict(walk.count, walk.end, AuditBreak(walk.file, walk.line, str(broken)), tuple(walk.notes))
     return AuditVerdict(walk.count, walk.end, None, tuple(walk.notes))

@@ -13,6 +13,7 @@ from typing import Final
 from gateway.numbered_documents.selection import read_selection
 from gateway.numbered_documents.store import file_name
 from gateway.processes.durable_file import read_regular
+from gateway.processes.state_directory import CALIBRATIONS, RECORDINGS
 from gateway.recording import RecordingError, read_header
 from gateway.recording.layout import SUFFIX, number_in
 
@@ -21,12 +22,12 @@ _SOURCE: Final = re.compile(r'^source: "recording ([^/"\\:]+):', re.MULTILINE)
 
 def kept_ladders(state: Path) -> frozenset[str]:
     """Return the files' names in STATE/recordings; no calibration is checked for it, and one that cannot be read keeps none."""
-    folder = state / "calibrations"
+    folder = state / CALIBRATIONS
     names: set[str] = set()
     with contextlib.suppress(OSError):
         selected, _ = read_selection(folder, "calibration")
         for number in selected.numbers:
-            names |= set(_parts(state / "recordings", _source_of(folder / file_name(number))))
+            names |= set(_parts(state / RECORDINGS, _source_of(folder / file_name(number))))
     return frozenset(names)
 
 

@@ -13,6 +13,7 @@ from typing import Final
 from gateway.bsfm.model import Calibration, Response
 from gateway.numbered_documents.store import NumberedStore, StoreError, file_name
 from gateway.processes.durable_file import add_checksum, read_regular, verify_checksum
+from gateway.processes.state_directory import CALIBRATIONS
 from gateway.profiles import ProfileError, Rig
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.strict_yaml.text import parse
@@ -28,7 +29,7 @@ class CalibrationStore(NumberedStore[Calibration]):
     noun = "calibration"
 
     def __init__(self, state: Path, built_in: Calibration | None = None) -> None:
-        super().__init__(state / "calibrations", built_in)
+        super().__init__(state / CALIBRATIONS, built_in)
 
     def number_of(self, document: Calibration) -> int:
         """Return its number."""

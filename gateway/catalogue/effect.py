@@ -62,24 +62,17 @@ class SearchHints:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EffectForm:
-    """One way in which an effect shows.
-
-    proportional: the response is proportional to the sizes together, whatever their signs; quadrature: the first size is
-    an amplitude and the last parameter a phase, so a start means two columns, a quarter turn apart; exact: a start is
-    right as it stands or not at all, like the teeth of a saw; everywhere: it acts at all times, so what shows in a few
-    moments only is something else; least: of the first parameter, as of the effect; like_a_held_start: shows nothing in a
-    rest at the beginning, as if friction held a force there.
-    """
+    """One way in which an effect shows."""
 
     parameters: tuple[Parameter, ...]
     probes: Callable[[SearchHints], tuple[Start, ...]]
     needs: tuple[str, ...] = ()
-    proportional: bool = False
-    quadrature: bool = False
-    exact: bool = False
-    everywhere: bool = False
-    least: float = 0.0
-    like_a_held_start: bool = False
+    proportional: bool = False  # the response is proportional to the sizes together, whatever their signs
+    quadrature: bool = False  # amplitude first, phase last: a start is two columns, a quarter turn apart
+    exact: bool = False  # a start is right as it stands or not at all, like the teeth of a saw
+    everywhere: bool = False  # acts at all times: what shows in a few moments only is something else
+    least: float = 0.0  # of the first parameter, as of the effect
+    like_a_held_start: bool = False  # shows nothing in a rest at the beginning, as if friction held a force there
 
 
 class PartName(StrEnum):
@@ -143,24 +136,19 @@ class Treatment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """One entry of the catalogue; names and numbers are contracts.
-
-    number: in the register residual_cause, frozen within a version of the map; what, signature: what it is and how it
-    shows, as parts of a sentence; excitation: what a recording must contain; experiment: what to do next, in words;
-    recipe: the same for the gateway; treatments: what control does about it; group: names it is easily confused with.
-    """
+    """One entry of the catalogue; names and numbers are contracts."""
 
     name: str
-    number: int
+    number: int  # in the register residual_cause, frozen within a version of the map
     family: str
-    what: str
-    signature: str
-    excitation: str
-    experiment: str
-    recipe: Recipe
-    treatments: tuple[Treatment, ...]
+    what: str  # it is, as part of a sentence
+    signature: str  # how it shows, as part of a sentence
+    excitation: str  # what a recording must contain
+    experiment: str  # what to do next, in words
+    recipe: Recipe  # the experiment for the gateway
+    treatments: tuple[Treatment, ...]  # what control does about it
     forms: tuple[EffectForm, ...]
-    group: tuple[str, ...] = ()
+    group: tuple[str, ...] = ()  # names it is easily confused with
     rarity: float = 0.0  # chi-square by which it must beat a commoner cause that explains as much
     least: float = 0.0  # of the first parameter, below which it is part of every machine
     least_rows: float = 0.0  # the same in rows of a table that a gauge drives: its channels are read one after another

@@ -9,13 +9,14 @@ from typing import Any, Final
 
 from gateway.cli.errors import CliError, NoAnswerError
 from gateway.processes import exit_codes
+from gateway.processes.json_socket.messages import LONGEST_ANSWER
+from gateway.processes.state_directory import CONTROL_SOCKET
 
 _TIMEOUT_S: Final = 2.0
 _HAS_CODE: Final = re.compile(r"E\d{3} ")
-_LONGEST_ANSWER: Final = 1 << 20
 
 
-def ask(state: Path, request: dict[str, Any], socket_name: str = "control.sock") -> dict[str, Any]:
+def ask(state: Path, request: dict[str, Any], socket_name: str = CONTROL_SOCKET) -> dict[str, Any]:
     """Return the answer of the gateway that runs on this state directory; CliError when there is none or it refuses, and as
     NoAnswerError where it was there and may have done what it was asked for."""
     path = state / socket_name
@@ -48,7 +49,7 @@ def _exchange(path: Path, line: bytes, on_asked: Callable[[], None]) -> dict[str
         on_asked()
         link.sendall(line)
         with link.makefile("rb") as stream:
-            answer = json.loads(stream.readline(_LONGEST_ANSWER) or b"null")
+            answer = json.loads(stream.readline(LONGEST_ANSWER) or b"null")
     if not isinstance(answer, dict):
         raise ValueError("no answer")
     return answer

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Endpoint = tuple[str, int]
-_LONGEST_NAME: Final = 60
 _LINE_OPTIONS: Final = ("baud", "parity", "stop_bits")
 _TLS_OPTIONS: Final = ("tls", "cert", "key")
 _FILE: Final = GivenPath(dir_okay=False)
@@ -262,19 +261,21 @@ def state_options(function: Callable[..., Any] | None = None, *, makes: bool = F
     return with_choice
 
 
-def calibration_name(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+def label_name(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
     """Return a name that stands on one line and is no number, for an option's callback."""
     if value is None:
         return None
-    name = " ".join(value.split())
-    if not name or not name.isprintable() or name.isdecimal() or len(name) > _LONGEST_NAME:
-        raise click.BadParameter(f"{value!r} is no name: 1 to {_LONGEST_NAME} printable characters, not a number alone")
-    return name
+    from gateway.recording.label import check_name
+
+    try:
+        return check_name(value)
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
 
 
 def name_option(function: Function) -> Function:
     """Add --name: what the user calls the calibration."""
-    return click.option("--name", callback=calibration_name, help="What the calibration is called.")(function)
+    return click.option("--name", callback=label_name, help="What the calibration is called.")(function)
 
 
 def json_option(function: Function) -> Function:

@@ -22,11 +22,13 @@ from typing import Final
 from gateway import VERSION
 from gateway.audit.audit_file import HEAD
 from gateway.plain_file import check_plain, open_plain_stream, replaced_by
+from gateway.processes import state_lock
 from gateway.processes.durable_file import sync_path
+from gateway.processes.state_directory import CONTROL_SOCKET, RUNNING
 
 _MANIFEST: Final = "backup.json"
 _TOP: Final = "state"
-_LEFT_OUT: Final = {"control.sock", "lock", "running"}
+_LEFT_OUT: Final = {CONTROL_SOCKET, state_lock.NAME, RUNNING}
 _FORMAT: Final = 1
 _LONGEST_MANIFEST: Final = 1 << 16
 _OWNER_READS: Final = 0o600

@@ -15,7 +15,8 @@ from gateway.clients.endpoint import Endpoint
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
-from gateway.registers.map.register_map import Register, RegisterMap, UnknownRegister
+from gateway.modbus.pdu import MOST_REGISTERS_READ
+from gateway.registers.map.register_map import Register, RegisterMap, UnknownRegister, span_of
 from gateway.registers.values import WordOrder, pack_number
 from gateway.registers.writes.byte_order_echo import PROOF
 
@@ -37,8 +38,6 @@ NEEDED: Final = {"command": COMMAND, "status": STATUS, "staging": STAGING, "acti
 NAMED: Final = ("fault_code", "refusal_reason", "warning_word", "state", "failing_reason", "commit_status")
 """Registers whose numbers or bits the clients say in words."""
 COMMIT_ENDS: Final = ("committed", "failed")
-_MOST_READ: Final = 125
-"""Words of one read, by the Modbus specification."""
 
 _WITH_NUMBERS: Final = ("status", "staging", "active")
 """Blocks with numbers of two words that the clients read or write, all high word first."""
@@ -93,8 +92,8 @@ class ExchangeTable:
         yield from self._find_missing_bits("control_word", CONTROL_BITS)
         yield from self._find_missing_bits("status_word", STATUS_BITS)
         yield from self._find_missing_names()
-        if self.status and self.status_span[1] > _MOST_READ:
-            yield f"a status block of at most {_MOST_READ} words"
+        if self.status and self.status_span[1] > MOST_REGISTERS_READ:
+            yield f"a status block of at most {MOST_REGISTERS_READ} words"
 
     def _find_missing_bits(self, word: str, names: Mapping[str, str] | tuple[str, ...]) -> Iterator[str]:
         try:
@@ -134,7 +133,7 @@ class ExchangeTable:
     @property
     def command_span(self) -> tuple[int, int]:
         """(first address, words) of what one write carries: all named registers of the command block."""
-        return _span(self.command)
+        return span_of(self.command)
 
     @cached_property
     def values_first(self) -> int:
@@ -146,7 +145,7 @@ class ExchangeTable:
     @property
     def status_span(self) -> tuple[int, int]:
         """(first address, words) of what one read brings."""
-        return _span(self.status)
+        return span_of(self.status)
 
     @cached_property
     def parts(self) -> tuple[int, int, int]:
@@ -269,16 +268,6 @@ class ExchangeTable:
         for prefix, word in (("bit", "control_word"), ("flag", "status_word")):
             masks |= {f"{prefix}_{name}": 1 << bit for bit, name in self.map.find(word).bits.items()}
         return masks
-
-
-def s7_address(address: int) -> str:
-    """Return MB_DATA_ADDR of a holding register: five digits up to 49999, six from 410000 on."""
-    return f"4{address + 1:04d}"
-
-
-def _span(registers: tuple[Register, ...]) -> tuple[int, int]:
-    first, last = registers[0], registers[-1]
-    return first.address, last.address + last.words - first.address
 
 
 def _limit(newton: float) -> str:

@@ -56,51 +56,34 @@ class ValveStatus(NamedTuple):
 
 
 class LineStatus(NamedTuple):
-    """What the output line and the process know, at the time of a step.
+    """What the output line and the process know at the time of a step."""
 
-    acknowledged_v: voltage that the device confirmed last, None before the first; standing_v: that surely stands
-    there, None while another one is on its way, and where nobody knows; sent_v: voltage that went out last on the
-    wire, which carries one at a time, None where nobody knows; wire_s: how long one setting keeps it, nan if not
-    known; unanswered_since_s: monotonic time of the oldest write without an answer, None if all are answered;
-    answer_late_s: what the last answer took, where it came after its time, else 0; fault: what the line itself
-    reports (refused, altered, lost), said: in the device's own words, where it has said something to it;
-    pressure_pa_per_v: of the output device by the ranges in its profile; owner_connected: False once the owning
-    master's last connection has closed; owner_refused: why its last write was refused, empty where it was taken;
-    late_s: how late this step runs; waited_s: so much of it the process could have run and was not let, None where
-    the machine does not count that; suspended_s: so much of it the whole machine was suspended; withheld: processor
-    time that was kept from us from outside about then, s, and by whom, in words; cell_held, output_held: what kept us
-    from hearing a device that has not been heard for a while; temperature_c, feed_mm_s: of the load cell and under
-    the tool, for compensation; nan: nobody knows. output_counts, cell_counts: of the two lines, growing; None where
-    nobody counts. valve: of the directional valve, None on a rig without one. cell_says: what the cell says in place
-    of readings, empty where nothing.
-    """
-
-    acknowledged_v: float | None = None
-    unanswered_since_s: float | None = None
-    fault: FaultCode = FaultCode.NONE
-    said: str = ""
+    acknowledged_v: float | None = None  # that the device confirmed last; None before the first
+    unanswered_since_s: float | None = None  # monotonic, of the oldest write without an answer; None: no such
+    fault: FaultCode = FaultCode.NONE  # what the line itself reports: refused, altered, lost
+    said: str = ""  # the device's own words to that, where it has said something
     cell_lost: bool = False
     pressure_pa: float = nan
-    pressure_pa_per_v: float = nan
-    owner_connected: bool = True
-    late_s: float = 0.0
-    waited_s: float | None = None
+    pressure_pa_per_v: float = nan  # of the output device, by the ranges in its profile; nan: nobody knows
+    owner_connected: bool = True  # False once the owning master's last connection has closed
+    late_s: float = 0.0  # how late this step runs
+    waited_s: float | None = None  # so much of it the process was not let run; None: the machine does not count that
     warnings: WarningBit = _NO_WARNING
-    temperature_c: float = nan
-    feed_mm_s: float = nan
-    sent_v: float | None = None
-    wire_s: float = nan
-    cell_held: Held = NOT_HELD
-    output_held: Held = NOT_HELD
-    output_counts: WireCounts | None = None
-    cell_counts: WireCounts | None = None
-    valve: ValveStatus | None = None
-    standing_v: float | None = None
-    cell_says: str = ""
-    answer_late_s: float = 0.0
-    suspended_s: float = 0.0
-    withheld: tuple[float, str] = 0.0, ""
-    owner_refused: str = ""
+    temperature_c: float = nan  # of the load cell, for compensation; nan: nobody knows
+    feed_mm_s: float = nan  # under the tool, for compensation; nan: nobody knows
+    sent_v: float | None = None  # that went out last on the wire, which carries one at a time; None: nobody knows
+    wire_s: float = nan  # how long one setting keeps the wire; nan: nobody knows
+    cell_held: Held = NOT_HELD  # what kept us from hearing a device that has not been heard for a while
+    output_held: Held = NOT_HELD  # the same of the output device
+    output_counts: WireCounts | None = None  # of its line, growing; None: nobody counts
+    cell_counts: WireCounts | None = None  # of its line, growing; None: nobody counts
+    valve: ValveStatus | None = None  # the directional valve; None: the rig has none
+    standing_v: float | None = None  # that surely stands there; None: another one is on its way, or nobody knows
+    cell_says: str = ""  # what the cell says in place of readings
+    answer_late_s: float = 0.0  # what the last answer took, where it came after its time
+    suspended_s: float = 0.0  # so much of late_s the whole machine was suspended
+    withheld: tuple[float, str] = 0.0, ""  # seconds kept from us from outside about then; by whom
+    owner_refused: str = ""  # why the owner's last write was refused; empty where it was taken
 
 
 class LoopInputs(NamedTuple):

@@ -21,30 +21,24 @@ _BLOCKS: Final = dict.fromkeys(State, RefusalReason.NONE) | {
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """Where the controller stands at the moment of the question. faulted_s, lost_s: of the last
-    fault and of the last master's loss; block: why an enable would be refused in OFF; excuse: the
-    machine, where that is the cause of it, or what the valve does; line_fault: what the output line reports, with its code;
-    is_output_known: that the output answers, so that its voltage is ours; is_output_heard: that it answers at all;
-    is_lowest: no less voltage can be out; leaving_n: force that the voltages of late still make, or one that the output may
-    have kept, by the model; repeats: that the load cell seems to be frozen; ramps_down: the force goes to 0, and then the
-    output off."""
+    """Where the controller stands at the moment of the question."""
 
     now_s: float
     state: State
-    faulted_s: float
-    lost_s: float
+    faulted_s: float  # when the last fault was latched; -inf: never
+    lost_s: float  # when the master was lost last, the same
     reading: Reading
-    block: RefusalReason
-    excuse: str
-    line_fault: str
-    is_output_known: bool
-    is_output_heard: bool
+    block: RefusalReason  # why an enable would be refused in OFF
+    excuse: str  # the machine, where that is the cause of it, or what the valve does
+    line_fault: str  # what the output line reports, with its code
+    is_output_known: bool  # the output answers, so that its voltage is ours
+    is_output_heard: bool  # it answers at all
     voltage_v: float
-    is_lowest: bool
+    is_lowest: bool  # no less voltage can be out
     applied_n: float
-    leaving_n: float
-    repeats: str
-    ramps_down: bool
+    leaving_n: float  # of voltages of late, or that the output may have kept; by the model
+    repeats: str  # the load cell seems to be frozen, in words; empty where it does not
+    ramps_down: bool  # the force goes to 0, and then the output off
 
 
 class Readiness:

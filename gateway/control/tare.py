@@ -20,7 +20,7 @@ _APART_S: Final = 0.0075  # of a faster one the samples of so long are one readi
 _FEWEST: Final = 5
 _DEVIATION: Final = 1.4826 / 2.0**0.5  # times the median step between neighbours: the standard deviation of white noise
 _NOISE_RANGE: Final = 7.0  # standard deviations, which it stays within
-_LEAVING_LAGS: Final = 5.0  # response lags behind the start, until what pressed before it has gone
+LEAVING_LAGS: Final = 5.0  # response lags until what pressed before has gone: 150 times less is left of it
 _LARGEST_SHARE: Final = 0.5  # of the saturation: a zero beyond it leaves no range to measure
 
 
@@ -35,7 +35,7 @@ class Zero:
         self._samples = 0
         self.largest_spread_n = max(5.0 * supervision.sample_quantum_n, 0.5)
         self._largest_n = _LARGEST_SHARE * supervision.saturation_n
-        self._leaving_s = _LEAVING_LAGS * supervision.response_lag_s
+        self._leaving_s = LEAVING_LAGS * supervision.response_lag_s
         self._may_leave_s = self._leaving_s if is_behind_death else 0.0
 
     def observe(self, force_n: float, interval_s: float = _APART_S) -> None:

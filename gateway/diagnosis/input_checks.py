@@ -35,23 +35,18 @@ _ROWS: Final = 4000  # are enough to see a factor
 
 @dataclass(frozen=True, slots=True)
 class Suspect:
-    """A column that is probably not what its name says.
-
-    factor: of `what` (the force, or a pressure beside a command) over what the plant gives for one of the drive's numbers;
-    unit: what the column is probably in, `-n` for a turned sign, empty for exchanged columns; is_sure: no cause is looked for;
-    option: what corrects it, as --columns is spelled by whoever knows how the table was read.
-    """
+    """A column that is probably not what its name says."""
 
     code: str
     recording: str
     column: str
-    factor: float
-    unit: str = ""
+    factor: float  # of `what` over what the plant gives for one of the drive's numbers
+    unit: str = ""  # probably of the column; `-n`: a turned sign, empty: exchanged columns
     other: str = ""
-    is_sure: bool = True
-    what: str = "the force"
+    is_sure: bool = True  # no cause is looked for
+    what: str = "the force"  # or a pressure beside a command
     against: str = ""
-    option: str = ""
+    option: str = ""  # what corrects it, as --columns has it
 
     @property
     def mapping(self) -> dict[str, str]:

@@ -19,7 +19,15 @@ from functools import partial
 from typing import Final
 
 from gateway.fieldbus.settings import ServerSettings
-from gateway.modbus.certificate import ROLE_OID, ROLES, PeerCertificate
+from gateway.modbus.certificate import (
+    HAS_EXPIRED,
+    NO_ISSUER,
+    NOT_YET_VALID,
+    ROLE_OID,
+    ROLES,
+    WRONG_PURPOSE,
+    PeerCertificate,
+)
 from gateway.plain_file import read_plain
 
 HANDSHAKE_S: Final = 5.0
@@ -37,10 +45,8 @@ HANDSHAKES_PER_S: Final = 20.0
 LONGEST_NAME: Final = 64
 """Characters of a client's common name (RFC 5280, ub-common-name), which stands in lines of log and audit."""
 CURVE: Final = "prime256v1"
-_EXPIRED, _NOT_YET = 10, 9  # X509_V_ERR_CERT_HAS_EXPIRED, X509_V_ERR_CERT_NOT_YET_VALID
-_PURPOSE: Final = 26
-_NO_WAY: Final = (2, 20, 21)
-"""X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT, the same _LOCALLY, X509_V_ERR_UNABLE_TO_VERIFY_LEAF_SIGNATURE."""
+_NO_WAY: Final = (NO_ISSUER, 20, 21)
+"""And X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT_LOCALLY, X509_V_ERR_UNABLE_TO_VERIFY_LEAF_SIGNATURE."""
 _STRANGER: Final = (7, 18, 19)
 """X509_V_ERR_CERT_SIGNATURE_FAILURE, X509_V_ERR_DEPTH_ZERO_SELF_SIGNED_CERT, X509_V_ERR_SELF_SIGNED_CERT_IN_CHAIN."""
 _NOT_TLS: Final = (
@@ -120,11 +126,11 @@ def handshake_failure(error: ssl.SSLError) -> str:
     """Return what a failed handshake was about, as a sentence with its code."""
     reason = error.reason or ""
     if isinstance(error, ssl.SSLCertVerificationError):
-        if error.verify_code in (_EXPIRED, _NOT_YET):
-            state = "has expired" if error.verify_code == _EXPIRED else "is not yet valid"
+        if error.verify_code in (HAS_EXPIRED, NOT_YET_VALID):
+            state = "has expired" if error.verify_code == HAS_EXPIRED else "is not yet valid"
             cure = "make a new one; force-gateway check says if it is our CA's that is outside its days"
             return f"W241 its certificate {state} (or its clock, or ours, is wrong): {cure}"
-        if error.verify_code == _PURPOSE:
+        if error.verify_code == WRONG_PURPOSE:
             return "W240 its certificate is not one for a client (a server's?)"
         return _doubt(error.verify_code, error.verify_message)
     if reason == "PEER_DID_NOT_RETURN_A_CERTIFICATE":

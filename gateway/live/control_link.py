@@ -9,7 +9,9 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-_LONGEST_ANSWER: Final = 1 << 20
+from gateway.processes.json_socket.messages import LONGEST_ANSWER
+from gateway.processes.state_directory import CONTROL_SOCKET
+
 ANSWER_S: Final = 2.0
 """A control that is being restarted answers nobody; its callers must be able to say so. What they ask of the force says until
 when they wait (`until_s`), for it may still be carried out behind that."""
@@ -19,7 +21,7 @@ class ControlLink:
     """A connection to the gateway that runs on this state directory; opened when it is needed, and anew after a loss."""
 
     def __init__(self, state_directory: Path) -> None:
-        self._path = state_directory / "control.sock"
+        self._path = state_directory / CONTROL_SOCKET
         self._turn = asyncio.Lock()
         self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
         self._is_sent = False  # the question that is asked now
@@ -56,7 +58,7 @@ class ControlLink:
 
     async def _say(self, line: bytes) -> dict[str, Any]:
         if self._streams is None:
-            self._streams = await asyncio.open_unix_connection(str(self._path), limit=_LONGEST_ANSWER)
+            self._streams = await asyncio.open_unix_connection(str(self._path), limit=LONGEST_ANSWER)
         reader, writer = self._streams
         writer.write(line)
         await writer.drain()

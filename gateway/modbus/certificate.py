@@ -16,6 +16,9 @@ ROLES: Final = {role.name.lower(): role for role in Role}
 """What the extension may say."""
 KEY_MISMATCH: Final = "KEY_VALUES_MISMATCH"
 """What OpenSSL says of a private key that is another certificate's."""
+NO_ISSUER, NOT_YET_VALID, HAS_EXPIRED, WRONG_PURPOSE = 2, 9, 10, 26
+"""What OpenSSL finds when it verifies: X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT, X509_V_ERR_CERT_NOT_YET_VALID,
+X509_V_ERR_CERT_HAS_EXPIRED, X509_V_ERR_INVALID_PURPOSE. Python has no names for them."""
 _BEGIN, _END = "-----BEGIN CERTIFICATE-----", "-----END CERTIFICATE-----"
 _ROLE_OID_BYTES: Final = bytes.fromhex("2b060104018389 0c8622 01".replace(" ", ""))
 _COMMON_NAME_BYTES: Final = bytes.fromhex("550403")

@@ -14,6 +14,7 @@ from gateway.control.compensation.cell_map import CellMap
 from gateway.diagnosis.force_error import FEWEST_BLOCKS, ErrorBlock
 from gateway.plants.recorded_force import read_recorded_force
 from gateway.processes.durable_file import lock_directory, make_directory, read_object, replace_durably
+from gateway.processes.state_directory import PLANTS
 from gateway.recording import Recording, RecordingError, read_recording, recording_paths
 
 _FILE: Final = "reference.json"
@@ -51,7 +52,7 @@ def reference_of(recording: Recording, plant: int, cell: CellMap | None) -> Forc
 
 def keep_reference(state: Path, reference: ForceReference | None) -> None:
     """Keep the reference, None: none, for the watch. OSError where the disk refuses."""
-    path = state / "plants" / _FILE
+    path = state / PLANTS / _FILE
     if reference is None:
         path.unlink(missing_ok=True)
         return
@@ -69,7 +70,7 @@ def read_reference(state: Path, plant: int) -> ForceReference | None:
 def kept_reference(state: Path) -> ForceReference | None:
     """Return the reference that was kept last, for whichever plant; None as of `read_reference`."""
     try:
-        facts = read_object(state / "plants" / _FILE)
+        facts = read_object(state / PLANTS / _FILE)
         blocks = tuple(_block_of(block) for block in facts["blocks"])
         return ForceReference(int(facts["plant"]), str(facts["recording"]), int(facts["plant_before"]), blocks)
     except (OSError, ValueError, TypeError, KeyError, OverflowError):

@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from gateway.numbered_documents.store import NumberedStore, StoreError
 from gateway.processes.durable_file import add_checksum, verify_checksum
+from gateway.processes.state_directory import PLANTS
 from gateway.profiles import PlantProfile, ProfileError
 from gateway.profiles.kinds.plant_writer import plant_text
 from gateway.profiles.kinds.plants import read_plant
@@ -69,7 +70,7 @@ class PlantStore(NumberedStore[NumberedPlant]):
     noun = "plant"
 
     def __init__(self, state: Path) -> None:
-        super().__init__(state / "plants")
+        super().__init__(state / PLANTS)
 
     def number_of(self, document: NumberedPlant) -> int:
         """Return its number."""

@@ -23,6 +23,23 @@ class RecordingLabel:
 NO_LABEL: Final = RecordingLabel()
 
 
+def check_name(text: str) -> str:
+    """Check what a recording, or the calibration that comes of it, is to be called; return it on one line. ValueError, a
+    sentence, for what is no name."""
+    name = " ".join(text.split())
+    if not name or not name.isprintable() or name.isdecimal() or len(name) > LONGEST_NAME:
+        raise ValueError(f"{text!r} is no name: 1 to {LONGEST_NAME} printable characters, not a number alone")
+    return name
+
+
+def check_note(text: str) -> str:
+    """Check what is to be said of a recording; return it as one paragraph. ValueError, a sentence, for what is no note."""
+    note = " ".join(text.split())
+    if not note or not note.isprintable() or len(note) > LONGEST_NOTE:
+        raise ValueError(f"a note has 1 to {LONGEST_NOTE} printable characters")
+    return note
+
+
 def label_of(header: Mapping[str, Any]) -> RecordingLabel:
     """Return what the header of a recording says of it. A foreign table may have anything there."""
     return RecordingLabel(*(_text(header.get(key)) for key in ("name", "note")))

@@ -6,12 +6,14 @@ A disk that does not take it is no reason not to control: then the next start do
 import contextlib
 from pathlib import Path
 
+from gateway.processes.state_directory import RUNNING
+
 
 class CleanShutdownMarker:
     """File that exists while a run lasts: found at the next start, the last run did not end cleanly."""
 
     def __init__(self, state: Path) -> None:
-        self._path = state / "running"
+        self._path = state / RUNNING
 
     def mark_running(self) -> bool:
         """Mark this run as begun; True when the one before never lowered its flag, or when that cannot be known."""

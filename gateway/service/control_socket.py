@@ -18,6 +18,7 @@ from gateway.audit.rig_audit import RigAudit
 from gateway.calibrations.upload import UploadService
 from gateway.modbus import Peer
 from gateway.processes.json_socket.server import Handler, JsonLineServer
+from gateway.processes.state_directory import CONTROL_SOCKET
 from gateway.profiles import Rig
 from gateway.recording.label import RecordingLabel
 from gateway.service.live_answers import LiveAnswers, LiveParts, clock_sentence
@@ -71,7 +72,7 @@ class ControlSocket(JsonLineServer):
             "state": self.live.state,
             "modbus": lambda request: self.live.modbus(request, has_waited=self.has_waited),
         }
-        super().__init__(state / "control.sock", parts.audit.watch_handlers(handlers), log)
+        super().__init__(state / CONTROL_SOCKET, parts.audit.watch_handlers(handlers), log)
         self._asked = parts
 
     def _record(self, request: dict[str, Any]) -> dict[str, Any] | Future[dict[str, Any]]:

@@ -27,6 +27,7 @@ from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.json_socket.server import JsonLineServer
 from gateway.processes.scheduling import priority
+from gateway.processes.state_directory import RIG_SOCKET
 from gateway.profiles import ProfileError, Rig
 from gateway.profiles.kept_rig import kept_rig
 from gateway.service.simulation.kept_settings import KeptSettings
@@ -166,7 +167,7 @@ async def serve(rig: Rig, link: socket.socket, kept: KeptSettings, log: EventLog
             guardian_link.send(link, guardian_link.PTYS, {"ptys": lines.paths(), "pid": os.getpid()})
 
     answers = SimulationSocket(lines, kept, tell_ports, log)
-    server = JsonLineServer(kept.state / "rig.sock", {"fault": answers.fault, "sim": answers.simulate}, log)
+    server = JsonLineServer(kept.state / RIG_SOCKET, {"fault": answers.fault, "sim": answers.simulate}, log)
     lines.open()
     answers.restore()
     if unserved := await server.start():

@@ -10,11 +10,11 @@ from typing import Any, Final
 
 from gateway.live.live_state import LiveAlarm, LiveLine, LiveState
 from gateway.registers.words import State
+from gateway.units import PASCAL_PER_KILOPASCAL
 
 PREFIX: Final = "force_gateway_"
 UP: Final = f"{PREFIX}up"
 STATES: Final = tuple(state.name.lower() for state in State)
-_PASCAL_PER_KILOPASCAL: Final = 1000.0
 
 Labels = dict[str, str]
 Sample = tuple[Labels, float]
@@ -58,7 +58,7 @@ def _error_n(state: LiveState) -> float | None:
 
 def _pressure_pa(state: LiveState) -> float | None:
     kilopascal = state.force.pressure_kpa
-    return None if kilopascal is None else kilopascal * _PASCAL_PER_KILOPASCAL
+    return None if kilopascal is None else kilopascal * PASCAL_PER_KILOPASCAL
 
 
 def _per_line(name: str, kind: str, unit: str, help_text: str, value: Callable[[LiveLine], Iterable[Sample]]) -> Series:

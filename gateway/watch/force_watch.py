@@ -26,7 +26,7 @@ from gateway.watch.pushed_rows import pushed_rows
 _LONGEST_S: Final = 300.0
 """Newest rows that are looked at: a machine that gets worse later is soon seen."""
 _LOOKS_TO_BE_SURE: Final = 2
-_TOLERANCE_SHARE: Final = 0.25
+TOLERANCE_SHARE: Final = 0.25
 """Share of the rig's band: a smaller change of the force does not matter to whoever holds it."""
 
 
@@ -43,7 +43,7 @@ class ForceWatch:
 
     def __init__(self, state: Path, tolerance_n: float) -> None:
         self._state = state
-        self._least_n = _TOLERANCE_SHARE * tolerance_n
+        self._least_n = TOLERANCE_SHARE * tolerance_n
         self._plant = PlantSince()
         self._reference: ForceReference | None = None
         self._worse_in_a_row = 0

@@ -1,16 +1,11 @@
 """Compare windows with the rig's plant: a replay is cheap, and only what it leaves beyond a floor is searched for."""
 
-from typing import Final
-
 from gateway.registers.residual_cause import ResidualCause
 from gateway.watch.reference import WatchReference
+from gateway.watch.reference_recording import LEAST_EXCITATION_V, LEAST_MOVES
 from gateway.watch.warning_filter import WindowVerdict
 from gateway.watch.window import Window
 from gateway.watch.window_verdict import Diagnose, judge_window
-
-_LEAST_EXCITATION_V: Final = 0.2
-_LEAST_MOVES: Final = 4
-"""What the first window that is judged must have: later ones are compared with it."""
 
 
 class PlantComparison:
@@ -23,7 +18,7 @@ class PlantComparison:
 
     def why_unsuitable(self, window: Window) -> str:
         """Return why this window may not be the first; empty when it may, or when it is not."""
-        enough = window.excitation_v >= _LEAST_EXCITATION_V and window.moves >= _LEAST_MOVES
+        enough = window.excitation_v >= LEAST_EXCITATION_V and window.moves >= LEAST_MOVES
         return "" if self.reference.is_settled or enough else "too little was commanded to begin with"
 
     def rms_n(self, window: Window) -> float:

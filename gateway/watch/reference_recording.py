@@ -23,16 +23,17 @@ from gateway.processes.durable_file import (
     replace_durably,
     sync_path,
 )
+from gateway.processes.state_directory import CALIBRATIONS
 from gateway.recording import RecordingError, read_header, read_table
+from gateway.recording.care.keeping import CLOSED_S
 from gateway.recording.reader import Recording, recording_paths
 
 _FOLDER: Final = "reference"
 _FACTS: Final = "reference.json"
 _LEAST_S: Final = 30.0
-_LEAST_EXCITATION_V: Final = 0.2
-_LEAST_MOVES: Final = 4
-"""What a recording must have to describe a machine: a rest, or one step, says little of it."""
-_CLOSED_S: Final = 5.0  # since its last row a recording is not being written any more: rows come ten times a second
+LEAST_EXCITATION_V: Final = 0.2
+LEAST_MOVES: Final = 4
+"""What a recording, or a window that later ones are compared with, must have: a rest, or one step, says little of a machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,12 +124,12 @@ class FirstGoodRecording:
         known = read_reference_recording(self._state)
         if since is None or (known and (known.is_chosen or known.calibration == since[0])):
             return None
-        if since[1] > now_s + _CLOSED_S:  # of years to come: the clock was ahead then, and nobody knows when it was
+        if since[1] > now_s + CLOSED_S:  # of years to come: the clock was ahead then, and nobody knows when it was
             since = since[0], 0.0
         for path in recording_paths(self._state):
             if (path, since[0]) in self._passed:
                 continue
-            if abs(now_s - path.stat().st_mtime) < _CLOSED_S:  # one of years to come: the clock was ahead, and is set
+            if abs(now_s - path.stat().st_mtime) < CLOSED_S:  # one of years to come: the clock was ahead, and is set
                 return None  # it may become the first good one
             if _is_first_good(path, *since):
                 return keep_reference_recording(self._state, path, since[0])
@@ -166,14 +167,14 @@ def _why_it_says_little(recording: Recording) -> str:
         return "a fault stood in it"
     signs = np.sign(np.diff(command_v))
     turns = np.count_nonzero(np.diff(signs[signs != 0.0]))
-    if np.std(command_v) < _LEAST_EXCITATION_V or turns < _LEAST_MOVES:
+    if np.std(command_v) < LEAST_EXCITATION_V or turns < LEAST_MOVES:
         return f"the command hardly moves in it: {np.std(command_v):.2f} V (rms), {turns} turns"
     return ""
 
 
 def _calibration_in_use(state: Path) -> tuple[int, float] | None:
     """Number of the calibration that somebody has taken into use, and when, s of the epoch; None for the rig's own."""
-    folder = state / "calibrations"
+    folder = state / CALIBRATIONS
     selection, _ = read_selection(folder, "calibration")
     if not selection.active.number:
         return None

@@ -23,8 +23,6 @@ _LONGEST_PAUSE_S: Final = 600.0  # between searches: a cause that has stood for 
 _MOST_DOUBLINGS: Final = 16  # far beyond the longest pause; the windows of a week are more than a float carries
 _WINDOWS_BEFORE_PAUSES: Final = 2
 """Windows in a row that show the same cause, from which on the search pauses longer and longer: more add nothing."""
-TOLERANCE_SHARE: Final = 0.25
-"""Share of the rig's band: a smaller change of the force does not matter to whoever holds it."""
 
 
 class WindowComparison(Protocol):

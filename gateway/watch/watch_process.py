@@ -22,6 +22,7 @@ from gateway import progress
 from gateway.extras import MissingExtraError
 from gateway.processes import exit_codes
 from gateway.processes.beside_control import exit_with_guardian, yield_to_others
+from gateway.processes.state_directory import CONTROL_SOCKET
 from gateway.side_by_side import one_after_another
 from gateway.watch.memory import give_large_arrays_back_at_once, resident_mb, return_memory
 from gateway.watch.processor_budget import ProcessorBudget
@@ -44,7 +45,7 @@ def report_to_control(state: Path, message: dict[str, Any]) -> dict[str, Any]:
     """Say it to control and return its answer, empty from a control that is being restarted: it hears it the next time."""
     with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as control:
         control.settimeout(_ANSWER_S)
-        control.connect(str(state / "control.sock"))
+        control.connect(str(state / CONTROL_SOCKET))
         control.sendall(json.dumps({"do": "residual"} | message).encode() + b"\n")
         with contextlib.suppress(ValueError):
             answer = json.loads(control.recv(_LONGEST_ANSWER))
@@ -73,11 +74,11 @@ def make_comparison(rig: "Rig", state: Path) -> "WindowComparison":
     from gateway.calibrations.store import calibration_in_use
     from gateway.recording import RecordingError
     from gateway.watch.described_machine import described_machine, is_straightened_alike
+    from gateway.watch.force_watch import TOLERANCE_SHARE
     from gateway.watch.machine_comparison import MachineComparison
     from gateway.watch.plant_comparison import PlantComparison
     from gateway.watch.reference import WatchReference
     from gateway.watch.reference_recording import read_reference_recording
-    from gateway.watch.residual_watch import TOLERANCE_SHARE
 
     assert rig.reference_plant is not None  # or nobody had started us
     least_n = TOLERANCE_SHARE * rig.control.defaults.in_band_tolerance_n

@@ -18,20 +18,20 @@ from collections.abc import Awaitable, Callable
 from math import isfinite
 from typing import Any, Final
 
+from gateway.defaults import BEATS_PER_LEASE
 from gateway.live.control_link import ANSWER_S, ControlLink
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.map.register_map import Register
 from gateway.registers.words import ControlBit, Mode, StatusBit
+from gateway.registers.writes.byte_order_echo import PROOF
 from gateway.web.context import WebContext
 
 GRACE_S: Final = 2.5
 RELOAD_S: Final = 1.5
-_BEATS_PER_LEASE: Final = 4.0
 _REFUSED_BEATS: Final = 8
 """In a row: another master has the setpoint. More of them would fill its refusal registers and the log for as long as the
 browser stays open."""
 _MOST_WORDS: Final = 120
-_PROOF: Final = 1234.5
 Words = dict[str, list[int]]
 
 
@@ -85,7 +85,7 @@ class Commands:
         """Enable, with this setpoint. RefusedCommand says why not."""
         stops = self._stops
         if self._context.profile.network.require_byte_order_echo:
-            await self._write("byte_order_echo@proof", _PROOF)
+            await self._write("byte_order_echo@proof", PROOF)
         words = await self._words_of_force(force_n)
         if stops != self._stops:
             raise RefusedCommand("stopped meanwhile: nothing was enabled")
@@ -217,7 +217,7 @@ class Commands:
         self._seen_s = self._clock()
         lease_s = self._context.profile.control.supervision.lease_s
         if lease_s is not None and (self._beat is None or self._beat.done()):
-            self._beat = asyncio.create_task(self._keep_beating(lease_s / _BEATS_PER_LEASE))
+            self._beat = asyncio.create_task(self._keep_beating(lease_s / BEATS_PER_LEASE))
 
     def _end_beat(self) -> None:
         if self._beat:

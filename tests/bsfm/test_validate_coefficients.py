@@ -19,16 +19,11 @@ from gateway.bsfm import (
 from gateway.bsfm.branches import Crossing
 from gateway.bsfm.model import Response
 from gateway.bsfm.slip.slip_stops import half_width_bound_v
-from tests.calibrations.coefficients import calibration
+from tests.calibrations.coefficients import calibration, swapped
 
 LIMITS = CoefficientLimits(cell_range_n=98.0)
 HANDLES, WEIGHTS = ("rising_handles_n", "falling_handles_n"), ("rising_weights", "falling_weights")
 GOOD = Coefficients(0.0, 5.0, (0.5, 14.0, 38.0), (1.0, 0.93, 1.2), (0.5, 22.0, 38.0), (1.0, 1.1, 1.2), 3.0)
-
-
-def swapped(number: float) -> float:
-    data = struct.pack(">f", number)
-    return struct.unpack(">f", data[2:] + data[:2])[0]
 
 
 def bits(digits: str) -> float:

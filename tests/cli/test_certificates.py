@@ -1,9 +1,8 @@
 """What `certs` writes: keys for their owner's eyes, nothing over what is there, and nobody's certificate signs another one."""
 
-import os
 import shlex
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -24,14 +23,6 @@ from gateway.processes import exit_codes
 @pytest.fixture(scope="module")
 def ca() -> Signed:
     return make_ca(30)
-
-
-@pytest.fixture
-def generous_umask() -> Iterator[None]:
-    """Takes nothing away: what is seen is what was asked for."""
-    previous = os.umask(0)
-    yield
-    os.umask(previous)
 
 
 @pytest.mark.usefixtures("generous_umask")

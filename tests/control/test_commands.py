@@ -16,14 +16,7 @@ from gateway.control.demand import demand_of
 from gateway.devices.messages import Quality
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, LimitedBy, Mode, State, StatusBit
-from tests.control.bench import Bench, settings
-
-
-def enabled(control=None, **plant) -> Bench:
-    bench = Bench(control, **plant)
-    bench.run(0.3)
-    bench.enable(0.0)
-    return bench
+from tests.control.bench import Bench, enabled, settings
 
 
 def test_direct_voltage_goes_out_as_it_came_within_range_and_slew():

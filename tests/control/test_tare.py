@@ -11,14 +11,7 @@ from gateway.control.settings import Supervision
 from gateway.control.supervision.plausibility import ExpectedForce, LeftForce
 from gateway.control.tare import Zero
 from gateway.registers.words import ControlBit, LimitedBy, State
-from tests.control.bench import Bench, bsfm, settings
-
-
-def enabled(control=None, **plant) -> Bench:
-    bench = Bench(control, **plant)
-    bench.run(0.3)
-    bench.enable(0.0)
-    return bench
+from tests.control.bench import Bench, bsfm, enabled, settings
 
 
 def test_a_tare_makes_the_resting_force_zero():

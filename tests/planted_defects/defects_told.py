@@ -49,7 +49,7 @@ TOLD = (
            "RigContext(rig=question.rig)", "RigContext()", ("fleet/test_row_values.py",)),
     Defect("behind the first cell each is judged as if it were the only one", "fleet/drift.py",
            "ALPHA / (len(order) - place)", "ALPHA / max(1, len(order) * (place == 0))", ("fleet/test_row_values.py",)),
-    Defect("the watch minds the whole band alone", "watch/residual_watch.py",
+    Defect("the watch minds the whole band alone", "watch/force_watch.py",
            "TOLERANCE_SHARE: Final = 0.25", "TOLERANCE_SHARE: Final = 1.0", ("watch/test_watch_reports.py",)),
     Defect("a hold tells millivolts", "cli/force_hold/state_line.py",
            '"voltage_v": status.voltage_v', '"voltage_v": 1000.0 * status.voltage_v',

@@ -3,7 +3,6 @@
 import errno
 import os
 import stat
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,14 +13,6 @@ from gateway.processes.durable_file import give_all_to_owner, lock_directory, ma
 
 def mode_of(path: Path) -> int:
     return stat.S_IMODE(path.stat().st_mode)
-
-
-@pytest.fixture
-def generous_umask() -> Iterator[None]:
-    """Takes nothing away: what is seen is what was asked for."""
-    previous = os.umask(0)
-    yield
-    os.umask(previous)
 
 
 def test_a_text_has_its_name_once_it_is_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,6 @@
 """Laws of the curve for any curve."""
 
 import math
-import struct
 
 import mpmath
 from hypothesis import assume, given, settings
@@ -15,6 +14,7 @@ from gateway.bsfm import (
     RationalBezier,
     validate_coefficients,
 )
+from tests.calibrations.coefficients import swapped
 
 EPS = 2.0**-52
 MANY = settings(derandomize=True, deadline=None, max_examples=150)
@@ -151,22 +151,17 @@ def with_weight(weight: float, index: int) -> Coefficients:
     return Coefficients(0.0, 5.0, (0.0, 18.0, 36.0), tuple(weights), (0.0, 18.0, 36.0), (1.0, 1.0, 1.0))
 
 
-def word_swapped(number: float) -> float:
-    data = struct.pack(">f", number)
-    return struct.unpack(">f", data[2:] + data[:2])[0]
-
-
 @MANY
 @given(st.floats(2.0**-9, 512.0, width=32), st.integers(0, 2))
 def test_a_weight_that_a_word_swap_threw_out_of_range_is_called_swapped(weight, index):
-    swapped = word_swapped(weight)
-    faults = {fault.index: fault.reason for fault in validate_coefficients(with_weight(swapped, index), LIMITS)}
-    if not 1e-3 <= swapped <= 1e3:
+    wrong = swapped(weight)
+    faults = {fault.index: fault.reason for fault in validate_coefficients(with_weight(wrong, index), LIMITS)}
+    if not 1e-3 <= wrong <= 1e3:
         assert faults[16 + index] is CoefficientReason.WORDS_SWAPPED
 
 
 @MANY
 @given(st.integers(1, 255), st.integers(0, 7), st.integers(1, 2))
 def test_a_swapped_weight_of_few_digits_never_passes(digits, shift, index):
-    swapped = word_swapped(digits / 2**shift)  # eight bits: the low word is 0, the swapped number below 1e-38
-    assert [fault.index for fault in validate_coefficients(with_weight(swapped, index), LIMITS)] == [16 + index]
+    wrong = swapped(digits / 2**shift)  # eight bits: the low word is 0, the swapped number below 1e-38
+    assert [fault.index for fault in validate_coefficients(with_weight(wrong, index), LIMITS)] == [16 + index]

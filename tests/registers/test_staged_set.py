@@ -14,7 +14,7 @@ from gateway.registers.upload.coefficients import BLOCK_BYTES, SET_BYTES, Coeffi
 from gateway.registers.upload.staging import StagedFault, check_staged
 from gateway.registers.values import float32
 from gateway.registers.words import UploadReason
-from tests.calibrations.coefficients import calibration
+from tests.calibrations.coefficients import calibration, swapped
 
 LIMITS = CoefficientLimits(cell_range_n=100.0)
 GOOD = CoefficientSet(
@@ -42,11 +42,6 @@ def staged(given: CoefficientSet = GOOD, *, length: int = 190, slot: int = 3, cr
     covered = words[:280] if length == 140 else words
     trailer = struct.pack(">H2xIH", length, set_crc(covered) if crc is None else crc, slot)
     return words[:280] + trailer + bytes(10) + words[280:]
-
-
-def swapped(number: float) -> float:
-    data = struct.pack(">f", number)
-    return struct.unpack(">f", data[2:] + data[:2])[0]
 
 
 def fault_of(words: bytes) -> StagedFault:

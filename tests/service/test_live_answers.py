@@ -16,19 +16,14 @@ from gateway.service.live_answers import AlarmTimes, clock_sentence
 from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.starting import StartError
 from tests.control.bench import bsfm
-from tests.service.requests.test_hostile_requests import Stage
+from tests.service.requests.stage import Stage, stage
 from tests.service.rigs import demo
 from tests.service.wired import Wired
 
+__all__ = ["stage"]
+
 ENABLE_12_N = "10000000020400" + "01" + "04b0"
 DISABLE = "060000" + "0000"
-
-
-@pytest.fixture
-def stage(tmp_path: Path):
-    stage = Stage(tmp_path)
-    yield stage
-    stage.close()
 
 
 def ask(stage: Stage, request: dict[str, Any]) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 import json
 import math
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +12,11 @@ from gateway.live.live_state import LiveState
 from gateway.recording.label import RecordingLabel
 from gateway.registers.words import LimitedBy, State
 from gateway.service.live_answers import _age_s
-from tests.service.requests.test_hostile_requests import PLAN, Stage
+from tests.service.requests.stage import Stage, stage
+from tests.service.requests.test_hostile_requests import PLAN
 from tests.service.wired import ENABLE
 
-
-@pytest.fixture
-def stage(tmp_path: Path) -> Iterator[Stage]:
-    stage = Stage(tmp_path)
-    yield stage
-    stage.close()
+__all__ = ["stage"]
 
 
 def ask(stage: Stage, **request: Any) -> dict[str, Any]:

@@ -29,7 +29,6 @@ class Surroundings:
     """cell_s: between two readings of a load cell that talks by itself; cell_pace: how many times longer it takes now."""
 
     cell_pace = 1.0
-    _is_cell_cut = False
     _dark_until_s = 0.0
     _freed_s = -LOOSE_S
     _is_stuck = False

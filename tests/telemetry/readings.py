@@ -25,6 +25,12 @@ def holding() -> LiveState:
     )
 
 
+def at(force_n: float) -> LiveState:
+    """The same, with another measured force."""
+    state = holding()
+    return replace(state, force=replace(state.force, measured_n=force_n))
+
+
 def reading() -> GatewayReading:
     return GatewayReading(holding(), HEALTH | {"residual": {"cause": 0, "name": "none", "looks": 4}})
 

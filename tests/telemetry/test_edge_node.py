@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.live.live_state import LiveState
 from gateway.processes.state_lock import hold_state_lock
 from gateway.telemetry.mqtt import kept_bd_seq
 from gateway.telemetry.mqtt.broker_session import BrokerMessage
@@ -19,15 +18,10 @@ from gateway.telemetry.mqtt.edge_node import REBIRTH, EdgeNode
 from gateway.telemetry.mqtt.kept_bd_seq import KeptBdSeq
 from gateway.telemetry.sparkplug_metrics import TYPES, values_of
 from gateway.telemetry.sparkplug_payload import DataType, SparkplugMetric, decode_values, encode_payload
-from tests.telemetry.readings import holding
+from tests.telemetry.readings import at, holding
 from tests.telemetry.sparkplug_schema import Payload, decoded, values
 
 NODE_NAME = "cell"
-
-
-def at(force_n: float) -> LiveState:
-    state = holding()
-    return replace(state, force=replace(state.force, measured_n=force_n))
 
 
 def drain(node: EdgeNode) -> list[BrokerMessage]:

@@ -15,7 +15,6 @@ from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.telemetry.mqtt.broker_session import BrokerMessage
 from gateway.telemetry.mqtt.json_topics import JsonTopics
 from gateway.telemetry.mqtt.register_commands import RegisterCommands, is_stop
-from gateway.telemetry.mqtt_process import Announcer
 from tests.telemetry.readings import holding
 
 
@@ -290,11 +289,3 @@ def test_what_must_not_be_carried_out_is_told_and_asks_nobody() -> None:
 
     (told_of,) = asyncio.run(JsonTopics("cell", command).answer("cell/command", b"{}", "too late"))
     assert told(told_of) == ("command/result", {"ok": False, "written": [], "error": "too late"}, False)
-
-
-def test_two_connections_to_one_broker_say_once_that_it_is_away() -> None:
-    said: list[str] = []
-    announcer = Announcer(said.append)
-    for text in ("away", "away", "back", "back", "away"):
-        announcer.say(text)
-    assert said == ["away", "back", "away"]

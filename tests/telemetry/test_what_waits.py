@@ -7,18 +7,12 @@ from typing import Any
 
 import pytest
 
-from gateway.live.live_state import LiveState
 from gateway.profiles import load_rig
 from gateway.telemetry.mqtt.edge_node import EdgeNode
 from gateway.telemetry.mqtt.json_topics import JsonTopics
 from gateway.telemetry.mqtt.register_commands import RegisterCommands
-from tests.telemetry.readings import holding
+from tests.telemetry.readings import at, holding
 from tests.telemetry.sparkplug_schema import decoded, values
-
-
-def at(force_n: float) -> LiveState:
-    state = holding()
-    return replace(state, force=replace(state.force, measured_n=force_n))
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ Judged as control would use it: volts asked for each force in turn against those
 begins on the rising branch, after a full cycle down; its first point only says where.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -21,17 +21,6 @@ LARGEST_SHARE: Final = 0.7  # of the force range
 FEWEST_POINTS: Final = 8
 
 
-@dataclass(frozen=True, slots=True)
-class SpanChoice:
-    """span_n and the errors on the walk in N: with it, largest with it, and with branches switched at once."""
-
-    span_n: float
-    rms_n: float
-    max_n: float
-    switched_rms_n: float
-    points: int
-
-
 def command_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
     """Return what the control law gets wrong along a walk, N; one shorter than the walk."""
     memory, errors = model.reversal.start(), []
@@ -44,11 +33,11 @@ def command_error_n(model: Bsfm, voltage_v: Floats, force_n: Floats) -> Floats:
     return np.array(errors)
 
 
-def choose_span(
+def choose_span_n(
     branches: Branches, voltage_v: Floats, force_n: Floats, mask: NDArray[np.bool_] | None = None
-) -> SpanChoice | None:
-    """Return the span with the smallest error on the walk, or on those of its points that are seen; None where it is too
-    short."""
+) -> float | None:
+    """Return the span with the smallest error on the walk, or on those of its points that are seen, N; None where the walk is
+    too short."""
     if len(voltage_v) < FEWEST_POINTS:
         return None
     model = Bsfm(branches, LinearBlend(0.0))
@@ -57,10 +46,7 @@ def choose_span(
     counts = np.ones(len(force_n), bool) if mask is None else mask
     errors = [command_error_n(_with(model, span_n), voltage_v, force_n)[counts[1:]] for span_n in spans_n.tolist()]
     best = min(range(SPANS), key=lambda k: float(np.mean(errors[k] ** 2)))
-    switched = command_error_n(model, voltage_v, force_n)[counts[1:]]
-    return SpanChoice(
-        float(spans_n[best]), rms_n(errors[best]), float(np.abs(errors[best]).max()), rms_n(switched), len(voltage_v)
-    )
+    return float(spans_n[best])
 
 
 def _with(model: Bsfm, span_n: float) -> Bsfm:

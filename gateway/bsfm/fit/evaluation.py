@@ -72,7 +72,7 @@ def evaluate(checked: CheckedLadder, question: FitRequest) -> Evaluation:
     if _is_poor(chosen, scores):
         chosen = _fit_constrained(ladder, question, settings, chosen, notes)
     reversal = choose_reversal(_to_move(chosen, scores), checked.ladder, checked.minor_v, checked.minor_n)
-    span_n = reversal.span.span_n if reversal else _assume_span(chosen, question, notes)
+    span_n = reversal.span_n if reversal else _assume_span(chosen, question, notes)
     model = reversal.model if reversal else chosen.result.bsfm(span_n)
     order = model.branches.rising.order
     if order != chosen.result.order:

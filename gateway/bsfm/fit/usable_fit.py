@@ -26,8 +26,8 @@ from gateway.bsfm.fit.projected_problem import Floats, ProjectedProblem, Samples
 from gateway.bsfm.fit.result import FitResult, ModelName, Ties
 from gateway.bsfm.ladder.measured_ladder import Ladder
 
-MARGINS = (0.01, 0.1, 0.5)  # of the slope floor; of 0.1 N for the gap
-GAP_N = 0.1
+MARGINS = (0.01, 0.1, 0.5)  # of the slope floor; of GAP_N for the gap
+GAP_N = 0.1  # between the branches, of a margin of 1
 HANDLES_SHARE = 1.5  # of the largest force: no rig takes coefficients far beyond its cell
 PLACES = np.concatenate([[0.0, 1.0e-4], np.arange(1, 64) / 64, [1.0 - 1.0e-4, 1.0]])
 

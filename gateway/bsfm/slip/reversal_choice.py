@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from gateway.bsfm.branches import Branches
-from gateway.bsfm.fit.blend_span import SpanChoice, choose_span, command_error_n
+from gateway.bsfm.fit.blend_span import choose_span_n, command_error_n, rms_n
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.ladder.measured_ladder import Ladder
 from gateway.bsfm.model import Bsfm
@@ -26,12 +26,12 @@ BETTER_SHARE: Final = 0.9  # held-out error of the stops, of the blend's
 class ReversalChoice:
     """The reversal that predicts a walk best.
 
-    span: of the blend on the model's own branches. slip: None where the blend is used. *_heldout_n: RMS on the points of
+    span_n: of the blend on the model's own branches. slip: None where the blend is used. *_heldout_n: RMS on the points of
     the walk by a fit to the others, nan where it was not tried.
     """
 
     model: Bsfm
-    span: SpanChoice
+    span_n: float
     slip: SlipFit | None
     blend_heldout_n: float
     slip_heldout_n: float
@@ -39,18 +39,18 @@ class ReversalChoice:
 
 def choose_reversal(branches: Branches, ladder: Ladder, volts: Floats, newtons: Floats) -> ReversalChoice | None:
     """Choose between blend and slip stops by a walk of partial reversals; None where it is too short for anything."""
-    span = choose_span(branches, volts, newtons)
-    if span is None:
+    span_n = choose_span_n(branches, volts, newtons)
+    if span_n is None:
         return None
-    blend = Bsfm(branches, LinearBlend(span.span_n))
+    blend = Bsfm(branches, LinearBlend(span_n))
     if len(volts) < FEWEST_POINTS:
-        return ReversalChoice(blend, span, None, float("nan"), float("nan"))
+        return ReversalChoice(blend, span_n, None, float("nan"), float("nan"))
     errors_n = _held_out_errors(branches, ladder, volts, newtons)
     if errors_n[1] >= BETTER_SHARE * errors_n[0]:
-        return ReversalChoice(blend, span, None, *errors_n)
+        return ReversalChoice(blend, span_n, None, *errors_n)
     slip = fit_joint(branches, [walk_of(ladder), Walk(volts, newtons)])
-    carried = choose_span(slip.branches, volts, newtons)
-    return ReversalChoice(slip.model, carried or span, slip, *errors_n)
+    carried_n = choose_span_n(slip.branches, volts, newtons)
+    return ReversalChoice(slip.model, span_n if carried_n is None else carried_n, slip, *errors_n)
 
 
 def _held_out_errors(branches: Branches, ladder: Ladder, volts: Floats, newtons: Floats) -> tuple[float, float]:
@@ -63,9 +63,9 @@ def _held_out_errors(branches: Branches, ladder: Ladder, volts: Floats, newtons:
             slip = fit_joint(branches, [walk_of(ladder), Walk(volts, newtons, (halves != half).astype(float))], 0)
         except ValueError:  # no loop between the branches that stops could select in
             return 0.0, float("inf")
-        span = choose_span(branches, volts, newtons, halves != half)
-        blend = Bsfm(branches, LinearBlend(span.span_n if span else 0.0))
+        span_n = choose_span_n(branches, volts, newtons, halves != half)
+        blend = Bsfm(branches, LinearBlend(span_n or 0.0))
         for model_errors, model in zip(errors, (blend, slip.model), strict=True):
             model_errors.append(command_error_n(model, volts, newtons)[halves[1:] == half])
-    rms = [float(np.sqrt(np.mean(np.concatenate(model_errors) ** 2))) for model_errors in errors]
+    rms = [rms_n(np.concatenate(model_errors)) for model_errors in errors]
     return rms[0], rms[1]

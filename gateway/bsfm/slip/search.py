@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.fit.projected_problem import Floats
+from gateway.bsfm.fit.usable_fit import GAP_N
 from gateway.bsfm.slip.jacobian import in_free_numbers, penalties_by_numbers, voltage_by_numbers, without
 from gateway.bsfm.slip.problem import GENTLEST_N_PER_V, SlipProblem, branches_of, free_numbers
 
@@ -20,7 +21,6 @@ PENALTY: Final = 10.0
 PENALTY_GRID: Final = 33
 END_PLACES: Final = np.geomspace(1.0e-4, 0.02, 8)  # of the range: beside the end at which the branches meet
 OPEN_AT: Final = 0.25  # of the range: the gap between the branches may be closing up to there
-GAP_N: Final = 0.1  # between the branches, of a margin of 1
 MOST_SHARE: Final = 1.45  # of the largest force: handles beyond 1.5 are refused (gateway.bsfm.fit.usable_fit)
 STEPS_MAX: Final = 200
 CLOSE: Final = 1.0e-5  # relative gain of a step that is the last

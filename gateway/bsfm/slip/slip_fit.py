@@ -23,7 +23,7 @@ import numpy as np
 from gateway.bsfm.branches import Branches
 from gateway.bsfm.coefficients import SLOPE_FLOOR_N_PER_V
 from gateway.bsfm.curve import elevate_order
-from gateway.bsfm.fit.blend_span import choose_span, command_error_n
+from gateway.bsfm.fit.blend_span import choose_span_n, command_error_n, rms_n
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.fit.result import verdicts_of
 from gateway.bsfm.fit.usable_fit import is_moderate
@@ -133,17 +133,17 @@ def compare_policies(branches: Branches, fits: Sequence[SlipFit], training: Walk
 
     PolicyError as control would use them (blend_span.command_error_n): driven by the forces, told in newtons.
     """
-    choice = choose_span(branches, training.voltage_v, training.force_n)
+    span_n = choose_span_n(branches, training.voltage_v, training.force_n)
     models = [("branches switched", Bsfm(branches, LinearBlend(0.0)))]
-    if choice:
-        models.append((f"linear blend over {choice.span_n:g} N", Bsfm(branches, LinearBlend(choice.span_n))))
+    if span_n is not None:
+        models.append((f"linear blend over {span_n:g} N", Bsfm(branches, LinearBlend(span_n))))
     models += [(f"slip stops, {'joint fit' if fit.joint else 'branches kept'}", fit.model) for fit in fits]
     return [_judge(policy, model, held_out) for policy, model in models]
 
 
 def _judge(policy: str, model: Bsfm, walk: Walk) -> PolicyError:
     error_n = command_error_n(model, walk.voltage_v, walk.force_n)
-    return PolicyError(policy, float(np.sqrt(np.mean(error_n**2))), float(np.abs(error_n).max()), model)
+    return PolicyError(policy, rms_n(error_n), float(np.abs(error_n).max()), model)
 
 
 def _radii_v(branches: Branches) -> Floats:
@@ -175,8 +175,7 @@ def _result(problem: SlipProblem, branches: Branches, *, joint: bool) -> SlipFit
     error_n = problem.errors_n(branches, shares)[problem.weight > 0.0]
     keep = shares > 0.0
     stops = SlipStops(_plain(problem.radii_v[keep]), _plain(shares[keep]))
-    rms_n, max_n = float(np.sqrt(np.mean(error_n**2))), float(np.abs(error_n).max())
-    return SlipFit(branches, stops, rms_n, max_n, len(error_n), joint)
+    return SlipFit(branches, stops, rms_n(error_n), float(np.abs(error_n).max()), len(error_n), joint)
 
 
 def _plain(values: Floats) -> tuple[float, ...]:

@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gateway.bsfm import Calibration
+from gateway.processes.state_directory import RECORDINGS
 
 if TYPE_CHECKING:
     from gateway.bsfm.ladder.check import CheckedLadder
-
-_RECORDINGS = "recordings"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,5 +58,5 @@ def _recording_of(calibration: Calibration, state: Path) -> Path | None:
     name = calibration.source.removeprefix("recording ").partition(":")[0]
     if not name or Path(name).name != name:
         return None
-    candidates = (state / _RECORDINGS / name, Path(name))
+    candidates = (state / RECORDINGS / name, Path(name))
     return next((path for path in candidates if path.is_file()), None)

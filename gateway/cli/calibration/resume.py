@@ -15,6 +15,7 @@ from gateway.bsfm.ladder.labels import Labels
 from gateway.bsfm.ladder.ladder_error import LadderError
 from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
+from gateway.processes.state_directory import RECORDINGS
 from gateway.recording import Recording, RecordingError, read_header, read_recording, recording_paths
 
 _NO_PLAN: Final = ("stairs", "top_v")  # what the header says beside the plan's own fields
@@ -77,7 +78,7 @@ def _last_ladder(state: Path) -> tuple[Path, dict[str, Any]]:
         with contextlib.suppress(RecordingError, OSError):
             if (header := read_header(path)).get("ladder"):
                 return path, header
-    sentence = f"no calibration run is recorded in {state / 'recordings'}: nothing to go on with"
+    sentence = f"no calibration run is recorded in {state / RECORDINGS}: nothing to go on with"
     raise CliError(f"E422 {sentence}", exit_codes.DATA)
 
 

@@ -12,6 +12,8 @@ from typing import Any, Final
 import click
 from click.shell_completion import CompletionItem
 
+from gateway.processes.state_directory import CALIBRATIONS, PLANTS, RECORDINGS
+
 Items = list[CompletionItem[str]]
 Words = Callable[[click.Context, str], Iterable[CompletionItem[str]]]
 _MOST: Final = 200
@@ -134,13 +136,13 @@ def complete_codes(context: click.Context, incomplete: str) -> Items:
 @_completes(files=True)
 def complete_recordings(context: click.Context, incomplete: str) -> Items:
     """Offer the numbers of recordings in the state directory that is meant, and files."""
-    return _items(_numbers_in(_directory(context) / "recordings", "*.fgr"))
+    return _items(_numbers_in(_directory(context) / RECORDINGS, "*.fgr"))
 
 
 @_completes()
 def complete_recording_numbers(context: click.Context, incomplete: str) -> Items:
     """Offer the numbers of recordings in the state directory that is meant."""
-    return _items(_numbers_in(_directory(context) / "recordings", "*.fgr"))
+    return _items(_numbers_in(_directory(context) / RECORDINGS, "*.fgr"))
 
 
 @_completes(files=True)
@@ -148,19 +150,19 @@ def complete_calibrations(context: click.Context, incomplete: str) -> Items:
     """Offer the numbers of calibrations, shipped names, and files."""
     from gateway.profiles import list_shipped
 
-    return _items([*_stored(context, "calibrations"), *list_shipped("calibration")])
+    return _items([*_stored(context, CALIBRATIONS), *list_shipped("calibration")])
 
 
 @_completes()
 def complete_calibration_numbers(context: click.Context, incomplete: str) -> Items:
     """Offer the numbers of calibrations in the state directory that is meant."""
-    return _items(_stored(context, "calibrations"))
+    return _items(_stored(context, CALIBRATIONS))
 
 
 @_completes()
 def complete_plant_numbers(context: click.Context, incomplete: str) -> Items:
     """Offer the numbers of plants in the state directory that is meant, 0 for the rig's own."""
-    return _items(["0", *_stored(context, "plants")])
+    return _items(["0", *_stored(context, PLANTS)])
 
 
 def _register_map(context: click.Context) -> Any:

@@ -38,29 +38,21 @@ _ANY_STATE: Final = defaults.RIG  # whose state directory is meant where neither
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sources:
-    """Everything that the diagnosis takes.
+    """Everything that the diagnosis takes."""
 
-    paths: of the recordings, as given; rig: its name, empty for none; known_rig: where it is known here; notes: what was
-    decided; late_s: how late the wires may have made the readings; quantum_n: their known step; calibration_noise_n: their
-    noise at rest by the calibration that they were made under, N, None where it is not known; is_own: the plant is that of
-    the rig that the recordings were made on; straightened: what a plant in use has taken back of the first recording's
-    readings, by the cell's numbers; factors: by what each recording's columns were multiplied; is_rehearsal: made while the
-    devices of a real rig were simulated.
-    """
-
-    paths: tuple[Path, ...]
+    paths: tuple[Path, ...]  # of the recordings, as given
     measurements: tuple[Measurement, ...]
     plant: PlantProfile
-    rig: str
-    known_rig: "Rig | None"
-    notes: tuple[str, ...]
-    late_s: float = 0.0
-    quantum_n: float = 0.0
-    calibration_noise_n: float | None = None
-    is_own: bool = False
-    straightened: dict[str, Any] | None = None
-    factors: dict[str, dict[str, float]] = field(default_factory=dict)
-    is_rehearsal: bool = False
+    rig: str  # its name; empty for none
+    known_rig: "Rig | None"  # where it is known here
+    notes: tuple[str, ...]  # what was decided
+    late_s: float = 0.0  # how late the wires may have made the readings
+    quantum_n: float = 0.0  # known step of the readings
+    calibration_noise_n: float | None = None  # at rest, by their calibration; None: not known
+    is_own: bool = False  # the plant is that of the rig that the recordings were made on
+    straightened: dict[str, Any] | None = None  # what a plant in use has taken back of the first readings
+    factors: dict[str, dict[str, float]] = field(default_factory=dict)  # by which each column was multiplied
+    is_rehearsal: bool = False  # made while the devices of a real rig were simulated
 
     @property
     def name(self) -> str:

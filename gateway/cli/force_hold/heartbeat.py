@@ -25,8 +25,7 @@ _ACTIONS: Final = {
     "hold": "the force stays, with a warning",
     "ramp": "it ramps to 0 N",
 }
-_BEATS_PER_LEASE: Final = 4.0
-DEFAULT_PERIOD_S: Final = defaults.LEASE_S / _BEATS_PER_LEASE  # where the rig's lease is unknown
+DEFAULT_PERIOD_S: Final = defaults.LEASE_S / defaults.BEATS_PER_LEASE  # where the rig's lease is unknown
 _SHORTEST_PERIOD_S: Final = 0.005
 _LOOK_S: Final = 0.1
 _OBEYED_S: Final = 0.3  # three times the usual bound on an output's silence
@@ -43,7 +42,7 @@ class KnownLease:
     @property
     def period_s(self) -> float:
         """Between two beats: several may be late before one is missed."""
-        shared = DEFAULT_PERIOD_S if self.length_s is None else self.length_s / _BEATS_PER_LEASE
+        shared = DEFAULT_PERIOD_S if self.length_s is None else self.length_s / defaults.BEATS_PER_LEASE
         return min(DEFAULT_PERIOD_S, max(_SHORTEST_PERIOD_S, shared))
 
 

@@ -1,12 +1,9 @@
 """Some rigs want 1234.5 in byte_order_echo before they begin anything: proof of a client's word order. Our own is right, so
 nobody need write it by hand."""
 
-from typing import Final
-
 from gateway.cli.master.client import Assignment, Frame, GatewayClient, RefusedError
 from gateway.codes.refusals import RefusalReason
-
-_PROOF: Final = 1234.5
+from gateway.registers.writes.byte_order_echo import PROOF
 
 
 def write_with_proof(client: GatewayClient, frame: Frame) -> None:
@@ -25,5 +22,5 @@ def prove_byte_order(client: GatewayClient) -> bool:
     if int(reason.value) != RefusalReason.BYTE_ORDER_UNPROVEN:
         return False
     echo = client.register_map.find("byte_order_echo")
-    client.write_values([Assignment(echo, echo.encode(_PROOF))])
+    client.write_values([Assignment(echo, echo.encode(PROOF))])
     return True

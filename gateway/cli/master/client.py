@@ -11,19 +11,18 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gateway.cli.errors import CliError
 from gateway.cli.master.wires import Wire
 from gateway.modbus.errors import ILLEGAL_ADDRESS
+from gateway.modbus.pdu import MOST_REGISTERS_READ, MOST_REGISTERS_WRITTEN
 from gateway.processes import exit_codes
 from gateway.registers import Register, RegisterMap
+from gateway.registers.map.register_map import span_of
 
 if TYPE_CHECKING:
     from pymodbus.client import ModbusSerialClient, ModbusTcpClient
-
-_MOST_READ: Final = 125
-_MOST_WRITTEN: Final = 123
 
 
 class RefusedError(Exception):
@@ -94,7 +93,7 @@ class GatewayClient:
         """Return `count` words from `address` (0-based), in as many requests as Modbus needs."""
         words: list[int] = []
         while len(words) < count:
-            at, most = address + len(words), min(count - len(words), _MOST_READ)
+            at, most = address + len(words), min(count - len(words), MOST_REGISTERS_READ)
             found = self._ask("read_holding_registers", f"read {most} at {at}", at, count=most).registers
             if len(found) != most:  # none of them would be asked for again without end
                 text = f"E131 {self.where} answered {len(found)} registers to read {most} at {at}: no gateway of ours"
@@ -156,7 +155,7 @@ class GatewayClient:
         return frames
 
     def _can_join(self, first: Register, last: Register, following: Register) -> bool:
-        if first.block != following.block or following.address + following.words - first.address > _MOST_WRITTEN:
+        if first.block != following.block or span_of((first, following))[1] > MOST_REGISTERS_WRITTEN:
             return False
         between = range(last.address + last.words, following.address)
         return all(register.is_writable for register in self._registers_at(between))
@@ -219,7 +218,7 @@ def _groups(registers: Sequence[Register]) -> list[list[Register]]:
     groups: list[list[Register]] = []
     for register in sorted(registers, key=lambda register: register.address):
         first = groups[-1][0] if groups else None
-        if first and first.block == register.block and register.address + register.words - first.address <= _MOST_READ:
+        if first and first.block == register.block and span_of((first, register))[1] <= MOST_REGISTERS_READ:
             groups[-1].append(register)
         else:
             groups.append([register])

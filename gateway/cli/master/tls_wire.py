@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from gateway.cli.errors import CliError
 from gateway.cli.master.wires import NETWORK_CUT, TIMEOUT_S, TcpWire
-from gateway.modbus.certificate import KEY_MISMATCH
+from gateway.modbus.certificate import HAS_EXPIRED, KEY_MISMATCH, NOT_YET_VALID
 from gateway.plain_file import check_plain
 from gateway.processes import exit_codes
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 _ASK_LOG = "its log (force-gateway events on its machine) says which"
 _WEAK = ("EE_KEY_TOO_SMALL", "CA_KEY_TOO_SMALL", "CA_MD_TOO_WEAK")
-_NOT_NOW = (9, 10)  # X509_V_ERR_CERT_NOT_YET_VALID, X509_V_ERR_CERT_HAS_EXPIRED
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +89,7 @@ class TlsWire(TcpWire):
         except ssl.SSLCertVerificationError as error:
             why = f"the certificate of {self.where} is not to be trusted: {error.verify_message.rstrip('.')}"
             cure = "give --tls the CA that has signed it, and --gateway a name that is in it (certs --host)"
-            if error.verify_code in _NOT_NOW:
+            if error.verify_code in (NOT_YET_VALID, HAS_EXPIRED):
                 cure = "look at the clocks of both machines, or make new ones there (force-gateway certs)"
             raise CliError(f"E176 {why}; {cure}", exit_codes.DEVICE) from None
         except OSError as error:

@@ -25,6 +25,7 @@ from gateway.modbus.pdu import (
 )
 from gateway.modbus.rtu import encode_adu
 from gateway.registers import Register, RegisterMap
+from gateway.registers.map.register_map import holding_number
 from gateway.registers.upload.coefficients import HEAD_BYTES, SET_WORDS, TAIL_FROM, CoefficientSet, set_crc
 from gateway.registers.words import CommitAction
 
@@ -162,7 +163,7 @@ def _title(request: Request) -> str:
     count = request.count or len(request.words)
     what = "read" if request.count else "write"
     words = "1 word" if count == 1 else f"{count} words"
-    return f"FC{request.function:02d} {what} {words} at {request.address} (4{request.address + 1:04d})"
+    return f"FC{request.function:02d} {what} {words} at {request.address} ({holding_number(request.address)})"
 
 
 def _values(request: Request, register_map: RegisterMap) -> Iterator[str]:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 HARMLESS: Final = (
     "asks only what changes nothing: readings, settings as they stand, what a device is; no voltage is written"
 )
-_SLOW_LATENCY_MS: Final = 16
 PATIENCE_S: Final = 0.5  # for a device that was named: a busy machine or a slow adapter is no wrong device
 _SLOW_BAUDS: Final = (1200, 2400, 4800)  # as many scales are delivered: heard, but too slow to be asked for
 _DATA_BITS: Final = 8  # with which a port is listened to
@@ -179,11 +178,11 @@ def _exception_of(data: bytes) -> str:
 
 
 def _tell_latency(report: "PortReport") -> "Iterator[str]":
-    from gateway.ports.latency import latency_ms
+    from gateway.ports.latency import SLOW_MS, latency_ms
 
     if report.warning:
         yield f"W332 {report.warning}"
-    elif (latency := latency_ms(report.path) or 0) >= _SLOW_LATENCY_MS:
+    elif (latency := latency_ms(report.path) or 0) >= SLOW_MS:
         yield f"W332 {report.path} waits up to {latency} ms before it hands over what it received; 1 ms is usual"
 
 

@@ -69,19 +69,16 @@ DevicePolicy=closed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnitOptions:
-    """rig: a shipped name or an absolute path; stem: what its state directory and unit are called; ports: of all its
-    listeners, for the one privilege that one below 1024 needs; devices: serial ports, as /dev/serial/by-id/...; networks: who
-    may reach it (CIDR), empty for everybody; compiles: the residual watch runs, or there is a page; waits_for_network: it
-    listens on an address of its own."""
+    """What the unit of one rig depends on."""
 
     command: Path
-    rig: str
-    stem: str
-    ports: Sequence[int] = ()
-    devices: Sequence[str] = ()
-    networks: Sequence[str] = ()
-    compiles: bool = False
-    waits_for_network: bool = False
+    rig: str  # a shipped name or an absolute path
+    stem: str  # what its state directory and unit are called
+    ports: Sequence[int] = ()  # of all its listeners: one below 1024 needs a privilege
+    devices: Sequence[str] = ()  # serial ports, as /dev/serial/by-id/...
+    networks: Sequence[str] = ()  # who may reach it (CIDR); empty for everybody
+    compiles: bool = False  # the residual watch runs, or there is a page
+    waits_for_network: bool = False  # it listens on an address of its own
 
     @property
     def name(self) -> str:

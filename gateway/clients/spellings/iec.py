@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from gateway.clients.exchange import CONTROL_BITS, STATUS_BITS, ExchangeTable, ModelField, s7_address
-from gateway.registers.map.register_map import Register
+from gateway.clients.exchange import CONTROL_BITS, STATUS_BITS, ExchangeTable, ModelField
+from gateway.registers.map.register_map import Register, holding_number
 
 _SET_BY_THE_BLOCK = ("control_word", "force_setpoint", "heartbeat")
 
@@ -68,7 +68,7 @@ def spell_scl(table: ExchangeTable) -> dict[str, str]:
         "commit_status": stage["commit_status"],
     }
     octets = {f"ip_{k}": octet for k, octet in enumerate(_octets(host), 1)}
-    places = {f"s7_{name}": s7_address(address) for name, address in numbers.items()}
+    places = {f"s7_{name}": holding_number(address) for name, address in numbers.items()}
     hexadecimal = {"set_words_hex": f"{part_a + part_b + part_c:04X}", "unit_hex": f"{table.where.unit:02X}"}
     return {**_lists(table, _SCL), **octets, **places, **hexadecimal}
 

@@ -1,5 +1,5 @@
-"""The network part of the page: where the gateway listens, and what to set in an IRC5, an S7, a CODESYS or TwinCAT controller
-and a Universal Robot. Addresses come from the exchange table that the generated clients are made from."""
+"""What to set in an IRC5, an S7, a CODESYS or TwinCAT controller and a Universal Robot, and lines of mbpoll to try it.
+Addresses come from the exchange table that the generated clients are made from."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,21 +10,16 @@ from typing import Final
 
 from gateway import defaults
 from gateway.clients.endpoint import Endpoint
-from gateway.clients.exchange import ExchangeTable, s7_address
+from gateway.clients.exchange import ExchangeTable
 from gateway.clients.rendering import endpoint_of, is_no_address
+from gateway.clients.wiring.network import network_section
 from gateway.clients.wiring.section import Row, Section
 from gateway.control.settings import LeaseAction
 from gateway.profiles import Rig
+from gateway.registers.map.register_map import holding_number
 
-_LOST: Final = {
-    LeaseAction.FAULT: "the safe voltage, and fault A310",
-    LeaseAction.HOLD: "a warning, and the force is kept (hold)",
-    LeaseAction.RAMP: "along the ramp to 0 N, and off",
-}
-"""What happens at the end of the lease."""
 _SHOWN: Final = ("status_word", "state", "force_measured", "fault_code", "refusal_reason")
 """What a robot wants to see that reads register by register."""
-_IPV4: Final = 4
 _USUAL_HZ: Final = 20
 _BEATS_OF_A_LEASE: Final = 3  # two lost ones are not a loss of the master
 SHORTEST_TIMER_LEASE_S: Final = 0.3
@@ -39,7 +34,7 @@ def network_sections(rig: Rig, called: str) -> Iterator[Section]:
     """Yield the sections about Modbus TCP: of a rig without it, what holds on its other faces too. called: the rig in commands.
     MissingRegisterError where the map lacks what the clients need."""
     table = ExchangeTable(rig.register_map, _reachable(rig))
-    yield _network(rig, table)
+    yield network_section(rig, table)
     if not rig.network.plain:
         return
     for describe, language, file in (
@@ -60,89 +55,6 @@ def _reachable(rig: Rig) -> Endpoint:
     if ip_address(where.host).is_unspecified:
         return Endpoint("GATEWAY-ADDRESS", where.port, where.unit)
     return where
-
-
-def _network(rig: Rig, table: ExchangeTable) -> Section:
-    network, where, lease_s = rig.network, table.where, rig.control.supervision.lease_s
-    allowed = ", ".join(map(str, network.allow)) or "nobody but this machine"
-    upload = "allowed" if network.allow_plain_upload else "refused on plain TCP (W211): allow_plain_upload"
-    plain = (
-        ("address", f"{where.host}:{where.shown_port}, TCP"),
-        ("unit ids", ", ".join(map(str, network.units))),
-        ("may connect", allowed),
-        ("upload of models", upload),
-    )
-    rows = (
-        ("what", "value"),
-        *(plain if network.plain else ()),
-        ("owner", network.owner or "the first master that commands, until it lets go"),
-        (
-            "lease",
-            "none: a command lasts until the next one"
-            if lease_s is None
-            else f"{lease_s:g} s without a new heartbeat, then {_LOST[rig.control.supervision.lease_action]}",
-        ),
-        (
-            "byte order",
-            "echo of 1234.5 is demanded before enable" if network.require_byte_order_echo else "ABCD, not demanded",
-        ),
-    )
-    return Section("Network: Modbus TCP", _network_sentences(rig, table), rows)
-
-
-def _network_sentences(rig: Rig, table: ExchangeTable) -> tuple[str, ...]:
-    network, where = rig.network, table.where
-    sentences = ["Ethernet cable to the robot's or PLC's network (IRC5: WAN, LAN or service port)."]
-    if not network.plain:
-        off = "Plain Modbus TCP is off in this rig (network.plain: false): masters use the faces above"
-        sentences = [f"{off}. The generated clients and mbpoll by TCP cannot connect. What follows holds on each face."]
-    elif ip_address(network.bind).is_loopback:
-        sentences.append(
-            f"This rig listens on {network.bind} only: no robot can reach it. Set network.bind to this machine's address on "
-            "the cell's network, and network.allow to the networks that may connect."
-        )
-    if network.plain and ip_address(network.bind).version > _IPV4 and not ip_address(network.bind).is_loopback:
-        sentences.append(
-            f"{network.bind} is an IPv6 address, and what follows for robots and PLCs knows IPv4 alone: set network.bind and "
-            "network.allow to this machine's IPv4 address and network. Other programs may use IPv6."
-        )
-    if network.plain and not where.port:
-        sentences.append(
-            f"network.port is 0: the gateway takes a free port at each start, {where.shown_port} below, and its banner says "
-            "which. A robot or PLC needs one that stays: set network.port (502 is Modbus' own)."
-        )
-    sentences += _rights(rig)
-    values = table.command_span[0] + table.values_first
-    generated = " The generated clients do so." if network.plain else ""
-    sentences.append(
-        "A program of your own that writes control_word in each cycle, enable in it, undoes another master's stop: write it "
-        f"only when you want it changed, else from address {values} (4{values + 1:04d}) on.{generated}"
-    )
-    if network.require_byte_order_echo:
-        echo = table.map.find("byte_order_echo").address
-        sentences.append(
-            f"Before the first enable write 1234.5 to byte_order_echo: words 16#449A, 16#5000 to address {echo} "
-            f"(4{echo + 1:04d}), once a connection.{generated}"
-        )
-    return tuple(sentences)
-
-
-def _rights(rig: Rig) -> Iterator[str]:
-    """Yield who may not command, and whose force outlasts it."""
-    supervision, owner = rig.control.supervision, rig.network.owner
-    if supervision.lease_s is None:
-        yield (
-            "This rig has no lease: the force lasts when the master's program stops or its cable is pulled. Before a robot or "
-            f"PLC commands it, set supervision.lease_s ({defaults.LEASE_S:g})."
-        )
-    elif supervision.lease_action is LeaseAction.HOLD:
-        yield (
-            "At the end of its lease this rig keeps the force (supervision.lease_action: hold): when a program stops "
-            "or its cable is pulled. Before a robot or PLC commands it, set fault or ramp."
-        )
-    if is_no_address(owner):
-        others = "a robot or PLC on plain Modbus TCP" if rig.network.plain else "whoever asks by another face"
-        yield f"Only {owner} may command here (network.owner): {others} may read, and disable."
 
 
 def _irc5(rig: Rig, table: ExchangeTable) -> Section:
@@ -232,7 +144,7 @@ def _s7_requests(table: ExchangeTable) -> Section:
     ]
     for what, writes, address, words in _requests(table):
         function = 6 if writes and words == 1 else 16 if writes else 3
-        numbers = (int(writes), s7_address(address), words, 100 + function, address)
+        numbers = (int(writes), holding_number(address), words, 100 + function, address)
         rows.append((what, *map(str, numbers), f"FC{function:02d}"))
     once = "One MB_CLIENT instance, one request at a time: REQ stays TRUE until DONE or ERROR, then FALSE for a call."
     other = "The second pair of MB_MODE and MB_DATA_ADDR counts from 0, and needs an MB_CLIENT that has it (S7-1200: FW 4.2)."

@@ -12,12 +12,12 @@ without lead, with 30 % too short it takes 0.26 s (0.20 s with the right lags, 0
 from math import exp
 from typing import Final
 
+from gateway.control.force_loop.lag_inverse import EQUAL_V
 from gateway.control.limits import TICK_S
 from gateway.control.settings import LeadSettings, Limits
 
 _SHARE: Final = 0.35  # of a lag that is left: 25 of 72 ms, as tried on 20 copies of the rig (tools/paper)
 _SHORTEST_S: Final = 2.0 * TICK_S  # a faster model would chatter between two ticks
-_EQUAL_V: Final = 1.0e-3  # below what an output can resolve: no push, the wish itself
 
 
 class LeadCompensator:
@@ -68,7 +68,7 @@ class LeadCompensator:
         if self._lag_s <= 0.0:
             return wanted_v
         asked_v = self._asked_v(wanted_v)
-        if abs(asked_v - wanted_v) < _EQUAL_V:
+        if abs(asked_v - wanted_v) < EQUAL_V:
             return wanted_v
         lowest_v, highest_v = self._limits.voltage_min_v, self._limits.voltage_max_v
         return max(min(lowest_v, wanted_v), min(max(highest_v, wanted_v), asked_v))

@@ -27,11 +27,11 @@ further time at one target, until it takes LONGEST_PATIENCE_S.
 from math import exp, sqrt
 from typing import Final
 
+from gateway.control.force_loop.response_timing import HELD_S
 from gateway.control.limits import trim_limited
 from gateway.control.settings import LoopTiming, Trim
 from gateway.registers.words import LimitedBy
 
-HELD_S: Final = 0.01  # of the interval between samples, which the pace already has (response_timing)
 SMOOTHING_S: Final = 0.10
 LEAST_SEEN_S: Final = 0.04  # of an error, before it is believed
 SIGMAS: Final = 3.5  # of the smoothed error's noise: the least zone

@@ -45,21 +45,11 @@ from gateway.control.self_test.measurements import (
     without_lone_reading,
 )
 from gateway.control.self_test.rest import judge_rest, why_no_force
+from gateway.control.self_test.stage_times import HOLD_S, READ_REST_S, RISE_S, StageTimes
 from gateway.control.supervision.fault_detection import StopCause
 from gateway.control.supervision.leaping_readings import LeapLimit
 from gateway.registers.words import CalibrationPhase
 
-REST_S: Final = 3.0  # the first of which lets a force from before leave, or as many response lags as it needs
-_LEAVES_S: Final = 1.0
-_LEAVING_LAGS: Final = 5.0  # then 150 times less is left of it
-_LONGEST_LEAVING_S: Final = 4.0  # with both settlings the whole takes less than 20 s, whatever the lag is
-RISE_S: Final = 1.0  # to the first level: less than half of the stated force: a second is slow
-HOLD_S: Final = 4.0  # in which a leak of 1 % per second is 4 % of the force
-_LONGEST_SETTLING_S: Final = 3.0  # or as many response lags as leave 3000 times less
-_SETTLING_LAGS: Final = 8.0
-_MOST_SETTLING_S: Final = 4.4
-_SHORTEST_SETTLING_S: Final = 0.8
-_SETTLED: Final = 4.0  # times the response: 2 % are left of one lag
 _FEWEST: Final = 3  # readings whose mean is compared with the stated force
 _RECENT: Final = 30  # readings, of which one that is alone tells no fall
 _SURE_SIGMAS: Final = 4.0
@@ -84,6 +74,7 @@ class SelfTestRun:
         self.findings: dict[Item, Finding] = {}
         self._known = known
         self._force_n = known.settings.self_test.force_n
+        self._times = StageTimes(known.response_s, moves=self._force_n > 0.0)
         self._stage, self._stage_s = _Stage.REST, 0.0
         self._began_s: float | None = None
         self._now_s = 0.0
@@ -118,29 +109,11 @@ class SelfTestRun:
     @property
     def eta_s(self) -> float:
         """Seconds that are left, at most."""
-        return max(0.0, self._planned_s - self._elapsed_s) if not self.is_done else 0.0
-
-    @property
-    def _planned_s(self) -> float:
-        moves_s = RISE_S + 2.0 * self._settling_s + HOLD_S if self._force_n > 0.0 else 0.0
-        return self._standing_s + moves_s
-
-    @property
-    def _standing_s(self) -> float:
-        """How long nothing moves at the beginning."""
-        return REST_S + max(0.0, min(_LONGEST_LEAVING_S, _LEAVING_LAGS * self._known.response_s) - _LEAVES_S)
+        return max(0.0, self._times.planned_s - self._elapsed_s) if not self.is_done else 0.0
 
     @property
     def _elapsed_s(self) -> float:
         return 0.0 if self._began_s is None else self._now_s - self._began_s
-
-    @property
-    def _settling_s(self) -> float:
-        return min(self._longest_settling_s, max(_SHORTEST_SETTLING_S, _SETTLED * self._known.response_s))
-
-    @property
-    def _longest_settling_s(self) -> float:
-        return max(_LONGEST_SETTLING_S, min(_MOST_SETTLING_S, _SETTLING_LAGS * self._known.response_s))
 
     def observe_line(self, line: LineStatus) -> None:
         """Take in what the lines have counted; before each step."""
@@ -163,7 +136,7 @@ class SelfTestRun:
             if self._stage is not _Stage.REST:
                 self._guard()
         self._advance()
-        progress = min(1.0, self._elapsed_s / self._planned_s)
+        progress = min(1.0, self._elapsed_s / self._times.planned_s)
         return RunStep(self._volts, CalibrationPhase.SELF_TEST, 1.0 if self.is_done else progress, self.eta_s)
 
     def report(self, number: int, fault: FaultCode) -> SelfTestReport:
@@ -177,7 +150,7 @@ class SelfTestRun:
 
     def _advance(self) -> None:
         stage_s, levels = self._now_s - self._stage_s, self._levels
-        if self._stage is _Stage.REST and stage_s >= self._standing_s:
+        if self._stage is _Stage.REST and stage_s >= self._times.standing_s:
             self._end_rest()
         elif self._stage is _Stage.FIRST and levels:
             share = min(1.0, stage_s / RISE_S)
@@ -200,13 +173,13 @@ class SelfTestRun:
     def _is_settled(self, after_s: float) -> bool:
         """No rise any more, or no time; a fall is no reason to wait."""
         waited_s = self._now_s - self._stage_s - after_s
-        if waited_s < self._settling_s or len(self._trace) < _FEWEST:
+        if waited_s < self._times.settling_s or len(self._trace) < _FEWEST:
             return False
-        return waited_s >= self._longest_settling_s or not still_rises(self._trace, self.noise_n)
+        return waited_s >= self._times.longest_settling_s or not still_rises(self._trace, self.noise_n)
 
     def _end_rest(self) -> None:
         known = self._known
-        rest = without_lone_reading(last(self._trace, REST_S - _LEAVES_S))
+        rest = without_lone_reading(last(self._trace, READ_REST_S))
         if not rest:
             self._set(Finding(Item.CELL_LINE, FAILED, "no reading came"))
             self._end()
@@ -248,7 +221,7 @@ class SelfTestRun:
         seen = f"{rise_n:+.1f} N at {levels.second_v:.2f} V, {expected_n:+.1f} N expected"
         self._set(Finding(Item.SIGN, PASSED, seen))
         if still_rises(self._trace, self.noise_n):
-            self._set(judgement.still_rising(self._longest_settling_s))
+            self._set(judgement.still_rising(self._times.longest_settling_s))
             self._leave_force("the force does not settle")
             return
         change_n, friction_n = self._second_n - self._first_n, levels.friction_n(levels.first_v)

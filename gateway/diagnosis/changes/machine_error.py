@@ -41,19 +41,16 @@ Columns = Callable[[int], Iterator[Floats]]
 
 @dataclass(frozen=True, slots=True)
 class ErrorModel:
-    """How large each column is on one machine. largest_pa, largest_n: by which pressure and force are measured; added: sizes
-    of the delayed pressures in each round, by which friction is driven; scale: of each column, 0 for one without a spread;
-    sizes: of the scaled columns, N; common_n, left_n: RMS of what they explain beside the model, and of what neither does.
-    """
+    """How large each column is on one machine."""
 
-    largest_pa: float
-    largest_n: float
+    largest_pa: float  # by which pressure is measured
+    largest_n: float  # by which force is measured
     area_m2: float
-    added: tuple[tuple[float, ...], ...]
-    scale: tuple[float, ...]
-    sizes: tuple[float, ...]
-    common_n: float
-    left_n: float
+    added: tuple[tuple[float, ...], ...]  # sizes of the delayed pressures in each round, by which friction is driven
+    scale: tuple[float, ...]  # of each column; 0 for one without a spread
+    sizes: tuple[float, ...]  # of the scaled columns, N
+    common_n: float  # RMS of what they explain beside the model
+    left_n: float  # RMS of what neither explains
 
     def columns(self, bench: Bench, parameters: ModelParameters) -> Floats:
         """Return the scaled columns (k, rows) of these recordings; zero beyond the force channels."""

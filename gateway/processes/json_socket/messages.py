@@ -5,6 +5,8 @@ from math import isfinite
 from typing import Any, Final
 
 Answer = dict[str, Any]
+LONGEST_ANSWER: Final = 1 << 20
+"""Bytes of an answer: more are none of ours."""
 _LONGEST_SENTENCE: Final = 500
 _DEEPEST: Final = 10
 _MOST_KEYS: Final = 64

@@ -26,6 +26,7 @@ from typing import Any, Final
 from gateway.processes.disk_worker import DiskWorker
 from gateway.processes.json_socket.connection import JsonConnection, SocketLimits, close_with_sentence
 from gateway.processes.json_socket.messages import (
+    LONGEST_ANSWER,
     Answer,
     encode_answer,
     error_answer,
@@ -37,7 +38,6 @@ from gateway.processes.json_socket.messages import (
 Handler = Callable[[dict[str, Any]], Answer | Future[Answer]]
 """A future, done in the loop, is for what waits for a disk."""
 _LONGEST_PATH: Final = 107  # bytes, of a Unix socket's address
-_LONGEST_ANSWER: Final = 1 << 20
 _SHARE: Final = 0.1  # of the loop's time
 _LONGEST_REST_S: Final = 0.5
 _NO_DESCRIPTOR_S: Final = 0.1
@@ -274,7 +274,7 @@ class JsonLineServer:
         """Return the line of the answer that is taken, or of why there is none."""
         try:
             text = encode_answer({"ok": True} | take())
-            if len(text) > _LONGEST_ANSWER:
+            if len(text) > LONGEST_ANSWER:
                 text = encode_answer(error_answer(f"the answer would have {len(text)} bytes"))
         except (ValueError, OSError) as error:
             text = encode_answer(error_answer(str(error)))

@@ -29,16 +29,14 @@ class ProcessorTime(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Silence:
-    """One silence of the control loop. turns: what it had in it; state: the kernel's letter before the kill, empty where
-    it is not known; was_late: the guardian, which does nothing but watch, was not let run in time either; withheld:
-    processor time that was kept from it from outside about then, s, and by whom, in words."""
+    """One silence of the control loop."""
 
     silent_s: float
     bound_s: float
-    used: ProcessorTime | None
-    state: str
-    was_late: bool
-    withheld: tuple[float, str] = 0.0, ""
+    used: ProcessorTime | None  # processor time in it; None: not known
+    state: str  # the kernel's letter before the kill; empty where it is not known
+    was_late: bool  # the guardian, which does nothing but watch, was not let run in time either
+    withheld: tuple[float, str] = 0.0, ""  # seconds kept from it from outside about then; by whom
 
 
 class SchedulerCounters:

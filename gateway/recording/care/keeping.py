@@ -23,7 +23,7 @@ from gateway.recording.reader import recording_paths
 _MARK: Final = ".keep"
 _GONE: Final = ".gone"  # of the highest number that was deleted: it is not used again
 CLOCK_SET_S: Final = 1_577_836_800.0  # 2020: an earlier time is of a clock that nobody had set, as after a power cut
-_CLOSED_S: Final = 5.0  # rows come ten times a second: what was written later than this is being recorded, lock or not
+CLOSED_S: Final = 5.0  # rows come ten times a second: what was written later than this is being recorded, lock or not
 
 
 def keep_recording(path: Path) -> None:
@@ -87,7 +87,7 @@ def choose_prunable(
     for _, status, path in ended:
         age_s = now_s - status.st_mtime if status.st_mtime >= CLOCK_SET_S else None
         why = _why_it_goes(age_s, total, retention)
-        is_needed = path.name in needed or abs(now_s - status.st_mtime) <= _CLOSED_S
+        is_needed = path.name in needed or abs(now_s - status.st_mtime) <= CLOSED_S
         if why and not is_needed and _may_go(path, reference):
             chosen.append(Prunable(path, status.st_size, why))
             total -= status.st_size
@@ -98,7 +98,7 @@ def _with_ends(paths: list[Path], now_s: float) -> Iterator[tuple[float, os.stat
     """With the time at which each ended, as far as the clock of now goes along with it. paths: by number."""
     ended_s = -inf
     for status, path in _statuses(paths):
-        ended_s = status.st_mtime if status.st_mtime <= now_s + _CLOSED_S else ended_s
+        ended_s = status.st_mtime if status.st_mtime <= now_s + CLOSED_S else ended_s
         yield ended_s, status, path
 
 

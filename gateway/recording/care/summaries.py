@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.processes.durable_file import read_object
+from gateway.processes.state_directory import RECORDINGS
 from gateway.progress import report
 from gateway.recording.care.keeping import is_being_recorded
 from gateway.recording.care.what_happened import tell_happened
@@ -30,7 +31,7 @@ Summary = dict[str, Any]
 def list_summaries(state: Path, *, reads_growing: bool = True) -> list[Summary]:
     """Return what is known of every recording, by number. reads_growing: False for who asks every few seconds, and needs no
     more of one that is being recorded than what its header says, and `growing`; by the hour it has 250 MB."""
-    folder = state / "recordings"
+    folder = state / RECORDINGS
     before, paths = _read_cache(folder), recording_paths(state)
     now: dict[str, list[Any]] = {}
     growing: dict[str, list[Any]] = {}

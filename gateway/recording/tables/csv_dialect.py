@@ -37,22 +37,20 @@ _UNPRINTABLE: Final = re.compile(r"[\x00-\x08\x0e-\x1f]")
 
 @dataclass(frozen=True, slots=True)
 class CsvDialect:
-    """names: one per column, "" where the header has none; skip: lines before the first row; sample: the first rows;
-    file: where the text lies, path itself or what was made of it; units: of the row below the header; is_sure: the decimal
-    sign was seen, so that a comma beside points is one of thousands, and no number."""
+    """How a table of text is written."""
 
     path: Path
-    file: Path
+    file: Path  # where the text lies: path itself, or what was made of it
     facts: dict[str, str]
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # one per column, "" where the header has none
     separator: str
     decimal: str
     has_header: bool
-    skip: int
-    sample: tuple[tuple[str, ...], ...]
-    units: tuple[str, ...] = ()
+    skip: int  # lines before the first row
+    sample: tuple[tuple[str, ...], ...]  # the first rows
+    units: tuple[str, ...] = ()  # of the row below the header
     notes: list[str] = field(default_factory=list)
-    is_sure: bool = False
+    is_sure: bool = False  # the decimal sign was seen: a comma beside points is one of thousands
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line as they stand; empty ones beyond the last column are a trailing separator, and dropped."""

@@ -12,11 +12,10 @@ from itertools import groupby
 from typing import Any, Final
 
 from gateway import defaults
-from gateway.registers.map.register_map import PLAIN_BLOCKS, Block, Register, RegisterMap
+from gateway.modbus.pdu import MOST_REGISTERS_READ, MOST_REGISTERS_WRITTEN
+from gateway.registers.map.register_map import PLAIN_BLOCKS, Block, Register, RegisterMap, holding_number, span_of
 from gateway.registers.values import WordOrder
 
-MOST_READ, MOST_WRITTEN = 125, 123
-"""Words of one request, by the Modbus specification."""
 ACTING: Final = ("commit", "slot_select")
 """Registers that do something when they are written, and are written alone therefore."""
 FORMATS: Final = ("markdown", "csv", "json")
@@ -60,7 +59,7 @@ def render_most_used(register_map: RegisterMap) -> str:
     for name in MOST_USED:
         register = register_map.find(name)
         unit = f"{register.scale:g} {register.unit}" if register.unit else ""
-        rows.append((f"4{register.address + 1:04d}", str(register.address), name, unit, _describe_briefly(register)))
+        rows.append((holding_number(register.address), str(register.address), name, unit, _describe_briefly(register)))
     return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
 
@@ -105,10 +104,12 @@ def _section(register_map: RegisterMap, block: Block) -> str:
 def _how_to(register_map: RegisterMap, block: Block) -> list[str]:
     """Return the whole block in the words of the masters that people use, in as many requests as Modbus needs."""
     registers = register_map.registers_of(block.name)
-    reads = list(_requests(registers, MOST_READ))
+    reads = list(_requests(registers, MOST_REGISTERS_READ))
     lines = [f"S7 MB_CLIENT: MB_MODE 0 reads, {_s7_place(each)}" for each in reads]
     for run in _writable_runs(registers):
-        lines += [f"S7 MB_CLIENT: MB_MODE 1 writes, {_s7_place(each)}" for each in _requests(run, MOST_WRITTEN)]
+        lines += [
+            f"S7 MB_CLIENT: MB_MODE 1 writes, {_s7_place(each)}" for each in _requests(run, MOST_REGISTERS_WRITTEN)
+        ]
     return lines + [_mbpoll(block, each) for each in reads]
 
 
@@ -131,20 +132,14 @@ def _writable_runs(registers: Sequence[Register]) -> list[list[Register]]:
     return sorted(runs, key=lambda run: run[0].name in ACTING)
 
 
-def _span(registers: Sequence[Register]) -> tuple[int, int]:
-    """Return (first address, words)."""
-    first, last = registers[0], registers[-1]
-    return first.address, last.address + last.words - first.address
-
-
 def _s7_place(registers: Sequence[Register]) -> str:
-    first, words = _span(registers)
+    first, words = span_of(registers)
     names = registers[0].name if len(registers) == 1 else f"{registers[0].name} .. {registers[-1].name}"
-    return f"MB_DATA_ADDR 4{first + 1:04d}, MB_DATA_LEN {words} ({names})"
+    return f"MB_DATA_ADDR {holding_number(first)}, MB_DATA_LEN {words} ({names})"
 
 
 def _mbpoll(block: Block, registers: Sequence[Register]) -> str:
-    first, words = _span(registers)
+    first, words = span_of(registers)
     if not block.repeats:
         return f"mbpoll -1 -p {defaults.MODBUS_PORT} -r {first + 1} -c {words} HOST"
     option = " -B" if block.word_order is WordOrder.ABCD else ""

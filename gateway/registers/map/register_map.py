@@ -100,6 +100,18 @@ class Block:
         return self.last - self.first + 1
 
 
+def span_of(registers: Sequence[Register]) -> tuple[int, int]:
+    """Return (first address, words) from the first of these registers to the last."""
+    first, last = registers[0], registers[-1]
+    return first.address, last.address + last.words - first.address
+
+
+def holding_number(address: int) -> str:
+    """Return the number by which people, and MB_DATA_ADDR of an S7, call a holding register: 40001 is address 0. Five digits up
+    to 49999, six from 410000 on."""
+    return f"4{address + 1:04d}"
+
+
 def repeat_as_float(register: Register, source: Block, block: Block) -> Register | None:
     """Return the same quantity as float32 in a float block: word k of the source at base + 2k. None if float32 cannot
     carry it."""

@@ -114,7 +114,7 @@ def _reversal_facts(evaluation: Evaluation) -> Document:
         "identified": True,
         "span_n": evaluation.span_n,
         "stops": len(reversal.slip.stops.radii_v) if reversal.slip else 0,
-        "points": reversal.span.points,
+        "points": len(checked.minor_v),
         "rms_n": rms_n(error_n),
         "max_n": float(np.abs(error_n).max()),
         "switched_rms_n": rms_n(switched_n),

@@ -19,18 +19,15 @@ WORSE_SHARE: Final = 0.05  # of the band: a smaller difference is none
 
 @dataclass(frozen=True, slots=True)
 class Acceptance:
-    """error: on all measured points; allowed_n: of its RMS, None where the rig is not known; other: the same data by another
-    calibration, None where the rig is not known; in_use: its number, None where nobody has said that it is in use; named:
-    which it is, in words; rejected: why the fit is not offered, empty where it is; has_walk: partial reversals are among the
-    points."""
+    """Whether a fit is offered, and what it was compared with."""
 
-    error: Error
-    allowed_n: float | None
-    other: Error | None
-    in_use: int | None
-    named: str
-    rejected: str
-    has_walk: bool
+    error: Error  # on all measured points
+    allowed_n: float | None  # of its RMS; None: the rig is not known
+    other: Error | None  # the same data by another calibration; None: the rig is not known
+    in_use: int | None  # number of the other one; None: nobody has said that it is in use
+    named: str  # which the other one is, in words
+    rejected: str  # why the fit is not offered; empty where it is
+    has_walk: bool  # partial reversals are among the points
 
     def facts(self) -> dict[str, Any]:
         """Return the decision as entries of the JSON document."""

@@ -22,6 +22,7 @@ from gateway.control.runs.experiment_run import ExperimentRun
 from gateway.devices.messages import ForceSample
 from gateway.plants.in_use import in_use_facts
 from gateway.processes.disk_worker import DiskWorker
+from gateway.processes.state_directory import RECORDINGS
 from gateway.profiles import Rig
 from gateway.profiles.kinds.plans import plan_of
 from gateway.recording import Recorder
@@ -241,7 +242,7 @@ class CalibrationRuns:
             "zero_n": self._controller.zero_n,
         }
         columns = COLUMNS if isinstance(run, ExperimentRun) else (*COLUMNS, *LABELS)
-        folder = self._state / "recordings"
+        folder = self._state / RECORDINGS
         self._recording = self._last = RunRecording(self.disk, lambda: Recorder(folder, header, columns), self._log)
         self._is_closing = False
         self._recording.begin(self._on_opened)

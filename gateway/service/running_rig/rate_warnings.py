@@ -17,6 +17,7 @@ from gateway.codes.warning_bits import WarningBit
 from gateway.control.blame_for_silence import NOT_HELD, Held, cure_for_waiting
 from gateway.devices.messages import Garbage
 from gateway.processes.scheduling.scheduler_counters import ProcessorTime
+from gateway.units import format_ms
 
 WINDOW_S: Final = 10.0
 LEAST: Final = 3
@@ -132,19 +133,21 @@ class SlowLoop(_RateWarning):
         if self.is_on or stalls < LEAST or missed <= SHARE * WINDOW_S / self._period_s:
             return ""
         self.is_on = True
-        bound = _ms(LATE_PERIODS * self._period_s)
+        bound = format_ms(LATE_PERIODS * self._period_s)
         observation = f"{missed:.0f} of {ticks:.0f} ticks within {WINDOW_S:g} s were missed or over {bound} late"
         withheld_s, by_whom = self._withheld() if self._withheld else (0.0, "")
         if is_cause(withheld_s, spent_s[0]):
-            return f"A342 {observation}, {_ms(spent_s[0])} in all: {by_whom}"
+            return f"A342 {observation}, {format_ms(spent_s[0])} in all: {by_whom}"
         return f"A342 {observation}, {_cause_of_lateness(*spent_s, is_counted=used is not None)}"
 
 
 def _cause_of_lateness(late_s: float, waited_s: float, ran_s: float, *, is_counted: bool) -> str:
     """The machine or the program, by what took most of the lateness; all in seconds."""
     if not is_counted:
-        return f"{_ms(late_s)} in all, not counted why: end other programs, or `run --realtime`"
-    times_text = f"{_ms(late_s)} in all, {_ms(waited_s)} of them waiting for a processor, {_ms(ran_s)} at work"
+        return f"{format_ms(late_s)} in all, not counted why: end other programs, or `run --realtime`"
+    times_text = (
+        f"{format_ms(late_s)} in all, {format_ms(waited_s)} of them waiting for a processor, {format_ms(ran_s)} at work"
+    )
     if is_cause(waited_s, late_s):
         return f"{times_text}: {BUSY_CURE}"
     if is_cause(ran_s, late_s):
@@ -156,17 +159,11 @@ def _late_rig_words(held: Held) -> str:
     """Why the process behind a simulated rig has answered late, empty where it has not, or where the rig is a real one."""
     rig = "the simulated rig's process"
     if held.rig_stopped_s >= _TORN_S:
-        return (
-            f"{rig} was stopped for {_ms(held.rig_stopped_s)} in that time (a signal, a debugger), which tears answers"
-        )
+        return f"{rig} was stopped for {format_ms(held.rig_stopped_s)} in that time (a signal, a debugger), which tears answers"
     if held.rig_waited_s >= _TORN_S:
-        waited = f"{rig} waited {_ms(held.rig_waited_s)} for a processor in that time, which tears answers"
+        waited = f"{rig} waited {format_ms(held.rig_waited_s)} for a processor in that time, which tears answers"
         return f"{waited}: {cure_for_waiting(held, held.rig_waited_s)}"
     return ""
-
-
-def _ms(seconds: float) -> str:
-    return f"{seconds * 1e3:.0f} ms"
 
 
 class RateWarnings:

@@ -24,6 +24,7 @@ from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import Ending
 from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 from gateway.processes.scheduling.withheld_time import WithheldTime
+from gateway.processes.state_directory import RECORDINGS
 from gateway.profiles import CellLine, OutputLine, Rig
 from gateway.recording.ring import SampleRing
 from gateway.registers import RegisterBank
@@ -95,7 +96,7 @@ class RunningRig:
             valve = rig.valve.device
             self._valve_line = ValveExchange(ValveHost(valve), self._ports.write_valve, valve.reply_timeout_s)
         self._tick = ClockTick(1.0 / rig.loop_hz, self._on_tick)
-        self._recordings = Recordings(state / "recordings", rig, log)
+        self._recordings = Recordings(state / RECORDINGS, rig, log)
         self._audit = RigAudit(state, log, time.monotonic)
 
     def _wire(self, cause: FaultCode) -> None:

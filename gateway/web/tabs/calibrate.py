@@ -17,11 +17,12 @@ from gateway import defaults
 from gateway.control.runs.ladder_stairs import QUICK, CalibrationPlan
 from gateway.control.runs.preconditions import preconditions
 from gateway.processes.durable_file import read_object
+from gateway.processes.state_directory import CALIBRATIONS
+from gateway.recording.label import check_name
 from gateway.web.context import WebContext
 from gateway.web.tabs.answers import Nothing, TabRefusedError, answers, read_body
 from gateway.web.tabs.run_follower import RunFollower
 
-_LONGEST_NAME: Final = 60
 _PLANS: Final = {"quick": QUICK, "full": CalibrationPlan()}
 _OFFERED: Final = ("step_v", "groups", "minor_points", "response_steps")
 
@@ -80,13 +81,11 @@ def routes(context: WebContext) -> list[Route]:
 
 
 def _checked_name(text: str) -> str:
-    """Return a calibration's name on one line, empty for none; the rules of `calibrate --name`."""
-    name = " ".join(text.split())
-    if name and (not name.isprintable() or name.isdecimal() or len(name) > _LONGEST_NAME):
-        raise TabRefusedError(
-            f"{name!r} is no name: at most {_LONGEST_NAME} printable characters, not a number alone", 400
-        )
-    return name
+    """Return a calibration's name, empty for none."""
+    try:
+        return check_name(text) if text.strip() else ""
+    except ValueError as error:
+        raise TabRefusedError(str(error), 400) from None
 
 
 def _number_of(recording: str | None) -> int | None:
@@ -96,7 +95,7 @@ def _number_of(recording: str | None) -> int | None:
 
 def _read_fit(state: Path, document: str) -> dict[str, Any] | None:
     """Return the fit's document; None for one that is gone, or is not in this state directory."""
-    path = state / "calibrations" / Path(document).name
+    path = state / CALIBRATIONS / Path(document).name
     try:
         fit: dict[str, Any] = read_object(path)
     except (OSError, ValueError):

@@ -14,6 +14,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from gateway.processes.durable_file import read_object, read_regular
+from gateway.processes.state_directory import CALIBRATIONS
 from gateway.web.context import WebContext
 from gateway.web.tabs.answers import (
     NOT_FOUND,
@@ -94,7 +95,7 @@ def routes(context: WebContext) -> list[Route]:
 
 def _read_report(state: Path, number: int) -> str:
     """Return the report of a calibration; the document beside it says whose it is."""
-    folder = state / "calibrations"
+    folder = state / CALIBRATIONS
     try:
         document = read_object(folder / f"{number:04d}.json")
         text = read_regular(folder / f"{number:04d}.html").decode()

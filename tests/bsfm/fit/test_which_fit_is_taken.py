@@ -175,7 +175,7 @@ def test_what_is_chosen_is_told_with_how_it_reverses(monkeypatch: pytest.MonkeyP
     assert (told.chosen, told.model, told.span_n, told.reversal) == (chosen, model, 10.0, None)
     assert (orders, ties) == ((1, 2), FitRequest().ties)
     assert [note.partition(":")[0] for note in told.notes] == ["checked", "12 stairs on a branch", "no minor-loop part"]
-    slip = SimpleNamespace(span=SimpleNamespace(span_n=3.0), model=SimpleNamespace(branches=model.branches))
+    slip = SimpleNamespace(span_n=3.0, model=SimpleNamespace(branches=model.branches))
     told, *_ = evaluated(monkeypatch, slip)
     assert (told.span_n, told.model, told.reversal) == (3.0, slip.model, slip)
     assert not any("fitted anew" in note for note in told.notes)

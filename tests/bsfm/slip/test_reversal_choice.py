@@ -42,7 +42,7 @@ def test_a_walk_of_slip_stops_is_recognised_as_one() -> None:
     assert choice is not None
     assert choice.slip is not None
     assert choice.slip_heldout_n < 0.9 * choice.blend_heldout_n
-    assert choice.span.span_n > 0.0  # for upload and C code
+    assert choice.span_n > 0.0  # for upload and C code
 
 
 def test_a_short_walk_identifies_the_blend_alone_and_none_nothing() -> None:

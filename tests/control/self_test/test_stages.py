@@ -11,7 +11,8 @@ from gateway.control.inputs import LineStatus, WireCounts
 from gateway.control.sample_conditioning import Reading
 from gateway.control.self_test.items import FAILED, FORCE_ITEMS, NOT_TESTED, PASSED, Item, SelfTestPlan
 from gateway.control.self_test.judgement import Known
-from gateway.control.self_test.self_test_run import HOLD_S, REST_S, RISE_S, SelfTestRun
+from gateway.control.self_test.self_test_run import SelfTestRun
+from gateway.control.self_test.stage_times import HOLD_S, REST_S, RISE_S
 from gateway.control.settings import SelfTestSettings, ValveControl
 from gateway.registers.words import CalibrationPhase
 from tests.control.bench import bsfm, settings

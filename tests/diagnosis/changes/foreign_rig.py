@@ -33,8 +33,6 @@ EFFECTS: Final = (
     "sensor-quantisation",
 )
 _MARCHED: Final = EFFECTS[:9]  # the rest is in the readings
-_PA_PER_V: Final = 0.9e5
-_AREA_M2: Final = 1.0e-4
 
 
 @numba.njit(cache=True)

@@ -6,6 +6,7 @@ import pytest
 
 from gateway.profiles import Report, check_report, load_rig
 from tests.certificates import store_all
+from tests.profiles.rigs.test_checks import messages
 from tests.profiles.rigs.test_tls_checks import files
 from tests.profiles.rigs.test_tls_checks import report as tls_report
 
@@ -19,10 +20,6 @@ def report(folder: Path, fieldbus: str, *, simulated: bool = False) -> Report:
     path = folder / "rig.yaml"
     path.write_text(f"{CELL}\nfieldbus: {fieldbus}\n", encoding="utf-8")
     return check_report(path, simulated=simulated)
-
-
-def messages(faults: tuple[object, ...]) -> list[str]:
-    return [str(fault).split(" ", 1)[1] for fault in faults]
 
 
 def test_a_face_is_read_with_modbus_own_defaults(tmp_path: Path) -> None:

@@ -6,7 +6,6 @@ import socket
 import stat
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,14 +13,6 @@ import pytest
 from gateway.processes import exit_codes
 from gateway.service.supervisor import guardian
 from gateway.service.supervisor.run_options import RunOptions
-
-
-@pytest.fixture
-def generous_umask() -> Iterator[None]:
-    """Takes nothing away: what is seen is what was asked for."""
-    previous = os.umask(0)
-    yield
-    os.umask(previous)
 
 
 class _EnoughSeenError(Exception):

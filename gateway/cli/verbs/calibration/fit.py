@@ -14,6 +14,7 @@ from gateway.cli.command_line.table_options import table_options
 from gateway.cli.errors import CliError, no_such_recording
 from gateway.cli.options import check_state, json_option, name_option, state_directory, state_option
 from gateway.processes import exit_codes
+from gateway.processes.state_directory import RECORDINGS
 
 if TYPE_CHECKING:
     from gateway.recording import Recording
@@ -166,7 +167,7 @@ def _background(recording: "Recording", options: dict[str, Any]) -> "RigContext"
 
     rig, state = options["rig"], options["state"]
     own = state_directory(state, rig)
-    if state is None and recording.path.parent == own / "recordings":
+    if state is None and recording.path.parent == own / RECORDINGS:
         rig, state = rig or str(recording.header.get("rig") or "") or None, own
     return RigContext(rig=rig, state=state, force_unit=options["force_unit"])
 

@@ -10,13 +10,12 @@ import click
 
 from gateway.cli.command_line.duration import parse_duration_s
 from gateway.cli.errors import CliError
-from gateway.cli.options import StateChoice, calibration_name, json_option, state_options
+from gateway.cli.options import StateChoice, json_option, label_name, state_options
 from gateway.processes import exit_codes
 
 _ON = {"on": True, "off": False}
 _LOOK_S: Final = 0.2
 _MOST_LOOKS: Final = 25  # five seconds, in which control is started again
-_LONGEST_NOTE: Final = 1000  # gateway.recording.label
 _LONGEST_S: Final = 31 * 86400.0
 
 
@@ -37,16 +36,18 @@ def _note(context: click.Context, parameter: click.Parameter, value: str | None)
     """Return what stands in one paragraph, for an option's callback."""
     if value is None:
         return None
-    note = " ".join(value.split())
-    if not note or not note.isprintable() or len(note) > _LONGEST_NOTE:
-        raise click.BadParameter(f"a note has 1 to {_LONGEST_NOTE} printable characters")
-    return note
+    from gateway.recording.label import check_note
+
+    try:
+        return check_note(value)
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
 
 
 @click.command()
 @click.argument("what", type=click.Choice(["on", "off", "status"]), required=False)
 @click.option("--for", "for_s", callback=_duration_s, metavar="TIME", help="Record so long (60s, 10min), and wait.")
-@click.option("--name", callback=calibration_name, help="What the recording is called.")
+@click.option("--name", callback=label_name, help="What the recording is called.")
 @click.option("--note", callback=_note, metavar="TEXT", help="What is to be known about it.")
 @state_options
 @json_option

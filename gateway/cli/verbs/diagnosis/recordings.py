@@ -17,6 +17,7 @@ from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
+from gateway.processes.state_directory import RECORDINGS
 
 if TYPE_CHECKING:
     from gateway.watch.reference_recording import ReferenceRecording
@@ -62,7 +63,7 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
         click.echo(json.dumps([facts_of(*one) for one in marked], indent=2))
         return
     if not marked:
-        click.echo(f"no recordings in {directory / 'recordings'}; force-gateway record on, or run --record, makes one")
+        click.echo(f"no recordings in {directory / RECORDINGS}; force-gateway record on, or run --record, makes one")
         return
     click.echo("\n".join(line for one in marked for line in lines_of(*one)))
 

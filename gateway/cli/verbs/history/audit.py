@@ -10,6 +10,7 @@ from gateway.cli.command_line.since_option import YoungerRecords, since_option
 from gateway.cli.errors import CliError, no_state_directory
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
+from gateway.processes.state_directory import AUDIT
 
 EXAMPLES = ("audit show --since 1h", "audit verify")
 
@@ -105,7 +106,7 @@ def _value(value: Any) -> str:
 def _directory_of(state: StateChoice) -> None:
     if not state.directory.is_dir():
         raise no_state_directory(state.directory)
-    if not (state.directory / "audit").is_dir():
+    if not (state.directory / AUDIT).is_dir():
         raise _no_audit(state)
 
 

@@ -10,6 +10,7 @@ from gateway.cli.command_line.completion_words import complete_setting_names, co
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.processes import exit_codes
+from gateway.processes.state_directory import RIG_SOCKET
 
 _COLUMN: Final = 32
 
@@ -90,7 +91,7 @@ def _ask(state: StateChoice, request: dict[str, Any]) -> dict[str, Any]:
     request = {"do": "sim"} | request
     ask(state.directory, request)
     try:
-        return ask(state.directory, request, "rig.sock")
+        return ask(state.directory, request, RIG_SOCKET)
     except CliError as error:
         if error.exit_code != exit_codes.DEVICE:
             raise

@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,9 +13,6 @@ from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
     from gateway.ports import PortInfo
-
-_SLOW_LATENCY_MS: Final = 16  # what FTDI adapters start with: at 9600 baud it costs half of the cycle
-
 
 EXAMPLES = ("ports", "ports --json")
 
@@ -78,11 +75,13 @@ def _listen(paths: tuple[str, ...], seconds: float, *, as_json: bool) -> int:
 
 
 def _line(port: "PortInfo") -> str:
+    from gateway.ports.latency import SLOW_MS
+
     facts = [port.device if port.by_id else "no by-id name: another adapter may get this name after a replug"]
     facts += [port.description] if port.description else []
     facts += [f"driver {port.driver}"] if port.driver else []
     if port.latency_ms is not None:
-        slow = " (slow: the gateway sets 1 ms where it may)" if port.latency_ms >= _SLOW_LATENCY_MS else ""
+        slow = " (slow: the gateway sets 1 ms where it may)" if port.latency_ms >= SLOW_MS else ""
         facts.append(f"latency timer {port.latency_ms} ms{slow}")
     facts += [f"in use by {port.holder}"] if port.holder else []
     return ", ".join(facts)

@@ -15,7 +15,15 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Final
 
-from gateway.modbus.certificate import KEY_MISMATCH, PeerCertificate, read_certificates
+from gateway.modbus.certificate import (
+    HAS_EXPIRED,
+    KEY_MISMATCH,
+    NO_ISSUER,
+    NOT_YET_VALID,
+    WRONG_PURPOSE,
+    PeerCertificate,
+    read_certificates,
+)
 from gateway.modbus.expiry import CURES, SOON_DAYS, day_of, end_of, expiry_sentence
 from gateway.plain_file import read_plain
 from gateway.profiles.rigs.checks.network import is_loopback
@@ -23,15 +31,12 @@ from gateway.profiles.rigs.checks.parts import Check, Found, Parts
 from gateway.profiles.rigs.faces import TlsFace
 from gateway.profiles.rigs.rig_file import Network
 
-_PURPOSE: Final = 26  # X509_V_ERR_INVALID_PURPOSE
-_NO_ROOT: Final = 2  # X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT: of one that is trusted
 _FLIGHTS: Final = 3  # of a handshake: hello, certificate, end
 _MAKE: Final = "`force-gateway certs DIR` makes a CA, a server and clients"
-_NOT_YET, _EXPIRED = 9, 10  # X509_V_ERR_CERT_NOT_YET_VALID, X509_V_ERR_CERT_HAS_EXPIRED
 _REFUSALS: Final = {
-    _NO_ROOT: "is of a CA that another one has signed, which the file of `ca` lacks (add it there)",
-    _PURPOSE: "is not one for a server (a client's?)",
-    _EXPIRED: "is of a CA that has expired, as all that it has signed",
+    NO_ISSUER: "is of a CA that another one has signed, which the file of `ca` lacks (add it there)",
+    WRONG_PURPOSE: "is not one for a server (a client's?)",
+    HAS_EXPIRED: "is of a CA that has expired, as all that it has signed",
 }
 _CURES: Final[dict[type[OSError], str]] = {
     FileNotFoundError: _MAKE,
@@ -164,7 +169,7 @@ def _unfit(path: str, face: TlsFace) -> Found:
     except (ssl.SSLError, OSError) as error:
         yield f"{path}.ca", f"E174 {face.ca} cannot be used: {_reason(error)}; {_MAKE}"
         return
-    if _is_in_its_days(face) and (code := _refusal(server, client)) and code != _EXPIRED:
+    if _is_in_its_days(face) and (code := _refusal(server, client)) and code != HAS_EXPIRED:
         yield f"{path}.certificate", _unwanted(face, code)
 
 
@@ -175,8 +180,8 @@ def _over(path: str, face: TlsFace) -> Found:
         yield f"{path}.certificate", f"E173 {face.certificate} expired on {day_of(shown.ends)}: {cure}"
     elif _is_in_its_days(face) and not list(_unreadable(path, face)):
         with contextlib.suppress(ssl.SSLError, OSError, ValueError):  # a fault, and told as one
-            if _refusal(_server_of(face), _client_of(face)) == _EXPIRED:
-                yield f"{path}.certificate", _unwanted(face, _EXPIRED)
+            if _refusal(_server_of(face), _client_of(face)) == HAS_EXPIRED:
+                yield f"{path}.certificate", _unwanted(face, HAS_EXPIRED)
 
 
 def _unwanted(face: TlsFace, code: int) -> str:
@@ -229,7 +234,7 @@ def _refusal(server: ssl.SSLContext, client: ssl.SSLContext) -> int:
         except ssl.SSLWantReadError:
             continue
         except ssl.SSLCertVerificationError as error:
-            return 0 if error.verify_code == _NOT_YET else error.verify_code  # of its CA: told as its days are
+            return 0 if error.verify_code == NOT_YET_VALID else error.verify_code  # of its CA: told as its days are
         except ssl.SSLError:  # nothing that the files are to blame for
             break
     return 0

@@ -3,23 +3,16 @@
 import asyncio
 import socket
 import threading
-from collections.abc import Iterator
 from pathlib import Path
-
-import pytest
 
 from gateway.processes.disk_worker import THREAD_NAME
 from gateway.recording import list_recordings
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.disk.threads import join_disk_threads
 from tests.end_to_end.own_devices import OwnDevices
-from tests.service.running_rig.test_running_rig import with_running_rig
+from tests.service.running_rig.begun_rig import devices, with_running_rig
 
-
-@pytest.fixture
-def devices(tmp_path: Path) -> Iterator[OwnDevices]:
-    with OwnDevices(tmp_path) as devices:
-        yield devices
+__all__ = ["devices"]
 
 
 def open_below(folder: Path) -> list[str]:

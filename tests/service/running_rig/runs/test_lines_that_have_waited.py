@@ -8,7 +8,7 @@ import pytest
 
 from gateway.registers.words import State
 from gateway.service.running_rig.calibration_runs import FOLLOWED_S
-from tests.service.requests.test_hostile_requests import Stage
+from tests.service.requests.stage import Stage
 from tests.service.running_rig.runs.test_calibration_runs import PLAN, POLL_S, SHORT
 
 
