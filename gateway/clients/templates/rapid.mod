@@ -214,7 +214,14 @@ ${crc_table}];
   PROC FgTimerStop()
     IDelete irTimer;
     fgEnable:=FALSE;
+    ! No cycle follows: OFF waits for no back-off, and goes once more
+    ! where the connection turns out to be dead
+    nBackoff:=0;
     FgCycle;
+    IF bOffPending THEN
+      nBackoff:=0;
+      FgCycle;
+    ENDIF
     SocketClose sdGateway;
     fgConnected:=FALSE;
     ClkStop clRetry;
@@ -228,11 +235,12 @@ ${crc_table}];
   PROC FgInit()
     IF ERR_FG_FRAME=-1 BookErrNo ERR_FG_FRAME;
     SocketClose sdGateway;
+    ! What was not let go, or is on, is let go first
+    IF bAsking OR FgIsOn() bOffPending:=TRUE;
     FgClearStatus;
     nBackoff:=0;
     fgEnded:=FALSE;
     FgForgetAsked;
-    bOffPending:=FALSE;
     bOffRefused:=FALSE;
     bAsking:=FALSE;
     ClkStop clRetry;
