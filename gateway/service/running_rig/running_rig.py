@@ -126,7 +126,7 @@ class RunningRig:
                 plants=self._plants,
                 audit=self._audit,
                 simulation=SimulationRequests(rig),
-                paths=lambda: {"output": self._ports.output.path, "load_cell": self._ports.cell.path},
+                paths=lambda: self._ports.paths,
                 peers=lambda: self._faces.peers,
                 calibration_date=lambda: self._calibration.date_utc,
                 running=self._running,
