@@ -25,7 +25,8 @@ TEXT_LENGTH: Final = 56
 
 COMMAND: Final = ("control_word", "force_setpoint", "force_ramp", "mode", "heartbeat", "command_sequence")
 STATUS: Final = (
-    "status_word state force_measured fault_code warning_word heartbeat_echo refusal_address refusal_reason refusal_value"
+    "status_word state force_measured force_requested fault_code warning_word heartbeat_echo "
+    "refusal_address refusal_reason refusal_value"
 ).split()
 STAGING: Final = (
     "order falling_b_0 blend_span length crc32 target_slot commit commit_status failing_index failing_reason slip_stops"
@@ -34,6 +35,9 @@ ACTIVE: Final = ("order", "falling_b_0", "blend_span", "crc32", "slip_stops")
 PROOF_BLOCK: Final = ("byte_order_echo", "map_hash")
 NEEDED: Final = {"command": COMMAND, "status": STATUS, "staging": STAGING, "active": ACTIVE, "proof": PROOF_BLOCK}
 """Block -> registers that the clients name."""
+
+REQUESTED: Final = "force_requested"
+"""What the gateway was asked for last: another program at a client's address owns the setpoint as well."""
 
 NAMED: Final = ("fault_code", "refusal_reason", "warning_word", "state", "failing_reason", "commit_status")
 """Registers whose numbers or bits the clients say in words."""
@@ -88,7 +92,11 @@ class ExchangeTable:
         for block in _WITH_NUMBERS:
             if any(each.words > 1 and each.word_order is not WordOrder.ABCD for each in self.map.registers_of(block)):
                 yield f"word order abcd in block {block}"
-        yield from (f"type int16 of {each.name}" for each in self.command if each.unit and each.type != "int16")
+        of_int16 = [
+            *(each for each in self.command if each.unit),
+            *(each for each in self.status if each.name == REQUESTED),
+        ]
+        yield from (f"type int16 of {each.name}" for each in of_int16 if each.type != "int16")
         yield from self._find_missing_bits("control_word", CONTROL_BITS)
         yield from self._find_missing_bits("status_word", STATUS_BITS)
         yield from self._find_missing_names()
@@ -187,7 +195,7 @@ class ExchangeTable:
     def values(self) -> dict[str, object]:
         """Return the scalar values that templates name, but for what a language spells in its own way."""
         (command_first, command_words), (status_first, status_words) = self.command_span, self.status_span
-        force = self.at("force_setpoint", "command")
+        force, requested = self.at("force_setpoint", "command"), self.at(REQUESTED, "status")
         return {
             "version": VERSION,
             "map_name": self.map.name,
@@ -207,6 +215,7 @@ class ExchangeTable:
             "force_min": _limit(force.minimum or 0.0),
             "force_max": _limit(force.maximum or 0.0),
             "force_counts": force.counts_per_unit,
+            "force_apart": f"{0.6 / min(force.counts_per_unit, requested.counts_per_unit):.10f}".rstrip("0"),
             **self._proof_values(),
             **self._upload_values(),
             **self._offsets(),

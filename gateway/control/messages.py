@@ -39,7 +39,7 @@ def hunting_sentence(force_n: float, turns: int) -> str:
     """Return W360, which says that the trim has backed off."""
     return (
         f"W360 at {force_n:.1f} N the trim has turned round {turns} times: the force sticks and slips, or the "
-        "workpiece moves; the trim stands still until there is another setpoint"
+        "workpiece moves; the trim stands still until there is another setpoint, or a large error that stays on one side"
     )
 
 

@@ -54,6 +54,10 @@ class OutputHost(Protocol):
         """Return what follows the last safe frame when the gateway ends in order: the device's watchdog is switched off."""
 
     @property
+    def hears_itself(self) -> bool:
+        """Decide whether the adapter is known to bring our own words back, which a device's answer may equal."""
+
+    @property
     def safe_reply(self) -> bytes:
         """The whole line that acknowledges the last `safe_frame` (the least voltage before the first)."""
 

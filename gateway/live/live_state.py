@@ -146,7 +146,7 @@ class LiveWriter:
 class LiveState:
     """The whole answer. state: off, ready, ramping, holding, fault or calibrating; mode: force or voltage; status: names of the
     bits that are set in status_word; enable_block: why an enable would be refused now, empty where it would not; refusals:
-    requests that were refused since the start."""
+    requests that were refused since the start; valve: without a device on a rig that has none."""
 
     rig: str
     simulated: bool
@@ -168,6 +168,7 @@ class LiveState:
     peers: tuple[LivePeer, ...] = ()
     output: LiveLine = field(default_factory=LiveLine)
     load_cell: LiveLine = field(default_factory=LiveLine)
+    valve: LiveLine = field(default_factory=LiveLine)
     loop: LiveLoop = field(default_factory=LiveLoop)
     recording: LiveRecording = field(default_factory=LiveRecording)
     run: LiveRun = field(default_factory=LiveRun)
@@ -198,6 +199,7 @@ _PARTS: dict[str, type] = {
     "plant": LivePlant,
     "output": LiveLine,
     "load_cell": LiveLine,
+    "valve": LiveLine,
     "loop": LiveLoop,
     "recording": LiveRecording,
     "run": LiveRun,

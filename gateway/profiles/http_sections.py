@@ -19,6 +19,7 @@ from gateway.profiles.strict_yaml.typed import adapter
 from gateway.profiles.telemetry_sections import Mqtt
 
 _SECRETS: Final = ("token", "password")
+_ESCAPE: Final = "\\"  # a key in double quotes may be spelt by escapes: "to\u006ben"
 _COMMENT: Final = re.compile(r"(?:^|(?<=\s))#[^\n]*", re.M)
 _SAID: Final = re.compile(rf"(?:{'|'.join(_SECRETS)})[\"']?\s*[:=]\s*(\S.*)", re.I)
 _LEAST: Final = 8  # characters of a secret that is looked for in comments: a shorter one stands in any word
@@ -113,7 +114,7 @@ def without_secrets(text: str) -> str:
     """Return the text of a rig file with tokens and passwords blanked; it reads as before otherwise. Where a value ends YAML
     says: it may have spaces, commas and number signs in it, and go on in the next line. One in a comment, as of a former token,
     goes to the end of its line; a comment that has the present one goes as a whole."""
-    if not any(name in text.lower() for name in _SECRETS):
+    if not any(name in text.lower() for name in (*_SECRETS, _ESCAPE)):
         return text
     document = yaml.compose(text, yaml.SafeLoader)
     nodes = list(_secret_nodes(document))

@@ -211,7 +211,22 @@ class LiveAnswers:
                 garbled=loop.cell_counts.garbled,
                 age_s=now_s - loop.sample.time_s if loop.sample else None,
             ),
+            "valve": self._valve_line(loop, now_s),
         }
+
+    def _valve_line(self, loop: ControlLoop, now_s: float) -> live.LiveLine:
+        valve = self._rig.valve
+        if valve is None or loop.valve is None:
+            return live.LiveLine()
+        counts, silent_s = loop.valve.counts, loop.valve.status.unanswered_since_s
+        return live.LiveLine(
+            port=self._parts.paths()["valve"],
+            device=valve.device.name,
+            asked=counts.asked,
+            heard=counts.heard,
+            garbled=counts.garbled,
+            age_s=None if not counts.heard else now_s - silent_s if silent_s else 0.0,
+        )
 
     def _loop(self, loop: ControlLoop) -> live.LiveLoop:
         health = loop.health

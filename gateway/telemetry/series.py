@@ -63,7 +63,11 @@ def _pressure_pa(state: LiveState) -> float | None:
 
 def _per_line(name: str, kind: str, unit: str, help_text: str, value: Callable[[LiveLine], Iterable[Sample]]) -> Series:
     def read(reading: GatewayReading) -> Iterator[Sample]:
-        for line, found in (("output", reading.state.output), ("load_cell", reading.state.load_cell)):
+        state = reading.state
+        lines = {"output": state.output, "load_cell": state.load_cell} | (
+            {"valve": state.valve} if state.valve.device else {}
+        )
+        for line, found in lines.items():
             yield from (({"line": line} | labels, number) for labels, number in value(found))
 
     return Series(PREFIX + name, kind, unit, help_text, read)

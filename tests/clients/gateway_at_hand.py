@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 
 from gateway.bsfm.coefficients import CoefficientLimits
 from gateway.codes.faults import FaultCode
@@ -61,6 +62,10 @@ class GatewayAtHand:
         """Another master takes the setpoint over, and holds 7 N."""
         answer(struct.pack(">BHHBHH", 16, 0, 2, 4, 9, 700), self.bank, Peer("10.0.0.7", 40001))
 
+    def write_beside_the_client(self, force_n: float) -> None:
+        """Another program at the client's address, an owner as well, writes a force."""
+        answer(struct.pack(">BHH", 6, 1, round(100 * force_n)), self.bank, replace(self.peer, port=40002))
+
     def publish(self, force_n: float, *, on: bool) -> None:
         word = StatusBit.ENABLED | StatusBit.READY | StatusBit.IN_BAND if on else StatusBit(0)
         state = State.HOLDING if on else State.OFF
@@ -71,7 +76,7 @@ class GatewayAtHand:
                 state=state,
                 status_word=int(word),
                 force_measured_n=force_n - 0.5,
-                force_requested_n=force_n,
+                force_requested_n=self.bank.command.force_requested_n,
                 fault_code=self.fault,
                 heartbeat_echo=self.bank.command.heartbeat,
             )

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.clients.conftest import CONTROLLERS
-from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
 from tests.clients.programs.controllers import Irc5
 from tests.clients.scenes import TEXTS, command, commands, cycles
 
@@ -88,4 +88,50 @@ def test_a_robot_that_stops_its_timer_lets_go(gateway: GatewayAtHand) -> None:
     client.enable(12.0)
     cycles(client)
     client.machine.start("FgTimerStop")
+    assert commands(gateway) == [command(1, 1200), command(0, 0)]
+
+
+def test_a_robot_that_stops_its_timer_behind_a_loss_lets_go_at_once(gateway: GatewayAtHand) -> None:
+    """It waited for no more back-off, for there is no cycle behind this one: a gateway without a lease went on pressing."""
+    client = Irc5(TEXTS["rapid"], gateway)
+    client.enable(12.0)
+    cycles(client)
+    gateway.is_cut = True
+    cycles(client)
+    gateway.is_cut = False
+    client.machine.start("FgTimerStop")
+    assert commands(gateway) == [command(1, 1200), command(0, 0)]
+
+
+def test_a_robot_that_stops_its_timer_over_a_connection_that_is_dead_lets_go_over_another(
+    gateway: GatewayAtHand,
+) -> None:
+    client = Irc5(TEXTS["rapid"], gateway)
+    client.enable(12.0)
+    cycles(client)
+    ask, lost = gateway.ask, list[bytes]()
+
+    def lose_one(frame: bytes) -> bytes:
+        if lost:
+            return ask(frame)
+        lost.append(frame)
+        raise Unplugged
+
+    gateway.ask = lose_one  # type: ignore[method-assign]
+    client.machine.start("FgTimerStop")
+    assert lost and commands(gateway) == [command(1, 1200), command(0, 0)]
+
+
+@pytest.mark.parametrize("stops", [True, False])
+def test_a_robot_that_could_not_let_go_does_so_when_its_timer_starts_again(stops: bool, gateway: GatewayAtHand) -> None:
+    """Behind a loss; or a main routine that begins again, and starts the timer while the force is on."""
+    client = Irc5(TEXTS["rapid"], gateway)
+    client.enable(12.0)
+    cycles(client)
+    if stops:
+        gateway.is_cut = True
+        client.machine.start("FgTimerStop")
+        gateway.is_cut = False
+    client.machine.start("FgTimerStart")
+    cycles(client)
     assert commands(gateway) == [command(1, 1200), command(0, 0)]

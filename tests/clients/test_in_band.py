@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from gateway.clients import render_client
 from gateway.registers import Command, Status
 from gateway.registers.words import ControlBit, State, StatusBit
+from tests.calibrations.coefficients import calibration
+from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
 from tests.clients.programs.python_program import PythonProgram
-from tests.clients.scenes import cycles
+from tests.clients.scenes import WHERE, cycles
+from tests.clients.test_controller_rules import own_map
 from tests.clients.test_edges_and_losses import control_word_of
 from tests.clients.test_guests import set_ramp
 from tests.clients.test_two_tasks import every_place
@@ -30,6 +35,7 @@ def ramp_above(gateway: GatewayAtHand, force_n: float) -> None:
             Status(
                 state=State.RAMPING if is_on else State.OFF,
                 status_word=int(held) if is_on else 0,
+                force_requested_n=command.force_requested_n,
                 heartbeat_echo=command.heartbeat,
             )
         )
@@ -158,6 +164,47 @@ def test_a_force_that_another_master_takes_over_is_in_band_for_nobody_else(clien
     else:
         client.cycle()
     assert client.ended and not any([in_band(client), *seen_in_band(client, 2)])
+
+
+def test_a_force_that_another_program_of_this_address_commands_is_not_in_band(
+    client: Any, gateway: GatewayAtHand
+) -> None:
+    """Both own the setpoint, for an owner is an address: the tool held 7 N, and who had asked for 12 N read "in band"."""
+    client.enable(12.0)
+    cycles(client)
+    assert in_band(client)
+    gateway.write_beside_the_client(7.0)
+    assert not any(seen_in_band(client)[1 if not isinstance(client, Plc) else 12 :])
+    assert client.enabled and gateway.bank.command.force_setpoint_n == 7.0
+    ask_for(client, 13.0)
+    cycles(client)
+    assert in_band(client) and gateway.bank.command.force_setpoint_n == 13.0
+
+
+def test_a_force_that_a_calibration_lowered_is_in_band_for_who_asked_for_more(
+    client: Any, gateway: GatewayAtHand
+) -> None:
+    """W314: what was asked for stands in force_requested still, so nobody waits for ever."""
+    client.enable(12.0)
+    cycles(client)
+    gateway.bank.set_active_model(calibration(force_limits_n=(0.0, 9.0)))
+    cycles(client)
+    assert in_band(client) and gateway.bank.command.force_setpoint_n == 9.0
+
+
+def test_a_force_that_the_status_shows_more_coarsely_is_in_band(language: str, tmp_path: Path) -> None:
+    """A map of one's own may show tenths of a newton of a force that is asked for in hundredths."""
+    shown = "name: force_requested, address: 103, type: int16, scale: 0."
+    coarse = own_map(tmp_path, f"{shown}01", f"{shown}1")
+    gateway = GatewayAtHand(coarse)
+    text = render_client(coarse, "st" if language in ("twincat", "codesys") else language, WHERE)
+    client = CONTROLLERS[language](text, gateway)
+    client.enable(12.04)
+    cycles(client)
+    assert in_band(client)
+    gateway.write_beside_the_client(12.2)
+    cycles(client, 12)
+    assert not in_band(client)
 
 
 def test_a_command_with_another_word_is_in_band_once_it_is_taken(client: Any, gateway: GatewayAtHand) -> None:

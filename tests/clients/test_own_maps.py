@@ -44,6 +44,11 @@ TENTHS = (
             "name: force_setpoint, address: 1, type: uint16, scale: 0.01, unit: N, access: RW, min: 0, max: 655.35",
             "type int16 of force_setpoint",
         ),
+        (  # which the clients compare with what they asked for
+            "name: force_requested, address: 103, type: int16, scale: 0.01, unit: N,",
+            "name: force_requested, address: 103, type: uint16, scale: 0.01, unit: N,",
+            "type int16 of force_requested",
+        ),
         (  # which SCL and ST named all the same
             '      - {name: heartbeat_echo, address: 114, type: uint16, text: "Heartbeat seen by the control"}\n',
             "",

@@ -61,5 +61,8 @@ def test_an_over_force_far_from_the_model_is_blamed_on_the_cell() -> None:
     assert over_force(61.0, 20.0, overload=True).startswith("cell saturated (98 N is 98 % of its range)")
 
 
-def test_a_hunting_loop_says_how_often_it_turned() -> None:
-    assert hunting_sentence(12.0, 7).startswith("W360 at 12.0 N the trim has turned round 7 times: ")
+def test_a_hunting_loop_says_how_often_it_turned_and_all_that_ends_its_rest() -> None:
+    """The trim goes on at an offset, too, and a second correction beside "until there is another setpoint" was a riddle."""
+    sentence = hunting_sentence(12.0, 7)
+    assert sentence.startswith("W360 at 12.0 N the trim has turned round 7 times: ")
+    assert sentence.endswith("stands still until there is another setpoint, or a large error that stays on one side")

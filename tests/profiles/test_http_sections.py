@@ -53,10 +53,11 @@ def test_a_page_for_others_needs_a_token_that_cannot_be_guessed(tmp_path: Path) 
     assert rig.metrics and rig.metrics.listen == "[::1]:0"
 
 
-def test_a_token_does_not_travel_with_the_rig_s_texts(tmp_path: Path) -> None:
-    """Every recording carries them, and the page shows them."""
-    rig = load_rig(rig_with(tmp_path, f'web: {{listen: "0.0.0.0:8080", token: "{TOKEN}"}}\n'))
-    assert all(TOKEN not in text for text in rig.texts.values())
+@pytest.mark.parametrize("key", ["token", '"to\\u006ben"', '"\\x74oken"'])
+def test_a_token_does_not_travel_with_the_rig_s_texts(key: str, tmp_path: Path) -> None:
+    """Every recording carries them, a bundle too, and the page shows them."""
+    rig = load_rig(rig_with(tmp_path, f'web: {{listen: "0.0.0.0:8080", {key}: "{TOKEN}"}}\n'))
+    assert rig.web and rig.web.token == TOKEN and all(TOKEN not in text for text in rig.texts.values())
     copy = tmp_path / "copy.yaml"
     copy.write_text(next(text for name, text in rig.texts.items() if name.endswith("rig.yaml")), encoding="utf-8")
     assert load_rig(str(copy)).web is not None, "what is left can be read as before"

@@ -9,7 +9,7 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
-from gateway.live.live_state import LiveState
+from gateway.live.live_state import LiveLine, LiveState
 from gateway.profiles import load_rig
 from gateway.registers.words import ControlBit, State
 from gateway.service.live_answers import AlarmTimes, clock_sentence
@@ -18,6 +18,7 @@ from gateway.service.running_rig.starting import StartError
 from tests.control.bench import bsfm
 from tests.service.requests.stage import Stage, stage
 from tests.service.rigs import demo
+from tests.service.running_rig.lines.test_valve_line import Relay
 from tests.service.wired import Wired
 
 __all__ = ["stage"]
@@ -43,6 +44,29 @@ def test_a_command_by_the_page_is_held_shown_and_owned_by_it(stage: Stage) -> No
     assert state.writers["force_setpoint"].peer == "web"
     assert [peer.identity for peer in state.peers] == ["10.0.0.5"]
     assert state.load_cell.heard > 20 and state.limits.tolerance_n == 1.0
+
+
+def test_the_line_of_a_valve_is_told_and_none_where_there_is_no_valve(stage: Stage) -> None:
+    """The third serial line of a rig that pulls was nowhere to be seen while it failed."""
+    told = lambda: LiveState.from_json(ask(stage, {"do": "state"})).valve  # noqa: E731
+    assert told() == LiveLine()
+    relay = Relay()
+    stage.wired.loop.valve = relay.line
+    stage.server.live._rig = replace(stage.wired.rig, valve=load_rig("paper-pull").valve)
+    never = told()
+    assert (never.port, never.device, never.asked, never.age_s) == ("/dev/pts/3", "waveshare-relay", 0, None)
+    relay.now_s = stage.wired.now_s - 1.0
+    relay.run(1.0)
+    heard = told()
+    assert (
+        heard.asked == len(relay.asked) >= 10 and heard.heard in (heard.asked, heard.asked - 1) and heard.age_s == 0.0
+    )
+    relay.is_deaf = True
+    relay.line.on_bytes(b"\xff" * 300, relay.now_s)
+    stage.wired.run(2.0)
+    silent = told()
+    assert silent.heard == heard.heard and silent.garbled > 0 and silent.asked > heard.asked
+    assert silent.age_s == pytest.approx(1.9, abs=0.15)
 
 
 def test_what_its_caller_has_given_up_presses_nothing_and_what_is_always_wanted_stops(stage: Stage) -> None:

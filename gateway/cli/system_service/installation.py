@@ -38,6 +38,8 @@ _HIDDEN: Final = ("/home", "/root", "/run/user", "/tmp", "/var/tmp")
 _STEM: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _NOT_OF_PROGRAMS: Final = frozenset("'\"\\$*?[")  # what systemd takes in no path of a program
 _RIG_OF_UNIT: Final = re.compile(r"^ExecStart=.* run (.+) --state ", re.M)
+_BOOTED: Final = Path("/run/systemd/system")  # sd_booted(3): in a container a systemctl may have nobody to ask
+_WITHOUT: Final = "without systemd the gateway runs by `force-gateway run`, in a container or under another supervisor"
 _NAMED_NETWORKS: Final = ("any", "localhost", "link-local", "multicast")
 
 
@@ -145,12 +147,10 @@ def run_command(words: Sequence[str], *, quiet: bool = False) -> str:
     try:
         done = subprocess.run(words, capture_output=True, text=True, check=False)
     except FileNotFoundError:
-        raise CliError(
-            f"E108 {words[0]} is not on this machine: without systemd the gateway runs by "
-            "`force-gateway run`, in a container or under another supervisor",
-            exit_codes.DEVICE,
-        ) from None
+        raise CliError(f"E108 {words[0]} is not on this machine: {_WITHOUT}", exit_codes.DEVICE) from None
     if done.returncode and not quiet:
+        if words[0] == "systemctl" and not _BOOTED.is_dir():
+            raise CliError(f"E108 systemd does not run on this machine: {_WITHOUT}", exit_codes.DEVICE)
         said = (done.stderr or done.stdout).strip().splitlines()
         raise CliError(f"E108 {' '.join(words)}: {said[-1] if said else f'exit code {done.returncode}'}")
     return done.stdout

@@ -1,6 +1,6 @@
 """URScript: global names, if statements; no exclusive or, so the CRC goes by tables of two bits."""
 
-from gateway.clients.exchange import STATUS_BITS, ExchangeTable
+from gateway.clients.exchange import REQUESTED, STATUS_BITS, ExchangeTable
 from gateway.clients.spellings.crc_table import crc_table
 
 
@@ -30,6 +30,7 @@ def spell_urscript(table: ExchangeTable) -> dict[str, str]:
         "part_c_zeros": _zeros(part_c),
         "crc_table": ", ".join(str(value >> 2 * k & 3) for value in crc_table(2) for k in range(16)),
         "force_measured_counts": str(table.at("force_measured", "status").counts_per_unit),
+        "force_requested_counts": str(table.at(REQUESTED, "status").counts_per_unit),
         "status_bytes": str(2 * table.status_span[1]),
         "tail_pdu": str(6 + 2 * tail_words),
         "tail_bytes": str(2 * tail_words),

@@ -431,6 +431,12 @@ ${status_decoding}
     s->warning = (s->status_word & FG_HAS_WARNING) != 0;
 }
 
+/* Is what the gateway was asked for last what this client asked for, and not another program at this address? */
+static int fg_is_own(const fg_client *client) {
+    float apart = client->status.force_requested - fg_scaled(client->good[FG_FORCE_SETPOINT], ${force_counts}.0f);
+    return client->good[FG_CONTROL_WORD] & FG_ENABLE && apart > -${force_apart}f && apart < ${force_apart}f;
+}
+
 static void fg_end(fg_client *client) {
     client->ended = 1;
     client->want[FG_CONTROL_WORD] = 0;
@@ -442,7 +448,7 @@ static void fg_end(fg_client *client) {
 static void fg_follow(fg_client *client) {
     client->seen = 1;
     fg_decode(client->words, &client->status);
-    if (!(client->good[FG_CONTROL_WORD] & FG_ENABLE)) client->status.in_band = 0; /* the force that another master holds */
+    if (!fg_is_own(client)) client->status.in_band = 0;
     if (client->good[FG_CONTROL_WORD] & FG_ENABLE && !client->status.enabled) fg_end(client);
 }
 

@@ -59,6 +59,8 @@ MODULE ForceGateway
   ! After a fault: fgReset:=TRUE, which goes FALSE when it is sent.
   ! fgInBand goes TRUE when what fgForce asks for is held; what was
   ! held before it forgets with the next cycle only: set it FALSE.
+  ! It stays FALSE while another program at this address has set
+  ! another force; what fgForce changes to is written again.
   !
   ! One cycle is one FC23: it writes the command block where
   ! control_word has changed, the words behind that where they have,
@@ -212,7 +214,14 @@ ${crc_table}];
   PROC FgTimerStop()
     IDelete irTimer;
     fgEnable:=FALSE;
+    ! No cycle follows: OFF waits for no back-off, and goes once more
+    ! where the connection turns out to be dead
+    nBackoff:=0;
     FgCycle;
+    IF bOffPending THEN
+      nBackoff:=0;
+      FgCycle;
+    ENDIF
     SocketClose sdGateway;
     fgConnected:=FALSE;
     ClkStop clRetry;
@@ -226,11 +235,12 @@ ${crc_table}];
   PROC FgInit()
     IF ERR_FG_FRAME=-1 BookErrNo ERR_FG_FRAME;
     SocketClose sdGateway;
+    ! What was not let go, or is on, is let go first
+    IF bAsking OR FgIsOn() bOffPending:=TRUE;
     FgClearStatus;
     nBackoff:=0;
     fgEnded:=FALSE;
     FgForgetAsked;
-    bOffPending:=FALSE;
     bOffRefused:=FALSE;
     bAsking:=FALSE;
     ClkStop clRetry;
@@ -530,6 +540,13 @@ ${crc_table}];
     RETURN Round(fgForce*${force_counts})=nGood{FG_C_FORCE_SETPOINT};
   ENDFUNC
 
+  ! Another program at this address may have written another force
+  LOCAL FUNC bool FgIsOwn()
+    VAR num nOwn;
+    nOwn:=nGood{FG_C_FORCE_SETPOINT}/${force_counts};
+    RETURN Abs(fgStatus{FG_S_FORCE_REQUESTED}-nOwn)<${force_apart};
+  ENDFUNC
+
   LOCAL PROC FgForget()
     ! fgForce stays: between T_ROB1's two lines it would hold 0 N
     IF fgEnable OR FgIsOn() THEN
@@ -543,11 +560,14 @@ ${crc_table}];
 
   LOCAL PROC FgDecode()
     VAR num nStatus;
+    VAR bool bOwn;
 ${status_decoding}
     nStatus:=nWords{FG_S_STATUS_WORD};
     fgEnabled:=FgHasBit(nStatus,FG_IS_ENABLED);
     fgReady:=FgHasBit(nStatus,FG_IS_READY);
-    fgInBand:=FgIsAsked() AND FgHasBit(nStatus,FG_IS_IN_BAND);
+    bOwn:=FgHasBit(nStatus,FG_IS_IN_BAND) AND FgIsOwn();
+    ! T_ROB1 may set another fgForce meanwhile: asked for comes last
+    fgInBand:=bOwn AND FgIsAsked();
     fgFault:=FgHasBit(nStatus,FG_HAS_FAULT);
   ENDPROC
 

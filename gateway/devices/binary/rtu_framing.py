@@ -54,14 +54,15 @@ class RtuSplitter:
     length_of: whole length of the frame that begins with these bytes, None while that is not known. asked: our own frame,
     which an adapter that hears itself brings back ahead of the answer; read as an answer it may seem to be a much longer one.
     The answer to a setting is often the same bytes: once another question has come back, the first of the two is the echo.
-    Else a dead device lived for as long as its setting changed, and we spoke into the answer of a living one.
+    Else a dead device lived for as long as its setting changed, and we spoke into the answer of a living one. hears_itself:
+    so far as that is known.
     """
 
     def __init__(self, unit: int, length_of: Callable[[bytes], int | None]) -> None:
         self._unit = unit
         self._length_of = length_of
         self._asked = b""
-        self._hears_itself = self._is_echo_due = False
+        self.hears_itself = self._is_echo_due = False
         self._buffer = b""
         self._dropped = b""
 
@@ -90,19 +91,19 @@ class RtuSplitter:
         self._buffer += chunk
         lines: list[Line] = []
         while len(self._buffer) > 1:
-            if self._hears_itself and self._is_echo_due and self._buffer.startswith(self.asked):
+            if self.hears_itself and self._is_echo_due and self._buffer.startswith(self.asked):
                 self._buffer, self._is_echo_due = self._buffer[len(self.asked) :], False
                 continue
             length = self._frame_length()
             line = self._frame(length) if 0 < length <= len(self._buffer) else None
             if line is not None:
-                self._hears_itself = self._hears_itself and not self._is_echo_due
+                self.hears_itself = self.hears_itself and not self._is_echo_due
                 lines += self._noise()
                 lines.append(line)
                 self._buffer = self._buffer[length:]
             elif self.asked and self._buffer.startswith(self.asked):
                 self._buffer = self._buffer[len(self.asked) :]
-                self._hears_itself, self._is_echo_due = True, False
+                self.hears_itself, self._is_echo_due = True, False
             elif length > len(self._buffer) or self.asked.startswith(self._buffer):
                 break
             else:

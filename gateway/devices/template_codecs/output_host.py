@@ -10,7 +10,7 @@ from collections import deque
 from math import isclose
 from typing import Final
 
-from gateway.devices.binary.rtu_framing import exception_text, quiet_s
+from gateway.devices.binary.rtu_framing import RtuSplitter, exception_text, quiet_s
 from gateway.devices.device_checks.spelling import CheckSpelling
 from gateway.devices.exchange import Exchange, VoltageExchange
 from gateway.devices.framing import Line
@@ -63,6 +63,11 @@ class TemplateOutputHost:
         self._tolerance_v: dict[type, float] = {SetVoltage: _ROUNDING * self._steps_between(self._confirmation)}
         if profile.read_voltage:
             self._tolerance_v[ReadVoltage] = _ROUNDING * self._steps_between(profile.read_voltage)
+
+    @property
+    def hears_itself(self) -> bool:
+        """Decide whether the adapter has brought our own words back, as far as answers could be told from them."""
+        return isinstance(self._lines, RtuSplitter) and self._lines.hears_itself
 
     @property
     def safe_reply(self) -> bytes:

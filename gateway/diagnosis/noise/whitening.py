@@ -81,7 +81,7 @@ class Whitener:
                 at += noise.length + 2
 
         side_by_side(fill, _some_at_once(flat.shape[0]))
-        return found.reshape(*vectors.shape[:-1], -1)
+        return found.reshape(*vectors.shape[:-1], found.shape[1])  # of no vectors, too
 
     def apply_adjoint(self, spectrum: Floats) -> Floats:
         """Return the vector (rows,) whose product with any vector is that of `spectrum`, (coordinates,), with the spectra of

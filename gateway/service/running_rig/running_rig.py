@@ -78,6 +78,7 @@ class RunningRig:
         self.failed = asyncio.Event()
         asyncio.get_running_loop().set_exception_handler(self._on_internal_error)
         host, rest_v = output_host(rig.output.device), rig.control.limits.safe_voltage_v
+        self._host = host
         self._safe_frame, self._last_frame = host.safe_frame(rest_v), host.last_frame
         frame, reply, end = self._safe_frame, host.safe_reply, rig.output.device.terminator_bytes
         handed = partial(guardian.hand_over, safe_frame=frame, safe_reply=reply, reply_end=end)
@@ -126,7 +127,7 @@ class RunningRig:
                 plants=self._plants,
                 audit=self._audit,
                 simulation=SimulationRequests(rig),
-                paths=lambda: {"output": self._ports.output.path, "load_cell": self._ports.cell.path},
+                paths=lambda: self._ports.paths,
                 peers=lambda: self._faces.peers,
                 calibration_date=lambda: self._calibration.date_utc,
                 running=self._running,
@@ -290,7 +291,7 @@ class RunningRig:
         self._recordings.flush(now_s)
         self._calibration_runs.flush(now_s)
         self._plants.take_waiting()
-        self._guardian.keep(zero_n=self.controller.zero_n)
+        self._guardian.keep(zero_n=self.controller.zero_n, hears_itself=self._host.hears_itself)
         self._audit.flush()
         self._tick.follow(self.loop.streamed_s)
         if starting.have_spoken(self._line, self.loop.sample, self._valve_line):

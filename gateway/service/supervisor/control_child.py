@@ -5,7 +5,7 @@ The guardian decides when it is started, killed and started again. Standard libr
 
 import contextlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isnan
 from typing import Any, Final
 
@@ -121,6 +121,8 @@ class ControlChild:
         if self.process:
             self.process.kill()
             self.read_messages()
+        if self.safe_line:
+            self.safe_line = replace(self.safe_line, hears_itself=bool(self.kept.get("hears_itself")))
         acknowledged = self.safe_line.write_safe() if self.safe_line else False if self.is_line_lost else None
         self.is_line_lost = False
         self._drop_line()  # our copy of the descriptor carries the port's lock, which the next control process needs

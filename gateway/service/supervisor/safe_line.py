@@ -22,12 +22,13 @@ _READ_BYTES = 4096
 @dataclass(frozen=True)
 class SafeLine:
     """One output port: its descriptor, the frame for the safe voltage and the reply that acknowledges it (may be empty).
-    end: of the reply, where lines have one; a Modbus frame has none."""
+    end: of the reply, where lines have one; a Modbus frame has none. hears_itself: control has found that the adapter does."""
 
     descriptor: int
     frame: bytes
     reply: bytes
     end: bytes
+    hears_itself: bool = False
 
     def close(self) -> None:
         """Close the descriptor."""
@@ -63,9 +64,10 @@ class SafeLine:
 
     def _acknowledges(self, received: bytes) -> bool:
         """A reply without a line's end (Modbus RTU) may contain one; with its checksum it is whole where it stands. An adapter
-        that hears itself puts our own words ahead, on the same line where they end otherwise."""
+        that hears itself puts our own words ahead, on the same line where they end otherwise; to a device that answers by the
+        same bytes, the first are ours."""
         if not self.end:
-            return self.reply in received
+            return self.reply in (received.replace(self.frame, b"", 1) if self.hears_itself else received)
         wanted, behind_echo = self.reply.removesuffix(self.end), received.removeprefix(self.frame)
         return any(wanted in heard.split(self.end)[:-1] for heard in (received, behind_echo))
 

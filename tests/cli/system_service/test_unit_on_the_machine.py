@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 from gateway import profiles
 from gateway.cli.main import command
+from gateway.cli.system_service import installation
 from gateway.cli.system_service.installation import plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, unit_text
 from gateway.processes import exit_codes
@@ -123,3 +124,19 @@ def test_an_end_that_nobody_has_asked_systemd_for_starts_it_again() -> None:
     failure, and stayed off for good. What `systemctl stop` ends stays off with any setting."""
     assert setting("Restart", "no") == "always"
     assert str(exit_codes.OK) not in setting("RestartPreventExitStatus", "").split()
+
+
+@pytest.mark.parametrize("is_booted", [True, False])
+def test_a_systemctl_without_systemd_is_told_as_none_is(
+    is_booted: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a container `service status` said all that it had asked, and "Failed to connect to bus: Host is down"."""
+    systemctl = tmp_path / "systemctl"
+    systemctl.write_text("#!/bin/sh\necho 'Failed to connect to bus: Host is down' >&2\nexit 1\n")
+    systemctl.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    monkeypatch.setattr(installation, "_BOOTED", tmp_path if is_booted else tmp_path / "none")
+    done = CliRunner().invoke(command, ["service", "status", "demo"])
+    assert ("Host is down" in done.stderr) is is_booted
+    assert done.stderr.startswith("E108 systemd does not run on this machine: without systemd") is not is_booted
+    assert done.exit_code == (exit_codes.FAILED if is_booted else exit_codes.DEVICE)

@@ -83,6 +83,7 @@ class Irc5:
             "NUMTOSTR": values(
                 lambda number, digits: f"{number:.{digits}f}" if isinstance(number, (int, float)) else number
             ),
+            "ABS": values(abs),
             "ROUND": values(lambda number: math.floor(number + 0.5)),
             "DIM": values(lambda numbers, _: len(numbers)),
             "BITXORDNUM": values(lambda a, b: a ^ b),
@@ -376,6 +377,7 @@ class Plc:
             "WORD_TO_INT": values(lambda word: word - 65536 if word > 32767 else word),
             "INT_TO_WORD": values(lambda number: number & 0xFFFF),
             **dict.fromkeys(["INT_TO_REAL", "UINT_TO_REAL"], values(float)),
+            "ABS": values(abs),
             "REAL_TO_INT": values(real_to_int),
             "REAL_TO_DWORD": values(lambda number: struct.unpack(">I", struct.pack(">f", number))[0]),
             "DWORD_TO_REAL": values(lambda bits: struct.unpack(">f", struct.pack(">I", bits))[0]),

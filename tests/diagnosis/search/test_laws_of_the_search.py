@@ -12,10 +12,12 @@ from gateway.catalogue.sensing import DRIFT, ZERO_PER_K
 from gateway.diagnosis import BY_NAME, Diagnosis, Measurement, Options, diagnose
 from gateway.diagnosis.bench.bench import Bench, bench_of
 from gateway.diagnosis.bench.parameters import ModelParameters
+from gateway.diagnosis.diagnose import prepare_search
 from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT, base_parameters, fit_base
 from gateway.diagnosis.model_fit.levenberg_marquardt import FitProblem, FittedModel, refine
 from gateway.diagnosis.model_fit.normal_equations import ModelSpan, NormalEquations, held_out_errors
 from gateway.diagnosis.noise.whitening import coloured_whitener, timing_weights, white_whitener
+from gateway.diagnosis.search.search import search_effects
 from gateway.recording import Recording
 from gateway.recording.measurement import measurement_of
 from gateway.reports.diagnosis.document import diagnosis_document
@@ -271,3 +273,10 @@ def test_rows_whose_times_are_in_doubt_weigh_less_only_while_the_force_moves() -
     whiten = white_whitener(bench, fitted.residual_n, weights)
     assert not whiten.knows_times
     assert white_whitener(bench, fitted.residual_n).knows_times
+
+
+def test_a_search_whose_effects_are_all_accepted_ends_with_them() -> None:
+    """Nothing is left to compare then, and no vector to whiten: of a catalogue of one effect it ended in a ValueError."""
+    start, effect = prepare_search([short()], MACHINE, Options()), BY_NAME["load-dependent-friction"]
+    found = search_effects(start.bench, start.base, [effect], start.whiten)
+    assert [each.effect for each in found.accepted] == [effect] and not found.last.ranked

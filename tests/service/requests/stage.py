@@ -54,7 +54,7 @@ class Stage:
             audit=RigAudit(self.state, log),
             simulation=SimulationRequests(wired.rig),
             watch=WatchReports(wired.loop, lambda: wired.now_s, log),
-            paths=lambda: {"output": "/dev/pts/1", "load_cell": "/dev/pts/2"},
+            paths=lambda: {"output": "/dev/pts/1", "load_cell": "/dev/pts/2", "valve": "/dev/pts/3"},
             peers=lambda: (MASTER,),
             calibration_date=lambda: wired.rig.calibration.date_utc,
             running={"rig": "demo", "port": 5020, "lease_s": None, "lease_action": "fault"},

@@ -6,6 +6,7 @@ import pytest
 
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
+from gateway.service.supervisor.safe_line import SafeLine
 from tests.service.supervisor.guarded import READY, SAFE_FRAME, FakeChild, Port, Scene, port
 from tests.service.supervisor.scripted_children import assert_comes_up, dies_after, lives, scene
 
@@ -106,6 +107,19 @@ def test_a_line_that_one_process_has_lost_is_no_word_about_the_next_one(scene, p
     lost, never_opened = (each for each in one.said if "control" in each)
     assert "not acknowledged" in lost
     assert "acknowledged" not in never_opened
+
+
+@pytest.mark.parametrize("hears_itself", [True, False])
+def test_what_control_has_found_of_its_adapter_counts_at_the_last_write(scene, port, hears_itself, monkeypatch):
+    """Known once a question has come back, long behind the line itself."""
+    one = scene(lives(port), lives(port))
+    assert_comes_up(one)
+    told: list[bool] = []
+    monkeypatch.setattr(SafeLine, "write_safe", lambda line: bool(told.append(line.hears_itself)))
+    one.child.say(message_link.KEEP, {"hears_itself": hears_itself})
+    one.child.dies(-9)
+    one.run(lambda: len(one.starter.started) == 2)
+    assert told == [hears_itself]
 
 
 def test_nonsense_is_an_end_at_once_and_nothing_that_follows_it_counts(scene, port):

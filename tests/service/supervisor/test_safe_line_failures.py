@@ -3,13 +3,14 @@
 import errno
 import os
 import termios
+import threading
 from collections.abc import Callable
 
 import pytest
 
 from gateway.ports import Pty
 from gateway.service.supervisor.safe_line import SafeLine
-from tests.service.supervisor.test_safe_line import END, FRAME, PATIENT_S, REPLY, SHORT_S
+from tests.service.supervisor.test_safe_line import END, FRAME, PATIENT_S, REPLY, SHORT_S, _heard
 
 
 def failing(call: Callable[..., object], numbers: list[int]) -> Callable[..., object]:
@@ -69,6 +70,37 @@ def test_a_device_that_talks_faster_than_it_can_be_read_is_told_all_the_same(
         patch.setattr(os, "read", endless)
         assert SafeLine(client, FRAME, b"", END).write_safe(SHORT_S)
     assert os.read(pty.fd, 256) == FRAME
+
+
+FC06 = bytes.fromhex("01 06 0000 0000 89CA")
+
+
+@pytest.mark.parametrize(("answer", "is_acknowledged"), [(FC06, True), (b"", False), (FC06[:-1], False)])
+def test_our_own_words_are_no_answer_of_a_device_that_answers_by_the_same_bytes(
+    pty: Pty, client: int, answer: bytes, is_acknowledged: bool
+) -> None:
+    """FC06 behind an adapter that hears itself: half a command of a dead process swallowed the frame, and it was said once."""
+    line, told, asked = SafeLine(client, FC06, FC06, b"", hears_itself=True), list[bool](), list[bytes]()
+    patient_s = PATIENT_S if is_acknowledged else SHORT_S
+    writer = threading.Thread(target=lambda: told.append(line.write_safe(patient_s)))
+    writer.start()
+    while writer.is_alive():
+        if said := _heard(pty):
+            asked.append(said)
+            os.write(pty.fd, said + answer)
+        writer.join(0.001)
+    assert told == [is_acknowledged] and b"".join(asked) == FC06 * (1 if is_acknowledged else 3)
+
+
+def test_one_copy_is_the_answer_where_nothing_comes_back(pty: Pty, client: int) -> None:
+    told: list[bool] = []
+    writer = threading.Thread(target=lambda: told.append(SafeLine(client, FC06, FC06, b"").write_safe(PATIENT_S)))
+    writer.start()
+    while writer.is_alive():
+        if said := _heard(pty):
+            os.write(pty.fd, said)
+        writer.join(0.001)
+    assert told == [True]
 
 
 def test_a_terminal_that_another_program_has_stopped_sends_again(pty: Pty, client: int) -> None:

@@ -169,6 +169,7 @@ def test_figures_samples_and_commands_are_those_that_were_told(page, chromium) -
         rig="demo", simulated=True, version="0", time_unix_s=0.0, state="holding", status=("enabled",), owner="web",
         loop=LiveLoop(hz=100.0, ticks=800, missed=4, late_p50_us=60, late_p99_us=12_000, step_us=250.0),
         output=LiveLine(device="itv", heard=99, garbled=1, age_s=0.01), load_cell=LiveLine(device="cell"),
+        valve=LiveLine(device="relay", heard=7, age_s=2.5),
         force=LiveForce(requested_n=12.0),
     )  # fmt: skip
     browser = chromium.new_context()
@@ -181,6 +182,7 @@ def test_figures_samples_and_commands_are_those_that_were_told(page, chromium) -
         ["Missed ticks", "4 of 800 (0.500 %)"],
         ["Output, itv", "answers; 99 heard, 1 garbled (1.00 %)"],
         ["Load cell, cell", "never heard; 0 heard, 0 garbled (0.00 %)"],
+        ["Valve, relay", "silent for 2 s; 7 heard, 0 garbled (0.00 %)"],
     ]
     assert told["columns"] == {"time_s": [1, 2, 3, 4], "force_n": [10, 20, 30, 40]}
     assert told["asked"] == ["setpoint", "enable"]

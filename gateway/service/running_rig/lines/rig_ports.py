@@ -75,6 +75,12 @@ class RigPorts:
             elif error := await open_again(port):
                 self.not_opened[port.path] = error
 
+    @property
+    def paths(self) -> dict[str, str]:
+        """Return where the lines are now, by name."""
+        ports = {"output": self.output, "load_cell": self.cell, "valve": self.valve}
+        return {name: port.path for name, port in ports.items() if port}
+
     def move(self, paths: dict[str, str]) -> None:
         """Move to where the devices are now: what was lost is opened there."""
         self.output.move(paths["output"])

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from math import inf
 from typing import Final
 
-from gateway.control.inputs import ValveStatus
+from gateway.control.inputs import ValveStatus, WireCounts
 from gateway.devices import ValveDirection, ValveHost
 from gateway.devices.messages import Garbage
 
@@ -16,11 +16,11 @@ _POLL_PERIOD_S: Final = 0.1
 
 
 class ValveExchange:
-    """Asks the device through `write`. status: what control is told; lost: its port is away."""
+    """Asks the device through `write`. status: what control is told; lost: its port is away; counts: since the start."""
 
     def __init__(self, host: ValveHost, write: Callable[[bytes], None], reply_timeout_s: float) -> None:
         self._host, self._write, self._reply_timeout_s = host, write, reply_timeout_s
-        self.lost = False
+        self.lost, self.counts = False, WireCounts()
         self._order: ValveDirection | None = None
         self.reset()
 
@@ -53,7 +53,9 @@ class ValveExchange:
         replies = self._host.receive(chunk)
         for reply in replies:
             if isinstance(reply, Garbage):
+                self.counts.garbled += 1
                 continue
+            self.counts.heard += 1
             if self._asked is None:
                 self._stands = reply
                 if self._order in (None, reply):  # else it may have refused to go there
@@ -86,6 +88,7 @@ class ValveExchange:
         self._asked = self._order if has_to_move and not just_told else None
         self._told = self._asked or self._told
         self._sent_s = now_s
+        self.counts.asked += 1
         if self._unanswered_since_s is None:
             self._unanswered_since_s = now_s
         self._write(self._host.request(self._asked))

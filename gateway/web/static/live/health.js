@@ -28,7 +28,7 @@ export function makeHealth() {
   const element = make("section", { className: "card" }, make("h2", { textContent: "Loop and serial lines" }), table);
   return {
     element,
-    state({ loop, output, load_cell }) {
+    state({ loop, output, load_cell, valve }) {
       const missed = loop.ticks ? (100 * loop.missed) / loop.ticks : 0;
       const rows = [
         ["Loop", `${loop.hz.toFixed(0)} Hz, ${milliseconds(loop.step_us)} of work`],
@@ -36,6 +36,7 @@ export function makeHealth() {
         ["Missed ticks", `${count(loop.missed)} of ${count(loop.ticks)} (${missed.toFixed(3)} %)`],
         line(`Output, ${output.device}`, output),
         line(`Load cell, ${load_cell.device}`, load_cell),
+        ...(valve.device ? [line(`Valve, ${valve.device}`, valve)] : []),
       ];
       if (body.children.length !== rows.length) {
         body.replaceChildren(...rows.map(() => make("tr", {}, make("th", { scope: "row" }), make("td"))));

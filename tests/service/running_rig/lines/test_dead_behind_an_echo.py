@@ -17,7 +17,8 @@ class Bus:
     """The line with its device, which dies at dies_s; every byte takes its time, the device 4 ms more."""
 
     def __init__(self, profile: DeviceProfile, dies_s: float, *, has_echo: bool) -> None:
-        self.exchange = OutputExchange(output_host(profile), self.write, profile.reply_timeout_s)
+        self.host = output_host(profile)
+        self.exchange = OutputExchange(self.host, self.write, profile.reply_timeout_s)
         self._device, self._character_s = output_device(profile), profile.serial.character_s
         self._dies_s, self._has_echo = dies_s, has_echo
         self._coming: list[tuple[float, bytes]] = []
@@ -60,4 +61,6 @@ def test_a_dead_device_is_silent_though_its_adapter_repeats_each_setting(change_
 @pytest.mark.parametrize("has_echo", [True, False])
 @pytest.mark.parametrize("change_v", [0.0, 0.001, 0.02])
 def test_one_that_lives_is_not(change_v: float, has_echo: bool) -> None:
-    assert Bus(WAVESHARE, 99.0, has_echo=has_echo).silent_s(5.0, change_v) < 0.1
+    bus = Bus(WAVESHARE, 99.0, has_echo=has_echo)
+    assert bus.silent_s(5.0, change_v) < 0.1
+    assert bus.host.hears_itself is has_echo
