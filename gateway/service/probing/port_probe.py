@@ -167,7 +167,9 @@ def _streamed(
     if count < _ENOUGH:
         return None
     (question,) = harmless_questions(profile)
-    line = received.split(profile.terminator_bytes)[1]
+    end = profile.terminator_bytes
+    whole = received.split(end)[1:]
+    line = next((one for one in whole if question.understands(end + one + end)), whole[0])
     return ProbeAnswer(profile, settings, question.understands(received), b"", line, 0.0, count / listened_s)
 
 

@@ -83,6 +83,15 @@ def test_of_a_stream_that_was_cut_at_its_beginning_a_whole_reading_is_told() -> 
     assert found and (found.said, found.heard) == ("reads 123456", b"123456")
 
 
+@pytest.mark.parametrize(("shipped", "line"), [("stream-st-gs", LINE), ("hx711-line", b"123456\r\n")])
+def test_of_a_stream_with_other_lines_a_reading_is_shown(shipped: str, line: bytes) -> None:
+    """`streams 'T=23.5', 18 readings/s` was said of a profile that reads those lines over."""
+    profile = replace(load_device(shipped), read_over=("T={degrees:.1f}",))
+    found = _streamed(profile, profile.serial, (b"T=23.5\r\n" * 2 + line) * 3, 0.25)
+    assert found and found.heard == line.strip()
+    assert found.rate_hz == pytest.approx(12.0)
+
+
 @pytest.mark.parametrize(("said_hz", "rate_hz"), [(80.0, 10.0), (3.0, 3.0)])
 def test_a_slow_stream_is_listened_to_until_it_has_said_enough(said_hz: float, rate_hz: float) -> None:
     """An HX711 gives ten readings a second as it comes, its profile eighty: it was no known device."""
