@@ -86,13 +86,15 @@ class DeviceProfile:
     steps: tuple[Step, ...] = ()  # output: commands that the gateway never sends but the device knows
     stream: ForceReading | None = None  # load cell that talks by itself
     read_force: ForceReading | None = None  # load cell that is asked
-    read_over: tuple[str, ...] = ()  # sentences of its own that it says besides: another sensor's, its program's
+    read_over: tuple[
+        str, ...
+    ] = ()  # sentences that it says besides: another sensor's, its program's; "": a line with nothing in it
     set_valve: ValveSettings | None = None  # valve: how each direction is set
     read_valve: ValveReading | None = None  # valve: which direction stands?
 
     def __post_init__(self) -> None:
         _check_codec(self)
-        for text in self.read_over:
+        for text in filter(None, self.read_over):
             compile_template(text)
         if self.role is DeviceRole.VALVE:
             _check_valve(self)

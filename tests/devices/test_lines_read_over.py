@@ -52,6 +52,15 @@ def test_they_have_the_checksum_that_all_lines_of_the_device_have() -> None:
     assert host.receive(good + bad, 0.0) == [Garbage(bad)]
 
 
+def test_a_line_with_nothing_in_it_is_an_empty_sentence() -> None:
+    """Between two blocks of lines, or where each line ends twice."""
+    said = b"N    12.50 kg\r\n\r\n\r\n"
+    assert cell_host(BLOCK).receive(said, 0.0) == [FORCE, Garbage(b"\r\n"), Garbage(b"\r\n")]
+    profile = replace(BLOCK, read_over=("", *BESIDE))
+    assert cell_host(profile).receive(said, 0.0) == [FORCE]
+    assert list(rehearse(profile)) == []
+
+
 def test_an_output_s_other_lines_are_no_noise_and_leave_the_order_of_its_answers_alone() -> None:
     host = output_host(DAC)
     host.request(SetVoltage(5.0))
