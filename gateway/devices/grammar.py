@@ -118,6 +118,12 @@ class Grammar:
         own = asked if self.profile.question_terminator != "" else b""
         return strip_checksum(line.body.removeprefix(own), self.profile.checksum) if line.is_whole else None
 
+    def is_read_over(self, line: Line) -> bool:
+        """Decide whether a line is one of those that the device says besides, and that mean nothing here."""
+        texts = self.profile.read_over
+        body = self.body(line) if texts else None
+        return (body == b"" and "" in texts) or any(self.read(text, body) is not None for text in texts)
+
     def number_body(self, template: str, number: float) -> bytes:
         """Return the sentence with this number in it, nearest on the template's own grid; others in it are 0."""
         values = self.fill(template)

@@ -19,17 +19,7 @@ from gateway.devices.checksum import ChecksumName
 from gateway.devices.device_checks.identity import Identity
 from gateway.devices.device_checks.watchdog import Watchdog
 from gateway.devices.exchange import Exchange, PressureExchange, Refusals, Span, Step, VoltageExchange
-from gateway.devices.fields import (
-    Choice,
-    Decimals,
-    Field,
-    HexNumber,
-    Plain,
-    RegisterNumber,
-    Scientific,
-    TemplateError,
-    WholeNumber,
-)
+from gateway.devices.fields import NUMBERS, Choice, Decimals, Field, Plain, RegisterNumber, Scientific, TemplateError
 from gateway.devices.force_reading import ForceReading
 from gateway.devices.line_settings import SerialSettings
 from gateway.devices.template import compile_template, quote
@@ -41,7 +31,6 @@ TEMPLATE: Final = "template"
 ADDRESS: Final = "address"
 """Name of the constant that tells devices on one bus apart: of a Modbus device its unit."""
 
-_NUMBERS: Final = (WholeNumber, HexNumber, Decimals, Scientific, Plain, RegisterNumber)
 _LONGEST_MODBUS_S: Final = 0.1  # later than this a Modbus answer is no use to a force loop
 _LARGEST_UNIT: Final = 255  # 247 by the specification; some devices take all that fit into a byte
 Terminator = Annotated[str, MaxLen(8)]
@@ -97,12 +86,16 @@ class DeviceProfile:
     steps: tuple[Step, ...] = ()  # output: commands that the gateway never sends but the device knows
     stream: ForceReading | None = None  # load cell that talks by itself
     read_force: ForceReading | None = None  # load cell that is asked
-
+    read_over: tuple[
+        str, ...
+    ] = ()  # sentences that it says besides: another sensor's, its program's; "": a line with nothing in it
     set_valve: ValveSettings | None = None  # valve: how each direction is set
     read_valve: ValveReading | None = None  # valve: which direction stands?
 
     def __post_init__(self) -> None:
         _check_codec(self)
+        for text in filter(None, self.read_over):
+            compile_template(text)
         if self.role is DeviceRole.VALVE:
             _check_valve(self)
         elif self.set_valve or self.read_valve:
@@ -181,7 +174,7 @@ class DeviceProfile:
         fields = compile_template(template_text).fields
         numbers = [one for one in fields if one.name not in self.constants and not isinstance(one, Choice)]
         numbers = [one for one in numbers if one.name == VALUE] or numbers
-        if len(numbers) > 1 or any(not isinstance(one, _NUMBERS) for one in numbers):
+        if len(numbers) > 1 or any(not isinstance(one, NUMBERS) for one in numbers):
             raise TemplateError(
                 f"{quote(template_text)} must carry one number beside constants and words; of several, call one {{value:...}}"
             )
@@ -220,8 +213,10 @@ def _check_codec(profile: DeviceProfile) -> None:
         if not f"{profile.terminator}{profile.question_terminator or ''}".isascii():
             raise ValueError("terminator and question_terminator are ASCII text")
         return
-    if profile.terminator or profile.question_terminator or profile.checksum != "none":
-        raise ValueError("a frame of Modbus RTU or of raw bytes has its own end: leave terminator and checksum out")
+    if profile.terminator or profile.question_terminator or profile.checksum != "none" or profile.read_over:
+        raise ValueError(
+            "a frame of Modbus RTU or of raw bytes has its own end: leave terminator, checksum and read_over out"
+        )
     if profile.is_raw:
         return
     if profile.reply_timeout_s > _LONGEST_MODBUS_S:
@@ -296,6 +291,8 @@ def _check_valve(profile: DeviceProfile) -> None:
         raise ValueError("set_voltage, read_voltage, read_pressure, read_force, stream and steps belong to other roles")
     if profile.watchdog != "none":
         raise ValueError("watchdog belongs to an output")
+    if profile.read_over:
+        raise ValueError("read_over belongs to an output or a load cell")
     _check_unasked(profile, "a valve")
 
 

@@ -32,6 +32,26 @@ def test_an_electrician_is_told_the_checksum_that_the_module_is_to_be_set_to(tmp
     assert rows_of(page, "Serial line: output")["line"] == ["9600 8N1, address 1, channel 0, checksum dcon-sum"]
 
 
+@pytest.mark.parametrize(
+    ("said", "shown"), [("0x10", "10 (hexadecimal, as the module has it; 16 in the rig file)"), ("9", "9")]
+)
+@pytest.mark.parametrize(
+    ("wire", "shipped", "module"),
+    [
+        ("output", "device: smc-itv-rc", "device: icpdas-702x, watchdog_s: 0.5"),
+        ("load cell", "device: stream-st-gs", "device: adam-4016, newton_per_count: 10"),
+    ],
+)
+def test_an_electrician_is_told_the_address_as_the_module_has_it(
+    wire: str, shipped: str, module: str, said: str, shown: str, tmp_path: Path
+) -> None:
+    """`address: 0x10` of a DCON module was `address 16` here: a module whose utility is told 16 hears none of its sentences."""
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("baud: 115200", "baud: 9600")
+    settings = f"{module}, address: {said}".replace(", ", "\n  ")
+    (tmp_path / "own.yaml").write_text(text.replace(shipped, settings).replace("_timeout_s: 0.05", "_timeout_s: 0.5"))
+    assert rows_of(page_of(tmp_path / "own.yaml"), f"Serial line: {wire}")["line"] == [f"9600 8N1, address {shown}"]
+
+
 def test_an_electrician_is_told_the_unit_that_a_modbus_device_is_to_be_set_to(tmp_path: Path) -> None:
     """A profile without `address` speaks to unit 1, and the page named none."""
     weigher = (PROFILES / "devices" / "laumas-tlb.yaml").read_text().replace("name: laumas-tlb", "name: my-weigher")

@@ -51,6 +51,10 @@ WHO = Identity(ask="ID?", answer="ID {model:s}", models=("A1",))
 @pytest.mark.parametrize(
     ("make", "told"),
     [
+        (
+            lambda: Identity(modbus=RegisterAccess(function=3, register=210), models=("4024",)),
+            "a register tells a number: write it without quotes, 4024 or 0x4024",
+        ),
         (lambda: replace(load_device("mcu-valve"), identity=WHO), "a valve is never asked what it is"),
         (lambda: replace(load_device("hx711-line"), identity=WHO), "that streams is never asked what it is"),
         (lambda: RegisterAccess(function=6, register=0, type="uint32"), "function 6 writes one register"),

@@ -72,7 +72,7 @@ def probe_line(line: "AnyLine", others_of_rig: "Iterable[AnyLine]") -> "PortRepo
     second = probe_path(line.port, others)
     second.heard = {**second.heard, **report.heard}
     second.strangers = report.strangers + second.strangers
-    second.unasked = report.unasked
+    second.unasked, second.refusals = report.unasked, report.refusals
     return second
 
 
@@ -145,6 +145,7 @@ def _tell_silence(report: "PortReport") -> str:
 
 
 def _tell_heard(report: "PortReport") -> str:
+    from gateway.devices.template import quote
     from gateway.service.probing.port_probe import is_text, show_bytes
 
     heard = {settings: data for settings, data in report.heard.items() if data}
@@ -156,6 +157,10 @@ def _tell_heard(report: "PortReport") -> str:
         return (
             f"{refused}: it is there, and has no such register or function; a manual's 40008 is register 7 on the wire"
         )
+    if report.refusals:
+        refused_as, line, said = report.refusals[0]
+        refused = f"one says no in the words of {refused_as.name} at {line}, {quote(said)}"
+        return f"{refused}: it is there, and has no answer to what it was asked"
     settings, data = max(
         heard.items(), key=lambda one: (is_text(one[1]), len(one[1]))
     )  # noise comes at every other speed

@@ -10,7 +10,9 @@ from gateway.clients.exchange import ExchangeTable
 from gateway.clients.rendering import endpoint_of
 from gateway.clients.wiring.device_wires import GENERAL, RS485, wires_of
 from gateway.clients.wiring.section import Section
-from gateway.devices.profile import ADDRESS
+from gateway.devices.fields import HexNumber
+from gateway.devices.profile import ADDRESS, DeviceProfile
+from gateway.devices.template import compile_template
 from gateway.profiles import Rig
 from gateway.profiles.rigs.device_settings import CHANNEL
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
@@ -42,9 +44,11 @@ def _lines(rig: Rig) -> Iterator[tuple[str, object]]:
 
 
 def _device_section(name: str, line: object) -> Section:
-    device, settings, port = getattr(line, "device"), getattr(line, "settings"), getattr(line, "port")  # noqa: B009
+    device: DeviceProfile = getattr(line, "device")  # noqa: B009
+    settings, port = getattr(line, "settings"), getattr(line, "port")  # noqa: B009
     wires = wires_of(device.name, is_modbus=device.is_modbus)
     set_to = {**({ADDRESS: device.unit_id} if device.is_modbus else {}), **device.constants}
+    set_to |= {ADDRESS: _address_in_module(device, set_to[ADDRESS])} if ADDRESS in set_to else {}
     constants = "".join(f", {name} {set_to[name]}" for name in (ADDRESS, CHANNEL) if name in set_to)
     constants += "" if device.checksum == "none" else f", checksum {device.checksum}"
     rows = [
@@ -59,6 +63,19 @@ def _device_section(name: str, line: object) -> Section:
         ("certainty", f"{device.hardware} (language: {device.certainty})"),
     ]
     return Section(f"Serial line: {name}", rows=tuple(rows))
+
+
+def _address_in_module(device: DeviceProfile, address: int | str) -> int | str:
+    """Return the address as it is set in the device: its utility knows the digits of its sentences, the rig file the number."""
+    asks = [each.ask for each in (device.set_voltage, device.read_force, device.stream) if each]
+    asks += [device.set_valve.push.ask] if device.set_valve else []
+    fields = [compile_template(ask).field(ADDRESS) for ask in asks if ask]
+    digits = next((field.encode(address) for field in fields if isinstance(field, HexNumber)), str(address))
+    return (
+        address
+        if digits.lstrip("0") == str(address)
+        else f"{digits} (hexadecimal, as the module has it; {address} in the rig file)"
+    )
 
 
 def _face_section(place: int, face: RtuFace, status: tuple[int, int]) -> Section:

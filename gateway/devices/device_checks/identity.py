@@ -32,6 +32,8 @@ class Identity:
         object.__setattr__(self, "ask", ask)
         object.__setattr__(self, "answer", answer)
         compile_template(ask)
+        if self.modbus and not all(isinstance(model, int) for model in self.models):
+            raise ValueError("models: a register tells a number: write it without quotes, 4024 or 0x4024")
         if compile_template(answer).field(self._field) is None:
             raise TemplateError(f"{quote(answer)} has no {{model:...}}: what the device says that it is")
 

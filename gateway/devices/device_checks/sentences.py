@@ -6,6 +6,7 @@ from typing import Final
 
 from gateway.devices.fields import Choice, Field, HexNumber, RegisterNumber
 from gateway.devices.framing import no_terminator
+from gateway.devices.grammar import Grammar
 from gateway.devices.profile import ADDRESS, DeviceProfile, DeviceRole
 from gateway.devices.template import compile_template, quote
 from gateway.modbus.crc import checksum_end
@@ -14,6 +15,7 @@ Place = tuple[str | int, ...]
 Found = Iterator[tuple[Place, str]]
 """(place in the profile, sentence)."""
 
+_BESIDE: Final = "read_over"
 _SAID_BY_US: Final = ("ask", "before", "start", "feed")
 _SAID: Final = (
     *_SAID_BY_US,
@@ -26,6 +28,7 @@ _SAID: Final = (
     "refusal",
     "overload",
     "underload",
+    _BESIDE,
 )
 _DIGITS: Final = frozenset("0123456789ABCDEF")
 _LEAST_FRAME: Final = 4  # bytes: unit, function, checksum
@@ -37,6 +40,7 @@ def misspelt(profile: DeviceProfile) -> Found:
     yield from _cut_sentences(profile)
     yield from _no_pdus(profile)
     yield from _unused_constants(profile)
+    yield from _hidden_answers(profile)
 
 
 def _terminators(profile: DeviceProfile) -> Found:
@@ -105,6 +109,17 @@ def _unused_constants(profile: DeviceProfile) -> Found:
     for name in profile.constants:
         if name not in said:
             yield ("constants", name), f"no sentence has a field {{{name}:...}}" + _cure(profile)
+
+
+def _hidden_answers(profile: DeviceProfile) -> Found:
+    """What is read over must be no answer: one that noise has changed would be read over as well, and nobody told of it."""
+    grammar = Grammar(profile)
+    answers = [text for place, text in _said(profile) if not {_BESIDE, *_SAID_BY_US} & set(place)]
+    for index, over in enumerate(profile.read_over):
+        for text in answers:
+            if grammar.read(over, grammar.encode_filled(text, dict(profile.constants))) is not None:
+                yield (_BESIDE, index), f"{quote(text)} is read over, too, as {quote(over)}: narrow it"
+                break
 
 
 def _cure(profile: DeviceProfile) -> str:

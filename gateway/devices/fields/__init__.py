@@ -18,6 +18,8 @@ One more shape is not for people: {force:int32} and its like are Modbus register
 `modbus:` of a profile stands for (binary/register_access.py).
 """
 
+from typing import Final
+
 from gateway.devices.fields.field import Field, TemplateError, Value, ValueRefused
 from gateway.devices.fields.numbers import Decimals, HexNumber, Plain, Scientific, WholeNumber
 from gateway.devices.fields.registers import RegisterNumber
@@ -25,6 +27,7 @@ from gateway.devices.fields.shapes import field_from
 from gateway.devices.fields.words import Choice, Text
 
 __all__ = [
+    "NUMBERS",
     "Choice",
     "Decimals",
     "Field",
@@ -39,3 +42,6 @@ __all__ = [
     "WholeNumber",
     "field_from",
 ]
+
+NUMBERS: Final = (WholeNumber, HexNumber, Decimals, Scientific, Plain, RegisterNumber)
+"""The shapes that carry a number."""

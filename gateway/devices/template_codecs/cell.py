@@ -105,11 +105,13 @@ class TemplateCellHost:
 
     def receive(self, chunk: bytes, now_s: float) -> list[ForceSample | Garbage | RepeatedSample]:
         """Return the samples and the garbage that these bytes complete, without our own words, which an adapter may hear, and
-        the answer to `before`. now_s: time of their arrival."""
+        the answer to `before`, nor what is read over. now_s: time of their arrival."""
         known = self._known.get(chunk)
         if known is not None and self._lines.is_between_lines:
             return [known.at(now_s)]  # one whole sentence, and one of the few
-        return [self._sample(line, now_s) for line in self._lines.feed(chunk) if line.data not in self._read_over]
+        lines = [line for line in self._lines.feed(chunk) if line.data not in self._read_over]
+        said = ((line, self._sample(line, now_s)) for line in lines)
+        return [one for line, one in said if not (isinstance(one, Garbage) and self._grammar.is_read_over(line))]
 
     def _sample(self, line: Line, now_s: float) -> ForceSample | Garbage | RepeatedSample:
         if not line.is_whole:

@@ -141,8 +141,8 @@ class TemplateOutputHost:
         if reply is not None:
             self._expected.popleft()
             return reply
-        if line.data in self._grammar.own_lines(self._asked):  # an adapter has heard us: it is no noise
-            return None
+        if line.data in self._grammar.own_lines(self._asked) or self._grammar.is_read_over(line):
+            return None  # an adapter has heard us, or the device says something besides: it is no noise
         if len(self._expected) > 1:
             self._expected.clear()
         return Garbage(line.data)

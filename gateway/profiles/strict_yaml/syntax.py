@@ -50,6 +50,7 @@ _MEANINGS: Final = tuple(
     )
 )
 _UNKNOWN: Final = _Meaning("", "")
+_BEHIND_A_BRACE: Final = "nothing but a comma stands behind `}`: quote the whole of a text that has braces in it"
 
 
 def syntax_sentence(error: yaml.YAMLError, text: str) -> tuple[int, int, str]:
@@ -63,6 +64,9 @@ def syntax_sentence(error: yaml.YAMLError, text: str) -> tuple[int, int, str]:
         return line, indent.index("\t") + 1, "a tab: YAML is indented with spaces"
     if isinstance(error, TooDeepError):
         return line, column, _TOO_DEEP
+    mark = getattr(error, "problem_mark", None)
+    if mark and mark.line < len(lines) and lines[mark.line][: mark.column].rstrip().endswith("}"):
+        return mark.line + 1, mark.column + 1, _BEHIND_A_BRACE
     return line, column, meaning.sentence or f"not YAML: {problem}"
 
 

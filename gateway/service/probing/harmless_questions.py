@@ -156,3 +156,10 @@ def count_readings(profile: DeviceProfile, received: bytes) -> int:
     messages = _cell_host(profile).receive(received, 0.0)
     count = sum(isinstance(one, ForceSample) for one in messages)
     return count if 2 * count > len(messages) else 0
+
+
+def refusal_among(profile: DeviceProfile, received: bytes) -> str:
+    """Return the first sentence of these bytes by which this device says no; empty where there is none."""
+    grammar = Grammar(profile)
+    bodies = map(grammar.body, grammar.answers().feed(received))
+    return next(filter(None, (grammar.refusal(body) for body in bodies if body)), "")

@@ -18,6 +18,7 @@ from gateway.service.probing.harmless_questions import (
     HarmlessQuestion,
     count_readings,
     harmless_questions,
+    refusal_among,
     start_of_stream,
 )
 
@@ -46,7 +47,8 @@ class ProbeAnswer:
 
 
 class Stranger(NamedTuple):
-    """A device that answers as the profile says, and is another one. said: what it calls itself."""
+    """A device that answers as the profile says, and is another one, or has no answer. said: what it calls itself, or how it
+    says no."""
 
     profile: DeviceProfile
     settings: SerialSettings
@@ -56,12 +58,13 @@ class Stranger(NamedTuple):
 @dataclass(slots=True)
 class PortReport:
     """What a port gave: answers in the order of finding; strangers: devices that speak a profile's words and call themselves
-    something that it does not know; bytes heard in all, by settings; warning: of its adapter; unasked: profiles that have no
-    question which changes nothing."""
+    something that it does not know; refusals: those that say no in its words; bytes heard in all, by settings; warning: of its
+    adapter; unasked: profiles that have no question which changes nothing."""
 
     path: str
     answers: list[ProbeAnswer] = field(default_factory=list)
     strangers: list[Stranger] = field(default_factory=list)
+    refusals: list[Stranger] = field(default_factory=list)
     heard: dict[str, bytes] = field(default_factory=dict)
     warning: str = ""
     unasked: tuple[str, ...] = ()
@@ -145,6 +148,8 @@ async def _probe_at(
                 report.answers.append(answer)
             else:
                 report.heard[str(settings)] += ear.received
+                if said := refusal_among(profile, ear.received):
+                    report.refusals.append(Stranger(profile, settings, said))
     finally:
         ear.port.close()
 
@@ -162,7 +167,9 @@ def _streamed(
     if count < _ENOUGH:
         return None
     (question,) = harmless_questions(profile)
-    line = received.split(profile.terminator_bytes)[1]
+    end = profile.terminator_bytes
+    whole = received.split(end)[1:]
+    line = next((one for one in whole if question.understands(end + one + end)), whole[0])
     return ProbeAnswer(profile, settings, question.understands(received), b"", line, 0.0, count / listened_s)
 
 

@@ -66,6 +66,9 @@ def test_a_word_means_what_yaml_1_2_says(parse: Parse, written: str, meant: obje
     assert value == meant and type(value) is type(meant)
 
 
+BEHIND_A_BRACE = "nothing but a comma stands behind `}`: quote the whole of a text that has braces in it"
+
+
 @pytest.mark.parametrize(
     ("data", "told"),
     [
@@ -88,6 +91,11 @@ def test_a_word_means_what_yaml_1_2_says(parse: Parse, written: str, meant: obje
         (b"a: 'x\nb: 1\n", "rig.yaml:1:4: a quote is opened and never closed"),
         (b"a: [1, 2\nb: 3\n", "rig.yaml:1:4: a list is opened with `[` and not closed, or a comma is missing"),
         (b"a: {x: 1\nb: 3\n", "rig.yaml:1:4: a mapping is opened with `{` and not closed, or a comma is missing"),
+        (b"a: 1\nframe: {force:8.2f} kg\n", f"rig.yaml:2:21: {BEHIND_A_BRACE}"),
+        (b"frame: {status:ST|OL},{force:+08.2f}\n", f"rig.yaml:1:22: {BEHIND_A_BRACE}"),
+        (b"ask: {address:02X}?\n", f"rig.yaml:1:19: {BEHIND_A_BRACE}"),
+        (b"a: {frame: {force:8.2f} kg, unit: N}\n", f"rig.yaml:1:25: {BEHIND_A_BRACE}"),
+        (b"a: {b: {c: 1} d: 2}\n", f"rig.yaml:1:15: {BEHIND_A_BRACE}"),
         (b"a: 1\n---\nb: 2\n", "rig.yaml:2:1: a second document (`---`): a profile is one document"),
         (b"a: \x07\n", "rig.yaml:1:4: a control character that no text editor shows: delete it"),
         (b"a: *\nb: 1\n", "rig.yaml:1:4: `*` and `&` name a value of YAML: quote the text that begins so"),

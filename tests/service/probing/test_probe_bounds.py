@@ -11,9 +11,10 @@ from gateway.devices import DeviceProfile, ValveDevice, ValveDirection, cell_dev
 from gateway.devices.binary.register_access import RegisterAccess
 from gateway.devices.binary.rtu_framing import rtu_frame
 from gateway.devices.device_checks.identity import Identity
+from gateway.devices.exchange import Refusals
 from gateway.devices.messages import DeviceAnswer, DeviceStep, ReadPressure
 from gateway.devices.profile import DeviceRole
-from gateway.ports import Pty
+from gateway.ports import PacedPty, Pty
 from gateway.profiles import list_shipped, load_device
 from gateway.service.probing import port_probe
 from gateway.service.probing.harmless_questions import HarmlessQuestion, count_readings, harmless_questions
@@ -40,6 +41,14 @@ class FakeEar:
 
     async def listen(self, duration_s: float) -> None:
         self.now_s += duration_s
+
+
+class Refusing(FarEnd):
+    """A device that has this answer to everything."""
+
+    def __init__(self, profile: DeviceProfile, answer: bytes) -> None:
+        super().__init__(profile)
+        self.pty = PacedPty(profile.serial.baud, on_bytes=lambda chunk, now_s: self.pty.send(answer))
 
 
 @pytest.mark.parametrize(
@@ -72,6 +81,15 @@ def test_of_a_stream_that_was_cut_at_its_beginning_a_whole_reading_is_told() -> 
     profile = load_device("hx711-line")
     found = _streamed(profile, profile.serial, b"456\r\n" + b"123456\r\n" * 4, 0.25)
     assert found and (found.said, found.heard) == ("reads 123456", b"123456")
+
+
+@pytest.mark.parametrize(("shipped", "line"), [("stream-st-gs", LINE), ("hx711-line", b"123456\r\n")])
+def test_of_a_stream_with_other_lines_a_reading_is_shown(shipped: str, line: bytes) -> None:
+    """`streams 'T=23.5', 18 readings/s` was said of a profile that reads those lines over."""
+    profile = replace(load_device(shipped), read_over=("T={degrees:.1f}",))
+    found = _streamed(profile, profile.serial, (b"T=23.5\r\n" * 2 + line) * 3, 0.25)
+    assert found and found.heard == line.strip()
+    assert found.rate_hz == pytest.approx(12.0)
 
 
 @pytest.mark.parametrize(("said_hz", "rate_hz"), [(80.0, 10.0), (3.0, 3.0)])
@@ -110,6 +128,23 @@ def test_a_modbus_device_that_refuses_is_there_and_what_it_says_is_told_in_words
     assert said.endswith(f"{told} or function; a manual's 40008 is register 7 on the wire")
     (said,) = tell_report(replace(report, heard={"9600 8N1": rtu_frame(3, b"8302")[:4]}))
     assert "4 bytes at 9600 8N1 that no profile understands" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"), [("smc-itv-rc", "UNKNOWN COMMAND"), ("icpdas-7024", "?01"), ("mantracourt-dsc", "?")]
+)
+def test_a_device_that_says_no_in_the_profile_s_own_words_is_there(name: str, shown: str) -> None:
+    """Of a module whose firmware has no `$01M` it was said that no profile understood its `?01`."""
+    profile = replace(load_device(name), refusals=Refusals(unknown=shown))
+    with behind_ptys(Refusing(profile, f"{shown}{profile.terminator}".encode())) as (path,):
+        report = asyncio.run(port_probe.probe_port(path, [profile], ()))
+    (said,) = tell_report(report)
+    assert said.endswith(
+        f"no known device answered; one says no in the words of {name} at {profile.serial}, '{shown}': it is there, and has no "
+        "answer to what it was asked"
+    )
+    (said,) = tell_report(replace(report, refusals=[]))
+    assert "that no profile understands" in said
 
 
 @pytest.mark.parametrize("baud", [300, 9600])
