@@ -196,6 +196,10 @@ def test_what_is_written_while_something_waits_comes_behind_it(run: Any, has_epo
         transport.write(b"end")
         size = (1 << 20) + 3 - len(found)
         assert found + await scene.heard(0, size) == bytes(1 << 20) + b"end"
+        await scene.until(lambda: not transport._waiting)
+        assert not (epoll := scene.ready._epoll) or epoll.poll(0) == [], (
+            "a socket that takes bytes wakes nobody for ever"
+        )
         await scene.end()
 
     run(main())

@@ -1,9 +1,13 @@
 """The force loop by itself where contact comes and goes: what it may go for, what it forgets, and what a rest leaves of it."""
 
+from dataclasses import replace
+
 import pytest
 
 from gateway.control.force_loop.force_loop import ForceLoop
+from gateway.control.inputs import LineStatus
 from gateway.control.sample_conditioning import Reading
+from gateway.control.settings import LeadSettings, Trim
 from gateway.registers.words import LimitedBy
 from tests.control.bench import settings
 from tests.control.force_loop.test_force_loop import LINE, inputs, loop_of, pressed, wish
@@ -78,3 +82,23 @@ def test_below_the_smallest_force_nothing_of_the_trim_goes_out() -> None:
     assert loop.trim_v > 0.0
     step(loop, 0.5 * settings().limits.smallest_force_n, 15.0, 400)
     assert (loop.voltage_v, loop.limited_by) == (0.0, LimitedBy.SMALLEST_FORCE)
+
+
+def test_a_force_that_was_in_band_is_not_once_the_output_rests() -> None:
+    loop = loop_of()
+    for tick in range(300):
+        step(loop, 20.0, loop.feedforward.reference_n, now_s=0.01 * tick)
+    assert loop.in_band
+    loop.rest()
+    assert not loop.in_band
+
+
+@pytest.mark.parametrize(("sent_v", "is_pushed"), [(None, False), (0.0, True)])
+def test_what_the_wire_has_not_taken_yet_is_pushed_for_on(sent_v: float | None, is_pushed: bool) -> None:
+    """By the wish alone the model of the lags would be there before the regulator has heard of it."""
+    loop = loop_of(replace(settings(), trim=Trim(), lead=LeadSettings(lag_s=0.1)))
+    for _ in range(100):
+        loop.elapse(0.01, LineStatus(sent_v=sent_v))
+        loop.step(wish(20.0, ramp_n_per_s=1e3), inputs(loop.feedforward.reference_n))
+    settled_v = pressed(loop_of(replace(settings(), trim=Trim())), 20.0).voltage_v
+    assert (loop.voltage_v > 1.5 * settled_v) is is_pushed
