@@ -25,6 +25,7 @@ def response(**numbers: float) -> dict[str, object]:
 FAULTS = [
     (stops((0.5, 1.0), (0.6, 0.5)), 80, SHARE, "slip shares add up to 1.1: 1 is needed"),
     (stops((0.5, 1.0), (0.6, 0.4001)), 80, SHARE, "slip shares add up to 1.0001: 1 is needed"),
+    (stops((0.5, 1.0), (0.6, 0.3999)), 80, SHARE, "slip shares add up to 0.9999: 1 is needed"),
     (stops((0.5,), (0.6, 0.4)), -1, STOPS, "slip stops: 1 radii and 2 shares: as many of each, at most 16"),
     (stops((0.5,) * 17, (0.1,) * 17), -1, STOPS, "slip stops: 17 radii and 17 shares: as many of each, at most 16"),
     (stops((1.0, 0.5), (0.6, 0.4)), 65, RADIUS,

@@ -113,6 +113,40 @@ def test_what_is_asked_for_behind_a_loss_waits_for_off(
     assert gateway.bank.command.force_setpoint_n == (0.0 if gateway.exceptions else 20.0)
 
 
+@pytest.mark.parametrize(
+    "ask", [lambda client: client.enable(20.0), lambda client: client.tare()], ids=["force", "tare"]
+)
+def test_what_is_asked_for_while_it_connects_again_goes_out_behind_off_or_not_at_all(
+    client: Any, gateway: GatewayAtHand, ask: Any
+) -> None:
+    """Ahead of OFF, or in its place, a force that nobody expects any more would be followed by another one."""
+    client.enable(12.0)
+    cycles(client)
+    gateway.is_cut = True
+    cycles(client, 3)
+    gateway.is_cut = False
+    answer, before = gateway.answer, len(gateway.requests)
+
+    def ask_beside_the_map(request: bytes) -> bytes:
+        gateway.answer = answer  # type: ignore[method-assign]
+        ask(client)
+        return answer(request)
+
+    if isinstance(client, Plc):
+        while len(gateway.requests) == before:
+            client.scan()
+        ask(client)
+    else:
+        gateway.answer = ask_beside_the_map  # type: ignore[method-assign]
+    for _ in range(6):
+        client.cycle(1.0)
+    first, off, *behind = commands(gateway)
+    assert (first, off) == (command(1, 1200), command(0, 0))
+    assert behind in ([], [command(1, 2000)], [command(4, 0)], [command(4, 0), command(0, 0)])
+    if isinstance(client, Irc5):
+        assert behind, "its data are read once it is connected"
+
+
 def test_the_python_client_takes_an_enable_back_whose_answer_was_lost(gateway: GatewayAtHand) -> None:
     python: dict[str, Any] = {}
     exec(render_client(MAP, "python", WHERE), python)

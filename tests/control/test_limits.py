@@ -56,6 +56,18 @@ def test_falling_is_immediate_and_rising_is_not():
     assert slew_limited(8.0, 0.0, 40.0, 0.0) == (0.0, LimitedBy.VOLTAGE_SLEW)
 
 
+def test_a_fall_takes_nothing_from_the_rise_behind_it():
+    """As a jam that has gone asks for: down at once, and up again as steeply as ever."""
+    limiter = VoltageLimiter(LIMITS)
+    for _ in range(30):
+        limiter.earn(TICK_S)
+        limiter.drive(8.0)
+    limiter.earn(TICK_S)
+    limiter.drive(2.0)
+    assert limiter.drive(8.0) is LimitedBy.VOLTAGE_SLEW
+    assert limiter.voltage_v == pytest.approx(2.0 + 40.0 * TICK_S)
+
+
 def test_the_strongest_of_several_limits_is_reported():
     assert strongest(LimitedBy.NONE, LimitedBy.FORCE_RANGE, LimitedBy.VOLTAGE_SLEW) is LimitedBy.VOLTAGE_SLEW
     assert strongest(LimitedBy.NONE) is LimitedBy.NONE

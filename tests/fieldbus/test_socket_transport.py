@@ -164,6 +164,72 @@ def test_who_does_not_read_is_told_of_at_the_cap(run: Any, has_epoll: bool) -> N
 
 
 @EITHER
+def test_who_says_that_nothing_more_comes_still_gets_the_whole_answer(run: Any, has_epoll: bool) -> None:
+    """As a program does that shuts its sending half and reads to the end."""
+
+    def answer(transport: SocketTransport, _: bytes) -> None:
+        transport.set_write_buffer_limits(high=1 << 21)
+        transport.write(bytes(1 << 20))
+
+    async def main() -> None:
+        scene = Scene([answer], has_epoll=has_epoll)
+        scene.far[0].send(b"x")
+        scene.far[0].shutdown(socket.SHUT_WR)
+        await scene.until(lambda: scene.ends[0].transport._is_closing)
+        assert await scene.heard(0, 1 << 20) == bytes(1 << 20)
+        assert await scene.heard(0, 1) == b""
+        await scene.end()
+
+    run(main())
+
+
+@EITHER
+def test_what_is_written_while_something_waits_comes_behind_it(run: Any, has_epoll: bool) -> None:
+    """Ahead of it, it would stand in the middle of another answer."""
+
+    async def main() -> None:
+        scene = Scene([lambda *_: None], has_epoll=has_epoll)
+        transport = scene.ends[0].transport
+        transport.set_write_buffer_limits(high=1 << 21)
+        transport.write(bytes(1 << 20))
+        found = scene.far[0].recv(1 << 18)  # there is room again, and the loop has not been round
+        transport.write(b"end")
+        size = (1 << 20) + 3 - len(found)
+        assert found + await scene.heard(0, size) == bytes(1 << 20) + b"end"
+        await scene.until(lambda: not transport._waiting)
+        assert not (epoll := scene.ready._epoll) or epoll.poll(0) == [], (
+            "a socket that takes bytes wakes nobody for ever"
+        )
+        await scene.end()
+
+    run(main())
+
+
+@EITHER
+def test_one_that_closes_hears_nothing_more_whoever_resumes_and_ends_once(run: Any, has_epoll: bool) -> None:
+    async def main() -> None:
+        told: list[Any] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(context))
+        scene = Scene([lambda *_: None], has_epoll=has_epoll)
+        transport = scene.ends[0].transport
+        transport.set_write_buffer_limits(high=1 << 21)
+        transport.write(bytes(1 << 20))
+        transport.close()
+        transport.resume_reading()
+        scene.far[0].send(b"too late")
+        assert await scene.heard(0, 1 << 20) == bytes(1 << 20)
+        for _ in range(2):
+            transport.abort()
+        await scene.until(lambda: scene.ends[0].lost)
+        for _ in range(5):
+            await asyncio.sleep(0)
+        assert scene.ends[0].heard == [] and scene.ends[0].lost == [None] and told == []
+        await scene.end()
+
+    run(main())
+
+
+@EITHER
 def test_who_pauses_hears_the_rest_when_it_goes_on(run: Any, has_epoll: bool) -> None:
     async def main() -> None:
         scene = Scene([lambda transport, _: transport.pause_reading(), echo], has_epoll=has_epoll)

@@ -75,6 +75,9 @@ frames = st.builds(Adu, st.integers(0, 0xFFFF), st.sampled_from([1, 2]), st.bina
 
 @given(st.one_of(nearly, frames, st.binary(max_size=40)))
 @example(pack(">HHHBB", 1, 0, 255, 1, 0x41) + bytes(253))  # longer than any frame
+@example(pack(">HHHBBHHB", 1, 0, 255, 1, 16, 0, 124, 248) + bytes(248))  # and a write of more than is allowed
+@example(pack(">HHHBBHHB", 1, 0, 10, 1, 16, 0, 1, 2) + bytes(2))  # a byte of it is still to come
+@example(pack(">HHHBBHHB", 1, 0, 8, 1, 16, 0, 1, 2) + bytes(2))  # it is one too many
 def test_any_segment_is_answered_as_the_long_way_or_left_to_it(segment: bytes) -> None:
     assert whole_answer(segment, UNITS, bank(), PEER) == the_long_way(segment)
 
@@ -89,3 +92,12 @@ def test_a_write_is_executed_as_the_long_way_or_left_to_it(count: int, data_byte
     assert whole_answer(segment, UNITS, quick, PEER) == the_long_way(segment)
     is_sound = data_bytes == 2 * count == len(data) and 1 <= count <= 123
     assert quick.image[: len(data)] == data if is_sound else quick.image == bank().image
+
+
+def test_what_is_kept_of_reads_is_bounded_and_no_refusal() -> None:
+    """Who reads here and there would have the memory, and a refusal that is known already leaves no reason."""
+    made = bank()
+    assert whole_read_answer(pack(">HHHBBHH", 1, 0, 6, 1, 3, 199, 2), UNITS, made, PEER) and not made.known_answers
+    for address in range(190):
+        assert whole_read_answer(pack(">HHHBBHH", 1, 0, 6, 1, 3, address, 1), UNITS, made, PEER)
+        assert 0 < len(made.known_answers) <= 64

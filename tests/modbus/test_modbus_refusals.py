@@ -168,6 +168,7 @@ def test_a_truncated_or_surplus_request_is_03_and_does_nothing(request_pdu: byte
 
 def test_other_encapsulated_interfaces_are_not_served() -> None:
     assert refusal("2b 0d 0000") == 1
+    assert refusal("2b 0d") == 1, "the function comes before the shape"
 
 
 @pytest.mark.parametrize("sub_function", [1, 2, 4, 10, 20, 255, 0xFFFF])

@@ -8,7 +8,14 @@ from gateway.modbus import Peer, answer
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.bits import pack_bits, unpack_bits
 from gateway.modbus.crc import checksum_end, crc16
-from gateway.modbus.rtu import RtuFault, answer_length, decode_adu, encode_adu, request_length
+from gateway.modbus.rtu import (
+    RtuFault,
+    answer_length,
+    decode_adu,
+    encode_adu,
+    is_broadcast_function,
+    request_length,
+)
 from tests.modbus.host_answers import identification_request, write_coil_request, write_coils_request
 from tests.modbus.memory_bank import MemoryBank
 
@@ -108,3 +115,13 @@ def test_the_longest_frame_is_one_and_a_longer_one_is_none() -> None:
 
 def test_a_refusal_is_known_by_its_second_byte() -> None:
     assert [answer_length(bytes.fromhex(seen)) for seen in ("01", "0183", "018302")] == [None, 5, 5]
+
+
+def test_only_what_writes_and_reads_nothing_may_be_said_to_everybody() -> None:
+    assert [function for function in range(256) if is_broadcast_function(function)] == [5, 6, 15, 16, 22]
+
+
+def test_a_checksum_the_other_way_round_is_none() -> None:
+    frame = encode_adu(1, P.read_request(3, 0, 2))
+    with pytest.raises(RtuFault, match="checksum"):
+        decode_adu(frame[:-2] + frame[-1:] + frame[-2:-1])

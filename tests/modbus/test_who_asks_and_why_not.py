@@ -7,6 +7,8 @@ from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.diagnostics import ServerId, report_answer
 from gateway.modbus.errors import NAMES
 from gateway.modbus.peer import NOBODY
+from gateway.modbus.server import refuse_unit
+from tests.modbus.memory_bank import MemoryBank
 from tests.modbus.test_modbus_refusals import PEER, FussyBank
 
 
@@ -36,3 +38,13 @@ def test_a_request_of_a_wrong_length_is_told_both_lengths() -> None:
         P.parse_read(bytes(3), 10)
     with pytest.raises(RequestError, match=r"2 bytes.*1"):
         report_answer(b"\x11\x00", ServerId(0, True, b""))
+
+
+@pytest.mark.parametrize("function", [5, 6, 15, 16, 22, 23, 1, 2, 3, 4, 8, 17, 43])
+def test_the_bank_is_told_whether_what_was_refused_wanted_to_write(function: int) -> None:
+    """Of a write the owner and the audit hear, too."""
+    bank, told = MemoryBank(words=200, bits=16, identity={0: b"v"}), list[bool]()
+    bank.note_refusal = lambda refusal, peer: told.append(refusal.is_write)  # type: ignore[method-assign]
+    answer(bytes((function, 0)), bank, PEER)
+    refuse_unit((9, bytes((function, 0, 4, 0, 1))), (1,), bank, PEER)
+    assert told == [function in (5, 6, 15, 16, 22, 23)] * 2

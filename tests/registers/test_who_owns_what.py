@@ -8,6 +8,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.registers import Status
 from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import ControlBit, State, StatusBit
+from gateway.registers.writes.held_runs import HeldRuns
 from gateway.registers.writes.ownership import (
     LARGEST_SERIAL_PLACE,
     NOT_IPV4,
@@ -180,6 +181,16 @@ def test_the_owner_s_address_is_that_of_its_last_command(make_bank, register_map
     assert shown == [1, 2, 1] and bank.owner == "certificate plc"
 
 
+def test_the_owner_s_address_follows_cycles_that_change_nothing_but_the_heartbeat(make_bank, register_map) -> None:
+    bank, address = make_bank(), register_map.find("owner_ip").address
+    first, second = (Master(bank, host, name="plc") for host in ("10.0.0.1", "10.0.0.2"))
+    shown = []
+    for beat, master in enumerate((first, first, first, second, second, first)):
+        master.write(0, 1, 1200, 0, 0, beat)
+        shown.append(bank.read_registers(address, 2)[-1])
+    assert shown == [1, 1, 1, 2, 2, 1] and bank.command.number == 6
+
+
 def test_who_ends_another_s_run_takes_no_owner_s_address_away(make_bank, register_map) -> None:
     """A certificate's name says no address: the last write of the owner itself does."""
     bank = make_bank(supported_bits=BASIC_BITS | ControlBit.START_CALIBRATION)
@@ -243,3 +254,17 @@ def test_a_held_bit_that_stops_another_s_run_begins_none_in_the_next_cycle(make_
     holder.write(0, run)
     assert bank.command.stops
     assert holder.refusal(holder.write, 0, run).reason is RefusalReason.CALIBRATION_HELD
+
+
+def test_whoever_keeps_what_is_held_is_told_of_each_end_and_the_oldest_of_too_many_is_forgotten() -> None:
+    told: list[dict[str, int]] = []
+    held = HeldRuns()
+    held.on_change = told.append
+    for bits in (TEST, TEST, 0, 0):
+        held.keep("a", bits)
+    assert told == [{"a": TEST}, {}]
+    for number in range(64):
+        held.keep(f"10.0.0.{number}", TEST)
+    held.keep("10.0.0.0", TEST)  # it is there again, as each of its cycles says
+    held.keep("new", TEST)
+    assert [held.of(host) for host in ("10.0.0.0", "10.0.0.1", "10.0.0.2", "new")] == [TEST, 0, TEST, TEST]

@@ -5,10 +5,11 @@ from itertools import pairwise
 
 import pytest
 
-from gateway.bsfm import FALLING, RISING, Bsfm
+from gateway.bsfm import FALLING, RISING, Bsfm, InverseStatus
 from gateway.control import CalibrationInUse, Controller
 from gateway.control.demand import demand_of
-from gateway.control.force_loop.feedforward import Approach, Feedforward
+from gateway.control.force_loop.feedforward import Approach, Feedforward, ModelError
+from gateway.control.force_loop.transport_delay import TransportDelay
 from gateway.registers.command import Command
 from gateway.registers.words import State
 from tests.control.bench import Bench, bsfm, settings
@@ -143,3 +144,72 @@ def test_a_path_ends_with_the_output_that_it_was_for() -> None:
     law.reset()
     law.advance(goal_n, 1.0e4, 0.01)
     assert law.aimed_n == pytest.approx(goal_n)
+
+
+def test_a_contact_that_is_lost_below_the_pre_contact_force_raises_nothing_at_once() -> None:
+    law = Feedforward(bsfm(), settings().limits, 0.1)
+    law.advance(40.0, 100.0, 0.01)
+    before_n = law.applied_n
+    law.fall_back(5.0)
+    assert 0.0 < law.applied_n == before_n < 5.0
+
+
+def test_what_a_swap_carries_over_ends_where_another_mode_drives_and_with_the_output() -> None:
+    """It was for a voltage of ours: added to another one's, it would be a bump of its own."""
+    laws = [pressing(20.0), pressing(20.0)]
+    for law in laws:
+        law.use(bsfm(1.3), 0.0)
+    laws[0].take_over(20.0, FALLING)
+    laws[1].reset()
+    laws[1].take_over(20.0, FALLING)
+    law = pressing(20.0)
+    law.use(bsfm(1.3), 0.0)
+    law.reset()
+    for _ in range(20):
+        law.advance(20.0, 1e3, 0.01)
+    falling, rising = bsfm(1.3).branches.falling, bsfm(1.3).branches.rising
+    assert [one.compute_voltage(0.0)[0] for one in laws] == pytest.approx([falling.inverse(20.0)[0]] * 2)
+    assert law.compute_voltage(0.0)[0] == pytest.approx(rising.inverse(20.0)[0])
+
+
+def test_a_swap_leaves_the_slide_on_its_branch() -> None:
+    law = pressing(20.0)
+    law.use(bsfm(1.3), 0.0)
+    assert law.branch_share == FALLING
+    for _ in range(500):
+        law.advance(20.0, 100.0, 0.01)
+    assert law.compute_voltage(0.0)[0] == pytest.approx(bsfm(1.3).branches.falling.inverse(20.0)[0], abs=1e-3)
+
+
+def test_a_target_of_nothing_vents_the_slide_and_the_next_force_begins_there() -> None:
+    law = pressing(20.0)
+    for _ in range(100):
+        law.advance(0.0, 100.0, 0.01)
+    assert law.branch_share == law.model.reversal.branch_share(law.model.reversal.start()) == RISING
+
+
+def test_a_weight_that_takes_over_a_part_of_the_force_lets_the_slide_down() -> None:
+    """Not the target has turned, but what the slide gives of it."""
+    law = Feedforward(bsfm(), settings().limits, 0.1)
+    for _ in range(200):
+        law.advance(30.0, 100.0, 0.01)
+    assert law.branch_share == RISING
+    law.advance(30.0, 100.0, 0.01, gravity_n=8.0)
+    assert law.branch_share == FALLING
+
+
+def test_a_voltage_that_is_no_number_is_the_model_s_fault() -> None:
+    class Broken(Bsfm):
+        def voltage_v(self, *_: object, **__: object) -> tuple[float, InverseStatus]:  # type: ignore[override]
+            return float("nan"), InverseStatus.OK
+
+    law = Feedforward(Broken(bsfm().branches, bsfm().reversal), settings().limits, 0.1)
+    law.take_over(20.0)
+    with pytest.raises(ModelError, match="nan"):
+        law.compute_voltage(0.0)
+
+
+def test_of_what_came_due_in_one_long_step_the_latest_counts() -> None:
+    line = TransportDelay(0.03)
+    assert [line.advance(value, 0.01) for value in (1.0, 2.0, 3.0, 4.0)] == [0.0, 0.0, 0.0, 1.0]
+    assert line.advance(5.0, 0.05) == 4.0

@@ -230,3 +230,14 @@ def test_a_reset_forgets_volts_and_what_each_direction_had_learned() -> None:
     held(one, 1.0, 3.0)
     one.travel(-4.0)
     assert abs(one.value_n) < 0.1, "only one direction has learned since"
+
+
+def test_another_rig_s_limit_and_zone_count_from_then_on() -> None:
+    one = trim(limit_v=0.5, dead_zone_n=0.1)
+    held(one, 3.0, 3.0)
+    one.retime(Trim(gain_v_per_n_s=0.3, limit_v=0.1, dead_zone_n=3.0), TIMING)
+    before_n = one.value_n
+    assert one.take_volts(0.4) == 0.1
+    one.rest()
+    held(one, 1.0, 2.0)
+    assert one.value_n == before_n, "within the zone of that one"

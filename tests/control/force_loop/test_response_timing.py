@@ -68,6 +68,7 @@ def test_everything_follows_from_the_response():
     assert slow.timing.integral_per_s < 0.6 * quick.timing.integral_per_s
     assert slow.supervision.response_lag_s == pytest.approx(0.42)
     assert slow.supervision.unreachable_s == pytest.approx(2.1)
+    assert quick.supervision.unreachable_s == settings().supervision.unreachable_s > 1.0, "a person has to see it, too"
     assert (slow.lead.lag_s, slow.lead.second_lag_s) == (0.2, 0.1)
     assert slow.limits == settings().limits
     assert slow.trim == settings().trim

@@ -63,7 +63,8 @@ class Watched:
     def __init__(self, register_map: RegisterMap, *, has_short_way: bool) -> None:
         supported = ControlBit(0x7F)
         rules = BankRules(rig_name="demo", force_max_n=60.0, supported_bits=supported)
-        self.bank = RegisterBank(register_map, rules, now=lambda: 1.0)
+        self.now_s = 0.0
+        self.bank = RegisterBank(register_map, rules, now=lambda: self.now_s)
         self.handed: list[Command] = []
         self.repeated, self._words = 0, [0] * 13
         self.bank._repeat = self._counted(self.bank._repeat) if has_short_way else lambda data, peer: False
@@ -73,6 +74,7 @@ class Watched:
         """Let this happen, and return all that can be seen of the bank behind it."""
         name, peer, argument = event
         bank, said = self.bank, ""
+        self.now_s += 0.1
         acts: dict[str, Callable[[], object]] = {
             "beat": lambda: self._write([*self._words[:4], argument, *self._words[5:]], peer),
             "words": lambda: self._write(list(argument), peer),
