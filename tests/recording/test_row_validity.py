@@ -129,6 +129,18 @@ def test_gaps_are_told_with_their_number_length_and_place() -> None:
     assert note.startswith("2 gaps in time (the longest 6.01 s, at 0.990 s the first): 100 rows up to 0.5 s")
 
 
+@pytest.mark.parametrize("leap_s", [7300.0, 86_400.0, 1.79e9], ids=["two hours", "a day", "from 1970"])
+def test_a_clock_that_leaps_ahead_is_refused_where_it_does(leap_s: float) -> None:
+    """A logger without a clock of its own begins in 1970: simulated over the leap the same force was off by 16 N."""
+    times_s = np.concatenate([0.01 * np.arange(100), leap_s + 0.01 * np.arange(100)])
+    with pytest.raises(RecordingError, match=r"column time_s: \d+ h after the row before \(1 time in"):
+        check_time_axis(timed(*times_s))
+
+
+def test_a_pause_of_an_hour_is_a_gap() -> None:
+    assert check_time_axis(timed(*(0.01 * np.arange(100)), *(3600.0 + 0.01 * np.arange(100)))).after_gap.sum() == 50
+
+
 def test_one_row_and_none_have_a_time_axis_too() -> None:
     assert check_time_axis(timed(7.0)).time_s.tolist() == [0.0]
     assert check_time_axis(timed()).time_s.size == 0
