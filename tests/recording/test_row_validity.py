@@ -103,7 +103,7 @@ def test_a_fifth_of_the_times_may_be_unknown(unknown: int, is_refused: bool) -> 
         assert f"{unknown} rows without a time" in check_time_axis(recording).notes[0]
 
 
-@pytest.mark.parametrize(("step_s", "unit"), [(2.0, "ms"), (999.0, "ms"), (1000.0, "us")])
+@pytest.mark.parametrize(("step_s", "unit"), [(2.0, "ms"), (999.0, "ms"), (1000.0, "us"), (1.0e6, "ns")])
 def test_rows_that_are_too_far_apart_are_refused_with_the_unit_that_they_look_like(step_s: float, unit: str) -> None:
     with pytest.raises(RecordingError, match=rf"Are the times in {unit}\?"):
         check_time_axis(timed(*(step_s * k for k in range(10))))

@@ -26,6 +26,7 @@ _COARSE_S: Final = 1.0
 TOO_COARSE_S: Final = 2.0
 """From here on every response that the catalogue knows is over between two rows; times in ms look like this."""
 _MICROSECONDS_S: Final = 1000.0  # as ms, that would still be one row a second
+_NANOSECONDS_S: Final = 1.0e6  # so it would as us
 LONGEST_GAP_S: Final = 7200.0
 """A clock that was set while it was recorded leaps further (from 1970, by a day), and a simulation that spans more has steps
 longer than a regulator's lag, or more rows than fit into memory."""
@@ -85,7 +86,7 @@ def _check_unknown(recording: Recording, known: Flags) -> list[str]:
 def _refuse_coarse(recording: Recording, time_s: Floats) -> None:
     median_s = float(np.median(np.diff(time_s))) if time_s.size > 1 else 0.0
     if median_s >= TOO_COARSE_S:
-        unit = "us" if median_s >= _MICROSECONDS_S else "ms"
+        unit = "ns" if median_s >= _NANOSECONDS_S else "us" if median_s >= _MICROSECONDS_S else "ms"
         raise RecordingError(
             f"{recording.path}, column time_s: one row every {median_s:.3g} s, and a force follows its command within one: "
             f"nothing can be judged between such rows. Are the times in {unit}? then --columns time_s=...:{unit}"
