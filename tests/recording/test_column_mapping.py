@@ -35,7 +35,7 @@ def test_a_file_says_the_same_as_the_text(tmp_path: Path) -> None:
         ("time_s", "'time_s' is not NAME=COLUMN"),
         ("", "no column is named"),
         ("time_s=1,time_s=2", "time_s stands twice"),
-        ("time_s=1:fortnight", "'fortnight' is no unit for time_s; allowed: s, ms, us, min, h"),
+        ("time_s=1:fortnight", "'fortnight' is no unit for time_s; allowed: s, ms, us, ns, min, h"),
         ("force_n=2:bar", "'bar' is no unit for force_n; allowed: n, mn, kn, kgf, gf, lbf"),
         ("humidity=2:percent", "humidity ends with no unit"),
         ("time_s=:ms", "names no column"),

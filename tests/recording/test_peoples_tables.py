@@ -15,7 +15,7 @@ from gateway.recording.tables import csv_dialect
 from gateway.recording.tables.mapping_file import column_mapping
 
 NEWTON = {"N": 1.0, "kgf": 9.80665, "mN": 1e-3, "lbf": 4.4482216152605, "kN": 1e3, "g": 9.80665e-3}
-SECOND = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0}
+SECOND = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0}
 KILOPASCAL = {"bar": 100.0, "Pa": 1e-3, "kPa": 1.0, "MPa": 1e3, "mbar": 0.1, "psi": 6.894757293168361}
 VOLT = {"V": 1.0, "mV": 1e-3, "%": 0.1}
 BEGIN = datetime(2026, 10, 25, 23, 59, 58, tzinfo=UTC)
@@ -137,7 +137,7 @@ def test_columns_taken_by_their_headers_are_told(tmp_path: Path) -> None:
     [
         (
             "Time,Force,Voltage",
-            "--columns time_s=1:s,force_n=2:n,command_v=3:v (the unit of column 1 is nowhere: s, ms, us",
+            "--columns time_s=1:s,force_n=2:n,command_v=3:v (the unit of column 1 is nowhere: s, ms, us, ns",
         ),
         ("Time [min],Force 1 [kgf],Voltage (V)", "--columns force_n=2:kgf"),
         (

@@ -103,7 +103,7 @@ def test_a_fifth_of_the_times_may_be_unknown(unknown: int, is_refused: bool) -> 
         assert f"{unknown} rows without a time" in check_time_axis(recording).notes[0]
 
 
-@pytest.mark.parametrize(("step_s", "unit"), [(2.0, "ms"), (999.0, "ms"), (1000.0, "us")])
+@pytest.mark.parametrize(("step_s", "unit"), [(2.0, "ms"), (999.0, "ms"), (1000.0, "us"), (1.0e6, "ns")])
 def test_rows_that_are_too_far_apart_are_refused_with_the_unit_that_they_look_like(step_s: float, unit: str) -> None:
     with pytest.raises(RecordingError, match=rf"Are the times in {unit}\?"):
         check_time_axis(timed(*(step_s * k for k in range(10))))
@@ -127,6 +127,18 @@ def test_gaps_are_told_with_their_number_length_and_place() -> None:
     times_s = np.concatenate([0.01 * np.arange(100), 2.0 + 0.01 * np.arange(100), 9.0 + 0.01 * np.arange(100)])
     (note,) = check_time_axis(timed(*times_s)).notes
     assert note.startswith("2 gaps in time (the longest 6.01 s, at 0.990 s the first): 100 rows up to 0.5 s")
+
+
+@pytest.mark.parametrize("leap_s", [7300.0, 86_400.0, 1.79e9], ids=["two hours", "a day", "from 1970"])
+def test_a_clock_that_leaps_ahead_is_refused_where_it_does(leap_s: float) -> None:
+    """A logger without a clock of its own begins in 1970: simulated over the leap the same force was off by 16 N."""
+    times_s = np.concatenate([0.01 * np.arange(100), leap_s + 0.01 * np.arange(100)])
+    with pytest.raises(RecordingError, match=r"column time_s: \d+ h after the row before \(1 time in"):
+        check_time_axis(timed(*times_s))
+
+
+def test_a_pause_of_an_hour_is_a_gap() -> None:
+    assert check_time_axis(timed(*(0.01 * np.arange(100)), *(3600.0 + 0.01 * np.arange(100)))).after_gap.sum() == 50
 
 
 def test_one_row_and_none_have_a_time_axis_too() -> None:

@@ -13,6 +13,7 @@ _WRITTEN: Final[dict[str, dict[str, str]]] = {
         "s": "s sec secs second seconds sek Sek sekunde sekunden Sekunde Sekunden",
         "ms": "ms msec msecs millisecond milliseconds Millisekunden",
         "us": "us µs μs usec microsecond microseconds Mikrosekunden",
+        "ns": "ns nsec nanosecond nanoseconds Nanosekunden",
         "min": "min mins minute minutes Min Minuten",
         "h": "h hr hrs hour hours Std Stunden",
     },

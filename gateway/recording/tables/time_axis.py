@@ -26,6 +26,10 @@ _COARSE_S: Final = 1.0
 TOO_COARSE_S: Final = 2.0
 """From here on every response that the catalogue knows is over between two rows; times in ms look like this."""
 _MICROSECONDS_S: Final = 1000.0  # as ms, that would still be one row a second
+_NANOSECONDS_S: Final = 1.0e6  # so it would as us
+LONGEST_GAP_S: Final = 7200.0
+"""A clock that was set while it was recorded leaps further (from 1970, by a day), and a simulation that spans more has steps
+longer than a regulator's lag, or more rows than fit into memory."""
 _SAME_S: Final = 1.0e-9  # what adding and scaling leaves of two equal stamps
 
 
@@ -64,6 +68,7 @@ def check_time_axis(recording: Recording) -> TimeAxis:
     kept_rows = rows[last_of_stamp]
     time_s = stamps[kept_rows] - stamps[kept_rows[0]] if kept_rows.size else stamps[kept_rows]
     _refuse_coarse(recording, time_s)
+    _refuse_leap(recording, kept_rows, time_s)
     after_gap, gap_notes = _flag_after_gaps(time_s)
     return TimeAxis(kept_rows, time_s, after_gap, (*notes, *gap_notes))
 
@@ -81,10 +86,21 @@ def _check_unknown(recording: Recording, known: Flags) -> list[str]:
 def _refuse_coarse(recording: Recording, time_s: Floats) -> None:
     median_s = float(np.median(np.diff(time_s))) if time_s.size > 1 else 0.0
     if median_s >= TOO_COARSE_S:
-        unit = "us" if median_s >= _MICROSECONDS_S else "ms"
+        unit = "ns" if median_s >= _NANOSECONDS_S else "us" if median_s >= _MICROSECONDS_S else "ms"
         raise RecordingError(
             f"{recording.path}, column time_s: one row every {median_s:.3g} s, and a force follows its command within one: "
             f"nothing can be judged between such rows. Are the times in {unit}? then --columns time_s=...:{unit}"
+        )
+
+
+def _refuse_leap(recording: Recording, rows: NDArray[np.int64], time_s: Floats) -> None:
+    far = np.flatnonzero(np.diff(time_s) > LONGEST_GAP_S)
+    if far.size:
+        place = recording.place(int(rows[far[0] + 1]))
+        leap_h = float(time_s[far[0] + 1] - time_s[far[0]]) / 3600.0
+        raise RecordingError(
+            f"{place}, column time_s: {leap_h:.0f} h after the row before ({far.size} time{'s' * (far.size > 1)} in the file): "
+            "nothing is known of what happened meanwhile. Two recordings in one file, or a clock that was set? Split it there"
         )
 
 
