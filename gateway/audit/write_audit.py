@@ -1,10 +1,16 @@
 """Which writes are of consequence, and what is kept of them.
 
-Kept are: every edge of the control word (enable, disable, reset_fault, tare, take_ownership, start_calibration and the others),
-every change of owner, every change of a value of the command block, commit and slot_select of an upload, every refused write,
-what the control socket is asked to change (calibration, plant, runs, recording), what of all that came to nothing afterwards,
-and each start with the calibration and plant in use. Not kept are reads, heartbeat and command_sequence, values written again
-as they are, the words of a staged set before its commit, and byte_order_echo: nothing follows from them.
+Kept are:
+- every edge of the control word: enable, disable, reset_fault, tare, take_ownership, start_calibration and the others;
+- every change of owner, and of a value of the command block;
+- commit and slot_select of an upload;
+- every refused write;
+- what the control socket is asked to change: calibration, plant, runs, recording;
+- what of all that came to nothing afterwards;
+- each start, with the calibration and plant in use.
+
+Not kept is what nothing follows from: reads, heartbeat and command_sequence, values written again as they are, the words of a
+staged set before its commit, byte_order_echo.
 
 What comes in streams is told in summaries (gateway.audit.write_series): of a value the first change at once, of an edge the
 first 20 in 10 s, of a refusal the first 5 of its reason and peer. An edge is preceded by the summaries of its peer, so that the

@@ -1,9 +1,9 @@
 """A device was not heard in time: was it silent, or did the machine not let us hear it?
 
 What is late is late, and the force goes; only the cause that is told differs. Where at least half of the silence was ours (or
-of the process behind a simulated rig), no wire is to blame: MACHINE_BUSY where the kernel counts so much waiting for a
-processor, else the fault of the line with what was seen, for a machine that stands still as a whole (a virtual one on a
-busy host) counts nothing.
+of the process behind a simulated rig), no wire is to blame. It is MACHINE_BUSY where the kernel counts so much waiting for a
+processor; else the fault of the line, with what was seen. A machine that stands still as a whole (a virtual one on a busy
+host) counts nothing.
 
 Bounds: Supervision.sample_timeout_s and output_timeout_s in control/settings.py.
 """

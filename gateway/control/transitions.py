@@ -47,18 +47,19 @@ class StepOutcome:
 
 
 class Transitions:
-    """Holds the present state, and whether it is an enabled one; the latched fault, and when it came (monotonic s, -inf before
-    the first); whether the force is on its way to 0 and then off, and whether it stays off then (is_stopping); whether the
-    master is lost; whether nobody has acknowledged a restart; and what the present step wants besides the voltage."""
+    """The present state, and the way to another one."""
 
     def __init__(self, parts: ControllerParts, *, is_restarted: bool) -> None:
         self.state, self.is_enabled = State.OFF, False
         self.fault = FaultCode.NONE
-        self.faulted_s = self.lost_s = -inf
-        self.is_ramping_down = self.is_master_lost = self.is_stopping = False
-        self.is_restarted = is_restarted
-        self.outcome = StepOutcome()
-        self.parts = self._parts = parts
+        self.faulted_s = -inf  # when the latched fault came, monotonic
+        self.lost_s = -inf  # when the master was lost last, the same
+        self.is_ramping_down = False  # the force is on its way to 0, and then off
+        self.is_stopping = False  # and it stays off then
+        self.is_master_lost = False
+        self.is_restarted = is_restarted  # and nobody has acknowledged that
+        self.outcome = StepOutcome()  # what the present step wants besides the voltage
+        self.parts = parts
         self._safe_voltage = SafeVoltageCheck(parts.faults)
 
     def begin_step(self) -> None:
@@ -78,34 +79,34 @@ class Transitions:
     def enable(self, now_s: float) -> None:
         """Enable the output and tell who asked for it."""
         self.fire(StateEvent.ENABLE)
-        self._start(now_s, f"enabled by {self._parts.commands.who}")
+        self._start(now_s, f"enabled by {self.parts.commands.who}")
 
     def begin_run(self, now_s: float, plan: AnyPlan, asked_by: str, *, is_local: bool = False) -> None:
         """Begin a calibration or an experiment. ValueError for a plan that the rig does not allow."""
         self.fire(StateEvent.CALIBRATE)
-        self._parts.run.begin(plan, is_local=is_local)
-        self._start(now_s, f"{self._parts.run.kind} begun by {asked_by}")
+        self.parts.run.begin(plan, is_local=is_local)
+        self._start(now_s, f"{self.parts.run.kind} begun by {asked_by}")
 
     def _start(self, now_s: float, sentence: str) -> None:
         self.is_restarted = False
-        self._parts.faults.start()
-        self._parts.one_shot.start()
-        self._parts.commands.start_lease(now_s)
+        self.parts.faults.start()
+        self.parts.one_shot.start()
+        self.parts.commands.start_lease(now_s)
         self.tell(sentence)
 
     def go_on_with_run(self) -> None:
         """Let the run go on. Until it rises the force of now is the rest that its rise is judged from: what was there at its
         begin may still leave, or come back."""
         self.fire(StateEvent.MOVE)
-        if not self._parts.run.has_risen:
-            self._parts.faults.start_rise()
+        if not self.parts.run.has_risen:
+            self.parts.faults.start_rise()
 
     def end_run(self, sentence: str, given_n: float) -> None:
         """Ramp the force to 0 along the rig's ramp after a run, then switch the output off.
         However the run ended, but by a fault or a disable. given_n: contact force that the slide need not give."""
-        self._parts.run.leave(self._parts.loop, given_n)
+        self.parts.run.leave(self.parts.loop, given_n)
         self.is_ramping_down = True
-        self.tell(sentence, *self._parts.run.take_report())
+        self.tell(sentence, *self.parts.run.take_report())
 
     def disable(self, sentence: str) -> None:
         """Switch the output off: the safe voltage at once, and the command with it."""
@@ -128,7 +129,7 @@ class Transitions:
             self._latch(now_s, FaultCode.INTERNAL)
         self._rest()
         self.is_ramping_down = self.is_master_lost = False
-        self._parts.commands.expect_clearing()
+        self.parts.commands.expect_clearing()
 
     def reset(self) -> None:
         """Leave FAULT, and have the output device's own latched faults cleared; in OFF only those."""
@@ -136,7 +137,7 @@ class Transitions:
         if self.state is State.OFF:
             return
         self.fire(StateEvent.RESET)
-        self.tell(f"fault {self.fault.name} reset by {self._parts.commands.who}")
+        self.tell(f"fault {self.fault.name} reset by {self.parts.commands.who}")
         self.fault, self.is_restarted = FaultCode.NONE, False
 
     def lose_master(self, now_s: float, observation: str, action: LeaseAction) -> None:
@@ -147,7 +148,7 @@ class Transitions:
             self.fail(now_s, stop_cause(FaultCode.MASTER_LOST, f"{observation}, safe voltage"))
             return
         self.is_master_lost = True
-        self.is_ramping_down = self.is_ramping_down or action is LeaseAction.RAMP or self._parts.run.running
+        self.is_ramping_down = self.is_ramping_down or action is LeaseAction.RAMP or self.parts.run.running
         words = "ramping to 0 N" if self.is_ramping_down else "holding the last setpoint"
         self.tell(fault_sentence(FaultCode.MASTER_LOST, f"{observation}, {words}"))
 
@@ -158,11 +159,11 @@ class Transitions:
     def _let_go(self, sentence: str) -> None:
         self._rest()
         self.is_ramping_down = self.is_master_lost = False
-        self.tell(sentence, *self._parts.run.take_report())
+        self.tell(sentence, *self.parts.run.take_report())
         self.outcome.clear_command = True
-        self._parts.commands.expect_clearing()
+        self.parts.commands.expect_clearing()
 
     def _rest(self) -> None:
         """The safe voltage at once; a run ends with it."""
-        self._parts.loop.rest()
-        self._parts.run.rest(self.fault)
+        self.parts.loop.rest()
+        self.parts.run.rest(self.fault)

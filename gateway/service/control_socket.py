@@ -1,10 +1,15 @@
 """`control.sock` in the state directory: what is asked of a running gateway by its own tools, apart from Modbus.
 
-record on|off|status, calibration runs, the last self-test's findings, the calibration and the plant in use and their change,
-last writers of each register and the sentence of the last refusal, which rig runs and its lease, what the residual watch has
-found (its process tells it here, others may read it), the loop's health, the whole state in words and Modbus requests of the
-processes beside control (gateway.service.live_answers), and whether something may be set on a simulated rig
-(judged and audited here, passed on to the rig's own socket by the tools themselves).
+It takes:
+- recordings: on, off, status;
+- calibration runs, and what the last self-test has found;
+- the calibration and the plant in use, and another one in their place;
+- who wrote each register last, and the sentence of the last refusal;
+- which rig runs, its lease, the loop's health;
+- the report of the residual watch, which its process makes here and others may read;
+- the whole state, and Modbus requests of the processes beside control (gateway.service.live_answers);
+- whether something may be set on a simulated rig: judged and audited here, told to the rig's own socket by the tools.
+
 Mode 0600: whoever may write the state directory may ask. What each verb takes stands in gateway.service.socket_requests.
 """
 

@@ -1,9 +1,9 @@
 """HTTP of the page and of the metrics: a connection that does not come to a whole request in time is closed, and one that
 takes nothing of its answer; where as many are open as are served, the one that has asked for nothing for longest makes room.
 
-uvicorn waits for the rest of a request for ever, and for an answer to be taken, and refuses everybody while its bound of
-connections is full: who opened as many and said nothing, or read nothing, shut out all others, and the page's Stop with them;
-by opening them again and again for ever, and without the page's token.
+uvicorn waits for ever for the rest of a request, and for an answer to be taken. While its bound of connections is full it
+refuses everybody. So whoever opened as many and said nothing, or read nothing, shut out all others, and the page's Stop with
+them: for as long as it liked, and without the page's token.
 """
 
 import asyncio

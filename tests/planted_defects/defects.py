@@ -50,8 +50,8 @@ DEFECTS = (
            "if len(values) < FEWEST or values[-1][0] - values[0][0] < LEAST_S:", "if len(values) < FEWEST:",
            ("control/force_loop/test_setpoint_trend.py",)),
     Defect("the integrator is kept over a fault", "control/transitions.py",
-           "        self._parts.loop.rest()\n        self._parts.run.rest(self.fault)",
-           "        self._parts.run.rest(self.fault)", _REACTIONS),
+           "        self.parts.loop.rest()\n        self.parts.run.rest(self.fault)",
+           "        self.parts.run.rest(self.fault)", _REACTIONS),
     # -- supervision
     Defect("over-force is counted one sample late", "control/supervision/fault_detection.py",
            "if self._over >= self._limits.over_force_samples", "if self._over > self._limits.over_force_samples", _DETECTION),
@@ -389,8 +389,8 @@ DEFECTS = (
            "            self._is_hung = True\n", "", ("service/running_rig/recording/test_run_recording.py",)),
     # -- as found by planting a second time: control and the master
     Defect("a scale that was right once is never looked at again", "control/transitions.py",
-           "        self._parts.faults.start()\n        self._parts.one_shot.start()\n",
-           "        self._parts.one_shot.start()\n",
+           "        self.parts.faults.start()\n        self.parts.one_shot.start()\n",
+           "        self.parts.one_shot.start()\n",
            ("control/supervision/test_rise_check.py",)),
     Defect("a reading in free air is a held force", "control/supervision/in_band.py",
            "may_be = inputs.touching and abs(", "may_be = abs(",

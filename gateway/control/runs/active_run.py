@@ -37,27 +37,26 @@ _PHASES: Final = {phase: phase.name.lower().replace("_", " ") for phase in Calib
 
 
 class ActiveRun:
-    """phase and progress stay after the end. model: what the check of the next run compares with; cell_n: cell force of the
-    last step, without the payload's weight; target_n: what the model expects of the voltage that the run wants; is_local
-    stays until the output is off; has_risen: this run has left the safe voltage; said: a sentence for the log; refused: why
-    the last plan asked for was not begun; self_test: the last one's report, or that one runs."""
+    """The run under way, if any; phase and progress stay after its end."""
 
     def __init__(self, settings: ControlSettings, model: Bsfm, given_n: Callable[[], float] = lambda: 0.0) -> None:
         """given_n: contact force of now that the slide need not give."""
         self.phase = CalibrationPhase.IDLE
         self.progress = 0.0
         self.eta_s = 0.0
-        self.cell_n = nan
-        self.target_n = 0.0
-        self.message = self.refused = ""
-        self.is_local = self.has_risen = False
+        self.cell_n = nan  # of the last step, without the payload's weight
+        self.target_n = 0.0  # what the model expects of the voltage that the run wants
+        self.message = ""  # a sentence for the log
+        self.refused = ""  # why the last plan asked for was not begun
+        self.is_local = False  # begun at this machine; stays until the output is off
+        self.has_risen = False  # this run has left the safe voltage
         self.run: AnyRun | None = None
         self.last_row: LadderRow | None = None
-        self.self_test = SelfTestReport()
+        self.self_test = SelfTestReport()  # of the last one, or that one runs
         self._settings, self._given_n = settings, given_n
         self._cell_noise_n = 0.0
         self._is_report_told = True
-        self.model = model
+        self.model = model  # what the check of the next run compares with
         self._asked: RecordedPlan | None = None
         self._stop_asked = ""
         self._ceiling = self._new_ceiling()

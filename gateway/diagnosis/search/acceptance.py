@@ -1,10 +1,13 @@
 """When the search accepts an effect, and what counts as more than a trifle.
 
-Chi-square at 1 % over the number of starts, also under the noise that the effect's own model leaves; a held-out gain over
-blocks of time that the fit did not see, in nearly all ways to resample them, and without the blocks that still feel how the
-recording began; at least 4 % of the held-out squared error, or 2 % where chi-square overwhelms; and, for every effect after
-the first, a few percent of what the others explain, or much of the error that is left: no form is exact, and what a cause's
-wrong form leaves must not be named. What oscillates does not count there: the rest of a sine is no bent line.
+It accepts one that passes all of these:
+- Chi-square at 1 % over the number of starts, also under the noise that the effect's own model leaves.
+- A gain over blocks of time that the fit did not see: in nearly all ways to resample them, and without the blocks that still
+  feel how the recording began.
+- That gain is at least 4 % of the held-out squared error, or 2 % where chi-square is overwhelming.
+- Every effect after the first explains a few percent of what the others do, or much of the error that is left. No form is
+  exact, and what a cause's wrong form leaves must not be named. What oscillates does not count there: the rest of a sine is
+  no bent line.
 """
 
 from collections.abc import Sequence

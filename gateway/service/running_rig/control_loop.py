@@ -2,9 +2,9 @@
 
 A master's write calls `on_asked` and, where control can take it, `on_command` inside the bank's write: so the answer is
 control's own, and the voltage is on its way before the master has it.
-The tick serves what must happen without anybody asking: watchdogs, trim, ramps. Where a sample or a command was decided on
-within the last period it leaves the decision to the next sample, which a cell as fast as the loop brings before the next
-tick; only a tick that finds none decides, so that two decisions are at most two periods apart (and a bit, for jitter).
+The tick serves what must happen without anybody asking: watchdogs, trim, ramps. It decides only where nothing was decided
+within the last period: a cell as fast as the loop brings the next sample before the next tick. So two decisions are at most two
+periods apart (and a bit, for jitter).
 Clock and ports come in as arguments. No exception of ours leaves a voltage standing: `_decide` turns any into the safe one.
 """
 

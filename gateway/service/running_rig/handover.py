@@ -1,7 +1,10 @@
-"""What a control process leaves, through the guardian, to the one that is started when it dies: the recording goes on, a TLS
-face whose port is any free one (0) keeps it, a master that keeps the bit of a run at 1 begins no other one by that, and a
-calibration or a plant that is another one now (their files are gone, say) is told, as is a tare that is forgotten. By itself a
-start knows only what it finds.
+"""What a control process leaves, through the guardian, to the one that is started when it dies.
+
+By itself a start knows only what it finds. By this:
+- the recording goes on;
+- a TLS face whose port is any free one (0) keeps it;
+- a master that keeps the bit of a run at 1 begins no other run by that;
+- a calibration or a plant that is another one now (their files are gone, say) is told, and so is a tare that is forgotten.
 """
 
 from collections.abc import Mapping

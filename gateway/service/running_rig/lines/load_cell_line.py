@@ -1,11 +1,10 @@
 """The load cell's line. A stream talks by itself; a cell that must be asked is asked here, at most one question on the wire.
 
-The next question follows the answer, so a slow wire is used whole; where the wire is faster than the device's own rate, or
-than anything the loop could use, it follows when that is over. An answer that does not come in its time is given up and
-asked for again. It may still come then, and a number does not say what it answers: it is a true reading of this moment all
-the same, but the line is left alone until the later answer is here or overdue too, for on a bus of two wires a third
-question would garble it; then nothing is missing any more, and the next question is like any other. Time comes in as an
-argument, so that tests run it in virtual time.
+The next question follows the answer, so a slow wire is used whole. Where the wire is faster than the device's own rate, or
+than anything the loop could use, the question waits for that period. An answer that does not come in its time is given up and
+asked for again. It may still come then, and a number does not say what it answers: it is taken, for it is a true reading of
+this moment all the same. But the line is left alone until the later answer is here or overdue too, for on a bus of two wires
+a third question would garble it. Time comes in as an argument.
 """
 
 from collections.abc import Callable
