@@ -84,7 +84,7 @@ class CommandTracker:
         if command.has_waited:
             self._lease.adopt(command.heartbeat)
         else:
-            self._lease.observe(now_s, command.heartbeat)
+            self._lease.observe(now_s, command.heartbeat, command.peer)
         self._update_demand()
         return edges
 
@@ -128,12 +128,12 @@ class CommandTracker:
 
     def would_have_beaten_since(self, since_s: float, command: Command) -> bool:
         """Return whether the heartbeat has changed since then, however long ago, were this command taken now."""
-        return self._lease.would_have_beaten_since(since_s, command.heartbeat)
+        return self._lease.would_have_beaten_since(since_s, command.heartbeat, command.peer)
 
     def would_beat_since(self, since_s: float, now_s: float, command: Command) -> bool:
         """Return whether the heartbeat has changed since then and within one length of the lease, were this command taken
         now."""
-        return self._lease.would_be_fresh_since(since_s, now_s, command.heartbeat)
+        return self._lease.would_be_fresh_since(since_s, now_s, command.heartbeat, command.peer)
 
     @property
     def who(self) -> str:

@@ -1,10 +1,14 @@
-"""A command that expires: only a changing heartbeat value renews it; reads and repeated frames do not.
+"""A command that expires: only a changing heartbeat value renews it; reads and repeated frames do not. Of a master whose last
+frame is sent on and on it does not change, whatever another one has written meanwhile.
 
 A closed connection of the owner counts as loss only where a lease is set; without a lease a command lasts until the
 next one.
 """
 
 from math import inf
+from typing import Final
+
+_MOST_MASTERS: Final = 64  # whose last heartbeats are known
 
 
 class Lease:
@@ -14,17 +18,24 @@ class Lease:
         self._length_s = length_s
         self._heartbeat = 0
         self._changed_s = -inf
+        self._beats: dict[str, tuple[int, float]] = {}  # of each master its last, and when it came
         self._started_s = -inf
 
     def adopt(self, heartbeat: int) -> None:
         """Take over a value without counting it as a beat: the bank itself zeroed the command block."""
         self._heartbeat = heartbeat
 
-    def observe(self, now_s: float, heartbeat: int) -> None:
-        """Note the time of a heartbeat that has changed."""
-        if heartbeat != self._heartbeat:
-            self._heartbeat = heartbeat
+    def observe(self, now_s: float, heartbeat: int, who: str = "") -> None:
+        """Note the time of a heartbeat that this master has changed."""
+        if self._is_beat(heartbeat, who):
             self._changed_s = now_s
+            self._beats[who] = heartbeat, now_s
+            if len(self._beats) > _MOST_MASTERS:
+                del self._beats[next(iter(self._beats))]
+        self._heartbeat = heartbeat
+
+    def _is_beat(self, heartbeat: int, who: str) -> bool:
+        return heartbeat != self._heartbeat and (who not in self._beats or heartbeat != self._beats[who][0])
 
     def start(self, now_s: float) -> None:
         """Start the lease at an enable: the master has one length to beat."""
@@ -46,10 +57,11 @@ class Lease:
             return True
         return self._changed_s > since_s and now_s - self._changed_s <= self._length_s
 
-    def would_have_beaten_since(self, since_s: float, heartbeat: int) -> bool:
-        """Return whether the heartbeat has changed since then, were this value observed now; true without a lease."""
-        return self._length_s is None or heartbeat != self._heartbeat or self._changed_s >= since_s
+    def would_have_beaten_since(self, since_s: float, heartbeat: int, who: str = "") -> bool:
+        """Return whether this master has beaten since then, were this value observed now; always true without a lease."""
+        beaten_s = self._beats[who][1] if who in self._beats else self._changed_s
+        return self._length_s is None or beaten_s >= since_s or self._is_beat(heartbeat, who)
 
-    def would_be_fresh_since(self, since_s: float, now_s: float, heartbeat: int) -> bool:
-        """Return the same, were this value observed now."""
-        return heartbeat != self._heartbeat or self.is_fresh_since(since_s, now_s)
+    def would_be_fresh_since(self, since_s: float, now_s: float, heartbeat: int, who: str = "") -> bool:
+        """Return what `is_fresh_since` would, were this value observed now."""
+        return self._is_beat(heartbeat, who) or self.is_fresh_since(since_s, now_s)

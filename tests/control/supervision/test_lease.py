@@ -38,8 +38,30 @@ def test_only_another_heartbeat_renews_it_and_none_that_the_bank_has_zeroed() ->
     lease.adopt(0)
     lease.observe(10.6, 0)
     assert lease.age_s(11.0) == 1.0
-    lease.observe(11.0, 7)
+    lease.observe(10.8, 7)
+    assert lease.age_s(11.0) == 1.0, "as before"
+    lease.observe(11.0, 8)
     assert lease.age_s(11.0) == 0.0
+
+
+def test_a_frame_that_is_sent_on_and_on_is_no_beat_behind_what_another_master_has_written() -> None:
+    lease = Lease(0.5)
+    lease.observe(10.0, 7, "plc")
+    lease.observe(10.2, 4711, "page")
+    lease.observe(10.4, 7, "plc")
+    assert lease.age_s(11.0) == pytest.approx(0.8)
+    assert not lease.would_have_beaten_since(10.1, 7, "plc") and not lease.would_be_fresh_since(10.3, 10.4, 7, "plc")
+    assert lease.would_have_beaten_since(10.1, 8, "plc") and lease.would_have_beaten_since(10.1, 4711, "page")
+    lease.observe(10.6, 4712, "page")
+    assert lease.age_s(11.0) == pytest.approx(0.4)
+
+
+def test_the_masters_that_are_remembered_are_bounded_and_the_oldest_is_forgotten() -> None:
+    lease = Lease(0.5)
+    for number in range(100):
+        lease.observe(float(number), number + 1, str(number))
+    assert lease.would_have_beaten_since(99.5, 1, "0"), "whoever is not known begins anew"
+    assert not lease.would_have_beaten_since(99.5, 99, "98")
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,10 @@ from gateway.control import LeaseAction
 from gateway.control.settings import SelfTestSettings
 from gateway.registers.words import State
 from tests.control.bench import settings
-from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, SmallRig
+from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, SmallRig
 
 LEASE_S, CYCLE_S = 0.35, 0.1
-SELF_TEST = 1 << 6
+RESET, SELF_TEST = 1 << 1, 1 << 6
 
 
 @pytest.mark.parametrize(
@@ -48,3 +48,17 @@ def test_a_program_that_goes_on_enables_with_its_next_beat() -> None:
     rig.run(0.1).until(State.OFF).run(1.0)
     rig.write(0, *frame[:4], 8, *frame[5:])
     assert rig.run(0.05).state is not State.OFF
+
+
+def test_a_fault_that_another_master_resets_lets_no_frame_of_before_press_again() -> None:
+    rig = SmallRig(settings(lease_s=LEASE_S))
+    frame = rig.block(ENABLE, 12.0, beat=7)
+    rig.write(0, *frame)
+    rig.beats = False
+    rig.run(0.1).until(State.FAULT).run(1.0)
+    rig.write(0, RESET, 0, 0, 0, 4711, peer=OTHER)
+    for _ in range(20):
+        rig.run(CYCLE_S).answer(0, *frame)
+    assert all(volts == 0.0 for _, volts, _ in rig.trace[-200:])
+    refused = rig.answer(0, *frame)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
