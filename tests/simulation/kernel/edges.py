@@ -7,6 +7,7 @@ import re
 from collections import deque
 from collections.abc import Callable
 from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 from types import SimpleNamespace
@@ -179,19 +180,23 @@ class NothingWithheld:
         return 0.0, ""
 
 
+@dataclass(frozen=True)
 class SimulatedSafeLine:
     """Stands for `SafeLine`: the guardian's last write goes out behind what is on the wire; who is plugged in answers."""
 
-    def __init__(self, descriptor: int, frame: bytes, reply: bytes, end: bytes) -> None:
-        self._descriptor, self._frame = descriptor, frame
+    descriptor: int
+    frame: bytes
+    reply: bytes
+    end: bytes
+    hears_itself: bool = False
 
     def close(self) -> None:
-        os.close(self._descriptor)
+        os.close(self.descriptor)
 
     def write_safe(self) -> bool:
         output = CABLES["output"]
         if output.is_plugged:
-            output.send_to_device(self._frame)
+            output.send_to_device(self.frame)
         return output.is_plugged
 
 
