@@ -24,7 +24,7 @@ def suspended_s() -> float:
     return max(0.0, time.clock_gettime(time.CLOCK_BOOTTIME) - time.clock_gettime(time.CLOCK_MONOTONIC))
 
 
-def awake_or_not_s() -> float:
+def boottime_s() -> float:
     """Return monotonic seconds that go on while the machine is suspended."""
     return time.monotonic() + suspended_s()
 
@@ -32,7 +32,7 @@ def awake_or_not_s() -> float:
 class Standstill:
     """clock: in seconds. Nothing is a standstill before `keep_time` runs."""
 
-    def __init__(self, clock: Callable[[], float] = awake_or_not_s) -> None:
+    def __init__(self, clock: Callable[[], float] = boottime_s) -> None:
         self._clock = clock
         self._beat_s: float | None = None
         self._over_s: float | None = None

@@ -22,7 +22,6 @@ Serve = Callable[[dict[str, Any], EventLog], Coroutine[Any, Any, None]]
 """Serves until the process ends; its first argument: the options that the guardian gives, `state` among them."""
 
 _FIRST_AMONG_THE_KILLED: Final = "900"
-_LAST_NICE: Final = 19
 
 
 def serve_behind_control() -> None:
@@ -39,7 +38,7 @@ def yield_to_others() -> None:
     """Give way to everybody, in processor time and memory: for what nobody waits for."""
     serve_behind_control()
     with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, 0, _LAST_NICE)  # where the idle class is refused
+        os.setpriority(os.PRIO_PROCESS, 0, priority.LAST_NICE)  # where the idle class is refused
     with contextlib.suppress(OSError, AttributeError):  # takes the idle class of the disk with it, see ioprio_set(2)
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
 

@@ -19,7 +19,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.control.inputs import Output
 from gateway.live import live_state as live
-from gateway.live.standstill import awake_or_not_s
+from gateway.live.standstill import boottime_s
 from gateway.modbus import Peer
 from gateway.modbus.pdu import is_exception
 from gateway.modbus.server import answer, refuse_unit
@@ -41,7 +41,7 @@ class AlarmTimes:
     server minutes after a start, takes them along: else an alarm would have stood for years, or not yet. steady: seconds that
     nobody sets. on_set: called when that has happened, with how far, s."""
 
-    def __init__(self, clock: Callable[[], float] = time.time, steady: Callable[[], float] = awake_or_not_s) -> None:
+    def __init__(self, clock: Callable[[], float] = time.time, steady: Callable[[], float] = boottime_s) -> None:
         self.on_set: Callable[[float], object] = lambda set_s: None
         self._clock, self._steady = clock, steady
         self._ahead_s = clock() - steady()

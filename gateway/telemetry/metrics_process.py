@@ -77,11 +77,11 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
     app = make_metrics_app(Path(options["state"]))
     import uvicorn
 
-    from gateway.web.impatient_http import ImpatientProtocol
+    from gateway.web.bounded_http import BoundedHttpProtocol
 
     config = uvicorn.Config(
         app,
-        http=ImpatientProtocol,
+        http=BoundedHttpProtocol,
         log_config=None,
         access_log=False,
         server_header=False,

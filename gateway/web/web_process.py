@@ -22,8 +22,8 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
 
     from gateway.live.control_link import ControlLink
     from gateway.live.ring_rows import RingRows
+    from gateway.web.bounded_http import BoundedHttpProtocol
     from gateway.web.context import WebContext
-    from gateway.web.impatient_http import ImpatientProtocol
     from gateway.web.security import PageAccess
     from gateway.web.server import make_app
 
@@ -41,7 +41,7 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
     rows = None if options["ring"] is None else RingRows(options["ring"])
     config = uvicorn.Config(
         make_app(context, access, rows),
-        http=ImpatientProtocol,
+        http=BoundedHttpProtocol,
         log_config=None,
         access_log=False,
         server_header=False,

@@ -11,7 +11,7 @@ from gateway.profiles.recordings_section import Retention
 from gateway.recording import recording_paths
 from gateway.service.running_rig.recording.retention import RecordingRetention
 from tests.calibrations.coefficients import calibration
-from tests.recording.test_care import record
+from tests.recording.care.test_care import record
 
 
 def made_from(store: CalibrationStore, mark: int, *sources: str) -> list[int]:

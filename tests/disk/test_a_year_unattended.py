@@ -19,7 +19,7 @@ from gateway.service.running_rig.recording.recordings import RUN_COLUMNS, Record
 from tests.disk.at_once import AtOnce
 from tests.disk.failing_disks import FailingDisk
 from tests.disk.watched_disk import watching
-from tests.recording.test_care import record
+from tests.recording.care.test_care import record
 from tests.service.rigs import demo
 
 HOUR_S, DAY_S = 3600.0, 86400.0

@@ -6,9 +6,10 @@ from random import Random
 
 import pytest
 
-from gateway.devices import DeviceProfile, DeviceRole, cell_device, cell_host, output_device, output_host
+from gateway.devices import DeviceRole, cell_device, cell_host, output_device, output_host
 from gateway.devices.messages import AskDevice, ForceSample, Garbage, Quality, ReadPressure, ReadVoltage, SetVoltage
 from gateway.profiles import list_shipped, load_device
+from tests.devices.conftest import unit_of
 from tests.fuzz.conftest import Examples
 from tests.fuzz.damage import damaged, held_bytes, pieces
 
@@ -17,10 +18,6 @@ CELLS = [name for name, one in PROFILES.items() if one.role is DeviceRole.LOAD_C
 OUTPUTS = [name for name, one in PROFILES.items() if one.role is DeviceRole.OUTPUT]
 GROWN_BYTES = 2_000
 """By how much a codec may grow under any noise: half a frame, and what its profile allows for a line."""
-
-
-def unit_of(profile: DeviceProfile) -> str | None:
-    return None if profile.reading.newton_per_unit or profile.reading.template.field("unit") else "N"
 
 
 def noisy(chance: Random, frame: bytes, older: list[bytes]) -> bytes:

@@ -68,7 +68,7 @@ def labelled(state: Any) -> dict[str, list[tuple[dict[str, str], float]]]:
 
 def test_of_each_force_over_mqtt_and_each_change_is_an_event() -> None:
     session = JsonTopics("cell", None)
-    session.greet()
+    session.announce()
     session.offer(holding(), 1.0)
     force = replace(holding().force, voltage_v=1.5)
     session.offer(replace(holding(), force=force, mode="voltage", owner="10.0.0.5"), 2.0)

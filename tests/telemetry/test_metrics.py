@@ -20,7 +20,7 @@ from gateway.telemetry import metrics_process
 from gateway.telemetry.exposition import exposition
 from gateway.telemetry.metrics_process import ReadingCollector, make_metrics_app, read_gateway
 from gateway.telemetry.series import SERIES, GatewayReading
-from gateway.web.impatient_http import ImpatientProtocol
+from gateway.web.bounded_http import BoundedHttpProtocol
 from tests.telemetry.readings import HEALTH, holding, reading, without_sample
 from tests.web.asgi import call
 
@@ -192,4 +192,4 @@ def test_scrapers_are_bounded_like_any_client(monkeypatch: pytest.MonkeyPatch, t
     with socket.socket() as listening:
         options = {"state": str(tmp_path), "listen": os.dup(listening.fileno())}
         asyncio.run(metrics_process.serve(options, None))  # type: ignore[arg-type]
-    assert (given["limit_concurrency"], given["http"], given["server_header"]) == (32, ImpatientProtocol, False)
+    assert (given["limit_concurrency"], given["http"], given["server_header"]) == (32, BoundedHttpProtocol, False)

@@ -46,7 +46,7 @@ class TlsWire(TcpWire):
 
         context = self._context()
         client = ModbusTlsClient(self.host, sslctx=context, port=self.port, timeout=TIMEOUT_S, retries=0)
-        client.socket = self._greet(context, self._open())
+        client.socket = self._shake_hands(context, self._open())
         return client
 
     def _context(self) -> "ssl.SSLContext":
@@ -81,7 +81,7 @@ class TlsWire(TcpWire):
             return f"E174 {certificate} is refused by this machine's OpenSSL ({why}): make one with a stronger key"
         return f"E174 {ca}, {certificate} or {key} is no PEM file of its kind"
 
-    def _greet(self, context: "ssl.SSLContext", plain: "socket.socket") -> "socket.socket":
+    def _shake_hands(self, context: "ssl.SSLContext", plain: "socket.socket") -> "socket.socket":
         import ssl
 
         try:

@@ -19,6 +19,7 @@ from typing import Final
 LOOP_NICE: Final = -10  # guardian and control
 RIG_NICE: Final = -8  # a simulated rig stands for a device, which would not wait for anybody
 HELPER_NICE: Final = 10  # fit, watch
+LAST_NICE: Final = 19  # what nobody waits for
 _REALTIME_PRIORITY: Final = 20
 _MCL_CURRENT_AND_FUTURE: Final = 3  # sys/mman.h
 _AUTOGROUP: Final = Path("/proc/self/autogroup")

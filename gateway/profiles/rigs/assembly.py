@@ -249,16 +249,7 @@ def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: 
         plant_profile=parts.plant,
         fallback_plant=None if parts.plant else load_plant(FALLBACK_PLANT),
         calibration=parts.calibration,
-        control=ControlSettings(
-            limits=file.limits,
-            defaults=file.defaults,
-            trim=file.trim,
-            lead=file.lead,
-            response=file.response,
-            supervision=file.supervision,
-            self_test=file.self_test,
-            valve=file.valve.control if file.valve else None,
-        ),
+        control=_control_settings(file),
         valve=_valve_line(file.valve, parts.valve_device) if file.valve and parts.valve_device else None,
         pull_calibration=parts.valve_calibration,
         network=file.network,
@@ -271,6 +262,19 @@ def _assemble_rig(file: RigFile, parts: Parts, register_map: RegisterMap, path: 
         fingerprint=_fingerprint(findings.texts.values()),
         notes=_notes(parts, compensation),
         compensation=compensation,
+    )
+
+
+def _control_settings(file: RigFile) -> ControlSettings:
+    return ControlSettings(
+        limits=file.limits,
+        defaults=file.defaults,
+        trim=file.trim,
+        lead=file.lead,
+        response=file.response,
+        supervision=file.supervision,
+        self_test=file.self_test,
+        valve=file.valve.control if file.valve else None,
     )
 
 

@@ -13,6 +13,8 @@ from typing import Final
 from gateway.recording.foreign.unit_names import is_unit, unit_of
 from gateway.units import LINEAR
 
+MOST_COLUMNS: Final = 4096
+"""Of any table: each costs memory for every row."""
 WORDS: Final[dict[str, tuple[str, str]]] = {
     "time_s": (
         "time",

@@ -14,13 +14,13 @@ from zipfile import BadZipFile, ZipFile
 
 from gateway.extras import import_library
 from gateway.recording.errors import RecordingError
+from gateway.recording.foreign.headers import MOST_COLUMNS
 
 LARGEST_SHEET_BYTES: Final = 512 << 20
 """As XML, unpacked: a million rows of five columns are 250 MB."""
 LARGEST_PART_BYTES: Final = 32 << 20
 """Of any other part: these are held in memory."""
 LONGEST_ROWS: Final = 1 << 20
-MOST_COLUMNS: Final = 4096
 _SHEETS: Final = "xl/worksheets/"
 _WHITE: Final = str.maketrans("\t\r\n\x0b\x0c", "     ")
 _FAULTY: Final = "is a damaged Excel workbook"

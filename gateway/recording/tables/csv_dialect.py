@@ -14,13 +14,12 @@ from pathlib import Path
 from typing import Final, TextIO
 
 from gateway.recording.errors import RecordingError
-from gateway.recording.foreign.headers import TableHeaders
+from gateway.recording.foreign.headers import MOST_COLUMNS, TableHeaders
 from gateway.recording.foreign.time_stamps import is_ambiguous_date, parse_stamp
 from gateway.recording.foreign.unit_names import is_unit
 
 MISSING: Final = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"))
 """What stands, in lower case, where no number was taken."""
-MOST_COLUMNS: Final = 4096
 LONGEST_LINE: Final = 1 << 20
 _SAMPLE_LINES: Final = 200
 _MOST_TITLE_LINES: Final = 60

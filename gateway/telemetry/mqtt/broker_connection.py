@@ -165,10 +165,10 @@ async def _subscribe(client: Any, session: BrokerSession) -> list[str]:
 async def _carry(client: Any, session: BrokerSession, queue: CommandQueue) -> None:
     """Say what the session has, and have it answer, until the connection is lost."""
     turn = asyncio.Lock()  # messages carry numbers in order: nobody speaks between the making of one and its sending
-    for message in session.greet():
+    for message in session.announce():
         await _publish(client, message)
     async with asyncio.TaskGroup() as group:
-        group.create_task(_speak(client, session, turn))
+        group.create_task(_send_messages(client, session, turn))
         group.create_task(_listen(client))
         group.create_task(_answer(client, session, queue, turn))
         group.create_task(queue.standstill.keep_time())
@@ -176,7 +176,7 @@ async def _carry(client: Any, session: BrokerSession, queue: CommandQueue) -> No
             group.create_task(_keep_asking(client, session, queue, turn))
 
 
-async def _speak(client: Any, session: BrokerSession, turn: asyncio.Lock) -> None:
+async def _send_messages(client: Any, session: BrokerSession, turn: asyncio.Lock) -> None:
     while True:
         session.ready.clear()
         while True:

@@ -36,7 +36,7 @@ class BrokerSession(Protocol):
     def begin(self) -> BrokerMessage:
         """Begin a connection, and return its will."""
 
-    def greet(self) -> Sequence[BrokerMessage]:
+    def announce(self) -> Sequence[BrokerMessage]:
         """Return what comes first on a new connection."""
 
     def offer(self, state: LiveState | None, time_unix_s: float) -> None:

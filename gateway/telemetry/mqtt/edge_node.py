@@ -78,7 +78,7 @@ class EdgeNode:
         death = encode_payload(int(time.time() * 1000), [self._bd_seq_at(self._time_ms)], None)
         return BrokerMessage(self.topic("NDEATH"), death, qos=1)
 
-    def greet(self) -> Sequence[BrokerMessage]:
+    def announce(self) -> Sequence[BrokerMessage]:
         """Return the birth: every metric that there will ever be, as it is now."""
         self._current = self._connections
         self._on_connected()

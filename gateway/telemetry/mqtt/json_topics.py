@@ -1,7 +1,7 @@
 """Plain JSON over MQTT, below one base topic: for people with mosquitto_sub, Node-RED, Home Assistant.
 
 `online` and `state` are retained, so that who comes later knows at once, and told again every ten seconds: a broker may tell
-the will of the connection before behind the greeting of the next one. `force` comes with every look while the broker is
+the will of the connection before behind what the next one announces. `force` comes with every look while the broker is
 there; `events` tell what changed, and wait for the broker when it is away. `command` is heard only where the rig allows it.
 """
 
@@ -64,7 +64,7 @@ class JsonTopics:
         """Leave `online` false with the broker."""
         return self._message("online", False, retain=True)
 
-    def greet(self) -> Sequence[BrokerMessage]:
+    def announce(self) -> Sequence[BrokerMessage]:
         """Return that the gateway is here, and how it is."""
         self._is_connected = True
         return self._online(), self._message("state", self._told, retain=True)

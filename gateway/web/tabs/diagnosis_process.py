@@ -17,7 +17,6 @@ from typing import Final
 from gateway import progress
 from gateway.processes.scheduling import priority
 
-_LAST_NICE: Final = 19
 _TOLD_EVERY_S: Final = 0.1
 
 
@@ -55,7 +54,7 @@ def main(arguments: list[str]) -> None:
     """Run a verb. arguments: descriptor of the link, the module, its words."""
     priority.lower_priority()
     with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, 0, _LAST_NICE)
+        os.setpriority(os.PRIO_PROCESS, 0, priority.LAST_NICE)
     link = socket.socket(fileno=int(arguments[0]))
     end_with(link)
     progress.hear_everything(ProgressTeller(link).tell)

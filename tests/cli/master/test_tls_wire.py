@@ -180,7 +180,7 @@ def test_a_gateway_is_believed_by_its_name_alone(server: TlsServer, folder: Fold
         socket.create_connection(("127.0.0.1", server.port)) as plain,
         pytest.raises(CliError, match=r"E176 the certificate of cell-3\.local:\d+ is not to be trusted"),
     ):
-        elsewhere._greet(context, plain)
+        elsewhere._shake_hands(context, plain)
     assert not wire.is_served_by({"port": server.port}), "what a gateway tells of itself is its plain port"
 
 
@@ -196,7 +196,7 @@ def test_what_is_out_of_its_days_wants_a_clock_or_another_one_and_no_other_ca(nu
 
     wire = TlsWire("127.0.0.1", 802, TlsFiles(Path("ca"), Path("crt"), Path("key")))
     with pytest.raises(CliError, match=f"E176 .* is not to be trusted: no good; .*{cure}"):
-        wire._greet(Context(), None)  # type: ignore[arg-type]
+        wire._shake_hands(Context(), None)  # type: ignore[arg-type]
 
 
 def test_a_folder_of_keys_is_for_its_owner_alone(tmp_path: Path, call: Any) -> None:

@@ -12,7 +12,7 @@ from click.testing import Result
 from gateway.cli.diagnosis.outputs import check_targets, write_all
 from gateway.processes.durable_file import replace_text
 from tests.other_kinds import never_waiting, put
-from tests.recording.test_care import record
+from tests.recording.care.test_care import record
 
 Call = Callable[..., Result]
 VERBS = ("backup out", "report out", "recordings export 1 -o out", "recordings export 1 --parquet -o out")

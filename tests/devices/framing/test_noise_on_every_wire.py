@@ -4,9 +4,10 @@ from random import Random
 
 import pytest
 
-from gateway.devices import DeviceProfile, DeviceRole, cell_device, cell_host, output_device, output_host
+from gateway.devices import DeviceRole, cell_device, cell_host, output_device, output_host
 from gateway.devices.messages import AskDevice, ForceSample, Garbage, ReadPressure, ReadVoltage, SetVoltage
 from gateway.profiles import list_shipped, load_device
+from tests.devices.conftest import unit_of
 
 PROFILES = {name: load_device(name) for name in list_shipped("device")}
 ROUNDS = 60
@@ -45,10 +46,6 @@ def test_an_output_and_its_host_bear_any_noise(name: str) -> None:
         host.receive(rng.randbytes(20), 0.0)
         host.forget()
     assert host.receive(b"", 0.0) == []
-
-
-def unit_of(profile: DeviceProfile) -> str | None:
-    return None if profile.reading.newton_per_unit or profile.reading.template.field("unit") else "N"
 
 
 @pytest.mark.parametrize("name", [name for name, one in PROFILES.items() if one.role is DeviceRole.LOAD_CELL])

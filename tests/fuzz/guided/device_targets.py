@@ -2,9 +2,10 @@
 
 from math import isfinite
 
-from gateway.devices import DeviceProfile, DeviceRole, cell_device, cell_host, output_device, output_host
+from gateway.devices import DeviceRole, cell_device, cell_host, output_device, output_host
 from gateway.devices.messages import AskDevice, ForceSample, Garbage, Quality, ReadPressure, ReadVoltage, SetVoltage
 from gateway.profiles import list_shipped, load_device
+from tests.devices.conftest import unit_of
 from tests.fuzz.damage import held_bytes
 from tests.fuzz.guided.slices import framed, sliced
 
@@ -12,10 +13,6 @@ PROFILES = [load_device(name) for name in sorted(list_shipped("device"))]
 CELLS = [one for one in PROFILES if one.role is DeviceRole.LOAD_CELL]
 OUTPUTS = [one for one in PROFILES if one.role is DeviceRole.OUTPUT]
 GROWN_BYTES = 2_000
-
-
-def unit_of(profile: DeviceProfile) -> str | None:
-    return None if profile.reading.newton_per_unit or profile.reading.template.field("unit") else "N"
 
 
 def judge_cell(data: bytes) -> None:

@@ -5,9 +5,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from gateway.profiles.rigs.addresses import is_certificate
-from gateway.profiles.rigs.checks.lines import UNSTABLE, UNSTABLE_PATHS, lines_of
+from gateway.profiles.rigs.checks.lines import NO_PORT, UNSTABLE, UNSTABLE_PATHS, lines_of, why_no_path
 from gateway.profiles.rigs.checks.parts import Check, Found, Parts
-from gateway.profiles.rigs.edit_marks import PLACEHOLDER
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
 from gateway.registers.writes.ownership import LARGEST_SERIAL_PLACE, serial_place
 
@@ -69,11 +68,9 @@ def check_face_ports_given(parts: Parts) -> Found:
     """Yield a fault for a serial face of a real rig without a port, or with one that is no path of a device."""
     for path, face in [] if parts.simulated else _rtu_faces(parts):
         if face.port is None:
-            yield f"{path}.port", "is missing: `force-gateway ports` lists what is plugged in"
-        elif PLACEHOLDER.search(face.port):
-            yield f"{path}.port", f"{face.port} is a placeholder: put your adapter's path here (`force-gateway ports`)"
-        elif not face.port.startswith("/"):
-            yield f"{path}.port", f'"{face.port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
+            yield f"{path}.port", NO_PORT
+        elif reason := why_no_path(face.port):
+            yield f"{path}.port", reason
 
 
 def check_face_ports_differ(parts: Parts) -> Found:

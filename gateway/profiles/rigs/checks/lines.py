@@ -16,6 +16,8 @@ UNSTABLE_PATHS: Final = ("/dev/ttyUSB", "/dev/ttyACM")
 """Ports that are numbered in the order of plugging."""
 UNSTABLE: Final = "may be another adapter after a replug: `force-gateway ports` lists its /dev/serial/by-id/... path"
 
+NO_PORT: Final = "is missing: `force-gateway ports` lists what is plugged in"
+SIMULATED_PORT: Final = "a simulated rig has no ports: delete this line, or write `simulated: false`"
 _POLLED_S: Final = 0.3  # three questions of an idle line: what a watchdog that any sentence feeds must outlast
 _ROLES: Final = {"output": DeviceRole.OUTPUT, "load_cell": DeviceRole.LOAD_CELL}
 _ARTICLE: Final = {DeviceRole.OUTPUT: "an output", DeviceRole.LOAD_CELL: "a load cell", DeviceRole.VALVE: "a valve"}
@@ -45,17 +47,14 @@ def check_simulated_ports(parts: Parts) -> Found:
     """Yield a fault for a port in a simulated rig."""
     for key, line, _ in lines_of(parts):
         if parts.simulated and line.port is not None:
-            yield f"{key}.port", "a simulated rig has no ports: delete this line, or write `simulated: false`"
+            yield f"{key}.port", SIMULATED_PORT
 
 
 def check_ports_given(parts: Parts) -> Found:
     """Yield a fault for a real rig's line without a port, or with one that is no path of a device."""
     for key, line, _ in [] if parts.simulated else lines_of(parts):
         if line.port is None:
-            yield (
-                f"{key}.port",
-                "is missing: `force-gateway ports` lists what is plugged in (no hardware: `simulated: true`)",
-            )
+            yield f"{key}.port", f"{NO_PORT} (no hardware: `simulated: true`)"
         elif reason := why_no_path(line.port):
             yield f"{key}.port", reason
 
@@ -64,7 +63,7 @@ def why_no_path(port: str) -> str:
     """Return why this is no path of a device, empty where it is one."""
     if PLACEHOLDER.search(port):
         cure = "put your adapter's path here, `force-gateway ports` lists them"
-        return f"{port} is the placeholder that init wrote: {cure}"
+        return f"{port} is a placeholder: {cure}"
     return "" if port.startswith("/") else f'"{port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
 
 

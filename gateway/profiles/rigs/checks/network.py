@@ -7,6 +7,8 @@ from gateway import defaults
 from gateway.profiles.http_sections import split_listen
 from gateway.profiles.rigs.addresses import is_certificate
 from gateway.profiles.rigs.checks.parts import Check, Found, Parts
+from gateway.profiles.rigs.faces import TlsFace
+from gateway.profiles.rigs.rig_file import Network
 from gateway.profiles.strict_yaml.fault_sentences import newton
 from gateway.registers.writes.ownership import serial_place
 
@@ -15,13 +17,24 @@ def check_allow_list(parts: Parts) -> Found:
     """Yield a fault for a server beyond loopback without an allow-list, and for an owner that the list leaves out."""
     if (network := parts.network) is None:
         return
-    if not is_loopback(network.bind) and not network.allow:
-        reason = "can be reached from other machines: say which may connect, such as `allow: [192.168.125.0/24]`"
-        yield "network.bind", f"{network.bind} {reason}"
+    yield from find_open_face("network", network)
     if network.owner is None or serial_place(network.owner) is not None or is_certificate(network.owner):
         return
     if network.allow and not any(ip_address(network.owner) in allowed for allowed in network.allow):
         yield "network.owner", f"{network.owner} is in none of the networks of network.allow: it could not connect"
+
+
+def find_open_face(path: str, face: Network | TlsFace) -> Found:
+    """Yield a fault for a face beyond loopback without an allow-list. path: of the face in the file."""
+    if not is_loopback(face.bind) and not face.allow:
+        reason = "can be reached from other machines: say which may connect, such as `allow: [192.168.125.0/24]`"
+        yield f"{path}.bind", f"{face.bind} {reason}"
+
+
+def find_everybody(path: str, face: Network | TlsFace) -> Found:
+    """Yield a warning for an allow-list that lets everybody connect."""
+    if any(allowed.prefixlen == 0 for allowed in face.allow):
+        yield f"{path}.allow", "lets every address in the world connect"
 
 
 def is_loopback(address: str) -> bool:
@@ -46,8 +59,7 @@ def check_network_exposure(parts: Parts) -> Found:
             "network.port",
             f"E120 {network.port} needs a privilege (a service, or CAP_NET_BIND_SERVICE); {defaults.MODBUS_PORT} does not",
         )
-    if any(allowed.prefixlen == 0 for allowed in network.allow):
-        yield "network.allow", "lets every address in the world connect"
+    yield from find_everybody("network", network)
 
 
 def check_map_carries_force(parts: Parts) -> Found:

@@ -26,7 +26,7 @@ from gateway.modbus.certificate import (
 )
 from gateway.modbus.expiry import CURES, SOON_DAYS, day_of, end_of, expiry_sentence
 from gateway.plain_file import read_plain
-from gateway.profiles.rigs.checks.network import is_loopback
+from gateway.profiles.rigs.checks.network import find_everybody, find_open_face
 from gateway.profiles.rigs.checks.parts import Check, Found, Parts
 from gateway.profiles.rigs.faces import TlsFace
 from gateway.profiles.rigs.rig_file import Network
@@ -54,9 +54,7 @@ def tls_faces(parts: Parts) -> Iterator[tuple[str, TlsFace]]:
 def check_tls_exposure(parts: Parts) -> Found:
     """Yield a fault for a TLS face beyond loopback without an allow-list, and for one on the plain face's port."""
     for path, face in tls_faces(parts):
-        if not is_loopback(face.bind) and not face.allow:
-            reason = "can be reached from other machines: say which may connect, such as `allow: [192.168.125.0/24]`"
-            yield f"{path}.bind", f"{face.bind} {reason}"
+        yield from find_open_face(path, face)
         network = parts.network
         if network and network.plain and _meet(face, network):
             yield f"{path}.port", f"{face.port} is the port of plain Modbus TCP too: 802 is that of Modbus/TCP Security"
@@ -75,8 +73,7 @@ def _meet(one: TlsFace, other: TlsFace | Network) -> bool:
 def check_tls_allow(parts: Parts) -> Found:
     """Yield a warning for an allow-list that lets everybody begin a handshake."""
     for path, face in tls_faces(parts):
-        if any(allowed.prefixlen == 0 for allowed in face.allow):
-            yield f"{path}.allow", "lets every address in the world connect"
+        yield from find_everybody(path, face)
 
 
 def check_tls_files(parts: Parts) -> Found:

@@ -5,7 +5,7 @@ from typing import Final
 from gateway.devices import DeviceRole, ValveDirection, ValveHost
 from gateway.devices.messages import Garbage
 from gateway.devices.valve import ValveDevice
-from gateway.profiles.rigs.checks.lines import is_same_port, of_role, why_no_path
+from gateway.profiles.rigs.checks.lines import NO_PORT, SIMULATED_PORT, is_same_port, of_role, why_no_path
 from gateway.profiles.rigs.checks.parts import Check, Found, Parts
 from gateway.profiles.rigs.checks.wires import check_reply_time
 from gateway.profiles.rigs.device_settings import find_unfit_settings
@@ -50,7 +50,7 @@ def check_valve_times(parts: Parts) -> Found:
 def check_valve_simulated_port(parts: Parts) -> Found:
     """Yield a fault for a port in a simulated rig."""
     if parts.simulated and parts.valve and parts.valve.port is not None:
-        yield "valve.port", "a simulated rig has no ports: delete this line, or write `simulated: false`"
+        yield "valve.port", SIMULATED_PORT
 
 
 def check_valve_port(parts: Parts) -> Found:
@@ -59,7 +59,7 @@ def check_valve_port(parts: Parts) -> Found:
     if valve is None or parts.simulated:
         return
     if valve.port is None:
-        yield "valve.port", "is missing: `force-gateway ports` lists what is plugged in"
+        yield "valve.port", NO_PORT
     elif reason := why_no_path(valve.port):
         yield "valve.port", reason
     for key, line in (("output", parts.output), ("load_cell", parts.load_cell)):

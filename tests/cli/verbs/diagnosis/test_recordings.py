@@ -10,7 +10,7 @@ import pytest
 from gateway.processes import exit_codes
 from gateway.recording import Recorder
 from gateway.watch.reference_recording import keep_reference_recording
-from tests.recording.test_care import record
+from tests.recording.care.test_care import record
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from gateway.recording.care import clock_doubt
 from gateway.recording.care.clock_doubt import ClockDoubt, doubt_clock
 from gateway.service.running_rig.recording import retention as module
 from gateway.service.running_rig.recording.retention import RecordingRetention
-from tests.recording.test_care import NOW_S, record
+from tests.recording.care.test_care import NOW_S, record
 
 DAY_S = 86400.0
 

@@ -12,7 +12,7 @@ from gateway.profiles.recordings_section import Retention
 from gateway.recording import recording_paths
 from gateway.recording.care import keeping
 from gateway.service.running_rig.recording.retention import RecordingRetention
-from tests.recording.test_care import record
+from tests.recording.care.test_care import record
 
 
 class Said:

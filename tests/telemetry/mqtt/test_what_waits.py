@@ -56,7 +56,7 @@ def test_the_longest_command_is_one() -> None:
 def test_a_change_wakes_who_sends_and_none_does_not() -> None:
     for session in (EdgeNode("plant", "cell", itertools.count().__next__), JsonTopics("cell", None)):
         session.begin()
-        session.greet()
+        session.announce()
         session.offer(at(1.0), 1.0)
         assert session.ready.is_set()
     node = EdgeNode("plant", "cell", itertools.count().__next__)
@@ -69,11 +69,11 @@ def test_a_change_wakes_who_sends_and_none_does_not() -> None:
 def test_what_comes_while_nobody_is_connected_is_historical_from_the_loss_on() -> None:
     node = EdgeNode("plant", "cell", itertools.count().__next__)
     node.begin()
-    node.greet()
+    node.announce()
     node.lose()
     node.offer(at(7.0), 1.0)
     node.begin()
-    node.greet()
+    node.announce()
     node.offer(at(8.0), 2.0)
     told = []
     while (message := node.next_message()) is not None:
@@ -87,7 +87,7 @@ def test_what_comes_while_nobody_is_connected_is_historical_from_the_loss_on() -
 def test_a_message_that_a_loss_has_dropped_takes_no_event_with_it() -> None:
     session = JsonTopics("cell", None)
     session.begin()
-    session.greet()
+    session.announce()
     session.offer(holding(), 1.0)
     offered = session.next_message()
     assert offered and not offered.topic.endswith("/events")
@@ -114,7 +114,7 @@ def test_commands_are_heard_and_answered_where_there_is_one_who_carries_them_out
 def test_an_alarm_is_raised_once_and_ages_alone_are_no_new_state() -> None:
     session = JsonTopics("cell", None)
     session.begin()
-    session.greet()
+    session.announce()
     raised = []
     for time_s in (1.0, 1.1, 1.2):
         state = replace(holding(), warnings=() if time_s == 1.0 else holding().warnings)

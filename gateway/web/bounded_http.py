@@ -18,11 +18,11 @@ UNREAD_S: Final = 30.0
 """For a browser that is asleep, and a page that it has frozen: it comes back by itself."""
 
 
-class ImpatientProtocol(H11Protocol):
+class BoundedHttpProtocol(H11Protocol):
     """One connection."""
 
-    _patience: asyncio.TimerHandle | None = None
-    _unread: asyncio.TimerHandle | None = None
+    _request_timer: asyncio.TimerHandle | None = None
+    _unread_timer: asyncio.TimerHandle | None = None
     _asked_s = 0.0  # when it connected, or its last whole request had come
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
@@ -35,19 +35,19 @@ class ImpatientProtocol(H11Protocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait for nothing any more."""
         super().connection_lost(exc)
-        self._end_patience()
-        self._end_unread()
+        self._end_request_timer()
+        self._end_unread_timer()
 
     def pause_writing(self) -> None:
         """Begin to wait until some of what was sent is taken."""
         super().pause_writing()
-        self._end_unread()
-        self._unread = self.loop.call_later(UNREAD_S, self.transport.abort)
+        self._end_unread_timer()
+        self._unread_timer = self.loop.call_later(UNREAD_S, self.transport.abort)
 
     def resume_writing(self) -> None:
         """End that wait."""
         super().resume_writing()
-        self._end_unread()
+        self._end_unread_timer()
 
     def data_received(self, data: bytes) -> None:
         """Take the next bytes."""
@@ -58,9 +58,9 @@ class ImpatientProtocol(H11Protocol):
         """More of the same request does not begin the time anew."""
         if not self._is_waited_for:
             self._asked_s = self.loop.time()
-            self._end_patience()
-        elif self._patience is None:
-            self._patience = self.loop.call_later(WHOLE_REQUEST_S, self.transport.close)
+            self._end_request_timer()
+        elif self._request_timer is None:
+            self._request_timer = self.loop.call_later(WHOLE_REQUEST_S, self.transport.close)
 
     @property
     def _is_waited_for(self) -> bool:
@@ -71,19 +71,21 @@ class ImpatientProtocol(H11Protocol):
         if self.limit_concurrency is None or len(self.connections) < self.limit_concurrency:
             return
         silent = [
-            one for one in self.connections if isinstance(one, ImpatientProtocol) and one._is_waited_for and one != self
+            one
+            for one in self.connections
+            if isinstance(one, BoundedHttpProtocol) and one._is_waited_for and one != self
         ]
         if silent:
             longest = min(silent, key=lambda one: one._asked_s)
             self.connections.discard(longest)  # now: several may come before it is told of its end
             longest.transport.abort()
 
-    def _end_patience(self) -> None:
-        patience, self._patience = self._patience, None
+    def _end_request_timer(self) -> None:
+        patience, self._request_timer = self._request_timer, None
         if patience:
             patience.cancel()
 
-    def _end_unread(self) -> None:
-        unread, self._unread = self._unread, None
+    def _end_unread_timer(self) -> None:
+        unread, self._unread_timer = self._unread_timer, None
         if unread:
             unread.cancel()

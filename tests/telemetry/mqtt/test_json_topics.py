@@ -34,7 +34,7 @@ def test_state_is_retained_and_force_comes_with_every_look() -> None:
     session = JsonTopics("cell", None)
     assert told(session.begin()) == ("online", False, True)
     session.offer(holding(), 1.0)
-    online, state = (told(message) for message in session.greet())
+    online, state = (told(message) for message in session.announce())
     assert online == ("online", True, True)
     assert state[0] == "state" and state[1]["state"] == "holding" and state[2] is True
     drain(session)
@@ -50,7 +50,7 @@ def test_a_clock_that_is_set_back_keeps_nobody_from_being_told() -> None:
     """By a year, say: until then the state would have been told on changes only."""
     session = JsonTopics("cell", None)
     session.begin()
-    session.greet()
+    session.announce()
     for time_s, topics in ((1e6, ["online", "state", "force"]), (9.0, ["online", "state", "force"]), (18.9, ["force"])):
         session.offer(holding(), time_s)
         assert [name for name, _, _ in drain(session)] == topics
@@ -59,7 +59,7 @@ def test_a_clock_that_is_set_back_keeps_nobody_from_being_told() -> None:
 def test_events_wait_for_the_broker_and_forces_do_not() -> None:
     session = JsonTopics("cell", None)
     session.begin()
-    session.greet()
+    session.announce()
     session.offer(holding(), 1.0)
     session.lose()
     session.offer(replace(holding(), state="fault", warnings=()), 2.0)
@@ -73,13 +73,13 @@ def test_that_control_was_away_while_the_broker_was_is_no_news_behind_the_greeti
     """`online` false of then was retained behind `online` true of now, until true came behind it."""
     session = JsonTopics("cell", None)
     session.begin()
-    session.greet()
+    session.announce()
     session.offer(holding(), 1.0)
     session.lose()
     for time_s, state in ((2.0, None), (3.0, holding()), (4.0, None), (5.0, holding())):
         session.offer(state, time_s)
     session.begin()
-    online, _ = (told(message) for message in session.greet())
+    online, _ = (told(message) for message in session.announce())
     assert online == ("online", True, True)
     assert [content for name, content, _ in drain(session) if name == "online"] == []
 
@@ -88,7 +88,7 @@ def test_what_a_restart_of_control_has_changed_is_told_as_events() -> None:
     """Who keeps an alarm log by the events hears of the restart, and that nothing presses any more."""
     session = JsonTopics("cell", None)
     session.begin()
-    session.greet()
+    session.announce()
     for state, time_s in ((holding(), 1.0), (None, 2.0)):
         session.offer(state, time_s)
     drain(session)
@@ -106,7 +106,7 @@ def test_a_control_that_does_not_answer_is_offline_without_an_old_state() -> Non
     session = JsonTopics("cell", None)
     session.begin()
     session.offer(holding(), 1.0)
-    session.greet()
+    session.announce()
     drain(session)
     session.offer(None, 2.0)
     assert drain(session) == [("online", False, True), ("state", None, True)]

@@ -11,7 +11,7 @@ from starlette.routing import Route
 from uvicorn import Config
 from uvicorn.server import ServerState
 
-from gateway.web import impatient_http
+from gateway.web import bounded_http
 
 WHOLE = b"GET / HTTP/1.1\r\nHost: a\r\n\r\n"
 
@@ -26,7 +26,7 @@ async def heard(said: bytes, then: bytes = b"") -> bytes:
     config.load()
     ours, far = socket.socketpair()
     await asyncio.get_running_loop().connect_accepted_socket(
-        lambda: impatient_http.ImpatientProtocol(config, ServerState(), {}), ours
+        lambda: bounded_http.BoundedHttpProtocol(config, ServerState(), {}), ours
     )
     reader, writer = await asyncio.open_connection(sock=far)
     writer.write(said)
@@ -57,14 +57,14 @@ async def heard(said: bytes, then: bytes = b"") -> bytes:
     ],
 )
 def test_half_a_request_is_hung_up_on(monkeypatch: pytest.MonkeyPatch, said: bytes, then: bytes) -> None:
-    monkeypatch.setattr(impatient_http, "WHOLE_REQUEST_S", 0.05)
+    monkeypatch.setattr(bounded_http, "WHOLE_REQUEST_S", 0.05)
     assert b"here" not in asyncio.run(heard(said, then))
 
 
 def test_a_whole_request_is_answered_and_half_of_the_next_one_is_not_waited_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(impatient_http, "WHOLE_REQUEST_S", 0.05)
+    monkeypatch.setattr(bounded_http, "WHOLE_REQUEST_S", 0.05)
     assert asyncio.run(heard(WHOLE + WHOLE, b"GET ")).count(b"here") == 2
 
 
@@ -73,10 +73,10 @@ def test_who_takes_nothing_of_an_answer_is_hung_up_on_and_who_takes_it_is_not(
     monkeypatch: pytest.MonkeyPatch, takes: bool
 ) -> None:
     """A frozen page kept its place among the connections, and its stream, for as long as its machine was awake."""
-    monkeypatch.setattr(impatient_http, "UNREAD_S", 5.0 if takes else 0.05)
+    monkeypatch.setattr(bounded_http, "UNREAD_S", 5.0 if takes else 0.05)
     size = 4_000_000
 
-    class Noted(impatient_http.ImpatientProtocol):
+    class Noted(bounded_http.BoundedHttpProtocol):
         def connection_lost(self, exc: Exception | None) -> None:
             super().connection_lost(exc)
             self.lost.set()
@@ -99,7 +99,7 @@ def test_who_takes_nothing_of_an_answer_is_hung_up_on_and_who_takes_it_is_not(
             while takes and taken < size:
                 taken += len(await loop.sock_recv(far, 100_000))
             if takes:
-                assert server._unread is None and not server.lost.is_set()
+                assert server._unread_timer is None and not server.lost.is_set()
                 far.close()
             await server.lost.wait()
         far.close()
@@ -122,7 +122,7 @@ def test_who_opens_connections_and_asks_for_nothing_shuts_nobody_out() -> None:
 
         async def connect() -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
             ours, far = socket.socketpair()
-            await loop.connect_accepted_socket(lambda: impatient_http.ImpatientProtocol(config, state, {}), ours)
+            await loop.connect_accepted_socket(lambda: bounded_http.BoundedHttpProtocol(config, state, {}), ours)
             return await asyncio.open_connection(sock=far)
 
         first = await connect()

@@ -31,7 +31,7 @@ class Session:
     def begin(self) -> BrokerMessage:
         return BrokerMessage("cell/online", b"false", retain=True)
 
-    def greet(self) -> Sequence[BrokerMessage]:
+    def announce(self) -> Sequence[BrokerMessage]:
         return ()
 
     def next_message(self) -> BrokerMessage | None:

@@ -41,7 +41,7 @@ def test_a_birth_names_all_with_types_and_its_death_has_its_bd_seq() -> None:
     for bd_seq in range(3):
         node.offer(holding(), 1000.0)
         will = node.begin()
-        (birth,) = node.greet()
+        (birth,) = node.announce()
         assert (will.topic, will.qos, birth.topic) == ("spBv1.0/plant/NDEATH/cell", 1, "spBv1.0/plant/NBIRTH/cell")
         assert values(will.payload) == {"bdSeq": bd_seq} and not decoded(will.payload).HasField("seq")
         said = decoded(birth.payload)
@@ -63,7 +63,7 @@ def test_no_force_is_told_under_the_name_of_another() -> None:
 def test_data_tells_what_changed_and_seq_goes_round() -> None:
     node = EdgeNode("plant", NODE_NAME, itertools.count().__next__)
     node.begin()
-    node.greet()
+    node.announce()
     node.offer(at(0.0), 0.0)
     drain(node)
     seqs = []
@@ -79,7 +79,7 @@ def test_data_tells_what_changed_and_seq_goes_round() -> None:
 def test_what_came_while_the_broker_was_away_follows_the_birth_in_order_as_historical() -> None:
     node = EdgeNode("plant", NODE_NAME, itertools.count().__next__, room=5)
     node.begin()
-    node.greet()
+    node.announce()
     node.offer(at(0.0), 0.0)
     drain(node)
     node.offer(at(1.0), 1.0)
@@ -88,7 +88,7 @@ def test_what_came_while_the_broker_was_away_follows_the_birth_in_order_as_histo
     for number in range(2, 5):
         node.offer(at(float(number)), float(number))
     node.begin()
-    (birth,) = node.greet()
+    (birth,) = node.announce()
     node.offer(at(9.0), 9.0)
     sent = drain(node)
     assert values(birth.payload)["Force/Measured N"] == 4.0
@@ -111,7 +111,7 @@ def test_a_full_store_loses_the_oldest_and_never_one_that_was_not_sent() -> None
 def test_only_a_rebirth_that_is_asked_for_is_answered() -> None:
     node = EdgeNode("plant", NODE_NAME, itertools.count().__next__)
     node.begin()
-    node.greet()
+    node.announce()
 
     def asked(payload: bytes) -> list[BrokerMessage]:
         return list(asyncio.run(node.answer("spBv1.0/plant/NCMD/cell", payload, "")))
@@ -134,7 +134,7 @@ def test_where_control_does_not_answer_nothing_old_is_told() -> None:
     node.offer(holding(), 1.0)
     node.offer(None, 2.0)
     node.begin()
-    (birth,) = node.greet()
+    (birth,) = node.announce()
     told = {name: value for name, value in values(birth.payload).items() if value is not None}
     assert told == {"bdSeq": 0, REBIRTH: False, "Control/Answers": False}
 
@@ -190,12 +190,12 @@ def test_a_broker_that_is_away_costs_the_disk_one_write(tmp_path: Path, monkeypa
         node.lose()
     assert len(writes) == 1
     node.begin()
-    node.greet()
+    node.announce()
     assert KeptBdSeq(tmp_path).next() == 101, "behind the one with which it was connected"
     for _ in range(2):
         node.lose()
         node.begin()
-        node.greet()
+        node.announce()
     assert KeptBdSeq(tmp_path).next() == 103 and len(writes) == 1 + 1 + 1 + 2 + 1
     (tmp_path / "sparkplug.json").unlink()
     node.lose()

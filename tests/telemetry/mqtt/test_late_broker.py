@@ -9,7 +9,7 @@ from gateway.telemetry.mqtt import broker_connection
 from gateway.telemetry.mqtt.broker_session import BrokerMessage
 from gateway.telemetry.mqtt.command_queue import ROOM, CommandQueue
 from gateway.telemetry.mqtt.round_trips import SLOW_S, RoundTrips
-from tests.telemetry.test_broker_connection import Library, Session, play, turns
+from tests.telemetry.mqtt.test_broker_connection import Library, Session, play, turns
 
 JUST_S = SLOW_S - 0.01
 

@@ -9,7 +9,7 @@ import pytest
 
 from gateway.telemetry.mqtt import broker_connection
 from gateway.telemetry.mqtt.broker_connection import Broker, BrokerNews, keep_connected
-from tests.telemetry.test_broker_connection import Session
+from tests.telemetry.mqtt.test_broker_connection import Session
 
 aiomqtt = pytest.importorskip("aiomqtt")
 
