@@ -164,7 +164,11 @@ def _cell(profile: DeviceProfile) -> Found:
         if complaints := list(_beyond_range(profile, unit, place)):
             yield from complaints
             return
-        if complaint := next(filter(None, (_shown(host, device, reading, counts) for counts in (0, 1, -1))), ""):
+        needs_minus = reading.newton_per_unit is not None or reading.template.field(
+            UNIT
+        )  # else the rig knows their zero
+        counts = (0, 1, -1) if needs_minus else (0, 1)
+        if complaint := next(filter(None, (_shown(host, device, reading, one) for one in counts)), ""):
             yield place, complaint
         elif reading.end is not None and not _tells_its_end(host, device):
             yield (*place, "end_count"), f"{reading.end_count:g} does not fit into {_shown_by(reading)}"
@@ -203,6 +207,8 @@ def _why_not(reading: ForceReading, counts: int) -> str:
     cure = ""
     if reading.modbus:
         cure = f": say {reading.modbus.type.removeprefix('u')}, or which bit is the sign in `negative`"
+        if reading.newton_per_count:
+            cure = f": say which count is 0 N in `zero_count`, else {reading.modbus.type.removeprefix('u')}"
     elif isinstance(number := reading.template.field(FORCE), HexNumber):
         cure = f": {{force:+0{number.width}{number.letter}}} is the two's complement"
     return f"there is no room for a minus sign, and noise needs it{cure}"

@@ -7,6 +7,8 @@ import pytest
 
 from gateway.devices import cell_host
 from gateway.devices.binary.rtu_framing import rtu_frame
+from gateway.devices.binary.weight_registers import WeightRegisters
+from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample
 from gateway.devices.template_codecs.unread_line import explain_unread
 from gateway.devices.wire import resample_at_baud
@@ -81,6 +83,28 @@ def test_a_modbus_cell_that_has_no_such_register_is_not_said_to_have_no_wires() 
     assert told == "it answers exception 2 (illegal data address): are registers and function those of laumas-tlb?"
     assert explain_unread(profile, rtu_frame(2, b"8302")) == "", "of another unit"
     assert explain_unread(profile, rtu_frame(1, b"0302000A")) == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "line", "told"),
+    [
+        ("mantracourt-dsc", b"?\r", "it says '?', its word for no: has it an answer to '!001:SYS?'?"),
+        ("hbm-aed", b"?\r\n", "it says '?', its word for no: has it an answer to 'MSV?'?"),
+        ("hbm-aed", b"!\r\n", ""),
+    ],
+)
+def test_a_cell_that_says_no_is_not_said_to_be_silent(name: str, line: bytes, told: str) -> None:
+    """Its power, its cable and its stream mode were to be checked."""
+    assert explain_unread(load_device(name), line) == told
+
+
+@pytest.mark.parametrize(("digits", "is_told"), [("7FC00000", True), ("FF800000", True), ("3FC00000", False)])
+def test_an_amplifier_whose_number_is_none_is_not_said_to_be_silent(digits: str, is_told: bool) -> None:
+    reading = ForceReading(ask="", modbus=WeightRegisters(first=63, last=65, weight=63, type="float32"), unit="kg")
+    profile = replace(load_device("laumas-tlb"), name="own", read_force=reading)
+    told = "it answers no number, but NaN or infinity: no reading, or is register 63 no float32 of that word order?"
+    assert explain_unread(profile, rtu_frame(1, f"0306{digits}0000".encode())) == (told if is_told else "")
+    assert explain_unread(profile, rtu_frame(1, f"0304{digits}".encode())) == ""
 
 
 def test_what_is_read_is_never_said_to_be_in_another_unit() -> None:

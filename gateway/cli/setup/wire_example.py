@@ -5,7 +5,7 @@ from typing import Final
 from gateway.devices.codecs import cell_device, cell_host, output_device, output_host
 from gateway.devices.fields import Choice
 from gateway.devices.force_reading import UNIT
-from gateway.devices.messages import Accepted, Garbage, SetVoltage
+from gateway.devices.messages import Accepted, ForceSample, Garbage, SetVoltage
 from gateway.devices.profile import DeviceProfile, DeviceRole
 from gateway.devices.template import quote
 from gateway.devices.valve import ValveDevice, ValveHost
@@ -46,8 +46,12 @@ def _cell(profile: DeviceProfile) -> str:
     asked = host.poll() or host.start
     most_n = reading.largest_shown * host.resolution_n / reading.step
     shown_n = _SHOWN_N if most_n > -_SHOWN_N else -float(f"{0.5 * most_n:.1g}")
+    frame = cell_device(profile, unit).frame
+    samples = [one for one in host.receive(frame(shown_n), 0.0) if isinstance(one, ForceSample)]
+    if not any(abs(one.force_n - shown_n) <= host.resolution_n for one in samples):
+        shown_n = -shown_n  # of counts without a sign, whose zero a rig knows
     question = f"{_shown(profile, asked)} -> " if asked else ""
-    return f"{shown_n:g} {name}: {question}{_shown(profile, cell_device(profile, unit).frame(shown_n))}"
+    return f"{shown_n:g} {name}: {question}{_shown(profile, frame(shown_n))}"
 
 
 def _valve(profile: DeviceProfile) -> str:

@@ -5,7 +5,7 @@
     {voltage_v:+07.3f} {voltage_v:.4f}      decimals, open or of fixed width; the point is always there
     {force:8,2f}                            the same with a decimal comma
     {volts:+.8E}                            decimals with an exponent, as SCPI devices answer
-    {force:g}                               decimals that come and go, as programs print them: 12, 12.5, 1e-05
+    {force:g} {force:10g}                   decimals that come and go, as programs print them: 12, 12.5, 1e-05
     {status:ST|US|OL} {status: |M|O}        one of the words; the first is the default; one may be a blank
     {unit:kg|lb} {unit: kg|  g}             words of one length may be padded, all on one side
     {text:s} {model:8s}                     printable text, open or of fixed width

@@ -179,38 +179,54 @@ class Scientific:
         return _finite_or_none(float(text))
 
 
+_PLAIN: Final = rf"(?:\d{{1,{LONGEST_NUMBER}}}(?:\.\d{{0,9}})?|\.\d{{1,9}})(?:[Ee][+-]?\d{{1,3}})?"
+_PLAIN_IN_COLUMN: Final = re.compile(rf"{_PADDED_NUMBER}{_PLAIN}")
+
+
 @dataclass(frozen=True, slots=True)
 class Plain:
-    """{force:g}: a number as programs print it, whose decimals come and go: 12, 12.5, .0273, 1e-05. decimals: those of what is
-    sent."""
+    """{force:g}: a number as programs print it, whose decimals come and go: 12, 12.5, .0273, 1e-05; {force:10g}: the same in a
+    column, blanks ahead. decimals: those of what is sent, where there is room for them."""
 
     name: str
     sign: str = ""
+    width: int = 0
     decimals: int = 4
 
     def step_below(self, largest: float) -> float:
         """Return the widest gap between two numbers up to this one, where a program prints six digits of each, as C's %g."""
-        return max(10.0**-self.decimals, _digit_below(largest) * 10.0**-_DECIMALS_OF_G)
+        digits = max(10.0**-self.decimals, _digit_below(largest) * 10.0**-_DECIMALS_OF_G)
+        return max(digits, 10.0 ** -self._decimals_of(largest))
 
     @property
     def is_open(self) -> bool:
-        """Return True: it takes as many digits as it needs."""
-        return True
+        """Decide whether it takes as many digits as it needs."""
+        return self.width == 0
 
     @property
     def pattern(self) -> str:
         """Regular expression of digits with or without a point and an exponent."""
-        return rf"[+-]?(?:\d{{1,{LONGEST_NUMBER}}}(?:\.\d{{0,9}})?|\.\d{{1,9}})(?:[Ee][+-]?\d{{1,3}})?"
+        return rf"[+-]?{_PLAIN}" if self.is_open else rf"[ +\-0-9.Ee]{{{self.width}}}"
 
     def encode(self, value: Value) -> str:
-        """Return the rounded number without zeros at its end. ValueRefused for one that is not finite, or no reading."""
+        """Return the rounded number without zeros at its end. ValueRefused for one that is not finite, does not fit, or is no
+        reading."""
         number = _bounded(self.name, value)
-        text = format(number, f"{self.sign}z.{self.decimals}f").rstrip("0")
-        return f"{text}0" if text.endswith(".") else text
+        decimals = self._decimals_of(number)
+        text = format(number, f"{self.sign}z.{decimals}f")
+        text = text.rstrip("0") if decimals else text
+        return of_width(self.name, (f"{text}0" if text.endswith(".") else text).rjust(self.width), self.width)
 
     def decode(self, text: str) -> Value | None:
-        """Return the number, None for one that no double holds."""
-        return _finite_or_none(float(text))
+        """Return the number, None for one that no double holds, and for a column with anything else in it."""
+        if not self.is_open and not _PLAIN_IN_COLUMN.fullmatch(text):
+            return None
+        return _finite_or_none(float(text.replace(" ", "")))
+
+    def _decimals_of(self, number: float) -> int:
+        """Return the decimals that a number has room for beside a sign, its digits and the point."""
+        room = self.width - len(format(number, f"{self.sign}z.0f")) - 1
+        return self.decimals if self.is_open else max(0, min(self.decimals, room))
 
 
 def _digit_below(largest: float) -> float:

@@ -11,7 +11,7 @@ _WHOLE = re.compile(r"(\+?)(0?)(\d{0,2})d")
 _HEX = re.compile(r"(\+?)0([1-8])([Xx])")
 _DECIMALS = re.compile(r"(\+?)(0?)(\d{0,2})([.,])([1-9])f")
 _SCIENTIFIC = re.compile(r"(\+?)\.([1-9])([Ee])")
-_PLAIN = re.compile(r"(\+?)g")
+_PLAIN = re.compile(r"(\+?)([1-9]\d?)?g")
 _TEXT = re.compile(r"(\d{0,2})s")
 _REGISTERS = re.compile(r"(u?int16|u?int32|float32)(-cdab)?")
 _WORD = re.compile(r"[!-~]+| +")
@@ -29,7 +29,7 @@ def field_from(name: str, spec: str) -> Field:
     if match := _SCIENTIFIC.fullmatch(spec):
         return Scientific(name, match[1], int(match[2]), match[3])
     if match := _PLAIN.fullmatch(spec):
-        return Plain(name, match[1])
+        return Plain(name, match[1], int(match[2] or 0))
     if match := _TEXT.fullmatch(spec):
         return Text(name, int(match[1] or 0))
     if match := _REGISTERS.fullmatch(spec):

@@ -12,6 +12,8 @@ from gateway.devices.binary.rtu_framing import answers, exception_text
 from gateway.devices.binary.weight_registers import WeightRegisters
 from gateway.devices.fields import Field
 from gateway.devices.force_reading import FORCE, UNIT, units_of
+from gateway.devices.framing import Line
+from gateway.devices.grammar import Grammar
 from gateway.devices.profile import TEMPLATE, DeviceProfile, DeviceRole
 from gateway.devices.template import TEXT_CHARACTERS, Template, join_patterns, quote
 
@@ -33,10 +35,12 @@ def explain_answer(line: bytes, question: bytes = b"") -> str:
 def explain_unread(profile: DeviceProfile, line: bytes) -> str:
     """Return what an unread line says, how the profile of a load cell reads it, and what to do; empty where it is no text."""
     if profile.is_modbus:
-        return _explain_exception(profile, line)
+        return _explain_exception(profile, line) or _explain_no_number(profile, line)
     body = line.removesuffix(profile.terminator_bytes)
     if profile.role is DeviceRole.OUTPUT:
         return explain_answer(line)
+    if refused := _explain_refusal(profile, Line(line, body, is_whole=body != line)):
+        return refused
     if profile.role is not DeviceRole.LOAD_CELL or profile.codec != TEMPLATE or not _TEXT.fullmatch(body):
         return ""
     said, frame = f"it says {quote(body.decode('ascii'))}", profile.reading.template
@@ -55,6 +59,29 @@ def _explain_exception(profile: DeviceProfile, frame: bytes) -> str:
         (f"; a manual's {one} is {(one - 1) % 10_000} on the wire" for one in _numbered_as_in_manuals(profile)), ""
     )
     return f"it answers {text}: are registers and function those of {profile.name}?{hint}" if text else ""
+
+
+def _explain_no_number(profile: DeviceProfile, frame: bytes) -> str:
+    """An amplifier that has no reading says so by a number that is none."""
+    registers = profile.read_force.modbus if profile.read_force else None
+    answer = next(iter(answers(profile.unit_id).feed(frame)), None)
+    if not (registers and registers.is_float and answer and answer.is_whole):
+        return ""
+    template = profile.reading.template
+    if not template.pattern.fullmatch(answer.body) or template.decode(answer.body) is not None:
+        return ""
+    cause = f"no reading, or is register {registers.weight} no float32 of that word order?"
+    return f"it answers no number, but NaN or infinity: {cause}"
+
+
+def _explain_refusal(profile: DeviceProfile, line: Line) -> str:
+    """A load cell that does not take its question is there, however short its word for that is."""
+    if profile.role is not DeviceRole.LOAD_CELL:
+        return ""
+    grammar, reading = Grammar(profile), profile.reading
+    said = grammar.refusal(grammar.body(line) or b"")
+    asked = quote(grammar.words(reading.ask or reading.start))
+    return f"it says {quote(said)}, its word for no: has it an answer to {asked}?" if said else ""
 
 
 def _numbered_as_in_manuals(profile: DeviceProfile) -> Iterator[int]:

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from gateway.cli.setup.wire_example import example
 from gateway.devices import cell_host, output_host
-from gateway.devices.messages import AskDevice, DeviceStep, SetVoltage
-from gateway.profiles import Report, check_report
+from gateway.devices.messages import AskDevice, DeviceStep, ForceSample, SetVoltage
+from gateway.profiles import Report, check_report, load_device
 
 RIG = """
 name: own
@@ -54,6 +55,39 @@ def test_a_modbus_units_address_is_the_rigs(tmp_path: Path) -> None:
     assert found.rig, found.faults
     assert output_host(found.rig.output.device).request(SetVoltage(5.0))[:6] == bytes.fromhex("110600001388")
     assert cell_host(found.rig.load_cell.device).poll()[0] == 3
+
+
+CONVERTER = """name: converter
+description: analogue input, 0 to 65535 for -10 to 10 V
+role: load cell
+source: a manual
+certainty: manual
+hardware: never run on hardware
+codec: modbus-rtu
+serial: {baud: 115200}
+read_force: {modbus: {function: 4, first: 0, last: 0, weight: 0, type: uint16}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("zero", "told"),
+    [
+        (", zero_count: 32768", ""),
+        (
+            "",
+            "there is no room for a minus sign, and noise needs it: say which count is 0 N in `zero_count`, else int16",
+        ),
+    ],
+)
+def test_counts_without_a_sign_have_their_zero_from_the_rig(zero: str, told: str, tmp_path: Path) -> None:
+    """The file was refused, and told to say int16: 40000 would have been -25536."""
+    (tmp_path / "converter.yaml").write_text(CONVERTER)
+    found = rig(tmp_path, cell=f", newton_per_count: 0.01{zero}", amplifier="converter")
+    assert [told in str(fault) for fault in found.faults] == ([True] if told else []), found.faults
+    assert example(load_device(tmp_path / "converter.yaml")).startswith("20 counts: 01 04")
+    if found.rig:
+        (reading,) = cell_host(found.rig.load_cell.device).receive(bytes.fromhex("0104 02 7830 9b24"), 0.0)
+        assert isinstance(reading, ForceSample) and reading.force_n == pytest.approx(-20.0)
 
 
 def test_raw_counts_are_sized_by_the_rig(tmp_path: Path) -> None:

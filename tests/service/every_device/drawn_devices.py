@@ -149,6 +149,8 @@ def drawn_cell(rng: Random) -> Profile:
         _maybe(rng, reading, "rate_hz", rng.choice([1.0, 10.0, 40.0, 100.0, 400.0]), 0.95)
         _maybe(rng, reading, "start", rng.choice(["SIR", "SG"]), 0.3)
     profile["read_force" if is_asked else "stream"] = reading
+    beside = Random(frame)  # one of its own: the other draws stay as they are
+    _maybe(beside, profile, "read_over", beside.choice([["T={degrees:.1f}"], ["alive {seconds:d}", ""]]), 0.3)
     return profile
 
 

@@ -82,7 +82,7 @@ def check_ports_differ(parts: Parts) -> Found:
 def check_unit(parts: Parts) -> Found:
     """Yield a fault for a frame without a unit where the rig names none, and for one that gets a second."""
     device, line = of_role(parts.cell_device, DeviceRole.LOAD_CELL), parts.load_cell
-    if device and line:
+    if device and line and (line.newton_per_count is None or device.reading.newton_per_count):  # else it does not fit
         try:
             cell_host(device, line.sign, line.unit)
         except ValueError as error:
