@@ -21,7 +21,14 @@ def kilopascal_from_pascal(pressure_pa: float) -> float:
 
 
 LINEAR: Final[dict[str, dict[str, tuple[float, float]]]] = {
-    "time": {"s": (1.0, 0.0), "ms": (1.0e-3, 0.0), "us": (1.0e-6, 0.0), "ns": (1.0e-9, 0.0), "min": (60.0, 0.0), "h": (3600.0, 0.0)},
+    "time": {
+        "s": (1.0, 0.0),
+        "ms": (1.0e-3, 0.0),
+        "us": (1.0e-6, 0.0),
+        "ns": (1.0e-9, 0.0),
+        "min": (60.0, 0.0),
+        "h": (3600.0, 0.0),
+    },
     "force": {
         "n": (1.0, 0.0),
         "mn": (1.0e-3, 0.0),
