@@ -29,7 +29,7 @@ def endpoint(context: click.Context, parameter: click.Parameter, value: str | No
         return None
     host, port = _split(value)
     port = port or str(defaults.MODBUS_PORT)
-    if not port.isdecimal() or int(port) > 65535:
+    if not port.isdecimal() or int(port) > 65535 or "/" in host:
         raise click.BadParameter(f"{value} is not HOST:PORT such as {DEFAULT_ENDPOINT} (port 0..65535)")
     return host or defaults.HOST, int(port)
 

@@ -262,7 +262,7 @@ class Rig:
         if not ip_address(network.bind).is_loopback:
             notes = (
                 *notes,
-                f"bound to {defaults.HOST}: a simulated rig does not take the cell's address {network.bind}",
+                f"a simulated rig does not take the cell's address {network.bind}: --bind names another than {defaults.HOST}",
             )
             network = replace(network, bind=defaults.HOST)
         if any(isinstance(face, RtuFace) for face in self.fieldbus):

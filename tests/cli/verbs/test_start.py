@@ -97,11 +97,14 @@ def test_an_endpoint_is_read_as_people_write_it(text: str, expected: tuple[str, 
     assert values[0].bind == expected
 
 
-@pytest.mark.parametrize("text", ["127.0.0.1:http", "host:70000", "1.2.3.4:-1"])
-def test_a_wrong_endpoint_is_a_usage_error(text: str, call) -> None:
-    answer = call("run", "--bind", text)
+@pytest.mark.parametrize(
+    "text", ["127.0.0.1:http", "host:70000", "1.2.3.4:-1", "http://127.0.0.1:5020", "tcp://127.0.0.1", "10.0.0.0/8:502"]
+)
+@pytest.mark.parametrize("command", [("run", "--bind"), ("read", "state", "--gateway")], ids=lambda words: words[0])
+def test_a_wrong_endpoint_is_a_usage_error(text: str, command: tuple[str, ...], call) -> None:
+    answer = call(*command, text)
     assert answer.exit_code == 2
-    assert "is not HOST:PORT" in answer.stderr
+    assert f"{text} is not HOST:PORT" in answer.stderr
 
 
 def test_run_hands_over_everything_and_ends_with_the_guardians_code(call, monkeypatch, tmp_path: Path) -> None:
