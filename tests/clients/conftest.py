@@ -6,7 +6,7 @@ import pytest
 
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.c_program import CProgram
-from tests.clients.programs.controllers import S7, Codesys, Irc5, TwinCat, UniversalRobot
+from tests.clients.programs.controllers import S7, Codesys, Irc5, Plc, TwinCat, UniversalRobot
 from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import MAP, TEXTS
 
@@ -19,6 +19,12 @@ CONTROLLERS: dict[str, Any] = {
     "python": PythonProgram,
     "c": CProgram,
 }
+
+
+@pytest.fixture(autouse=True)
+def scan_finely_throughout_in_the_long_run(budget: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    if budget > 1:
+        monkeypatch.setattr(Plc, "WAIT_CYCLE_S", Plc.CYCLE_S)
 
 
 @pytest.fixture(params=CONTROLLERS)

@@ -44,7 +44,7 @@ def be_lost(client: Any, gateway: GatewayAtHand) -> None:
     """A wire that is cut, until the pause between two attempts is the longest."""
     cycles(client, 2)
     gateway.is_cut = True
-    for _ in range(10):
+    for _ in range(6):
         client.cycle(5.0)
 
 

@@ -132,6 +132,7 @@ def test_a_request_that_fails_in_its_own_call_is_tried_again_no_sooner(
 
     monkeypatch.setattr(MbClient if kind is S7 else TwinCatRequest, "call", fail)
     client = kind(TEXTS["scl" if kind is S7 else "st"], GatewayAtHand(MAP))
+    client.WAIT_CYCLE_S = client.CYCLE_S
     client.cycle(8.0)
     gaps = [later - earlier for earlier, later in pairwise(tries)]
     assert [round(gap, 1) for gap in gaps] == [0.3, 0.5, 1.0, 2.0, 4.0]

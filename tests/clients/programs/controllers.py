@@ -343,6 +343,8 @@ class Plc:
     """What S7 and CODESYS share: a block with inputs and outputs, called in cycles of 10 ms."""
 
     CYCLE_S = 0.01
+    WAIT_CYCLE_S = 0.05
+    """Of a block that is left to itself for a second or longer, in the push gate: its timers decide what it does then."""
     NAMES: ClassVar[dict[str, str]] = {}
 
     def __init__(self, text: str, language: str, gateway: GatewayAtHand, block: str) -> None:
@@ -415,8 +417,12 @@ class Plc:
         raise NotImplementedError
 
     def cycle(self, seconds: float = 0.12) -> None:
+        cycle_s = self.CYCLE_S
+        if seconds >= 1.0:
+            self.CYCLE_S = max(cycle_s, self.WAIT_CYCLE_S)
         for _ in range(round(seconds / self.CYCLE_S)):
             self.scan()
+        self.CYCLE_S = cycle_s
 
     def output(self, name: str) -> Any:
         return self.machine.member(self.block, self.NAMES[name])
