@@ -133,7 +133,7 @@ class CommandTracker:
     def would_beat_since(self, since_s: float, now_s: float, command: Command) -> bool:
         """Return whether the heartbeat has changed since then and within one length of the lease, were this command taken
         now."""
-        return self._lease.would_be_fresh_since(since_s, now_s, command.heartbeat, command.peer)
+        return self._lease.would_be_fresh_since(since_s, now_s, command.heartbeat)
 
     @property
     def who(self) -> str:

@@ -62,6 +62,6 @@ class Lease:
         beaten_s = self._beats[who][1] if who in self._beats else self._changed_s
         return self._length_s is None or beaten_s >= since_s or self._is_beat(heartbeat, who)
 
-    def would_be_fresh_since(self, since_s: float, now_s: float, heartbeat: int, who: str = "") -> bool:
-        """Return what `is_fresh_since` would, were this value observed now."""
-        return self._is_beat(heartbeat, who) or self.is_fresh_since(since_s, now_s)
+    def would_be_fresh_since(self, since_s: float, now_s: float, heartbeat: int) -> bool:
+        """Return what `is_fresh_since` would, were this value observed now: any master's, for a reset presses nothing."""
+        return heartbeat != self._heartbeat or self.is_fresh_since(since_s, now_s)
