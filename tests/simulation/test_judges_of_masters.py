@@ -117,7 +117,7 @@ def test_a_lease_that_frames_with_the_same_heartbeat_renew_is_seen_in_a_schedule
     assert not run_schedule(4, events, 2.0).broken
     monkeypatch.setattr(
         "gateway.control.supervision.lease.Lease.observe",
-        lambda lease, now_s, heartbeat: setattr(lease, "_changed_s", now_s),
+        lambda lease, now_s, *heard: setattr(lease, "_changed_s", now_s),
     )
     assert "I3 heartbeat" in {line.partition(" at ")[0] for line in run_schedule(4, events, 2.0).broken}
 
