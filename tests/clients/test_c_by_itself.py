@@ -1,4 +1,4 @@
-"""What the client of C alone does: words below 0, a close that forgets, a band that ends with the demand; and how long it waits."""
+"""What the client of C alone does: words below 0, a close that forgets, a band that ends with the demand, how long it waits."""
 
 from __future__ import annotations
 
