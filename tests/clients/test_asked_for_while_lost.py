@@ -10,7 +10,7 @@ from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
 from tests.clients.programs.python_program import PythonProgram
-from tests.clients.scenes import MODEL, cycles
+from tests.clients.scenes import MODEL, TEXTS, cycles
 
 
 def reset(client: Any) -> None:
@@ -95,3 +95,13 @@ def test_an_upload_that_is_asked_for_between_two_attempts_is_not_sent_later(
     for _ in range(8):
         client.cycle(1.0)
     assert gateway.requests and not gateway.uploads and not client.uploaded
+
+
+def test_a_robot_that_asks_while_it_is_lost_is_told_so_at_once_and_nothing_goes_out(gateway: GatewayAtHand) -> None:
+    """Also where the very next attempt finds the gateway again."""
+    robot = UniversalRobot(TEXTS["urscript"], gateway)
+    be_lost(robot, gateway)
+    assert robot.machine.start("fg_enable", 12.0) is False and robot.ended
+    gateway.is_cut = False
+    cycles(robot, 8)
+    assert gateway.words == [] and not robot.enabled

@@ -155,3 +155,28 @@ def test_while_a_ladder_is_fitted_no_run_begins_and_the_refusal_names_which(plan
     assert refused.text.startswith(f"{name} refused: the last ladder is being fitted")
     behind = check().of_run(plan, REST)
     assert behind is None or behind.reason is not RefusalReason.FITTING
+
+
+@pytest.mark.parametrize(
+    ("at", "word", "reason"),
+    [
+        (replace(REST, repeats="repeated for 9 s"), TARE, RefusalReason.TARE_REFUSED),
+        (replace(REST, state=State.FAULT), TARE, RefusalReason.TARE_REFUSED),
+        (replace(REST, is_output_known=False), TARE, RefusalReason.TARE_REFUSED),
+        (replace(REST, state=State.READY), ControlBit.RESET_FAULT, RefusalReason.NOTHING_TO_RESET),
+        (replace(REST, state=State.CALIBRATING), TARE, RefusalReason.CALIBRATING),
+        (replace(REST, state=State.CALIBRATING), ENABLE, RefusalReason.CALIBRATING),
+        (replace(REST, state=State.HOLDING, ramps_down=True), TARE, RefusalReason.STOPPING),
+    ],
+)
+def test_an_edge_that_cannot_be_taken_now_is_refused_and_taken_otherwise(
+    at: Situation, word: ControlBit, reason: RefusalReason
+) -> None:
+    refused = refusal(at, word)
+    assert refused is not None and refused.reason is reason
+    assert refusal(REST, word) is None
+
+
+def test_a_reset_in_the_same_write_lets_a_tare_follow_it() -> None:
+    """Each edge is judged in the state that the one before it leaves."""
+    assert refusal(replace(REST, state=State.FAULT), ControlBit.RESET_FAULT | TARE) is None

@@ -100,3 +100,21 @@ def test_a_zero_is_the_mean_of_a_fifth_of_a_second() -> None:
         conditioner.read(1.0, sample(9.0 if k < 20 else 1.0 if k < 35 else 1.4, 1.0 + 0.01 * k), 0.0)
     conditioner.take_zero(0.0)
     assert conditioner.zero_n == pytest.approx(1.1)
+
+
+def test_a_sample_that_is_dated_later_than_its_step_has_no_age_and_a_gap_counts_as_one_time_out() -> None:
+    """What is learned from a sample is learned over its interval: of a gap nobody knows what was in it."""
+    conditioner = SampleConditioner(BOUNDS)
+    conditioner.read(1.0, sample(1.0, 1.0), 0.0)
+    assert conditioner.read(1.01, sample(1.0, 1.012), 0.0).age_s == 0.0
+    behind = conditioner.read(9.0, sample(1.0, 9.0), 0.0)
+    assert behind.is_new and behind.interval_s == BOUNDS.sample_timeout_s
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_while_nobody_knows_what_stands_on_the_output_a_force_is_no_zero(is_known: bool) -> None:
+    conditioner = SampleConditioner(BOUNDS)
+    for k in range(30):
+        conditioner.note_output(is_known=is_known)
+        conditioner.read(0.01 * k, sample(5.0, 0.01 * k), 0.0)
+    assert (conditioner.why_no_zero(0.0) == "") is is_known

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from gateway.devices import DeviceRole, output_device, output_host
-from gateway.devices.messages import Accepted, Garbage, ReadPressure, ReadVoltage, SetVoltage
+from gateway.devices import DeviceRole, cell_host, output_device, output_host
+from gateway.devices.force_reading import ForceReading
+from gateway.devices.messages import Accepted, ForceSample, Garbage, ReadPressure, ReadVoltage, SetVoltage
 from gateway.profiles import list_shipped
+from tests.dialogues.test_overload_dialogue import cell
 from tests.profile_files import load_device
 
 OUTPUTS = [name for name in list_shipped("device") if load_device(name).role is DeviceRole.OUTPUT]
@@ -47,3 +49,17 @@ def test_an_idle_output_that_answers_without_a_number_is_asked_for_both(answer: 
     assert profile.set_voltage
     profile = replace(profile, set_voltage=replace(profile.set_voltage, answer=answer))
     assert output_host(profile).idle_questions == (ReadPressure(), ReadVoltage())
+
+
+@pytest.mark.parametrize(("cut", "is_whole"), [(4, False), (0, True)])
+def test_the_rest_of_an_answer_that_was_given_up_is_no_reading(cut: int, is_whole: bool) -> None:
+    """Of `00184000` a cell that is asked would have read `4000`; where nothing was begun nothing is cut."""
+    profile = cell(read_force=ForceReading(ask="W", frame="{force:d}", unit="N"))
+    host, line = cell_host(profile), b"184000\r\n"
+    host.poll()
+    host.receive(line[:cut], 0.0)
+    host.forget()
+    host.poll()
+    found = host.receive(line[cut:], 0.1)
+    assert [isinstance(one, ForceSample) for one in found] == [is_whole]
+    assert isinstance(host.receive(line, 0.2)[0], ForceSample)

@@ -9,6 +9,8 @@ from pymodbus.pdu import DecodePDU
 from gateway.devices.binary.register_access import RegisterAccess
 from gateway.devices.binary.rtu_framing import RtuSplitter, answers, quiet_s, requests, rtu_frame
 from gateway.devices.framing import Line
+from gateway.modbus.pdu import read_request, write_register_request
+from gateway.modbus.rtu import encode_adu
 
 BODIES = ("0600001388", "0300000001", "0302138 8".replace(" ", ""), "100000000204AABBCCDD", "1000000002", "8603")
 
@@ -95,3 +97,18 @@ def test_a_frame_of_another_unit_is_none_of_ours() -> None:
 def test_a_frame_to_everybody_is_no_answer_of_the_device() -> None:
     (line,) = answers(1).feed(rtu_frame(0, b"03021388"))
     assert not line.is_whole
+
+
+def test_an_adapter_that_repeats_nothing_more_is_known_by_the_next_answer() -> None:
+    """The plug was changed: as its own echo each answer to a setting would be dropped, and a living device be silent."""
+    reading, setting = encode_adu(1, read_request(3, 0, 1)), encode_adu(1, write_register_request(0, 5))
+    answer = encode_adu(1, b"\x03\x02\x00\x07")
+    splitter = answers(1)
+    splitter.asked = reading
+    assert [line.data for line in splitter.feed(reading + answer)] == [answer]
+    splitter.asked = setting
+    assert splitter.feed(setting) == [], "its echo, for it repeats"
+    splitter.asked = reading
+    assert [line.data for line in splitter.feed(answer)] == [answer]
+    splitter.asked = setting
+    assert [line.data for line in splitter.feed(setting)] == [setting]

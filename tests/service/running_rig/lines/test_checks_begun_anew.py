@@ -198,3 +198,12 @@ def test_a_watchdog_that_watches_with_another_time_is_armed_anew(device: str) ->
     assert looks[0] is STATUS and looks[-1] is VERIFY and looks.count(VERIFY) == 1
     assert checks.times_forgotten == 1 and ARM in answer_all(checks)
     assert checks.is_armed and not checks.fault
+
+
+def test_who_waives_a_watchdog_is_told_all_the_same_that_it_has_tripped() -> None:
+    """A tripped device obeys nothing, whether it was wanted or not."""
+    checks = DeviceChecks(output_host(load_device(DEVICE)), is_waived=True)
+    answer_all(checks)
+    assert checks.is_done
+    checks.trip()
+    assert (checks.fault, checks.is_done, checks.is_tripped) == (FaultCode.WATCHDOG_TRIPPED, False, True)
