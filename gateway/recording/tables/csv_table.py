@@ -271,6 +271,8 @@ class _LineReader:
         self._ragged = None
         width = f"{len(self._form.names)}" if self._form.has_header else f"{len(self._form.names)} as in the first row"
         sentence = f"{cells} cells, {'the header' if self._form.has_header else 'expected'} {width}"
+        if self._form.separator == "," and 1 < len(self._form.names) < cells <= 2 * len(self._form.names):
+            sentence += " (decimal commas beside commas? Nobody can tell them apart: write the table with semicolons)"
         if not self._lenient:
             raise RecordingError(f"{self._form.path}:{at}: {sentence}")
         self._findings.append(f"line {at} has {sentence}: left out")
