@@ -295,5 +295,5 @@ def test_parquet_of_others_is_read_by_what_its_columns_are(tmp_path: Path) -> No
     assert recording.notes == ("columns that hold no numbers: who",)
     assert recording.header == {"rig": "cell 4", "force_unit": "N"}
     assert recording.place(1) == f"{path}, row 2"
-    with pytest.raises(RecordingError, match="column force_n holds string, not numbers"):
+    with pytest.raises(RecordingError, match=r"column force_n holds string, not numbers: convert it \(pandas: astype"):
         read_table(path, ColumnMapping.parse("force_n=who"))

@@ -224,6 +224,8 @@ class _LineReader:
                     rows = []
         blocks.append(np.array(rows, dtype=np.float64).reshape(-1, len(self._chosen)))
         self._end_of_file()
+        if self._findings and not lines:
+            raise RecordingError(f"{self._form.path}: no row can be read: {self._findings[0]}")
         table = np.concatenate(blocks)
         columns = {k: table[:, k].copy() for k in range(len(self._chosen)) if not self._is_words(k, len(table))}
         columns |= {k: seconds_from_stamps(columns[k]) for k in self._stamps if k in columns}
