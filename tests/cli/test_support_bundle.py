@@ -162,6 +162,8 @@ def test_who_packs_a_bundle_is_told_what_is_not_in_it(tmp_path: Path, monkeypatc
     done = gateway("report", tmp_path / "b.tar.gz", "--rig", "demo")
     told = {line.split()[0]: line for line in done.stderr.splitlines()}
     assert done.exit_code == 0 and {"live.json", "health.json", "state.txt"} <= told.keys()
+    packed = set(done.stdout.split(" into ")[0].removeprefix("packed ").split(", "))
+    assert {"versions.json", "rig.txt"} <= packed and not packed & told.keys(), "nothing is said to be in it and not"
     assert told["state.txt"].startswith("state.txt not in it: ") and "No such file" in told["state.txt"]
 
 

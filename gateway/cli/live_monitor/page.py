@@ -111,7 +111,8 @@ def _numbers(view: View) -> list[Text]:
 def _minute(view: View, rows: int) -> list[Text]:
     points = buckets(view.track.points, view.track.time_s, view.width - 2)
     top_n = chart_top_n(points)
-    return boxed(f"force, last 60 s, 0 .. {top_n:g} N (line: setpoint)", chart(points, rows, top_n), view.width)
+    unit = "N of pull" if view.track.has_status(StatusBit.PULLING) else "N"
+    return boxed(f"force, last 60 s, 0 .. {top_n:g} {unit} (line: setpoint)", chart(points, rows, top_n), view.width)
 
 
 def _alarms(view: View) -> list[Text]:

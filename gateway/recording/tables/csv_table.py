@@ -224,6 +224,8 @@ class _LineReader:
                     rows = []
         blocks.append(np.array(rows, dtype=np.float64).reshape(-1, len(self._chosen)))
         self._end_of_file()
+        if self._findings and not lines:
+            raise RecordingError(f"{self._form.path}: no row can be read: {self._findings[0]}")
         table = np.concatenate(blocks)
         columns = {k: table[:, k].copy() for k in range(len(self._chosen)) if not self._is_words(k, len(table))}
         columns |= {k: seconds_from_stamps(columns[k]) for k in self._stamps if k in columns}
@@ -271,6 +273,8 @@ class _LineReader:
         self._ragged = None
         width = f"{len(self._form.names)}" if self._form.has_header else f"{len(self._form.names)} as in the first row"
         sentence = f"{cells} cells, {'the header' if self._form.has_header else 'expected'} {width}"
+        if self._form.separator == "," and 1 < len(self._form.names) < cells <= 2 * len(self._form.names):
+            sentence += " (decimal commas beside commas? Nobody can tell them apart: write the table with semicolons)"
         if not self._lenient:
             raise RecordingError(f"{self._form.path}:{at}: {sentence}")
         self._findings.append(f"line {at} has {sentence}: left out")

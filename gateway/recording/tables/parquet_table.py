@@ -89,7 +89,9 @@ def _columns(
         column = _column_at(table, headers, pick.index)
         values = _numbers(column)
         if values is None and pick.is_contract:
-            raise RecordingError(f"{path}: column {pick.name} holds {column.type}, not numbers")
+            raise RecordingError(
+                f"{path}: column {pick.name} holds {column.type}, not numbers: convert it (pandas: astype(float)), or write CSV"
+            )
         if values is None:
             words.append(pick.name)
         else:

@@ -54,9 +54,14 @@ def check_time_axis(recording: Recording) -> TimeAxis:
         at = int(np.flatnonzero(steps < -_SAME_S)[0])
         times = int((steps < -_SAME_S).sum())
         before, after = stamps[rows[at]], stamps[rows[at + 1]]
+        clock = (
+            "a clock that went from summer time to winter time"
+            if abs(steps[at] + 3600.0) < 60.0
+            else "a clock that was set"
+        )
         raise RecordingError(
             f"{recording.place(int(rows[at + 1]))}, column time_s: {after:.12g} after {before:.12g}: time runs backwards "
-            f"({times} time{'s' * (times > 1)} in the file). Two recordings in one file, a clock that was set, or the "
+            f"({times} time{'s' * (times > 1)} in the file). Two recordings in one file, {clock}, or the "
             "wrong column? Split it there, or name the column with --columns time_s=..."
         )
     last_of_stamp = np.append(steps > _SAME_S, True)[: rows.size]

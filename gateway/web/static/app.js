@@ -79,7 +79,10 @@ async function openTab() {
       (await import(`./tabs/${name}.js`)).mount(element, api);
     } catch (error) {
       mounted.delete(name);
-      element.textContent = `This section could not be loaded: ${error.message}`;
+      console.error(error); // a browser's words and our addresses help nobody at a machine
+      const told = document.createElement("p");
+      told.textContent = "This section could not be loaded. It comes by itself once the gateway answers again; else reload the page.";
+      element.replaceChildren(told);
     }
   }
   element.dispatchEvent(new Event("shown"));

@@ -69,6 +69,15 @@ def test_the_header_begins_with_the_state_by_its_name(state: State, register_map
     assert text_of(View(track, "127.0.0.1:5020", 80, 24))[0].split()[0] == state.name
 
 
+@pytest.mark.parametrize(("bits", "scale"), [(0, "0 .. 20 N (line"), (StatusBit.PULLING, "0 .. 20 N of pull (line")])
+def test_the_chart_of_a_pull_says_that_it_is_one(bits: int, scale: str, register_map: RegisterMap) -> None:
+    """Beside -15.00 N measured it stood at 15 N, without a word."""
+    track = Track()
+    force_n = -15.0 if bits else 15.0
+    track.add(0.0, poll_of(register_map, force_requested=15, force_measured=force_n, status_word=bits))
+    assert scale in "\n".join(text_of(View(track, "127.0.0.1:5020", 60, 24)))
+
+
 def test_a_frame_like_the_last_one_writes_nothing_and_a_change_its_line() -> None:
     console = Console(width=20, height=5, file=StringIO(), force_terminal=True, color_system=None)
     screen = Screen(console)

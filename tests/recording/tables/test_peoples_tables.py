@@ -278,3 +278,11 @@ def test_a_decimal_comma_stays_one_beside_a_version_and_behind_whole_numbers(tmp
     np.testing.assert_allclose(read_table(path).columns["force_n"], [1.234, 2.345])
     path.write_text("time_s;force_n\n" + "".join(f"{k};{k}\n" for k in range(300)) + "300;1,5\n")
     assert read_table(path).columns["force_n"][-1] == 1.5
+
+
+def test_a_table_of_which_every_row_is_left_out_is_told_why(tmp_path: Path) -> None:
+    """`fit`, which leaves rows out, said '0 rows: a ladder goes up and down in stairs'."""
+    path = tmp_path / "table.csv"
+    path.write_text("time_s,force_n\n0,5,1,2\n0,6,1,3\n0,7,1,4\n")
+    with pytest.raises(RecordingError, match=r"no row can be read: line 2 has 4 cells, the header 2 .*decimal commas"):
+        read_table(path, lenient=True)

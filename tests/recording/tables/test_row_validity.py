@@ -137,6 +137,12 @@ def test_a_clock_that_leaps_ahead_is_refused_where_it_does(leap_s: float) -> Non
         check_time_axis(timed(*times_s))
 
 
+@pytest.mark.parametrize(("back_s", "clock"), [(3599.99, "went from summer time to winter time"), (7200.0, "was set")])
+def test_a_clock_that_goes_back_by_an_hour_is_asked_for_its_season(back_s: float, clock: str) -> None:
+    with pytest.raises(RecordingError, match=rf"time runs backwards .* a clock that {clock}, or the wrong column"):
+        check_time_axis(timed(*(4000.0 + 0.01 * np.arange(9)), *(4000.09 - back_s + 0.01 * np.arange(9))))
+
+
 def test_a_pause_of_an_hour_is_a_gap() -> None:
     assert check_time_axis(timed(*(0.01 * np.arange(100)), *(3600.0 + 0.01 * np.arange(100)))).after_gap.sum() == 50
 

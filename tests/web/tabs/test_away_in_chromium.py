@@ -58,7 +58,7 @@ def test_what_could_not_be_read_at_first_is_there_when_the_gateway_is_back(page,
 def test_a_tab_that_could_not_be_loaded_is_there_when_the_gateway_is_back(
     page, served: ScriptedControl, chromium
 ) -> None:
-    """It said so until somebody went to another tab and came back."""
+    """It said so until somebody went to another tab and came back, by an address that left a telephone's screen."""
     from playwright.sync_api import expect
 
     window = open_tab(chromium, page.address, "wiring")
@@ -69,7 +69,12 @@ def test_a_tab_that_could_not_be_loaded_is_there_when_the_gateway_is_back(
     expect(state).to_have_text("no answer", timeout=10_000)
     window.route("**/static/tabs/recordings.js", lambda route: route.abort())
     window.get_by_role("link", name="Recordings").click()
-    expect(window.locator("#tab-recordings")).to_contain_text("This section could not be loaded")
+    expect(window.locator("#tab-recordings")).to_contain_text(
+        "could not be loaded. It comes by itself once the gateway"
+    )
+    window.set_viewport_size({"width": 390, "height": 800})
+    assert window.evaluate("document.documentElement.scrollWidth") == 390
+    assert "http" not in window.inner_text("#tab-recordings")
     window.unroute("**/static/tabs/recordings.js")
     served.answer = answer  # type: ignore[method-assign]
     window.get_by_role("button", name="Start recording").wait_for()

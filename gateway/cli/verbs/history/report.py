@@ -34,9 +34,8 @@ def command(*, file: Path, force: bool, show: bool, state: StateChoice) -> None:
         click.echo("\n".join(f"== {name}\n{text}" for name, text in parts.items()))
         return
     pack_bundle(parts, file)
-    size = f"{file.stat().st_size / 1e3:.1f} kB"
-    click.echo(
-        f"packed {', '.join(parts)} into {file}, {size}; `tar -xzOf {shlex.quote(str(file))}` prints what is in it"
-    )
-    for name in parts_missing(parts):
+    size, missing = f"{file.stat().st_size / 1e3:.1f} kB", parts_missing(parts)
+    packed = ", ".join(name for name in parts if name not in missing)
+    click.echo(f"packed {packed} into {file}, {size}; `tar -xzOf {shlex.quote(str(file))}` prints what is in it")
+    for name in missing:
         click.echo(f"{name} {parts[name].splitlines()[0]}", err=True)
