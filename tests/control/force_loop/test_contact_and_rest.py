@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.bsfm.model import Response
 from gateway.control.force_loop.force_loop import ForceLoop
+from gateway.control.force_loop.response_timing import timing_of
 from gateway.control.inputs import LineStatus
 from gateway.control.sample_conditioning import Reading
 from gateway.control.settings import LeadSettings, Trim
@@ -102,3 +104,18 @@ def test_what_the_wire_has_not_taken_yet_is_pushed_for_on(sent_v: float | None, 
         loop.step(wish(20.0, ramp_n_per_s=1e3), inputs(loop.feedforward.reference_n))
     settled_v = pressed(loop_of(replace(settings(), trim=Trim())), 20.0).voltage_v
     assert (loop.voltage_v > 1.5 * settled_v) is is_pushed
+
+
+@pytest.mark.parametrize("wires_s", [(0.0, 0.015), (0.015, 0.04)])
+def test_what_keeps_the_wire_for_longer_is_braked_for_sooner(wires_s: tuple[float, float]) -> None:
+    """A setting that waits behind the push lets it go on: told nothing of it, the loop would push beyond the wish."""
+    measured = timing_of(Response(dead_time_s=0.02, lag_s=0.1, second_lag_s=0.08), settings())
+    pushes = []
+    for wire_s in wires_s:
+        loop, volts = loop_of(measured), list[float]()
+        for _ in range(40):
+            loop.elapse(0.01, LineStatus(wire_s=wire_s))
+            loop.step(wish(20.0, ramp_n_per_s=200.0), inputs(loop.feedforward.reference_n))
+            volts.append(loop.voltage_v)
+        pushes.append(sum(voltage_v > 8.0 for voltage_v in volts))
+    assert pushes[0] > pushes[1] > 0
