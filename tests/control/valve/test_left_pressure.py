@@ -3,6 +3,7 @@ the valve."""
 
 import pytest
 
+from gateway.bsfm.model import Response
 from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse, Controller
 from gateway.registers.words import State
@@ -103,3 +104,17 @@ def test_a_stop_waits_for_no_valve_that_rests_already_or_does_not_come() -> None
     stuck = ValveBench(dwell_s=DWELL_S, timeout_s=0.5).pulling(15.0)
     stuck.obeys = False
     assert seconds_to_stop(stuck) < 3.0 and stuck.stands is PULL
+
+
+@pytest.mark.parametrize("lag_s", [0.05, 0.4])
+def test_the_valve_waits_by_the_response_of_the_calibration_in_use(lag_s: float) -> None:
+    bench = ValveBench(dwell_s=DWELL_S).pulling(15.0)
+    response = Response(dead_time_s=0.0, lag_s=lag_s)
+    bench.controller.use(CalibrationInUse(bsfm(), 2, response))
+    bench.run(2.0)
+    bench.write(control_word=NONE, force_setpoint_n=0.0)
+    disabled_s = bench.now_s
+    bench.run(4.0)
+    waited_s = bench.switched[-1][0] - disabled_s - DWELL_S
+    assert bench.stands is PUSH
+    assert (waited_s > 1.0) is (lag_s > 0.3), f"{waited_s:.2f} s with a lag of {lag_s} s"
