@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gateway
+
 _BLOCKED = ("numba", "llvmlite", "pyarrow")
 _SITE = f"""
 import sys
@@ -30,7 +32,8 @@ print(json.dumps(answers))
 def lean_environment(directory: Path) -> dict[str, str]:
     """Environment of a process for which the extra is not there, by a `sitecustomize` in this directory."""
     (directory / "sitecustomize.py").write_text(_SITE, encoding="utf-8")
-    return os.environ | {"PYTHONPATH": str(directory)}
+    tree = Path(gateway.__file__).parents[1]
+    return os.environ | {"PYTHONPATH": f"{directory}{os.pathsep}{tree}"}
 
 
 def call_lean(directory: Path, *calls: tuple[object, ...]) -> list[tuple[int, str, str]]:

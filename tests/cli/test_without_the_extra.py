@@ -1,5 +1,7 @@
 """Without the extra `analysis` everything that holds a force works, and what needs it says so by a code."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +9,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+import gateway
 from gateway import extras
 from gateway.recording import Recorder, read_recording, read_table
-from tests.cli.lean import call_lean
+from tests.cli.lean import call_lean, lean_environment
 from tests.cli.verbs.calibration.test_fit import ORDERS, ladder_rows, written
 
 NEEDS = "E160 this needs more than is installed: {} is not installed; pip install 'force-gateway[analysis]' brings it"
@@ -63,3 +66,12 @@ def test_a_library_that_is_there_and_breaks_is_told_by_its_error(monkeypatch) ->
     monkeypatch.setattr(extras, "import_module", break_off)
     with pytest.raises(extras.MissingExtraError, match=r"E160 .* numba does not load \(numpy.core failed\)"):
         extras.import_library("numba")
+
+
+def test_what_runs_without_the_extra_is_this_tree(tmp_path: Path) -> None:
+    """And not a gateway that was installed beside it, of another day."""
+    asked = [sys.executable, "-c", "import gateway; print(gateway.__file__)"]
+    found = subprocess.run(
+        asked, env=lean_environment(tmp_path), cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert found.stdout.strip() == gateway.__file__

@@ -50,14 +50,18 @@ class ProgressLine:
         self._began_s = clock()
         self._progress = Progress("")
         self._stage_began = (self._began_s, 0)
+        self._advanced_s = self._began_s
         self._is_over = threading.Event()
         self._writing = threading.Lock()
         self._is_shown = False
 
     def tell(self, progress: Progress) -> None:
         """Take what it is at; from any thread, at any time."""
-        if (progress.stage, progress.of) != (self._progress.stage, self._progress.of):
-            self._stage_began = (self._clock(), progress.done)
+        is_another = (progress.stage, progress.of) != (self._progress.stage, self._progress.of)
+        if is_another or progress.done != self._progress.done:
+            self._advanced_s = self._clock()
+        if is_another:
+            self._stage_began = (self._advanced_s, progress.done)
         self._progress = progress
 
     @contextmanager
@@ -83,12 +87,15 @@ class ProgressLine:
         return next((one for one in sentences if len(one) <= width), f"{sentences[-1][: width - 1]}…")
 
     def _time_left(self, now_s: float) -> str:
-        """Return what the stage still takes at its present speed; nothing before that can be told."""
+        """Return what the stage still takes at its present speed, less what the part that is being done has taken, at most as
+        long as one takes; nothing before that can be told."""
         began_s, done_then = self._stage_began
-        spent_s, done = now_s - began_s, self._progress.done - done_then
-        if done <= 0 or spent_s < _TOLD_S:
+        done = self._progress.done - done_then
+        if done <= 0 or now_s - began_s < _TOLD_S:
             return ""
-        left_s = round(spent_s / done * (self._progress.of - self._progress.done))
+        part_s = (self._advanced_s - began_s) / done
+        left_s = round(part_s * (self._progress.of - self._progress.done) - min(now_s - self._advanced_s, part_s))
+        left_s = max(left_s, 0)
         return f"{left_s // 60}:{left_s % 60:02d} left"
 
     def clear(self) -> None:

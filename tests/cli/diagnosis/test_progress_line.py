@@ -4,6 +4,7 @@ import ctypes
 import io
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -74,6 +75,19 @@ def test_a_pipe_gets_a_line_for_each_stage(at_once: None) -> None:
     assert [words.partition(": ")[2] for words in stream.getvalue().splitlines()] == ["loading", "solving: 1 of 2"]
 
 
+def test_the_time_left_of_what_goes_on_steadily_never_grows() -> None:
+    """`record --for 60s` counted whole seconds: 58 s left became 78 within each of the first."""
+    now_s = [0.0]
+    line, told = ProgressLine("record", Terminal(is_terminal=True), lambda: now_s[0]), list[int]()
+    for tenths in range(600):
+        now_s[0] = 0.1 * tenths
+        if not tenths % 2:
+            line.tell(Progress("0001.fgr, seconds", int(now_s[0]), 60))
+        if found := re.search(r"(\d+):(\d\d) left", line.sentence()):
+            told.append(60 * int(found[1]) + int(found[2]))
+    assert len(told) > 500 and told == sorted(told, reverse=True) and told[0] <= 60
+
+
 def test_the_time_left_is_that_of_the_stage_at_its_present_speed() -> None:
     now_s = [0.0]
     line = ProgressLine("fitting", Terminal(is_terminal=True), lambda: now_s[0])
@@ -84,6 +98,11 @@ def test_the_time_left_is_that_of_the_stage_at_its_present_speed() -> None:
     now_s[0] = 110.0
     line.tell(Progress("solving", 4, 40))
     assert line.sentence() == "fitting, 110 s, 10 %, 1:30 left: solving: 4 of 40"
+    now_s[0] = 112.0
+    assert line.sentence() == "fitting, 112 s, 10 %, 1:28 left: solving: 4 of 40", "nothing is slower yet"
+    now_s[0] = 125.0
+    assert line.sentence() == "fitting, 125 s, 10 %, 1:28 left: solving: 4 of 40", "the next part takes longer"
+    now_s[0] = 110.0
     assert line.sentence(40) == "10 %, 1:30 left: solving: 4 of 40", "on a narrow terminal the stage is not cut"
     assert line.sentence(30) == "10 %: solving: 4 of 40"
 
