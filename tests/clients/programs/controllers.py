@@ -236,7 +236,7 @@ class UniversalRobot:
             "socket_send_byte": values(self.send_byte),
             "socket_read_byte_list": values(self.read),
             "floor": values(math.floor),
-            "str_cat": values(lambda a, b: a + b),
+            "str_cat": values(lambda a, b: f"{a}{b}"),  # of strings and whole numbers alike (script manual)
             "textmsg": values(lambda *words: None),
             "sync": values(lambda: None),
             "sleep": values(lambda seconds: None),
@@ -531,6 +531,7 @@ class S7(Plc):
         **{name: name for name in ("tare", "text", "status", "ended", "uploadBusy")},
         "take": "takeOwnership",
         "uploaded": "uploadDone",
+        "failing": "failingIndex",
     }
 
     def __init__(self, text: str, gateway: GatewayAtHand) -> None:
@@ -570,6 +571,7 @@ class StructuredText(Plc):
         "status": "stStatus",
         "ended": "bEnded",
         "uploaded": "bUploadDone",
+        "failing": "nFailingIndex",
     }
 
     def __init__(self, text: str, gateway: GatewayAtHand) -> None:
