@@ -60,7 +60,7 @@ def main(arguments: list[str]) -> int:
         Path(options["state"]).mkdir(parents=True, exist_ok=True, mode=0o700)
     with EventLog(source="control", file=EventFile(Path(options["state"]))) as log:
         try:
-            rig = kept_rig(options["rig"], simulated=options["simulate"])
+            rig = kept_rig(options["rig"], simulated=options["simulate"], memory=options["kept_rig"])
             if options["rtu"] is not None:
                 rig = with_rtu_face(rig, options["rtu"])
             notes = use_realtime() if options["realtime"] else ()

@@ -205,7 +205,7 @@ def main(arguments: list[str]) -> int:
     with EventLog(source="rig", file=EventFile(state)) as log:
         kept = KeptSettings(state, options.get("run", ""))
         try:
-            rig = kept_rig(options["rig"], simulated=options["simulate"])
+            rig = kept_rig(options["rig"], simulated=options["simulate"], memory=options.get("kept_rig"))
         except ProfileError as error:  # edited since
             log("rig", "E151 the rig file has faults:\n" + "\n".join(map(str, error.faults)))
             return exit_codes.CONFIGURATION

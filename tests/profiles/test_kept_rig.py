@@ -1,11 +1,13 @@
 """A rig that is read again while the gateway runs: as it was, or not at all."""
 
+import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from gateway.profiles import shipped_profiles_folder
-from gateway.profiles.kept_rig import ChangedRigError, unchanged_rig
+from gateway.profiles.kept_rig import ChangedRigError, kept_rig, unchanged_rig
 
 DEMO = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
 
@@ -41,3 +43,36 @@ def test_a_rig_whose_files_have_changed_is_another_one(file: Path, text: str | N
         file.write_text(text, encoding="utf-8")
     with pytest.raises(ChangedRigError, match=f"W247 .* {words}"):
         unchanged_rig(str(file), fingerprint, simulated=True)
+
+
+@pytest.fixture
+def memory() -> Iterator[int]:
+    descriptor = os.memfd_create("kept rig")
+    yield descriptor
+    os.close(descriptor)
+
+
+def test_what_the_first_has_left_in_the_memory_outlives_the_files(file: Path, memory: int) -> None:
+    """Behind the death of the process that had read the rig a restart took the edited file, and the lease was gone."""
+    first = kept_rig(str(file), simulated=True, memory=memory)
+    file.write_text(DEMO.replace("force_max_n: 60", "force_max_n: 50"), encoding="utf-8")
+    assert kept_rig(str(file), simulated=True, memory=memory) == first
+    assert kept_rig(str(file), simulated=True).control.limits.force_max_n == 50.0
+
+
+@pytest.mark.parametrize("left", [b"", bytes(8), bytes(8) + b"the beginning of a rig"])
+def test_what_nobody_came_to_the_end_of_is_read_from_the_files(file: Path, memory: int, left: bytes) -> None:
+    """Whoever is killed while it writes has left no length."""
+    os.pwrite(memory, left, 0)
+    first = kept_rig(str(file), simulated=True, memory=memory)
+    file.unlink()
+    assert kept_rig(str(file), simulated=True, memory=memory) == first
+
+
+def test_a_memory_that_takes_nothing_costs_no_start(file: Path, tmp_path: Path) -> None:
+    (tmp_path / "full").touch()
+    with (tmp_path / "full").open("rb") as full:
+        rig = kept_rig(str(file), simulated=True, memory=full.fileno())
+        assert rig.name == "demo"
+        file.write_text(DEMO.replace("name: demo", "name: other"), encoding="utf-8")
+        assert kept_rig(str(file), simulated=True, memory=full.fileno()).name == "other"

@@ -135,9 +135,9 @@ def reap_orphans(known: set[int]) -> None:
 
 
 def create_shared_memory() -> int | None:
-    """Return memory without a name and without a disk, for the sample ring; None where the kernel has none."""
+    """Return memory without a name and without a disk, for more than one process; None where the kernel has none."""
     try:
-        return os.memfd_create("force-gateway-samples")
+        return os.memfd_create("force-gateway")
     except (OSError, AttributeError):
         return None
 

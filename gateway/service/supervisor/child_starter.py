@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.service.supervisor import fork_server
-from gateway.service.supervisor.child_process import Child, describe_exit, spawn_child
+from gateway.service.supervisor.child_process import Child, create_shared_memory, describe_exit, spawn_child
 from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
 
 _START_TIMEOUT_S: Final = 5.0  # from asking a prepared server: a busy machine is no reason to import everything again
@@ -29,13 +29,15 @@ OPTIONAL: Final = {
 
 
 class ChildStarter:
-    """rig, simulate: what the fork server reads once in advance. Times are monotonic seconds."""
+    """rig, simulate: what the fork server reads once in advance; the first child leaves the rig in memory of ours, too, for
+    those that come when that process is gone. Times are monotonic seconds."""
 
     def __init__(self, rig: str, *, simulate: bool, state: Path, say: Callable[[str], None]) -> None:
         self._options = {"rig": rig, "simulate": simulate}
         self._state = state
         self._say = say
         self._run = f"{os.getpid()}-{time.time_ns()}"  # what is set on the simulated rig holds for this long
+        self._kept_rig: int | None = None
         self._server: Child | None = None
         self._is_proven = False
         self._is_doubted = False  # the last child came to nothing: the next one is started the long way
@@ -119,12 +121,18 @@ class ChildStarter:
             self.open()
 
     def end(self) -> None:
-        """End the fork server."""
+        """End the fork server, and forget the rig."""
         if self._server:
             self._server.end()
             self._server = None
+        if self._kept_rig is not None:
+            os.close(self._kept_rig)
+            self._kept_rig = None
 
     def _child(self, module: str, arguments: dict[str, Any]) -> Child:
+        if self._kept_rig is None:
+            self._kept_rig = create_shared_memory()
+        arguments = {**arguments, "kept_rig": self._kept_rig}
         shared = [arguments[name] for name in fork_server.SHARED if arguments.get(name) is not None]
         if self._server and not self._is_doubted:
             try:

@@ -34,7 +34,7 @@ from gateway.processes.scheduling import priority
 
 CONTROL: Final = "gateway.service.control_process"
 RIG: Final = "gateway.service.simulated_rig"
-SHARED: Final = ("ring", "beat")
+SHARED: Final = ("ring", "beat", "kept_rig")
 """Arguments that are descriptors, in the order in which they are handed over."""
 _SUBREAPER: Final = 36
 _PARENT_POLL_S: Final = (

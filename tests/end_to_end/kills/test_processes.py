@@ -5,6 +5,7 @@ import signal
 import time
 
 import psutil
+import pytest
 
 from gateway.processes.event_file import EventReader
 from gateway.profiles import shipped_profiles_folder
@@ -89,14 +90,19 @@ def test_a_dead_guardian_takes_control_and_rig_with_it(running):
     assert said == ["A412"], "no plug of the simulated rig, whose ports went with it"
 
 
-def test_a_rig_file_that_is_edited_meanwhile_is_for_the_next_start(tmp_path):
+@pytest.mark.parametrize("is_prepared", [True, False])
+def test_a_rig_file_that_is_edited_meanwhile_is_for_the_next_start(tmp_path, is_prepared):
     """Half done, as editors leave files, when control dies, and then the simulated rig: all goes on as it was started, and
-    control says so."""
+    control says so; also where the process that both are forked from was gone already, the first that a machine without
+    memory takes."""
     rig = tmp_path / "cell.yaml"
     rig.write_text((shipped_profiles_folder() / "rigs" / "demo.yaml").read_text().replace("name: demo", "name: cell"))
     gateway = start(tmp_path / "state", rig=str(rig))
     try:
         rig.write_text("name: cell\nlimits: {force_max_n: 6")
+        if not is_prepared:
+            os.kill(gateway.ready["pids"]["fork_server"], signal.SIGKILL)
+            gateway.said("A407")
         os.kill(gateway.ready["pids"]["control"], signal.SIGKILL)
         assert reconnect(gateway)["state"] == OFF
         assert "go" in gateway.said("W247 the files of rig cell have faults now")

@@ -44,7 +44,7 @@ def test_the_state_directory_is_for_its_owner_alone(tmp_path: Path, monkeypatch:
 def test_a_control_process_that_is_started_again_makes_it_anew(tmp_path: Path) -> None:
     """Whoever cleans up a disk takes it from a gateway that runs: its control socket could not be made behind a restart."""
     state, (ours, its) = tmp_path / "force-gateway" / "demo", socket.socketpair()
-    options = {"rig": "no-such-rig", "simulate": True, "state": str(state), "rtu": None}
+    options = {"rig": "no-such-rig", "simulate": True, "state": str(state), "rtu": None, "kept_rig": None}
     words = (sys.executable, "-m", "gateway.service.control_process", str(its.fileno()), json.dumps(options))
     with ours, its:
         ended = subprocess.run(words, pass_fds=[its.fileno()], capture_output=True, text=True, timeout=60, check=False)

@@ -37,11 +37,12 @@ def spawned(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[tuple[str, FakeChi
 
 
 @pytest.fixture
-def kept(spawned: list[tuple[str, FakeChild]]) -> tuple[ChildStarter, list[str]]:
+def kept(spawned: list[tuple[str, FakeChild]]) -> Iterator[tuple[ChildStarter, list[str]]]:
     said: list[str] = []
     one = ChildStarter("demo", simulate=True, state=Path("state"), say=said.append)
     one.open()
-    return one, said
+    yield one, said
+    one.end()
 
 
 def modules(spawned: list[tuple[str, FakeChild]]) -> list[str]:
@@ -52,8 +53,9 @@ def test_control_is_asked_of_the_prepared_process(kept, spawned):
     one, _ = kept
     child = one.control(ARGUMENTS)
     (asked,) = spawned[0][1].hears()
-    assert (asked.tag, asked.body) == (message_link.FORK, {"module": fork_server.CONTROL, "arguments": ARGUMENTS})
-    assert len(asked.descriptors) == 1, "the child's end of its line"
+    assert (asked.tag, asked.body["module"]) == (message_link.FORK, fork_server.CONTROL)
+    assert asked.body["arguments"].items() >= ARGUMENTS.items()
+    assert len(asked.descriptors) == 2, "the child's end of its line, and where the rig is kept"
     asked.drop_descriptors()
     assert message_link.receive(child.link) is None, "a server that drops it ends the line: nobody waits"
     child.close()
@@ -143,9 +145,28 @@ def test_control_is_forked_with_the_memories_that_it_shares(kept, spawned, tmp_p
         (asked,) = spawned[0][1].hears()
         assert [
             os.path.samestat(os.fstat(given), os.fstat(ours.fileno()))
-            for given, ours in zip(asked.descriptors[1:], (ring, beat), strict=True)
+            for given, ours in zip(asked.descriptors[1:3], (ring, beat), strict=True)
         ] == [True, True]
         asked.drop_descriptors()
+
+
+def test_every_child_that_needs_the_rig_is_given_the_same_memory_of_it(kept, spawned, monkeypatch):
+    """Also where the process that has read the rig is gone: it would read other files."""
+    one, _ = kept
+    passed: list[tuple[dict[str, int], tuple[int, ...]]] = []
+    one.control(ARGUMENTS).close()
+    one.rig(prepared=True).close()
+    first, second = spawned[0][1].hears()
+    files = {os.fstat(asked.descriptors[-1]).st_ino for asked in (first, second)}
+    for asked in (first, second):
+        asked.drop_descriptors()
+    monkeypatch.setattr(child_starter, "spawn_child", lambda _, given, *shared: passed.append((given, shared)))
+    spawned[0][1].dies(-9)
+    one.poll_child(set(one.sources), 0.0)
+    one.control(ARGUMENTS)
+    ((arguments, shared),) = passed
+    assert shared == (arguments["kept_rig"],)
+    assert {os.fstat(arguments["kept_rig"]).st_ino} == files
 
 
 def test_the_rig_is_forked_as_it_was_read_or_read_anew_and_stays_the_same_run(kept, spawned, monkeypatch):
@@ -158,7 +179,7 @@ def test_the_rig_is_forked_as_it_was_read_or_read_anew_and_stays_the_same_run(ke
     (asked,) = spawned[0][1].hears()
     asked.drop_descriptors()
     one.rig(prepared=False)
-    assert told == [asked.body["arguments"]]
+    assert told == [{name: value for name, value in asked.body["arguments"].items() if name != "kept_rig"}]
     assert (told[0]["rig"], told[0]["simulate"], told[0]["state"]) == ("demo", True, "state")
 
 

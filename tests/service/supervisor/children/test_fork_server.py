@@ -108,7 +108,7 @@ def sockets() -> int:
 def _child_that_tells(words: list[str]) -> int:
     """Plays a child's module: what it is, and what it was given, as its second word; its exit code is 7."""
     given = json.loads(words[1])
-    files = {name: os.fstat(given[name]).st_ino for name in fork_server.SHARED}
+    files = {name: os.fstat(given[name]).st_ino for name in fork_server.SHARED if name in given}
     line = socket.socket(fileno=int(words[0]))
     numbers = len([*Path("/proc/self/fd").iterdir()])
     facts = {"session": os.getsid(0), "parent": os.getppid(), "files": files, "open": numbers, "sockets": sockets()}
