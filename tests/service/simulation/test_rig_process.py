@@ -45,7 +45,7 @@ def test_what_is_set_is_kept_for_this_run_of_the_gateway(arguments: list[str], m
 def test_a_rig_file_that_was_edited_since_is_no_internal_error(
     arguments: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(_name: str, *, simulated: bool) -> None:
+    def refuse(_name: str, *, simulated: bool, memory: int | None) -> None:
         os.close(int(arguments[0]))
         raise ProfileError(())
 
