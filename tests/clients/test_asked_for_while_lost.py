@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
@@ -105,3 +106,20 @@ def test_a_robot_that_asks_while_it_is_lost_is_told_so_at_once_and_nothing_goes_
     gateway.is_cut = False
     cycles(robot, 8)
     assert gateway.words == [] and not robot.enabled
+
+
+def test_what_has_ended_is_told_until_the_next_enable(client: Any, gateway: GatewayAtHand) -> None:
+    """C and Python forgot it with a disable, as a program's own way out of it."""
+    client.enable(12.0)
+    cycles(client)
+    gateway.fail(FaultCode.OVER_FORCE)
+    cycles(client)
+    client.disable()
+    cycles(client)
+    assert client.ended
+    client.reset()
+    cycles(client)
+    assert client.ended
+    client.enable(12.0)
+    cycles(client, 8)
+    assert client.enabled and not client.ended

@@ -111,7 +111,7 @@ typedef struct fg_client {
     uint8_t ended, exception;   /* exception: of the last refused request, 0 none */
     fg_status status;
     uint16_t words[FG_STATUS_WORDS];
-    char message[160];          /* the last refusal or loss in words */
+    char message[160];          /* the last refusal, FG_RANGE or loss in words */
 } fg_client;
 
 #ifdef __cplusplus
@@ -590,14 +590,20 @@ static void fg_leave_band(fg_client *client) {
 
 int fg_set(fg_client *client, int offset, float value, float counts_per_unit) {
     float counts = value * counts_per_unit;
-    if (offset < 0 || offset >= FG_COMMAND_WORDS || !(counts >= -32767.5f && counts < 32767.5f)) return FG_RANGE;
+    if (offset < 0 || offset >= FG_COMMAND_WORDS || !(counts >= -32767.5f && counts < 32767.5f)) {
+        snprintf(client->message, sizeof client->message, "%g does not fit into word %d of the command block", (double)value, offset);
+        return FG_RANGE;
+    }
     client->want[offset] = (uint16_t)(int16_t)(counts < 0 ? counts - 0.5f : counts + 0.5f);
     fg_leave_band(client);
     return FG_OK;
 }
 
 int fg_force(fg_client *client, float force_n) {
-    if (!(force_n >= ${force_min}f && force_n <= ${force_max}f)) return FG_RANGE;
+    if (!(force_n >= ${force_min}f && force_n <= ${force_max}f)) {
+        snprintf(client->message, sizeof client->message, "force %g N is out of range, ${force_min} .. ${force_max} N", (double)force_n);
+        return FG_RANGE;
+    }
     return fg_set(client, FG_FORCE_SETPOINT, force_n, ${force_counts}.0f);
 }
 
@@ -620,7 +626,6 @@ void fg_pull(fg_client *client, int pulls) {
 void fg_disable(fg_client *client) {
     client->want[FG_CONTROL_WORD] = 0;
     client->want[FG_FORCE_SETPOINT] = 0;
-    client->ended = 0;
     fg_leave_band(client);
 }
 
