@@ -277,8 +277,8 @@ class RefusalReason(IntEnum):
         Explanation(
             "W302",
             "fault reset, or enable behind a lost master, without a new heartbeat",
-            "The reset bit was written where the rig has a lease, and the heartbeat is the one of the fault; or an enable, "
-            "and it is the one that the last master was lost with.",
+            "On a rig with a lease: the heartbeat beside the reset is the one of the fault, or beside the enable the one of "
+            "the loss.",
             "The master writes the bit without its heartbeat, or its program stands still and its last frame is repeated.",
             "Write the bit and another heartbeat value in one request; with a reset force_setpoint 0, too.",
         ),
