@@ -163,8 +163,9 @@ class EdgeCheck:
     def _forbids_tare(self, command: Command, state: State, at: Situation) -> str:
         if state is State.FAULT:
             return "a fault is latched: fix its cause, then reset"
-        if at.state in ENABLED_STATES and not at.is_lowest:
-            return f"{at.voltage_v:.2f} V are out: disable the output or set the force to 0 first"
+        if at.state in ENABLED_STATES and (at.applied_n > 0.0 or not at.is_lowest):
+            applied = f"{at.applied_n:.1f} N are applied, " if at.applied_n > 0.0 else ""
+            return f"{applied}{at.voltage_v:.2f} V are out: disable the output or set the force to 0 first"
         if not at.is_output_known:
             return f"{at.line_fault or 'the output does not answer'}: {_UNKNOWN}"
         if not at.reading.is_fresh:

@@ -227,6 +227,19 @@ def test_a_rig_whose_regulator_rests_above_0_v_is_tared_at_force_0_and_nothing_l
     assert bench.refused and "disable the output or set the force to 0 first" in bench.refused.text
 
 
+def test_a_force_that_the_least_voltage_holds_by_friction_is_no_zero():
+    """1 V presses 7 N, and 9 N on the way down take no more: a tare then took those 9 N for zero, and the state was READY."""
+    rig = settings()
+    bench = enabled(replace(rig, limits=replace(rig.limits, voltage_min_v=1.0, safe_voltage_v=1.0)))
+    bench.force(0.1)
+    bench.run(1.0)
+    assert (bench.last.voltage_v, bench.last.force_applied_n) == (1.0, 0.1)
+    bench.write(control_word=ControlBit.ENABLE | ControlBit.TARE)
+    assert bench.refused and bench.refused.text == (
+        "tare refused: 0.1 N are applied, 1.00 V are out: disable the output or set the force to 0 first"
+    )
+
+
 def test_what_a_tare_under_force_makes_of_a_force_that_leaves_is_no_wrong_sign():
     """The wires, a tilt or something that pulls were blamed: what pressed at the safe voltage was taken for the zero."""
     rig = settings()

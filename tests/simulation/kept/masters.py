@@ -45,4 +45,12 @@ KEPT: list[tuple[int, list[Event]]] = [
         ],
     ),
     (24577, [Event(12.9101, "rival", "take", (20.64,)), Event(14.2472, "rival", "hang")]),
+    (
+        36779,
+        [
+            Event(0.1, "worker", "hold_on", (27.04,)),
+            Event(1.7338, "worker", "hold_on", (9.22,)),
+            Event(7.9475, "worker", "tare"),
+        ],
+    ),
 ]
