@@ -5,9 +5,12 @@ letter, and to answer one's own echo would never end. Decisions:
 
 - Such a frame is an echo where no master can have been as fast: before the answer, the silence and a request of the same
   length can have passed the wire.
-- Once an answer of the other kind has come back, or has not, the line is known.
+- Once an answer of the other kind has come back, or has not, the line is known. What is heard before a master can have listened
+  to an answer tells nothing of its echo.
 - Until then, a slow adapter could bring the echo later. Equal writes at once after each answer are a master's at first; behind
   a row of them one is left out, which ends what an echo had begun and costs a master one request. The row grows each time.
+- On a line that has an echo, or may have one, what is asked before it comes back was asked by a master that had given up. It is
+  executed and not answered, and the echo behind it is one: an enable that came back behind a stop would undo that.
 """
 
 from typing import Final
@@ -21,7 +24,7 @@ class RtuEcho:
     """The answer that may come back, and whether this line gives answers back. may_echo: false where it cannot."""
 
     __slots__ = (
-        "_character_s", "_has_echo", "_is_like_request", "_master_s", "_may_echo", "_most_repeats", "_repeats", "_silence_s",
+        "_character_s", "_has_echo", "_is_like_request", "_may_echo", "_most_repeats", "_repeats", "_sent_s", "_silence_s",
         "_until_s", "frame",
     )  # fmt: skip
 
@@ -30,7 +33,7 @@ class RtuEcho:
         self._may_echo = may_echo
         self._has_echo: bool | None = None if may_echo else False  # None: not known yet
         self._is_like_request = False
-        self._master_s = self._until_s = 0.0  # the earliest a master's next request can have come; the latest an echo
+        self._sent_s = self._until_s = 0.0  # the answer; the latest that its echo comes
         self._repeats, self._most_repeats = 0, _QUICK_REPEATS
         self.frame = b""
 
@@ -38,8 +41,7 @@ class RtuEcho:
         """Expect this answer back, where the line may have an echo. is_like_request: it is its request once more."""
         self._is_like_request = is_like_request
         self.frame = answer if not is_like_request or self._has_echo is not False else b""
-        wire_s = len(answer) * self._character_s
-        self._master_s, self._until_s = now_s + 2.0 * wire_s + self._silence_s, now_s + wire_s + _ECHO_LATENCY_S
+        self._sent_s, self._until_s = now_s, now_s + len(answer) * self._character_s + _ECHO_LATENCY_S
 
     def is_this(self, frame: bytes, heard_s: float) -> bool:
         """Decide whether a frame is our last answer come back."""
@@ -52,9 +54,13 @@ class RtuEcho:
         self.frame = b""
         return True
 
+    def _heard_out_s(self, size: int) -> float:
+        """The earliest that a request of so many bytes can be there, of a master that has listened to the answer."""
+        return self._sent_s + (len(self.frame) + size) * self._character_s
+
     def _is_doubtful(self, heard_s: float) -> bool:
         """Decide whether a write that is equal to our answer is rather taken for it."""
-        if heard_s < self._master_s:
+        if heard_s < self._heard_out_s(len(self.frame)) + self._silence_s:
             return True
         self._repeats = self._repeats + 1 if heard_s <= self._until_s else 0
         if self._repeats <= self._most_repeats:
@@ -62,8 +68,18 @@ class RtuEcho:
         self._repeats, self._most_repeats = 0, self._most_repeats * _DOUBT_GROWTH
         return True
 
-    def note_master(self) -> None:
-        """Note that a master speaks: an answer that has not come back by now does not."""
+    def is_coming(self, size: int, heard_s: float) -> bool:
+        """Decide whether our last answer may still come back behind a request of so many bytes."""
+        if not self.frame or self._has_echo is False:
+            return False
+        if self._has_echo:
+            return heard_s <= self._until_s
+        return not self._is_like_request and heard_s < self._heard_out_s(size)
+
+    def note_master(self, size: int, heard_s: float) -> None:
+        """Note that a master speaks, in so many bytes: an answer that had to come back by now, and has not, does not."""
+        if self.is_coming(size, heard_s):
+            return
         if self.frame and not self._is_like_request:
             self._has_echo = False
         self.frame = b""

@@ -14,8 +14,9 @@ come as one piece. So silence only says when to look; what is a frame, its lengt
   nothing longer can still come; else only where nothing but whole frames follow up to the next silence, and where it cannot lie
   inside of what the noise may have begun: by its first three bytes a frame of another unit that was heard on this line. One or
   two bytes begin none: a line without bias puts them before each frame. In doubt nothing is done, for a master asks again.
-- Only the last frame is answered: behind an older request its master, or another slave, has spoken since. It is executed all
-  the same, as on TCP.
+- Another's answer that breaks off just behind a whole request to us, with an adapter's pause before that, cannot be told
+  from a request behind a silence. It is executed: were it not, a neighbour that always breaks off would hide them all.
+- Only the last frame is answered: behind an older request, executed as on TCP, its master or another slave has spoken since.
 - An adapter may hear itself: rtu_echo.
 
 Source: "MODBUS over Serial Line Specification and Implementation Guide V1.02", sections 2.2, 2.4 and 2.5.1.
@@ -199,9 +200,9 @@ class RtuReceiver:
             frame = bytes(self._burst[at : at + size])
             if not self._is_ours(at) or self._echo.is_this(frame, self._last_s):
                 continue
-            is_last = at == found[-1][0]
+            is_last = at == found[-1][0] and not self._echo.is_coming(size, self._last_s)
             requests.append(RtuRequest(frame[0], frame[1:-2], is_last and frame[0] == self._unit))
-            self._echo.note_master()
+            self._echo.note_master(size, self._last_s)
         return requests
 
     def _scan(self, *, is_final: bool) -> tuple[list[tuple[int, int]], int, int]:

@@ -1,8 +1,11 @@
 """Answers that come back from an adapter that hears itself: nothing is executed twice, and no master's write is lost."""
 
+import pytest
+
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus import rtu_receiver
 from gateway.modbus.rtu import encode_adu
+from gateway.modbus.rtu_receiver import RtuRequest
 from tests.modbus.rtu_bus import CHARACTER_S, SILENCE_S, Bus
 
 READ, READ_ANSWER = P.read_request(3, 100, 12), b"\x03\x18" + bytes(24)
@@ -50,6 +53,7 @@ def test_equal_writes_of_a_master_are_all_executed() -> None:
     """As fast as the wire allows, once a read has shown that there is no echo; and slowly always."""
     bus = Bus()
     exchange(bus, READ)
+    bus.pause((len(READ_ANSWER) - len(WRITE)) * CHARACTER_S)  # its answer takes so much longer
     assert [exchange(bus.pause(AT_ONCE), WRITE) for _ in range(500)] == [1] * 500
     bus = Bus()
     assert [exchange(bus.pause(0.03), WRITE) for _ in range(100)] == [1] * 100
@@ -110,3 +114,50 @@ def test_a_pause_ends_a_row_of_equal_writes() -> None:
     bus = Bus()
     for _ in range(20):
         assert [exchange(bus.pause(pause_s), WRITE) for pause_s in (0.1, AT_ONCE, AT_ONCE, AT_ONCE)] == [1] * 4
+
+
+@pytest.mark.parametrize("parted", [False, True])
+@pytest.mark.parametrize("last", [P.write_register_request(0, 0), READ])
+def test_an_echo_that_comes_behind_the_next_request_is_one_all_the_same(last: bytes, parted: bool) -> None:
+    """A master that gave up early asks again while our answer waits to be sent: what it writes then, a stop, was undone by
+    the echo of the write before it. It does not listen, so that it is not answered: its answer would come back as well."""
+    bus = Bus()
+    exchange(bus, READ, echo_s=ANSWER_S + 1e-3)
+    ((_, heard),) = bus.pause(0.1).send(encode_adu(1, WRITE)).pause(1.05 * SILENCE_S).heard
+    bus.heard.clear()
+    bus.receiver.note_sent(heard, encode_adu(1, WRITE), bus.now_s)
+    pieces = (encode_adu(1, last), encode_adu(1, WRITE))
+    bus.send(*(pieces if parted else [b"".join(pieces)]), pause_s=0.01)
+    assert bus.requests() == [RtuRequest(1, last, False)]
+    assert exchange(bus, WRITE, echo_s=ANSWER_S + 1e-3) == 1
+    assert exchange(bus.pause(0.1), READ, echo_s=ANSWER_S + 0.016) == 1
+
+
+def test_an_echo_that_is_awaited_no_more_leaves_no_request_without_an_answer() -> None:
+    bus = Bus()
+    exchange(bus, READ, echo_s=ANSWER_S + 1e-3)
+    exchange(bus.pause(0.1), READ)
+    assert bus.pause(0.1).send(encode_adu(1, READ)).requests() == [RtuRequest(1, READ, True)]
+
+
+def test_a_master_that_speaks_before_the_first_answer_has_come_tells_nothing_of_its_echo() -> None:
+    """The line was taken for one without an echo: each write was then answered, heard again and answered without an end."""
+    bus, late_s = Bus(baud=115200), 8 * 11 / 115200 + 0.016
+    ((_, heard),) = bus.send(encode_adu(1, READ)).pause(0.002).heard
+    bus.heard.clear()
+    bus.receiver.note_sent(heard, encode_adu(1, READ_ANSWER), bus.now_s)
+    assert bus.send(encode_adu(1, WRITE) + encode_adu(1, READ_ANSWER)).requests() == [RtuRequest(1, WRITE, False)]
+    assert [exchange(bus.pause(0.1), WRITE, echo_s=late_s) for _ in range(5)] == [1] * 5
+
+
+def test_a_master_that_leaves_no_silence_is_answered_each_time() -> None:
+    """Whatever it writes, and whether or not a read has shown yet that there is no echo."""
+    for first in ((), (READ,)):
+        bus = Bus()
+        for pdu in (*first, *(P.write_register_request(4, beat) for beat in range(100))):
+            ((_, heard),) = bus.send(encode_adu(1, pdu)).pause(1.05 * SILENCE_S).heard
+            bus.heard.clear()
+            assert heard == RtuRequest(1, pdu, True)
+            answer = encode_adu(1, ANSWERS.get(pdu, pdu))
+            bus.receiver.note_sent(heard, answer, bus.now_s)
+            bus.pause((len(answer) + 8) * CHARACTER_S)
