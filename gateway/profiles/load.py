@@ -101,7 +101,17 @@ def _other_kind(data: bytes) -> str:
     if not data.strip():
         return "an empty file"
     found = describe_signature(data[:SIGNATURE_BYTES])
-    return found[0] if found and found[0] != JSON else ""
+    if found:
+        return found[0] if found[0] != JSON else ""
+    return "a table of values (CSV)" if _is_table(data) else ""
+
+
+def _is_table(data: bytes) -> bool:
+    """Are its first two lines, beside comments, cells of a table? A profile has keys with their colon there."""
+    lines = (line for line in data.splitlines() if line.strip() and not line.startswith(b"#"))
+    head, row = next(lines, b""), next(lines, b"")
+    has_keys = b":" in head or b": " in row
+    return not has_keys and any(head.count(cell) == row.count(cell) > 0 for cell in (b",", b";", b"\t"))
 
 
 def read_named(kind: str, reference: ProfileReference | None, read: Read[T], findings: Findings) -> T | None:

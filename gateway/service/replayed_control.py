@@ -21,7 +21,7 @@ from gateway.progress import report
 from gateway.recording import Recording, RecordingError
 from gateway.recording.calibrations_used import numbers_by_row
 from gateway.recording.tables.row_validity import pulled_rows
-from gateway.recording.tables.time_axis import check_time_axis
+from gateway.recording.tables.time_axis import check_time_axis, gaps_of
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
 
@@ -84,6 +84,16 @@ def replay_control(recording: Recording, setup: ReplaySetup) -> Columns:
         rows.append(_row_of(output))
     table = np.array(rows)
     return {name: table[:, at] for at, name in enumerate((*SIGNALS, *WORDS))}
+
+
+def tell_missing_rows(recording: Recording) -> str:
+    """Return where rows are missing and what is decided there, as a sentence; empty where none are."""
+    _rows, told = gaps_of(recording.columns["time_s"])
+    until_s = f"for at most {_LONGEST_GAP_S:.0f} s"
+    return (
+        told
+        and f"{told}: control is replayed there with the reading before, {until_s}, and what it decides differs by that"
+    )
 
 
 def _check(recording: Recording) -> None:

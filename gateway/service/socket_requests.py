@@ -81,7 +81,7 @@ class CalibrateRequest:
     __pydantic_config__ = _STRICT
     plan: dict[str, Any] | None = None
     continues: Annotated[tuple[Number, ...], MaxLen(1000)] = ()
-    name: Annotated[str, MaxLen(200), Text] = ""
+    name: Annotated[str, MaxLen(LONGEST_NAME), Text] = ""
     dry_run: bool = False
     stop: bool = False
 

@@ -160,7 +160,9 @@ def _why_it_says_little(recording: Recording) -> str:
     import numpy as np
 
     columns = recording.columns
-    time_s, command_v = (columns.get(name, np.zeros(0)) for name in ("time_s", "command_v"))
+    if missing := [name for name in ("time_s", "command_v") if name not in columns]:
+        return f"it has no {' and no '.join(missing)}"
+    time_s, command_v = columns["time_s"], columns["command_v"]
     if command_v.size < 2 or time_s[-1] - time_s[0] < _LEAST_S:
         return f"it is shorter than {_LEAST_S:.0f} s"
     if np.any(columns.get("fault_code", np.zeros(1)) != 0.0):

@@ -153,7 +153,7 @@ def test_a_command_stands_until_the_next_one() -> None:
 def test_rows_after_a_gap_wait_until_it_is_forgotten() -> None:
     found = measured(time_s=TIME_S + np.where(TIME_S >= 2.0, 0.2, 0.0))
     assert np.flatnonzero(~found.usable).tolist() == list(range(400, 500))
-    assert noted(found, "1 gaps in time (the longest 0.205 s, at 1.995 s the first): 100 rows")
+    assert noted(found, "1 gap in time (the longest 0.205 s, at 1.995 s the first): 100 rows")
 
 
 def test_uneven_sampling_is_no_gap() -> None:

@@ -14,7 +14,7 @@ from gateway.cli.main import command
 from gateway.numbered_documents.selection import Selection, SelectionState, write_selection
 from gateway.processes import exit_codes
 from gateway.processes.durable_file import lock_directory, make_directory
-from gateway.recording import Recorder
+from gateway.recording import Recorder, read_header
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.watch import reference_recording
 from gateway.watch.reference_recording import (
@@ -85,6 +85,30 @@ def test_what_does_not_show_the_machine_is_no_reference(tmp_path, facts, why):
     refused = reference(tmp_path, 1)
     assert refused.exit_code == exit_codes.DATA and "E523" in refused.output
     assert read_reference_recording(tmp_path) is None
+
+
+def test_a_reference_that_may_be_another_machines_is_taken_and_told(tmp_path):
+    """The watch compares this machine with it from then on; a table of anybody's was taken without a word."""
+    own = record(tmp_path)
+    assert reference(tmp_path, 1).stderr == ""
+    rows = [f"{at / 20:.2f},{2.0 + np.sin(at / 20):.3f},17.0" for at in range(800)]
+    foreign = tmp_path / "foreign.csv"
+    foreign.write_text("\n".join(["time_s,command_v,force_n", *rows]))
+    told = reference(tmp_path, foreign)
+    assert told.exit_code == 0 and "reference: foreign.csv, chosen" in told.stdout
+    assert "foreign.csv does not say which rig it is of" in told.stderr and "reference --none" in told.stderr
+    foreign.write_text("\n".join(["# rig: irc5-cell", "time_s,command_v,force_n", *rows]))
+    assert "foreign.csv is of rig irc5-cell, and this is demo" in reference(tmp_path, foreign).stderr
+    assert read_header(own)["rig"] == "demo"
+
+
+def test_a_table_without_the_command_is_told_so_and_not_that_it_is_short(tmp_path):
+    table = tmp_path / "force.csv"
+    table.write_text(
+        "\n".join(["time_s,pressure_kpa,force_n", *(f"{at / 20:.2f},{at % 300},17.0" for at in range(800))])
+    )
+    refused = reference(tmp_path, table)
+    assert refused.exit_code == exit_codes.DATA and "has no command_v" in refused.output
 
 
 def test_against_a_reference_that_is_not_there_says_how_to_make_one(tmp_path):

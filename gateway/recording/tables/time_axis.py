@@ -109,25 +109,30 @@ def _refuse_leap(recording: Recording, rows: NDArray[np.int64], time_s: Floats) 
         )
 
 
-def _flag_after_gaps(time_s: Floats) -> tuple[Flags, list[str]]:
-    flags = np.zeros(time_s.size, dtype=bool)
+def gaps_of(time_s: Floats) -> tuple[NDArray[np.int64], str]:
+    """Return the rows before which there is a gap, and how many there are, how long and where, in words; empty without one."""
     steps = np.diff(time_s)
     if not steps.size:
-        return flags, []
-    median_s = float(np.median(steps))
-    ends = np.flatnonzero((steps > GAP_STEPS * median_s) & (steps > GAP_S)) + 1
+        return np.zeros(0, dtype=np.int64), ""
+    ends = np.flatnonzero((steps > GAP_STEPS * float(np.median(steps))) & (steps > GAP_S)) + 1
+    if not ends.size:
+        return ends, ""
+    longest_s, first_s = float(steps[ends - 1].max()), float(time_s[ends[0] - 1] - time_s[0])
+    count = f"{ends.size} gap{'s' * (ends.size > 1)}"
+    return ends, f"{count} in time (the longest {longest_s:.3g} s, at {first_s:.3f} s the first)"
+
+
+def _flag_after_gaps(time_s: Floats) -> tuple[Flags, list[str]]:
+    if time_s.size < 2:
+        return np.zeros(time_s.size, dtype=bool), []
+    median_s = float(np.median(np.diff(time_s)))
+    ends, told = gaps_of(time_s)
     upto = np.searchsorted(time_s, time_s[ends] + SETTLING_S)
     edges = np.zeros(time_s.size + 1)
     np.add.at(edges, ends, 1.0)
     np.add.at(edges, upto, -1.0)
     flags = np.cumsum(edges)[:-1] > 0.0
-    notes = []
-    if ends.size:
-        longest_s = float(steps[ends - 1].max())
-        notes.append(
-            f"{ends.size} gaps in time (the longest {longest_s:.3g} s, at {time_s[ends[0] - 1]:.3f} s the first): "
-            f"{int(flags.sum())} rows up to {SETTLING_S:g} s after them are not judged"
-        )
+    notes = [f"{told}: {int(flags.sum())} rows up to {SETTLING_S:g} s after them are not judged"] if told else []
     if median_s >= _COARSE_S:
         notes.append(f"one row every {median_s:.3g} s: are the times in ms? then --columns time_s=...:ms")
     return flags, notes

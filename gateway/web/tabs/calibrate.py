@@ -18,7 +18,7 @@ from gateway.control.runs.ladder_stairs import QUICK, CalibrationPlan
 from gateway.control.runs.preconditions import preconditions
 from gateway.processes.durable_file import read_object
 from gateway.processes.state_directory import CALIBRATIONS
-from gateway.recording.label import check_name
+from gateway.recording.label import LONGEST_NAME, check_name
 from gateway.web.context import WebContext
 from gateway.web.tabs.answers import Nothing, TabRefusedError, answers, read_body
 from gateway.web.tabs.run_follower import RunFollower
@@ -33,7 +33,7 @@ class WantedRun:
 
     __pydantic_config__ = defaults.STRICT
     plan: dict[str, Any] = field(default_factory=dict)
-    name: Annotated[str, MaxLen(200)] = ""
+    name: Annotated[str, MaxLen(LONGEST_NAME)] = ""
 
 
 class CalibrateTab:

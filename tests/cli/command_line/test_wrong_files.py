@@ -96,6 +96,38 @@ def test_a_verb_that_wants_a_profile_says_what_it_got(verb: str, name: str, file
     assert name == "folder" or wanted in sentences[0]
 
 
+TABLE = "time_s,force_n,command_v\n" + "0.01,12.5,3.25\n" * 10
+
+
+@pytest.mark.parametrize("verb", PROFILE_VERBS)
+@pytest.mark.parametrize(
+    "table",
+    [
+        TABLE,
+        "# format: 1\n# rig: demo\n" + TABLE,
+        "Zeit;Kraft\n12:00:01;1,5\n12:00:02;1,6\n",
+        "\ufefft\tN\n1\t2\n",
+        TABLE * 10_000,
+    ],
+)
+def test_a_table_for_a_profile_is_told_as_one_however_large_it_is(
+    verb: str, table: str, files: Path, call: Call
+) -> None:
+    """Of a large one its size was told, of a small one that it is a single value."""
+    (files / "table.csv").write_text(table)
+    answer = call(*verb.split(), "table.csv")
+    sentences = [line for line in answer.output.splitlines() if "table.csv" in line]
+    assert len(sentences) == 1, answer.output
+    assert f"is a table of values (CSV); a {PROFILE_VERBS[verb]} is needed here, a YAML file" in sentences[0]
+
+
+@pytest.mark.parametrize("text", ["a, b\nc\n", "a, b\nc: 1, 2\n", "# only, a\n# comment, b\n", "demo\n"])
+def test_what_is_no_table_is_not_called_one(text: str, files: Path, call: Call) -> None:
+    (files / "rig.yaml").write_text(text)
+    answer = call("check", "rig.yaml")
+    assert answer.exit_code == 78 and "rig.yaml" in answer.output and "table" not in answer.output
+
+
 @pytest.mark.parametrize("verb", ["calibration use", "plant use", "plant show"])
 def test_a_file_for_a_number_says_which_list_has_the_numbers(verb: str, files: Path, call: Call) -> None:
     answer = call(*verb.split(), "--state", "state", "rig.yaml")

@@ -36,7 +36,7 @@ BOUNDS: tuple[tuple[type, dict[str, Any], dict[str, Any]], ...] = (
     (PlantRequest, {"use": 0}, {"use": True}),
     (CalibrateRequest, {"continues": [1] * 1000}, {"continues": [1] * 1001}),
     (CalibrateRequest, {"continues": [0]}, {"continues": [-1]}),
-    (CalibrateRequest, {"name": 200 * "n"}, {"name": 201 * "n"}),
+    (CalibrateRequest, {"name": 60 * "n"}, {"name": 61 * "n"}),
     (ResidualRequest, {"cause": 0}, {"cause": -1}),
     (FaultRequest, {"name": "air"}, {"name": "air", "values": {"contact.gap_m": inf}}),
     (SimulationRequest, {"set": {100 * "n": 1.0}}, {"set": {101 * "n": 1.0}}),

@@ -233,6 +233,19 @@ def _keep_reference(state: StateChoice, name: str) -> None:
     if why := reference.why_no_reference(path):
         raise CliError(f"E523 {path} cannot be the reference: {why}", exit_codes.DATA)
     reference.keep_reference_recording(state.directory, path)
+    if doubt := _doubt_of_machine(path, state):
+        click.echo(f"{doubt}: if it shows another machine, `force-gateway recordings reference --none`", err=True)
+
+
+def _doubt_of_machine(path: Path, state: StateChoice) -> str:
+    """Return why a reference may show another machine than this rig's, as the begin of a sentence; empty where it does not."""
+    from gateway.recording import read_table
+    from gateway.service.supervisor.run_options import stem_of
+
+    named, meant = read_table(path).header.get("rig"), stem_of(state.rig)
+    if not named:
+        return f"{path.name} does not say which rig it is of"
+    return f"{path.name} is of rig {named}, and this is {meant}" if named != meant else ""
 
 
 def _describe_reference(known: "ReferenceRecording | None") -> str:

@@ -37,7 +37,7 @@ def command(*, recording: str, against: str | None, state: StateChoice, as_json:
     from gateway.cli.diagnosis.progress_line import show_progress
     from gateway.cli.recordings.setups import other_setup, own_setup
     from gateway.recording import read_table
-    from gateway.service.replayed_control import compare_decisions, replay_control
+    from gateway.service.replayed_control import compare_decisions, replay_control, tell_missing_rows
 
     table = read_table(recording_path(recording, state.rig, state.path))
     own, notes = own_setup(table, state)
@@ -50,6 +50,8 @@ def command(*, recording: str, against: str | None, state: StateChoice, as_json:
     names = (own.name, other.name) if other else ("recorded", f"replayed with {own.name}")
     if other is None and table.columns["state"][0]:
         notes.append("it begins while a force was on: control starts anew there, and its first seconds differ")
+    if told := tell_missing_rows(table):
+        notes.append(told)
     answer: dict[str, Any] = {"recording": str(table.path), "rows": table.rows, "one": names[0], "other": names[1]}
     if as_json:
         click.echo(

@@ -129,3 +129,19 @@ def test_a_row_without_its_time_or_state_is_named_and_one_without_quality_is_a_g
     answer = call("replay", tmp_path / "edited.csv", "--state", state, "--rig", "demo")
     assert answer.exit_code == code, answer.output
     assert "E500" not in answer.output
+
+
+def test_rows_that_are_missing_are_told_with_where_and_how_long(state: Path, call, tmp_path: Path) -> None:
+    """Control ramped on while nothing was written: the replay differed there by volts, and said nothing of it."""
+    whole = read_recording(state / "recordings" / "0001.fgr")
+    there = np.delete(np.arange(whole.rows), [*range(22, 42), *range(150, 165)])
+    export_csv(
+        replace(whole, columns={name: values[there] for name, values in whole.columns.items()}), tmp_path / "a.csv"
+    )
+    answer = call("replay", tmp_path / "a.csv", "--state", state, "--rig", "demo")
+    assert answer.exit_code == 0, answer.output
+    time_s = whole.columns["time_s"]
+    assert f"2 gaps in time (the longest {time_s[42] - time_s[21]:.2g} s, " in answer.stderr
+    assert f"at {time_s[21] - time_s[0]:.3f} s the first): " in answer.stderr
+    assert "with the reading before" in answer.stderr
+    assert "gaps" not in call("replay", "1", "--state", state, "--rig", "demo").stderr
