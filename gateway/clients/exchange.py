@@ -46,6 +46,8 @@ COMMIT_ENDS: Final = ("committed", "failed")
 _WITH_NUMBERS: Final = ("status", "staging", "active")
 """Blocks with numbers of two words that the clients read or write, all high word first."""
 CONTROL_BITS: Final = ("enable", "reset_fault", "tare", "take_ownership", "valve_pull")
+_STARTS: Final = ("enable", "start_calibration", "start_self_test")
+"""Bits that press from their rise on until the gateway switches off."""
 STATUS_BITS: Final = {
     "enabled": "is_enabled",
     "ready": "is_ready",
@@ -276,7 +278,8 @@ class ExchangeTable:
         masks: dict[str, object] = {}
         for prefix, word in (("bit", "control_word"), ("flag", "status_word")):
             masks |= {f"{prefix}_{name}": 1 << bit for bit, name in self.map.find(word).bits.items()}
-        return masks
+        starts = sum(1 << bit for bit, name in self.map.find("control_word").bits.items() if name in _STARTS)
+        return {**masks, "starts": f"0x{starts:04X}"}
 
 
 def _limit(newton: float) -> str:

@@ -13,7 +13,15 @@ from gateway.modbus.peer import Role
 from gateway.registers import BankRules, Command, RegisterBank, RegisterMap, Status
 from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.upload.staging import StagedFault, check_staged
-from gateway.registers.words import CommitStatus, ControlBit, State, StatusBit
+from gateway.registers.words import (
+    CommitStatus,
+    ControlBit,
+    SelfTestResult,
+    SelfTestVerdict,
+    State,
+    StatusBit,
+)
+from gateway.registers.writes.admission import STARTS
 from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 
 COMMAND_WORDS, HEARTBEAT = 13, 4
@@ -31,7 +39,7 @@ class GatewayAtHand:
         self, register_map: RegisterMap, *, wants_echo: bool = False, units: tuple[int, ...] = (0, 1, 255)
     ) -> None:
         self.units = units
-        bits = BASIC_BITS | ControlBit.VALVE_PULL
+        bits = BASIC_BITS | ControlBit.VALVE_PULL | ControlBit.START_SELF_TEST
         rules = BankRules(rig_name="test", force_max_n=60.0, supported_bits=bits, require_byte_order_echo=wants_echo)
         self.bank = RegisterBank(register_map, rules, now=lambda: 0.0)
         self.bank.on_command = self.obey
@@ -39,7 +47,7 @@ class GatewayAtHand:
         self.bank.staging.on_commit = self.commit
         self.requests: list[bytes] = []
         self.exceptions: list[tuple[int, int]] = []
-        self.is_cut = False
+        self.is_cut = self.is_testing = False
         self.fault = FaultCode.NONE
         self.peer = Peer("10.0.0.9", 40000, role=Role.CALIBRATION)
         self.publish(0.0, on=False)
@@ -47,12 +55,23 @@ class GatewayAtHand:
     def obey(self, command: Command) -> None:
         if ControlBit.RESET_FAULT in command.control_word:
             self.fault = FaultCode.NONE
-        self.publish(command.force_setpoint_n, on=ControlBit.ENABLE in command.control_word)
+        self.is_testing = ControlBit.START_SELF_TEST in command.control_word
+        self.publish(command.force_setpoint_n, on=bool(command.control_word & STARTS))
 
     def decide(self, proposal: ProposedWrite) -> EdgeRefusal | None:
         if self.fault and ControlBit.ENABLE in proposal.command.control_word:
             return EdgeRefusal(RefusalReason.FAULT_LATCHED, ControlBit.ENABLE, "a fault is latched")
+        is_asked = bool(proposal.command.control_word & ~self.bank.command.control_word & ControlBit.START_SELF_TEST)
+        if is_asked and self.bank.command.control_word & ControlBit.ENABLE:
+            return EdgeRefusal(RefusalReason.SELF_TEST_REFUSED, ControlBit.START_SELF_TEST, "a force is held")
         return None
+
+    def end_self_test(self, result: SelfTestResult, **verdicts: SelfTestVerdict) -> None:
+        """The self-test has come to its end: the output is off, and the command cleared."""
+        self.bank.self_test.show(7, result, verdicts)
+        self.is_testing = False
+        self.bank.clear_command()
+        self.publish(0.0, on=False)
 
     def stop_from_elsewhere(self) -> None:
         """Another master writes 0 to control_word."""
@@ -69,6 +88,8 @@ class GatewayAtHand:
     def publish(self, force_n: float, *, on: bool) -> None:
         word = StatusBit.ENABLED | StatusBit.READY | StatusBit.IN_BAND if on else StatusBit(0)
         state = State.HOLDING if on else State.OFF
+        if self.is_testing:
+            state = State.CALIBRATING
         if self.fault:
             word, state = StatusBit.FAULT, State.FAULT
         self.bank.publish(
@@ -84,7 +105,7 @@ class GatewayAtHand:
 
     def fail(self, fault: FaultCode) -> None:
         """Latch a fault: control is off, and the command cleared."""
-        self.fault = fault
+        self.fault, self.is_testing = fault, False
         self.bank.clear_command()
         self.publish(0.0, on=False)
 

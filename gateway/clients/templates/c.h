@@ -60,6 +60,8 @@ enum {
 ${control_bits}
 };
 
+enum { FG_STARTS = ${starts} }; /* enable, and the bits of a ladder and a self-test, which press as well */
+
 /* status_word */
 enum {
 ${status_bits}
@@ -139,7 +141,8 @@ const char *fg_state_text(uint16_t state);
 uint32_t fg_crc32(const uint8_t *bytes, size_t count); /* zlib's; of "123456789" it is 0xCBF43926 */
 int fg_stage(fg_client *client, const fg_model *model, uint16_t slot);
 int fg_commit(fg_client *client);                     /* answered at once; then ask fg_commit_state */
-int fg_commit_state(fg_client *client);               /* FG_OK committed, FG_WORKING, FG_FAILED: message says why */
+int fg_commit_state(fg_client *client);               /* FG_OK committed, FG_FAILED: message says why, FG_WORKING: with an exchange,
+                                                         where enabled, for the lease */
 int fg_read_active(fg_client *client, fg_model *model, uint16_t words[FG_SET_WORDS]);
 void fg_model_words(const fg_model *model, uint16_t words[FG_SET_WORDS]);
 void fg_model_from_words(const uint16_t words[FG_SET_WORDS], fg_model *model);
@@ -261,7 +264,7 @@ static int fg_wait(int descriptor, short events, long long until_ms) {
 
 /* Without a connection nothing is commanded; the first write of the next one is OFF where this one had enabled. */
 static void fg_forget(fg_client *client) {
-    if ((client->good[FG_CONTROL_WORD] | client->asked) & FG_ENABLE) client->off_pending = 1;
+    if ((client->good[FG_CONTROL_WORD] | client->asked) & FG_STARTS) client->off_pending = 1;
     if ((client->good[FG_CONTROL_WORD] | client->want[FG_CONTROL_WORD]) & FG_ENABLE) client->ended = 1;
     client->asked = 0;
     client->want[FG_CONTROL_WORD] = 0;
@@ -437,8 +440,9 @@ static int fg_is_own(const fg_client *client) {
     return client->good[FG_CONTROL_WORD] & FG_ENABLE && apart > -${force_apart}f && apart < ${force_apart}f;
 }
 
+/* It is off: no `ended` of a ladder or a self-test, which end by themselves. */
 static void fg_end(fg_client *client) {
-    client->ended = 1;
+    if (client->good[FG_CONTROL_WORD] & FG_ENABLE) client->ended = 1;
     client->want[FG_CONTROL_WORD] = 0;
     client->want[FG_FORCE_SETPOINT] = 0;
     memcpy(client->good, client->want, sizeof client->good);
@@ -449,7 +453,7 @@ static void fg_follow(fg_client *client) {
     client->seen = 1;
     fg_decode(client->words, &client->status);
     if (!fg_is_own(client)) client->status.in_band = 0;
-    if (client->good[FG_CONTROL_WORD] & FG_ENABLE && !client->status.enabled) fg_end(client);
+    if (client->good[FG_CONTROL_WORD] & FG_STARTS && !client->status.enabled) fg_end(client);
 }
 
 static int fg_refresh(fg_client *client) {
@@ -517,7 +521,7 @@ static int fg_prove_byte_order(fg_client *client) {
 /* Behind a refusal the last accepted command goes on; a disable beside what was refused goes out alone, at once. */
 static int fg_go_on(fg_client *client) {
     uint8_t frame[FG_FRAME];
-    int was_on = client->good[FG_CONTROL_WORD] & FG_ENABLE, stays_on = client->want[FG_CONTROL_WORD] & FG_ENABLE, result;
+    int was_on = client->good[FG_CONTROL_WORD] & FG_STARTS, stays_on = client->want[FG_CONTROL_WORD] & FG_STARTS, result;
     if (!was_on) client->good[FG_FORCE_SETPOINT] = 0;
     memcpy(client->want, client->good, sizeof client->want);
     client->once = 0;
@@ -528,7 +532,7 @@ static int fg_go_on(fg_client *client) {
     result = fg_ask(client, frame, fg_frame_write(frame, ++client->transaction, client->unit, FG_COMMAND_FIRST,
                                                   FG_COMMAND_WORDS, client->want));
     if (result == FG_LOST) return FG_LOST;
-    if (result == FG_REFUSED) client->ended = 1;
+    if (result == FG_REFUSED) fg_end(client);
     memcpy(client->good, client->want, sizeof client->good);
     return FG_OK;
 }
@@ -544,7 +548,7 @@ int fg_exchange(fg_client *client) {
     if (!changed && client->want[FG_CONTROL_WORD] == 0) return fg_refresh(client);
     if ((result = fg_prove_byte_order(client)) != FG_OK) return result;
     /* Enable goes out beside a pull or an edge: behind a stop of since the last exchange it would be a new rise. */
-    if (!client->seen || (client->good[FG_CONTROL_WORD] & client->want[FG_CONTROL_WORD] & FG_ENABLE && changed &&
+    if (!client->seen || (client->good[FG_CONTROL_WORD] & client->want[FG_CONTROL_WORD] & FG_STARTS && changed &&
                           !client->off_pending && !fg_first_to_write(client))) {
         if ((result = fg_refresh(client)) != FG_OK) return result;
         changed = fg_has_changed(client);
@@ -696,7 +700,8 @@ int fg_commit_state(fg_client *client) {
     int result = fg_read(client, ${stg_commit_status}, 3, words);
     if (result != FG_OK) return result;
     if (words[0] == FG_COMMIT_COMMITTED) return FG_OK;
-    if (words[0] != FG_COMMIT_FAILED) return FG_WORKING;
+    if (words[0] != FG_COMMIT_FAILED) /* a refusal of the heartbeat is none of the commit: `ended` tells it */
+        return client->good[FG_CONTROL_WORD] & FG_STARTS && fg_exchange(client) == FG_LOST ? FG_LOST : FG_WORKING;
     snprintf(client->message, sizeof client->message, "commit failed at number %d: %s", (int)(int16_t)words[1],
              fg_failing_text(words[2]));
     return FG_FAILED;
