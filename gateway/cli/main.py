@@ -33,6 +33,8 @@ _FOLDERS: Final = {verb: folder for folder, (_, verbs) in SECTIONS.items() for v
 VERBS: Final = tuple(_FOLDERS)
 ALIASES: Final = {"install-service": ("service", "install")}
 """Other names of subcommands, on which programs rely; the help does not list them."""
+_WHOLE: Final = 1000
+"""More characters than the first sentence of any verb: a list of verbs folds it, and cuts nothing."""
 HELP: Final = """Modbus gateway that holds a constant contact force, and says why the force is off.
 
 Begin with: force-gateway run demo --sim"""
@@ -62,9 +64,8 @@ class VerbGroup(click.Group):
         for title, verbs in SECTIONS.values():
             commands = [(verb, self.get_command(ctx, verb)) for verb in verbs]
             with formatter.section(title):
-                limit = formatter.width - 6 - width
                 formatter.write_dl(
-                    [(verb.ljust(width), one.get_short_help_str(limit)) for verb, one in commands if one]
+                    [(verb.ljust(width), one.get_short_help_str(_WHOLE)) for verb, one in commands if one]
                 )
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
@@ -77,6 +78,8 @@ class VerbGroup(click.Group):
         module = import_verb(cmd_name)
         command: click.Command = module.command
         command.epilog = format_examples(getattr(module, "EXAMPLES", ()))
+        for one in command.commands.values() if isinstance(command, click.Group) else ():
+            one.short_help = one.get_short_help_str(_WHOLE)  # click itself cuts it at the width of the terminal
         return command
 
     def resolve_command(

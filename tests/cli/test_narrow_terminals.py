@@ -4,7 +4,9 @@ import io
 import re
 from collections.abc import Iterable
 
+import click
 import pytest
+from click.testing import CliRunner
 from rich.console import Console, RenderableType
 
 from gateway.catalogue.all_effects import EFFECTS
@@ -14,6 +16,8 @@ from gateway.cli.calibration.runs import RunStatus
 from gateway.cli.diagnosis.terminal import render_diagnosis
 from gateway.cli.force_hold import state_line
 from gateway.cli.force_hold.sequence import StatusReading
+from gateway.cli.main import VERBS, import_verb
+from gateway.cli.main import command as force_gateway
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers.words import State, StatusBit
 from tests.reports.fake_diagnosis import diagnosis
@@ -119,3 +123,15 @@ def test_the_line_of_hold_has_its_warnings(width: int) -> None:
     )
     line = state_line._within(state_line.describe_state(status), width - 1)
     assert missing(line, ["holding", "112.34", "112.00", "8.123", "in", "band", "A301", "A345"], width) == []
+
+
+GROUPS = [verb for verb in VERBS if isinstance(import_verb(verb).command, click.Group)]
+
+
+@WIDTHS
+@pytest.mark.parametrize("group", ["", *GROUPS])
+def test_a_list_of_verbs_says_each_sentence_to_its_end(group: str, width: int) -> None:
+    """Half of the lines of `recordings --help` ended in the middle: `Delete recording N; not one that is kept, ...`."""
+    told = CliRunner().invoke(force_gateway, [*group.split(), "--help"], terminal_width=width).output
+    assert "Commands:" in told or "Set up a cell:" in told
+    assert [line for line in told.splitlines() if line.endswith("...") and "Usage:" not in line] == []

@@ -190,7 +190,7 @@ class Guardian:
             words.print_ready(info | {"pids": self._pids()})
         elif not self.announced:
             words.print_ready(banner)
-        self.log.note("start", f"ready: rig {self.options.rig}, {where}, processes {self._pids()}")
+        self.log.note("start", words.ready_sentence(self.options.rig, where, self._pids()))
         self.manager.ready(f"rig {self.options.rig}, {where}")
         self.announced = True
         self.restarts.came_up()

@@ -7,6 +7,7 @@ import select
 import sys
 import threading
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any, Final
 
 from gateway.processes.exit_cause import EndCause, Ending
@@ -39,6 +40,11 @@ def _write_out(data: bytes) -> None:
         descriptor = sys.stdout.fileno()
         while data:
             data = data[os.write(descriptor, data) :]
+
+
+def ready_sentence(rig: str, where: str, pids: Mapping[str, int]) -> str:
+    """Return what the log says of a start. where: what it listens on; pids: process ids by name."""
+    return f"ready: rig {rig}, {where}; processes: {', '.join(f'{name} {pid}' for name, pid in pids.items())}"
 
 
 def restart_sentence(ending: Ending, how: str, acknowledged: bool | None) -> str:

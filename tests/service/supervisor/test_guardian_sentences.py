@@ -84,3 +84,9 @@ def test_a_line_of_ready_that_goes_out_in_pieces_is_whole(monkeypatch):
 def test_what_was_not_acknowledged_is_not_called_so_nor_written_where_the_port_may_be_away():
     said = [words.describe_acknowledgement(one) for one in (True, False, None)]
     assert said == ["acknowledged", "not acknowledged", "no line was open"]
+
+
+def test_a_start_names_its_processes_in_words():
+    """The page and `events` showed them as Python writes a dict."""
+    said = words.ready_sentence("demo", "modbus tcp 127.0.0.1:5020", {"guardian": 12, "fork_server": 13})
+    assert said == "ready: rig demo, modbus tcp 127.0.0.1:5020; processes: guardian 12, fork_server 13"
