@@ -45,4 +45,11 @@ KEPT: list[tuple[int, list[Event]]] = [
         ],
     ),
     (24577, [Event(12.9101, "rival", "take", (20.64,)), Event(14.2472, "rival", "hang")]),
+    (
+        38229,
+        [
+            Event(9.2133, "machine", "kill", (0.2458, 657774.9208479484)),
+            Event(10.0665, "crowd", "connect", (37.0, 40.0, 0.0)),
+        ],
+    ),
 ]
