@@ -5,7 +5,6 @@ module each, and the style is the reports' own (gateway.reports.style.css) with 
 """
 
 import asyncio
-import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from importlib import import_module
@@ -23,7 +22,7 @@ from gateway import VERSION
 from gateway.live.control_link import ask_once
 from gateway.live.ring_rows import RingRows
 from gateway.live.standstill import Standstill
-from gateway.processes.json_socket.messages import encode_answer
+from gateway.processes.json_socket.messages import encode_answer, load_shallow
 from gateway.reports.style import read_style
 from gateway.web import tabs
 from gateway.web.commands import Commands, RefusedCommand
@@ -172,8 +171,8 @@ def _command(context: WebContext, commands: Commands) -> Callable[[Request], Awa
 def _fields(body: bytes) -> dict[str, Any]:
     """Return the fields of a request's body. ValueError for anything but a JSON object, however deeply it nests."""
     try:
-        fields = json.loads(body or b"{}")
-    except (ValueError, RecursionError):
+        fields = load_shallow(body or b"{}")
+    except ValueError:
         fields = None
     if not isinstance(fields, dict):
         raise ValueError("a JSON object is expected")

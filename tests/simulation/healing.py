@@ -85,6 +85,7 @@ def _repair(simulation: "Simulation") -> None:
     SimulatedDisk.fails = ""
     SimulatedDisk.go_on()
     simulation.service.refuse_processes(0.0)
+    simulation.crowd.leave()
     for master in simulation.masters.values():
         master.fall_silent()
         master.disconnect()

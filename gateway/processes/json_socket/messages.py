@@ -1,6 +1,7 @@
 """Requests and answers of a local socket as JSON: what is too large to be looked at, and what has no number in JSON."""
 
 import json
+import re
 from math import isfinite
 from typing import Any, Final
 
@@ -9,6 +10,8 @@ LONGEST_ANSWER: Final = 1 << 20
 """Bytes of an answer: more are none of ours."""
 _LONGEST_SENTENCE: Final = 500
 _DEEPEST: Final = 10
+_DEEPEST_READ: Final = 100  # lists and objects inside of each other; the reader has room for ten times as many
+_BESIDE_BRACKETS: Final = re.compile(r'"[^"\\]*(?:\\.[^"\\]*)*"?|[^\[\]{}"]+', re.DOTALL)
 _MOST_KEYS: Final = 64
 _LONGEST_KEY: Final = 100
 _MOST_VALUES: Final = 3000
@@ -26,6 +29,18 @@ def error_answer(sentence: str) -> Answer:
 def has_huge_number(line: bytes) -> bool:
     """Decide whether a text may hold a number of very many digits: to read one takes longer than to read as many others."""
     return b"0" * _MOST_DIGITS in line.translate(_DIGITS_AS_ZEROS)
+
+
+def load_shallow(text: bytes, **hooks: Any) -> Any:
+    """Return what a text from outside holds, read by json.loads with these hooks. ValueError for no JSON, and for
+    what is nested more than 100 deep: garbage that is collected in the depth of a recursion has no room for its finalizers."""
+    brackets = _BESIDE_BRACKETS.sub("", text.decode(json.detect_encoding(text), "replace"))
+    depth = 0
+    for bracket in brackets if len(brackets) > _DEEPEST_READ else "":
+        depth += 1 if bracket in "[{" else -1
+        if depth > _DEEPEST_READ:
+            raise ValueError(f"nested more than {_DEEPEST_READ} deep")
+    return json.loads(text, **hooks)
 
 
 def why_too_large(request: Any) -> str:

@@ -12,7 +12,6 @@ A gateway works without it, so a place where no socket can be made is a sentence
 import asyncio
 import contextlib
 import errno
-import json
 import os
 import socket
 import time
@@ -31,6 +30,7 @@ from gateway.processes.json_socket.messages import (
     encode_answer,
     error_answer,
     has_huge_number,
+    load_shallow,
     refuse_constant,
     why_too_large,
 )
@@ -291,9 +291,9 @@ class JsonLineServer:
         if has_huge_number(line):
             return error_answer("a number of more digits than any that means something")
         try:
-            request = json.loads(line, parse_constant=refuse_constant)
+            request = load_shallow(line, parse_constant=refuse_constant)
             handler = self._handlers[request["do"]]
-        except (ValueError, KeyError, TypeError, RecursionError):
+        except (ValueError, KeyError, TypeError):
             return error_answer(f'expected {{"do": one of {", ".join(sorted(self._handlers))}, ...}}')
         if too_much := why_too_large(request):
             return error_answer(too_much)

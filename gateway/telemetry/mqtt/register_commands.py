@@ -9,7 +9,6 @@ the setpoint is refused before it would be the end of the stop. A force beside i
 the next enable.
 """
 
-import json
 import time
 from collections.abc import Callable, Iterable
 from math import isfinite
@@ -17,11 +16,12 @@ from typing import Any, Final
 
 from gateway.live.control_link import ANSWER_S, ControlLink
 from gateway.modbus import pdu as P  # noqa: N812
+from gateway.processes.json_socket.messages import load_shallow
 from gateway.registers.map.register_map import Register, RegisterMap
 
 _SETPOINTS: Final = ("force_setpoint", "voltage_setpoint")
 _LONGEST: Final = 16_384
-"""Bytes of a command: far beyond one that names every register, and too few to nest deeply."""
+"""Bytes of a command: far beyond one that names every register."""
 _SUCH: Final = 'a command is JSON such as {"force_setpoint": 12.0, "control_word": 1}'
 _TWICE: Final = object()
 """Stands for the value of a name that stands twice."""
@@ -120,9 +120,7 @@ def _registers(payload: bytes) -> dict[str, float]:
     if len(payload) > _LONGEST:
         raise ValueError(f"{len(payload)} bytes: a command has {_LONGEST} at most")
     try:
-        content = json.loads(payload, object_pairs_hook=_each_once)
-    except RecursionError:
-        raise ValueError("nested too deeply for a command") from None
+        content = load_shallow(payload, object_pairs_hook=_each_once)
     except ValueError as error:
         raise ValueError(f"{_SUCH}: {error}") from None
     if not isinstance(content, dict) or not content:

@@ -5,7 +5,6 @@ no gateway is an OSError (503). The body of an error is always {"error": sentenc
 """
 
 import errno
-import json
 import os
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
 from gateway.extras import MissingExtraError
-from gateway.processes.json_socket.messages import encode_answer
+from gateway.processes.json_socket.messages import encode_answer, load_shallow
 from gateway.profiles.strict_yaml.text import Document
 from gateway.profiles.strict_yaml.typed import build
 
@@ -81,8 +80,8 @@ async def read_body(request: Request, shape: type[Shape]) -> Shape:
         if len(body) > _LONGEST_BODY:
             raise TabRefusedError(f"a request of more than {_LONGEST_BODY} bytes", BAD_REQUEST)
     try:
-        fields = json.loads(body or b"{}")
-    except (ValueError, RecursionError):
+        fields = load_shallow(body or b"{}")
+    except ValueError:
         raise TabRefusedError("the request is no JSON", BAD_REQUEST) from None
     shaped, faults = build(shape, Document("request", fields, {}))
     if shaped is None or faults:

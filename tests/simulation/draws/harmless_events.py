@@ -5,13 +5,13 @@ Others ask, write, upload and send nonsense; people at the machine question, rec
 answer now and then is spoiled on its wire.
 """
 
-import json
 from collections.abc import Iterator
 from dataclasses import replace
 from heapq import merge
 from operator import attrgetter
 from random import Random
 
+from gateway.processes.json_socket.messages import load_shallow
 from tests.simulation.draws.behaviours import draw_crowd, draw_delays
 from tests.simulation.draws.event import Event
 from tests.simulation.draws.events import draw_usual
@@ -141,7 +141,7 @@ def _may_stop(pdu: bytes) -> bool:
 def _asks_to_stop(line: bytes) -> bool:
     """Whether a person's line is a request of a master's that clears enable."""
     try:
-        request = json.loads(line)
+        request = load_shallow(line)
         return request["do"] == "modbus" and _may_stop(bytes.fromhex(request["pdu"]))
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except (ValueError, KeyError, TypeError):
         return False

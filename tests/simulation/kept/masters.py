@@ -53,4 +53,11 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(7.9475, "worker", "tare"),
         ],
     ),
+    (
+        38229,
+        [
+            Event(9.2133, "machine", "kill", (0.2458, 657774.9208479484)),
+            Event(10.0665, "crowd", "connect", (37.0, 40.0, 0.0)),
+        ],
+    ),
 ]
