@@ -48,6 +48,11 @@ _SPELT_UNITS: Final = {
 """What the word behind a force stands for, as devices spell it. A lone K or L is none: it may be a mode."""
 
 
+def unit_meant(word: str) -> str:
+    """Return the unit that a device's word stands for, blanks around it left out; the word itself where it is none."""
+    return _SPELT_UNITS.get(word.strip(), word.strip())
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceReading:
     """One reading of a load cell: streamed, or the answer to `ask`.
@@ -192,7 +197,7 @@ class ForceReading:
         """Return the frame's own word for a unit, which may be padded."""
         field = self.template.field(UNIT)
         words = field.words if isinstance(field, Choice) else ()
-        return next((word for word in words if word.strip() == unit), unit)
+        return next((word for word in words if unit_meant(word) == unit), unit)
 
     def read_over(self, constants: Container[str]) -> tuple[Field, ...]:
         """Return the fields whose words, digits or text change nothing in what is believed."""
@@ -201,8 +206,8 @@ class ForceReading:
 
 
 def units_of(field: Field | None) -> tuple[str, ...]:
-    """Return the units that the words of a field stand for, without the blanks that pad them; none where it has no words."""
-    return tuple(word.strip() for word in field.words) if isinstance(field, Choice) else ()
+    """Return the units that the words of a field stand for, each as a device spells it; none where it has no words."""
+    return tuple(map(unit_meant, field.words)) if isinstance(field, Choice) else ()
 
 
 def _check_reading(template: Template, reading: ForceReading) -> None:

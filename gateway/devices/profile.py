@@ -31,6 +31,7 @@ TEMPLATE: Final = "template"
 ADDRESS: Final = "address"
 """Name of the constant that tells devices on one bus apart: of a Modbus device its unit."""
 
+_NO_TCP: Final = "Modbus TCP is not spoken to devices, which are on serial lines"
 _LONGEST_MODBUS_S: Final = 0.1  # later than this a Modbus answer is no use to a force loop
 _LARGEST_UNIT: Final = 255  # 247 by the specification; some devices take all that fit into a byte
 Terminator = Annotated[str, MaxLen(8)]
@@ -203,9 +204,8 @@ def _check_codec(profile: DeviceProfile) -> None:
     exchanges = (profile.set_voltage, profile.read_voltage, profile.read_pressure, profile.read_force, profile.stream)
     for name, exchange in zip(_EXCHANGES, exchanges, strict=True):
         if exchange and profile.is_modbus is (exchange.modbus is None):
-            wanted = (
-                "needs `modbus` with its registers" if profile.is_modbus else f"has `modbus`: say `codec: {MODBUS_RTU}`"
-            )
+            cure = _NO_TCP if "tcp" in profile.codec.lower() else f"say `codec: {MODBUS_RTU}`"
+            wanted = "needs `modbus` with its registers" if profile.is_modbus else f"has `modbus`: {cure}"
             raise ValueError(f"{name} of codec {profile.codec} {wanted}")
     if not (profile.is_modbus or profile.is_raw):
         if not profile.terminator:

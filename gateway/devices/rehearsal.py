@@ -10,6 +10,7 @@ from math import inf
 from typing import Final
 
 from gateway.devices.codecs import cell_device, cell_host, output_device, output_host
+from gateway.devices.device_checks.ranges import unfit_ranges
 from gateway.devices.device_checks.sentences import Found, misspelt
 from gateway.devices.fields import Choice, HexNumber, Text, ValueRefused
 from gateway.devices.force_reading import FORCE, STATUS, UNIT, ForceReading
@@ -75,6 +76,7 @@ def _output(profile: DeviceProfile) -> Found:
         if complaint := _talk(profile, SetVoltage(voltage_v), Accepted(voltage_v)):
             yield ("set_voltage",), f"{voltage_v:g} V: {complaint}"
             return
+    yield from unfit_ranges(profile)
     for place, question, answers in _readings(profile):
         complaint = next(filter(None, (_talk(profile, question, answer) for answer in answers)), "")
         if complaint:

@@ -200,3 +200,16 @@ def test_an_amplifier_in_motion_at_its_converters_end_is_overloaded() -> None:
         one for words in ("7FFF0001", "7FFE0001") for one in host.receive(rtu_frame(1, f"0404{words}".encode()), 0.0)
     ]
     assert [getattr(one, "quality", None) for one in samples] == [Quality.OVERLOAD, Quality.UNSTABLE]
+
+
+@pytest.mark.parametrize("registers", ["FFFFFB2E0080", "000004D20080"])
+def test_a_sign_that_is_told_twice_is_one_minus(registers: str) -> None:
+    """A weight of a signed type whose state register says its sign, too: a pull was read as a push."""
+    registers_read = WeightRegisters(
+        first=0, last=2, weight=0, type="int32", decimals=2, negative=RegisterBit(register=2, bit=7)
+    )
+    profile = replace(load_device("laumas-tlb"), read_force=ForceReading(modbus=registers_read, unit="N"))
+    (sample,) = cell_host(profile).receive(rtu_frame(1, f"0306{registers}".encode()), 0.0)
+    assert isinstance(sample, ForceSample) and sample.force_n == pytest.approx(-12.34)
+    (pushed,) = cell_host(profile).receive(rtu_frame(1, b"0306000004D20000"), 0.0)
+    assert isinstance(pushed, ForceSample) and pushed.force_n == pytest.approx(12.34)

@@ -74,6 +74,17 @@ PRESSURE = {"ask": "P?", "answer": "{p:d}", "range": {"device": [0, 10], "pressu
             {"set_voltage__answer": None, "read_voltage__range__voltage_v": [0, 5]},
             "the ranges do not fit",
         ),
+        (
+            {"read_voltage__range__voltage_v": [0, 5]},
+            "read_voltage.range.voltage_v: reads 0 .. 5 V, and set_voltage sets 0 .. 10 V: what is beyond is read as anot",
+        ),
+        ({"read_voltage__range__voltage_v": [1, 10]}, "reads 1 .. 10 V, and set_voltage sets 0 .. 10 V"),
+        ({"read_voltage__range__voltage_v": [-1, 9.95]}, None),
+        (
+            {"read_pressure__range__pressure_pa": [0, 9]},
+            "read_pressure.range.pressure_pa: 9 Pa are 9e-05 bar: a pressure is in pascals here, and 1 bar is 100000",
+        ),
+        ({"read_pressure__range__pressure_pa": [-1e5, 1e3]}, None),
         ({"set_voltage__answer": "{counts:+.3E}"}, None),
         (
             {"set_voltage__ask": "SET {a:02X}{counts:d}", "constants": {"a": 300}},

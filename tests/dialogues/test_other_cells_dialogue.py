@@ -5,7 +5,9 @@ from dataclasses import replace
 import pytest
 
 from gateway.devices import DeviceProfile, cell_device, cell_host
+from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample, Garbage, Quality, RepeatedSample
+from gateway.devices.rehearsal import rehearse
 from tests.profile_files import load_device
 
 DSC = load_device("mantracourt-dsc")
@@ -91,3 +93,46 @@ def test_the_simulated_amplifier_knows_its_question_and_answers(profile: DeviceP
         (found,) = host.receive(device.frame(force_n), 0.0)
         assert isinstance(found, ForceSample)
         assert found.force_n == pytest.approx(force_n, abs=0.6 * host.resolution_n)
+
+
+MARK_10 = replace(  # Series 4, page 16: an operator may switch the unit at the gauge
+    DSC,
+    terminator="\r\n",
+    question_terminator="\r",
+    constants={},
+    read_force=ForceReading(ask="?", frame="{force:g} {unit:N|lbF|kgF|gF}", unit="N"),
+)
+SELLETON = replace(  # SL-7515, page 12, whose print has its unit in capitals
+    DSC,
+    terminator="\r\n",
+    constants={},
+    read_force=ForceReading(
+        ask="R",
+        frame="{status:ST|US|OL}, {mode:GS|NT}{force:+6.2f}{unit:KG|LB}",
+        quality={"ST": Quality.OK, "US": Quality.UNSTABLE, "OL": Quality.OVERLOAD},
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("profile", "line", "found"),
+    [
+        (MARK_10, b"-18.78 lbF\r\n", sample(-18.78, -83.5376020)),
+        (MARK_10, b"4.285 N\r\n", sample(4.285, 4.285)),
+        (MARK_10, b"1.5 kgF\r\n", sample(1.5, 14.709975)),
+        (MARK_10, b"150 gF\r\n", sample(150.0, 1.4709975)),
+        (MARK_10, b"0.30 ozF\r\n", Garbage(b"0.30 ozF\r\n")),
+        (SELLETON, b"ST, GS+ 5.12KG\r\n", sample(5.12, 50.2100480)),
+        (SELLETON, b"US, GS- 5.12LB\r\n", sample(-5.12, -22.7748947, Quality.UNSTABLE)),
+    ],
+)
+def test_a_unit_is_read_as_the_device_spells_it(profile: DeviceProfile, line: bytes, found: object) -> None:
+    assert list(rehearse(profile)) == []
+    assert cell_host(profile).receive(line, 0.0) == [found]
+
+
+def test_a_simulated_device_says_its_unit_in_its_own_word() -> None:
+    assert cell_device(MARK_10).frame(-2.5) == b"-2.5 N\r\n"
+    in_pounds = replace(MARK_10, read_force=replace(MARK_10.reading, unit="lb"))
+    assert cell_device(in_pounds).frame(1.5 * 4.4482216152605) == b"1.5 lbF\r\n"
+    assert cell_device(SELLETON).frame(9.80665) == b"ST, GS +1.00KG\r\n"

@@ -27,7 +27,7 @@ class ModbusCellHost(TemplateCellHost):
     def _raw(self, values: dict[str, Value]) -> float:
         weight = float(values[FORCE]) / 10.0**self._registers.decimals
         negative = self._registers.negative
-        return -weight if negative and _is_set(negative, values) else weight
+        return -abs(weight) if negative and _is_set(negative, values) else weight  # a signed one may say it twice
 
     def _quality(self, raw: float, values: dict[str, Value]) -> Quality:
         if any(_is_set(bit, values) for bit in self._registers.overload):

@@ -12,7 +12,7 @@ from gateway.devices.binary.rtu_framing import quiet_s
 from gateway.devices.device_checks.spelling import CheckSpelling
 from gateway.devices.device_checks.watchdog import WatchdogState
 from gateway.devices.fields import Choice, Field, Text, Value, ValueRefused
-from gateway.devices.force_reading import FORCE, MINUS, SIGN, STATUS, UNIT, ForceReading, units_of
+from gateway.devices.force_reading import FORCE, MINUS, SIGN, STATUS, UNIT, ForceReading, unit_meant, units_of
 from gateway.devices.framing import Line, LineSplitter
 from gateway.devices.grammar import Grammar
 from gateway.devices.messages import ForceSample, Garbage, Quality, RepeatedSample
@@ -148,7 +148,7 @@ class TemplateCellHost:
         return -number if is_negative else number
 
     def _newtons(self, raw: float, values: dict[str, Value]) -> float:
-        per_unit = NEWTON_PER_UNIT[str(values[UNIT]).strip()] if UNIT in values else self._newton_per_unit
+        per_unit = NEWTON_PER_UNIT[unit_meant(str(values[UNIT]))] if UNIT in values else self._newton_per_unit
         return self._sign * (raw - self._reading.zero_count) * per_unit
 
     def _quality(self, raw: float, values: dict[str, Value]) -> Quality:

@@ -10,8 +10,8 @@ from typing import Final
 
 from gateway.devices.binary.rtu_framing import answers, exception_text
 from gateway.devices.binary.weight_registers import WeightRegisters
-from gateway.devices.fields import Field
-from gateway.devices.force_reading import FORCE, UNIT, units_of
+from gateway.devices.fields import Choice, Field
+from gateway.devices.force_reading import FORCE, UNIT
 from gateway.devices.framing import Line
 from gateway.devices.grammar import Grammar
 from gateway.devices.profile import TEMPLATE, DeviceProfile, DeviceRole
@@ -99,7 +99,7 @@ def _other_unit(frame: Template, body: bytes) -> tuple[str, str] | None:
     if at is None:
         return None
     piece = frame.pieces[at]
-    words = (str(piece).strip(),) if isinstance(piece, str) else units_of(piece)
+    words = [word.strip() for word in (piece.words if isinstance(piece, Choice) else (str(piece),))]
     around = [_pattern(one) if k != at else r" *([A-Za-z]{1,4}) *" for k, one in enumerate(frame.pieces)]
     found = re.fullmatch(join_patterns(frame.pieces, around).encode("ascii"), body)
     other = found[1].decode("ascii") if found else words[0]

@@ -147,3 +147,12 @@ def test_a_number_in_quotes_is_told_so() -> None:
     """It was `19200 is not one of ..., 19200, ...; did you mean 19200?`."""
     (fault,) = told(("baud: 19200", 'baud: "19200"'))
     assert fault.endswith('serial.baud: "19200" is text: write 19200 (take the quotes away)')
+
+
+@pytest.mark.parametrize("codec", ["modbus-tcp", "Modbus TCP"])
+def test_modbus_tcp_of_a_device_is_told_to_be_none(codec: str) -> None:
+    """It was told to be Modbus RTU, by which a serial port was looked for that a coupler with Ethernet alone has not."""
+    setting = "set_voltage: {modbus: {function: 6, register: 0}, range: {device: [0, 10000], voltage_v: [0, 10]}}\n"
+    about = RELAY.split("set_valve")[0].replace("role: valve", "role: output")
+    (fault,) = told(("codec: modbus-rtu", f"codec: {codec}"), source=about + setting)
+    assert "Modbus TCP is not spoken to devices, which are on serial lines" in fault

@@ -165,6 +165,14 @@ def test_a_real_rig_needs_its_two_ports_and_two_different_ones(tmp_path: Path) -
     assert named == ['output.port: "ttyUSB0" is not the path of a device, such as /dev/serial/by-id/usb-...']
 
 
+@pytest.mark.parametrize("port", ["192.168.1.127:502", "socket://moxa:4001", "10.0.0.5", "nport.cell:950"])
+def test_a_device_that_has_ethernet_is_told_what_it_needs(port: str, tmp_path: Path) -> None:
+    line = next(line for line in CELL.splitlines() if line.startswith("  port: /dev/"))
+    (told,) = messages(report(tmp_path, CELL, (line, f'  port: "{port}"')).faults)
+    assert told.startswith(f'output.port: "{port}" is not the path of a device')
+    assert "what has Ethernet needs a serial server whose driver makes a port here" in told
+
+
 def test_the_shipped_rigs_have_no_fault_and_the_demo_no_warning() -> None:
     assert check_report("demo").faults == check_report("demo").warnings == ()
     cell = check_report("irc5-cell")

@@ -132,7 +132,7 @@ def drawn_cell(rng: Random) -> Profile:
     if rng.random() < 0.2:
         frame = frame.replace("{force:", "{sign: |-}{force:").replace("{force:+", "{force:")
     if rng.random() < 0.4:
-        frame += rng.choice(["{unit:kg|lb|g|N}", "{unit: kg|  N}"])
+        frame += rng.choice(["{unit:kg|lb|g|N}", "{unit: kg|  N}", " {unit:KG|lbF|gf|N}"])
     frame += rng.choice(["", "", " {serial:04X}", " {remark:6s}", ";{count:d}"])
     reading["frame"] = frame
     _maybe(rng, reading, "unit", rng.choice(["N", "N", "kg", "g", "lb"]), 0.7)

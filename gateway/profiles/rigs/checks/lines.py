@@ -1,6 +1,7 @@
 """Whether the two serial lines of a rig fit: the right device at each end, and stable ports. How fast they are: wires."""
 
 import os
+import re
 from collections.abc import Iterator
 from typing import Final
 
@@ -18,6 +19,7 @@ UNSTABLE: Final = "may be another adapter after a replug: `force-gateway ports` 
 
 NO_PORT: Final = "is missing: `force-gateway ports` lists what is plugged in"
 SIMULATED_PORT: Final = "a simulated rig has no ports: delete this line, or write `simulated: false`"
+_HOST: Final = re.compile(r"://|:\d+$|^\d+(\.\d+){3}$")  # an address of the network, with a port or without
 _POLLED_S: Final = 0.3  # three questions of an idle line: what a watchdog that any sentence feeds must outlast
 _ROLES: Final = {"output": DeviceRole.OUTPUT, "load_cell": DeviceRole.LOAD_CELL}
 _ARTICLE: Final = {DeviceRole.OUTPUT: "an output", DeviceRole.LOAD_CELL: "a load cell", DeviceRole.VALVE: "a valve"}
@@ -64,7 +66,11 @@ def why_no_path(port: str) -> str:
     if PLACEHOLDER.search(port):
         cure = "put your adapter's path here, `force-gateway ports` lists them"
         return f"{port} is a placeholder: {cure}"
-    return "" if port.startswith("/") else f'"{port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
+    if port.startswith("/"):
+        return ""
+    wanted = f'"{port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
+    cure = "a device is on a serial line, and what has Ethernet needs a serial server whose driver makes a port here"
+    return f"{wanted}: {cure}" if _HOST.search(port) else wanted
 
 
 def is_same_port(one: str | None, other: str | None) -> bool:
