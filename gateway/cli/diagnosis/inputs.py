@@ -21,6 +21,7 @@ from gateway.profiles.kinds.plants import PlantProfile, load_shipped_plant
 from gateway.recording import Recording, find_recording, read_table
 from gateway.recording.calibrations_used import tell_changes
 from gateway.recording.measurement import measurement_of
+from gateway.recording.tables.column_names import SENT
 from gateway.recording.tables.mapping_file import column_mapping
 from gateway.service.fitting.recorded_rig import is_rehearsal, plant_of, recorded_noise_n, rig_of, rig_texts
 from gateway.twin.plant import values
@@ -92,7 +93,7 @@ def read_sources(
         plant=plant,
         rig=rig_name,
         known_rig=here,
-        notes=(*notes, *unknown, *_changes_of_calibration(recordings)),
+        notes=(*notes, *unknown, *_changes_of_calibration(recordings), *_unknown_settings(recordings)),
         calibration_noise_n=noise_n,
         late_s=_WIRE_S if all(map(_of_gateway, recordings)) else 0.0,
         quantum_n=_quantum_n(here) if all(map(_of_gateway, recordings)) else 0.0,
@@ -160,6 +161,16 @@ def _calibration_noise(
 def _changes_of_calibration(recordings: Sequence[Recording]) -> list[str]:
     told = [(each.path.name, tell_changes(each)) for each in recordings]
     return [f"{name}: {changes}" for name, changes in told if changes]
+
+
+def _unknown_settings(recordings: Sequence[Recording]) -> list[str]:
+    """Return a sentence for each of a gateway's own recordings that does not hold what went out, and when."""
+    return [
+        f"{each.path.name} has no {' and '.join(SENT)}: it is replayed with what was wanted and not with what the device was "
+        "sent, so a cause of some tenths of a newton may be that; a new recording holds both"
+        for each in recordings
+        if _of_gateway(each) and not set(SENT) <= set(each.columns)
+    ]
 
 
 def _load_rig(name: str) -> "Rig":

@@ -145,13 +145,22 @@ class JsonLineServer:
         except OSError as error:
             return error.strerror or str(error)
 
+    def _look(self) -> str | None:
+        """As above, and the way is free where a dead socket stands in it: it came back with a folder that was moved away."""
+        why = self._why_lost()
+        if not why or not _is_dead(self._path):
+            return why
+        with contextlib.suppress(OSError):
+            self._path.unlink()
+        return None
+
     def _look_at_file(self) -> None:
         """In a thread: of a network's folder whose server is away the mere question has no end, and the loop would stand."""
         if self._is_looking:
             return
         self._is_looking = True
         looking = DiskWorker()
-        looking(self._why_lost, self._on_looked)
+        looking(self._look, self._on_looked)
         looking.close()
 
     def _on_looked(self, why: str | BaseException | None) -> None:
@@ -298,3 +307,14 @@ class JsonLineServer:
         if too_much := why_too_large(request):
             return error_answer(too_much)
         return handler(request)
+
+
+def _is_dead(path: Path) -> bool:
+    """Is this a socket without a listener? Nobody can listen on it any more: whoever binds makes a file of his own."""
+    with socket.socket(socket.AF_UNIX) as caller:
+        caller.setblocking(False)  # of one that has no room it is told at once
+        try:
+            caller.connect(str(path))
+        except OSError as error:
+            return error.errno == errno.ECONNREFUSED and path.is_socket()
+    return False

@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from gateway.cli.diagnosis.inputs import read_sources
 from gateway.cli.main import command
+from gateway.recording import Recording
+from gateway.recording.export import export_csv
 
 _ONLY_FOR_RIGS = ("gateway.control.controller", "gateway.profiles.rigs.rig_file", "gateway.devices.codecs")
 _ONLY_FOR_SOME = ("scipy", "asyncio", "gateway.reports.diagnosis.page", "gateway.service.closed_loop.study")
@@ -65,3 +68,26 @@ def test_a_machine_at_rest_is_none_to_compare_with(old: tuple[str, ...], tmp_pat
     is_refused = old == ("still.csv",)
     assert answer.exit_code == (65 if is_refused else 0), answer.output
     assert ("E403 still.csv: the command does not move" in answer.stderr) is is_refused
+
+
+@pytest.mark.parametrize(
+    ("header", "names", "is_told"),
+    [
+        ({"rig_texts": {"demo.yaml": "name: demo"}}, (), True),
+        ({"rig_texts": {"demo.yaml": "name: demo"}}, ("sent_v",), True),
+        ({"rig_texts": {"demo.yaml": "name: demo"}}, ("sent_v", "sent_age_s"), False),
+        ({}, (), False),
+    ],
+)
+def test_a_gateways_recording_without_what_was_sent_says_that_its_names_may_be_that(
+    header: dict[str, Any], names: tuple[str, ...], is_told: bool, tmp_path: Path
+) -> None:
+    """Without these columns the model is driven by what was wanted: one recording had four causes by it, and no word of why."""
+    time_s = np.arange(400) * 0.01
+    columns = {"time_s": time_s, "command_v": 2.0 + np.sin(time_s), "force_n": 17.0 + np.sin(time_s)}
+    columns |= {name: columns["command_v"] if name == "sent_v" else np.full(400, 0.001) for name in names}
+    export_csv(Recording(tmp_path / "run.csv", header, columns, 400, truncated=False), tmp_path / "run.csv")
+    notes = read_sources([str(tmp_path / "run.csv")], rig="demo", columns=None, state=tmp_path).notes
+    told = [note for note in notes if "run.csv has no sent_v and sent_age_s" in note]
+    assert bool(told) == is_told
+    assert not told or "what was wanted" in told[0]

@@ -96,18 +96,39 @@ def test_what_stands_in_its_place_is_told_once_and_stays(tmp_path: Path) -> None
     assert path.read_text() == "somebody else's"
 
 
-def test_a_later_socket_of_another_gateway_is_not_taken_for_its_own(tmp_path: Path) -> None:
+def test_a_dead_socket_that_came_back_with_its_folder_gives_way(tmp_path: Path) -> None:
+    """Of a state directory that was moved away while control was restarted, and back: `another file has its name`, and no tool
+    and no page found the gateway any more."""
     path = tmp_path / "state" / "control.sock"
 
     async def scene(said: asyncio.Queue[str]) -> None:
-        shutil.rmtree(path.parent)
-        path.parent.mkdir()
-        with socket.socket(socket.AF_UNIX) as other:
-            other.bind(str(path))
-            assert "another file has its name" in await said.get()
+        path.parent.rename(tmp_path / "away")
+        (tmp_path / "away" / path.name).unlink()
+        with socket.socket(socket.AF_UNIX) as before:
+            before.bind(str(tmp_path / "away" / path.name))
+            before.listen()
+        (tmp_path / "away").rename(path.parent)
+        while "it is served again" not in await said.get():
+            pass
+        assert await answer(path)
 
     beside_a_server(path, scene)
-    assert path.is_socket()
+
+
+def test_a_later_socket_of_another_gateway_is_not_taken_for_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "state" / "control.sock"
+    with socket.socket(socket.AF_UNIX) as other:
+
+        async def scene(said: asyncio.Queue[str]) -> None:
+            shutil.rmtree(path.parent)
+            path.parent.mkdir()
+            other.bind(str(path))
+            other.listen()
+            assert "another file has its name" in await said.get()
+            await asyncio.sleep(4 * OFTEN.idle_s)
+
+        beside_a_server(path, scene)
+        assert path.is_socket()
 
 
 def test_a_disk_that_does_not_say_where_the_file_is_holds_up_nobody(
