@@ -32,22 +32,27 @@ STAGING: Final = (
     "order falling_b_0 blend_span length crc32 target_slot commit commit_status failing_index failing_reason slip_stops"
 ).split()
 ACTIVE: Final = ("order", "falling_b_0", "blend_span", "crc32", "slip_stops")
-PROOF_BLOCK: Final = ("byte_order_echo", "map_hash")
+PROOF_BLOCK: Final = ("byte_order_echo", "map_hash", "self_test_result", "self_test_noise")
+SELF_TEST: Final = "self_test_"
+"""What the names of a self-test's registers begin with: its result, its number, and what it found of each item."""
 NEEDED: Final = {"command": COMMAND, "status": STATUS, "staging": STAGING, "active": ACTIVE, "proof": PROOF_BLOCK}
 """Block -> registers that the clients name."""
 
 REQUESTED: Final = "force_requested"
 """What the gateway was asked for last: another program at a client's address owns the setpoint as well."""
 
-NAMED: Final = ("fault_code", "refusal_reason", "warning_word", "state", "failing_reason", "commit_status")
-"""Registers whose numbers or bits the clients say in words."""
+NAMED: Final = {
+    **dict.fromkeys(("fault_code", "refusal_reason", "warning_word", "state"), "status"),
+    **dict.fromkeys(("failing_reason", "commit_status"), "staging"),
+    **dict.fromkeys(("self_test_result", "self_test_noise"), "proof"),
+}
+"""Registers whose numbers or bits the clients say in words -> block. The verdicts on all items are as that on noise."""
 COMMIT_ENDS: Final = ("committed", "failed")
 
 _WITH_NUMBERS: Final = ("status", "staging", "active")
 """Blocks with numbers of two words that the clients read or write, all high word first."""
-CONTROL_BITS: Final = ("enable", "reset_fault", "tare", "take_ownership", "valve_pull")
+CONTROL_BITS: Final = ("enable", "reset_fault", "tare", "take_ownership", "valve_pull", "start_self_test")
 _STARTS: Final = ("enable", "start_calibration", "start_self_test")
-"""Bits that press from their rise on until the gateway switches off."""
 STATUS_BITS: Final = {
     "enabled": "is_enabled",
     "ready": "is_ready",
@@ -124,7 +129,7 @@ class ExchangeTable:
                 yield from (f"value {end} of {name}" for end in COMMIT_ENDS if end not in register.values.values())
 
     def _named(self, name: str) -> Register:
-        return self.at(name, "staging" if name in ("failing_reason", "commit_status") else "status")
+        return self.at(name, NAMED[name])
 
     def at(self, name: str, block: str) -> Register:
         """Return a register of a block. Raises UnknownRegister."""
@@ -139,6 +144,27 @@ class ExchangeTable:
     def status(self) -> tuple[Register, ...]:
         """The status block's registers, by address."""
         return self.map.registers_of("status")
+
+    @cached_property
+    def self_test(self) -> tuple[Register, ...]:
+        """The words that a self-test leaves, by address."""
+        return tuple(one for one in self.map.registers_of("proof") if one.name.startswith(SELF_TEST))
+
+    @property
+    def starts(self) -> int:
+        """Bits of control_word that press from their rise on until the gateway switches off."""
+        return sum(1 << bit for bit, name in self.map.find("control_word").bits.items() if name in _STARTS)
+
+    @property
+    def test_words(self) -> dict[str, int]:
+        """Return {what it is of: place among those words}."""
+        first = self.self_test[0].address
+        return {one.name.removeprefix(SELF_TEST): one.address - first for one in self.self_test}
+
+    @property
+    def test_items(self) -> dict[str, int]:
+        """Return those of the words that are a verdict on an item."""
+        return {name: place for name, place in self.test_words.items() if name not in ("result", "count")}
 
     @property
     def command_span(self) -> tuple[int, int]:
@@ -232,6 +258,9 @@ class ExchangeTable:
             "echo_number": f"{PROOF:g}",
             "echo_first": echo.address,
             "hash_first": found.address,
+            "test_first": span_of(self.self_test)[0],
+            "test_words": span_of(self.self_test)[1],
+            "test_result": self.test_words["result"],
         }
         data = {"echo": pack_number("float32", WordOrder.ABCD, PROOF), "hash": found.encode(self.map.map_hash)}
         for name, pair in data.items():
@@ -278,8 +307,7 @@ class ExchangeTable:
         masks: dict[str, object] = {}
         for prefix, word in (("bit", "control_word"), ("flag", "status_word")):
             masks |= {f"{prefix}_{name}": 1 << bit for bit, name in self.map.find(word).bits.items()}
-        starts = sum(1 << bit for bit, name in self.map.find("control_word").bits.items() if name in _STARTS)
-        return {**masks, "starts": f"0x{starts:04X}"}
+        return {**masks, "starts": self.starts}
 
 
 def _limit(newton: float) -> str:

@@ -55,12 +55,17 @@ class GatewayAtHand:
     def obey(self, command: Command) -> None:
         if ControlBit.RESET_FAULT in command.control_word:
             self.fault = FaultCode.NONE
+        was_testing = self.is_testing
         self.is_testing = ControlBit.START_SELF_TEST in command.control_word
+        if was_testing and not self.is_testing:
+            self.bank.self_test.show(7, SelfTestResult.STOPPED, {})
         self.publish(command.force_setpoint_n, on=bool(command.control_word & STARTS))
 
     def decide(self, proposal: ProposedWrite) -> EdgeRefusal | None:
         if self.fault and ControlBit.ENABLE in proposal.command.control_word:
             return EdgeRefusal(RefusalReason.FAULT_LATCHED, ControlBit.ENABLE, "a fault is latched")
+        if self.is_testing and proposal.command.control_word & (ControlBit.ENABLE | ControlBit.TARE):
+            return EdgeRefusal(RefusalReason.BUSY, ControlBit.ENABLE, "a self-test has the output")
         is_asked = bool(proposal.command.control_word & ~self.bank.command.control_word & ControlBit.START_SELF_TEST)
         if is_asked and self.bank.command.control_word & ControlBit.ENABLE:
             return EdgeRefusal(RefusalReason.SELF_TEST_REFUSED, ControlBit.START_SELF_TEST, "a force is held")

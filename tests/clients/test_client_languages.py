@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.registers.words import SelfTestResult
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.controllers import Irc5
 from tests.clients.programs.machine import Machine
@@ -88,10 +89,16 @@ def test_every_rapid_routine_runs_and_declares_what_it_uses() -> None:
     client.cycle()
     client.force(400.0)
     client.cycle()
+    client.reset()
+    cycles(client, 2)
+    client.self_test()
+    cycles(client, 2)
+    gateway.end_self_test(SelfTestResult.PASSED)
+    client.cycle()
     client.machine.start("FgTimerStart")
     client.machine.start("FgTick")
     client.machine.start("FgTimerStop")
-    for name in ("FgFaultText", "FgRefusalText", "FgWarningText", "FgFailingText", "FgStateText"):
+    for name in ("FgFaultText", "FgRefusalText", "FgWarningText", "FgFailingText", "FgStateText", "FgVerdictText"):
         client.machine.start(name, 1)
     client.machine.start("FgCrcIsRight")
     gateway.is_cut = True

@@ -148,6 +148,20 @@ def test_a_disable_at_any_place_of_an_exchange_takes_the_force_off(language: str
         assert gateway.bank.command.control_word == 0 and not client.enabled and not client.ended
 
 
+@pytest.mark.parametrize("act", ["tare", "enable", "self-test"])
+def test_what_a_robot_asks_for_while_its_gateway_is_being_lost_is_not_done_later(act: str) -> None:
+    """Set behind the place where a loss forgets the edges, and before it says that it is one, a tare went out seconds later."""
+    acts = {"tare": lambda client: client.tare(), "self-test": lambda client: client.self_test()}
+
+    def prepare(client: Any, gateway: GatewayAtHand) -> None:
+        cycles(client, 2)
+        gateway.is_cut = True
+
+    for client, gateway in every_place("urscript", prepare, [acts.get(act, lambda client: client.enable(12.0))]):
+        asked = [words[0] for words in gateway.words if words[0]]
+        assert asked == [] and not client.get("fg_is_on"), client.text
+
+
 @pytest.mark.parametrize("late", [1, 3, 5])
 def test_an_enable_right_behind_a_start_of_the_program_waits_for_its_timer(late: int, gateway: GatewayAtHand) -> None:
     """A breakpoint before it, or a stop: the timer interrupt of T_ROB1 comes up to 0.1 s behind that line, which was told

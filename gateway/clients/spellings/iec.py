@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from gateway.clients.exchange import CONTROL_BITS, STATUS_BITS, ExchangeTable, ModelField
-from gateway.registers.map.register_map import Register, holding_number
+from gateway.registers.map.register_map import Register, holding_number, span_of
 
 _SET_BY_THE_BLOCK = ("control_word", "force_setpoint", "heartbeat")
 
@@ -59,6 +59,7 @@ def spell_scl(table: ExchangeTable) -> dict[str, str]:
         "heartbeat": table.at("heartbeat", "command").address,
         "echo": table.at("byte_order_echo", "proof").address,
         "hash": table.at("map_hash", "proof").address,
+        "test": table.self_test[0].address,
         "status": table.status_span[0],
         "stage_a": stage["order"],
         "stage_b": stage["order"] + part_a,
@@ -105,7 +106,12 @@ def _lists(table: ExchangeTable, dialect: _Dialect) -> dict[str, str]:
         "refusal_cases": _cases(table.texts("refusal_reason"), "RefusalText", dialect),
         "warning_cases": _cases(table.texts("warning_word"), "WarningText", dialect),
         "failing_cases": _cases(table.texts("failing_reason"), "FailingText", dialect),
-        "buffer_last": str(max(*table.parts, table.status_span[1]) - 1),
+        "state_cases": _cases(table.texts("state"), "StateText", dialect),
+        "test_result_cases": _cases(table.texts("self_test_result"), "TestResultText", dialect),
+        "verdict_cases": _cases(table.texts("self_test_noise"), "VerdictText", dialect),
+        "test_fields": "\n".join(f"{dialect.member}{name} : {dialect.types['uint']};" for name in table.test_words),
+        "test_decoding": "\n".join(_decode_test(table, dialect)),
+        "buffer_last": str(max(*table.parts, table.status_span[1], span_of(table.self_test)[1]) - 1),
         "set_last": str(table.set_words - 1),
         "part_a_last": str(part_a - 1),
         "part_b_last": str(part_b - 1),
@@ -120,6 +126,7 @@ def _constants(table: ExchangeTable, dialect: _Dialect) -> Iterator[str]:
     states = table.at("commit_status", "staging").values.items()
     masks |= {f"COMMIT_{name}": number for number, name in states if name in ("committed", "failed")}
     word = dialect.types["word"]
+    masks["STARTS"] = table.starts
     yield from (f"{dialect.member}{name.upper()} : {word} := 16#{mask:04X};" for name, mask in masks.items())
 
 
@@ -179,6 +186,12 @@ def _decode(register: Register, table: ExchangeTable, dialect: _Dialect) -> str:
     if _is_scaled_word(register):
         return f"{place}UINT_TO_REAL(WORD_TO_UINT({first})) / {register.counts_per_unit}.0;"
     return f"{place}{first};" if register.bits else f"{place}WORD_TO_UINT({first});"
+
+
+def _decode_test(table: ExchangeTable, dialect: _Dialect) -> Iterator[str]:
+    indent, structure = (" " * 12, "#test") if dialect.local else (" " * 8, "stTest")
+    for name, place in table.test_words.items():
+        yield f"{indent}{structure}.{name} := WORD_TO_UINT({dialect.arrays[1]}[{place}]);"
 
 
 def _encode_field(each: ModelField, dialect: _Dialect) -> Iterator[str]:

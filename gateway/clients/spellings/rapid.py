@@ -2,7 +2,7 @@
 
 from gateway.clients.exchange import STATUS_BITS, ExchangeTable
 from gateway.clients.spellings.crc_table import crc_table
-from gateway.registers.map.register_map import Register
+from gateway.registers.map.register_map import Register, span_of
 
 PER_LINE = 4
 
@@ -28,6 +28,10 @@ def spell_rapid(table: ExchangeTable) -> dict[str, str]:
         "warning_cases": _cases(table.texts("warning_word")),
         "failing_cases": _cases(table.texts("failing_reason")),
         "state_cases": _cases(table.texts("state")),
+        "test_constants": _constants({f"FG_T_{name}": place + 1 for name, place in table.test_words.items()}),
+        "test_zeros": _zeros(span_of(table.self_test)[1]),
+        "test_result_cases": _cases(table.texts("self_test_result")),
+        "verdict_cases": _cases(table.texts("self_test_noise")),
     }
 
 

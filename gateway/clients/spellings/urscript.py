@@ -2,6 +2,7 @@
 
 from gateway.clients.exchange import REQUESTED, STATUS_BITS, ExchangeTable
 from gateway.clients.spellings.crc_table import crc_table
+from gateway.registers.map.register_map import span_of
 
 
 def spell_urscript(table: ExchangeTable) -> dict[str, str]:
@@ -40,6 +41,19 @@ def spell_urscript(table: ExchangeTable) -> dict[str, str]:
         "refusal_cases": _cases(table.texts("refusal_reason"), "reason"),
         "warning_cases": _cases(table.texts("warning_word"), "bit"),
         "failing_cases": _cases(table.texts("failing_reason"), "reason"),
+        "state_cases": _cases(table.texts("state"), "number"),
+        **_spell_self_test(table),
+    }
+
+
+def _spell_self_test(table: ExchangeTable) -> dict[str, str]:
+    words = span_of(table.self_test)[1]
+    return {
+        "test_constants": _globals({f"FG_T_{name}": place for name, place in table.test_words.items()}),
+        "test_zeros": _zeros(words),
+        "test_bytes": str(2 * words),
+        "test_result_cases": _cases(table.texts("self_test_result"), "result"),
+        "verdict_cases": _cases(table.texts("self_test_noise"), "verdict"),
     }
 
 

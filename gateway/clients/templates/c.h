@@ -77,6 +77,17 @@ enum {
 ${commit_states}
 };
 
+/* The words that a self-test leaves: its result, its number, a verdict on each item. */
+enum {
+    FG_TEST_FIRST = ${test_first}, FG_TEST_WORDS = ${test_words},
+${test_offsets}
+};
+
+/* of FG_TEST_RESULT */
+enum {
+${test_results}
+};
+
 /* The status block, decoded: int16 words in their unit, NaN where the gateway has no value. */
 typedef struct fg_status {
 ${status_fields}
@@ -130,6 +141,10 @@ void fg_pull(fg_client *client, int pulls);           /* instead of pushing, on 
 void fg_reset_fault(fg_client *client);               /* disables, too: a reset needs force 0 */
 void fg_tare(fg_client *client);
 void fg_take_ownership(fg_client *client);
+void fg_self_test(fg_client *client);                 /* begins the rig's self-test, which presses; disables, for it begins at
+                                                         force 0. fg_disable ends it sooner */
+int fg_is_testing(const fg_client *client);           /* asked for, or runs: call fg_exchange; 0 behind a refusal, a fault, a loss */
+int fg_read_self_test(fg_client *client, uint16_t words[FG_TEST_WORDS]); /* what the last one has found */
 void fg_close(fg_client *client);
 
 const char *fg_fault_text(uint16_t code);
@@ -137,6 +152,9 @@ const char *fg_refusal_text(uint16_t reason);
 const char *fg_warning_text(int bit);
 const char *fg_failing_text(uint16_t reason);
 const char *fg_state_text(uint16_t state);
+const char *fg_test_result_text(uint16_t result);     /* of words[FG_TEST_RESULT] */
+const char *fg_test_item_text(int word);              /* of a word of fg_read_self_test; empty where it is no verdict */
+const char *fg_verdict_text(uint16_t verdict);
 
 uint32_t fg_crc32(const uint8_t *bytes, size_t count); /* zlib's; of "123456789" it is 0xCBF43926 */
 int fg_stage(fg_client *client, const fg_model *model, uint16_t slot);
@@ -521,7 +539,7 @@ static int fg_prove_byte_order(fg_client *client) {
 /* Behind a refusal the last accepted command goes on; a disable beside what was refused goes out alone, at once. */
 static int fg_go_on(fg_client *client) {
     uint8_t frame[FG_FRAME];
-    int was_on = client->good[FG_CONTROL_WORD] & FG_STARTS, stays_on = client->want[FG_CONTROL_WORD] & FG_STARTS, result;
+    int was_on = client->good[FG_CONTROL_WORD] & FG_STARTS, stays_on = was_on & client->want[FG_CONTROL_WORD], result;
     if (!was_on) client->good[FG_FORCE_SETPOINT] = 0;
     memcpy(client->want, client->good, sizeof client->want);
     client->once = 0;
@@ -556,7 +574,10 @@ int fg_exchange(fg_client *client) {
     }
     /* Behind a loss OFF goes alone: what is asked for since then waits, for its refusal would be that of OFF. */
     memcpy(sent, client->off_pending ? client->good : client->want, sizeof sent);
-    if (client->once & FG_RESET_FAULT) sent[FG_CONTROL_WORD] = sent[FG_FORCE_SETPOINT] = 0; /* an enable behind it waits */
+    /* A reset needs force 0, a self-test as well: an enable behind the one, and the other behind an enable, wait. */
+    if (client->once & FG_RESET_FAULT ||
+        (client->good[FG_CONTROL_WORD] & FG_ENABLE && sent[FG_CONTROL_WORD] & FG_STARTS & ~FG_ENABLE))
+        sent[FG_CONTROL_WORD] = sent[FG_FORCE_SETPOINT] = 0;
     memcpy(command, sent, sizeof command);
     if (!client->off_pending) command[FG_CONTROL_WORD] |= client->once;
     /* Not the one that stands there, of an earlier start of this program, say: a reset wants a new one. */
@@ -641,6 +662,19 @@ void fg_reset_fault(fg_client *client) {
 void fg_tare(fg_client *client) { client->once |= FG_TARE; }
 
 void fg_take_ownership(fg_client *client) { client->once |= FG_TAKE_OWNERSHIP; }
+
+void fg_self_test(fg_client *client) {
+    fg_disable(client);
+    client->want[FG_CONTROL_WORD] = FG_START_SELF_TEST;
+}
+
+int fg_is_testing(const fg_client *client) {
+    return ((client->want[FG_CONTROL_WORD] | client->good[FG_CONTROL_WORD]) & FG_START_SELF_TEST) != 0;
+}
+
+int fg_read_self_test(fg_client *client, uint16_t words[FG_TEST_WORDS]) {
+    return fg_read(client, FG_TEST_FIRST, FG_TEST_WORDS, words);
+}
 
 /* Forgets what was commanded, too: whoever connects again later has to ask for force again. */
 void fg_close(fg_client *client) {
@@ -749,6 +783,27 @@ const char *fg_state_text(uint16_t state) {
     switch (state) {
 ${state_cases}
     default: return "unknown state";
+    }
+}
+
+const char *fg_test_result_text(uint16_t result) {
+    switch (result) {
+${test_result_cases}
+    default: return "unknown result";
+    }
+}
+
+const char *fg_test_item_text(int word) {
+    switch (word) {
+${test_item_cases}
+    default: return "";
+    }
+}
+
+const char *fg_verdict_text(uint16_t verdict) {
+    switch (verdict) {
+${verdict_cases}
+    default: return "unknown verdict";
     }
 }
 

@@ -57,6 +57,12 @@ MODULE ForceGateway
   !    CONNECT irEnded WITH MyTrap;  IPers fgEnded,irEnded;
   ! and in MyTrap: IF fgEnded StopMove;
   ! After a fault: fgReset:=TRUE, which goes FALSE when it is sent.
+  ! The rig's self-test, which presses, while nothing is enabled:
+  !    fgSelfTest:=TRUE;             ! FALSE again ends it sooner
+  !    WaitUntil NOT fgSelfTest;
+  ! Then fgTested is TRUE, or fgText says why not; what was found:
+  !    TPWrite FgResultText(fgTest{FG_T_RESULT});
+  !    TPWrite "leak: "+FgVerdictText(fgTest{FG_T_LEAK});
   ! fgInBand goes TRUE when what fgForce asks for is held; what was
   ! held before it forgets with the next cycle only: set it FALSE.
   ! It stays FALSE while another program at this address has set
@@ -97,6 +103,8 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   PERS bool fgTake:=FALSE;
   ! Pull instead of push, on a rig with a directional valve
   PERS bool fgPull:=FALSE;
+  ! Begin the rig's self-test; FALSE again when it has ended
+  PERS bool fgSelfTest:=FALSE;
   ! Counted on by T_ROB1 while its program runs (A)
   PERS num fgAlive:=0;
   ! The other words of the command, in counts: index FG_C_...
@@ -114,6 +122,9 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   PERS num fgStatus{${status_words}}:=[${status_zeros}];
   ! The last refusal, fault or loss in words
   PERS string fgText:="";
+  ! The self-test has come to its end; what it found: index FG_T_...
+  PERS bool fgTested:=FALSE;
+  PERS num fgTest{${test_words}}:=[${test_zeros}];
 
   ! ---- upload of a model --------------------------------------------
   ! FgModelClear, FgModelCount, FgModelNumber and FgModelArray fill it
@@ -136,6 +147,9 @@ ${command_constants}
 
   ! ---- places in fgStatus -------------------------------------------
 ${status_constants}
+
+  ! ---- places in fgTest ---------------------------------------------
+${test_constants}
 
   ! ---- places in fgSet ----------------------------------------------
 ${set_constants}
@@ -214,6 +228,7 @@ ${crc_table}];
   PROC FgTimerStop()
     IDelete irTimer;
     fgEnable:=FALSE;
+    fgSelfTest:=FALSE;
     ! No cycle follows: OFF waits for no back-off, and goes once more
     ! where the connection turns out to be dead
     nBackoff:=0;
@@ -300,6 +315,7 @@ ${crc_table}];
     nWant{FG_C_FORCE_SETPOINT}:=0;
     IF fgReset THEN
       IF FgIsOn() fgEnable:=FALSE;
+      FgDropTest;
       nOnce:=nOnce+FgBitUnless(FG_RESET_FAULT);
       fgReset:=FALSE;
     ENDIF
@@ -312,7 +328,15 @@ ${crc_table}];
       fgTake:=FALSE;
     ENDIF
     ! A reset needs force 0: an enable beside it waits for its answer
+    FgChoose;
     nCounts:=NO_COUNTS;
+    IF fgSelfTest AND FgMayTest() THEN
+      IF NOT FgIsOn() THEN
+        fgText:="";
+        fgTested:=FALSE;
+      ENDIF
+      nWant{FG_C_CONTROL_WORD}:=FG_START_SELF_TEST;
+    ENDIF
     IF fgEnable AND FgMayEnable() nCounts:=FgForceCounts();
     IF nCounts<>NO_COUNTS THEN
       IF NOT FgIsOn() fgText:="";
@@ -324,6 +348,19 @@ ${crc_table}];
     ! Behind a loss OFF goes alone: what is asked for since then waits,
     ! for its refusal would be that of OFF
     IF bOffPending nWant:=nGood;
+  ENDPROC
+
+  ! A force and a self-test: the one that is on goes on, else the force
+  LOCAL PROC FgChoose()
+    IF NOT fgEnable RETURN;
+    IF FgIsTesting() THEN
+      fgEnable:=FALSE;
+      fgEnded:=TRUE;
+      fgText:="a self-test runs: set fgEnable when it has ended";
+    ELSEIF fgSelfTest THEN
+      FgDropTest;
+      fgText:="no self-test beside fgEnable";
+    ENDIF
   ENDPROC
 
   ! What fgForce asks for. Of a force that was refused, or is none, the
@@ -346,16 +383,17 @@ ${crc_table}];
     VAR num nLongest;
     nLongest:=FG_QUIET;
     ! An enable right behind a start waits for the timer of T_ROB1
-    IF fgEnable AND (NOT FgIsOn()) nLongest:=2*FG_QUIET;
+    IF (fgEnable OR fgSelfTest) AND (NOT FgIsOn()) nLongest:=2*FG_QUIET;
     IF fgAlive<>nAlive THEN
       nAlive:=fgAlive;
       nQuiet:=0;
     ELSEIF nQuiet<nLongest THEN
       nQuiet:=nQuiet+1;
-    ELSEIF fgEnable THEN
+    ELSEIF fgEnable OR fgSelfTest THEN
       nQuiet:=FG_QUIET;
+      IF fgEnable fgEnded:=TRUE;
       fgEnable:=FALSE;
-      fgEnded:=TRUE;
+      FgDropTest;
       fgText:="off: T_ROB1 does not count fgAlive";
     ENDIF
   ENDPROC
@@ -363,6 +401,12 @@ ${crc_table}];
   LOCAL FUNC bool FgMayEnable()
     IF FgHasBit(nOnce,FG_RESET_FAULT) RETURN FALSE;
     RETURN FgIsOn() OR nQuiet<FG_QUIET;
+  ENDFUNC
+
+  ! Behind a disable it waits for the answer to that
+  LOCAL FUNC bool FgMayTest()
+    IF FgHasBit(nGood{FG_C_CONTROL_WORD},FG_ENABLE) RETURN FALSE;
+    RETURN FgMayEnable();
   ENDFUNC
 
   ! PackRawBytes takes whole numbers of 16 bits only
@@ -401,7 +445,7 @@ ${crc_table}];
   ! Does enable go out beside a pull or an edge, while it stands?
   LOCAL FUNC bool FgRepeatsEnable()
     IF bOffPending OR (NOT FgIsOn()) RETURN FALSE;
-    IF NOT FgHasBit(nWant{FG_C_CONTROL_WORD},FG_ENABLE) RETURN FALSE;
+    IF nWant{FG_C_CONTROL_WORD}=0 RETURN FALSE;
     RETURN FgHasChanged() AND FgFirstToWrite()=1;
   ENDFUNC
 
@@ -485,7 +529,10 @@ ${crc_table}];
     VAR bool bPulls;
     nOnce:=0;
     ! Never to TRUE: T_ROB1 may have taken it back meanwhile
-    IF NOT FgIsOn() fgEnable:=FALSE;
+    IF NOT FgIsOn() THEN
+      fgEnable:=FALSE;
+      FgDropTest;
+    ENDIF
     IF FgIsOn() AND FgHasBit(nWant{FG_C_CONTROL_WORD},FG_ENABLE) THEN
       IF nWant{FG_C_FORCE_SETPOINT}<>nGood{FG_C_FORCE_SETPOINT} THEN
         nDenied:=nWant{FG_C_FORCE_SETPOINT};
@@ -521,19 +568,44 @@ ${crc_table}];
     IF FgIsOn() AND (NOT fgEnabled) THEN
       IF fgFault fgText:=FgFaultText(fgStatus{FG_S_FAULT_CODE});
       IF NOT fgFault fgText:="disabled by the gateway or another master";
+      IF FgIsTesting() FgReadTest;
       FgForget;
     ENDIF
   ENDPROC
 
-  ! Is enable in the last accepted command?
+  ! Is enable in the last accepted command, or the self-test's bit?
   LOCAL FUNC bool FgIsOn()
-    RETURN FgHasBit(nGood{FG_C_CONTROL_WORD},FG_ENABLE);
+    RETURN FgIsTesting() OR FgHasBit(nGood{FG_C_CONTROL_WORD},FG_ENABLE);
   ENDFUNC
+
+  LOCAL FUNC bool FgIsTesting()
+    RETURN FgHasBit(nGood{FG_C_CONTROL_WORD},FG_START_SELF_TEST);
+  ENDFUNC
+
+  ! What fgTest holds is of an earlier one
+  LOCAL PROC FgDropTest()
+    IF fgSelfTest fgTested:=FALSE;
+    fgSelfTest:=FALSE;
+  ENDPROC
+
+  ! What it has found, before fgSelfTest goes FALSE
+  LOCAL PROC FgReadTest()
+    FgFrameRead ${test_first},${test_words};
+    FgAsk 3;
+    IF nException<>0 RAISE ERR_FG_FRAME;
+    FgTakeWords ${test_words};
+    FOR i FROM 1 TO ${test_words} DO
+      fgTest{i}:=nWords{i};
+    ENDFOR
+    fgTested:=TRUE;
+    fgSelfTest:=FALSE;
+    IF NOT fgFault fgText:="self-test "+FgResultText(fgTest{FG_T_RESULT});
+  ENDPROC
 
   ! Does T_ROB1 ask for just that? Not behind a new fgForce of since
   LOCAL FUNC bool FgIsAsked()
     VAR bool bPulls;
-    IF NOT (fgEnable AND FgIsOn()) RETURN FALSE;
+    IF FgIsTesting() OR (NOT fgEnable) OR (NOT FgIsOn()) RETURN FALSE;
     IF bPullDenied RETURN FALSE;
     bPulls:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
     IF fgPull<>bPulls RETURN FALSE;
@@ -549,10 +621,11 @@ ${crc_table}];
 
   LOCAL PROC FgForget()
     ! fgForce stays: between T_ROB1's two lines it would hold 0 N
-    IF fgEnable OR FgIsOn() THEN
+    IF fgEnable OR FgHasBit(nGood{FG_C_CONTROL_WORD},FG_ENABLE) THEN
       fgEnable:=FALSE;
       fgEnded:=TRUE;
     ENDIF
+    FgDropTest;
     nWant{FG_C_CONTROL_WORD}:=0;
     nWant{FG_C_FORCE_SETPOINT}:=0;
     nGood:=nWant;
@@ -947,6 +1020,24 @@ ${failing_cases}
 ${state_cases}
     DEFAULT:
       RETURN "unknown state";
+    ENDTEST
+  ENDFUNC
+
+  ! nResult: fgTest{FG_T_RESULT}
+  FUNC string FgResultText(num nResult)
+    TEST nResult
+${test_result_cases}
+    DEFAULT:
+      RETURN "unknown result";
+    ENDTEST
+  ENDFUNC
+
+  ! nVerdict: another word of fgTest, but for FG_T_COUNT
+  FUNC string FgVerdictText(num nVerdict)
+    TEST nVerdict
+${verdict_cases}
+    DEFAULT:
+      RETURN "unknown verdict";
     ENDTEST
   ENDFUNC
 ENDMODULE

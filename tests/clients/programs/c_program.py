@@ -37,7 +37,7 @@ def library_of(text: str) -> Any:
         options = ["-shared", "-fPIC", "-O1", "-I", folder, "-o", str(where / "client.so")]
         subprocess.run([compiler, *options, str(GLUE), "-lm"], check=True)
         library = ctypes.CDLL(str(where / "client.so"))
-    for name in ("message", "fault"):
+    for name in ("message", "fault", "fg_test_result_text", "fg_test_item_text", "fg_verdict_text"):
         getattr(library, name).restype = ctypes.c_char_p
     for name in ("make", "make_model"):
         getattr(library, name).restype = ctypes.c_void_p
@@ -57,6 +57,7 @@ class CProgram:
         self._allowed_n = tuple(map(float, re.findall(r"force_n [<>]= (\S+)f", text)))
         self._upload: tuple[Any, int] | None = None
         self._is_committing = False
+        self.found: dict[str, str] = {}
 
     def _ask(self, frame: Any, count: int, answer: Any) -> int:
         try:
@@ -98,6 +99,28 @@ class CProgram:
     def pull(self, *, pulls: bool) -> None:
         self._library.fg_pull(self._client, int(pulls))
 
+    def self_test(self) -> None:
+        self.text, self.found = "", {}
+        self._library.fg_self_test(self._client)
+
+    def end_self_test(self) -> None:
+        self._library.fg_disable(self._client)
+
+    @property
+    def is_testing(self) -> bool:
+        return bool(self._library.fg_is_testing(self._client))
+
+    def _read_self_test(self) -> int:
+        words = (ctypes.c_uint16 * 64)()
+        result = int(self._library.fg_read_self_test(self._client, words))
+        if result == OK:
+            items = {self._library.fg_test_item_text(k).decode(): k for k in range(64)}
+            say = self._library.fg_verdict_text
+            self.found = {"result": self._library.fg_test_result_text(words[0]).decode()}
+            self.found["leak"] = say(words[items["leak"]]).decode()
+            self.text = f"self-test {self.found['result']}"
+        return result
+
     def begin_upload(self, model: dict[str, Any], slot: int) -> None:
         made = ctypes.c_void_p(self._library.make_model())
         lists = [value for name in LISTS for value in (*model[name], *[0.0] * (16 - len(model[name])))]
@@ -107,13 +130,15 @@ class CProgram:
 
     def cycle(self, seconds: float = 0.04) -> None:
         self.now_s += seconds
-        had_ended = self.ended
+        had_ended, was_testing = self.ended, self.is_testing
         self._library.use(self._answer, self._accept, round(self.now_s * 1e3))
         result = self._library.fg_exchange(self._client)
         if result == OK and self._upload:
             result, self._upload, self._is_committing = self._stage(*self._upload), None, True
         elif result == OK and self._is_committing:
             result = self._await_commit()
+        if result == OK and was_testing and not self.is_testing:
+            result = self._read_self_test()
         self.now_s = self._library.time_ms() / 1e3
         if result != OK:
             self.text = "lost: " * (result == LOST) + self._library.message(self._client).decode()

@@ -192,6 +192,25 @@ class Irc5:
     def pull(self, *, pulls: bool) -> None:
         self.set(fgPull=pulls)
 
+    def self_test(self) -> None:
+        self.set(fgSelfTest=True)
+
+    def end_self_test(self) -> None:
+        self.set(fgSelfTest=False)
+
+    @property
+    def is_testing(self) -> bool:
+        return bool(self.get("fgSelfTest"))
+
+    @property
+    def found(self) -> dict[str, str]:
+        """What the last self-test has found, in words; nothing where it did not come to its end."""
+        if not self.get("fgTested"):
+            return {}
+        words = self.get("fgTest")
+        say = lambda name, item: str(self.machine.start(name, words[int(self.get(f"FG_T_{item}")) - 1]))  # noqa: E731
+        return {"result": say("FgResultText", "result"), "leak": say("FgVerdictText", "leak")}
+
     def cycle(self, seconds: float = 0.04) -> None:
         self.now_s += seconds
         self.machine.start("FgCycle")
@@ -298,6 +317,25 @@ class UniversalRobot:
     def pull(self, *, pulls: bool) -> None:
         self.machine.start("fg_pull", pulls)
 
+    def self_test(self) -> None:
+        self.machine.start("fg_self_test")
+
+    def end_self_test(self) -> None:
+        self.disable()
+
+    @property
+    def is_testing(self) -> bool:
+        return bool(self.get("fg_is_testing"))
+
+    @property
+    def found(self) -> dict[str, str]:
+        """What the last self-test has found, in words; nothing where it did not come to its end."""
+        if not self.get("fg_tested"):
+            return {}
+        words = self.get("fg_test")
+        say = lambda name, item: str(self.machine.start(name, words[self.get(f"FG_T_{item}")]))  # noqa: E731
+        return {"result": say("fg_test_result_text", "RESULT"), "leak": say("fg_verdict_text", "LEAK")}
+
     def cycle(self, seconds: float = 0.04) -> None:
         self.machine.start("fg_exchange")
 
@@ -355,7 +393,7 @@ class Plc:
         self.machine.begin()
         self.block = self.machine.fresh(block)
         self.inputs: dict[str, Any] = dict.fromkeys(
-            [self.NAMES[each] for each in ("enable", "reset", "tare", "take", "upload", "pull")], False
+            [self.NAMES[each] for each in ("enable", "reset", "tare", "take", "upload", "pull", "test")], False
         )
         self.inputs[self.NAMES["force"]] = 0.0
         self.structures = {
@@ -380,6 +418,7 @@ class Plc:
             "INT_TO_WORD": values(lambda number: number & 0xFFFF),
             **dict.fromkeys(["INT_TO_REAL", "UINT_TO_REAL"], values(float)),
             "ABS": values(abs),
+            "CONCAT": values(lambda first, second: first + second),
             "REAL_TO_INT": values(real_to_int),
             "REAL_TO_DWORD": values(lambda number: struct.unpack(">I", struct.pack(">f", number))[0]),
             "DWORD_TO_REAL": values(lambda bits: struct.unpack(">f", struct.pack(">I", bits))[0]),
@@ -412,6 +451,32 @@ class Plc:
 
     def pull(self, *, pulls: bool) -> None:
         self.inputs[self.NAMES["pull"]] = pulls
+
+    TEXTS: ClassVar[tuple[str, str]] = ("", "")
+    """Functions that say the result of a self-test, and a verdict."""
+
+    def self_test(self) -> None:
+        self.inputs[self.NAMES["test"]] = False
+        self.scan()
+        self.inputs[self.NAMES["test"]] = True
+        self.scan()
+
+    def end_self_test(self) -> None:
+        self.inputs[self.NAMES["test"]] = False
+        self.scan()
+
+    @property
+    def is_testing(self) -> bool:
+        return bool(self.output("testing"))
+
+    @property
+    def found(self) -> dict[str, str]:
+        """What the last self-test has found, in words; nothing where it did not come to its end."""
+        if not self.output("tested"):
+            return {}
+        words = self.output("words")
+        say = lambda name, item: str(self.machine.start(name, self.machine.member(words, item)))  # noqa: E731
+        return {"result": say(self.TEXTS[0], "result"), "leak": say(self.TEXTS[1], "leak")}
 
     def scan(self) -> None:
         raise NotImplementedError
@@ -526,10 +591,15 @@ class S7(Plc):
 
     CYCLE_S = 0.01
     TYPES = ('"FG_Command"', '"FG_Model"')
+    TEXTS = ("FG_TestResultText", "FG_VerdictText")
     NAMES: ClassVar[dict[str, str]] = {
         **{name: name for name in ("enable", "reset", "force", "upload", "slot", "command", "model", "pull")},
         **{name: name for name in ("tare", "text", "status", "ended", "uploadBusy")},
         "take": "takeOwnership",
+        "test": "selfTest",
+        "testing": "selfTestBusy",
+        "tested": "selfTestDone",
+        "words": "test",
         "uploaded": "uploadDone",
         "failing": "failingIndex",
     }
@@ -556,11 +626,16 @@ class StructuredText(Plc):
     TRANSPORT = ""
 
     TYPES = ("ST_FgCommand", "ST_FgModel")
+    TEXTS = ("F_FgTestResultText", "F_FgVerdictText")
     NAMES: ClassVar[dict[str, str]] = {
         "enable": "bEnable",
         "reset": "bReset",
         "tare": "bTare",
         "take": "bTakeOwnership",
+        "test": "bSelfTest",
+        "testing": "bSelfTestBusy",
+        "tested": "bSelfTestDone",
+        "words": "stTest",
         "force": "fForce",
         "upload": "bUpload",
         "pull": "bPull",

@@ -38,6 +38,7 @@ class PythonProgram:
         )
         self.client = self.module["Client"]()
         self._upload: tuple[dict[str, Any], int] | None = None
+        self.found: dict[str, Any] = {}
 
     def _sleep(self, seconds: float) -> None:
         self.now_s += seconds
@@ -75,14 +76,27 @@ class PythonProgram:
     def pull(self, *, pulls: bool) -> None:
         self.client.pull(pulls)
 
+    def self_test(self) -> None:
+        self.text, self.found = "", {}
+        self.client.self_test()
+
+    def end_self_test(self) -> None:
+        self.client.disable()
+
+    @property
+    def is_testing(self) -> bool:
+        return bool(self.client.is_testing)
+
     def begin_upload(self, model: dict[str, Any], slot: int) -> None:
         self._upload = model, slot
 
     def cycle(self, seconds: float = 0.04) -> None:
         self.now_s += seconds
-        had_ended = self.ended
+        had_ended, was_testing = self.ended, self.is_testing
         try:
             status = self.client.exchange()
+            if was_testing and not self.is_testing:
+                self.found = self.client.read_self_test()
             if self._upload:
                 (model, slot), self._upload = self._upload, None
                 self.client.stage(model, slot)
@@ -97,6 +111,8 @@ class PythonProgram:
                 self.text = self.module["FAULTS"][status["fault_code"]]
             elif self.ended and not had_ended:
                 self.text = "disabled by the gateway or another master"
+            elif self.found and was_testing:
+                self.text = f"self-test {self.found['result']}"
 
     @property
     def enabled(self) -> bool:
