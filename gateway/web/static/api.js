@@ -4,7 +4,7 @@
 //   api.post(path, body)     the same for what changes something; the CSRF token goes with it
 //   api.on(name, listener)   `state` (twice a second), `samples`, `history`, `note`, `gone`, `open`; returns a function that ends it
 //   api.last(name)           what came last under that name, or undefined
-//   api.say(sentence)        tells the user, and a screen reader
+//   api.say(sentence)        tells the user, and a screen reader, for ten seconds; what went wrong, or `stays`, until the next one
 
 const listeners = new Map();
 const latest = new Map();
@@ -13,6 +13,7 @@ const AWAY_MS = 2000;
 const COMMAND_MS = 5000;
 const SILENT_MS = 3000; // a state comes twice a second
 const ANEW_MS = 10000;
+const SAID_MS = 10000;
 const PRESSES = /^\/api\/v1\/(command\/(?!stop)|calibrate\/start)/;
 let csrf = "";
 let source = null;
@@ -21,6 +22,7 @@ let clock = null; // the gateway's, as the last state told it, and when that cam
 let openedAt = 0;
 let isGone = false;
 let comeBack = 0;
+let saidUntil = 0;
 
 export const viewer = (() => {
   // of this browser tab: a reload keeps it, and with it the command
@@ -152,9 +154,11 @@ export const api = {
     return () => listeners.get(name).delete(listener);
   },
   last: (name) => latest.get(name),
-  say(sentence, isBad = false) {
+  say(sentence, isBad = false, stays = isBad) {
     const said = document.getElementById("said");
     said.textContent = sentence;
     said.classList.toggle("bad-text", isBad);
+    clearTimeout(saidUntil);
+    if (!stays) saidUntil = setTimeout(() => (said.textContent = ""), SAID_MS); // `Enabled with 12.00 N` is no news beside a fault
   },
 };
