@@ -96,7 +96,7 @@ FOLDED = """async (map) => {
   const table = makeRegisters({ get: async () => map, say: () => {} });
   await table.state({ words: {}, writers: {} });
   document.body.append(table.element);
-  const name = Array.from(table.element.querySelectorAll("th"), (one) => one).find((one) => one.textContent === "voltage_setpoint");
+  const name = [...table.element.querySelectorAll("th")].find((one) => one.textContent === "voltage_setpoint");
   const lines = new Map();
   for (const part of name.childNodes) {
     const range = document.createRange();
