@@ -34,14 +34,23 @@ export const viewer = (() => {
   return name;
 })();
 
+/** The gateway's answer. Where none comes a browser has words of its own, such as `Failed to fetch`. */
+async function ask(path, options) {
+  try {
+    return await fetch(path, options);
+  } catch (error) {
+    throw error instanceof TypeError ? new Error("no answer from the gateway") : error;
+  }
+}
+
 async function beginSession(giving) {
-  const answer = await fetch("/api/v1/session", giving);
+  const answer = await ask("/api/v1/session", giving);
   if (answer.status === 401) location.assign("/login");
   csrf = (await answer.json()).csrf;
 }
 
 async function request(path, options) {
-  const answer = await fetch(path, options);
+  const answer = await ask(path, options);
   const kind = answer.headers.get("content-type") || "";
   const body = kind.includes("json") ? await answer.json() : await answer.text();
   if (answer.ok) return body;

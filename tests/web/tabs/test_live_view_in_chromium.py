@@ -81,6 +81,16 @@ TREND = """async () => {
 }"""
 
 
+UNREACHED = """async () => {
+  const { api } = await import("/static/api.js");
+  const told = [];
+  for (const ask of [() => api.get("/api/v1/state"), () => api.post("/api/v1/command/stop")]) {
+    await ask().catch((error) => told.push(error.message));
+  }
+  return told;
+}"""
+
+
 @pytest.fixture
 def window(page, chromium) -> Any:
     """A page to which nothing comes but what a test tells it."""
@@ -124,3 +134,9 @@ def test_a_trend_shows_the_setpoint_of_a_force_that_is_held_and_nothing_where_no
     assert drawn["wanted"] in [pixel[:3] for pixel in drawn["held"]]
     assert {pixel[3] for pixel in drawn["silent"]} == {0}
     assert drawn["word"]["x"] + drawn["word"]["width"] < drawn["line"], "a code is beside its own line, not across it"
+
+
+def test_a_gateway_that_is_away_is_told_in_our_words(window) -> None:
+    """Stop said `Not stopped from here: Failed to fetch`, and each tab `Failed to fetch` alone."""
+    window.context.route("**/api/v1/**", lambda route: route.abort())
+    assert window.evaluate(UNREACHED) == ["no answer from the gateway"] * 2
