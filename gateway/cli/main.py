@@ -52,7 +52,9 @@ def format_examples(examples: Iterable[str]) -> str | None:
 
 
 class VerbGroup(click.Group):
-    """Finds verbs by name, and turns whatever they raise into one message."""
+    """Finds verbs by name, and turns whatever they raise into one message. is_interrupted: Ctrl-C has ended the verb."""
+
+    is_interrupted = False
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the verbs in the order of the help."""
@@ -97,7 +99,12 @@ class VerbGroup(click.Group):
         """Run the verb; turn what it raises into one message."""
         try:
             return super().invoke(ctx)
-        except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
+        except (KeyboardInterrupt, click.Abort) as error:  # a question that is answered with Ctrl-C is an Abort
+            self.is_interrupted = isinstance(error, KeyboardInterrupt) or isinstance(
+                error.__context__, KeyboardInterrupt
+            )
+            raise
+        except (click.ClickException, click.exceptions.Exit, BrokenPipeError):
             raise
         except Exception as error:
             command_line = " ".join(word for word in sys.argv[1:] if word != "--debug")
@@ -143,6 +150,11 @@ def main() -> None:
         use_our_bash()
     try:
         command(prog_name="force-gateway")
+    except SystemExit:
+        if not getattr(command, "is_interrupted", False):
+            raise
+        sys.excepthook = lambda *_: None  # all is said: Aborted!
+        raise KeyboardInterrupt from None  # Python ends by the signal: a shell sees 130, and its loop over files ends, too
     except OSError as error:  # of the help itself, for which no verb runs: what it is printed to takes nothing
         refused = translate_error(error, "--help", debug=False)
         refused.show()

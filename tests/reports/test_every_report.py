@@ -11,6 +11,7 @@ import pytest
 
 from gateway.reports.fit.document import fit_document, residual_of
 from gateway.reports.fit.headline import answer_sentence
+from gateway.reports.fit.page import fit_page
 from tests.reports.sample_pages import PAGES, fit_evaluation, fit_sample
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -109,6 +110,15 @@ def test_a_fit_shows_the_raw_ladder_measured_points_and_models_by_their_names() 
         "identified"
     ] and f"off by {reversal['rms_n']:.2f} N RMS and {reversal['max_n']:.2f} N" in html.replace(NO_BREAK, " ")
     assert not re.search(r">[^<]*\bbsfm\d", html)
+
+
+@pytest.mark.parametrize(("groups", "seen"), [(1, "stairs"), (2, "a group")])
+def test_a_fit_names_what_it_was_judged_by(groups: int, seen: str) -> None:
+    """Each quick calibration has one group, and its page said that another one had been held out."""
+    document = fit_sample()[1]
+    html = fit_page(fit_evaluation(), document | {"ladder": document["ladder"] | {"groups": groups}}, None)
+    assert f"by branch, on {seen} not seen" in html
+    assert f"Error on {seen} that the fit has not seen" in html
 
 
 def test_a_comparison_draws_the_points_and_says_how_far_both_are_off() -> None:

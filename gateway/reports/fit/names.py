@@ -25,6 +25,11 @@ def spell_groups(count: int) -> str:
     return f"{count} group{'s' * (count != 1)}"
 
 
+def spell_held_out(groups: int) -> str:
+    """Return what a fit was judged by that it has not seen: of a ladder of one group there are stairs alone."""
+    return "a group" if groups > 1 else "stairs"
+
+
 def spell_reversal(stops: int, span_n: float) -> str:
     """Return how the command turns back within the loop: `2 slip stops`, or `a linear blend over 5 N`."""
     if stops:

@@ -9,7 +9,7 @@ from gateway.reports.figures import figure
 from gateway.reports.fit import charts
 from gateway.reports.fit.document import Document
 from gateway.reports.fit.headline import answer_sentence, policy, reversal_sentence
-from gateway.reports.fit.names import describe_model, spell_groups, spell_model
+from gateway.reports.fit.names import describe_model, spell_groups, spell_held_out, spell_model
 from gateway.reports.fit.raw_ladder import RawLadder
 from gateway.reports.frame import Head, notes, page, section, table, tiles
 
@@ -19,6 +19,7 @@ _WORDS: Final = " class='words'"
 def fit_page(evaluation: Evaluation, document: Document, raw: RawLadder | None) -> str:
     """Return the whole page. document: `fit_document` of the evaluation, with `calibration` where one was stored; raw: the
     rows of its recording."""
+    held_out = spell_held_out(document["ladder"]["groups"])
     parts = [
         _figures(document),
         "<h2>Measured and model</h2>",
@@ -37,7 +38,7 @@ def fit_page(evaluation: Evaluation, document: Document, raw: RawLadder | None) 
             figure(
                 "Order sweep",
                 charts.draw_order_sweep(document),
-                "Error on a group that the fit has not seen. Hollow: may not drive a plant.",
+                f"Error on {held_out} that the fit has not seen. Hollow: may not drive a plant.",
             ),
             f"<div>{_why(document)}</div>",
         ),
@@ -86,7 +87,7 @@ def _figures(document: Document) -> str:
     return tiles(
         ("Error", f"{measured['rms_n']:.3f}", f"N RMS on all {measured['points']} points, {reversals}"),
         ("Largest", f"{measured['max_n']:.2f}", "N at one of them"),
-        ("Held out", heldout, "N RMS by branch, on a group not seen"),
+        ("Held out", heldout, f"N RMS by branch, on {spell_held_out(document['ladder']['groups'])} not seen"),
         ("Reversals", off, f"{'N RMS, ' if reversal['identified'] else ''}{policy(reversal)}"),
         ("Range", f"{low_n:.1f} – {high_n:.1f}", "N on both branches"),
     )

@@ -4,7 +4,7 @@
 //   api.post(path, body)     the same for what changes something; the CSRF token goes with it
 //   api.on(name, listener)   `state` (twice a second), `samples`, `history`, `note`, `gone`, `open`; returns a function that ends it
 //   api.last(name)           what came last under that name, or undefined
-//   api.say(sentence)        tells the user, and a screen reader
+//   api.say(sentence)        tells the user, and a screen reader, for ten seconds; what went wrong, or `stays`, until the next one
 
 const listeners = new Map();
 const latest = new Map();
@@ -13,6 +13,7 @@ const AWAY_MS = 2000;
 const COMMAND_MS = 5000;
 const SILENT_MS = 3000; // a state comes twice a second
 const ANEW_MS = 10000;
+const SAID_MS = 10000;
 const PRESSES = /^\/api\/v1\/(command\/(?!stop)|calibrate\/start)/;
 let csrf = "";
 let source = null;
@@ -21,6 +22,7 @@ let clock = null; // the gateway's, as the last state told it, and when that cam
 let openedAt = 0;
 let isGone = false;
 let comeBack = 0;
+let saidUntil = 0;
 
 export const viewer = (() => {
   // of this browser tab: a reload keeps it, and with it the command
@@ -32,14 +34,23 @@ export const viewer = (() => {
   return name;
 })();
 
+/** The gateway's answer. Where none comes a browser has words of its own, such as `Failed to fetch`. */
+async function ask(path, options) {
+  try {
+    return await fetch(path, options);
+  } catch (error) {
+    throw error instanceof TypeError ? new Error("no answer from the gateway") : error;
+  }
+}
+
 async function beginSession(giving) {
-  const answer = await fetch("/api/v1/session", giving);
+  const answer = await ask("/api/v1/session", giving);
   if (answer.status === 401) location.assign("/login");
   csrf = (await answer.json()).csrf;
 }
 
 async function request(path, options) {
-  const answer = await fetch(path, options);
+  const answer = await ask(path, options);
   const kind = answer.headers.get("content-type") || "";
   const body = kind.includes("json") ? await answer.json() : await answer.text();
   if (answer.ok) return body;
@@ -152,9 +163,11 @@ export const api = {
     return () => listeners.get(name).delete(listener);
   },
   last: (name) => latest.get(name),
-  say(sentence, isBad = false) {
+  say(sentence, isBad = false, stays = isBad) {
     const said = document.getElementById("said");
     said.textContent = sentence;
     said.classList.toggle("bad-text", isBad);
+    clearTimeout(saidUntil);
+    if (!stays) saidUntil = setTimeout(() => (said.textContent = ""), SAID_MS); // `Enabled with 12.00 N` is no news beside a fault
   },
 };

@@ -225,7 +225,7 @@ def test_ctrl_c_in_the_real_verb(stage: str, tmp_path: Path) -> None:
         assert process.stdout
         assert process.stdout.read() == ""
     os.close(ours)
-    assert process.returncode == 1
+    assert process.returncode == -signal.SIGINT
     assert "Traceback" not in said
     assert "\r\x1b[2K\r\nAborted!" in said
     assert {each.name for each in tmp_path.iterdir()} <= {path.name, "kept"}

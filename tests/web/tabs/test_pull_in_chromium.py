@@ -23,9 +23,9 @@ DRAWN = """async () => {
   for (const one of made) { document.body.append(one.element); one.draw(); }
   await new Promise(requestAnimationFrame);
   made[1].state();
-  const [, low, high, wanted, force] = plots[0].chart.data.map((values) => values.at(-1));
+  const [, low, high, force, wanted] = plots[0].chart.data.map((values) => values.at(-1));
   const error = made[1].element.querySelector("p.small").textContent;
-  return { low, high, wanted, force, pushed: plots[0].chart.data[3][0], error, least: plots[2].chart.scales.y.min };
+  return { low, high, wanted, force, pushed: plots[0].chart.data[4][0], error, least: plots[2].chart.scales.y.min };
 }"""
 
 

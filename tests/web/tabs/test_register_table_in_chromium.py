@@ -89,3 +89,27 @@ def test_words_are_read_in_their_order_and_unit_and_the_line_to_copy_reads_the_s
         "mbpoll -1 -p 5020 -t 4:float -r 337 127.0.0.1",
     ]
     window.close()
+
+
+FOLDED = """async (map) => {
+  const { makeRegisters } = await import("/static/live/registers.js");
+  const table = makeRegisters({ get: async () => map, say: () => {} });
+  await table.state({ words: {}, writers: {} });
+  document.body.append(table.element);
+  const name = [...table.element.querySelectorAll("th")].find((one) => one.textContent === "voltage_setpoint");
+  const lines = new Map();
+  for (const part of name.childNodes) {
+    const range = document.createRange();
+    range.selectNode(part);
+    for (const box of range.getClientRects()) if (box.width) lines.set(box.top, (lines.get(box.top) ?? "") + part.textContent);
+  }
+  return [...lines.values()];
+}"""
+
+
+def test_a_name_goes_on_behind_an_underscore_on_a_telephone(page, chromium) -> None:
+    """It stood there as `voltage_setpoin` and `t`."""
+    browser = chromium.new_context(viewport={"width": 390, "height": 844})
+    window: Any = open_tab(browser, page.address, "live")
+    assert window.evaluate(FOLDED, register_table(demo(), 5020)) == ["voltage_", "setpoint"]
+    browser.close()

@@ -114,7 +114,14 @@ class _SelfTest:
         self._write(0)
 
     def follow(self, *, shows: bool) -> None:
-        """Wait for its end. shows: one line on the terminal, written over and over."""
+        """Wait for its end. shows: one line on the terminal, written over and over, and gone with the wait."""
+        try:
+            self._follow(shows=shows)
+        finally:
+            if shows:
+                click.echo("\r\033[K", nl=False, err=True)
+
+    def _follow(self, *, shows: bool) -> None:
         from gateway.registers.words import SelfTestResult
 
         end_s = time.monotonic() + _LONGEST_S
@@ -128,8 +135,6 @@ class _SelfTest:
                 self._show()
             time.sleep(max(0.0, _LOOK_S - (time.monotonic() - began_s)))  # a slow line has taken that time already
             self._write(None)
-        if shows:
-            click.echo("\r\033[K", nl=False, err=True)
         if result == SelfTestResult.NONE:  # on a serial line no connection breaks with the process behind it
             ended = "and the self-test has ended with it: its log has the first cause"
             raise CliError(f"A401 the gateway has started anew, in OFF, {ended}")

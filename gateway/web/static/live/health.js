@@ -69,11 +69,11 @@ export function makeAlarms(api) {
     }
   }
 
-  function entry(alarm, isFault, now_s) {
+  function entry(alarm, isFault) {
     const words = make("div", {},
       make("strong", { textContent: `${alarm.code} ${alarm.title}` }),
       make("p", { textContent: alarm.cure }),
-      make("p", { className: "small", textContent: `for ${duration(Math.max(0, now_s - alarm.since_unix_s))}` }));
+      make("p", { className: "small age" }));
     const item = make("li", { className: isFault ? "fault" : "warning" }, words);
     if (isFault) item.append(make("button", { type: "button", textContent: "Acknowledge and reset", onclick: acknowledge }));
     return item;
@@ -93,15 +93,19 @@ export function makeAlarms(api) {
     state(state) {
       none.hidden = state.faults.length + state.warnings.length > 0;
       residual.textContent = state.residual.sentence ? `Residual watch: ${state.residual.sentence}` : "";
-      const key = JSON.stringify([state.faults, state.warnings, Math.floor(state.time_unix_s / 10)]);
-      if (key === shown) return; // a button that is about to be pressed stays where it is
-      const hadFocus = list.contains(document.activeElement);
-      shown = key;
-      list.replaceChildren(
-        ...state.faults.map((alarm) => entry(alarm, true, state.time_unix_s)),
-        ...state.warnings.map((alarm) => entry(alarm, false, state.time_unix_s)),
-      );
-      if (hadFocus) list.querySelector("button")?.focus();
+      const key = JSON.stringify([state.faults, state.warnings]);
+      if (key !== shown) {
+        // else a button that is about to be pressed stays where it is
+        const hadFocus = list.contains(document.activeElement);
+        shown = key;
+        list.replaceChildren(...state.faults.map((alarm) => entry(alarm, true)), ...state.warnings.map((alarm) => entry(alarm, false)));
+        if (hadFocus) (list.querySelector("button") ?? notes).focus(); // what was said of the reset
+      }
+      const standing = [...state.faults, ...state.warnings];
+      list.querySelectorAll(".age").forEach((told, place) => {
+        const text = `for ${duration(Math.max(0, state.time_unix_s - standing[place].since_unix_s))}`;
+        if (told.textContent !== text) told.textContent = text;
+      });
     },
   };
 }

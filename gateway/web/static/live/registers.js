@@ -32,6 +32,9 @@ function inWords(register, words) {
   return `${register.unit ? scaled.toFixed(digits) : scaled} ${register.unit}`.trim();
 }
 
+/** On a narrow screen a name goes on below behind one of its underscores; what is copied of it is the name. */
+const foldable = (name) => name.split(/(?<=_)/).flatMap((part, place) => (place ? [make("wbr"), part] : [part]));
+
 function age(seconds) {
   if (seconds === undefined) return "";
   return seconds < 120 ? `${seconds.toFixed(1)} s` : seconds < 7200 ? `${Math.floor(seconds / 60)} min` : `${Math.floor(seconds / 3600)} h`;
@@ -68,7 +71,7 @@ export function makeRegisters(api) {
       await navigator.clipboard.writeText(line);
       api.say(`Copied: ${line}`);
     } catch {
-      api.say(line); // no clipboard without https: it can be marked there
+      api.say(line, false, true); // no clipboard without https: it can be marked there
     }
   }
 
@@ -83,7 +86,7 @@ export function makeRegisters(api) {
         const cells = HEADINGS.map(() => make("td"));
         cells[0].textContent = 40001 + register.address;
         cells[1].textContent = register.address;
-        cells[2].replaceWith((cells[2] = make("th", { scope: "row", textContent: register.name, title: register.text })));
+        cells[2].replaceWith((cells[2] = make("th", { scope: "row", title: register.text }, ...foldable(register.name))));
         if (map.port) {
           const button = make("button", { type: "button", className: "small", textContent: "mbpoll", onclick: () => copy(register) });
           button.setAttribute("aria-label", `Copy the mbpoll line of ${register.name}`);

@@ -5,6 +5,8 @@ import { make } from "./health.js";
 
 const newton = (value) => (value === null || value === undefined ? "–" : `${value.toFixed(2)}`);
 
+const RESET = "A fault stands: mend its cause, then acknowledge and reset it under Alarms."; // a register's way is a program's
+
 export function makeSteering(api) {
   const big = (name, unit) => {
     const value = make("dd", { textContent: "–" });
@@ -79,7 +81,7 @@ export function makeSteering(api) {
       enable.textContent = isOn && !isOther ? "Set" : "Enable";
       take.disabled = !isOther;
       record.textContent = state.recording.on ? "Stop recording" : "Record";
-      const block = !isOn && state.enable_block ? state.enable_block : "";
+      const block = state.faults.length ? RESET : !isOn && state.enable_block ? state.enable_block : "";
       why.textContent = isOther ? `${state.owner} owns the setpoint: take it over first.` : block;
     },
   };

@@ -3,6 +3,17 @@
 import { Plot, axis, colour, figure } from "./plots.js";
 
 const SPAN_S = 60;
+const GAP_S = 0.5; // what nobody has measured is no line
+
+/** Breaks a line where no sample came, of a silent cell, say; uPlot itself breaks it at what is null. */
+function gaps(chart, series, from, to, known) {
+  const time_s = chart.data[0];
+  const at = (place) => Math.round(chart.valToPos(time_s[place], "x", true));
+  for (let place = from + 1; place <= to; place++) {
+    if (time_s[place] - time_s[place - 1] > GAP_S) known.push([at(place - 1), at(place)]);
+  }
+  return known.sort((one, other) => one[0] - other[0]);
+}
 
 export function makeTrend(samples) {
   const element = figure("Force, last 60 s", [
@@ -28,10 +39,10 @@ export function makeTrend(samples) {
       ],
       series: [
         {},
-        { stroke: "transparent", points: { show: false } },
-        { stroke: "transparent", points: { show: false } },
-        { stroke: colour("rising"), width: 1.5, dash: [6, 4], points: { show: false } },
-        { stroke: colour("after"), width: 2, points: { show: false } },
+        { stroke: "transparent", points: { show: false }, gaps },
+        { stroke: "transparent", points: { show: false }, gaps },
+        { stroke: colour("after"), width: 2, points: { show: false }, gaps },
+        { stroke: colour("rising"), width: 1.5, dash: [6, 4], points: { show: false }, gaps }, // above: a force that is held hid it
       ],
       bands: [{ series: [2, 1], fill: `color-mix(in srgb, ${colour("bsfm")} 20%, transparent)` }],
       hooks: { draw: [drawMarks] },
@@ -59,7 +70,7 @@ export function makeTrend(samples) {
       if (!mark.code) continue; // a command, a start: what it was stands in the log below
       const words = mark.code;
       const space = context.measureText(words).width;
-      context.fillText(words, Math.min(x + 3, left + width - space), top + (12 + 13 * (row++ % 3)) * devicePixelRatio);
+      context.fillText(words, x + 3 + space > left + width ? x - 3 - space : x + 3, top + (12 + 13 * (row++ % 3)) * devicePixelRatio);
     }
     context.restore();
   }
@@ -74,7 +85,7 @@ export function makeTrend(samples) {
       const wanted = setpoint_n.map((value, place) => (value > 0 ? (pulling[place] ? -value : value) : null));
       const high = wanted.map((value) => (value === null ? null : value + tolerance_n));
       const low = wanted.map((value) => (value === null ? null : value - tolerance_n));
-      plot.chart.setData([time_s, low, high, wanted, force_n]);
+      plot.chart.setData([time_s, low, high, force_n, wanted]);
     },
     state(state) {
       tolerance_n = state.limits.tolerance_n;

@@ -134,6 +134,20 @@ def test_one_that_runs_already_is_another_masters_and_neither_followed_nor_stopp
     assert gateway.words == []
 
 
+def test_what_is_said_of_its_end_begins_a_line(gateway: Registers, monkeypatch: Any, capsys: Any) -> None:
+    """A terminal read `self-test  52 %,  5 s left,   6.57 N^Cself-test stopped; the force went to 0`."""
+    show = self_test._SelfTest._show
+
+    def interrupt(run: self_test._SelfTest) -> None:
+        show(run)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(self_test._SelfTest, "_show", interrupt)
+    with pytest.raises(CliError, match="stopped"):
+        self_test._run_to_its_end(run_of(gateway), shows=True)
+    assert capsys.readouterr().err.endswith(" N\r")  # what erases it goes to terminals alone
+
+
 def test_progress_is_told_in_percent(gateway: Registers, capsys: pytest.CaptureFixture[str]) -> None:
     run_of(gateway)._show()
     assert "self-test  25 %" in capsys.readouterr().err
