@@ -110,10 +110,12 @@ ERRORS: Final = (
     Explanation(
         "E152",
         "no local socket for the tools",
-        "control.sock (or rig.sock of a simulated rig) could not be made in the state directory. Control works "
-        "without it.",
-        "A path of more than 107 bytes, a file system that has no sockets, or somebody has put another file in its place.",
-        "Give a shorter --state DIR, on a local disk; another file in its place: remove it, the socket comes back.",
+        "control.sock (or a simulated rig's rig.sock) could not be made. The tools, the page and MQTT reach control by it, "
+        "and so do their stops; Modbus does not.",
+        "A path of more than 107 bytes, a file system that has no sockets, somebody has put another file in its place, or has "
+        "removed the state directory.",
+        "Give a shorter --state DIR, on a local disk; remove the other file, or make the directory again: the socket comes "
+        "back. Stop by Modbus until then.",
     ),
     Explanation(
         "E160",

@@ -8,7 +8,8 @@ Decisions
 - The session is a cookie that scripts cannot read and other sites cannot send. With a token configured it exists after a
   login only; tools send `Authorization: Bearer TOKEN` instead, which needs no CSRF token because no browser adds it by itself.
   It holds for as long as the token does: where the page's process was started anew, Esc stops, and leads to no login.
-- A failed login costs a second, one at a time: a token of 16 characters is not guessed.
+- A failed login costs a second, one at a time: a token of 16 characters is not guessed. Only a few wait for their turn: as many
+  as are served shut out all others, and their Stop, by who knows no token.
 - What came while this process stood still is refused, but for what stops: an enable of then pressed seconds after its browser
   had given it up. So is what a line has held up for as long: the page says by this machine's clock when it asks.
 """
@@ -41,6 +42,7 @@ _OPEN: Final = ("/login", "/healthz", "/static/style.css", "/static/page.css", "
 """Reached without a session: what the login itself needs."""
 _STOPS: Final = ("/api/v1/command/stop", "/api/v1/calibrate/stop")
 _FAILED_LOGIN_S: Final = 1.0
+MOST_FAILED_LOGINS: Final = 16  # that wait for their turn
 _SAFE_METHODS: Final = ("GET", "HEAD")
 HEADERS: Final = {
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
@@ -64,6 +66,7 @@ class PageAccess:
     token: str | None = None
     key: bytes = field(default_factory=lambda: secrets.token_bytes(32))
     login_turn: asyncio.Lock = field(default_factory=asyncio.Lock)
+    failed_logins: int = 0
 
     def __post_init__(self) -> None:
         if self.token is not None:
@@ -186,8 +189,14 @@ async def login(request: Request) -> Response:
     access: PageAccess = request.app.state.access
     given = (await request.body()).decode("utf-8", "replace").strip()
     if not access.is_token(given):
-        async with access.login_turn:
-            await asyncio.sleep(_FAILED_LOGIN_S)
+        if access.failed_logins >= MOST_FAILED_LOGINS:
+            return refuse(429, "that is not the token, and too many wrong ones come at once: try again")
+        access.failed_logins += 1
+        try:
+            async with access.login_turn:
+                await asyncio.sleep(_FAILED_LOGIN_S)
+        finally:
+            access.failed_logins -= 1
         return refuse(401, "that is not the token; it stands in the rig file under web.token")
     response = JSONResponse({"ok": True})
     _set_session(response, access, access.new_session())

@@ -164,6 +164,21 @@ def test_guesses_wait_for_one_another(tmp_path: Path, monkeypatch: pytest.Monkey
     assert asyncio.run(scene()) >= 8 * 0.02
 
 
+def test_guesses_take_no_connection_of_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """256 that waited for their turn were all that the page serves: to a Stop it answered 503 for minutes."""
+    monkeypatch.setattr(security, "_FAILED_LOGIN_S", 0.01)
+    app = page(tmp_path, TOKEN)
+
+    async def scene() -> list[int]:
+        guesses = [asyncio.create_task(call(app, "POST", "/login", None, b"wrong")) for _ in range(300)]
+        done, waiting = await asyncio.wait(guesses, return_when=asyncio.FIRST_COMPLETED)
+        assert {(await one).status for one in done} == {429} and len(waiting) <= security.MOST_FAILED_LOGINS
+        assert (await call(app, "POST", "/login", None, TOKEN.encode())).status == 200
+        return [(await one).status for one in waiting]
+
+    assert set(asyncio.run(scene())) == {401}
+
+
 def test_a_tool_sends_the_token_itself(tmp_path: Path) -> None:
     app = page(tmp_path, TOKEN)
     assert answer(app, "POST", ALIVE, {"authorization": f"Bearer {TOKEN}"}).status == 200

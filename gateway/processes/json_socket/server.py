@@ -42,6 +42,7 @@ _SHARE: Final = 0.1  # of the loop's time
 _LONGEST_REST_S: Final = 0.5
 _NO_DESCRIPTOR_S: Final = 0.1
 _LOOK_BOUND_S: Final = 0.1  # a disk that takes longer keeps the file
+_GONE: Final = "its directory is gone: make it again (mkdir), and it is served again"
 
 
 class JsonLineServer:
@@ -177,7 +178,7 @@ class JsonLineServer:
             except OSError as error:
                 if error.errno == errno.EADDRINUSE:
                     return  # another file has come since: the next look tells what it is
-                why = error.strerror or str(error)
+                why = _GONE if error.errno == errno.ENOENT else error.strerror or str(error)
             else:
                 was = "removed: it is served again" if self._listener else "not to be had: it is served now"
                 self._let_go()

@@ -49,7 +49,8 @@ def test_a_socket_whose_file_is_removed_is_served_again(folder_too: bool, tmp_pa
     async def scene(said: asyncio.Queue[str]) -> None:
         if folder_too:
             shutil.rmtree(path.parent)
-            assert "E152" in await said.get()
+            assert f"E152 {path} is not served" in (sentence := await said.get())
+            assert sentence.endswith("its directory is gone: make it again (mkdir), and it is served again")
             path.parent.mkdir()
         else:
             path.unlink()
