@@ -113,6 +113,21 @@ def test_what_a_full_disk_kept_back_is_written_at_the_end_where_it_is_free_again
     assert file.is_closed
 
 
+def test_a_disk_that_hangs_at_the_end_keeps_the_file_that_is_being_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The thread has its descriptor: closed beneath it, the number may be another file's before the write."""
+    monkeypatch.setattr(audit_log_module, "_LAST_WORDS_S", 0.01)
+
+    async def run() -> FailingFile:
+        file = FailingFile()
+        log = audit_log(file, [], lambda: 0.0)
+        log.run_in_background = lambda work, done: None
+        log.put({"k": 1})
+        await log.close()
+        return file
+
+    assert not asyncio.run(run()).is_closed
+
+
 def test_a_write_that_fails_halfway_leaves_the_chain_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = AuditFile(tmp_path)
     file.append([{"what": "enable"}])

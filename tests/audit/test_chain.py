@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 from gateway.audit.audit_file import AuditFile, audit_files, read_head
 from gateway.audit.audit_reader import read_audit, verify_audit
-from gateway.audit.chain import open_line, seal_line
+from gateway.audit.chain import ChainEnd, open_line, seal_line
 from gateway.cli.main import command
 
 LINES = 14
@@ -247,6 +247,12 @@ def test_the_verbs_show_and_verify(state: Path) -> None:
     bad = run(command, ["audit", "verify", "--state", str(state)])
     assert bad.exit_code == 1
     assert bad.stderr.startswith(f"E170 {path.name} line {place + 1} was changed: its own hash does not fit")
+
+
+def test_a_number_that_no_json_has_makes_no_line() -> None:
+    """Python reads its own NaN again, and nobody else would."""
+    with pytest.raises(ValueError, match="JSON"):
+        seal_line({"what": "force_setpoint", "new": float("nan")}, ChainEnd())
 
 
 def test_a_folder_without_an_audit_is_told_and_no_internal_error(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from gateway.audit.audit_file import AuditFile, audit_files
 from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.audit.chain import NO_HASH
-from tests.audit.test_chain import FILE_BYTES, LINES, find_line, records, replace_last_line
+from tests.audit.test_chain import FILE_BYTES, LINES, files_of, find_line, records, replace_last_line
 from tests.other_kinds import MAKERS, never_waiting, put
 
 
@@ -104,6 +104,26 @@ def test_a_writer_killed_between_a_new_file_and_its_first_line_leaves_the_chain_
     file.close()
     verdict = verify_audit(state)
     assert (verdict.broken, verdict.end.number) == (None, LINES + 1)
+
+
+def test_of_a_long_torn_line_the_beginning_is_quoted(state: Path) -> None:
+    """Quoted whole, a megabyte made a line that is longer than any that is read back."""
+    with files_of(state)[-1].open("ab") as stream:
+        stream.write(b"x" * (1 << 20))
+    file = AuditFile(state, 1 << 24)
+    file.append([{"what": "enable"}])
+    file.close()
+    torn = next(record for record in read_audit(state) if record["what"] == "torn line")
+    assert torn["torn"] == 400 * "x" and str(1 << 20) in torn["text"] and not verify_audit(state).broken
+
+
+def test_a_writer_that_is_closed_twice_closes_nobody_else_s_file(tmp_path: Path) -> None:
+    file = AuditFile(tmp_path)
+    file.append(records(1))
+    file.close()
+    with (tmp_path / "other").open("wb") as other:  # the number is given again
+        file.close()
+        assert other.write(b"kept") == 4
 
 
 @pytest.mark.parametrize("removed", [1, 2, 5])

@@ -103,3 +103,17 @@ def test_a_state_directory_that_was_moved_away_is_not_begun_anew(tmp_path: Path)
     assert file.append([{"what": "enable"}]) == ()
     file.close()
     assert whats(state) == ["start", "enable"]
+
+
+def test_what_was_removed_is_told_by_the_first_line_that_the_disk_takes(
+    tmp_path: Path, written: AuditFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Removed and full at once, as by somebody who makes room: the batch comes again, and what goes before it does, too."""
+    remove_file(tmp_path)
+    with monkeypatch.context() as full:
+        full.setattr(audit_file.os, "write", lambda *_: (_ for _ in ()).throw(OSError(errno.ENOSPC, "full")))
+        with pytest.raises(OSError, match="full"):
+            written.append([{"what": "enable"}])
+    (told,) = written.append([{"what": "enable"}])
+    written.close()
+    assert told.startswith("A352") and whats(tmp_path)[-2:] == ["chain broken", "enable"]

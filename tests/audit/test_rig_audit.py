@@ -117,6 +117,24 @@ def test_what_waits_for_a_disk_is_told_with_its_end(tmp_path: Path) -> None:
     assert ["No space left" in json.dumps(record) for record in read_audit(tmp_path)] == [True, False, False]
 
 
+def test_what_was_refused_at_this_machine_is_kept_as_that_and_refused_still(tmp_path: Path) -> None:
+    refusals = {"calibration": ValueError("E436 it was rejected"), "record": OSError("the disk is full")}
+
+    def refuse(request: dict[str, Any]) -> None:
+        raise refusals[request["do"]]
+
+    async def run() -> None:
+        audit = RigAudit(tmp_path, lambda cause, sentence: None)
+        for verb, handler in audit.watch_handlers(dict.fromkeys(refusals, refuse)).items():
+            with pytest.raises(type(refusals[verb])):
+                handler({"do": verb, "use": 1})
+        await audit.close()
+
+    asyncio.run(run())
+    told = [(record["what"], record["result"]) for record in read_audit(tmp_path)][:-1]
+    assert told == [(verb, str(error)) for verb, error in refusals.items()]
+
+
 def test_every_verb_that_changes_something_is_kept_and_no_question_or_rehearsal(tmp_path: Path) -> None:
     verbs = ("record", "calibration", "plant", "calibrate", "sim")
 

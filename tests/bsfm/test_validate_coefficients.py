@@ -17,6 +17,7 @@ from gateway.bsfm import (
     validate_coefficients,
 )
 from gateway.bsfm.branches import Crossing
+from gateway.bsfm.coefficients import float32
 from gateway.bsfm.model import Response
 from gateway.bsfm.slip.slip_stops import half_width_bound_v
 from tests.calibrations.coefficients import calibration, swapped
@@ -35,6 +36,8 @@ def branches(rising: tuple[float, ...], falling: tuple[float, ...]) -> Branches:
 
 
 def test_a_good_set_has_no_fault():
+    over_all = replace(GOOD, x1_v=10.0)  # the whole range of a regulator, as most ladders have it
+    assert validate_coefficients(over_all, LIMITS) == []
     assert validate_coefficients(GOOD, LIMITS) == []
     assert validate_coefficients(Coefficients.of(branches((0.0, 10.0, 20.0), (0.0, 12.0, 20.0))), LIMITS) == []
 
@@ -48,6 +51,7 @@ def test_a_good_set_has_no_fault():
         ({"falling_weights": (1.0, 1.1, 1.1e3)}, 50, CoefficientReason.WEIGHT_RANGE),
         ({"rising_weights": (100.0, 0.01, 100.0)}, 17, CoefficientReason.WEIGHT_RANGE),
         ({"rising_handles_n": (0.5, 14.0, 98.1)}, 2, CoefficientReason.HANDLE_RANGE),
+        ({"rising_handles_n": (-98.1, 14.0, 38.0)}, 0, CoefficientReason.HANDLE_RANGE),
         ({"rising_handles_n": (math.nan, 14.0, 38.0)}, 0, CoefficientReason.NOT_FINITE),
         ({"rising_handles_n": (0.5, 14.0, 1e39)}, 2, CoefficientReason.NOT_FINITE),
         ({"falling_handles_n": (0.5, 39.0, 38.0)}, 32, CoefficientReason.NOT_INCREASING),
@@ -163,3 +167,21 @@ def test_the_forces_of_both_branches_are_those_at_their_shares():
 
 def test_a_crossing_says_by_how_much_the_falling_branch_is_below() -> None:
     assert str(Crossing(1.5, -0.25)) == "the falling branch is 0.25 N below the rising one at 1.500 V"
+
+
+@pytest.mark.parametrize(("slope_n_per_v", "is_taken"), [(0.45, False), (0.55, True)])
+def test_the_floor_of_the_slope_is_per_volt_whatever_the_range(slope_n_per_v: float, is_taken: bool) -> None:
+    line = RationalBezier(0.0, 8.0, (0.0, 8.0 * slope_n_per_v), (1.0, 1.0))
+    reasons = [fault.reason for fault in validate_coefficients(Coefficients.of(Branches(line, line)), LIMITS)]
+    assert reasons == [] if is_taken else set(reasons) == {CoefficientReason.SLOPE_FLOOR}
+    assert line.minimum_slope() == pytest.approx(slope_n_per_v)
+
+
+def test_two_branches_are_over_the_same_voltages_or_none() -> None:
+    falling = RationalBezier(0.0, 6.0, (0.0, 20.0), (1.0, 1.0))
+    with pytest.raises(ValueError, match="same voltages"):
+        Branches(RationalBezier(0.0, 5.0, (0.0, 20.0), (1.0, 1.0)), falling)
+
+
+def test_what_overflows_is_infinite_on_its_own_side() -> None:
+    assert (float32(1.0e39), float32(-1.0e39)) == (math.inf, -math.inf)

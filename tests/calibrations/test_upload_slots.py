@@ -56,6 +56,11 @@ def test_a_slot_whose_file_is_damaged_fails_and_the_active_set_stays(filled):
     assert filled.outcome == (CommitStatus.FAILED, -1, UploadReason.NOT_STORED)
     assert filled.log[-1].startswith("E432 ") and filled.log[-1].endswith("active set 4 unchanged")
     assert filled.active_words == before
+    assert filled.upload.status()["failed"]
+    filled.write(1149, 2)
+    filled.run()
+    status = filled.upload.status()
+    assert (status["failed"], status["reason"], status["slot"]) == (False, 0, 2), "of the last one, not of any"
 
 
 def test_a_slot_filled_again_holds_the_new_set_and_the_old_one_is_kept_for_going_back(filled):

@@ -3,6 +3,7 @@
 import math
 from itertools import pairwise
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -27,6 +28,19 @@ def test_blend_state_is_bounded_whatever_happens(state, deltas, span):
     for delta in deltas:
         state = blend.advance(state, delta)
         assert -1.0 <= state <= 1.0
+
+
+@pytest.mark.parametrize("span_n", [-0.5, -1.0e-9, math.nan, math.inf])
+def test_a_blend_over_less_than_nothing_is_none(span_n: float) -> None:
+    """It would lead away from the branch that the force goes to."""
+    with pytest.raises(ValueError, match="blend span"):
+        LinearBlend(span_n)
+
+
+def test_a_vented_tool_is_on_the_rising_branch() -> None:
+    """There a ladder starts, and so the first force after a start is led by the branch that was fitted to it."""
+    memory = MODEL.reversal.start()
+    assert MODEL.voltage_v(19.0, MODEL.branch_share(memory)) == RISING.inverse(19.0)
 
 
 @MANY

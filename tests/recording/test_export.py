@@ -91,6 +91,7 @@ def test_an_export_that_fails_halfway_leaves_what_was_there(
     with pytest.raises(OSError, match="No space"):
         export_csv(recording, target)
     assert target.read_text() == "of yesterday"
+    assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
 
 
 def test_a_note_of_several_lines_is_one_line_of_the_csv(tmp_path: Path) -> None:

@@ -37,6 +37,7 @@ def test_a_limit_on_the_length_of_files_is_told_as_one(tmp_path: Path, more_byte
     assert recorder.failure is not None
     assert "after 1 rows: File too large: longer than a process may write here (ulimit -f" in recorder.failure
     assert "full" not in recorder.failure
+    assert recorder.rows_written == 1  # `record off` tells it
     recorder.close()
     assert read_recording(recorder.path).rows == 1
 

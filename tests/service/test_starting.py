@@ -30,6 +30,7 @@ from gateway.service.running_rig.starting import (
     listen,
     open_again,
     open_first,
+    waiting_s,
     warning_notes,
 )
 from tests.service.rigs import demo
@@ -221,3 +222,7 @@ def test_who_cannot_listen_ends_with_a_sentence_and_by_its_kind(error: OSError, 
     with pytest.raises(StartError, match=words) as refused:
         asyncio.run(listen(Server(), "192.0.2.1", 502))  # type: ignore[arg-type]
     assert refused.value.exit_code == code
+
+
+def test_behind_a_restart_masters_wait_no_second_for_a_device_that_is_silent() -> None:
+    assert waiting_s(is_restart=True) <= 1.0 < waiting_s(is_restart=False)

@@ -101,6 +101,18 @@ def calibration(**changes: object) -> Calibration:
     return Calibration(**{**facts, **changes})
 
 
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({}, "bsfm n=2"),
+        ({"falling_handles_n": RISING.handles, "falling_weights": RISING.weights}, "bfm n=2"),
+        ({"rising_weights": (1.0, 1.0, 1.0), "falling_weights": (1.0, 1.0, 1.0)}, "psfm n=2"),
+    ],
+)
+def test_a_calibration_says_which_of_the_four_models_it_is(changes, kind):
+    assert calibration(**changes).kind == kind
+
+
 def test_a_calibration_becomes_its_model(model):
     assert calibration().model() == model
 

@@ -1,12 +1,16 @@
 """Slip stops or blend: chosen on what neither has seen."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from gateway.bsfm import Branches, Bsfm, RationalBezier, SlipStops
+from gateway.bsfm.curve import elevate_order
 from gateway.bsfm.ladder.measured_ladder import Ladder, ladder_plan
+from gateway.bsfm.slip import reversal_choice
+from gateway.bsfm.slip.problem import Walk
 from gateway.bsfm.slip.reversal_choice import choose_reversal
 
 BRANCHES = Branches(
@@ -66,3 +70,36 @@ def test_one_curve_for_both_ways_has_nothing_to_select() -> None:
 @pytest.mark.parametrize("points", [0, 2])
 def test_nothing_is_chosen_from_nothing(points: int) -> None:
     assert choose_reversal(BRANCHES, ladder(), np.zeros(points), np.zeros(points)) is None
+
+
+@pytest.mark.parametrize(("stops_n", "is_taken"), [(0.95, False), (0.85, True)])
+def test_stops_are_taken_only_where_they_are_clearly_better(
+    monkeypatch: pytest.MonkeyPatch, stops_n: float, is_taken: bool
+) -> None:
+    """And what a master that cannot carry them is left with is blended on the branches that they have moved."""
+    moved = Branches(BRANCHES.rising, elevate_order(BRANCHES.falling))
+    fitted = SimpleNamespace(branches=moved, model=TRUE)
+    monkeypatch.setattr(reversal_choice, "_held_out_errors", lambda *_: (1.0, stops_n))
+    monkeypatch.setattr(reversal_choice, "fit_joint", lambda *_: fitted)
+    monkeypatch.setattr(reversal_choice, "choose_span_n", lambda branches, *_: 5.0 if branches is moved else 3.0)
+    choice = choose_reversal(BRANCHES, ladder(), *walk(TURNS_N))
+    assert choice is not None
+    assert (choice.slip is not None, choice.span_n) == (is_taken, 5.0 if is_taken else 3.0)
+
+
+def test_each_point_of_a_walk_is_judged_by_the_fit_that_has_not_seen_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the other half stops would win always: they have more numbers."""
+    fits: list[np.ndarray] = []
+
+    def fit(branches: Branches, walks: list[Walk], waves: int) -> SimpleNamespace:
+        fits.append(np.asarray(walks[1].trust))
+        return SimpleNamespace(model=fits[-1])
+
+    def error_n(model: object, volts: np.ndarray, newtons: np.ndarray) -> np.ndarray:
+        return np.asarray(model)[1:] if isinstance(model, np.ndarray) else np.ones(volts.size - 1)
+
+    monkeypatch.setattr(reversal_choice, "fit_joint", fit)
+    monkeypatch.setattr(reversal_choice, "command_error_n", error_n)
+    errors_n = reversal_choice._held_out_errors(BRANCHES, ladder(), *walk(TURNS_N))
+    assert errors_n == (1.0, 0.0), "1 where a fit has seen the point"
+    assert (sum(fits) == 1.0).all() and len(fits) == 2

@@ -67,3 +67,30 @@ def test_a_caller_that_comes_when_no_descriptor_is_left_is_served_when_there_is_
 
     assert json.loads(asyncio.run(scene()))["said"] == "here"
     assert len(tries) == 3
+
+
+def test_a_caller_that_reads_no_answer_has_one_request_handled(tmp_path: Path) -> None:
+    """Else one that asks without end and reads nothing would fill control's memory with answers."""
+    asked = list[int]()
+
+    def answer(request: dict[str, Any]) -> dict[str, Any]:
+        asked.append(request["k"])
+        return {"rows": 200_000 * "x"}
+
+    async def scene() -> None:
+        server = JsonLineServer(tmp_path / "control.sock", {"all": answer})
+        await server.start()
+        reader, writer = await asyncio.open_unix_connection(str(tmp_path / "control.sock"), limit=1 << 16)
+        reader._transport.pause_reading()  # type: ignore[attr-defined]
+        writer.write(b"".join(b'{"do": "all", "k": %d}\n' % k for k in range(20)))
+        async with asyncio.timeout(5.0):
+            while not server._callers or not next(iter(server._callers))._unsent:
+                await asyncio.sleep(0.001)
+        await asyncio.sleep(0.05)  # as many rests of the queue as twenty would take
+        handled = len(asked)
+        writer.close()
+        await server.close()
+        assert handled < 4, "those that the kernel's buffer holds, and the one that waits"
+
+    asyncio.run(scene())
+    assert asked[:1] == [0]

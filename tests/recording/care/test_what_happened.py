@@ -45,3 +45,13 @@ def test_of_two_limits_the_tighter_one_counts(tmp_path: Path) -> None:
     for limits, gone in (((2 * size, 30.0), paths[:1]), ((9 * size, 0.5), paths), ((9 * size, 30.0), [])):
         chosen = choose_prunable(paths, Retention(bytes=limits[0], days=limits[1]), "", now_s)
         assert [one.path for one in chosen] == gone
+
+
+def test_what_somebody_will_read_again_stays_and_takes_the_room_of_others(tmp_path: Path) -> None:
+    """A calibration's ladder, by the name of its file."""
+    for _ in range(3):
+        Recorder(tmp_path / "recordings", {}, ("time_s", "force_n")).close()
+    paths = recording_paths(tmp_path)
+    now_s = paths[-1].stat().st_mtime + 86_400.0
+    chosen = choose_prunable(paths, Retention(days=0.5), "", now_s, frozenset({paths[0].name}))
+    assert [one.path for one in chosen] == paths[1:]

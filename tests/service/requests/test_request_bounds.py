@@ -57,3 +57,13 @@ def test_each_field_is_taken_up_to_its_bound_and_refused_beyond_it(
     key = next(name for name, value in refused.items() if name not in taken or value is not taken[name])
     with pytest.raises(ValueError, match=key):
         parse_request(shape, {"do": "verb"} | refused)
+
+
+def test_what_is_left_out_asks_for_nothing_more() -> None:
+    """Above all: a rejected calibration is used for who says so, and a run is begun and not stopped."""
+    used = parse_request(CalibrationRequest, {"do": "calibration", "use": 3})
+    assert (used.force, used.rollback) == (False, False)
+    asked = parse_request(CalibrateRequest, {"do": "calibrate"})
+    assert (asked.plan, asked.stop, asked.dry_run) == (None, False, False)
+    recorded = parse_request(RecordRequest, {"do": "record"})
+    assert (recorded.on, recorded.for_s) == (None, 0.0)

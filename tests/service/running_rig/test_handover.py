@@ -105,9 +105,9 @@ def test_another_calibration_or_plant_than_before_is_told_and_the_same_is_not() 
     kept = {"calibration": 3, "plant": 2}
     assert Handover({}, record=False).changes(calibration=1, plant=0) == ()
     assert Handover(kept, record=False).changes(calibration=3, plant=2) == ()
-    words = Handover(kept, record=False).changes(calibration=1, plant=0)
+    words = Handover(kept, record=False).changes(calibration=4, plant=0)
     assert [word.partition(":")[0] for word in words] == [
-        "W250 calibration 3 was in use before the restart, now it is 1",
+        "W250 calibration 3 was in use before the restart, now it is 4",
         "W250 plant 2 was in use before the restart, now it is the rig's own",
     ]
 

@@ -92,3 +92,14 @@ def test_a_rollback_does_not_go_to_a_plant_that_waited_and_was_never_in_use(edge
     assert edges.plants.status()["active"] == 0, "the rig's own, as before"
     edges.plants.answer({"rollback": True})
     assert edges.plants.status()["active"] == 2
+
+
+def test_one_change_at_a_time(edges: Edges) -> None:
+    """Two threads would select, and what is told as in use be the one that ended last."""
+    work: list[object] = []
+    edges.plants.run_in_background = lambda begun, done: work.append(begun)
+    assert edges.plants.answer({"do": "plant", "use": 0})["busy"]
+    for request in ({"use": 0}, {"rollback": True}):
+        with pytest.raises(ValueError, match="plant use 0 is under way"):
+            edges.plants.answer({"do": "plant", **request})
+    assert len(work) == 1 and edges.plants.answer({"do": "plant"})["job"] == 1

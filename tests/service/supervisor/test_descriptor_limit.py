@@ -44,6 +44,14 @@ def test_what_is_enough_is_left_as_it_is(limits: Callable[[int, int], Limits], s
     assert not set_to
 
 
+@pytest.mark.parametrize("hard", [NEEDED, WANTED - 1])
+def test_the_soft_limit_is_raised_no_further_than_the_hard_one(limits: Callable[[int, int], Limits], hard: int) -> None:
+    """The kernel refuses more, and all stayed at the 16 that it was."""
+    set_to = limits(16, hard)
+    assert raise_descriptor_limit() == ""
+    assert set_to == [(hard, hard)]
+
+
 def test_a_hard_limit_that_is_too_low_is_told_with_what_is_needed(limits: Callable[[int, int], Limits]) -> None:
     assert limits(16, 29) == []
     sentence = raise_descriptor_limit()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gateway.processes import message_link
+from gateway.processes import exit_codes, message_link
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.processes.scheduling.scheduler_counters import ProcessorTime
 from gateway.service.supervisor.safe_line import SafeLine
@@ -140,6 +140,21 @@ def test_who_gives_up_says_whether_the_safe_voltage_stands(scene, port, monkeypa
     assert one.run() == 1
     assert one.said[-1].startswith("A402 five restarts")
     assert one.said[-1].endswith(f"the gateway stops, {said}")
+
+
+@pytest.mark.parametrize("code", [exit_codes.DATA, exit_codes.PERMISSION, exit_codes.CONFIGURATION, exit_codes.DEVICE])
+def test_who_has_told_why_it_cannot_start_is_not_started_again(scene, port, code):
+    """Five more starts would tell it five times more, and a service's `Restart=` goes by the code."""
+    one = scene(dies_after(1, port, code))
+    assert one.run() == code
+    assert len(one.starter.started) == 1 and one.said == []
+
+
+@pytest.mark.parametrize(("code", "starts"), [(exit_codes.DEVICE, 2), (exit_codes.PERMISSION, 1)])
+def test_a_device_that_is_away_later_is_started_for_again_and_a_permission_is_not(scene, port, code, starts):
+    one = scene(dies_after(8, port, code), lives(port))
+    one.run(lambda: len(one.starter.started) == 2 and one.guardian.announced, steps=40)
+    assert len(one.starter.started) == starts
 
 
 def test_who_gives_up_without_ever_a_line_claims_no_safe_voltage(scene, port):

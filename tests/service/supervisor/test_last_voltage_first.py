@@ -45,6 +45,22 @@ def test_a_silent_loop_is_killed_then_the_voltage_is_safe_and_then_its_death_is_
     assert done == [("killed", b""), ("waited for", SAFE_FRAME)]
 
 
+def test_why_a_loop_was_silent_is_asked_behind_the_safe_voltage(scene, port, monkeypatch):
+    """The kernel's files may keep whoever reads them waiting, above all on the machine that is too busy."""
+    one = scene(lives(port), lives(port))
+    assert_comes_up(one)
+    asked: list[bytes] = []
+
+    def why() -> Ending:
+        asked.append(port.wrote())
+        return Ending(EndCause.STALLED, "it was silent")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(one.guardian.control.heartbeat, "why_silent", lambda process, now_s: why)
+        assert one.run(lambda: len(one.starter.started) == 2) is None
+    assert asked == [SAFE_FRAME]
+
+
 def test_at_the_end_nobody_is_waited_for_before_the_voltage_is_safe(scene, port, monkeypatch):
     """Each child has a second to end in order, when it is asked: force would stand for as long."""
     one = scene(lives(port))

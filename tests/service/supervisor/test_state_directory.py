@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from gateway.processes import exit_codes
+from gateway.processes.state_lock import hold_state_lock
 from gateway.service.supervisor import guardian
 from gateway.service.supervisor.run_options import RunOptions
 
@@ -41,6 +42,15 @@ def test_a_control_process_that_is_started_again_makes_it_anew(tmp_path: Path) -
         ended = subprocess.run(words, pass_fds=[its.fileno()], capture_output=True, text=True, timeout=60, check=False)
     assert "no-such-rig" in ended.stderr and ended.returncode == exit_codes.CONFIGURATION
     assert stat.S_IMODE(state.stat().st_mode) == 0o700
+
+
+def test_a_second_gateway_on_one_state_ends_by_a_code_of_its_own(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """0 would read as a gateway that has done its work: a service would not be started again."""
+    with hold_state_lock(tmp_path) as is_ours:
+        assert is_ours and guardian.run(RunOptions(state=tmp_path)) == exit_codes.DEVICE
+    assert capfd.readouterr().err.startswith("E104 ")
 
 
 def test_a_rig_without_a_given_directory_has_one_of_its_own_name(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gateway.profiles.recordings_section import Retention
-from gateway.recording import recording_paths
+from gateway.recording import Recorder, recording_paths
 from gateway.recording.care import clock_doubt
 from gateway.recording.care.clock_doubt import ClockDoubt, doubt_clock
 from gateway.service.running_rig.recording import retention as module
@@ -99,3 +99,23 @@ def test_a_year_that_no_calendar_has_is_said_as_its_last_one(tmp_path: Path, mon
     monkeypatch.setattr(clock_doubt, "_ended", lambda paths: [(2.0e12, path.name)])
     doubt = doubt_clock([path], 90.0, NOW_S)
     assert doubt.kind is ClockDoubt.BEHIND and "ended on 9999-12-31" in doubt.sentence
+
+
+def test_what_is_being_recorded_is_no_witness_for_the_clock(tmp_path: Path) -> None:
+    """Its time is that of the clock itself: beside one that had just begun nothing was doubted, and all others went."""
+    record(tmp_path, days_ago=2.0)
+    growing = Recorder(tmp_path / "recordings", {}, ("time_s",))
+    now_s = NOW_S + 3650 * DAY_S
+    os.utime(growing.path, (now_s, now_s))
+    paths = recording_paths(tmp_path)
+    assert doubt_clock(paths, 90.0, now_s).kind is ClockDoubt.AHEAD
+    growing.close()
+    assert doubt_clock(paths, 90.0, now_s).kind is ClockDoubt.NONE
+
+
+@pytest.mark.parametrize(("ahead_days", "kind"), [(0.9, ClockDoubt.NONE), (1.1, ClockDoubt.BEHIND)])
+def test_a_recording_of_more_than_a_day_from_now_is_no_summer_time(
+    ahead_days: float, kind: ClockDoubt, tmp_path: Path
+) -> None:
+    record(tmp_path, days_ago=-ahead_days)
+    assert doubt_clock(recording_paths(tmp_path), 90.0, NOW_S).kind is kind

@@ -12,9 +12,10 @@ from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse, Controller
 from gateway.devices.messages import ForceSample, Quality
 from gateway.profiles.recordings_section import Retention
-from gateway.recording import list_recordings
+from gateway.recording import list_recordings, read_recording, recording_paths
 from gateway.recording.label import RecordingLabel, label_of
 from gateway.recording.recorder import sync_recording
+from gateway.recording.tables.column_names import CALIBRATION
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recording.recorded_row import COLUMNS, row_of
 from gateway.service.running_rig.recording.recordings import LONGEST_S, RUN_COLUMNS, Recordings
@@ -123,6 +124,31 @@ def test_one_that_goes_on_for_days_goes_on_in_another_file(recordings: Recording
     assert {label_of(entry.header).name for entry in list_recordings(tmp_path)} == {"for ever"}
     assert len([line for line in recordings._log if "as long as one may be" in line]) == 3
     recordings.stop()
+
+
+def test_each_row_says_the_calibration_that_was_in_use_for_it(recordings: Recordings, tmp_path: Path) -> None:
+    decision = Controller(demo().control, CalibrationInUse(bsfm(), 1)).safe_output(FaultCode.NONE)
+    recordings.start()
+    for number in (3, 3, 4):
+        recordings.calibration = replace(demo().calibration, number=number)
+        recordings.append(ForceSample(1.0, 12.5, Quality.OK, time_s=1.0), decision, LineState(0.0, 0.0, 0.0))
+    recordings.stop()
+    (path,) = recording_paths(tmp_path)
+    assert read_recording(path).columns[CALIBRATION].tolist() == [3.0, 3.0, 4.0]
+
+
+def test_with_each_next_file_it_is_looked_at_once_what_there_is_no_room_for(tmp_path: Path) -> None:
+    """An hour of samples is more than an eighth of what a small limit has room for."""
+    limited = replace(demo(), retention=Retention(days=80.0))
+    recordings, looked = Recordings(tmp_path / "recordings", limited, Log(), AtOnce()), []
+    recordings._retention._worker = lambda work, done: looked.append(work)  # type: ignore[assignment]
+    recordings.start()
+    for at_s in (1.0, 2.0, 1.0 + LONGEST_S / 48.0, 1.0 + 1.1 * LONGEST_S, 2.0 + 1.1 * LONGEST_S):
+        recordings.flush(at_s)
+    recordings.stop()
+    assert recordings.status()["recording"] is None and len(looked) == 3, (
+        "at the start, after hours, with the next file"
+    )
 
 
 @pytest.mark.parametrize("limit", [Retention(days=1.0e-6), Retention(bytes=1_000_000)], ids=["days", "bytes"])

@@ -11,6 +11,7 @@ import pytest
 from gateway.profiles.recordings_section import Retention
 from gateway.recording import recording_paths
 from gateway.recording.care import keeping
+from gateway.service.running_rig.recording import retention as module
 from gateway.service.running_rig.recording.retention import RecordingRetention
 from tests.recording.care.test_care import record
 
@@ -133,3 +134,16 @@ def test_a_recording_that_has_become_long_is_a_reason_to_look_where_there_is_a_l
         return counts
 
     assert asyncio.run(run()) == [2, 0]
+
+
+def test_the_ladder_of_the_calibration_in_use_stays_however_old_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Kept by no mark: that it is needed is known by the calibrations alone."""
+    paths = [record(tmp_path, days_ago=1_000) for _ in range(3)]
+    record_now(tmp_path)
+    monkeypatch.setattr(module, "kept_ladders", lambda state: frozenset({paths[1].name}))
+    retention = RecordingRetention(tmp_path, Retention(days=30.0), Said())
+    retention.close()
+    assert [one.path for one in retention._prune(0.0)] == [paths[0], paths[2]]
+    assert paths[1].is_file()

@@ -5,6 +5,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.registers.refusal import Refusal
 from gateway.registers.words import State
+from gateway.service.running_rig.last_tick import LastTick
 from tests.service.wired import ENABLE, Wired
 
 HOUR_S = 3600.0
@@ -50,3 +51,13 @@ def test_a_machine_that_woke_long_ago_presses_as_ever() -> None:
         wired.suspended_s = HOUR_S - 1e-6 * (k % 3)  # two clocks are never read at one moment
         wired.run(0.005)
     assert wired.state is State.HOLDING
+
+
+def test_what_passes_between_the_reading_of_two_clocks_is_no_suspension() -> None:
+    """Of a machine that never sleeps each tick would be a little late, and the oldest enable thrown away."""
+    apart_s = iter((0.0, 0.001, 0.002, 0.019, 5.0))
+    last = LastTick(lambda: next(apart_s))
+    assert last.suspended_s() == 0.0
+    last.note(1.0, None)
+    assert (last.slept_s, last.suspended_s()) == (0.0, 0.0)
+    assert last.suspended_s() == pytest.approx(5.0, abs=0.02), "and one that sleeps is"
