@@ -15,7 +15,7 @@ import hypothesis
 import pytest
 
 from tests.tried_again import TriedAgain
-from tests.workers import FewMessages, GroupsStayTogether, OneCompiler, schedule_groups
+from tests.workers import ForkedWorkers, OneCompiler
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosis' matrices are small
 
@@ -23,14 +23,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosi
 def pytest_configure(config: pytest.Config) -> None:
     """A shell's background job inherits an ignored SIGINT, and so would every process under test."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    config.pluginmanager.register(GroupsStayTogether(group_of))
     config.pluginmanager.register(TriedAgain(lambda nodeid: "tests/web/" in nodeid or group_of(nodeid) in IN_REAL_TIME))
     draw_examples(at_random=config.getoption("--long"))
-    if hasattr(config, "workerinput"):
-        config.pluginmanager.register(FewMessages(config.pluginmanager))
+    if workers := config.getoption("--workers"):
+        config.pluginmanager.register(ForkedWorkers(workers, group_of))
     gc.disable()  # until all tests are collected, of which none is garbage
-    if hasattr(config, "workerinput") and config.args_source is pytest.Config.ArgsSource.TESTPATHS:
-        config.args = places_from_another_one_on(config.workerinput)
 
 
 def draw_examples(*, at_random: bool) -> None:
@@ -38,15 +35,6 @@ def draw_examples(*, at_random: bool) -> None:
     bound in time: a busy machine is no fault."""
     hypothesis.settings.register_profile("ours", derandomize=not at_random, deadline=None, print_blob=True)
     hypothesis.settings.load_profile("ours")
-
-
-def places_from_another_one_on(worker: dict[str, Any]) -> list[str]:
-    """What is collected, from another place on in each worker: in a fresh checkout all of them compile every file that no
-    other has compiled yet, and they come to the same file at different times."""
-    places = [place for place in sorted(HERE.iterdir()) if place.is_dir() or place.name.startswith("test_")]
-    places = [place for place in places if place.name != "__pycache__"]
-    first = int(worker["workerid"].removeprefix("gw")) * len(places) // worker["workercount"]
-    return [str(place) for place in places[first:] + places[:first]]
 
 
 KEPT_PROFILES = 64
@@ -103,14 +91,14 @@ def nobody_changes_what_all_share() -> Iterator[None]:
 
 
 def pytest_collection() -> None:
-    """Before test files are read, of which many ask for profiles at their import. xdist's master collects none."""
+    """Before test files are read, of which many ask for profiles at their import."""
     keep_parsed_profiles()
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
     """The thousands of tests stay until the end: they are not walked through at each collection of garbage, of which there is
     one for every so many new things. At Python's own 700 it takes a thirtieth of a simulated schedule."""
-    if hasattr(session.config, "workerinput"):
+    if session.config.getoption("--workers"):
         from numba.core.dispatcher import Dispatcher  # which test files have imported by now
 
         OneCompiler(HERE / "conftest.py").take_turns(Dispatcher)
@@ -122,6 +110,9 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--long", action="store_true", help="the same tests with a bigger budget: seeds, kills, fuzz, soak"
+    )
+    parser.addoption(
+        "--workers", type=int, default=0, help="so many processes share the tests; 0: one runs all, in order"
     )
 
 
@@ -182,17 +173,12 @@ def begun_at(nodeid: str) -> int:
     return order.index(group) if group in order else len(order)
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    return schedule_groups(group_of, config, log)
-
-
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    is_worker = hasattr(config, "workerinput")
-    if is_worker:
+    is_shared = bool(config.getoption("--workers"))
+    if is_shared:
         items.sort(key=lambda item: (begun_at(item.nodeid), item.path))  # stable: within a file nothing moves
     if not config.getoption("--long"):
-        leave_out_long(items, in_silence=is_worker)
+        leave_out_long(items, in_silence=is_shared)
 
 
 def leave_out_long(items: list[pytest.Item], *, in_silence: bool) -> None:

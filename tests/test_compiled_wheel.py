@@ -40,7 +40,7 @@ def test_compiled_it_passes_the_tests_of_the_wire_the_bank_and_whole_schedules(t
         [sys.executable, "-c", WHERE], cwd=copy, env=environment, capture_output=True, text=True, check=True
     )
     assert all(path.startswith(str(copy)) and path.endswith(".so") for path in where.stdout.split()), where.stdout
-    command = [sys.executable, "-m", "pytest", *ROOMS, "--numprocesses", "2", "-k", f"not {REPLACES_A_METHOD}"]
+    command = [sys.executable, "-m", "pytest", *ROOMS, "--workers", "2", "-k", f"not {REPLACES_A_METHOD}"]
     tested = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, check=False)
     assert tested.returncode == 0, tested.stdout[-5000:]
     assert " passed" in tested.stdout

@@ -1,19 +1,37 @@
 """How the gate shares its tests among workers: what must stay together does, and no name in the lists is out of date. What
-workers tell of a test, and that none leaves anything behind."""
+workers tell of a test, how they end, and that no test leaves anything behind."""
 
 import asyncio
 import fcntl
 import os
+import re
+import signal
+import subprocess
+import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from tests.conftest import LONG_WAITS, REAL_TIME, SLOW, SPREAD, begun_at, find_leaks, group_of, leave_out_long
-from tests.workers import FewMessages, OneCompiler, schedule_groups
+from tests.workers import OneCompiler, is_needed
 
 TESTS = Path(__file__).parent
+CONFTEST = """
+import os
+from pathlib import Path
+import pytest
+from tests.workers import ForkedWorkers
+
+@pytest.fixture(scope="session", autouse=True)
+def ends():
+    yield
+    Path(f"ended-{os.getpid()}").touch()
+    assert not os.path.exists("ends badly"), "ended badly"
+
+def pytest_configure(config):
+    config.pluginmanager.register(ForkedWorkers(2, lambda nodeid: nodeid.partition("::")[0]))
+"""
 
 
 def test_a_file_is_one_group_whatever_its_parameters_are_called() -> None:
@@ -52,16 +70,6 @@ def test_every_place_that_the_lists_name_is_there() -> None:
         assert f"def {name.removesuffix('[')}(" in (TESTS / file).read_text(encoding="utf-8")
 
 
-class WorkerInteractor:
-    """Stands for xdist's."""
-
-    def __init__(self) -> None:
-        self.told: list[tuple[str, Any]] = []
-
-    def sendevent(self, name: str, **contents: Any) -> None:
-        self.told.append((name, contents))
-
-
 def report(when: str, outcome: str, duration_s: float = 0.0, said: tuple[tuple[str, str], ...] = ()) -> Any:
     place = ("a.py", 1, "test_a")
     return pytest.TestReport("a.py::test_a", place, {}, outcome, None, when, user_properties=said, duration=duration_s)  # type: ignore[arg-type]
@@ -80,42 +88,79 @@ def report(when: str, outcome: str, duration_s: float = 0.0, said: tuple[tuple[s
         (report("teardown", "passed", said=(("tried again", "stolen"),)), True),
     ],
 )
-def test_the_master_is_told_of_all_but_a_fixture_that_went_well(one: Any, is_told: bool) -> None:
-    plugins, worker = pytest.PytestPluginManager(), WorkerInteractor()
-    plugins.register(worker)
-    few = FewMessages(plugins)
-    data = few.pytest_report_to_serializable(one) or {"outcome": one.outcome}
-    worker.sendevent("testreport", data=data | {"item_index": 3})
-    worker.sendevent("logstart", nodeid=one.nodeid)
-    worker.sendevent("runtest_protocol_complete", item_index=3)
-    told = [("testreport", {"data": {"outcome": one.outcome, "item_index": 3}})] if is_told else []
-    assert worker.told == [*told, ("runtest_protocol_complete", {"item_index": 3})]
+def test_all_but_a_fixture_that_went_well_is_told(one: Any, is_told: bool) -> None:
+    assert is_needed(one) is is_told
 
 
-def test_a_group_is_handed_on_by_the_places_of_its_tests() -> None:
-    class Node:
-        shutting_down = False
+def run_in_workers(folder: Path, *words: str, **files: str) -> subprocess.Popen[str]:
+    """Begin to run test files of this text in two workers."""
+    (folder / "conftest.py").write_text(CONFTEST)
+    for name, text in files.items():
+        (folder / f"test_{name}.py").write_text("import os, signal, time\nfrom pathlib import Path\n" + text)
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-q", *words, "."]
+    environment = os.environ | {"PYTHONPATH": str(TESTS.parent), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    out = subprocess.PIPE
+    return subprocess.Popen(command, cwd=folder, env=environment, stdout=out, stderr=subprocess.STDOUT, text=True)
 
-        def __init__(self) -> None:
-            self.given: list[int] = []
 
-        def send_runtest_some(self, places: list[int]) -> None:
-            self.given += places
+def test_each_test_runs_once_in_its_group_s_worker_and_what_fails_is_told(tmp_path: Path) -> None:
+    note = "def test_{}(tmp_path):\n    print('said')\n    with open('ran', 'a') as ran: "
+    note += "ran.write(f'{} {} {{os.getpid()}}\\n')\n"
+    files = {
+        group: "".join(note.format(name, group, name) for name in "ab")
+        + ("    assert tmp_path.parent.name == 'no'\n" if group == "three" else "")
+        for group in ("one", "two", "three")
+    }
+    run = run_in_workers(tmp_path, **files)
+    said, _ = run.communicate()
+    ran = [line.split() for line in (tmp_path / "ran").read_text().splitlines()]
+    assert sorted((group, name) for group, name, _ in ran) == sorted((group, name) for group in files for name in "ab")
+    assert len({(group, pid) for group, _, pid in ran}) == 3 and str(run.pid) not in {pid for *_, pid in ran}
+    assert run.returncode == 1 and "1 failed, 5 passed" in said
+    assert re.search(r"AssertionError: assert 'worker[12]' == 'no'", said) and said.count("said\n") == 1
+    assert {path.name for path in tmp_path.glob("ended-*")} >= {f"ended-{pid}" for *_, pid in ran}
 
-    node: Any = Node()
-    config: Any = SimpleNamespace(getvalue=lambda name: ["popen"], option=SimpleNamespace())
-    shared = schedule_groups(lambda nodeid: nodeid[0], config, None)
-    shared.add_node(node)
-    shared.registered_collections[node] = ["a1", "b1", "a2", "b2", "a3"]
-    shared.workqueue.update({"b": {"b1": True, "b2": False}, "a": {"a1": False, "a2": False, "a3": False}})
-    shared._assign_work_unit(node)
-    assert node.given == [3]
-    shared._assign_work_unit(node)
-    assert node.given == [3, 0, 2, 4] and not shared.workqueue
-    shared.assigned_work[node]["b"]["b2"] = True
-    shared.workqueue["c"] = {"b1": False}
-    shared._assign_work_unit(node)
-    assert list(shared.assigned_work[node]) == ["a", "c"], "what is done is counted no more"
+
+def test_a_worker_that_dies_fails_its_test_and_another_one_goes_on_behind_it(tmp_path: Path) -> None:
+    dying = "def test_a(): pass\ndef test_b(): os.kill(os.getpid(), signal.SIGKILL)\ndef test_c(): pass\n"
+    run = run_in_workers(tmp_path, dying=dying, other="def test_d(): pass\n")
+    said, _ = run.communicate()
+    assert run.returncode == 1 and "1 failed, 3 passed" in said
+    assert "a worker has died in this test: -9" in said and "FAILED test_dying.py::test_b" in said
+
+
+def test_what_the_session_s_end_finds_fails_the_run(tmp_path: Path) -> None:
+    (tmp_path / "ends badly").touch()
+    run = run_in_workers(tmp_path, one="def test_a(): pass\n")
+    said, _ = run.communicate()
+    assert run.returncode == 1 and "1 passed, 1 error" in said and "ended badly" in said
+
+
+def test_at_the_first_failure_the_others_are_ended_with_all_their_fixtures(tmp_path: Path) -> None:
+    waits = "def test_a():\n    Path('waits').touch()\n    time.sleep(600)\n"
+    fails = "def test_b():\n    while not Path('waits').exists(): time.sleep(0.01)\n    assert False\n"
+    run = run_in_workers(tmp_path, "-x", fails=fails, waits=waits, later="def test_c(): pass\n")
+    said, _ = run.communicate()
+    assert run.returncode == 1 and "1 failed" in said and "Traceback" not in said
+    assert len(list(tmp_path.glob("ended-*"))) == 2
+
+
+def test_a_thread_that_no_worker_would_have_ends_the_run_before_its_first_test(tmp_path: Path) -> None:
+    thread = "import threading\nthreading.Thread(target=time.sleep, args=(1.0,)).start()\ndef test_a(): pass\n"
+    run = run_in_workers(tmp_path, one=thread)
+    said, _ = run.communicate()
+    assert run.returncode == 3 and "has started what no worker would have" in said and "passed" not in said
+
+
+def test_an_interrupt_ends_all_workers_with_their_fixtures(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "begun")
+    waits = "def test_a():\n    Path('begun').write_text('x')\n    time.sleep(600)\n"
+    run = run_in_workers(tmp_path, waits=waits)
+    assert (tmp_path / "begun").read_text() == "x"
+    run.send_signal(signal.SIGINT)
+    said, _ = run.communicate()
+    assert run.returncode == 2 and "KeyboardInterrupt" in said
+    assert len(list(tmp_path.glob("ended-*"))) == 1
 
 
 def test_a_descriptor_that_is_left_fails_its_test_and_one_that_is_closed_does_not() -> None:

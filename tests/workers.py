@@ -1,90 +1,233 @@
-"""How a run's workers share its tests, and what they tell of them: as xdist has it, where that is neither wrong nor dear."""
+"""How a run's tests are shared among workers: processes that are forked once all tests are collected, so that each test file
+is imported once. Who is free takes the next group of tests from a pipe that all share."""
 
 import fcntl
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from mmap import mmap
+from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 from threading import RLock
-from typing import Any, Final
+from types import ModuleType
+from typing import Any, Final, NamedTuple
 
 import pytest
 
 TELLING_S: Final = 0.1
 """A fixture that takes longer is told, for the list of the slowest."""
-PLAIN: Final = "plain"
+NUMBER: Final = 4
+"""Bytes of the place of a group or a test."""
+NO_TEST: Final = b"\xff" * NUMBER
 
 
-class FewMessages:
-    """Leaves out what nobody needs to know. xdist sends six messages for each of fifteen thousand tests; two of them say that
-    nothing has gone wrong before and behind it, and what packs and unpacks them takes as long as a short test does."""
-
-    def __init__(self, plugins: pytest.PytestPluginManager) -> None:
-        (worker,) = (one for one in plugins.get_plugins() if type(one).__name__ == "WorkerInteractor")
-        self._send, worker.sendevent = worker.sendevent, self._send_what_is_needed
-
-    @pytest.hookimpl(tryfirst=True)
-    def pytest_report_to_serializable(self, report: object) -> dict[str, Any] | None:
-        """What is not sent is not packed."""
-        return None if is_needed(report) else {PLAIN: True}
-
-    def _send_what_is_needed(self, name: str, **contents: Any) -> None:
-        if name != "logstart" and PLAIN not in contents.get("data", ()):
-            self._send(name, **contents)
-
-
-def is_needed(report: object) -> bool:
+def is_needed(report: pytest.TestReport) -> bool:
     """Return False for a fixture that was made or ended at once, without a fault and in silence."""
-    if not isinstance(report, pytest.TestReport):
-        return True
     is_told = report.failed or report.skipped or report.when == "call" or report.duration >= TELLING_S
     return is_told or bool(report.user_properties)
 
 
-def schedule_groups(group_of: Callable[[str], str], config: pytest.Config, log: Any) -> Any:
-    """Our own groups: xdist 3.8 passes its `xdist_group` through a field that pytest 9.2 no longer has, and in silence
-    groups nothing (pytest-xdist issue 1386)."""
-    from xdist.scheduler import LoadScopeScheduling
+class Telling:
+    """Tells of each test of a worker, at the test's end, what it came to. When the session ends nobody may listen any more."""
 
-    places: dict[str, int] = {}
-
-    class ByGroup(LoadScopeScheduling):
-        def _split_scope(self, nodeid: str) -> str:
-            return group_of(nodeid)
-
-        def _assign_work_unit(self, node: Any) -> None:
-            """As xdist does, which walks through all tests for the place of each, and at each test's end through all that its
-            worker has ever had: groups that are done are forgotten."""
-            if not places:
-                places.update((nodeid, place) for place, nodeid in enumerate(self.registered_collections[node]))
-            group, tests = self.workqueue.popitem(last=False)
-            left = {name: had for name, had in self.assigned_work.get(node, {}).items() if not all(had.values())}
-            self.assigned_work[node] = {**left, group: tests}
-            node.send_runtest_some([places[nodeid] for nodeid, is_done in tests.items() if not is_done])
-
-    config.option.loadscopereorder = False  # not by the number of tests: our order
-    return ByGroup(config, log)
-
-
-class GroupsStayTogether:
-    """Fails a run in which a group was spread over workers: everything would pass, only slower and less surely."""
-
-    def __init__(self, group_of: Callable[[str], str]) -> None:
-        self._group_of = group_of
-        self.workers: dict[str, set[str]] = {}
-        self.lost_one = False
+    def __init__(self, session: pytest.Session, told: Connection) -> None:
+        self._config, self._told = session.config, told
+        self._reports: list[Any] = []
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        if worker := getattr(report, "worker_id", None):
-            self.workers.setdefault(self._group_of(report.nodeid), set()).add(worker)
+        if is_needed(report):
+            pack = self._config.hook.pytest_report_to_serializable
+            self._reports.append(pack(config=self._config, report=report))
 
-    @pytest.hookimpl(optionalhook=True)
-    def pytest_testnodedown(self, error: object) -> None:
-        self.lost_one |= bool(error)  # its work went to another one
+    def pytest_runtest_logfinish(self, nodeid: str, location: tuple[str, int | None, str]) -> None:
+        self._told.send((nodeid, location, self._reports))
+        self._reports = []
 
-    def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        spread = [] if self.lost_one else [group for group, workers in self.workers.items() if len(workers) > 1]
-        if spread:
-            raise pytest.UsageError(f"not kept on one worker: {spread[:5]}")
+
+class BetweenGroups:
+    """Stands for a group's next test, which nobody has chosen yet: of the fixtures those of the session stay."""
+
+    def __init__(self, session: pytest.Session) -> None:
+        self._session = session
+
+    def listchain(self) -> list[pytest.Session]:
+        return [self._session]
+
+
+class WorkerProcess:
+    """What a forked process does. place: where it notes the place of the test that it is at."""
+
+    def __init__(self, session: pytest.Session, name: str, told: Connection, place: mmap) -> None:
+        self._session, self._place = session, place
+        self._last: pytest.Item | None = None
+        config: Any = session.config
+        config.workerinput = {"workerid": name}  # by which plugins know a worker
+        sys.modules["__main__"] = ModuleType("__main__")  # else what a test spawns would import pytest
+        capture, terminal = (config.pluginmanager.get_plugin(name) for name in ("capturemanager", "terminalreporter"))
+        capture.stop_global_capturing()  # into files that all would share
+        capture.start_global_capturing()
+        config.pluginmanager.unregister(terminal)
+        config.pluginmanager.register(Telling(session, told))
+        folders = config._tmp_path_factory
+        folders._basetemp = folders.getbasetemp() / name
+        folders._basetemp.mkdir(mode=0o700)
+
+    def run(self, groups: Iterable[list[int]]) -> None:
+        """Run the tests at these places, until -x or Ctrl-C ends that."""
+        try:
+            for group in groups:
+                self._run_group([self._session.items[place] for place in group], group)
+                if self._session.shouldfail:
+                    break
+        except KeyboardInterrupt:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+        finally:
+            if self._last:
+                self._end_session(self._last)
+
+    def _run_group(self, items: list[pytest.Item], places: list[int]) -> None:
+        following: list[Any] = [*items[1:], BetweenGroups(self._session)]
+        for item, place, after in zip(items, places, following, strict=True):
+            self._last, self._place[:] = item, place.to_bytes(NUMBER)
+            item.ihook.pytest_runtest_protocol(item=item, nextitem=after)
+            if self._session.shouldfail:
+                return
+
+    def _end_session(self, last: pytest.Item) -> None:
+        """End the session's fixtures, as a part of the last test."""
+        end: Any = self._session._setupstate.teardown_exact  # type: ignore[attr-defined]
+        call = pytest.CallInfo.from_call(lambda: end(None), "teardown")
+        report = last.ihook.pytest_runtest_makereport(item=last, call=call)
+        last.ihook.pytest_runtest_logreport(report=report)
+        last.ihook.pytest_runtest_logfinish(nodeid=last.nodeid, location=last.location)
+
+
+@contextmanager
+def ending_the_process(terminal: int) -> Iterator[None]:
+    """Let a worker leave no frame of those in which it was forked. terminal: descriptor for what it has died of."""
+    try:
+        yield
+        os._exit(0)
+    except BrokenPipeError:  # the run has ended
+        os._exit(1)
+    except BaseException:
+        os.write(terminal, traceback.format_exc().encode())
+        os._exit(1)
+
+
+def own_threads() -> set[str]:
+    """Names of this process's threads beside its first, which a fork does not take along. That of pyarrow's allocator, which it
+    starts again in each process, is none of them."""
+    threads = [thread for thread in Path("/proc/self/task").iterdir() if thread.name != str(os.getpid())]
+    return {(thread / "comm").read_text().strip() for thread in threads} - {"jemalloc_bg_thd"}
+
+
+class Worker(NamedTuple):
+    """A worker as the run sees it."""
+
+    pid: int
+    place: mmap
+
+
+class ForkedWorkers:
+    """Runs what is collected in `count` processes, each group (`group_of` a test's id) in one of them, in its order."""
+
+    def __init__(self, count: int, group_of: Callable[[str], str]) -> None:
+        self._count, self._group_of = count, group_of
+        self._workers: dict[Connection, Worker] = {}
+        self._groups: dict[str, list[int]] = {}
+        self._started = 0
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool | None:
+        option = session.config.option
+        if session.testsfailed or option.collectonly or option.usepdb:
+            return None  # and pytest goes on
+        assert not (threads := own_threads()), (
+            f"an import of a test file has started what no worker would have: {threads}"
+        )
+        for place, item in enumerate(session.items):
+            self._groups.setdefault(self._group_of(item.nodeid), []).append(place)
+        self._queue, filling = os.pipe()
+        os.write(filling, b"".join(number.to_bytes(NUMBER) for number in range(len(self._groups))))
+        os.close(filling)
+        session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]  # one for all
+        try:
+            for _ in range(min(self._count, len(self._groups))):
+                self._start(session, [])
+            self._listen(session)
+        finally:
+            self._end()
+        return True
+
+    def _start(self, session: pytest.Session, first: list[int]) -> None:
+        """Fork a worker, which begins with the tests at these places."""
+        (heard, told), place = Pipe(duplex=False), mmap(-1, NUMBER)
+        place[:] = NO_TEST
+        self._started += 1
+        pid = os.fork()
+        if not pid:
+            for other in (heard, *self._workers):
+                other.close()
+            with ending_the_process(os.dup(2)):
+                WorkerProcess(session, f"worker{self._started}", told, place).run(self._take_groups(first))
+        told.close()
+        self._workers[heard] = Worker(pid, place)
+
+    def _take_groups(self, first: list[int]) -> Iterator[list[int]]:
+        if first:
+            yield first
+        groups = list(self._groups.values())
+        while number := os.read(self._queue, NUMBER):
+            yield groups[int.from_bytes(number)]
+
+    def _listen(self, session: pytest.Session) -> None:
+        """Pass on what the workers tell, until each has ended."""
+        hook = session.config.hook
+        while self._workers:
+            for heard in wait([*self._workers]):
+                assert isinstance(heard, Connection)
+                try:
+                    nodeid, location, reports = heard.recv()
+                except EOFError:
+                    self._bury(session, heard)
+                    continue
+                for packed in reports:
+                    report = hook.pytest_report_from_serializable(config=session.config, data=packed)
+                    hook.pytest_runtest_logreport(report=report)
+                hook.pytest_runtest_logfinish(nodeid=nodeid, location=location)
+                if session.shouldfail:
+                    raise session.Failed(session.shouldfail)
+
+    def _bury(self, session: pytest.Session, heard: Connection) -> None:
+        """A worker has ended. Died it has with a test that fails so, and another one goes on behind that."""
+        worker = self._workers.pop(heard)
+        heard.close()
+        _, status = os.waitpid(worker.pid, 0)
+        if not status:
+            return
+        if worker.place[:] == NO_TEST:
+            raise ChildProcessError("a worker has died before its first test")
+        place = int.from_bytes(worker.place[:])
+        item = session.items[place]
+        how = f"a worker has died in this test: {os.waitstatus_to_exitcode(status)}"
+        report = pytest.TestReport(item.nodeid, item.location, {}, "failed", how, "call")
+        session.config.hook.pytest_runtest_logreport(report=report)
+        if not session.shouldfail:
+            self._start(session, [other for other in self._groups[self._group_of(item.nodeid)] if other > place])
+
+    def _end(self) -> None:
+        """End workers that still run, since -x or Ctrl-C has ended the run."""
+        os.close(self._queue)
+        for heard, worker in self._workers.items():
+            heard.close()
+            with suppress(ProcessLookupError):
+                os.kill(worker.pid, signal.SIGINT)
+        for worker in self._workers.values():
+            os.waitpid(worker.pid, 0)
 
 
 class OneCompiler:
