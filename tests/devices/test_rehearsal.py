@@ -181,6 +181,14 @@ def test_a_question_beside_the_work_that_could_not_be_told_apart_is_told_where_i
     assert any(place in fault for fault in faults), faults
 
 
+@pytest.mark.parametrize("name", ["waveshare-ao8b", "waveshare-relay", "laumas-tlb", "hbm-aed-binary"])
+def test_seven_data_bits_are_told_of_a_device_that_sends_whole_bytes(name: str, tmp_path: Path) -> None:
+    """Each byte above 127 would be another one, and the device silent at any speed."""
+    (fault,) = loaded(tmp_path, name, serial__data_bits=7)
+    assert "serial.data_bits: 7: " in fault and fault.endswith(" sends whole bytes: 8 data bits")
+    assert loaded(tmp_path, "stream-st-gs", serial__data_bits=7) == []
+
+
 def test_a_weight_in_registers_without_a_sign_is_told_by_its_type(tmp_path: Path) -> None:
     registers = {"function": 4, "first": 0, "last": 1, "weight": 0, "type": "uint32", "decimals": 2}
     (fault,) = loaded(tmp_path, "laumas-tlb", read_force={"modbus": registers, "unit": "kg"})
