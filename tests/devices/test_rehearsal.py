@@ -81,6 +81,11 @@ PRESSURE = {"ask": "P?", "answer": "{p:d}", "range": {"device": [0, 10], "pressu
         ({"read_voltage__range__voltage_v": [1, 10]}, "reads 1 .. 10 V, and set_voltage sets 0 .. 10 V"),
         ({"read_voltage__range__voltage_v": [-1, 9.95]}, None),
         (
+            {"set_voltage__range__voltage_v": [0, 10000], "read_voltage": None},
+            "set_voltage.range.voltage_v: 10000 V: a voltage is in volts here, and an input of 10 V ends at 10",
+        ),
+        ({"set_voltage__range__voltage_v": [0, 24], "read_voltage__range__voltage_v": [0, 24]}, None),
+        (
             {"read_pressure__range__pressure_pa": [0, 9]},
             "read_pressure.range.pressure_pa: 9 Pa are 9e-05 bar: a pressure is in pascals here, and 1 bar is 100000",
         ),
