@@ -168,6 +168,8 @@ def drawn_modbus_output(rng: Random) -> Profile:
     profile, kind = _as_modbus(rng, _about(rng, "output")), rng.choice(list(_REGISTER_SPANS))
     ranges = {"device": _REGISTER_SPANS[kind], "voltage_v": [0.0, 10.0]}
     access = {"register": rng.choice([0, 4096]), "type": kind, "word_order": rng.choice(["abcd", "cdab"])}
+    if profile["constants"] == {"address": 17}:
+        profile["channels"] = 8
     writes = 6 if kind.endswith("16") and rng.random() < 0.5 else 16
     profile["set_voltage"] = {"modbus": {"function": writes, **access}, "range": ranges}
     _maybe(rng, profile, "read_voltage", {"modbus": {"function": rng.choice([3, 4]), **access}, "range": ranges})
