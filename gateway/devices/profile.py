@@ -75,7 +75,7 @@ class DeviceProfile:
         default_factory=dict
     )  # fields with one fixed value, such as an address; a rig may say another address and channel
     channels: Annotated[int, Ge(1)] | None = (
-        None  # outputs that a rig's `channel` chooses from, counted from 0; null: unknown
+        None  # outputs that a rig's `channel` chooses from, counted from 0; on Modbus their registers follow; null: unknown
     )
     reply_timeout_s: Annotated[float, Gt(0)] = 0.1  # an answer later than this is overdue
     watchdog: Literal["none"] | Watchdog = "none"  # none: the device holds its last output when nobody talks to it

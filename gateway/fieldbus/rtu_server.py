@@ -7,7 +7,9 @@ Decisions
 - The answer follows at once: the receiver has waited for the silence that the line must have before it.
 - What is asked while an answer is still on the wire is executed and not answered: who sends does not listen, and nothing
   piles up. Of a master that has not waited for answers for a quarter of a second nothing renews a lease, and nothing begins:
-  what it has sent waits in adapters and drivers, and it may be gone.
+  what it has sent waits in adapters and drivers, and it may be gone. That is seen by requests that are read together; where
+  a slow line parts them (9600 baud in pieces of 4 or 8 ms) it is not, and a driver's 4 KB of heartbeats last for 4 s. What
+  the baud says of the time between them would tell, but it says nothing on adapters that have none (CDC, serial servers).
 - Without a port of its own the face is a pseudo-terminal, paced like a line at its baud.
 """
 

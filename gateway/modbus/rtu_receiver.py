@@ -194,12 +194,11 @@ class RtuReceiver:
         return self._burst[at] in (self._unit, BROADCAST_UNIT)
 
     def _requests(self, found: list[tuple[int, int]]) -> list[RtuRequest]:
-        """Return those frames that are requests to us, in order; echoes are not."""
+        """Return those frames that are requests to us, in order; echoes are not, and are known before a master is noted."""
         requests: list[RtuRequest] = []
-        for at, size in found:
-            frame = bytes(self._burst[at : at + size])
-            if not self._is_ours(at) or self._echo.is_this(frame, self._last_s):
-                continue
+        ours = [(at, size, bytes(self._burst[at : at + size])) for at, size in found if self._is_ours(at)]
+        heard = [one for one in ours if not self._echo.is_this(one[2], self._last_s)]
+        for at, size, frame in heard:
             is_last = at == found[-1][0] and not self._echo.is_coming(size, self._last_s)
             requests.append(RtuRequest(frame[0], frame[1:-2], is_last and frame[0] == self._unit))
             self._echo.note_master(size, self._last_s)

@@ -81,6 +81,11 @@ PRESSURE = {"ask": "P?", "answer": "{p:d}", "range": {"device": [0, 10], "pressu
         ({"read_voltage__range__voltage_v": [1, 10]}, "reads 1 .. 10 V, and set_voltage sets 0 .. 10 V"),
         ({"read_voltage__range__voltage_v": [-1, 9.95]}, None),
         (
+            {"set_voltage__range__voltage_v": [0, 10000], "read_voltage": None},
+            "set_voltage.range.voltage_v: 10000 V: a voltage is in volts here, and an input of 10 V ends at 10",
+        ),
+        ({"set_voltage__range__voltage_v": [0, 24], "read_voltage__range__voltage_v": [0, 24]}, None),
+        (
             {"read_pressure__range__pressure_pa": [0, 9]},
             "read_pressure.range.pressure_pa: 9 Pa are 9e-05 bar: a pressure is in pascals here, and 1 bar is 100000",
         ),
@@ -179,6 +184,14 @@ def test_a_question_beside_the_work_that_could_not_be_told_apart_is_told_where_i
 ) -> None:
     faults = loaded(tmp_path, "adam-4024", **changes)
     assert any(place in fault for fault in faults), faults
+
+
+@pytest.mark.parametrize("name", ["waveshare-ao8b", "waveshare-relay", "laumas-tlb", "hbm-aed-binary"])
+def test_seven_data_bits_are_told_of_a_device_that_sends_whole_bytes(name: str, tmp_path: Path) -> None:
+    """Each byte above 127 would be another one, and the device silent at any speed."""
+    (fault,) = loaded(tmp_path, name, serial__data_bits=7)
+    assert "serial.data_bits: 7: " in fault and fault.endswith(" sends whole bytes: 8 data bits")
+    assert loaded(tmp_path, "stream-st-gs", serial__data_bits=7) == []
 
 
 def test_a_weight_in_registers_without_a_sign_is_told_by_its_type(tmp_path: Path) -> None:

@@ -140,13 +140,15 @@ def test_an_echo_that_is_awaited_no_more_leaves_no_request_without_an_answer() -
     assert bus.pause(0.1).send(encode_adu(1, READ)).requests() == [RtuRequest(1, READ, True)]
 
 
-def test_a_master_that_speaks_before_the_first_answer_has_come_tells_nothing_of_its_echo() -> None:
+@pytest.mark.parametrize("handed_over_s", [0.0, 0.016])
+def test_a_master_that_speaks_before_the_first_answer_has_come_tells_nothing_of_its_echo(handed_over_s: float) -> None:
     """The line was taken for one without an echo: each write was then answered, heard again and answered without an end."""
     bus, late_s = Bus(baud=115200), 8 * 11 / 115200 + 0.016
     ((_, heard),) = bus.send(encode_adu(1, READ)).pause(0.002).heard
     bus.heard.clear()
     bus.receiver.note_sent(heard, encode_adu(1, READ_ANSWER), bus.now_s)
-    assert bus.send(encode_adu(1, WRITE) + encode_adu(1, READ_ANSWER)).requests() == [RtuRequest(1, WRITE, False)]
+    bus.pause(handed_over_s).send(encode_adu(1, WRITE) + encode_adu(1, READ_ANSWER))
+    assert bus.requests() == [RtuRequest(1, WRITE, False)]
     assert [exchange(bus.pause(0.1), WRITE, echo_s=late_s) for _ in range(5)] == [1] * 5
 
 

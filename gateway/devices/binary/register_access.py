@@ -5,7 +5,7 @@ without the blanks. So everything that is built on templates holds for Modbus de
 rtu_framing. Function codes and PDUs: Modbus Application Protocol V1.1b3, sections 6.3, 6.4, 6.6 and 6.12.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Final, Literal
 
 from annotated_types import Ge, Le
@@ -47,6 +47,10 @@ class RegisterAccess:
     def is_reading(self) -> bool:
         """Decide whether the request changes nothing."""
         return self.function in _READING
+
+    def of_channel(self, channel: int) -> "RegisterAccess":
+        """Return the access to the same number of another output, counted from 0: its registers follow one another."""
+        return replace(self, register=self.register + channel * self.words)
 
     def question(self) -> str:
         """Return the request's PDU as a template."""

@@ -7,7 +7,7 @@ from typing import Final
 from gateway.devices.fields import Choice, Field, HexNumber, RegisterNumber
 from gateway.devices.framing import no_terminator
 from gateway.devices.grammar import Grammar
-from gateway.devices.profile import ADDRESS, DeviceProfile, DeviceRole
+from gateway.devices.profile import ADDRESS, TEMPLATE, DeviceProfile, DeviceRole
 from gateway.devices.template import compile_template, quote
 from gateway.modbus.crc import checksum_end
 
@@ -31,11 +31,14 @@ _SAID: Final = (
     _BESIDE,
 )
 _DIGITS: Final = frozenset("0123456789ABCDEF")
+_BITS_OF_A_BYTE: Final = 8
 _LEAST_FRAME: Final = 4  # bytes: unit, function, checksum
 
 
 def misspelt(profile: DeviceProfile) -> Found:
     """Return what is wrong with single sentences."""
+    if profile.codec != TEMPLATE and profile.serial.data_bits != _BITS_OF_A_BYTE:
+        yield ("serial", "data_bits"), f"{profile.serial.data_bits}: {profile.codec} sends whole bytes: 8 data bits"
     yield from _terminators(profile)
     yield from _cut_sentences(profile)
     yield from _no_pdus(profile)

@@ -21,6 +21,8 @@ def set_device(device: DeviceProfile, line: LineFile) -> DeviceProfile:
     """Return the device as the rig says that it is set. ValueError where it cannot be set so."""
     changes: dict[str, Any] = {}
     said = {name: getattr(line, name) for name in _CONSTANTS if getattr(line, name, None) is not None}
+    if device.is_modbus and (channel := said.pop(CHANNEL, 0)):
+        changes |= _registers(device, channel)
     if said:
         changes["constants"] = {**device.constants, **said}
     if not isinstance(line, ValveFile) and line.checksum is not None:
@@ -40,11 +42,11 @@ def find_unfit_settings(device: DeviceProfile, line: LineFile) -> Settings:
         if (
             getattr(line, name, None) is not None
             and name not in device.constants
-            and not (name == ADDRESS and device.is_modbus)
+            and not (device.is_modbus and (name == ADDRESS or device.channels))
         ):
-            yield name, f"{device.name} has no {name}: leave this line out"
+            yield name, f"{device.name} has no {name}: {_without(device, name)}"
     channel = getattr(line, CHANNEL, None)
-    if channel is not None and CHANNEL in device.constants and device.channels and channel >= device.channels:
+    if channel is not None and device.channels and channel >= device.channels:
         yield CHANNEL, f"{device.name} has {device.channels} outputs: 0 to {device.channels - 1}"
         return
     if not isinstance(line, ValveFile) and line.checksum is not None and device.is_modbus:
@@ -63,6 +65,22 @@ def find_unfit_settings(device: DeviceProfile, line: LineFile) -> Settings:
         complaints = [str(error)]
     if complaints:
         yield _blamed(line), complaints[0]
+
+
+def _without(device: DeviceProfile, name: str) -> str:
+    if device.is_modbus and name == CHANNEL:
+        return "its file names the registers of one output; `channels` in a copy of it says how many follow"
+    return "leave this line out"
+
+
+def _registers(device: DeviceProfile, channel: int) -> dict[str, Any]:
+    """The exchanges of another output of a Modbus device."""
+    exchanges = {name: getattr(device, name) for name in ("set_voltage", "read_voltage", "read_pressure")}
+    return {
+        name: replace(one, ask="", answer="", modbus=one.modbus.of_channel(channel))
+        for name, one in exchanges.items()
+        if one
+    }
 
 
 def _has_unit(device: DeviceProfile, line: CellFile) -> bool:

@@ -6,8 +6,8 @@ import pytest
 
 from gateway.cli.setup.wire_example import example
 from gateway.devices import cell_host, output_host
-from gateway.devices.messages import AskDevice, DeviceStep, ForceSample, SetVoltage
-from gateway.profiles import Report, check_report, load_device
+from gateway.devices.messages import AskDevice, DeviceStep, ForceSample, ReadVoltage, SetVoltage
+from gateway.profiles import Report, check_report, load_device, shipped_profiles_folder
 
 RIG = """
 name: own
@@ -55,6 +55,34 @@ def test_a_modbus_units_address_is_the_rigs(tmp_path: Path) -> None:
     assert found.rig, found.faults
     assert output_host(found.rig.output.device).request(SetVoltage(5.0))[:6] == bytes.fromhex("110600001388")
     assert cell_host(found.rig.load_cell.device).poll()[0] == 3
+
+
+def test_another_output_of_a_modbus_device_is_the_rigs_channel(tmp_path: Path) -> None:
+    """It was told to be none, and to leave the line out: output 0 moved in place of the one that was wired."""
+    found = rig(tmp_path, ", channel: 3", device="waveshare-ao8b")
+    assert found.rig, found.faults
+    host = output_host(found.rig.output.device)
+    assert host.request(SetVoltage(5.0))[:6] == bytes.fromhex("010600031388")
+    assert host.request(ReadVoltage())[:6] == bytes.fromhex("010300030001")
+    first = rig(tmp_path, ", channel: 0", device="waveshare-ao8b")
+    assert first.rig and output_host(first.rig.output.device).request(SetVoltage(5.0))[:6] == bytes.fromhex(
+        "010600001388"
+    )
+
+
+def test_another_output_in_two_registers_begins_two_further_on(tmp_path: Path) -> None:
+    text = (shipped_profiles_folder() / "devices" / "waveshare-ao8b.yaml").read_text()
+    text = text.replace("function: 6, register: 0", "function: 16, register: 100, type: float32")
+    text = text.replace("function: 3, register: 0", "function: 3, register: 200, type: float32")
+    (tmp_path / "dac.yaml").write_text(text.replace("name: waveshare-ao8b", "name: dac"))
+    found = rig(tmp_path, ", channel: 2", device="dac")
+    assert found.rig, found.faults
+    host = output_host(found.rig.output.device)
+    assert host.request(SetVoltage(5.0))[:7] == bytes.fromhex("01100068000204")
+    assert host.request(ReadVoltage())[:6] == bytes.fromhex("010300CC0002")
+    (tmp_path / "one.yaml").write_text(text.replace("channels: 8\n", "").replace("name: waveshare-ao8b", "name: one"))
+    (told,) = rig(tmp_path, ", channel: 2", device="one").faults
+    assert "one has no channel: its file names the registers of one output; `channels` in a copy" in told.message
 
 
 CONVERTER = """name: converter
@@ -108,6 +136,12 @@ def test_raw_counts_are_sized_by_the_rig(tmp_path: Path) -> None:
         ),
         (", channel: 1", "", ("icpdas-702x", "stream-st-gs"), "output.channel: icpdas-702x has no channel"),
         (", channel: 4", "", ("icpdas-7024", "stream-st-gs"), "output.channel: icpdas-7024 has 4 outputs: 0 to 3"),
+        (
+            ", channel: 8",
+            "",
+            ("waveshare-ao8b", "stream-st-gs"),
+            "output.channel: waveshare-ao8b has 8 outputs: 0 to 7",
+        ),
         (", channel: 7", "", ("adam-4024", "stream-st-gs"), "output.channel: adam-4024 has 4 outputs: 0 to 3"),
         (", address: 300", "", ("icpdas-702x", "stream-st-gs"), "output.address: 0 V: address = 12C: does not fit"),
         (

@@ -157,7 +157,8 @@ def drawn_cell(rng: Random) -> Profile:
 def _as_modbus(rng: Random, profile: Profile) -> Profile:
     """The same device on Modbus RTU: no words, no line's end."""
     left = {key: value for key, value in profile.items() if key not in ("terminator", "checksum", "steps", "refusals")}
-    return left | {"codec": "modbus-rtu", "reply_timeout_s": 0.1, "constants": {"address": rng.choice([1, 17])}}
+    whole = {"codec": "modbus-rtu", "serial": left["serial"] | {"data_bits": 8}, "reply_timeout_s": 0.1}
+    return left | whole | {"constants": {"address": rng.choice([1, 17])}}
 
 
 _REGISTER_SPANS = {"uint16": [0, 10000], "int16": [-32000, 32000], "uint32": [0, 100000], "float32": [0.0, 10.0]}
@@ -167,6 +168,8 @@ def drawn_modbus_output(rng: Random) -> Profile:
     profile, kind = _as_modbus(rng, _about(rng, "output")), rng.choice(list(_REGISTER_SPANS))
     ranges = {"device": _REGISTER_SPANS[kind], "voltage_v": [0.0, 10.0]}
     access = {"register": rng.choice([0, 4096]), "type": kind, "word_order": rng.choice(["abcd", "cdab"])}
+    if profile["constants"] == {"address": 17}:
+        profile["channels"] = 8
     writes = 6 if kind.endswith("16") and rng.random() < 0.5 else 16
     profile["set_voltage"] = {"modbus": {"function": writes, **access}, "range": ranges}
     _maybe(rng, profile, "read_voltage", {"modbus": {"function": rng.choice([3, 4]), **access}, "range": ranges})
