@@ -58,7 +58,7 @@ ALARMS: Final = (
         "simulated rig stays off",
         "The simulated rig ended four times in a row.",
         "No pseudo terminal to be had, too little memory, or an internal error.",
-        "Read the lines above it; ls /dev/pts and free -h show what is short.",
+        "Read the lines above it; ls /dev/pts and free -h show what is short. Then end the gateway and start it again.",
     ),
     Explanation(
         "A410",
@@ -72,7 +72,8 @@ ALARMS: Final = (
         "too few files may be open",
         "The limit on files, ports and connections that a process may have open is below what the gateway needs.",
         "A small `ulimit -n` in the shell that starts it, LimitNOFILE= of a unit, or a container's limit.",
-        "Raise the hard limit and start again; until then ports, masters, recordings or restarts may fail for want of one.",
+        "Start it again behind `ulimit -n 4096`, as a service with LimitNOFILE=4096; until then ports, masters or restarts may "
+        "fail for want of one.",
         is_warning=True,
     ),
     Explanation(

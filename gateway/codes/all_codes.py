@@ -1,7 +1,7 @@
 """Every code with its explanation, for `explain` and for messages at the terminal; works offline."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from gateway.codes.alarms import ALARMS
@@ -14,6 +14,8 @@ from gateway.codes.notices import NOTICES
 from gateway.codes.page_errors import PAGE_ERRORS
 from gateway.codes.refusals import SPECIAL_REFUSALS, RefusalReason
 from gateway.codes.warning_bits import WarningBit
+
+_THEN_RESET: Final = "Then reset with setpoint 0."
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +42,18 @@ def _describe(explanation: Explanation, name: str = "", exception: int = 0) -> C
     return CatalogueEntry(explanation.code, *texts, name)
 
 
+def _describe_fault(fault: FaultCode) -> CatalogueEntry:
+    """A fault latches, so that whatever is done about it ends with the reset."""
+    entry = _describe(fault.explanation, fault.name)
+    return entry if "reset" in entry.do else replace(entry, do=f"{entry.do} {_THEN_RESET}")
+
+
 def _entries() -> Iterator[CatalogueEntry]:
     yield from map(_describe, (*MACHINE_ERRORS, *ERRORS, *FACE_ERRORS, *PAGE_ERRORS))
     yield from (_describe(reason.explanation, reason.name, reason.exception) for reason in RefusalReason)
     yield from (_describe(special.explanation, exception=special.reason.exception) for special in SPECIAL_REFUSALS)
     yield from map(_describe, NOTICES)
-    yield from (_describe(fault.explanation, fault.name) for fault in FaultCode)
+    yield from map(_describe_fault, FaultCode)
     yield from (_describe(bit.explanation, str(bit.name)) for bit in WarningBit)
     yield from map(_describe, ALARMS)
 

@@ -91,7 +91,7 @@ ERRORS: Final = (
         "the running gateway said no",
         "The control socket answered, with a refusal; the message has its sentence.",
         "What was asked does not fit its present state, e.g. a second recording beside a running one.",
-        "force-gateway record status shows what it is doing.",
+        "Do what the message ends with, or wait for what is under way: force-gateway monitor shows the state.",
     ),
     Explanation(
         "E150",
@@ -197,7 +197,7 @@ ERRORS: Final = (
         "not a usable backup",
         "The archive is damaged, was not made by `backup`, or contains paths that lead out of the directory.",
         "The wrong file, or a transfer that broke off. Nothing was changed.",
-        "gzip -t FILE tells whether the transfer is whole; copy it again.",
+        "gzip -t FILE tells whether the transfer is whole: copy it again where not. force-gateway backup makes such a file.",
     ),
     Explanation(
         "E405",
@@ -319,6 +319,6 @@ ERRORS: Final = (
         "internal error",
         "A verb ended with an error that its author did not foresee.",
         "An internal error; nothing that you typed should do this.",
-        "Report it with the traceback that `force-gateway --debug ...` prints.",
+        "Report it with the traceback that `force-gateway --debug ...` prints; force-gateway report packs the rest.",
     ),
 )

@@ -45,7 +45,7 @@ class FaultCode(IntEnum):
             "The last sample of the load cell is older than the bound.",
             "A loose cable, no power at the amplifier, another unit or format than its profile reads, a rate too low for "
             "sample_timeout_s; or we were late.",
-            "Look at sample_age; check the amplifier's power and its output rate.",
+            "Look at sample_age: where it grows, check the amplifier's power and cable; where it falls back, its output rate.",
         ),
     )
     SAMPLE_FROZEN = (
@@ -161,7 +161,7 @@ class FaultCode(IntEnum):
             "a number was not finite",
             "A computation inside the gateway gave NaN or infinity, and the safe voltage was written instead.",
             "An internal error, or a calibration from outside its range.",
-            "Report it with a recording; go back to the previous calibration.",
+            "Go back to the previous calibration (force-gateway calibration rollback); report it with a recording.",
         ),
     )
     INTERNAL = (
@@ -171,7 +171,7 @@ class FaultCode(IntEnum):
             "internal error",
             "The control law failed with an exception; the safe voltage was written.",
             "An internal error.",
-            "Report it with the traceback in the gateway's log.",
+            "Report it with force-gateway report and the traceback in the log; where it comes again, calibration rollback.",
         ),
     )
     MODEL_INVALID = (
@@ -181,7 +181,8 @@ class FaultCode(IntEnum):
             "voltage-force model invalid",
             "The active calibration fails its checks.",
             "A calibration file that was edited by hand, or a damaged disk.",
-            "force-gateway check RIG names file and line.",
+            "Take another one: force-gateway calibration list, then calibration use N; of the rig's own, check RIG names file "
+            "and line.",
         ),
     )
     # the loop was late because the machine did not let it run
@@ -193,8 +194,7 @@ class FaultCode(IntEnum):
             "The control loop, or a simulated rig's process, was later than a bound; most of that time it got no processor.",
             "Other programs take all cores: a build, more gateways; or a virtual machine's host, or a container's CPU quota, "
             "withholds them.",
-            "End them, or `nice -n 10` them; else give the loop priority (run --realtime), a virtual machine cores of its "
-            "own, or the rig a longer stall_s.",
+            "End them, or `nice -n 10` them; else run --realtime, cores of its own for a virtual machine, or a longer stall_s.",
         ),
     )
     VALVE_SILENT = (

@@ -47,7 +47,7 @@ MACHINE_ERRORS: Final = (
         "the operating system refused",
         "A file operation failed; the message has the system's own words and the path.",
         "A full disk, a missing directory, or a directory where a file was expected.",
-        "df -h and ls -ld of the path in the message show which.",
+        "df -h and ls -ld of the path in the message show which: make room, make the directory, or name another path.",
     ),
     Explanation(
         "E107",

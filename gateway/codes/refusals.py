@@ -166,7 +166,8 @@ class RefusalReason(IntEnum):
             "Enable was asked for before everything was.",
             "The gateway has just started or ends, its loop has just stood still, the cell reads over_force_n, a force stays "
             "at the safe voltage, or a stop is under way.",
-            "Wait for bit 1 (ready) of status_word.",
+            "Wait for bit 1 (ready) of status_word; where it stays 0, lift the tool, look at force_measured and the gateway's "
+            "log.",
         ),
     )
     OUTPUT_FAULT = (

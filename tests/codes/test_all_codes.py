@@ -117,6 +117,12 @@ def test_a_refusal_says_its_code_and_answers_with_the_exception_that_explain_nam
         assert CATALOGUE[reason.code].seen.endswith(f" Exception {reason.exception:02X}.")
 
 
+@pytest.mark.parametrize("fault", [fault for fault in FaultCode if fault is not FaultCode.NONE])
+def test_what_to_do_about_a_fault_ends_with_the_reset(fault: FaultCode) -> None:
+    """Faults latch: of eleven of them it was said what to mend, and not how work goes on."""
+    assert "reset" in CATALOGUE[fault.code].do
+
+
 def test_numbers_survive_a_way_through_their_enumerations() -> None:
     for number in NUMBERED:
         assert type(number)(int(number)) is number

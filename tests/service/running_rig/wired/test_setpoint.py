@@ -288,3 +288,11 @@ def test_a_tick_decides_nothing_anew_behind_a_sample_and_everything_without_one(
     wired.is_cell_plugged = False
     wired.run(0.2)
     assert 19 <= len(decided) <= 20, "each tick of 10 ms but the first, for nothing else comes"
+
+
+def test_the_mode_stays_behind_a_disable_and_a_force_then_presses_nothing() -> None:
+    wired = Wired().ready()
+    for words in ((ENABLE, 0, 0, 1, 0, 2000), (0,), (ENABLE, 1200)):
+        wired.write(0, *words)
+        wired.run(0.5)
+    assert [wired.word(name) for name in ("mode", "state", "output_voltage")] == [1, State.READY, 0]
