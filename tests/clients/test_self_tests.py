@@ -191,6 +191,7 @@ def test_an_enable_that_is_taken_back_during_a_self_test_leaves_that_alone(clien
 def test_a_reset_ends_a_self_test_too(client: Any, gateway: GatewayAtHand) -> None:
     begin(client, gateway)
     client.reset()
+    assert client.text == "the self-test was ended by a reset"
     cycles(client)
     assert not gateway.is_testing and not client.is_testing and commands(gateway)[:2] == [BEGUN, OFF]
 
