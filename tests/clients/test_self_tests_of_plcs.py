@@ -63,6 +63,7 @@ def test_an_input_that_bounces_at_the_end_of_a_self_test_presses_nothing(
     """While its verdicts are read it is neither on nor over: a rise taken for a new one enabled, at the force input."""
     begin(plc, gateway)
     plc.force(12.0)
+    switch(plc, "enable", on=True)  # which is none meanwhile, and stays TRUE
     gateway.end_self_test(SelfTestResult.PASSED)
     for _ in range(scans):
         plc.scan()
@@ -73,14 +74,18 @@ def test_an_input_that_bounces_at_the_end_of_a_self_test_presses_nothing(
 
 
 @pytest.mark.parametrize("scans", SCANS)
+@pytest.mark.parametrize("gap", [0, 1])
 def test_an_enable_in_place_of_a_self_test_is_none_wherever_its_request_is(
-    plc: Plc, gateway: GatewayAtHand, scans: int
+    plc: Plc, gateway: GatewayAtHand, scans: int, gap: int
 ) -> None:
+    """gap: calls from the fall of the one to the rise of the other."""
     begin(plc, gateway)
     for _ in range(scans):
         plc.scan()
     plc.force(12.0)
     plc.inputs[plc.NAMES["test"]] = False
+    for _ in range(gap):
+        plc.scan()
     switch(plc, "enable", on=True)
     cycles(plc)
     assert commands(gateway) == [BEGUN, OFF] and plc.ended and outputs(plc) == ""
