@@ -15,6 +15,7 @@ from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import S7, Irc5, Plc, UniversalRobot
 from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import TEXTS, command, commands, cycles
+from tests.clients.test_in_band import in_band
 
 RUN = int(ControlBit.START_SELF_TEST)
 BEGUN, OFF = command(RUN, 0), command(0, 0)
@@ -201,54 +202,6 @@ def test_a_reset_ends_a_self_test_too(client: Any, gateway: GatewayAtHand) -> No
     assert commands(gateway)[0] == BEGUN and OFF in commands(gateway)
 
 
-def test_a_self_test_ends_with_the_timer_of_an_irc5(gateway: GatewayAtHand) -> None:
-    client = Irc5(TEXTS["rapid"], gateway)
-    begin(client, gateway)
-    client.machine.start("FgTimerStop")
-    assert commands(gateway) == [BEGUN, OFF] and not gateway.is_testing
-
-
-def test_a_program_of_an_irc5_that_shows_no_life_begins_no_self_test(gateway: GatewayAtHand) -> None:
-    client = Irc5(TEXTS["rapid"], gateway)
-    client.set(fgTested=True)  # of an earlier one
-    client.serve(20, client.self_test)
-    assert gateway.writes == [] and "fgAlive" in client.text and not client.found
-
-
-@pytest.mark.parametrize("late", [1, 3, 5])
-def test_a_self_test_right_behind_a_start_of_the_program_waits_for_its_timer(late: int, gateway: GatewayAtHand) -> None:
-    client = Irc5(TEXTS["rapid"], gateway)
-    pauses: list[bool] = []
-
-    def go_on_from_a_breakpoint() -> None:
-        pauses.append(gateway.is_testing)
-        if len(pauses) == 30:
-            client.self_test()
-        if len(pauses) >= 30 + late:
-            client.set(fgAlive=(client.get("fgAlive") + 1) % 1000)
-
-    client.serve(45, go_on_from_a_breakpoint)
-    assert not any(pauses[: 30 + late]) and gateway.is_testing and client.is_testing
-
-
-def test_a_self_test_ends_with_the_program_of_an_irc5_that_began_it(gateway: GatewayAtHand) -> None:
-    """A SemiStatic task goes on at a stop of T_ROB1."""
-    client = Irc5(TEXTS["rapid"], gateway)
-    alive: list[bool] = []
-
-    def program() -> None:
-        if len(alive) == 2:
-            client.self_test()
-        if len(alive) < 20:
-            client.set(fgAlive=(client.get("fgAlive") + 1) % 1000)
-        alive.append(gateway.is_testing)
-
-    client.serve(40, program)
-    assert alive[19] and not alive[-1]
-    assert commands(gateway) == [BEGUN, OFF] and "T_ROB1 does not count fgAlive" in client.text
-    assert not client.is_testing and not client.found
-
-
 def test_every_language_says_a_state_in_words(language: str, gateway: GatewayAtHand) -> None:
     client = CONTROLLERS[language](TEXTS[language], gateway)
     say: Any = None
@@ -269,3 +222,11 @@ def test_a_tare_during_a_self_test_is_told_to_be_none(client: Any, gateway: Gate
     cycles(client)
     assert "a self-test runs" in client.text or "busy" in client.text
     assert gateway.is_testing and client.is_testing
+
+
+def test_a_self_test_is_in_no_band_and_a_force_beside_it_is_not_written(client: Any, gateway: GatewayAtHand) -> None:
+    begin(client, gateway)
+    assert not in_band(client)
+    client.force(5.0)
+    cycles(client)
+    assert not in_band(client) and commands(gateway) == [BEGUN] and not gateway.exceptions
