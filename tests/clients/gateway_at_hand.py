@@ -64,7 +64,8 @@ class GatewayAtHand:
     def decide(self, proposal: ProposedWrite) -> EdgeRefusal | None:
         if self.fault and ControlBit.ENABLE in proposal.command.control_word:
             return EdgeRefusal(RefusalReason.FAULT_LATCHED, ControlBit.ENABLE, "a fault is latched")
-        if self.is_testing and proposal.command.control_word & (ControlBit.ENABLE | ControlBit.TARE):
+        busy = ControlBit.ENABLE | ControlBit.TARE | ControlBit.RESET_FAULT
+        if self.is_testing and proposal.command.control_word & busy:
             return EdgeRefusal(RefusalReason.BUSY, ControlBit.ENABLE, "a self-test has the output")
         is_asked = bool(proposal.command.control_word & ~self.bank.command.control_word & ControlBit.START_SELF_TEST)
         if is_asked and self.bank.command.control_word & ControlBit.ENABLE:

@@ -80,7 +80,7 @@ def test_a_task_beside_a_motion_program_that_shows_no_life_enables_nothing() -> 
 def test_an_input_that_is_true_when_a_controller_starts_enables_nothing(kind: type[Plc]) -> None:
     gateway = GatewayAtHand(MAP)
     client = kind(TEXTS["scl" if kind is S7 else "st"], gateway)
-    names = ("enable", "reset", "tare", "take", "upload")
+    names = ("enable", "reset", "tare", "take", "test", "upload")
     client.inputs |= dict.fromkeys([client.NAMES[each] for each in names], True)
     client.inputs[client.NAMES["force"]] = 12.0
     cycles(client)

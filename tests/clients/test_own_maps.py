@@ -49,6 +49,12 @@ TENTHS = (
             "name: force_requested, address: 103, type: uint16, scale: 0.01, unit: N,",
             "type int16 of force_requested",
         ),
+        (
+            "name: self_test_noise, address: 420, type: uint16, values: self_test_verdict,",
+            "name: self_test_noise, address: 420, type: uint16,",
+            "names of self_test_noise",
+        ),
+        ("name: self_test_noise,", "name: rauschen,", r"self_test_noise \(block proof\)"),
         (  # which SCL and ST named all the same
             '      - {name: heartbeat_echo, address: 114, type: uint16, text: "Heartbeat seen by the control"}\n',
             "",
@@ -86,6 +92,20 @@ def test_a_register_of_ones_own_that_a_language_cannot_name_is_told(
                 render_client(own, language, WHERE)
         else:
             assert name in render_client(own, language, WHERE).lower()
+
+
+@pytest.mark.parametrize(
+    ("item", "languages"),
+    [("type", {"scl", "st"}), ("loss_of_force_behind_the_reducer", {"rapid"}), ("valve", set[str]())],
+)
+def test_an_item_of_a_self_test_of_ones_own_is_said_or_told(item: str, languages: set[str], tmp_path: Path) -> None:
+    own = own_map(tmp_path, "self_test_leak", f"self_test_{item}")
+    for language in LANGUAGES:
+        if language in languages:
+            with pytest.raises(UnspeakableNameError, match=f"^map own: {item} .*: give it another name$"):
+                render_client(own, language, WHERE)
+        else:
+            assert re.search(rf"\b(FG_T(EST)?_)?{item}\b", render_client(own, language, WHERE), re.I)
 
 
 @pytest.mark.parametrize(("name", "is_told"), [("written_to_disk_by_now", False), ("written_to_the_disk_now", True)])

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.registers.words import SelfTestResult
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.syntax import Node
@@ -160,6 +161,29 @@ def test_what_a_robot_asks_for_while_its_gateway_is_being_lost_is_not_done_later
     for client, gateway in every_place("urscript", prepare, [acts.get(act, lambda client: client.enable(12.0))]):
         asked = [words[0] for words in gateway.words if words[0]]
         assert asked == [] and not client.get("fg_is_on"), client.text
+
+
+@pytest.mark.parametrize("language", ["rapid", "urscript"])
+@pytest.mark.parametrize("prepare", [tare_that_is_refused, nobody_there, stopped_by_another])
+def test_a_self_test_asked_for_beside_an_exchange_is_begun_or_dropped(language: str, prepare: Any) -> None:
+    for client, gateway in every_place(language, prepare, [lambda client: client.self_test()]):
+        assert gateway.is_testing == client.is_testing == (gateway.bank.command.control_word == 64), client.text
+        assert gateway.is_testing or not client.found
+
+
+@pytest.mark.parametrize("language", ["rapid", "urscript"])
+@pytest.mark.parametrize("has_ended", [False, True])
+def test_a_self_test_that_is_let_go_at_any_place_of_an_exchange_ends(language: str, has_ended: bool) -> None:
+    def prepare(client: Any, gateway: GatewayAtHand) -> None:
+        cycles(client)
+        client.self_test()
+        cycles(client, 2)
+        if has_ended:
+            gateway.end_self_test(SelfTestResult.PASSED)
+
+    for client, gateway in every_place(language, prepare, [lambda client: client.end_self_test()]):
+        assert gateway.bank.command.control_word == 0 and not client.is_testing and not client.ended
+        assert client.found.get("result", "passed") == "passed" and not gateway.exceptions
 
 
 @pytest.mark.parametrize("late", [1, 3, 5])

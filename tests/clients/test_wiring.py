@@ -17,6 +17,7 @@ from gateway.clients import Endpoint, render_client
 from gateway.clients.wiring import wiring_page
 from gateway.profiles import list_shipped, load_register_map, load_rig
 from gateway.profiles.rigs.faces import TlsFace
+from gateway.registers.words import SelfTestResult
 from tests.certificates import store_all
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.controllers import S7, MbClient
@@ -233,7 +234,13 @@ def test_the_s7_table_is_what_the_generated_block_asks(monkeypatch: pytest.Monke
         finish(self, given)
 
     monkeypatch.setattr(MbClient, "finish", note)
-    client = S7(render_client(MAP, "scl", Endpoint("10.1.2.3", 502, 1)), GatewayAtHand(MAP))
+    gateway = GatewayAtHand(MAP)
+    client = S7(render_client(MAP, "scl", Endpoint("10.1.2.3", 502, 1)), gateway)
+    client.cycle()
+    client.self_test()
+    client.cycle()
+    gateway.end_self_test(SelfTestResult.PASSED)
+    client.cycle()
     client.enable(12.0)
     client.begin_upload({"order": 1}, 0)
     for cycle in range(10):

@@ -16,7 +16,7 @@ from gateway.clients.wiring.network import network_section
 from gateway.clients.wiring.section import Row, Section
 from gateway.control.settings import LeaseAction
 from gateway.profiles import Rig
-from gateway.registers.map.register_map import holding_number
+from gateway.registers.map.register_map import holding_number, span_of
 
 _SHOWN: Final = ("status_word", "state", "force_measured", "fault_code", "refusal_reason")
 """What a robot wants to see that reads register by register."""
@@ -97,6 +97,8 @@ def _requests(table: ExchangeTable) -> Iterator[tuple[str, bool, int, int]]:
     yield "command, when its control word has changed", True, command, words
     yield "command without it, when the rest has", True, command + table.values_first, words - table.values_first
     yield "heartbeat alone", True, table.at("heartbeat", "command").address, 1
+    test, test_words = span_of(table.self_test)
+    yield "what a self-test has found, behind its end", False, test, test_words
     yield "model: order, rising branch", True, first, part_a
     yield "model: falling branch, force limits", True, first + part_a, part_b
     yield "model: reversal, response", True, table.at("slip_stops", "staging").address, part_c
@@ -124,7 +126,7 @@ def _s7(rig: Rig, table: ExchangeTable) -> Section:
         ("instruction", "MODBUS (TCP) V4.0 (S7-1200), V3.0 (S7-1500) or newer: an older one has no CONNECT"),
         ("call of the block below", calls),
     )
-    stop = "A CPU goes on at an emergency stop: `enable` of the block has to fall with it (and with the guard, and the robot)."
+    stop = "A CPU goes on at an emergency stop: `enable` and `selfTest` have to fall with it (and guard, and robot)."
     sentences = (stop, f"{where.s7_port_fault} Set network.port to another one.") if where.s7_port_fault else (stop,)
     return Section("Siemens S7-1200/1500: connection of MB_CLIENT", sentences, rows)
 
@@ -174,9 +176,7 @@ def _codesys(rig: Rig, table: ExchangeTable) -> Section:
         ("library", "Tc2_ModbusSrv, TF6250 on the controller", "ModbusFB"),
         ("call", "fbGateway, then fbTransport: task of 10 ms", f"a heartbeat every 40 to 120 ms{_short_of_a_plc(rig)}"),
     )
-    stop = (
-        "A controller goes on at an emergency stop: `bEnable` has to fall with it (and with the guard, and the robot)."
-    )
+    stop = "A controller goes on at an emergency stop: `bEnable` and `bSelfTest` have to fall with it (and guard, and robot)."
     return Section("TwinCAT 3 and CODESYS V3", (stop,), rows)
 
 
