@@ -62,6 +62,9 @@ def test_a_token_does_not_travel_with_the_rig_s_texts(key: str, tmp_path: Path) 
     copy.write_text(next(text for name, text in rig.texts.items() if name.endswith("rig.yaml")), encoding="utf-8")
     assert load_rig(str(copy)).web is not None, "what is left can be read as before"
     assert without_secrets(f"password: '{TOKEN}' # of the broker") == "password: removed-from-this-copy # of the broker"
+    assert without_secrets(f"brokers:\n- host: a\n- password: {TOKEN}\n").endswith(
+        "- password: removed-from-this-copy\n"
+    )
 
 
 @pytest.mark.parametrize(
