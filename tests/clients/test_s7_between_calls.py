@@ -111,3 +111,18 @@ def test_a_force_that_is_in_range_again_is_refused_no_more(client: S7, gateway: 
     client.force(13.0)
     cycles(client)
     assert not member(client, "refused") and commands(gateway)[-1][:2] == (1, 1300)
+
+
+@pytest.mark.parametrize("scans", range(0, 12, 2))
+def test_a_value_that_is_refused_takes_no_stop_with_it(client: S7, gateway: GatewayAtHand, scans: int) -> None:
+    """A program that ends a job sets its next values in the same call; one of them is none, and the force has to go."""
+    client.enable(12.0)
+    cycles(client)
+    for _ in range(scans):
+        client.scan()
+    client.structures["command"]["FORCE_RAMP"] = 1.0e6
+    client.disable()
+    refused_before = len(gateway.exceptions)
+    while gateway.bank.command.control_word and len(gateway.exceptions) == refused_before:
+        client.scan()
+    assert gateway.bank.command.control_word == 0, "the stop is not behind a refusal: it is the first that goes out"
