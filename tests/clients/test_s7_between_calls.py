@@ -126,3 +126,24 @@ def test_a_value_that_is_refused_takes_no_stop_with_it(client: S7, gateway: Gate
     while gateway.bank.command.control_word and len(gateway.exceptions) == refused_before:
         client.scan()
     assert gateway.bank.command.control_word == 0, "the stop is not behind a refusal: it is the first that goes out"
+
+
+def test_a_write_that_was_taken_and_whose_answer_is_none_is_a_loss_and_no_refusal(
+    client: S7, gateway: GatewayAtHand, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """16#8383: an answer that MB_CLIENT does not understand. The gateway presses by then, and a block that called it a refusal
+    would not take it off."""
+    finish, garbled = MbClient.finish, list[int]()
+
+    def garble(self: MbClient, given: dict[str, Any]) -> None:
+        finish(self, given)
+        if given["MB_MODE"] == 1 and given["MB_DATA_LEN"] > 2 and not garbled:
+            garbled.append(1)
+            self.DONE, self.ERROR, self.STATUS = False, True, 0x8383
+
+    cycles(client)
+    monkeypatch.setattr(MbClient, "finish", garble)
+    client.enable(12.0)
+    client.cycle(3.0)
+    assert garbled and [words[0] for words in commands(gateway)] == [1, 0]
+    assert client.ended and not client.enabled
