@@ -5,6 +5,7 @@ A regulator hears nothing at another speed, not even the safe voltage, and what 
 
 import asyncio
 import os
+import select
 import termios
 from typing import Any
 
@@ -12,7 +13,7 @@ import pytest
 
 from gateway.devices import SerialSettings
 from gateway.ports import PortError, PortEvents, Pty, SerialPort
-from gateway.ports.opening import settings_of
+from gateway.ports.opening import open_descriptor, settings_of
 from tests.ports.raw_bytes import gather
 
 
@@ -126,3 +127,14 @@ def test_a_terminal_that_somebody_stops_sends_again(ear: Any, line: Pty) -> None
         port.close()
 
     asyncio.run(scene())
+
+
+def test_a_line_that_was_stopped_before_it_is_opened_sends_from_its_first_byte_on(line: Pty) -> None:
+    """The first one is the safe voltage, and the probe that opens a port looks at no settings later."""
+    termios.tcflow(line._slave, termios.TCOOFF)
+    descriptor = open_descriptor(line.path, SerialSettings(baud=9600))
+    os.write(descriptor, b"SET 0")
+    os.set_blocking(line.fd, False)
+    heard = os.read(line.fd, 16) if select.select([line.fd], [], [], 5.0)[0] else b""
+    os.close(descriptor)
+    assert heard == b"SET 0"

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from gateway.devices import SerialSettings
-from gateway.ports import PortError, PortEvents, Pty, SerialPort
+from gateway.ports import PortError, PortEvents, Pty, SerialPort, serial_port
 from gateway.ports.opening import explain_in_brief, open_descriptor
 from tests.ports.raw_bytes import gather
 from tests.ports.test_port_failures import denying
@@ -175,3 +175,27 @@ def test_who_holds_a_port_is_looked_for_once_and_beside_the_loop(
 
     monkeypatch.setattr("gateway.ports.errors.describe_holders", looking)
     asyncio.run(scene())
+
+
+@pytest.mark.parametrize(("refusals", "codes"), [(3, ["E101"]), (0, [])], ids=["still", "open by then"])
+def test_a_refusal_that_is_found_out_behind_the_opening_is_told_nobody(
+    refusals: int, codes: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Who holds a port is looked for in a thread; it may have opened before that is known."""
+    told, answers = list[PortError](), list[Any]()
+
+    class Later:
+        def __call__(self, work: Any, done: Any) -> None:
+            answers.append(done)
+
+        def close(self) -> None:
+            pass
+
+    monkeypatch.setattr(serial_port, "DiskWorker", Later)
+    events = PortEvents(lambda *_: None, lambda _: None, lambda _: None, on_refused=told.append)
+    port = SerialPort("/dev/no-such", SerialSettings(baud=9600), events)
+    port._is_wanted = True
+    port._tell_refusal("/dev/no-such", PermissionError(errno.EACCES, "denied"))
+    port._refusals = refusals
+    answers[0](PortError("E101", "may not be opened"))
+    assert [error.code for error in told] == codes

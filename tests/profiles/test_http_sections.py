@@ -41,6 +41,14 @@ def test_anything_else_is_refused_in_the_file(tmp_path: Path, text: str) -> None
         load_rig(rig_with(tmp_path, f'web: {{listen: "{text}"}}\n'))
 
 
+def test_opc_ua_has_a_port_that_a_client_can_know(tmp_path: Path) -> None:
+    """With any free one it would be another after each start, and nothing says which."""
+    with pytest.raises(ProfileError, match=r"opcua\.listen"):
+        load_rig(rig_with(tmp_path, 'opcua: {listen: "127.0.0.1:0"}\n'))
+    rig = load_rig(rig_with(tmp_path, 'opcua: {listen: "127.0.0.1:4841"}\n'))
+    assert rig.opcua and rig.opcua.listen == "127.0.0.1:4841"
+
+
 def test_a_page_for_others_needs_a_token_that_cannot_be_guessed(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match=r"web\.listen: E128 0\.0\.0\.0:8080 can be reached from other machines"):
         load_rig(rig_with(tmp_path, 'web: {listen: "0.0.0.0:8080"}\n'))
@@ -62,6 +70,9 @@ def test_a_token_does_not_travel_with_the_rig_s_texts(key: str, tmp_path: Path) 
     copy.write_text(next(text for name, text in rig.texts.items() if name.endswith("rig.yaml")), encoding="utf-8")
     assert load_rig(str(copy)).web is not None, "what is left can be read as before"
     assert without_secrets(f"password: '{TOKEN}' # of the broker") == "password: removed-from-this-copy # of the broker"
+    assert without_secrets(f"brokers:\n- host: a\n- password: {TOKEN}\n").endswith(
+        "- password: removed-from-this-copy\n"
+    )
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from gateway.profiles import kept_rig as module
 from gateway.profiles import shipped_profiles_folder
-from gateway.profiles.kept_rig import ChangedRigError, kept_rig, unchanged_rig
+from gateway.profiles.kept_rig import ChangedRigError, keep_rig, kept_rig, unchanged_rig
 
 DEMO = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
 
@@ -76,3 +77,30 @@ def test_a_memory_that_takes_nothing_costs_no_start(file: Path, tmp_path: Path) 
         assert rig.name == "demo"
         file.write_text(DEMO.replace("name: demo", "name: other"), encoding="utf-8")
         assert kept_rig(str(file), simulated=True, memory=full.fileno()).name == "other"
+
+
+@pytest.mark.parametrize("written", [0.5, 1.0])
+def test_a_rig_counts_as_kept_once_all_of_it_is_there(
+    file: Path, memory: int, monkeypatch: pytest.MonkeyPatch, written: float
+) -> None:
+    """Whoever dies between two writes, or gets half of one: a length before its rig would end each restart."""
+    write, lengths = os.pwrite, list[int]()
+
+    def write_part(descriptor: int, data: bytes, at: int) -> int:
+        lengths.append(int.from_bytes(os.pread(descriptor, 8, 0)))
+        return write(descriptor, data[: int(len(data) * written)] if at else data, at)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "pwrite", write_part)
+        kept_rig(str(file), simulated=True, memory=memory)
+    assert lengths == [0] * len(lengths), "no length while the rig is written"
+    assert bool(int.from_bytes(os.pread(memory, 8, 0))) == (written == 1.0)
+    assert kept_rig(str(file), simulated=True, memory=memory).name == "demo"
+
+
+def test_a_rig_that_was_kept_for_a_simulation_is_not_the_real_one(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_kept", {})
+    keep_rig(str(file), simulated=True)
+    file.write_text(DEMO.replace("name: demo", "name: other"), encoding="utf-8")
+    assert kept_rig(str(file), simulated=True).name == "demo"
+    assert kept_rig(str(file), simulated=False).name == "other", "that one nobody has kept"

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gateway.bsfm.fit.blend_span import command_error_n
 from gateway.reports.fit.document import fit_document, residual_of
 from gateway.reports.fit.headline import answer_sentence
 from gateway.reports.fit.page import fit_page
@@ -157,3 +158,15 @@ def test_a_fit_is_monotone_where_both_of_its_branches_are(branch: str) -> None:
     broken = replace(score, result=replace(score.result, verdicts=verdicts))
     told = fit_document(replace(found, scores=[score, broken]), Path("ladder.csv"), {})["fits"]
     assert [fit["monotone"] for fit in told] == [True, False]
+
+
+def test_the_errors_of_a_fit_are_in_newtons_and_the_largest_one_has_no_sign() -> None:
+    found, (_, document) = fit_evaluation(), fit_sample()
+    for score, told in zip(found.scores, document["fits"], strict=True):
+        if told["heldout_rms_n"]:  # of a square's standard error the half over the root is the root's
+            assert told["heldout_error_n"] == pytest.approx(score.error_n2 / (2.0 * score.heldout_rms_n))
+    error_n = command_error_n(found.model, found.checked.minor_v, found.checked.minor_n)
+    assert document["reversal"]["max_n"] == pytest.approx(np.abs(error_n).max())
+    for shift_n in (-5.0, 5.0):
+        shifted = replace(found, checked=replace(found.checked, minor_n=found.checked.minor_n + shift_n))
+        assert fit_document(shifted, Path("ladder.csv"), {})["reversal"]["max_n"] > 4.0

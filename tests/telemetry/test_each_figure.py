@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from gateway.live.live_state import LiveAlarm, LiveForce, LiveLimits
+from gateway.live.live_state import LiveAlarm, LiveForce, LiveLimits, LiveLine
 from gateway.profiles.telemetry_sections import Mqtt
 from gateway.telemetry.exposition import exposition
 from gateway.telemetry.mqtt.json_topics import JsonTopics
@@ -44,6 +44,7 @@ def test_of_each_series() -> None:
         "pause_s": 16.0,
     }
     health = {"ticks": 123_456_789, "missed_ticks": 18, "loop_time_us": 19.0, "residual": residual}
+    health |= {"late_p50_us": 20.0, "late_p99_us": 21.0}
     lines = [line for line in exposition(GatewayReading(state, health)) if not line.startswith("#")]
     bare = [line.split() for line in lines if "{" not in line]
     plain = {name.removeprefix("force_gateway_"): float(value) for name, value in bare}
@@ -53,12 +54,25 @@ def test_of_each_series() -> None:
         "force_max_newtons": 8.0, "tolerance_newtons": 9.0, "residual_looks_total": 10.0, "residual_judged_total": 11.0,
         "residual_skipped_total": 12.0, "residual_warnings_total": 13.0, "residual_age_seconds": 14.0,
         "residual_floor_newtons": 15.0, "residual_pause_seconds": 16.0, "loop_ticks_total": 123_456_789.0,
-        "loop_missed_ticks_total": 18.0, "loop_step_seconds": 19.0e-6, "faults": 2.0, "warnings": 1.0,
+        "loop_missed_ticks_total": 18.0, "loop_step_seconds": 19.0e-6, "loop_late_p50_seconds": 20.0e-6,
+        "loop_late_p99_seconds": 21.0e-6, "faults": 2.0, "warnings": 1.0,
         "calibration_number": 3.0,
     }  # fmt: skip
     assert {name: plain[name] for name in expected} == pytest.approx(expected, rel=1e-9)
     alarms = {name: [labels["code"] for labels, _ in read] for name, read in labelled(state).items()}
     assert alarms == {"fault": ["A313", "A311"], "warning": ["W301"]}
+
+
+def test_of_each_line_that_the_rig_has() -> None:
+    """A relay that garbles each answer was to be seen nowhere."""
+    (errors,) = (one for one in SERIES if one.name == "force_gateway_serial_errors_total")
+    valve = LiveLine(port="/dev/c", device="relay", garbled=7)
+    told = [list(errors.read(GatewayReading(state, {}))) for state in (holding(), replace(holding(), valve=valve))]
+    assert [[labels["line"] for labels, _ in each] for each in told] == [
+        ["output", "load_cell"],
+        ["output", "load_cell", "valve"],
+    ]
+    assert told[1][-1][1] == 7
 
 
 def labelled(state: Any) -> dict[str, list[tuple[dict[str, str], float]]]:

@@ -52,6 +52,16 @@ def calibration(**changes: Any) -> Parts:
     return parts(calibration=replace(load_rig("demo").calibration, **changes), **others)
 
 
+SAFE_V = 3.0
+RESTS_N = load_rig("demo").calibration.model().force_n(SAFE_V, -1.0)
+"""What a tool that has pressed is left with at this safe voltage: the falling branch, some newtons above the rising one."""
+
+
+def resting(stuck_n: float) -> Parts:
+    limited = replace(LIMITS, safe_voltage_v=SAFE_V)
+    return replace(calibration(), limits=limited, supervision=replace(Supervision(), stuck_n=stuck_n))
+
+
 def output(**facts: Any) -> SimpleNamespace:
     return SimpleNamespace(role=DeviceRole.OUTPUT, name="dac", **facts)
 
@@ -167,6 +177,7 @@ BOUNDS: tuple[tuple[Check, str, Parts, Parts], ...] = (
         calibration(),
         replace(calibration(), limits=replace(LIMITS, safe_voltage_v=7.0)),
     ),
+    (checks.check_calibration_against_cell, "supervision.stuck_n", resting(RESTS_N + 0.1), resting(RESTS_N - 0.1)),
     (
         checks.check_calibration_range,
         "limits.force_max_n",

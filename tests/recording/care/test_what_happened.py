@@ -1,14 +1,18 @@
 """What the list of recordings says of each."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from gateway.bsfm.ladder.plan import LABELS
 from gateway.profiles.recordings_section import Retention
-from gateway.recording import Recorder, recording_paths
+from gateway.recording import Recorder, read_recording, recording_paths
+from gateway.recording.calibrations_used import tell_changes
 from gateway.recording.care.keeping import choose_prunable
 from gateway.recording.care.summaries import list_summaries
+from gateway.recording.label import check_name, check_note
+from gateway.recording.tables.column_names import CALIBRATION, DERIVED
 from gateway.registers.words import CalibrationPhase
 
 
@@ -55,3 +59,40 @@ def test_what_somebody_will_read_again_stays_and_takes_the_room_of_others(tmp_pa
     now_s = paths[-1].stat().st_mtime + 86_400.0
     chosen = choose_prunable(paths, Retention(days=0.5), "", now_s, frozenset({paths[0].name}))
     assert [one.path for one in chosen] == paths[1:]
+
+
+def test_a_file_that_has_grown_within_one_tick_of_the_clock_is_read_again(tmp_path: Path) -> None:
+    """Clocks of file systems go by milliseconds, some by two seconds."""
+    recorder = Recorder(tmp_path / "recordings", {}, ("time_s",))
+    status = recorder.path.stat()
+    for rows in (1, 2):
+        recorder.append((float(rows),))
+        recorder.write()
+        os.utime(recorder.path, ns=(status.st_atime_ns, status.st_mtime_ns))
+        assert [summary["rows"] for summary in list_summaries(tmp_path)] == [rows]
+    recorder.close()
+
+
+def test_a_change_of_calibration_is_told_by_the_time_since_the_first_row(tmp_path: Path) -> None:
+    """Times count from the start of the gateway."""
+    recorder = Recorder(tmp_path / "recordings", {}, ("time_s", *DERIVED, CALIBRATION))
+    for row, number in enumerate((3.0, 3.0, 4.0, 4.0)):
+        recorder.append((100.0 + row, *(0.0 for _ in DERIVED), number))
+    recorder.close()
+    (path,) = recording_paths(tmp_path)
+    assert tell_changes(read_recording(path)) == "calibration 4 from 2.00 s on"
+
+
+@pytest.mark.parametrize("text", ["", " ", "17", "a\x1b[2Jb", 61 * "n"])
+def test_what_is_no_name_is_refused_and_what_is_one_stands_on_one_line(text: str) -> None:
+    """A number would be looked for as one, and what a terminal obeys is no name."""
+    with pytest.raises(ValueError, match="is no name"):
+        check_name(text)
+    assert (check_name(60 * "n"), check_name(" worn\n seal 2 ")) == (60 * "n", "worn seal 2")
+
+
+@pytest.mark.parametrize("text", ["", "\n", "a\x1b[2Jb", 1001 * "n"])
+def test_what_is_no_note_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="a note has 1 to 1000"):
+        check_note(text)
+    assert check_note("new seals,\n17 cells") == "new seals, 17 cells"

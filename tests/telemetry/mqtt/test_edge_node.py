@@ -256,6 +256,7 @@ def test_a_value_is_read_as_its_field_and_one_of_another_width_is_none(content: 
         field(3, 1, bytes(7)),
         field(3, 3, b""),
         field(3, 0, b"\xff" * 11),
+        field(3, 0, b"\xff" * 10 + b"\x01"),
         field(3, 0, b""),
     ],
 )
