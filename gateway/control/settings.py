@@ -19,11 +19,11 @@ class Limits:
     __pydantic_config__ = STRICT
     force_max_n: Annotated[float, Gt(0), Le(300)]  # largest accepted setpoint (int16 at 0.01 N carries 327)
     over_force_n: Annotated[float, Gt(0)]  # measured force that trips OVER_FORCE
-    over_force_samples: Annotated[int, Ge(1), Le(10)] = 3
+    over_force_samples: Annotated[int, Ge(1), Le(10)] = 3  # so many readings in a row trip it
     smallest_force_n: Annotated[float, Ge(0)] = 0.0  # below it the output is 0 V
-    voltage_min_v: Annotated[float, Ge(0)] = 0.0
-    voltage_max_v: Annotated[float, Gt(0), Le(10)] = defaults.VOLTAGE_MAX_V
-    safe_voltage_v: Annotated[float, Ge(0)] = 0.0
+    voltage_min_v: Annotated[float, Ge(0)] = 0.0  # least voltage while enabled: that of 0 N
+    voltage_max_v: Annotated[float, Gt(0), Le(10)] = defaults.VOLTAGE_MAX_V  # largest voltage that is sent
+    safe_voltage_v: Annotated[float, Ge(0)] = 0.0  # out while off and in a fault; 0 V may drop a tool
     voltage_slew_v_per_s: Annotated[float, Gt(0)] = 100.0  # rising only; falling may be immediate
 
 
@@ -32,13 +32,15 @@ class Defaults:
     """Values that 0 in a command register means."""
 
     __pydantic_config__ = STRICT
-    force_ramp_n_per_s: Annotated[float, Gt(0), Le(3276.7)] = 200.0
-    precontact_force_n: Annotated[float, Ge(0)] = 2.0
-    contact_ramp_s: Annotated[float, Ge(0), Le(10)] = 0.0
-    in_band_tolerance_n: Annotated[float, Gt(0)] = 1.0
-    in_band_time_s: Annotated[float, Ge(0)] = 0.1
-    contact_threshold_n: Annotated[float, Gt(0)] = 0.5
-    payload_kg: Annotated[float, Ge(0)] = 0.0
+    force_ramp_n_per_s: Annotated[float, Gt(0), Le(3276.7)] = 200.0  # rate at which the setpoint is approached
+    precontact_force_n: Annotated[float, Ge(0)] = (
+        2.0  # before contact; friction that the calibration found is its least
+    )
+    contact_ramp_s: Annotated[float, Ge(0), Le(10)] = 0.0  # from contact to the setpoint; 0: by force_ramp_n_per_s
+    in_band_tolerance_n: Annotated[float, Gt(0)] = 1.0  # half the width of the band around the setpoint
+    in_band_time_s: Annotated[float, Ge(0)] = 0.1  # within the band for so long: in_band
+    contact_threshold_n: Annotated[float, Gt(0)] = 0.5  # measured force from which there is contact
+    payload_kg: Annotated[float, Ge(0)] = 0.0  # what hangs on the cell; its weight is taken off by tilt_angle
 
 
 OVERSHOOT_BANDS: Final = 2.0  # in_band_tolerance_n, so far a rise may go beyond its setpoint for three samples
@@ -55,8 +57,8 @@ class Trim:
     """The bounded integral from the load cell. gain 0 switches it off: feedforward alone."""
 
     __pydantic_config__ = STRICT
-    gain_v_per_n_s: Annotated[float, Ge(0)] = 0.0
-    limit_v: Annotated[float, Ge(0), Le(3)] = 0.5
+    gain_v_per_n_s: Annotated[float, Ge(0)] = 0.0  # of the integral; 0: feedforward alone
+    limit_v: Annotated[float, Ge(0), Le(3)] = 0.5  # largest correction, of either sign
     dead_zone_n: Annotated[float, Ge(0)] = 0.15  # errors below it are stiction's: integrating them makes a limit cycle
     memory_n: Annotated[float, Gt(0)] = 20.0  # travel of the target over which a correction fades to 37 %
 
@@ -101,12 +103,14 @@ class Supervision:
     """Bounds of the supervision, most of them in time."""
 
     __pydantic_config__ = STRICT
-    lease_s: Annotated[float, Gt(0)] | None = None  # None: a command lasts until the next one
-    lease_action: LeaseAction = LeaseAction.FAULT
-    sample_timeout_s: Annotated[float, Gt(0)] = 0.05
-    output_timeout_s: Annotated[float, Gt(0)] = 0.1
-    stall_s: Annotated[float, Gt(0)] = defaults.STALL_S
-    frozen_s: Annotated[float, Gt(0)] = 0.5
+    lease_s: Annotated[float, Gt(0)] | None = None  # null: a command lasts until the next one
+    lease_action: LeaseAction = LeaseAction.FAULT  # when it ends: fault, hold or ramp
+    sample_timeout_s: Annotated[float, Gt(0)] = 0.05  # no reading for so long: a fault
+    output_timeout_s: Annotated[float, Gt(0)] = 0.1  # no answer of the output for so long: a fault
+    stall_s: Annotated[float, Gt(0)] = (
+        defaults.STALL_S
+    )  # no tick for so long: control is replaced, the safe voltage is out
+    frozen_s: Annotated[float, Gt(0)] = 0.5  # equal readings for so long while the force should move: a fault
     sample_quantum_n: Annotated[float, Gt(0)] = 0.1  # one count of the amplifier
     saturation_n: Annotated[float, Gt(0)] = 98.0  # raw at or beyond 98 % of the cell's range
     frozen_equal_samples: Annotated[int, Ge(3)] | None = None  # where noise shows in every reading: so many equal ones
@@ -155,6 +159,6 @@ class ControlSettings:
     supervision: Supervision = Supervision()
     lead: LeadSettings = LeadSettings()
     response: ResponseSource = ResponseSource.MEASURED
-    self_test: SelfTestSettings | None = None  # None: the rig offers none
-    valve: ValveControl | None = None  # None: the rig has none
+    self_test: SelfTestSettings | None = None  # null: the rig offers none
+    valve: ValveControl | None = None  # null: the rig has none
     timing: LoopTiming | None = None  # of the calibration in use, None where nothing was measured or the rig file rules

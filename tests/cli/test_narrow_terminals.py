@@ -18,7 +18,9 @@ from gateway.cli.force_hold import state_line
 from gateway.cli.force_hold.sequence import StatusReading
 from gateway.cli.main import VERBS, import_verb
 from gateway.cli.main import command as force_gateway
+from gateway.clients.wiring import TEXT_WIDTH, Section, render_page, wiring_page
 from gateway.codes.warning_bits import WarningBit
+from gateway.profiles import load_rig
 from gateway.registers.words import State, StatusBit
 from tests.reports.fake_diagnosis import diagnosis
 
@@ -123,6 +125,17 @@ def test_the_line_of_hold_has_its_warnings(width: int) -> None:
     )
     line = state_line._within(state_line.describe_state(status), width - 1)
     assert missing(line, ["holding", "112.34", "112.00", "8.123", "in", "band", "A301", "A345"], width) == []
+
+
+@pytest.mark.parametrize("rig", ["demo", "irc5-cell", "paper-pull"])
+def test_a_wiring_page_is_folded_between_words(rig: str) -> None:
+    """On 80 columns it was the terminal that broke its lines: `separate hardwa` and `re`."""
+    _, sections = wiring_page(load_rig(rig), rig)
+    cells = [tuple(("what", row[-1]) for row in each.rows) for each in sections]
+    told = [Section(each.title, each.sentences, rows) for each, rows in zip(sections, cells, strict=True)]
+    wide, narrow = (render_page("rig", told, "text", columns) for columns in (TEXT_WIDTH, 80))
+    assert narrow.split() == wide.split()
+    assert max(map(len, narrow.splitlines())) <= 80 < max(map(len, wide.splitlines()))
 
 
 GROUPS = [verb for verb in VERBS if isinstance(import_verb(verb).command, click.Group)]

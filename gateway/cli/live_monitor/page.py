@@ -1,6 +1,6 @@
 """One frame of the monitor, for any size from 60 x 24: header, four big numbers, a minute of force, alarms, registers."""
 
-from math import isnan
+from math import isnan, nan
 from typing import Final
 
 from rich.text import Text
@@ -94,10 +94,12 @@ def _describe_settling(track: Track) -> str:
 def _numbers(view: View) -> list[Text]:
     track = view.track
     measured_n, setpoint_n = track.value("force_measured"), track.wanted_n
+    is_wanted = setpoint_n != 0.0 and track.has_status(StatusBit.ENABLED)
+    error_n = track.acting_n - setpoint_n if is_wanted else nan  # of a force that nobody asks for there is none
     numbers = (
         ("measured N", measured_n, 2, "-", "bold cyan"),
         ("target N" if track.is_calibrating else "setpoint N", setpoint_n, 2, "-", "yellow"),
-        ("error N", track.acting_n - setpoint_n, 2, "+", "green" if track.has_status(StatusBit.IN_BAND) else "white"),
+        ("error N", error_n, 2, "+", "green" if track.has_status(StatusBit.IN_BAND) else "white"),
         ("output V", track.value("output_voltage") / 1e3, 3, "-", "magenta"),
     )
     boxes = []

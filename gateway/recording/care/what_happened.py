@@ -116,7 +116,8 @@ def _what_ran(recording: Recording) -> str:
         climbed = f", {labels.last_stair} of {ladder['stairs']} stairs climbed" if labels and is_cut else ""
         step_v = ladder.get("step_v", 0.0)
         stairs = f"{step_v:g} V stairs" if isinstance(step_v, (int, float)) else "stairs"
-        return f"calibration ladder of {ladder.get('groups', '?')} × {stairs}{climbed}"
+        groups = ladder.get("groups", "?")
+        return f"calibration ladder of {groups} {'group' if groups == 1 else 'groups'} of {stairs}{climbed}"
     if experiment := header.get("experiment"):
         return f"experiment {experiment.get('name', '')}".strip()
     return "run"

@@ -62,6 +62,22 @@ def test_nothing_is_cut_on_a_narrow_terminal(width: int, writers, register_map: 
     assert ("192.168.125.101" in words) == (writers is not None)
 
 
+@pytest.mark.parametrize(
+    ("status", "requested", "has_error"),
+    [(StatusBit.ENABLED, 12.0, True), (0, 0.0, False), (StatusBit.ENABLED, 0.0, False)],
+)
+def test_a_force_that_nobody_asks_for_has_no_error(
+    status: int, requested: float, has_error: bool, register_map: RegisterMap
+) -> None:
+    """What rests on the cell of a gateway that is off was shown as an error of +0.98 N, and a ladder's force as one of 59 N."""
+    track = Track()
+    told = {"force_requested": requested, "force_measured": 1.0, "output_voltage": 1500.0, "status_word": status}
+    track.add(0.0, poll_of(register_map, **told))
+    lines = text_of(View(track, "127.0.0.1:5020", 80, 24))
+    top = next(place for place, line in enumerate(lines) if "error N" in line)
+    assert ("–" in "".join(line[40:60] for line in lines[top + 1 : top + 4])) is not has_error
+
+
 @pytest.mark.parametrize("state", State)
 def test_the_header_begins_with_the_state_by_its_name(state: State, register_map: RegisterMap) -> None:
     track = Track()

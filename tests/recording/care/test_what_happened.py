@@ -16,17 +16,18 @@ from gateway.recording.tables.column_names import CALIBRATION, DERIVED
 from gateway.registers.words import CalibrationPhase
 
 
-def test_a_ladder_that_was_cut_says_how_far_it_has_climbed(tmp_path: Path) -> None:
-    """It read like a whole one."""
+@pytest.mark.parametrize(("groups", "words"), [(1, "1 group"), (2, "2 groups")])
+def test_a_ladder_that_was_cut_says_how_far_it_has_climbed(tmp_path: Path, groups: int, words: str) -> None:
+    """It read like a whole one; and `1 × 0.5 V stairs` like one stair."""
     for last in (CalibrationPhase.LADDER, CalibrationPhase.FITTING):
-        header = {"ladder": {"groups": 2, "step_v": 0.5, "stairs": 85}}
+        header = {"ladder": {"groups": groups, "step_v": 0.5, "stairs": 85}}
         recorder = Recorder(tmp_path / "recordings", header, ("time_s", *LABELS))
         for row in range(46):
             recorder.append((float(row), float(last if row == 45 else CalibrationPhase.LADDER), 0.0, float(row)))
         recorder.close()
     cut, whole = (summary["happened"] for summary in list_summaries(tmp_path))
-    assert cut == "calibration ladder of 2 × 0.5 V stairs, 45 of 85 stairs climbed"
-    assert whole == "calibration ladder of 2 × 0.5 V stairs"
+    assert cut == f"calibration ladder of {words} of 0.5 V stairs, 45 of 85 stairs climbed"
+    assert whole == f"calibration ladder of {words} of 0.5 V stairs"
 
 
 def test_a_recording_lasts_from_its_first_row_to_its_last(tmp_path: Path) -> None:

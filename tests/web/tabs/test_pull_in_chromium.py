@@ -9,6 +9,7 @@ DRAWN = """async () => {
   const { makeTrend } = await import("/static/live/trend.js");
   const { makeError } = await import("/static/live/error.js");
   const { makeLoop } = await import("/static/live/loop.js");
+  const { makeSteering } = await import("/static/live/steering.js");
   const time_s = Array.from({ length: 200 }, (_, place) => 100 + place / 20);
   const column = (push, pull) => time_s.map((at_s) => (at_s < 105 ? push : pull));
   const columns = {
@@ -23,9 +24,17 @@ DRAWN = """async () => {
   for (const one of made) { document.body.append(one.element); one.draw(); }
   await new Promise(requestAnimationFrame);
   made[1].state();
+  const status = ["enabled", "pulling"], force_v = { voltage_v: null, measured_n: null };
+  const state = { status, calibration: {}, plant: {}, force: force_v, limits: {}, faults: [], recording: {} };
+  made[2].state(state);
+  const steering = makeSteering({});
+  steering.state(state);
+  const units = Array.from(steering.element.querySelectorAll(".unit"), (unit) => unit.textContent);
+  const model = made[2].element.querySelector("p.small").textContent;
   const [, low, high, force, wanted] = plots[0].chart.data.map((values) => values.at(-1));
   const error = made[1].element.querySelector("p.small").textContent;
-  return { low, high, wanted, force, pushed: plots[0].chart.data[4][0], error, least: plots[2].chart.scales.y.min };
+  const least = plots[2].chart.scales.y.min;
+  return { low, high, wanted, force, pushed: plots[0].chart.data[4][0], error, least, units, model };
 }"""
 
 
@@ -39,4 +48,6 @@ def test_setpoint_error_and_range_go_with_the_pull(page, chromium) -> None:
     assert (drawn["force"], drawn["pushed"]) == (-11.8, 12.0)
     assert drawn["error"] == "RMS 0.16 N rising, last minute."
     assert drawn["least"] == -15.0
+    assert drawn["units"] == ["N measured", "N, pulling", "N, −measured − setpoint", "V"]  # -14.91, 15.00, -0.09
+    assert drawn["model"] == "The tool pulls; the model drawn is that of pushing."
     browser.close()

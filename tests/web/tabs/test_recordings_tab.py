@@ -22,7 +22,7 @@ def test_the_list_says_what_each_is_and_names_what_cannot_be_read(page, state) -
     assert (run["number"], run["rows"]) == (1, ROWS)
     assert run["duration_s"] == pytest.approx((ROWS - 1) / 100.0)
     assert run["happened"] == "run, 1 change of setpoint, up to 30 N, 7.0 to 49.0 N measured"
-    assert ladder["happened"].startswith("calibration ladder of 3 × 0.5 V stairs, ")
+    assert ladder["happened"].startswith("calibration ladder of 3 groups of 0.5 V stairs, ")
     assert "is not a recording" in newest["fault"]
 
 

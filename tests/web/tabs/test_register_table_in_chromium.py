@@ -94,7 +94,7 @@ def test_words_are_read_in_their_order_and_unit_and_the_line_to_copy_reads_the_s
 FOLDED = """async (map) => {
   const { makeRegisters } = await import("/static/live/registers.js");
   const table = makeRegisters({ get: async () => map, say: () => {} });
-  await table.state({ words: {}, writers: {} });
+  await new Promise((done) => setTimeout(done));
   document.body.append(table.element);
   const name = [...table.element.querySelectorAll("th")].find((one) => one.textContent === "voltage_setpoint");
   const lines = new Map();
@@ -110,6 +110,6 @@ FOLDED = """async (map) => {
 def test_a_name_goes_on_behind_an_underscore_on_a_telephone(page, chromium) -> None:
     """It stood there as `voltage_setpoin` and `t`."""
     browser = chromium.new_context(viewport={"width": 390, "height": 844})
-    window: Any = open_tab(browser, page.address, "live")
+    browser.route("**/events?*", lambda route: route.abort())
+    window: Any = open_tab(browser, page.address, "wiring")
     assert window.evaluate(FOLDED, register_table(demo(), 5020)) == ["voltage_", "setpoint"]
-    browser.close()

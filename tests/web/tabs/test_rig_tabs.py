@@ -13,6 +13,8 @@ from gateway.web.tabs.rig_values import HIDDEN, rig_document
 from gateway.web.tabs.wiring import wiring_document
 from tests.web.tabs.served_tabs import serve
 
+CONTROL = ("limits.", "defaults.", "trim.", "lead.", "supervision.", "self_test.")
+
 
 @pytest.fixture
 def own_rig(tmp_path: Path) -> Path:
@@ -32,6 +34,14 @@ def test_each_value_that_is_set_stands_in_its_line(own_rig) -> None:
     by_path = {one["path"]: one for one in rig["values"]}
     assert (by_path["load_cell.sign"]["value"], by_path["load_cell.sign"]["default"]) == ("1", "1")
     assert by_path["network.idle_s"]["line"] is None  # nobody has written it
+
+
+def test_each_number_of_control_says_what_it_is(own_rig) -> None:
+    """Of eighteen, the safe voltage and what ends a force among them, a page or an editor said nothing."""
+    values = rig_document(str(own_rig), simulated=True)["files"][0]["values"]
+    told = {one["path"]: one["about"] for one in values if one["path"].startswith(CONTROL)}
+    assert len(told) > 30
+    assert [path for path, about in told.items() if not about or "None" in about] == []
 
 
 def test_every_file_of_the_rig_is_told_with_a_numbers_source(own_rig) -> None:

@@ -1,5 +1,8 @@
 """`wiring`: one page for whoever wires a cell and sets up its robot or PLC, from the rig file."""
 
+import shutil
+import sys
+
 import click
 
 from gateway import defaults
@@ -20,7 +23,7 @@ def command(*, rig_name: str, form: str, as_json: bool) -> None:
     mbpoll lines to try it. RIG is a shipped name or a file (default: demo). Opens no port.
     """
     from gateway.clients import MissingRegisterError
-    from gateway.clients.wiring import render_page, wiring_page
+    from gateway.clients.wiring import TEXT_WIDTH, render_page, wiring_page
     from gateway.profiles import load_rig
 
     rig = load_rig(rig_name)
@@ -28,4 +31,5 @@ def command(*, rig_name: str, form: str, as_json: bool) -> None:
         title, sections = wiring_page(rig, rig_name)
     except MissingRegisterError as error:
         raise CliError(f"E185 {error}: masters need them; copy them from {defaults.REGISTER_MAP}") from None
-    click.echo(render_page(title, sections, "json" if as_json else form), nl=False)
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else TEXT_WIDTH
+    click.echo(render_page(title, sections, "json" if as_json else form, width), nl=False)

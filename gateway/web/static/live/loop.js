@@ -11,6 +11,8 @@ export function makeLoop(samples, api) {
   let model = { voltage_v: [0, 10], rising_n: [null, null], falling_n: [null, null] }; // none yet
   let shown = null;
   let lowest_n = 0;
+  const summary = document.createElement("p");
+  summary.className = "small";
 
   const plot = new Plot(element, () => ({
     data: [model.voltage_v, model.rising_n, model.falling_n],
@@ -63,6 +65,7 @@ export function makeLoop(samples, api) {
     }
   }
 
+  element.append(summary);
   return {
     element,
     draw() {
@@ -74,6 +77,7 @@ export function makeLoop(samples, api) {
       plot.chart.setData(plot.chart.data);
     },
     state(state) {
+      summary.textContent = state.status.includes("pulling") ? "The tool pulls; the model drawn is that of pushing." : "";
       const key = `${state.calibration.number} ${state.calibration.name} ${state.plant.number}`;
       if (key !== shown) load(key);
     },

@@ -10,7 +10,8 @@ const RESET = "A fault stands: mend its cause, then acknowledge and reset it und
 export function makeSteering(api) {
   const big = (name, unit) => {
     const value = make("dd", { textContent: "–" });
-    return { value, element: make("div", {}, make("dt", { textContent: name }), value, make("dd", { className: "unit", textContent: unit })) };
+    const told = make("dd", { className: "unit", textContent: unit });
+    return { value, told, element: make("div", {}, make("dt", { textContent: name }), value, told) };
   };
   const force = big("Force", "N measured");
   const wanted = big("Setpoint", "N");
@@ -72,6 +73,9 @@ export function makeSteering(api) {
     state(next) {
       state = next;
       const isOn = state.status.includes("enabled");
+      const isPulling = state.status.includes("pulling");
+      wanted.told.textContent = isPulling ? "N, pulling" : "N"; // measured it is negative
+      error.told.textContent = isPulling ? "N, −measured − setpoint" : "N, measured − setpoint";
       wanted.value.textContent = newton(state.force.requested_n);
       voltage.value.textContent = state.force.voltage_v === null ? "–" : state.force.voltage_v.toFixed(3);
       showForce(state.force.measured_n); // also where no sample comes

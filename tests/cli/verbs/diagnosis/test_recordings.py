@@ -35,7 +35,7 @@ def test_a_list_is_whole_on_a_narrow_terminal(width: int, state: Path, call, mon
     assert "1 2026-01-02 03:04:05 UTC demo 0.9 s 10 rows" in told
     assert "before repair: new seals tomorrow run, 1 change of setpoint, up to 20 N, 20.0 to 29.0 N measured" in told
     assert "a-cell-with-a-rather-long-name-such-as-people-give" in told
-    assert "calibration ladder of 3 × 0.5 V stairs" in told
+    assert "calibration ladder of 3 groups of 0.5 V stairs" in told
 
 
 def test_show_says_everything_that_is_known(state: Path, call) -> None:
