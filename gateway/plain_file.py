@@ -125,6 +125,12 @@ def tell_refusal(error: OSError) -> str:
     return f"{words}: {reason}" if reason else words
 
 
+def tell_place_and_refusal(error: OSError) -> str:
+    """As tell_refusal, behind the name that was refused, where the error knows it."""
+    words = tell_refusal(error)
+    return f"{error.filename}: {words}" if error.filename and not words.startswith(f"{error.filename}") else words
+
+
 def _other_kind(status: os.stat_result) -> str:
     return "" if stat.S_ISREG(status.st_mode) else _KINDS.get(stat.S_IFMT(status.st_mode), "something else")
 

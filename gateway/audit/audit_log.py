@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final, NamedTuple
 
 from gateway.audit.audit_file import AuditFile
-from gateway.plain_file import tell_refusal
+from gateway.plain_file import tell_place_and_refusal
 from gateway.processes.disk_worker import DiskWorker
 from gateway.processes.event import utc_text
 
@@ -92,7 +92,7 @@ class AuditLog:
             self._lost = self._told.and_then(self._lost)
             self._not_before_s = self._clock() + _AGAIN_S
             if not self._has_failed:
-                why = tell_refusal(result) if isinstance(result, OSError) else repr(result)
+                why = tell_place_and_refusal(result) if isinstance(result, OSError) else repr(result)
                 self._log(
                     "audit",
                     f"A351 the audit is not stored: {why}; kept in memory (at most {MOST_WAITING}), control goes on",

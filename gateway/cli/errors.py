@@ -12,7 +12,7 @@ from typing import IO, Any
 
 import click
 
-from gateway.plain_file import tell_refusal
+from gateway.plain_file import tell_place_and_refusal
 from gateway.processes import exit_codes
 
 
@@ -77,11 +77,10 @@ def translate_error(error: Exception, command_line: str, *, debug: bool) -> CliE
 
 def _from_system(error: OSError) -> CliError:
     """Return what the operating system refused: permission, disk, a missing directory."""
-    words = tell_refusal(error)
-    place = f"{error.filename}: " if error.filename and not words.startswith(f"{error.filename}") else ""
+    words = tell_place_and_refusal(error)
     if error.errno in (errno.EACCES, errno.EPERM):
-        return CliError(f"E105 {place}{error.strerror}: this user may not", exit_codes.PERMISSION)
-    return CliError(f"E106 {place}{words}")
+        return CliError(f"E105 {words}: this user may not", exit_codes.PERMISSION)
+    return CliError(f"E106 {words}")
 
 
 def _is_a(error: Exception, module: str, name: str) -> bool:

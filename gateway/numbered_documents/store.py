@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final, Generic, TypeVar
 
 from gateway.numbered_documents.selection import BUILT_IN, Selection, SelectionState, read_selection, write_selection
-from gateway.plain_file import tell_refusal
+from gateway.plain_file import tell_place_and_refusal
 from gateway.processes.durable_file import lock_directory, make_directory, read_regular, write_durably
 from gateway.registers.upload.staging import SLOTS
 
@@ -221,7 +221,7 @@ class NumberedStore(ABC, Generic[Document]):
         return number
 
     def _disk_error(self, error: OSError) -> StoreError:
-        return StoreError("E431", f"{self.noun} not stored: {tell_refusal(error)}")
+        return StoreError("E431", f"{self.noun} not stored: {tell_place_and_refusal(error)}")
 
 
 def file_name(number: int) -> str:

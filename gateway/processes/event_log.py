@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Final, Self
 
-from gateway.plain_file import tell_refusal
+from gateway.plain_file import tell_place_and_refusal
 from gateway.processes.event import EventRecord, encode_event, format_event, make_event
 from gateway.processes.event_file import EventFile
 from gateway.processes.systemd.journal import journal_writer
@@ -282,7 +282,9 @@ class _EventFileWriter:
         except OSError as error:
             self._lost += 1
             if self._lost == 1:
-                sentence = f"E150 events are not kept: {tell_refusal(error)}; control goes on, stderr has them"
+                sentence = (
+                    f"E150 events are not kept: {tell_place_and_refusal(error)}; control goes on, stderr has them"
+                )
                 self._tell(self._event("events", sentence))
             if isinstance(event, _NotedEvent):  # the sentence above says that it is there
                 self._tell(event)

@@ -47,7 +47,8 @@ class Recorder:
         self._batch = 0
         self.rows_written = 0
         self.failure: str | None = None
-        directory.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with contextlib.suppress(FileExistsError):  # a link to a disk that is not mounted, too: that is told below
+            directory.mkdir(parents=True, mode=0o700)
         self.number, self.path, descriptor = _create_next(directory)
         self._descriptor: int | None = descriptor
         with contextlib.suppress(OSError):  # some file systems have no locks

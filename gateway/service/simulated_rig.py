@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.devices import DeviceProfile
+from gateway.plain_file import tell_place_and_refusal
 from gateway.ports import PacedPty
 from gateway.processes import exit_codes
 from gateway.processes import message_link as guardian_link
@@ -147,7 +148,10 @@ class SimulationSocket:
         try:
             self._kept.write(settings)
         except OSError as error:
-            self._log("simulation", f"what is set does not outlive the simulated rig's process: {error}")
+            self._log(
+                "simulation",
+                f"what is set does not outlive the simulated rig's process: {tell_place_and_refusal(error)}",
+            )
 
 
 def _in_words(settings: SimulationSettings) -> str:

@@ -1,5 +1,5 @@
 """HTTP of the page and of the metrics: a connection that does not come to a whole request in time is closed, and one that
-takes nothing of its answer; where as many are open as are served, the one that has asked for nothing for longest makes room.
+takes nothing of its answer; where as many are open as are served, of such the one that asked longest ago makes room.
 
 uvicorn waits for ever for the rest of a request, and for an answer to be taken. While its bound of connections is full it
 refuses everybody. So whoever opened as many and said nothing, or read nothing, shut out all others, and the page's Stop with
@@ -67,13 +67,18 @@ class BoundedHttpProtocol(H11Protocol):
         """Decide whether its next request, or the rest of one, is still to come."""
         return self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
 
+    @property
+    def _keeps_others_waiting(self) -> bool:
+        """Decide whether nothing comes of it but by its caller, who has asked for nothing, or takes nothing."""
+        return self._is_waited_for or self._unread_timer is not None
+
     def _make_room(self) -> None:
         if self.limit_concurrency is None or len(self.connections) < self.limit_concurrency:
             return
         silent = [
             one
             for one in self.connections
-            if isinstance(one, BoundedHttpProtocol) and one._is_waited_for and one != self
+            if isinstance(one, BoundedHttpProtocol) and one._keeps_others_waiting and one != self
         ]
         if silent:
             longest = min(silent, key=lambda one: one._asked_s)

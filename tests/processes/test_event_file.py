@@ -1,5 +1,6 @@
 """What a process says stands in the state directory, one event per line, whatever kills a writer or fills a disk."""
 
+import errno
 import json
 import os
 import queue
@@ -55,6 +56,17 @@ def test_a_log_waits_for_no_file_that_is_none_and_says_so(kind: str, tmp_path: P
     with EventLog(lines.put, file=EventFile(tmp_path)) as log:
         log.note("start", "ready")
         assert f"E150 events are not kept: {tmp_path}/events.jsonl: it is {kind}" in lines.get(timeout=5)
+
+
+def test_a_file_that_cannot_be_reached_is_named(tmp_path: Path) -> None:
+    """A link to a disk that is not mounted: 'No such file or directory' was all, in the log of a gateway with several."""
+    (tmp_path / "events.jsonl").symlink_to(tmp_path / "not mounted" / "events.jsonl")
+    lines: queue.Queue[str] = queue.Queue()
+    with EventLog(lines.put, file=EventFile(tmp_path)) as log:
+        log.note("start", "ready")
+        assert f"E150 events are not kept: {tmp_path}/events.jsonl: {os.strerror(errno.ENOENT)};" in lines.get(
+            timeout=5
+        )
 
 
 def test_what_is_noted_is_not_on_the_terminal(tmp_path: Path) -> None:

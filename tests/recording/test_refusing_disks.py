@@ -86,3 +86,13 @@ def test_a_disk_that_takes_no_header_is_left_without_a_file(
     with pytest.raises(OSError, match="No space left"):
         Recorder(tmp_path / "recordings", HEADER, COLUMNS)
     assert list((tmp_path / "recordings").iterdir()) == []
+
+
+def test_a_link_to_a_disk_that_is_not_mounted_is_no_file_that_exists(tmp_path: Path) -> None:
+    """`record on` said 'E141 .../recordings: File exists' where recordings lead to another disk, and that is away."""
+    (tmp_path / "recordings").symlink_to(tmp_path / "not mounted")
+    with pytest.raises(FileNotFoundError):
+        Recorder(tmp_path / "recordings", HEADER, COLUMNS)
+    (tmp_path / "not mounted").mkdir()
+    Recorder(tmp_path / "recordings", HEADER, COLUMNS).close()
+    assert [path.name for path in (tmp_path / "not mounted").iterdir()] == ["0001.fgr"]

@@ -6,6 +6,7 @@ from contextlib import suppress
 
 import pytest
 from starlette.applications import Starlette
+from starlette.requests import Request
 from starlette.responses import PlainTextResponse
 from starlette.routing import Route
 from uvicorn import Config
@@ -141,3 +142,31 @@ def test_who_opens_connections_and_asks_for_nothing_shuts_nobody_out() -> None:
             await asyncio.sleep(0)
 
     asyncio.run(asyncio.wait_for(scene(), 10.0))
+
+
+def test_who_takes_nothing_of_an_answer_shuts_nobody_out_either() -> None:
+    """The login's style, asked for without end and not read, kept every place for half a minute, and then anew."""
+    most = 4
+
+    async def answer(request: Request) -> PlainTextResponse:
+        return PlainTextResponse("x" * 4_000_000 if request.query_params else "here")
+
+    async def scene() -> bytes:
+        app = Starlette(routes=[Route("/", answer)])
+        config = Config(app, ws="none", lifespan="off", log_config=None, limit_concurrency=most)
+        config.load()
+        state, loop = ServerState(), asyncio.get_running_loop()
+        pairs = [socket.socketpair() for _ in range(most)]
+        for ours, far in pairs:
+            far.setblocking(False)
+            await loop.connect_accepted_socket(lambda: bounded_http.BoundedHttpProtocol(config, state, {}), ours)
+            await loop.sock_sendall(far, WHOLE if far is pairs[-1][1] else 2 * WHOLE.replace(b"/ ", b"/?large=1 ", 1))
+            await asyncio.sleep(0.01)
+        heard = await loop.sock_recv(pairs[-1][1], 1000)
+        for _, far in pairs:
+            far.close()
+        while state.connections:
+            await asyncio.sleep(0)
+        return heard
+
+    assert b"here" in asyncio.run(asyncio.wait_for(scene(), 10.0))

@@ -16,6 +16,7 @@ from gateway.telemetry.mqtt.round_trips import ASK_S, SLOW_S, RoundTrips
 AGAIN_S: Final = 2.0
 _KEEPALIVE_S: Final = 10
 _SHORT_S: Final = 10.0
+_CONNACK: Final = 2  # a type of packet (MQTT 3.1.1, 2.2.1)
 _MOST_SHORT: Final = 3  # connections in a row; then it is no broker that comes and goes
 
 
@@ -51,7 +52,8 @@ async def keep_connected(
                 news.note_unheard(await _subscribe(client, session))
                 await _carry(client, session, queue)
         except* (aiomqtt.MqttError, OSError, UnicodeError) as lost:
-            news.note_lost(_reason(lost))
+            first = _first(lost)
+            (news.note_refused if _is_refusal(first) else news.note_lost)(_reason(first))
         finally:
             session.lose()
         await asyncio.sleep(again_s)
@@ -65,6 +67,7 @@ class BrokerNews:
     def __init__(self, broker: str, name: str, say: Callable[[str], None], clock: Callable[[], float]) -> None:
         self._broker, self._name, self._say, self._clock = broker, name, say, clock
         self._is_away = False
+        self._refused = ""
         self._unheard: list[str] = []
         self._connected_s: float | None = None
         self._short = 0
@@ -74,7 +77,7 @@ class BrokerNews:
         self._connected_s = self._clock()
         if self._is_away:
             self._say(f"{self._broker} is back")
-        self._is_away = False
+        self._is_away, self._refused = False, ""
 
     def note_unheard(self, topics: list[str]) -> None:
         """Note which topics the broker does not let us listen to; told once, for each connection says it again."""
@@ -84,6 +87,15 @@ class BrokerNews:
                 "heard. Allow its user to read there"
             )
         self._unheard = topics
+
+    def note_refused(self, reason: str) -> None:
+        """Note that it is there, and does not let us in: told, too, where it was away before, and once for each reason."""
+        if reason != self._refused:
+            self._say(
+                f"E181 {self._broker} does not let this gateway in ({reason}): look at mqtt.username, password_file and tls, "
+                "and at its log; data is kept meanwhile"
+            )
+        self._is_away, self._refused, self._short = True, reason, 0
 
     def note_lost(self, reason: str) -> None:
         """Note that it is lost, or that there was none to be had."""
@@ -230,9 +242,17 @@ async def _publish(client: Any, message: BrokerMessage) -> None:
     await client.publish(message.topic, message.payload, qos=message.qos, retain=message.retain)
 
 
-def _reason(lost: BaseExceptionGroup[BaseException]) -> str:
-    first: BaseException = lost
-    while isinstance(first, BaseExceptionGroup):
-        first = first.exceptions[0]
+def _first(lost: BaseException) -> BaseException:
+    while isinstance(lost, BaseExceptionGroup):
+        lost = lost.exceptions[0]
+    return lost
+
+
+def _is_refusal(first: BaseException) -> bool:
+    """Decide whether the broker has answered our hello, by a no; the library's own class for it is not public."""
+    return getattr(getattr(first, "rc", None), "packetType", 0) == _CONNACK
+
+
+def _reason(first: BaseException) -> str:
     is_no_name = isinstance(first, UnicodeError)  # `a..b`, or a part of over 63 characters
     return "no such host name" if is_no_name else str(first)

@@ -1,6 +1,7 @@
 """The simulated rig's ptys and its socket: what streams, which plug is out, what is kept, and what is told to whom."""
 
 import asyncio
+import errno
 import os
 import socket
 from collections.abc import Awaitable, Callable
@@ -180,7 +181,8 @@ def test_a_directory_that_takes_nothing_is_said_and_the_rig_is_set_all_the_same(
         one = Answers(tmp_path / "gone")
         one.socket.simulate({"do": "sim", "set": {"air.off": True}})
         assert one.lines.world.settings.is_on("air.off")
-        assert one.said[-1].startswith("what is set does not outlive the simulated rig's process: ")
+        place = f"{tmp_path}/gone/simulation.json.part: {os.strerror(errno.ENOENT)}"
+        assert one.said[-1] == f"what is set does not outlive the simulated rig's process: {place}"
 
     asyncio.run(in_a_loop(scene))
 

@@ -186,6 +186,28 @@ def test_a_broker_that_ends_each_connection_at_once_is_not_away_and_is_told_once
     assert len(said) == 8, "it is away still"
 
 
+def test_a_broker_that_refuses_who_we_are_is_not_away() -> None:
+    """'is away (not authorized)' sent people to the network, and behind a broker that had come back with other passwords
+    nothing more was said at all."""
+    (sentence,) = asyncio.run(meet_once([b"\x20\x02\x00\x05"]))
+    assert "does not let this gateway in ([code:135] Not authorized)" in sentence and "away" not in sentence
+    said = list[str]()
+    news = BrokerNews("the MQTT broker b:1883", "force-gateway cell", said.append, lambda: 0.0)
+    news.note_lost("nobody listens")
+    for reason in ("not authorized", "not authorized", "banned"):
+        news.note_refused(reason)
+        news.note_lost("nobody listens")
+    news.note_connected()
+    news.note_refused("banned")
+    assert [sentence.removeprefix("E181 ").partition(";")[0][23:] for sentence in said] == [
+        "is away (nobody listens)",
+        "does not let this gateway in (not authorized): look at mqtt.username, password_file and tls, and at its log",
+        "does not let this gateway in (banned): look at mqtt.username, password_file and tls, and at its log",
+        "is back",
+        "does not let this gateway in (banned): look at mqtt.username, password_file and tls, and at its log",
+    ]
+
+
 def test_what_the_broker_lets_nobody_hear_is_told_once_and_again_where_it_was_allowed_between() -> None:
     said = list[str]()
     news = BrokerNews("the MQTT broker b:1883", "force-gateway cell", said.append, lambda: 0.0)
