@@ -144,8 +144,14 @@ SLOW = (
     "paper/test_paper_report.py",
     "control/foreign/test_foreign_machines.py",
     "test_compiled_folder.py",
+    "web/tabs/test_away_in_chromium.py",
+    "web/tabs/test_steering_in_chromium.py",
+    "web/tabs/test_tabs_in_chromium.py",
+    "web/tabs/test_many_tabs_in_chromium.py",
+    "web/tabs/test_calibrations_tab.py",
 )
-"""Files of more than ten seconds of processor: begun first, so that none is left to one worker at the end."""
+"""Files of more than ten seconds of processor, or that wait as long for a browser: begun first, so that none is left to one
+worker at the end, nor all workers wait there."""
 
 SPREAD = (
     "hidden_effects/test_hidden_effects.py::test_a_recording_gets_an_answer[",

@@ -17,6 +17,16 @@ from tests.conftest import LONG_WAITS, REAL_TIME, SLOW, SPREAD, begun_at, find_l
 from tests.workers import OneCompiler, is_needed
 
 TESTS = Path(__file__).parent
+INTERRUPTED = """
+import os, signal
+
+def fork(fork=os.fork):
+    if pid := fork():
+        os.kill(os.getpid(), signal.SIGINT)
+    return pid
+
+os.fork = fork
+"""
 CONFTEST = """
 import os
 from pathlib import Path
@@ -97,8 +107,9 @@ def run_in_workers(folder: Path, *words: str, **files: str) -> subprocess.Popen[
     (folder / "conftest.py").write_text(CONFTEST)
     for name, text in files.items():
         (folder / f"test_{name}.py").write_text("import os, signal, time\nfrom pathlib import Path\n" + text)
+    (folder / "interrupted.py").write_text(INTERRUPTED)
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-q", *words, "."]
-    environment = os.environ | {"PYTHONPATH": str(TESTS.parent), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    environment = os.environ | {"PYTHONPATH": f"{TESTS.parent}:{folder}", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     out = subprocess.PIPE
     return subprocess.Popen(command, cwd=folder, env=environment, stdout=out, stderr=subprocess.STDOUT, text=True)
 
@@ -150,6 +161,15 @@ def test_a_thread_that_no_worker_would_have_ends_the_run_before_its_first_test(t
     run = run_in_workers(tmp_path, one=thread)
     said, _ = run.communicate()
     assert run.returncode == 3 and "has started what no worker would have" in said and "passed" not in said
+
+
+def test_an_interrupt_right_behind_a_fork_ends_that_worker_too(tmp_path: Path) -> None:
+    run = run_in_workers(
+        tmp_path, "-p", "interrupted", waits="def test_a():\n    time.sleep(2)\n    Path('went on').touch()\n"
+    )
+    said, _ = run.communicate()
+    assert run.returncode == 2 and "KeyboardInterrupt" in said
+    assert not (tmp_path / "went on").exists()
 
 
 def test_an_interrupt_ends_all_workers_with_their_fixtures(tmp_path: Path) -> None:

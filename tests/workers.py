@@ -21,6 +21,7 @@ TELLING_S: Final = 0.1
 """A fixture that takes longer is told, for the list of the slowest."""
 NUMBER: Final = 4
 """Bytes of the place of a group or a test."""
+INTERRUPT: Final = {signal.SIGINT}
 NO_TEST: Final = b"\xff" * NUMBER
 
 
@@ -111,7 +112,7 @@ def ending_the_process(terminal: int) -> Iterator[None]:
     try:
         yield
         os._exit(0)
-    except BrokenPipeError:  # the run has ended
+    except (BrokenPipeError, KeyboardInterrupt):  # the run has ended
         os._exit(1)
     except BaseException:
         os.write(terminal, traceback.format_exc().encode())
@@ -168,14 +169,17 @@ class ForkedWorkers:
         (heard, told), place = Pipe(duplex=False), mmap(-1, NUMBER)
         place[:] = NO_TEST
         self._started += 1
+        signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPT)  # until the one is in its frame, and the other knows of it
         pid = os.fork()
         if not pid:
-            for other in (heard, *self._workers):
-                other.close()
             with ending_the_process(os.dup(2)):
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPT)
+                for other in (heard, *self._workers):
+                    other.close()
                 WorkerProcess(session, f"worker{self._started}", told, place).run(self._take_groups(first))
-        told.close()
         self._workers[heard] = Worker(pid, place)
+        told.close()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPT)
 
     def _take_groups(self, first: list[int]) -> Iterator[list[int]]:
         if first:
