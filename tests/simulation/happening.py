@@ -6,6 +6,7 @@ from tests.simulation.draws.event import Event
 from tests.simulation.kernel.cables import CABLES
 from tests.simulation.kernel.edges import SimulatedDisk
 from tests.simulation.kernel.spoiled import Spoil
+from tests.simulation.masters.bus_master import BUSES
 from tests.simulation.masters.spelling import ENABLE
 from tests.simulation.masters.tcp_master import PULL, RUNS, TAKE, Master
 
@@ -28,7 +29,7 @@ def happen(simulation: "Simulation", event: Event) -> None:
             simulation.held_force.expect(event.numbers[0], simulation.clock.now_s)
         _command(simulation.masters[event.whom], event)
     elif event.whom in simulation.integrators:
-        simulation.integrators[event.whom].upload(*event.numbers)
+        getattr(simulation.integrators[event.whom], event.what)(*event.numbers)
     elif event.whom == "person":
         simulation.person.say(event.data)
     elif event.whom == "world" and event.what == "sim":
@@ -119,8 +120,8 @@ def _touch_line(simulation: "Simulation", event: Event) -> None:
         return  # a rig without a valve
     if event.what == "pull":
         simulation.around.pull(event.whom)
-        if event.whom == "bus":  # what it has asked may have been done, and its answer is lost
-            simulation.masters["rival"].lose()
+        if event.whom in BUSES:  # what it has asked may have been done, and its answer is lost
+            simulation.masters[BUSES[event.whom]].lose()
     elif event.what == "push":
         simulation.around.push(event.whom)
     elif event.what == "deaf":

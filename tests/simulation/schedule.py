@@ -46,6 +46,7 @@ from tests.simulation.masters.spelling import (
     control_of,
     hangs_payload,
     read_pdu,
+    takes_set,
     tells_weight,
     word_of,
 )
@@ -120,7 +121,7 @@ class Simulation:
         )
         self.service.on_death = self._on_death
         self.masters = {
-            name: make_master(name, "bus" in CABLES)(
+            name: make_master(name)(
                 f"10.0.0.{place}",
                 self.outside,
                 lambda: self.service.inside,
@@ -135,7 +136,7 @@ class Simulation:
             for place, name in ((8, "integrator"), (7, "designer"))
         }
         for one in self.integrators.values():
-            one.sets = self.sets
+            one.sets, one.on_model = self.sets, self._expect_any_model
         self.integrator = self.integrators["integrator"]
         self.crowd = Crowd(self.outside, lambda: self.service.inside)
         self.person = SocketUser(lambda: self.service.inside, self.service.answer_socket)
@@ -221,6 +222,8 @@ class Simulation:
             self.tares.note_asked(is_sure=is_answered and control > 0)
         if tells_weight(pdu):
             self._note_weight(pdu)
+        if takes_set(pdu):
+            self._expect_any_model()
 
     def _note_weight(self, pdu: bytes) -> None:
         self.explained.note_change(self.clock.now_s)

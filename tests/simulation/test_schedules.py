@@ -12,14 +12,12 @@ import pytest
 
 from tests.simulation.draws.event import Event
 from tests.simulation.draws.events import draw_events
-from tests.simulation.draws.harmless_events import draw_harmless_events
+from tests.simulation.draws.schedules import draw_schedule
 from tests.simulation.kept import load_cell, masters, output_line, people_at_the_machine, stopped_processes
 from tests.simulation.schedule import Outcome, run_schedule
 from tests.simulation.shrinking import shrink
 
 PUSH_SEEDS, LONG_SEEDS = 500, 50_000
-HELD_EVERY, HELD = 8, 3
-"""Of so many schedules one has a force that is held, and only what may not cost it happens beside."""
 SHARD = 25
 """So many seeds are one test, ten times as many in a long run."""
 SHRUNK = 3
@@ -65,8 +63,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def test_whatever_happens_no_law_is_broken_and_the_force_comes_back(shard: range) -> None:
     commits, broken = 0, list[str]()
     for seed in shard:
-        draw = draw_harmless_events if seed % HELD_EVERY == HELD else draw_events
-        events = list(draw(seed, SECONDS))
+        events = list(draw_schedule(seed, SECONDS))
         outcome = run_schedule(seed, events, SECONDS)
         if outcome.broken:
             broken.append(tell(seed, events, outcome, shortest=len(broken) < SHRUNK))

@@ -8,6 +8,7 @@ from math import inf
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from gateway.calibrations.store import CalibrationStore
 from gateway.control import LeadSettings, LeaseAction
@@ -20,6 +21,7 @@ from gateway.profiles.rigs.faces import RtuFace
 from gateway.profiles.rigs.rig import ValveLine
 from gateway.twin.plant import with_value
 from tests.service.rigs import demo, with_supervision
+from tests.simulation.draws.quiet_events import EVERY, QUIET
 from tests.simulation.draws.sequences import has_recipes
 from tests.simulation.judges.heard import OUTPUTS, RTU_OUTPUT, SENTENCES, LineObserver, RtuObserver
 from tests.simulation.judges.observer import DOWN_S, Bounds, Observer
@@ -63,6 +65,18 @@ ADAPTER_SHARE, ADAPTERS_S = 0.1, (0.001, 0.004, 0.016)
 REST_SHARE, VARIED_SHARE = 0.05, 0.06
 RESTS_V = (0.3, 0.0), (0.55, 0.55), (1.0, 0.0), (1.0, 1.0)
 """Safe voltages that press, where a tool would drop at 0 V, and the least that may be out."""
+OWN_SHARE = 0.5
+"""Of schedules with few events (quiet_events.py): those that have a rig which no other has."""
+OWN_KINDS = ("valve",) * 4 + ("buses",) * 3 + ("devices",) * 2 + ("plain",) * 4
+OWN_LEASES_S = 0.2, 0.2, 0.4, 1.0
+OWN_BOUNDS: tuple[dict[str, Any], ...] = (
+    {},
+    {},
+    {"idle_s": 2.0},
+    {"requests_per_s": 25.0},
+    {"connections": 9, "per_address": 1},
+)
+"""Of the network: an idle connection is closed soon, or whoever asks more waits, or there are places for the masters only."""
 BUS_TOO_SHARE = 0.2
 """Of rigs that have something else of their own."""
 BOW = 0.005
@@ -112,7 +126,7 @@ def bounds_of(rig: Rig) -> Bounds:
         limits.voltage_slew_v_per_s,
         supervision.sample_timeout_s,
         supervision.stall_s,
-        LEASE_S if supervision.lease_s and supervision.lease_action is not LeaseAction.HOLD else inf,
+        supervision.lease_s or inf if supervision.lease_action is not LeaseAction.HOLD else inf,
         1.0 / rig.loop_hz,
         DOWN_S if supervision.lease_action is LeaseAction.RAMP else 0.0,
         supervision.output_timeout_s + rig.output.device.reply_timeout_s + POLL_S,
@@ -127,6 +141,8 @@ def draw_rig(seed: int) -> Drawn:
     """The rig of this seed, with strict bounds: a cell that is late by two samples and a half is lost."""
     loop_hz, chance = Random(f"rate {seed}").choice(RATES_HZ), Random(f"rig 2 {seed}")
     kind, output, share = chance.choice(KINDS), DEMO_OUTPUT, 1.0
+    own = _draw_own(seed)
+    kind = own.choice(OWN_KINDS) if own else kind
     if kind != "plain":
         loop_hz = min(loop_hz, SLOW_HZ)
     if kind == "rate":
@@ -140,6 +156,8 @@ def draw_rig(seed: int) -> Drawn:
         rig = with_devices(output, chance.choice(CELLS))
     if kind == "bus" or (kind != "plain" and Random(f"bus beside {seed}").random() < BUS_TOO_SHARE):
         rig = replace(rig, fieldbus=(RtuFace(type="rtu", port="bus"),))
+    if own:
+        rig = _with_own(rig, kind, own)
     cell_hz = share * loop_hz
     rig = _varied(_resting(rig, Random(f"safe {seed}")), Random(f"varied 2 {seed}"))
     device = rig.load_cell.device
@@ -148,6 +166,20 @@ def draw_rig(seed: int) -> Drawn:
         asked = replace(device, read_force=replace(reading, rate_hz=2.0 * cell_hz))  # so that each tick finds it due
         rig = replace(rig, load_cell=replace(rig.load_cell, device=asked))
     return Drawn(_strict(rig, seed, loop_hz, cell_hz), 1.0 / cell_hz if device.stream else None, output)
+
+
+def _draw_own(seed: int) -> Random | None:
+    """Return what a rig of its own is drawn from; None for most."""
+    chance = Random(f"own rig 64 {seed}")
+    return chance if seed % EVERY == QUIET and chance.random() < OWN_SHARE else None
+
+
+def _with_own(rig: Rig, kind: str, chance: Random) -> Rig:
+    """In these, there may be two serial faces, and other bounds of the network; and a lease of another length."""
+    buses = ("bus", "second bus") if kind == "buses" else ("bus",) if chance.random() < BUS_TOO_SHARE else ()
+    network = replace(rig.network, **chance.choice(OWN_BOUNDS))
+    faces = tuple(RtuFace(type="rtu", port=bus) for bus in buses)
+    return replace(rig, network=network, fieldbus=faces)
 
 
 def _resting(rig: Rig, chance: Random) -> Rig:
@@ -203,6 +235,7 @@ def _strict(rig: Rig, seed: int, loop_hz: float, cell_hz: float) -> Rig:
         "output_timeout_s": max(0.1, ticks / loop_hz, 1.7 * rig.output.device.reply_timeout_s),
     }
     lease_s, action = Random(f"lease {seed}").choice(LEASES)
+    lease_s = OWN_LEASES_S[seed // EVERY % len(OWN_LEASES_S)] if lease_s and _draw_own(seed) else lease_s
     if loop_hz < LEAST_HZ:
         rig = replace(rig, control=replace(rig.control, response=ResponseSource.RIG, lead=LeadSettings()))
     rig = with_supervision(rig, lease_s=lease_s, lease_action=action, stall_s=STALL_S, **bounds)

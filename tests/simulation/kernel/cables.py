@@ -312,6 +312,7 @@ def lay_cables(
     CABLES["load_cell"] = Cable(outside, rig.load_cell.settings, on_cell)
     for face in rig.fieldbus:
         if isinstance(face, RtuFace):
-            CABLES["bus"] = Cable(outside, face.settings, lambda chunk, now_s: None)
+            assert face.port
+            CABLES[face.port] = Cable(outside, face.settings, lambda chunk, now_s: None)
     if rig.valve:
         CABLES["valve"] = Cable(outside, rig.valve.settings, on_valve)

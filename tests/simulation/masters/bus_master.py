@@ -6,6 +6,7 @@ been done all the same.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from tests.simulation.judges.heard import crc16
@@ -22,6 +23,8 @@ MOST_WAITING = 3
 LONGEST_GAP_S = 0.05
 """Inside of a request: who waits longer has given it up."""
 UNIT, BROADCAST = 1, 0
+BUSES = {"bus": "rival", "second bus": "worker"}
+"""Who is the master on each."""
 
 
 class BusMaster(Master):
@@ -31,14 +34,15 @@ class BusMaster(Master):
     _number = 0
     _is_pausing = False
 
-    def __init__(self, *arguments: Any) -> None:
+    def __init__(self, bus: str, *arguments: Any) -> None:
         super().__init__(*arguments)
         self._queue: list[tuple[bytes, int]] = []
-        CABLES["bus"].on_device = self._hear_bus
+        self._bus = CABLES[bus]
+        self._bus.on_device = self._hear_bus
 
     def connect(self) -> bool:
         """Whether somebody is at the other end."""
-        return CABLES["bus"].port is not None
+        return self._bus.port is not None
 
     def disconnect(self) -> None:
         """A bus has no connections: it only falls silent."""
@@ -58,7 +62,7 @@ class BusMaster(Master):
             self._ask_next()
 
     def send_raw(self, data: bytes) -> None:
-        CABLES["bus"].send_to_host(data)
+        self._bus.send_to_host(data)
 
     def _ask_next(self) -> None:
         if self._question is not None or self._is_pausing or not self._queue:
@@ -74,7 +78,7 @@ class BusMaster(Master):
     def _put(self, pieces: Sequence[tuple[bytes, float]], broadcast: int) -> None:
         """Put a request on the bus, with a gap inside where it is to be split. broadcast: its number, which nobody answers: it
         has been done as soon as it is through; 0: none."""
-        bus, ((piece, gap_s), *rest) = CABLES["bus"], pieces
+        bus, ((piece, gap_s), *rest) = self._bus, pieces
         bus.send_to_host(piece)
         if rest:
             self._outside.call_later(min(gap_s, LONGEST_GAP_S) + bus.backlog_s, self._put, rest, broadcast)
@@ -107,7 +111,7 @@ class BusMaster(Master):
         if len(frame) < 5 or crc16(frame[:-2]) != int.from_bytes(frame[-2:], "little"):
             return
         self._stream = b""
-        question, is_strange = self._question, now_s - CABLES["bus"].strange_s < STRANGE_S
+        question, is_strange = self._question, now_s - self._bus.strange_s < STRANGE_S
         if question is None:
             if not self._is_pausing and not is_strange:
                 self.complaints.append(f"I8: {self.name} was answered {frame.hex()} on the bus without having asked")
@@ -126,6 +130,7 @@ class BusMaster(Master):
         self._ask_next()
 
 
-def make_master(name: str, on_bus: bool) -> Callable[..., Master]:
-    """Who `rival` is: where there is a bus, a master on it."""
-    return BusMaster if on_bus and name == "rival" else Master
+def make_master(name: str) -> Callable[..., Master]:
+    """Who `rival` is, and `worker`: where there is a bus, or a second one, a master on it."""
+    bus = next((bus for bus, master in BUSES.items() if master == name), "")
+    return partial(BusMaster, bus) if bus in CABLES else Master

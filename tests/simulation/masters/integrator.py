@@ -6,6 +6,7 @@ was acknowledged, that one, after a kill, too.
 """
 
 import struct
+from collections.abc import Callable
 from zlib import crc32
 
 from tests.simulation.masters.spelling import read_pdu, write_pdu
@@ -18,6 +19,7 @@ HANDLES_AT = 6  # of the rising branch, two words each, behind order, an unused 
 MOST_AT = 2 * 136  # the largest force that may be asked for
 LESS_N = 40.0
 COMMITTED, FAILED = 3, 4
+ROLLBACK = 3
 STEP_N = 0.001
 MARKS = 50  # a plant has so many recipes, and not another one each time
 LOOK_S, ASK_S = 1.0, 0.1
@@ -89,10 +91,12 @@ class Sets:
 
 
 class Integrator(Master):
-    """complaints: broken answers, and what was in use although nobody had committed it. committed: how many were."""
+    """complaints: broken answers, and what was in use although nobody had committed it. committed: how many were;
+    on_model: another set may be in use from now on."""
 
     committed = 0
     sets: Sets
+    on_model: Callable[[], None] = staticmethod(lambda: None)
     _sent: bytes | None = None
 
     def watch(self) -> None:
@@ -118,6 +122,12 @@ class Integrator(Master):
             if pause_s:
                 self._outside.call_later(pause_s, self._stage, requests, words, pause_s)
                 return
+
+    def recall(self) -> None:
+        """Take the set before into use, whichever that is."""
+        if self.connect():
+            self.on_model()
+            self.ask(write_pdu(COMMIT, ROLLBACK))
 
     def forget(self) -> None:
         """Somebody else takes a set into use: how an upload ends then tells nothing."""

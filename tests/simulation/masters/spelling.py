@@ -169,6 +169,11 @@ def tells_weight(pdu: bytes) -> bool:
     return any(_told_at(PAYLOAD + TILT, pdu))
 
 
+def takes_set(pdu: bytes) -> bool:
+    """Decide whether a master commits what others have staged, or selects a slot."""
+    return pdu[0] == 6 and written_address(pdu) in (1145, 1149)
+
+
 def _told_at(places: tuple[tuple[int, int], ...], pdu: bytes) -> Iterator[bytes]:
     """What a write tells of each of these places, and how it is masked; nothing of those that it leaves alone."""
     data = {6: pdu[3:5], 16: pdu[6:], 22: pdu[3:7], 23: pdu[10:]}.get(pdu[0], b"")
