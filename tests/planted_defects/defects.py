@@ -818,7 +818,7 @@ DEFECTS = (
     Defect("what the disk refuses at this machine is not audited", "audit/rig_audit.py",
            "except (ValueError, OSError) as error:", "except ValueError as error:", ("audit/test_rig_audit.py",)),
     Defect("an S7 forgets the fall of an enable that is on its way", "clients/templates/simatic.scl",
-           "         OR #step = #WRITING AND (#sent[${cmd_control_word}] AND #ENABLE_BIT) <> 16#0000) THEN", "         ) THEN",
+           "         OR #step = #WRITING AND (#sent[${cmd_control_word}] AND #falls) <> 16#0000 THEN", "         THEN",
            ("clients/test_s7_between_calls.py",)),
     Defect("why a loop was silent is asked before the safe voltage", "service/supervisor/guardian.py",
            "        acknowledged = self.control.write_safe_voltage()\n        control, self.control.process",

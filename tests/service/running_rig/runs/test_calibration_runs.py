@@ -109,7 +109,7 @@ def test_a_disk_that_takes_no_file_ends_the_run_at_its_beginning(tmp_path: Path)
     runs = kept(wired, tmp_path)
     runs.answer({"plan": PLAN})
     wired.until(lambda: bool(runs.answer({})["ended"]), 1.0)
-    assert "A330 calibration stopped: the recording cannot be written: File exists" in runs.status()["ended"]
+    assert "A330 calibration stopped: the recording cannot be written: Not a directory" in runs.status()["ended"]
     assert runs.status()["recording"] is None
     assert wired.word("calibration_phase") == CalibrationPhase.STOPPED
 
