@@ -33,9 +33,7 @@ class Defaults:
 
     __pydantic_config__ = STRICT
     force_ramp_n_per_s: Annotated[float, Gt(0), Le(3276.7)] = 200.0  # rate at which the setpoint is approached
-    precontact_force_n: Annotated[float, Ge(0)] = (
-        2.0  # before contact; friction that the calibration found is its least
-    )
+    precontact_force_n: Annotated[float, Ge(0)] = 2.0  # before contact; the calibration's friction is its least
     contact_ramp_s: Annotated[float, Ge(0), Le(10)] = 0.0  # from contact to the setpoint; 0: by force_ramp_n_per_s
     in_band_tolerance_n: Annotated[float, Gt(0)] = 1.0  # half the width of the band around the setpoint
     in_band_time_s: Annotated[float, Ge(0)] = 0.1  # within the band for so long: in_band
@@ -107,9 +105,7 @@ class Supervision:
     lease_action: LeaseAction = LeaseAction.FAULT  # when it ends: fault, hold or ramp
     sample_timeout_s: Annotated[float, Gt(0)] = 0.05  # no reading for so long: a fault
     output_timeout_s: Annotated[float, Gt(0)] = 0.1  # no answer of the output for so long: a fault
-    stall_s: Annotated[float, Gt(0)] = (
-        defaults.STALL_S
-    )  # no tick for so long: control is replaced, the safe voltage is out
+    stall_s: Annotated[float, Gt(0)] = defaults.STALL_S  # no tick for so long: safe voltage, and a new control process
     frozen_s: Annotated[float, Gt(0)] = 0.5  # equal readings for so long while the force should move: a fault
     sample_quantum_n: Annotated[float, Gt(0)] = 0.1  # one count of the amplifier
     saturation_n: Annotated[float, Gt(0)] = 98.0  # raw at or beyond 98 % of the cell's range
