@@ -156,15 +156,15 @@ class ExchangeTable:
         return sum(1 << bit for bit, name in self.map.find("control_word").bits.items() if name in _STARTS)
 
     @property
-    def test_words(self) -> dict[str, int]:
+    def self_test_words(self) -> dict[str, int]:
         """Return {what it is of: place among those words}."""
         first = self.self_test[0].address
         return {one.name.removeprefix(SELF_TEST): one.address - first for one in self.self_test}
 
     @property
-    def test_items(self) -> dict[str, int]:
+    def self_test_items(self) -> dict[str, int]:
         """Return those of the words that are a verdict on an item."""
-        return {name: place for name, place in self.test_words.items() if name not in ("result", "count")}
+        return {name: place for name, place in self.self_test_words.items() if name not in ("result", "count")}
 
     @property
     def command_span(self) -> tuple[int, int]:
@@ -260,7 +260,7 @@ class ExchangeTable:
             "hash_first": found.address,
             "test_first": span_of(self.self_test)[0],
             "test_words": span_of(self.self_test)[1],
-            "test_result": self.test_words["result"],
+            "test_result": self.self_test_words["result"],
         }
         data = {"echo": pack_number("float32", WordOrder.ABCD, PROOF), "hash": found.encode(self.map.map_hash)}
         for name, pair in data.items():

@@ -30,12 +30,12 @@ def spell_c(table: ExchangeTable) -> dict[str, str]:
         "warning_cases": _cases(table.texts("warning_word")),
         "failing_cases": _cases(table.texts("failing_reason")),
         "state_cases": _cases(table.texts("state")),
-        "test_offsets": _enumerate(table.test_words, "FG_TEST_"),
+        "test_offsets": _enumerate(table.self_test_words, "FG_TEST_"),
         "test_results": _enumerate(
             {name: number for number, name in table.at("self_test_result", "proof").values.items()}, "FG_RESULT_"
         ),
         "test_result_cases": _cases(table.texts("self_test_result")),
-        "test_item_cases": _cases({place: name.replace("_", " ") for name, place in table.test_items.items()}),
+        "test_item_cases": _cases({place: name.replace("_", " ") for name, place in table.self_test_items.items()}),
         "verdict_cases": _cases(table.texts("self_test_noise")),
     }
 

@@ -109,7 +109,9 @@ def _lists(table: ExchangeTable, dialect: _Dialect) -> dict[str, str]:
         "state_cases": _cases(table.texts("state"), "StateText", dialect),
         "test_result_cases": _cases(table.texts("self_test_result"), "TestResultText", dialect),
         "verdict_cases": _cases(table.texts("self_test_noise"), "VerdictText", dialect),
-        "test_fields": "\n".join(f"{dialect.member}{name} : {dialect.types['uint']};" for name in table.test_words),
+        "test_fields": "\n".join(
+            f"{dialect.member}{name} : {dialect.types['uint']};" for name in table.self_test_words
+        ),
         "test_decoding": "\n".join(_decode_test(table, dialect)),
         "buffer_last": str(max(*table.parts, table.status_span[1], span_of(table.self_test)[1]) - 1),
         "set_last": str(table.set_words - 1),
@@ -190,7 +192,7 @@ def _decode(register: Register, table: ExchangeTable, dialect: _Dialect) -> str:
 
 def _decode_test(table: ExchangeTable, dialect: _Dialect) -> Iterator[str]:
     indent, structure = (" " * 12, "#test") if dialect.local else (" " * 8, "stTest")
-    for name, place in table.test_words.items():
+    for name, place in table.self_test_words.items():
         yield f"{indent}{structure}.{name} := WORD_TO_UINT({dialect.arrays[1]}[{place}]);"
 
 

@@ -38,7 +38,7 @@ def unspeakable(table: ExchangeTable, language: str) -> Iterator[str]:
         for before, name in _constants(table):
             if len(name) > (room := longest - len(before)):
                 yield f"{name} has {len(name)} characters, and {language} has room for {room}"
-    members = (*(register.name for register in (*table.command, *table.status)), *table.test_words)
+    members = (*(register.name for register in (*table.command, *table.status)), *table.self_test_words)
     yield from (
         f"{name} is a word of {language} itself" for name in members if name in _KEYWORDS.get(language, "").split()
     )
@@ -60,7 +60,7 @@ def _constants(table: ExchangeTable) -> Iterator[tuple[str, str]]:
     """Yield each name of the map that becomes a constant, behind what the client sets before it."""
     yield from (("FG_S_", register.name) for register in (*table.command, *table.status))
     yield from (("FG_M_", each.name) for each in table.model_fields)
-    yield from (("FG_T_", name) for name in table.test_words)
+    yield from (("FG_T_", name) for name in table.self_test_words)
     yield from (
         ("FG_", name) for word in ("control_word", "status_word") for name in table.map.find(word).bits.values()
     )

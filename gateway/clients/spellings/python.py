@@ -24,7 +24,7 @@ def spell_python(table: ExchangeTable) -> dict[str, str]:
         "warnings": _texts(table.texts("warning_word")),
         "commit_states": _texts(table.texts("commit_status")),
         "failing": _texts(table.texts("failing_reason")),
-        "test_table": "\n".join(f'    ("{name}", {place}),' for name, place in table.test_words.items()),
+        "test_table": "\n".join(f'    ("{name}", {place}),' for name, place in table.self_test_words.items()),
         "test_results": _texts(table.texts("self_test_result")),
         "test_verdicts": _texts(table.texts("self_test_noise")),
     }

@@ -28,7 +28,7 @@ def spell_rapid(table: ExchangeTable) -> dict[str, str]:
         "warning_cases": _cases(table.texts("warning_word")),
         "failing_cases": _cases(table.texts("failing_reason")),
         "state_cases": _cases(table.texts("state")),
-        "test_constants": _constants({f"FG_T_{name}": place + 1 for name, place in table.test_words.items()}),
+        "test_constants": _constants({f"FG_T_{name}": place + 1 for name, place in table.self_test_words.items()}),
         "test_zeros": _zeros(span_of(table.self_test)[1]),
         "test_result_cases": _cases(table.texts("self_test_result")),
         "verdict_cases": _cases(table.texts("self_test_noise")),

@@ -49,7 +49,7 @@ def spell_urscript(table: ExchangeTable) -> dict[str, str]:
 def _spell_self_test(table: ExchangeTable) -> dict[str, str]:
     words = span_of(table.self_test)[1]
     return {
-        "test_constants": _globals({f"FG_T_{name}": place for name, place in table.test_words.items()}),
+        "test_constants": _globals({f"FG_T_{name}": place for name, place in table.self_test_words.items()}),
         "test_zeros": _zeros(words),
         "test_bytes": str(2 * words),
         "test_result_cases": _cases(table.texts("self_test_result"), "result"),
