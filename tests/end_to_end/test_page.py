@@ -1,6 +1,5 @@
-"""The page in a real browser (Debian's chromium) on a whole running gateway: what it draws moves, and Stop stops."""
+"""The page in a real browser on a whole running gateway: what it draws moves, and Stop stops."""
 
-import shutil
 import subprocess
 import sys
 import time
@@ -10,13 +9,10 @@ from typing import Any
 
 import pytest
 
+from tests.browser import BROWSER, NO_BROWSER, started_browser
 from tests.end_to_end.conftest import OWNER_IP, RunningGateway, start, stop
 
-CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
-pytestmark = pytest.mark.skipif(
-    not Path(CHROMIUM).exists(),
-    reason="no chromium here (apt-get install chromium): THE PAGE IS NOT TRIED IN A BROWSER",
-)
+pytestmark = pytest.mark.skipif(BROWSER is None, reason=NO_BROWSER)
 OFF, HOLDING, BUSY = 0, 3, 503
 SERIOUS = ("serious", "critical")
 
@@ -30,12 +26,8 @@ def gateway(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningGateway
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+    with started_browser() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")

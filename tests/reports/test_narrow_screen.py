@@ -3,7 +3,6 @@
 import html
 import json
 import re
-import shutil
 import subprocess
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,9 +10,9 @@ from typing import Any
 
 import pytest
 
+from tests.browser import BROWSER, FLAGS, NO_BROWSER
 from tests.reports.sample_pages import PAGES
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 TELEPHONE_PX, DESK_PX, WALL_PX = 400, 1280, 2560
 GROUNDS = {"dark": "rgb(21, 24, 27)", "light": "rgb(253, 253, 252)"}
 MEASURE = """
@@ -60,8 +59,7 @@ def measured(pages: Mapping[str, str], folder: Path, width_px: int, themes: tupl
     (folder / "frames.html").write_text(f"<!doctype html><body>{''.join(frames)}{script}</body>", encoding="utf-8")
     quiet = [
         "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
+        *FLAGS,
         f"--user-data-dir={folder / 'browser'}",
         "--window-size=1400,900",
     ]
@@ -73,9 +71,7 @@ def measured(pages: Mapping[str, str], folder: Path, width_px: int, themes: tupl
     return found
 
 
-@pytest.mark.skipif(
-    BROWSER is None, reason="no chromium here (apt install chromium): the layout of the reports is not tested"
-)
+@pytest.mark.skipif(BROWSER is None, reason=NO_BROWSER)
 @pytest.mark.parametrize(
     ("width_px", "themes"),
     [

@@ -1,7 +1,6 @@
 """What the tests of the tabs share: a state directory with a recording, the page on it, and a browser."""
 
 import math
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -9,10 +8,10 @@ from typing import Any
 import pytest
 
 from gateway.recording import Recorder
+from tests.browser import BROWSER, NO_BROWSER, started_browser
 from tests.web.tabs.scripted_control import ScriptedControl, modbus, scripted_control
 from tests.web.tabs.served_tabs import ServedPage, serve
 
-CHROMIUM = "/usr/bin/chromium"
 ROWS = 500
 
 
@@ -61,17 +60,11 @@ def page(state: Path) -> Iterator[ServedPage]:
 
 @pytest.fixture(scope="module")
 def started_chromium() -> Iterator[Any]:
-    """A browser without a window, once for a file; skipped where Debian's chromium is absent."""
-    if not os.access(CHROMIUM, os.X_OK):
-        pytest.skip(f"{CHROMIUM} is not installed: apt-get install chromium")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
-        try:
-            yield browser
-        finally:
-            browser.close()
+    """A browser without a window, once for a file; skipped where there is none."""
+    if BROWSER is None:
+        pytest.skip(NO_BROWSER)
+    with started_browser() as browser:
+        yield browser
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ def test_esc_stops_also_behind_a_click_in_a_report(page, served: ScriptedControl
     window = open_tab(chromium, page.address, "recordings")
     window.get_by_role("button", name="Plot recording 1").click()
     window.frame_locator("iframe").locator("h1").click()
+    expect(window.locator("iframe")).not_to_be_focused()
     window.keyboard.press("Escape")
     expect(window.locator("#said")).to_have_text("Stopped: the safe voltage is out.", timeout=10_000)
     assert written(served) == [STOP]
