@@ -14,6 +14,7 @@ from typing import Any
 import hypothesis
 import pytest
 
+from tests.budgets import leave_out_long
 from tests.tried_again import TriedAgain
 from tests.workers import ForkedWorkers, OneCompiler
 
@@ -185,17 +186,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items.sort(key=lambda item: (begun_at(item.nodeid), item.path))  # stable: within a file nothing moves
     if not config.getoption("--long"):
         leave_out_long(items, in_silence=is_shared)
-
-
-def leave_out_long(items: list[pytest.Item], *, in_silence: bool) -> None:
-    """Skip what needs the bigger budget. in_silence: drop it, for to skip a test takes as long as a short one runs."""
-    skip = pytest.mark.skip(reason="needs the bigger budget: ./tools/test --long")
-    long = [item for item in items if "long" in item.keywords]
-    for item in long:
-        item.add_marker(skip)
-    if in_silence:
-        left_out = set(long)
-        items[:] = [item for item in items if item not in left_out]
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

@@ -39,6 +39,7 @@ def test_value_and_slope_agree_with_fifty_digits(order, spread, reference):
             assert curve.slope(x) == pytest.approx(float(truth.slope(x)), rel=TOLERANCE)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("spread", [0.0, 1.0, 6.0, 12.0])
 @pytest.mark.parametrize("order", ORDERS)
 def test_inverse_agrees_with_fifty_digits_even_near_both_ends(order, spread, reference):

@@ -49,6 +49,7 @@ def be_lost(client: Any, gateway: GatewayAtHand) -> None:
         client.cycle(5.0)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("ask", [enable, tare, reset, take])
 @pytest.mark.parametrize("attempts", [0, 3])
 def test_what_is_asked_for_between_two_attempts_does_not_go_out_with_the_next_connection(

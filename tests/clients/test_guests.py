@@ -88,6 +88,7 @@ def test_a_word_that_is_set_while_nobody_presses_goes_out_and_with_the_next_enab
     assert not gateway.bank.command.control_word and not client.enabled
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("scans", range(0, 10, 2))
 def test_a_force_that_changes_each_cycle_does_not_undo_another_master_s_stop(
     client: Any, gateway: GatewayAtHand, scans: int

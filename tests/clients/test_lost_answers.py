@@ -87,6 +87,7 @@ def ask_before_off(client: Any, gateway: GatewayAtHand, ask: Any) -> None:
     gateway.answer = ask_behind_the_echo  # type: ignore[method-assign]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("ask", "behind"),
     [

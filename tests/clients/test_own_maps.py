@@ -28,6 +28,7 @@ TENTHS = (
 )
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [

@@ -18,6 +18,7 @@ def client(gateway: GatewayAtHand) -> S7:
     return S7(TEXTS["scl"], gateway)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("scans", range(1, 16))
 def test_an_enable_that_falls_before_its_answer_has_come_is_stopped(
     client: S7, gateway: GatewayAtHand, monkeypatch: pytest.MonkeyPatch, scans: int
@@ -91,6 +92,7 @@ def test_the_next_upload_blames_no_number_of_the_last_one(client: S7, gateway: G
     assert (client.output("failing"), member(client, "uploadError")) == (-1, False)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("scans", range(3, 36, 2))
 def test_a_second_upload_waits_for_the_end_of_the_first(client: S7, gateway: GatewayAtHand, scans: int) -> None:
     """Begun anew between two parts it would send a CRC-32 of some of both, and be refused."""

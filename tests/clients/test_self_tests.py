@@ -123,6 +123,7 @@ def test_a_tare_right_behind_the_end_begins_no_other_self_test(client: Any, gate
     assert commands(gateway)[:2] == [BEGUN, *tared] and not gateway.is_testing
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("language", ["scl", "twincat", "codesys"], indirect=True)
 @pytest.mark.parametrize("scans", range(12))
 def test_a_tare_at_the_end_begins_no_other_self_test_wherever_the_request_of_a_plc_is(

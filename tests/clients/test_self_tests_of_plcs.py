@@ -43,6 +43,7 @@ def outputs(plc: Plc) -> str:
     return " ".join(word for name, word in names.items() if plc.output(name))
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("scans", SCANS)
 def test_a_self_test_that_falls_for_one_call_is_let_go_and_begun_anew(
     plc: Plc, gateway: GatewayAtHand, scans: int
@@ -56,6 +57,7 @@ def test_a_self_test_that_falls_for_one_call_is_let_go_and_begun_anew(
     assert commands(gateway) == [BEGUN, OFF, BEGUN] and outputs(plc) == "busy" and not gateway.exceptions
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("scans", SCANS)
 def test_an_input_that_bounces_at_the_end_of_a_self_test_presses_nothing(
     plc: Plc, gateway: GatewayAtHand, scans: int
@@ -73,6 +75,7 @@ def test_an_input_that_bounces_at_the_end_of_a_self_test_presses_nothing(
     assert {words[:2] for words in commands(gateway)} <= {BEGUN[:2], OFF[:2]}
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("scans", SCANS)
 @pytest.mark.parametrize("gap", [0, 1])
 def test_an_enable_in_place_of_a_self_test_is_none_wherever_its_request_is(
@@ -113,6 +116,7 @@ def cut(gateway: GatewayAtHand) -> None:
     gateway.is_cut = True
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("happen", "told"), [(end, "done"), (fail, "done"), (cut, "error"), (refuse_commands, "error")]
 )

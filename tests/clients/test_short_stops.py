@@ -21,6 +21,7 @@ def switch(client: Plc, *, on: bool) -> None:
     client.inputs[client.NAMES["enable"]] = on
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("language", BLOCKS)
 @pytest.mark.parametrize("scans", range(12))
 def test_an_enable_that_falls_for_one_call_is_a_stop_wherever_its_request_is(
@@ -41,6 +42,7 @@ def test_an_enable_that_falls_for_one_call_is_a_stop_wherever_its_request_is(
     assert client.enabled and not client.ended and not gateway.exceptions
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("language", BLOCKS)
 @pytest.mark.parametrize("scans", range(1, 24))
 def test_a_fall_while_the_enable_is_on_its_way_is_a_stop_too(language: str, scans: int, gateway: GatewayAtHand) -> None:
@@ -86,6 +88,7 @@ def test_a_write_that_ends_with_the_connection_is_a_loss_and_no_refusal(
     assert client.ended and not client.enabled and "lost" in client.text
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("language", BLOCKS)
 @pytest.mark.parametrize("scans", range(12))
 def test_a_reset_while_enabled_stops_with_the_next_request(language: str, scans: int, gateway: GatewayAtHand) -> None:

@@ -29,6 +29,7 @@ def settling_s(bench: Bench, target_n: float, seconds: float = 2.0) -> float:
     return max(outside, default=start_s) - start_s
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("friction_n", [0.0, 1.0, 2.0, 3.0])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_steps_up_and_down_and_partial_reversals_settle_within_a_newton(friction_n, seed):

@@ -66,6 +66,7 @@ def assert_nothing_found(name: str) -> None:
     assert found.baseline.noise_floor_n == pytest.approx(NOISE_N, rel=0.05)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", GATE)
 def test_an_effect_is_named_with_its_size(name: str) -> None:
     assert_found(BY_NAME[name])

@@ -47,6 +47,7 @@ def assert_nothing_is_named(found: Diagnosis) -> None:
     assert found.baseline.rms_n < 1.2 * NOISE_N
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("kind", ["from a hold", "taps"])
 def test_a_recording_that_begins_in_the_middle_of_work_gives_no_name(tmp_path: Path, kind: str) -> None:
     """Before, they gave `warm-up or presliding` and `regulator-hysteresis`."""
@@ -66,6 +67,7 @@ def test_half_of_a_clean_recording_has_no_drift(tmp_path: Path) -> None:
     assert found.base.friction.coulomb_n == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("kind", ["from wiggles", "from a fall", "sine"])
 def test_what_was_sent_and_the_start_leave_the_cell_s_noise_only(tmp_path: Path, kind: str) -> None:
     """By the rig's own plant, with nothing fitted but the start and what the wires take."""

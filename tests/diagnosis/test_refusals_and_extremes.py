@@ -218,6 +218,7 @@ def assert_answered(tmp_path: Path, table: Columns) -> None:
     assert all(np.isfinite(cause["confidence"]) for cause in document["causes"])
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("what", IN_THE_GATE)
 def test_a_strange_table_gets_an_answer(tmp_path: Path, what: str) -> None:
     assert_answered(tmp_path, ANSWERED[what])

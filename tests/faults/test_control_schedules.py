@@ -233,6 +233,7 @@ def life(request: pytest.FixtureRequest) -> Life:
     return Life(bench.history, steps, bench.seconds_until(lambda output: bool(output.status & 8), 2.0))
 
 
+@pytest.mark.sampled
 def test_random_faults_break_no_invariant(life: Life) -> None:
     for assert_invariant in INVARIANTS:
         assert_invariant(life.history[: life.disturbed])

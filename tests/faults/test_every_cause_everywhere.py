@@ -119,6 +119,7 @@ def _in(situation: str) -> Bench:
     return bench
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("fault", CAUSES, ids=lambda fault: fault.name.lower())
 @pytest.mark.parametrize("situation", SITUATIONS)
 def test_each_cause_stops_each_situation_and_a_reset_begins_as_ever(situation: str, fault: FaultCode) -> None:

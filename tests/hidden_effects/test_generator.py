@@ -67,6 +67,7 @@ def test_the_catalogue_has_the_names_of_the_contract() -> None:
     assert all(name in page_group(name) <= physical_group(name) <= set(NAMES) for name in NAMES)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("name", "size"), BY_STAGE.items())
 def test_a_refit_of_another_base_model_leaves_the_size_that_was_asked(name: str, size: float) -> None:
     excess_n = np.sqrt(refitted_rms(of(name, size)) ** 2 - 0.1**2)

@@ -72,6 +72,7 @@ def test_a_frame_that_comes_byte_by_byte_is_one_frame() -> None:
     assert Bus().send(*(bytes((byte,)) for byte in COMMAND), pause_s=0.016).requests() == answered(WRITE)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("cut", [*range(5, 105), 119, 140])
 def test_a_request_full_of_zeros_and_small_floats_is_one_frame_in_three_reads(cut: int) -> None:
     """As an upload's are. 34 zeros before a float of 0.5 to 2 are a frame to everybody, of function 0, by their checksum; and

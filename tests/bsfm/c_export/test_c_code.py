@@ -82,6 +82,7 @@ def bits(answers: Iterable[tuple[float, int]]) -> list[tuple[int, int]]:
     return list(zip(np.array(values, np.float32).view(np.uint32).tolist(), map(int, codes), strict=True))
 
 
+@pytest.mark.sampled
 @needs_gcc
 @every_level
 @every_case
@@ -114,6 +115,7 @@ def wandering_n(name: str) -> list[float]:
     return forces
 
 
+@pytest.mark.sampled
 @needs_gcc
 @every_level
 @every_case

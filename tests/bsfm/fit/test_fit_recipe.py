@@ -55,6 +55,7 @@ def independent_rms_n(ladder: Ladder, order: int, tied: bool, starts: int) -> fl
     return float(np.sqrt((min(costs) + scatter) / len(ladder)))
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("order", "plant"),
     [
@@ -91,6 +92,7 @@ def test_the_analytic_jacobian_is_the_difference_quotient(curves, loops):
     assert problem.jacobian(problem.evaluate(theta)) == pytest.approx(quotient, abs=2e-7)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("order", [1, 2, 3, 5, 9, 15])
 @pytest.mark.parametrize("model", MODELS)
 def test_no_model_of_any_order_has_a_pole_or_a_negative_weight(model, order, loops):

@@ -79,6 +79,7 @@ def bound_s(lags: tuple[float, ...], from_v: float, to_v: float) -> float:
     return float(_settled_s(machine, (pushes.ravel(), brakes.ravel()), (from_v, *ends, to_v), BAND_V, 100.0).min())
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("lags", LAGS + RINGING)
 @pytest.mark.parametrize(("from_v", "to_v"), [(0.0, 1.0), (0.0, 4.0), (2.0, 2.6), (5.0, 3.0)])
 def test_it_comes_near_to_the_best_bang_bang_command_and_does_not_pass_the_wish(lags, from_v, to_v):

@@ -190,6 +190,7 @@ def course(lead: LeadSettings, seed: int) -> tuple[list[float], float]:
     return times_s, trim_v
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", [1, 2, 7])
 def test_the_demo_rig_settles_sooner_and_the_trim_learns_nothing_of_the_push(seed):
     led_s, led_v = course(demo().control.lead, seed)

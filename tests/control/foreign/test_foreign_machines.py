@@ -64,6 +64,7 @@ def test_the_response_is_that_of_the_machine(seed):
     assert response.dead_time_s + response.lag_s + response.second_lag_s == pytest.approx(whole_s, rel=0.08)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_trim_is_never_worse_than_none(seed):
     off, on = gone(seed, 0.0), gone(seed, 0.3)

@@ -25,6 +25,7 @@ def slow(every_ms: int) -> Bench:
     return bench
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("at_s", [AT_REST_S, ON_A_STAIR_S, NEAR_THE_TOP_S])
 @pytest.mark.parametrize("said_n", [58.0, -20.0])
 @pytest.mark.parametrize("every_ms", [10, 100])

@@ -9,6 +9,7 @@ from tests.control.runs.test_ladder_run import begun, roomy
 BEHIND_THE_CHECK_S = 9.0
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("lost", ["air", "contact"])
 @pytest.mark.parametrize("at_s", [BEHIND_THE_CHECK_S, 14.0, 20.0])
 def test_a_ladder_without_air_or_contact_ends_within_seconds(lost: str, at_s: float) -> None:

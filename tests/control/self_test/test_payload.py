@@ -26,6 +26,7 @@ def hanging(payload_kg: float, tilt_deg: float = 0.0, off_n: float = 0.0, unit: 
     return rig
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("payload_kg", [0.3, 1.0, 2.0])
 @pytest.mark.parametrize("tilt_deg", [0.0, 60.0, 90.0, 110.0])
 def test_a_healthy_machine_passes_with_it_in_the_air(payload_kg: float, tilt_deg: float) -> None:

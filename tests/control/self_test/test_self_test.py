@@ -101,6 +101,7 @@ def test_a_machine_that_is_stronger_than_its_calibration_stays_below_the_stated_
     assert report.result in (SelfTestResult.WARNED, SelfTestResult.FAILED)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("force_n", [FORCE_N, 0.0])
 @pytest.mark.parametrize(
     ("drift_n_per_s", "verdict"), [(0.02, PASSED), (0.15, WARNED), (-0.15, WARNED), (0.5, FAILED), (-0.5, FAILED)]
@@ -177,6 +178,7 @@ def test_a_second_self_test_has_the_next_number() -> None:
     assert [rig.tested().number, rig.tested().number] == [1, 2]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("said_n", [-20.0, 60.0])
 @pytest.mark.parametrize("at_s", [1.5, 2.8, 3.3, 3.5, 3.9, 4.1, 5.0, 7.0])
 def test_one_reading_that_was_disturbed_on_its_wire_fails_no_machine(at_s: float, said_n: float) -> None:

@@ -17,6 +17,7 @@ def pressing(force_n: float, seconds: float, every_ms: int = 100) -> Bench:
     return bench
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("said_n", [-95.0, -50.0, 59.0, 95.0])
 @pytest.mark.parametrize("seconds", [0.2, 0.35, 0.5, 2.0])
 @pytest.mark.parametrize("force_n", [2.0, 5.0, 30.0])

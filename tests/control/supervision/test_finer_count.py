@@ -26,6 +26,7 @@ def test_a_cell_that_rightly_repeats_itself_is_not_dead_behind_one_false_digit(r
         assert Watched().after(DisturbedCell(0.2, seed, rate_hz), 3000.0 / rate_hz) == inf
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("disturbed_at", [1, 2, 3, 4])
 @pytest.mark.parametrize("counts", [0.1, 0.2, 0.3])
 def test_a_false_digit_in_the_first_readings_is_no_count_either(disturbed_at: int, counts: float) -> None:

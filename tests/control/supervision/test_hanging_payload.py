@@ -45,6 +45,7 @@ class HangingBench(Bench):
         return self.last.fault
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("payload_kg", [0.1, 0.2, 1.0, 2.0])
 @pytest.mark.parametrize(("from_deg", "to_deg"), [(0.0, 0.0), (0.0, 90.0), (90.0, 0.0), (180.0, 0.0), (180.0, 60.0)])
 def test_it_may_come_down_and_be_tilted_before(payload_kg: float, from_deg: float, to_deg: float) -> None:

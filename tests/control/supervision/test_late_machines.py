@@ -26,6 +26,7 @@ def late_machine(delay_s: float, lag_s: float) -> Bench:
     return bench
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("delay_s", "lag_s"), LATE)
 @pytest.mark.parametrize("hold_s", [1.5, 4.0])
 def test_no_cell_of_a_late_machine_is_called_frozen(delay_s: float, lag_s: float, hold_s: float) -> None:

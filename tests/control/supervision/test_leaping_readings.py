@@ -55,6 +55,7 @@ def test_one_false_reading_does_not_move_a_held_force(said_n: float, every_ms: i
     assert moved_n(bench, said_n) < MOST_MOVED_N
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("said_n", [(3.0, 15.0), (58.0, -20.0), (-20.0, 10.0), (58.0, 45.0), (12.0, 22.0)])
 @pytest.mark.parametrize("every_ms", [10, 50, 100])
 @pytest.mark.parametrize("response", [None, Response(dead_time_s=0.03, lag_s=0.08)], ids=["fixed", "measured"])

@@ -107,6 +107,7 @@ def test_a_frozen_cell_is_found_within_2_s_while_holding() -> None:
     assert "N repeated for 0." in sentence
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("rate_hz", [10, 25, 100, 1000])
 def test_whenever_a_cell_with_a_count_of_noise_freezes_the_loop_finds_it_within_2_s(rate_hz: int) -> None:
     """By the whole controller, in every phase between two samples and two ticks."""
@@ -191,6 +192,7 @@ def test_false_alarms_are_as_seldom_as_the_law_says(
     assert 0.2 < alarms / (40 * samples * 0.1 / 200.0) < 1.0
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("rate_hz", RATES)
 @pytest.mark.parametrize("quantum_n", [QUANTUM_N, 0.001])
 def test_where_the_noise_says_so_2_s_of_equal_samples_are_enough(rate_hz: float, quantum_n: float) -> None:

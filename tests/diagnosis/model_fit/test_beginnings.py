@@ -10,6 +10,7 @@ from gateway.diagnosis.noise.whitening import white_whitener
 from tests.diagnosis.begun_anywhere import BEGINNINGS, COLOURS, NOISE_N, begun
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("beginning", BEGINNINGS)
 def test_the_base_model_leaves_the_noise_from_the_first_row_on(beginning: str) -> None:
     """The first second is no worse than the rest, by the root mean square of 100 readings; a mass rings after steps."""
@@ -28,6 +29,7 @@ def assert_quiet(beginning: str, seed: int, colour: str, floor_n: float | None) 
     assert found.verdict is Verdict.NOTHING_FOUND
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("beginning", "seed", "colour"),
     [("in a stroke", 3, "white"), ("after a wiggle", 9, "lorentzian"), ("in a stroke", 21, "lorentzian")],

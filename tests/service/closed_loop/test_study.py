@@ -61,6 +61,7 @@ def assert_force_is_better(name, numbers, largest):
     assert found.rms_ratio < largest
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("name", "numbers", "largest"), OF_EACH_KIND, ids=[name for name, _, _ in OF_EACH_KIND])
 def test_a_known_effect_costs_less_force(name, numbers, largest):
     assert_force_is_better(name, numbers, largest)

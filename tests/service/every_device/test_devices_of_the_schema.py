@@ -114,6 +114,7 @@ def presses(wired: Wired, force_n: float, first_beat: int, within_s: float = 6.0
     raise AssertionError(f"{force_n} N: {wired.show()}, {wired.log[-3:]}")
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_drawn_rig_presses_or_check_says_why_not(seed: int, all_drawn: list[Drawn]) -> None:
     drawn = all_drawn[seed]

@@ -32,6 +32,7 @@ def real() -> Rig:
     return load_rig("irc5-cell")
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("name", "simulated", "made_on"),
     [

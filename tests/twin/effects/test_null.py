@@ -157,6 +157,7 @@ def test_without_effects_force_is_area_times_pressure_at_once() -> None:
         assert twin.measured_n == twin.force_n
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("section", "name"), sorted(ON))
 def test_an_effect_that_fades_away_comes_to_nothing_and_one_switched_on_does_not(section: str, name: str) -> None:
     """Its code runs with almost the null value, and leaves what the plant without it gives."""

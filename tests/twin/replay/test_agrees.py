@@ -148,6 +148,7 @@ def without() -> Floats:
     return lived(BASE)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("case", range(len(EFFECTS)), ids=NAMES)
 def test_replay_reads_what_the_running_twin_reads(case: int) -> None:
     section, change, tolerance_n, _ = EFFECTS[case]

@@ -209,6 +209,7 @@ def test_no_run_begins_where_the_tool_waits_for_contact_with_a_force() -> None:
 # -- the rig's largest force
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("gain_n_per_v", [6.0, 7.4, 9.0, 13.0])
 def test_a_ladder_never_measures_more_than_the_rig_allows_and_goes_on_below(gain_n_per_v: float) -> None:
     rig = SmallRig(with_limits(settings(), force_max_n=40.0), gain_n_per_v=gain_n_per_v)

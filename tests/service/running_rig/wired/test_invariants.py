@@ -43,6 +43,7 @@ def non_safe_without_leave(wired: Wired, decision: Output) -> bool:
     return decision.voltage_v > 0.0 and decision.state in (State.OFF, State.FAULT)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(30))
 def test_whatever_happens_the_wire_keeps_the_invariants(seed: int, budget: int) -> None:
     for schedule in range(seed * budget, (seed + 1) * budget):

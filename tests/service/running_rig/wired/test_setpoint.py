@@ -97,6 +97,7 @@ UP_AND_DOWN = (*STEPS_N, *reversed(STEPS_N))
 REVERSALS = (20, 12, 26, 16, 30, 4, 18, 10)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("setpoints_n", [UP_AND_DOWN, REVERSALS], ids=["ladder", "partial reversals"])
 def test_steps_and_reversals_settle_within_a_newton_with_the_trim(setpoints_n: tuple[float, ...]) -> None:
     trimmed = errors_n(Wired().ready(), setpoints_n)

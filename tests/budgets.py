@@ -1,0 +1,33 @@
+"""What the push gate leaves to the long run: what is marked `long`, and of a `sampled` table two cases in three."""
+
+from collections.abc import Iterator
+from typing import Final
+from zlib import crc32
+
+import pytest
+
+SAMPLED: Final = 3
+"""Of so many cases of a table one is run in the push gate."""
+
+
+def leave_out_long(items: list[pytest.Item], *, in_silence: bool) -> None:
+    """Skip what needs the bigger budget. in_silence: drop it, for to skip a test takes as long as a short one runs."""
+    skip = pytest.mark.skip(reason="needs the bigger budget: ./tools/test --long")
+    long = [item for item in items if "long" in item.keywords] + list(beyond_samples(items))
+    for item in long:
+        item.add_marker(skip)
+    if in_silence:
+        left_out = set(long)
+        items[:] = [item for item in items if item not in left_out]
+
+
+def beyond_samples(items: list[pytest.Item]) -> Iterator[pytest.Item]:
+    """Return what the push gate leaves out of `sampled` tables: always the same cases, drawn by their names' checksums, since
+    neighbours in a table are much alike."""
+    tables: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if "sampled" in item.keywords:
+            tables.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for cases in tables.values():
+        cases.sort(key=lambda case: crc32(case.nodeid.encode()))
+        yield from cases[-(-len(cases) // SAMPLED) :]
