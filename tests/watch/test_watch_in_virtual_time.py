@@ -156,6 +156,7 @@ def test_more_friction_raises_the_warning_by_its_name_and_its_end_clears_it(scen
     assert scene.looks(2)[-1] is ResidualCause.NONE
 
 
+@pytest.mark.long
 def test_a_standing_cause_is_searched_for_less_and_less(scene):
     scene.work(FIRST_WINDOW_S)
     scene.looks(1)
@@ -166,6 +167,7 @@ def test_a_standing_cause_is_searched_for_less_and_less(scene):
     assert scene.search.requests - requests <= 2
 
 
+@pytest.mark.long
 def test_a_change_that_hardly_moves_the_force_disturbs_nobody(scene):
     scene.work(FIRST_WINDOW_S)
     scene.looks(1)
@@ -174,6 +176,7 @@ def test_a_change_that_hardly_moves_the_force_disturbs_nobody(scene):
     assert scene.looks(3) == [ResidualCause.NONE] * 3
 
 
+@pytest.mark.long
 def test_a_name_for_a_force_that_is_where_it_should_be_disturbs_nobody(scene):
     """The demo, clean, raised A345 for a refit that changed two numbers against each other and the force not at all."""
     scene.work(FIRST_WINDOW_S)
@@ -212,6 +215,7 @@ def test_the_first_window_must_have_seen_something(scene):
     assert scene.search.requests == 0
 
 
+@pytest.mark.long
 def test_a_gain_has_no_name_in_the_catalogue_but_is_told(scene):
     scene.work(FIRST_WINDOW_S)
     scene.looks(1)

@@ -208,6 +208,7 @@ def test_ctrl_c_while_files_are_written_leaves_none_and_a_later_one_all(
     assert {path: path.read_text() for path in tmp_path.iterdir()} == texts
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("stage", ["preparing the simulation for this machine, once", "diagnosing, "])
 def test_ctrl_c_in_the_real_verb(stage: str, tmp_path: Path) -> None:
     """On a terminal, while loops are compiled and in the middle of the search; the line is gone afterwards."""

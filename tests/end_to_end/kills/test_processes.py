@@ -90,6 +90,7 @@ def test_a_dead_guardian_takes_control_and_rig_with_it(running):
     assert said == ["A412"], "no plug of the simulated rig, whose ports went with it"
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("is_prepared", [True, False])
 def test_a_rig_file_that_is_edited_meanwhile_is_for_the_next_start(tmp_path, is_prepared):
     """Half done, as editors leave files, when control dies, and then the simulated rig: all goes on as it was started, and
