@@ -277,7 +277,7 @@ class RefusalReason(IntEnum):
         modbus.ILLEGAL_VALUE,
         Explanation(
             "W302",
-            "fault reset, or enable behind a lost master, without a new heartbeat",
+            "fault reset, or enable, without a new heartbeat",
             "On a rig with a lease: the heartbeat beside the reset is the one of the fault, or beside the enable the one of "
             "the loss.",
             "The master writes the bit without its heartbeat, or its program stands still and its last frame is repeated.",

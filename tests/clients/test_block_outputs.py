@@ -42,13 +42,28 @@ def test_behind_a_loss_no_word_of_the_status_says_that_force_is_held(language: s
     assert (shown(client, "status_word"), shown(client, "state")) == (11, 3)
     gateway.is_cut = True
     client.cycle(1.5)
-    assert (shown(client, "status_word"), shown(client, "state")) == (0, 0)
-    if isinstance(client, UniversalRobot):
-        assert shown(client, "force_measured") == 0x8000 and client.get("fg_force_measured") == pytest.approx(9e9)
-    else:
-        assert shown(client, "force_measured") == pytest.approx(9e9)
+    assert (shown(client, "status_word"), shown(client, "state")) == (0, 0) and is_force_unknown(client)
     if isinstance(client, Plc):
         assert not any(shown(client, name) for name in ("contact", "fault", "warning"))
+
+
+def is_force_unknown(client: Any) -> bool:
+    if isinstance(client, UniversalRobot):
+        assert client.get("fg_force_measured") == pytest.approx(9e9)
+        return bool(shown(client, "force_measured") == 0x8000)
+    return bool(shown(client, "force_measured") == pytest.approx(9e9))
+
+
+@pytest.mark.parametrize("language", [*BLOCKS, "rapid", "urscript"])
+def test_before_the_first_answer_no_measured_force_is_shown(language: str, gateway: GatewayAtHand) -> None:
+    """0.0 N, for up to 2 s: a program that looks whether the tool is free before it moves found it so."""
+    client: Any = CONTROLLERS[language](TEXTS[language], gateway)
+    assert is_force_unknown(client)
+    if isinstance(client, Plc):
+        client.scan()
+        assert is_force_unknown(client)
+    cycles(client)
+    assert shown(client, "force_measured") in (-0.5, 65486)
 
 
 def test_a_module_of_rapid_that_starts_again_shows_nothing_of_its_last_run(gateway: GatewayAtHand) -> None:

@@ -10,12 +10,14 @@ from pathlib import Path
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.codes.refusals import RefusalReason
+from gateway.codes.warning_bits import WarningBit
 from gateway.registers.words import SelfTestResult
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.controllers import Irc5
 from tests.clients.programs.machine import Machine
 from tests.clients.programs.syntax import PATTERNS, Unit, parse, tokenize
-from tests.clients.scenes import MAP, MODEL, TEXTS, cycles
+from tests.clients.scenes import LANGUAGES, MAP, MODEL, TEXTS, cycles
 
 RESERVED = {
     "rapid": "alias and backward case connect const default div do else elseif endfor endfunc endif endmodule endproc "
@@ -75,6 +77,16 @@ def test_rapid_lines_fit_the_editor_and_strings_the_language() -> None:
     assert [line for line in TEXTS["rapid"].splitlines() if len(line) > 80] == []
     assert all(len(text) <= 80 for text in re.findall(r'"([^"]*)"', TEXTS["rapid"]))
     assert TEXTS["rapid"].isascii()
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_no_text_of_the_shipped_map_is_cut(language: str) -> None:
+    """Of 'W302 fault reset, or enable behind a lost master, withou' nobody reads that a new heartbeat is what lacks."""
+    titles = [
+        f"{each.code} {each.explanation.title}" for each in (*FaultCode, *RefusalReason, *WarningBit) if each.code
+    ]
+    spelled = TEXTS[language].replace("$'", "'")
+    assert len(titles) > 60 and [title for title in titles if title not in spelled] == []
 
 
 def test_every_rapid_routine_runs_and_declares_what_it_uses() -> None:

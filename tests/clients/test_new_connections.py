@@ -10,7 +10,7 @@ import pytest
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
 from tests.clients.programs.c_program import OK, CProgram
-from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
+from tests.clients.programs.controllers import Codesys, Irc5, Plc, UniversalRobot
 from tests.clients.scenes import TEXTS, command, commands, cycles
 from tests.clients.test_edges_and_losses import OF_A_PROGRAM
 
@@ -114,3 +114,22 @@ def test_off_goes_alone_though_an_edge_waits_already(gateway: GatewayAtHand) -> 
     robot.set(fg_off_pending=True)
     cycles(robot)
     assert [words[0] for words in gateway.words] == [1, 0, 5] and not gateway.exceptions
+
+
+def test_a_codesys_controller_leaves_a_connection_on_which_nobody_answers(gateway: GatewayAtHand) -> None:
+    """Behind a power cut of the gateway's machine nothing closes it, and it was asked over it for as long as TCP tries: the
+    others have a new connection within 4 s, and their OFF."""
+    client = Codesys(TEXTS["codesys"], gateway)
+    client.enable(12.0)
+    cycles(client)
+    connection = client.machine.member(client.transport, "fbClient")
+    connection.is_dead = True
+    client.cycle()
+    assert client.ended and "lost" in client.text and not connection.xConnected
+    client.cycle(4.0)
+    assert commands(gateway) == [command(1, 1200), command(0, 0)]
+    client.disable()
+    client.cycle()
+    client.enable(5.0)
+    cycles(client)
+    assert client.enabled

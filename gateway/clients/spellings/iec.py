@@ -147,7 +147,8 @@ def _is_scaled_word(register: Register) -> bool:
 
 def _declare(register: Register, dialect: _Dialect, *, registers: bool) -> str:
     kind = dialect.types[_kind(register, registers=registers)]
-    return f"{dialect.member}{register.name} : {kind};{_unit_note(register.unit, dialect)}"
+    unread = " := 9.0E9" if register.name == "force_measured" else ""  # before the first answer, as behind a loss
+    return f"{dialect.member}{register.name} : {kind}{unread};{_unit_note(register.unit, dialect)}"
 
 
 def _unit_note(unit: str, dialect: _Dialect) -> str:

@@ -24,7 +24,7 @@ def spell_urscript(table: ExchangeTable) -> dict[str, str]:
             _globals({f"FG_{name}": mask for name, mask in each.items()}) for each in (control, shown, commit)
         ),
         "command_zeros": _zeros(words),
-        "status_zeros": _zeros(table.status_span[1]),
+        "status_unread": _unread(table),
         "answer_zeros": _zeros(2 * table.status_span[1] + 3),
         "part_a_zeros": _zeros(part_a),
         "part_b_zeros": _zeros(part_b),
@@ -63,6 +63,13 @@ def _globals(numbers: dict[str, int]) -> str:
 
 def _zeros(count: int) -> str:
     return ", ".join("0" * count)
+
+
+def _unread(table: ExchangeTable) -> str:
+    """Return the words of a status that was not read yet: none of them is a force."""
+    words = ["0"] * table.status_span[1]
+    words[table.at("force_measured", "status").address - table.status_span[0]] = str(0x8000)
+    return ", ".join(words)
 
 
 def _cases(texts: dict[int, str], name: str) -> str:

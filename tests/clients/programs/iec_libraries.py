@@ -96,10 +96,11 @@ def tc2_modbus_srv(gateway: GatewayAtHand) -> dict[str, Callable[[], Any]]:
 
 
 class ClientTcp:
-    """ModbusFB.ClientTCP: connects with the rise of xConnect; an error stays until xConnect falls."""
+    """ModbusFB.ClientTCP: connects with the rise of xConnect; an error stays until xConnect falls. is_dead: the gateway's
+    machine was without power, and knows nothing of this connection: nothing answers here, and no block can see it."""
 
     def __init__(self, gateway: GatewayAtHand) -> None:
-        self.gateway, self.xConnected, self.xError = gateway, False, False
+        self.gateway, self.xConnected, self.xError, self.is_dead = gateway, False, False, False
         self.asked, self.calls = False, 0
 
     def call(self, given: dict[str, Any]) -> None:
@@ -120,7 +121,7 @@ class ClientTcp:
         except Unplugged:
             self.xError = True
         else:
-            self.xConnected = True
+            self.xConnected, self.is_dead = True, False
 
     def lose(self) -> None:
         self.xConnected, self.xError = False, True
@@ -162,6 +163,8 @@ class CodesysRequest:
             words_of(target, read[1], 2 * len(target))
         try:
             assert given["rClient"].xConnected
+            if given["rClient"].is_dead:
+                raise Unplugged
             pdu = self.gateway.ask_unit(given["uiUnitId"], pdu_of(write, read))
         except Unplugged:
             self.xError, self.eErrorID = True, REPLY_TIMEOUT
