@@ -99,12 +99,12 @@ def table(comparison: Comparison) -> str:
     for name, difference in comparison.branches.items():
         place_v = comparison.place_v(difference)
         lines.append(
-            f"{name:<8} B - A  {difference.rms_n:7.3f} N RMS, at most {difference.max_n:+.3f} N at {place_v:.2f} V"
+            f"{name:<8} B - A  {difference.rms_n:7.3f} N RMS, at most {difference.max_n:+z.3f} N at {place_v:.2f} V"
         )
     lines += ["", "     V   rising A  rising B   B - A   falling A falling B   B - A"]
     for k in range(0, _POINTS, (_POINTS - 1) // (_SHOWN - 1)):
         forces = (
-            f"{difference.a_n[k]:9.2f} {difference.b_n[k]:9.2f} {difference.difference_n[k]:+8.3f}"
+            f"{difference.a_n[k]:9.2f} {difference.b_n[k]:9.2f} {difference.difference_n[k]:+z8.3f}"
             for difference in comparison.branches.values()
         )
         lines.append(f"{comparison.voltage_v[k]:6.2f}  {'   '.join(forces)}")

@@ -92,7 +92,7 @@ def _across(volts: tuple[float, ...]) -> Axis:
 
 
 def _signed(value_n: float) -> str:
-    return f"{value_n:+.3f}".replace("-", "−")
+    return f"{value_n:+z.3f}".replace("-", "−")
 
 
 def _table(comparison: Comparison) -> str:

@@ -6,6 +6,7 @@ import "./live/samples.js";
 
 const NAMES = ["live", "calibrate", "recordings", "calibrations", "diagnosis", "wiring", "configuration"];
 const BADGES = { fault: "bad", holding: "good", ramping: "warn", calibrating: "warn", ready: "good" };
+const RUNS = { self_test: "self-test", experiment: "experiment" }; // their state is that of a calibration, too
 const mounted = new Set();
 const at = (id) => document.getElementById(id);
 let aliveAt = 0;
@@ -22,9 +23,10 @@ function showState(state) {
   at("gone").hidden = true;
   document.body.classList.remove("old");
   at("rig").textContent = state.rig + (state.simulated ? " (simulated)" : "");
-  document.title = `${state.state} · ${state.rig} · force-gateway`;
+  const shown = (state.state === "calibrating" && RUNS[state.run.phase]) || state.state;
+  document.title = `${shown} · ${state.rig} · force-gateway`;
   const badge = at("state");
-  if (badge.textContent !== state.state) badge.textContent = state.state; // a screen reader says it once
+  if (badge.textContent !== shown) badge.textContent = shown; // a screen reader says it once
   badge.className = `badge ${BADGES[state.state] ?? ""}`;
   const { number, name, kind, age_s } = state.calibration;
   at("calibration").textContent = `${number} ${name}, ${kind}${ageInWords(age_s)}`;

@@ -40,7 +40,8 @@ class ScriptedControl:
             return self._record(request)
         if request["do"] == "state":
             run = LiveRun(running=self.status["running"], phase=self.status["phase"], share=self.status["progress"])
-            live = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="off", force=PRESSING)
+            state = "calibrating" if run.running else "off"
+            live = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state=state, force=PRESSING)
             return replace(live, run=run).to_json()
         return self._calibrate(request)
 

@@ -55,6 +55,18 @@ def lead_to_the_run(window: Any) -> None:
     window.get_by_role("button", name="Stop the run").wait_for()
 
 
+@pytest.mark.parametrize(
+    ("phase", "badge"), [("self_test", "self-test"), ("experiment", "experiment"), ("ladder", "calibrating")]
+)
+def test_the_badge_names_the_run_that_has_the_output(page, served, chromium, phase: str, badge: str) -> None:
+    """It read `calibrating` while the self-test pressed that somebody had started."""
+    served.status = served.status | {"running": True, "phase": phase}
+    window = open_tab(chromium, page.address, "wiring")
+    window.locator("#state.warn").wait_for()
+    assert window.locator("#state").text_content() == badge
+    assert window.title() == f"{badge} · demo · force-gateway"
+
+
 def test_a_reload_in_the_middle_of_a_run_loses_nothing(page, control, state, chromium) -> None:
     (state / "calibrations").mkdir()
     (state / "calibrations" / "0002.json").write_text(json.dumps(FIT))

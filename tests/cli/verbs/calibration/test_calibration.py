@@ -164,6 +164,17 @@ def test_compare_tells_the_differences_of_the_branches(state, call, tmp_path):
     assert "No measured points of A: " in html
 
 
+def test_a_difference_that_rounds_to_nothing_has_no_sign(state, call, tmp_path):
+    """The branches of two calibrations of one machine read -0.000 N in terminal and report."""
+    for name, top_n in (("one", 50.0001), ("other", 50.0)):
+        given = calibration(rising_handles_n=(0.0, 25.0, top_n), falling_handles_n=(0.0, 27.0, top_n))
+        (tmp_path / name).write_text(as_text(given), encoding="utf-8")
+    plot = tmp_path / "plot.html"
+    told = call("calibration", "compare", tmp_path / "one", tmp_path / "other", "--state", state, "--plot", plot)
+    assert told.exit_code == 0 and "+0.000 N at 8.00 V" in told.output and "-0.000" not in told.output
+    assert not re.search(r"\N{MINUS SIGN}0\.000\b", plot.read_text(encoding="utf-8"))
+
+
 def test_only_the_common_voltages_are_compared(state, call, tmp_path):
     for name, low_v, high_v in (("half", 4.0, 9.0), ("apart", 8.5, 9.5)):
         (tmp_path / f"{name}.yaml").write_text(as_text(calibration(16, x0_v=low_v, x1_v=high_v)), encoding="utf-8")
