@@ -225,6 +225,7 @@ class Feedforward:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump: what a swapped calibration
         carries over was for a voltage of ours. gravity_n as in `advance`."""
         self._carry_over_v, self._given_n = 0.0, gravity_n
+        self._trend.restart()
         self.applied_n = self.aimed_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
         self._delayed.restart(self.applied_n)
         self._remember(self.model.reversal.at(branch_share))
