@@ -109,6 +109,7 @@ class Controller:
         timed = timing_of(self._calibration.response, self._rig_settings)
         self._loop.use(model, self._given_n, timed)
         self._turning.use(model, timed)
+        self._conditioner.retime(timed.supervision.response_lag_s)
         self._commands.use(model)
 
     def most_pull_n(self) -> float:

@@ -63,6 +63,10 @@ class SampleConditioner:
         self._zero.forget()
         self._cell = cell
 
+    def retime(self, response_lag_s: float) -> None:
+        """Replace the time, s, in which a force that was pressed before follows its voltage."""
+        self._zero.retime(response_lag_s)
+
     def note_output(self, *, is_known: bool) -> None:
         """Note whether the output has confirmed a voltage: as long as nobody knows what stands there, it may press."""
         if not is_known:

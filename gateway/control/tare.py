@@ -50,6 +50,13 @@ class Zero:
         """Expect from now on that what was pressed before may still leave."""
         self._may_leave_s = self._leaving_s
 
+    def retime(self, response_lag_s: float) -> None:
+        """Replace the response lag, s: what is left from before leaves at the pace of the calibration in use."""
+        longer_s = LEAVING_LAGS * response_lag_s - self._leaving_s
+        self._leaving_s += longer_s
+        if self._may_leave_s > 0.0:
+            self._may_leave_s += longer_s
+
     def forget(self) -> None:
         """Forget all samples after the stream was interrupted: they do not describe now."""
         self._recent_n.clear()

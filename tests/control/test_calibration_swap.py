@@ -157,3 +157,40 @@ def test_a_set_that_is_swapped_in_voltage_mode_carries_nothing_over_into_force_m
     bench.write(mode=Mode.FORCE, force_setpoint_n=expected_n, voltage_setpoint_v=0.0)
     assert bench.last.voltage_v == pytest.approx(3.0, abs=0.05)
     assert bench.run(0.1).feedforward_v == pytest.approx(3.0, abs=0.05)
+
+
+MEASURED = pytest.mark.parametrize("response", [None, Response(dead_time_s=0.02, lag_s=0.08)], ids=["rig", "measured"])
+
+
+def held_by_two(response: Response | None, scale: float) -> Bench:
+    """40 N, and a set of another strength a moment ago: volts are carried over."""
+    bench = Bench()
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1, response))
+    bench.run(0.2)
+    bench.enable(40.0)
+    bench.run(2.0)
+    bench.controller.use(CalibrationInUse(bsfm(scale=scale), 2, response))
+    bench.run(0.02)
+    return bench
+
+
+@MEASURED
+def test_what_a_swap_carries_over_shrinks_with_a_setpoint_that_falls_right_behind_it(response: Response | None):
+    """A volt and a half of a force of 40 N were 6 N too much of 5 N, for half a second."""
+    forces_n = {}
+    for scale in (1.0, 1.5):
+        bench = held_by_two(response, scale)
+        bench.force(5.0)
+        bench.run(0.4)
+        forces_n[scale] = bench.plant.force_n
+    assert forces_n[1.5] < forces_n[1.0] + 1.0
+
+
+@MEASURED
+def test_what_a_swap_carries_over_does_not_push_a_tool_that_loses_its_contact_right_behind_it(
+    response: Response | None,
+):
+    bench = held_by_two(response, 1.5)
+    bench.plant.contact = False
+    bench.seconds_until(lambda output: not output.status & StatusBit.CONTACT, 1.0)
+    assert bench.run(0.05).voltage_v < bsfm().voltage_v(bench.settings.defaults.precontact_force_n, 1.0)[0] + 0.1

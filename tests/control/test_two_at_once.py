@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from gateway.bsfm.model import Response
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
@@ -239,3 +240,26 @@ def test_a_swinging_force_is_blamed_on_the_trims_gain_only_where_there_is_one(
     bench.run(6.0)
     told = [one for one in bench.events if one.startswith("W360")]
     assert [("gain_v_per_n_s" in one) for one in told] == [is_named]
+
+
+def test_a_path_of_setpoints_that_a_voltage_has_broken_off_leads_no_force_behind_it() -> None:
+    """Where the aim was on its way to when the mode changed, seconds ago, is nowhere that the new setpoint goes."""
+    highest_v = []
+    for setpoints_n in ((33.5,), [20.0 + 1.5 * k for k in range(10)]):
+        bench = Bench(noise_n=0.02)
+        bench.controller = Controller(
+            bench.settings, CalibrationInUse(bsfm(), 1, Response(dead_time_s=0.1, lag_s=0.15))
+        )
+        bench.run(0.5)
+        bench.enable(20.0)
+        bench.run(2.0)
+        for setpoint_n in setpoints_n:
+            bench.force(setpoint_n)
+            bench.run(0.03)
+        bench.voltage(bsfm().voltage_v(33.5, 1.0)[0])
+        bench.run(5.0)
+        bench.history.clear()
+        bench.write(mode=Mode.FORCE, force_setpoint_n=33.5, voltage_setpoint_v=0.0)
+        bench.run(0.5)
+        highest_v.append(max(one.output.voltage_v for one in bench.history))
+    assert highest_v[1] < highest_v[0] + 0.1

@@ -1,9 +1,14 @@
 """What a zero is made of, by number."""
 
+from math import nan
+
 import pytest
 
-from gateway.control.tare import Zero
-from tests.control.bench import settings
+from gateway.bsfm.model import Response
+from gateway.control import CalibrationInUse, Controller
+from gateway.control.tare import LEAVING_LAGS, Zero
+from gateway.registers.words import ControlBit
+from tests.control.bench import Bench, bsfm, settings
 
 
 @pytest.mark.parametrize(("readings", "why"), [(4, "4 usable samples, at least 5 are needed"), (5, "")])
@@ -32,3 +37,25 @@ def test_of_a_fast_cell_no_sample_of_before_a_gap_is_in_the_zero_behind_it() -> 
     assert zero.unsteady(0.0) == ""
     zero.take(0.0)
     assert zero.zero_n == 1.0
+
+
+FAST, SLOW = CalibrationInUse(bsfm(), 1), CalibrationInUse(bsfm(), 2, Response(dead_time_s=1.0, lag_s=0.3))
+
+
+@pytest.mark.parametrize("swapped_s", [nan, 0.1, 0.5], ids=["at the start", "before it is heard", "behind that"])
+def test_what_an_unheard_output_has_pressed_is_waited_for_at_the_pace_of_the_calibration_in_use(swapped_s):
+    """A slower one is put to use meanwhile: for a second of dead time 20 N stand as steady as a zero."""
+    bench = Bench(delay_s=1.0, lag_s=0.3, noise_n=0.02, force_n=20.0, _pressure=20.0 / 7.4, _cell_n=20.0)
+    bench.plant._waiting.extend([20.0 / 7.4] * 1000)
+    bench.controller = Controller(bench.settings, FAST if swapped_s > 0.0 else SLOW)
+    bench.line = bench.line._replace(acknowledged_v=None)
+    for tenth in range(80):
+        bench.run(0.1)
+        if tenth == 1:
+            bench.line = bench.line._replace(acknowledged_v=0.0)
+        if tenth == round(10.0 * swapped_s) if swapped_s > 0.0 else False:
+            bench.controller.use(SLOW)
+        bench.write(control_word=ControlBit.TARE)
+        if bench.refused is None:
+            break
+    assert 2.0 < 0.1 * tenth < 1.0 + LEAVING_LAGS * 1.3 and abs(bench.controller.zero_n) < 1.0

@@ -733,7 +733,7 @@ DEFECTS = (
            "            self._trim.forget()\n",
            ("control/force_loop/test_contact_and_rest.py",)),
     Defect("a contact that is lost early raises the target at once", "control/force_loop/feedforward.py",
-           "self.applied_n = self.aimed_n = min(self.applied_n, goal_n)",
+           "self.applied_n = self.aimed_n = min(last_n, goal_n)",
            "self.applied_n = self.aimed_n = goal_n",
            ("control/force_loop/test_feedforward.py",)),
     Defect("a force that was in band is so behind a disable", "control/force_loop/force_loop.py",

@@ -126,6 +126,7 @@ class Feedforward:
         self._pace.earn(dt_s)
         last_n, given_n = self.applied_n, self._given_n if self.applied_n > 0.0 else gravity_n
         self.applied_n = ramp_limited(goal_n, last_n, rate_n_per_s, self._pace.available_s)
+        self._lower_carry_over(last_n)
         moved_n, self._given_n = self.applied_n - last_n, gravity_n
         if moved_n:
             self._pace.spend(moved_n, rate_n_per_s)
@@ -136,6 +137,11 @@ class Feedforward:
         self.reference_n += (delayed_n - self.reference_n) * dt_s / (self._lag_s + dt_s)
         self._carry_over_v -= self._carry_over_v * dt_s / (_CARRY_OVER_S + dt_s)
         return moved_n - (gravity_n - given_n)
+
+    def _lower_carry_over(self, last_n: float) -> None:
+        """Of a swap's difference no more stays than of the force that it was for; last_n: the target before."""
+        if self.applied_n < last_n:
+            self._carry_over_v *= self.applied_n / last_n
 
     def _aim_n(self, goal_n: float, rate_n_per_s: float) -> float:
         """Where the target will be ahead_s later."""
@@ -193,7 +199,9 @@ class Feedforward:
     def fall_back(self, goal_n: float, gravity_n: float = 0.0) -> None:
         """Drop to the goal at once when contact is lost, and stay on the rising branch for the next contact. Nothing corrects
         it any more; gravity_n as in `advance`."""
-        self.applied_n = self.aimed_n = min(self.applied_n, goal_n)
+        last_n = self.applied_n
+        self.applied_n = self.aimed_n = min(last_n, goal_n)
+        self._lower_carry_over(last_n)
         self._remember(self.model.reversal.at(RISING))
         self._place_slide(gravity_n)
 
@@ -217,6 +225,7 @@ class Feedforward:
         """Follow a force that another mode drives, so that coming back to force mode makes no bump: what a swapped calibration
         carries over was for a voltage of ours. gravity_n as in `advance`."""
         self._carry_over_v, self._given_n = 0.0, gravity_n
+        self._trend.restart()
         self.applied_n = self.aimed_n = self.reference_n = max(0.0, min(self._limits.force_max_n, force_n))
         self._delayed.restart(self.applied_n)
         self._remember(self.model.reversal.at(branch_share))

@@ -192,6 +192,7 @@ class ForceLoop:
         self._lead.advance(self._limiter.voltage_v if line.sent_v is None else line.sent_v, dt_s)
         if isinstance(self._lead, LinearizedLagInverse):
             self._lead.set_wire_time(line.wire_s)
+            self._coming.elapse(self._lead, dt_s)
         self.expected.advance(self.voltage_v, dt_s)
         self.left.advance(self.voltage_v, line, dt_s)
 
@@ -299,7 +300,7 @@ class ForceLoop:
         the trim learns as soon as that is little, without waiting for it to arrive; but not from what goes away by itself."""
         law, reading, lead = self.feedforward, inputs.reading, self._lead
         assert isinstance(lead, LinearizedLagInverse)
-        coming_n = self._coming.advance(lead, self._wanted_v, inputs.dt_s)
+        coming_n = self._coming.coming_n(lead, self._wanted_v)
         if not reading.is_new:
             return
         if abs(coming_n) >= NEAR_N or abs(law.applied_n - law.aimed_n) >= STILL_N:
