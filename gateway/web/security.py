@@ -8,17 +8,16 @@ Decisions
 - The session is a cookie that scripts cannot read and other sites cannot send. With a token configured it exists after a
   login only; tools send `Authorization: Bearer TOKEN` instead, which needs no CSRF token because no browser adds it by itself.
   It holds for as long as the token does: where the page's process was started anew, Esc stops, and leads to no login.
-- A failed login costs a second, one at a time: a token of 16 characters is not guessed. Only a few wait for their turn: as many
-  as are served shut out all others, and their Stop, by who knows no token.
+- A token of 16 characters is not guessed: an address that was wrong too often has one more a second (token_guesses.py).
 - What came while this process stood still is refused, but for what stops: an enable of then pressed seconds after its browser
   had given it up. So is what a line has held up for as long: the page says by this machine's clock when it asks.
 """
 
-import asyncio
 import contextlib
 import hmac
 import secrets
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from hashlib import sha256
 from ipaddress import ip_address
@@ -32,6 +31,7 @@ from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from gateway.live.standstill import Standstill
+from gateway.web.token_guesses import TokenGuesses
 
 CSRF_HEADER: Final = "x-csrf-token"
 ASKED_HEADER: Final = "x-asked-s"
@@ -41,8 +41,6 @@ LONGEST_BODY: Final = 1 << 16
 _OPEN: Final = ("/login", "/healthz", "/static/style.css", "/static/page.css", "/static/login.js")
 """Reached without a session: what the login itself needs."""
 _STOPS: Final = ("/api/v1/command/stop", "/api/v1/calibrate/stop")
-_FAILED_LOGIN_S: Final = 1.0
-MOST_FAILED_LOGINS: Final = 16  # that wait for their turn
 _SAFE_METHODS: Final = ("GET", "HEAD")
 HEADERS: Final = {
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
@@ -65,8 +63,8 @@ class PageAccess:
     port: int
     token: str | None = None
     key: bytes = field(default_factory=lambda: secrets.token_bytes(32))
-    login_turn: asyncio.Lock = field(default_factory=asyncio.Lock)
-    failed_logins: int = 0
+    guesses: TokenGuesses = field(default_factory=TokenGuesses)
+    clock_s: Callable[[], float] = time.monotonic
 
     def __post_init__(self) -> None:
         if self.token is not None:
@@ -91,9 +89,17 @@ class PageAccess:
         """Return the token that a session's commands must carry."""
         return self._sign("csrf", session)
 
-    def is_token(self, given: str) -> bool:
-        """Decide whether this is the page's token."""
-        return self.token is not None and hmac.compare_digest(given.encode(), self.token.encode())
+    def judge_token(self, given: str, request: Request) -> bool | None:
+        """Return whether this is the page's token, None where its caller has been wrong too often to be told."""
+        if self.token is None:
+            return False
+        address, now_s = request.client.host if request.client else "", self.clock_s()
+        if self.guesses.wait_s(address, now_s):
+            return None
+        is_right = hmac.compare_digest(given.encode(), self.token.encode())
+        if not is_right:
+            self.guesses.note_wrong(address, now_s)
+        return is_right
 
     def admits_host(self, host: str) -> bool:
         """Decide whether a Host header names this machine in a way that no foreign name can."""
@@ -152,10 +158,13 @@ class Guard:
             return refuse(403, "this page answers to its address only, not to the name in the address bar")
         if headers.get("sec-fetch-site") == "cross-site" and path not in ("/", "/login"):
             return refuse(403, "another site asked for this")
-        is_bearer = access.is_token(headers.get("authorization", "").removeprefix("Bearer "))
+        scheme, _, given = headers.get("authorization", "").partition(" ")
+        is_bearer = path not in _OPEN and scheme.lower() == "bearer" and access.judge_token(given, request)
         session = request.cookies.get(access.cookie, "")
         has_session = access.is_session(session)
         if access.token is not None and not (is_bearer or has_session) and path not in _OPEN:
+            if is_bearer is None:
+                return _too_many()
             return RedirectResponse("/login", 303) if path == "/" else refuse(401, "log in first: /login", "login")
         if request.method in _SAFE_METHODS:
             return None
@@ -188,15 +197,10 @@ async def login(request: Request) -> Response:
     """Take the token of a form; begin a session where it is right."""
     access: PageAccess = request.app.state.access
     given = (await request.body()).decode("utf-8", "replace").strip()
-    if not access.is_token(given):
-        if access.failed_logins >= MOST_FAILED_LOGINS:
-            return refuse(429, "that is not the token, and too many wrong ones come at once: try again")
-        access.failed_logins += 1
-        try:
-            async with access.login_turn:
-                await asyncio.sleep(_FAILED_LOGIN_S)
-        finally:
-            access.failed_logins -= 1
+    is_right = access.judge_token(given, request)
+    if is_right is None:
+        return _too_many()
+    if not is_right:
         return refuse(401, "that is not the token; it stands in the rig file under web.token")
     response = JSONResponse({"ok": True})
     _set_session(response, access, access.new_session())
@@ -206,6 +210,10 @@ async def login(request: Request) -> Response:
 def refuse(status: int, sentence: str, reason: str = "") -> JSONResponse:
     """Return an answer that says why not. reason: one word for the page's script, where it can do something about it."""
     return JSONResponse({"error": sentence, "reason": reason}, status)
+
+
+def _too_many() -> JSONResponse:
+    return refuse(429, "too many wrong tokens came from this address: wait for a few seconds, and send none meanwhile")
 
 
 def _set_session(response: Response, access: PageAccess, value: str) -> None:

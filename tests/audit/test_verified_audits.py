@@ -1,15 +1,18 @@
 """What the reader of an audit calls tampering, and what it does not: pieces of lines, other names, another past, growth."""
 
 import json
+import os
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from gateway.audit import audit_reader
 from gateway.audit.audit_file import AuditFile
 from gateway.audit.audit_reader import verify_audit
 from gateway.audit.chain import open_line, seal_line
+from gateway.cli.main import command
 from tests.audit.test_chain import FILE_BYTES, LINES, files_of, records
 
 
@@ -103,3 +106,17 @@ def test_a_chain_that_is_written_anew_behind_what_was_dropped_is_found(tmp_path:
     (tmp_path / "audit" / "head").write_text(json.dumps({"n": end.number, "sha256": end.sha256}))
     broken = verify_audit(tmp_path).broken
     assert broken and "no line says that those before it were dropped" in broken.text
+
+
+@pytest.mark.parametrize(
+    ("kind", "what"),
+    [("file", "a file"), ("pipe", "a pipe"), ("link", "a link to what is not there")],
+)
+def test_what_stands_in_the_place_of_the_audit_is_named(tmp_path: Path, kind: str, what: str) -> None:
+    """Its gateway writes none there, and "none yet" had its reader wait for one."""
+    place = tmp_path / "audit"
+    {"file": place.touch, "pipe": lambda: os.mkfifo(place), "link": lambda: place.symlink_to("away")}[kind]()
+    for verb in ("show", "verify"):
+        told = CliRunner().invoke(command, ["audit", verb, "--state", str(tmp_path)])
+        assert told.exit_code == 65
+        assert told.stderr.startswith(f"E106 {place}: it is {what}, and no directory")

@@ -27,10 +27,16 @@ class Answer:
 
 
 async def call(
-    app: Any, method: str, path: str, headers: dict[str, str] | None = None, body: bytes | None = b""
+    app: Any,
+    method: str,
+    path: str,
+    headers: dict[str, str] | None = None,
+    body: bytes | None = b"",
+    *,
+    client: str = "127.0.0.1",
 ) -> Answer:
     """Send one request; a Host header of the machine itself is added where there is none. body: None for one without, which
-    says no length."""
+    says no length. client: the address that it comes from."""
     length = {} if body is None else {"content-length": str(len(body))}
     own = {"host": "127.0.0.1:8080"} | length | (headers or {})
     scope = {
@@ -44,7 +50,7 @@ async def call(
         "root_path": "",
         "scheme": "http",
         "headers": [(name.lower().encode(), value.encode("latin-1")) for name, value in own.items()],
-        "client": ("127.0.0.1", 4711),
+        "client": (client, 4711),
         "server": ("127.0.0.1", 8080),
     }
     sent: list[dict[str, Any]] = []
