@@ -16,7 +16,7 @@ from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
 from tests.clients.programs.python_program import PythonProgram
-from tests.clients.scenes import WHERE, cycles
+from tests.clients.scenes import TEXTS, WHERE, cycles
 from tests.clients.test_controller_rules import own_map
 from tests.clients.test_edges_and_losses import control_word_of
 from tests.clients.test_guests import set_ramp
@@ -220,3 +220,74 @@ def test_a_command_with_another_word_is_in_band_once_it_is_taken(client: Any, ga
     assert not in_band(client)
     cycles(client)
     assert in_band(client) and gateway.bank.command.force_ramp_n_per_s == 50.0
+
+
+COMMAND_OF = {"rapid": "fgCommand", "urscript": "fg_command"}
+
+
+def set_voltage(client: Any, millivolts: int) -> None:
+    """voltage_setpoint, as the head of the client's text says."""
+    if isinstance(client, Plc):
+        client.structures[client.NAMES["command"]]["VOLTAGE_SETPOINT"] = float(millivolts)
+        return
+    place = client.get("FG_C_VOLTAGE_SETPOINT")
+    if isinstance(client, Irc5):
+        client.get("fgCommand")[place - 1] = millivolts
+        client.set(fgInBand=False)
+    else:
+        client.machine.start("fg_set_command", place, millivolts)
+
+
+@pytest.mark.parametrize("language", ["scl", "twincat", "codesys", "rapid", "urscript"])
+@pytest.mark.parametrize("wrong", [20000, 70000])
+def test_a_word_that_was_refused_leaves_nothing_in_band_until_another_one_is_taken(
+    language: str, wrong: int, gateway: GatewayAtHand
+) -> None:
+    """A program that asked for a voltage, and waited for that bit, went on with the one before. 70000 has no 16 bits."""
+    client: Any = CONTROLLERS[language](TEXTS[language], gateway)
+    client.enable(12.0)
+    cycles(client)
+    set_voltage(client, wrong)
+    assert not any(seen_in_band(client, 8)) and client.enabled
+    assert ("W204" if isinstance(client, Plc) or wrong == 20000 else "-32768 .. 65535") in client.text
+    if isinstance(client, UniversalRobot):
+        assert not client.machine.start("fg_wait_in_band", 0.1)
+    set_voltage(client, 3000)
+    cycles(client)
+    assert in_band(client) and gateway.bank.command.voltage_setpoint_v == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("language", ["rapid", "urscript"])
+def test_a_word_without_16_bits_beside_an_enable_is_told_and_not_in_band(language: str, gateway: GatewayAtHand) -> None:
+    """The enable went out with the word of before, and cleared the text that said so. A disable is a new beginning."""
+    client: Any = CONTROLLERS[language](TEXTS[language], gateway)
+    cycles(client)
+    set_voltage(client, 70000)
+    client.enable(12.0)
+    assert not any(seen_in_band(client, 8)) and client.enabled and "a word of" in client.text
+    client.disable()
+    cycles(client)
+    client.enable(12.0)
+    cycles(client)
+    assert in_band(client)
+
+
+@pytest.mark.parametrize("language", ["rapid", "urscript"])
+def test_a_new_word_beside_an_exchange_is_not_in_band_because_the_old_one_was(language: str) -> None:
+    """Whatever the other task is doing at that moment. RAPID has words but one by one: it may say so for some instructions."""
+    seen: list[bool] = []
+
+    def look(client: Any) -> None:
+        is_new = client.gateway.bank.command.voltage_setpoint_v == 3.0
+        seen.append(in_band(client) and not is_new and 3000 in client.get(COMMAND_OF[language]))
+
+    def prepare(client: Any, gateway: GatewayAtHand) -> None:
+        client.enable(12.0)
+        cycles(client, 2)
+        answer = gateway.answer
+        gateway.answer = lambda request: look(client) or answer(request)  # type: ignore[method-assign, func-returns-value]
+
+    acts = [lambda client: set_voltage(client, 3000), *[look] * (400 if language == "urscript" else 0)]
+    for client, gateway in every_place(language, prepare, acts):
+        assert in_band(client) and gateway.bank.command.voltage_setpoint_v == 3.0
+    assert len(seen) > 100 and not any(seen)

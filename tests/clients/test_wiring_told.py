@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from gateway.clients import Endpoint, endpoint_of, render_client
-from gateway.clients.wiring import wiring_page
-from gateway.profiles import load_rig
+from gateway.clients.wiring import render_page, wiring_page
+from gateway.profiles import list_shipped, load_rig
 from tests.clients.programs.syntax import parse
 from tests.clients.test_wiring import PROFILES, page_of, rows_of
 
@@ -173,11 +173,20 @@ def test_who_wires_a_twincat_or_codesys_controller_is_told_of_the_emergency_stop
     page = page_of(tmp_path / "own.yaml")
     (section,) = [one for one in page["sections"] if one["title"] == "TwinCAT 3 and CODESYS V3"]
     assert any("emergency stop: `bEnable`" in one for one in section["sentences"])
-    (pace, other) = rows_of(page, section["title"])["call"]
-    assert "10 ms" in pace and ("set lease_s to 0.36 or more" in other) is is_short
+    (pace,) = rows_of(page, section["title"])["call"]
+    assert "10 ms" in pace and ("set lease_s to 0.36 or more" in pace) is is_short
     rig = load_rig(str(tmp_path / "own.yaml"))
     head = render_client(rig.register_map, "st", endpoint_of(rig)).split("*)", 1)[0]
     assert "0.36" in head and "lease_s" in head
+
+
+@pytest.mark.parametrize("rig", list_shipped("rig"))
+def test_the_tables_of_the_page_fit_a_terminal_of_80_columns(rig: str) -> None:
+    """They had 122 columns of requests of an S7, and 90 for TwinCAT and CODESYS: on a terminal each row was broken."""
+    for section in wiring_page(load_rig(rig), rig)[1]:
+        lines = render_page("", [replace(section, commands=())], "text", 80).splitlines()
+        path = str(load_rig(rig).file)
+        assert [line for line in lines if len(line) > 80 and path not in line] == [], section.title
 
 
 def test_which_mb_client_the_block_needs_is_told_on_the_page_and_in_its_head() -> None:
@@ -209,7 +218,7 @@ def test_the_requests_of_an_s7_and_the_lines_to_try_have_the_function_and_the_ad
     requests = rows_of(page, "Siemens S7-1200/1500: requests")
     assert requests["status"] == ["0", "40101", "32", "103", "100", "FC03"]
     assert requests["heartbeat alone"] == ["1", "40005", "1", "106", "4", "FC06"]
-    assert requests["byte_order_echo, 1234.5 once a connection"] == ["1", "40417", "2", "116", "416", "FC16"]
+    assert requests["byte_order_echo, 1234.5 per connection"] == ["1", "40417", "2", "116", "416", "FC16"]
     (lines,) = [section["commands"] for section in page["sections"] if section["title"].startswith("mbpoll")]
     floats = [line.split("    # ") for line in lines if "4:float" in line]
     assert floats == [

@@ -184,6 +184,8 @@ ${crc_table}];
   LOCAL VAR num nDenied:=NO_COUNTS;
   ! fgPull was refused, and nothing else has been taken since
   LOCAL VAR bool bPullDenied:=FALSE;
+  ! A word of fgCommand was, and neither another one nor OFF since
+  LOCAL VAR bool bWordDenied:=FALSE;
   LOCAL VAR num nException:=0;
   LOCAL VAR num nOnce:=0;
   LOCAL VAR bool bOffPending:=FALSE;
@@ -256,6 +258,7 @@ ${crc_table}];
     nBackoff:=0;
     fgEnded:=FALSE;
     FgForgetAsked;
+    bWordDenied:=FALSE;
     bOffRefused:=FALSE;
     bAsking:=FALSE;
     ClkStop clRetry;
@@ -339,7 +342,10 @@ ${crc_table}];
     ENDIF
     IF fgEnable AND FgMayEnable() nCounts:=FgForceCounts();
     IF nCounts<>NO_COUNTS THEN
-      IF NOT FgIsOn() fgText:="";
+      IF NOT FgIsOn() THEN
+        fgText:="";
+        IF bWordDenied fgText:="a word of fgCommand was refused";
+      ENDIF
       nWant{FG_C_CONTROL_WORD}:=FG_ENABLE;
       IF fgPull nWant{FG_C_CONTROL_WORD}:=FG_ENABLE+FG_VALVE_PULL;
       nWant{FG_C_FORCE_SETPOINT}:=nCounts;
@@ -416,6 +422,7 @@ ${crc_table}];
       nCounts:=fgCommand{i};
       IF nCounts<-32768 OR nCounts>65535 THEN
         fgText:="fgCommand, place "+NumToStr(i,0)+": allowed -32768 .. 65535";
+        bWordDenied:=TRUE;
         fgCommand{i}:=nGood{i};
       ELSEIF nCounts<>Round(nCounts) THEN
         fgCommand{i}:=Round(nCounts);
@@ -489,6 +496,8 @@ ${crc_table}];
     FgTakeWords STATUS_WORDS;
     bOffRefused:=FALSE;
     IF nFrom<>nTo bPullDenied:=FALSE;
+    IF NOT FgAreTaken(nWant) bWordDenied:=FALSE;
+    IF FgIsOn() AND nWant{FG_C_CONTROL_WORD}=0 bWordDenied:=FALSE;
     nGood:=nWant;
     IF NOT bOff nOnce:=0;
     bAsking:=FALSE;
@@ -542,6 +551,7 @@ ${crc_table}];
       IF bSent<>bPulls bPullDenied:=TRUE;
       IF fgPull=bSent fgPull:=bPulls;
     ENDIF
+    IF NOT FgAreTaken(nWant) bWordDenied:=TRUE;
     FOR i FROM 1 TO COMMAND_WORDS DO
       IF fgCommand{i}=nWant{i} fgCommand{i}:=nGood{i};
     ENDFOR
@@ -606,10 +616,21 @@ ${crc_table}];
   LOCAL FUNC bool FgIsAsked()
     VAR bool bPulls;
     IF FgIsTesting() OR (NOT fgEnable) OR (NOT FgIsOn()) RETURN FALSE;
-    IF bPullDenied RETURN FALSE;
+    IF bPullDenied OR bWordDenied RETURN FALSE;
+    IF NOT FgAreTaken(fgCommand) RETURN FALSE;
     bPulls:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
     IF fgPull<>bPulls RETURN FALSE;
     RETURN Round(fgForce*${force_counts})=nGood{FG_C_FORCE_SETPOINT};
+  ENDFUNC
+
+  ! Does the gateway hold these words? Three are not of fgCommand
+  LOCAL FUNC bool FgAreTaken(num nAsked{*})
+    FOR i FROM 1 TO COMMAND_WORDS DO
+      IF i<>FG_C_CONTROL_WORD AND i<>FG_C_FORCE_SETPOINT THEN
+        IF nAsked{i}<>nGood{i} AND i<>FG_C_HEARTBEAT RETURN FALSE;
+      ENDIF
+    ENDFOR
+    RETURN TRUE;
   ENDFUNC
 
   ! Another program at this address may have written another force
@@ -620,6 +641,7 @@ ${crc_table}];
   ENDFUNC
 
   LOCAL PROC FgForget()
+    IF FgIsOn() bWordDenied:=FALSE;
     ! fgForce stays: between T_ROB1's two lines it would hold 0 N
     IF fgEnable OR FgHasBit(nGood{FG_C_CONTROL_WORD},FG_ENABLE) THEN
       fgEnable:=FALSE;
@@ -641,6 +663,8 @@ ${status_decoding}
     bOwn:=FgHasBit(nStatus,FG_IS_IN_BAND) AND FgIsOwn();
     ! T_ROB1 may set another fgForce meanwhile: asked for comes last
     fgInBand:=bOwn AND FgIsAsked();
+    ! ... of several words nothing can be the last: it looks once more
+    IF NOT FgAreTaken(fgCommand) fgInBand:=FALSE;
     fgFault:=FgHasBit(nStatus,FG_HAS_FAULT);
   ENDPROC
 

@@ -91,14 +91,14 @@ def _requests(table: ExchangeTable) -> Iterator[tuple[str, bool, int, int]]:
     part_a, part_b, part_c = table.parts
     first, length = table.at("order", "staging").address, table.at("length", "staging").address
     tail = table.at("target_slot", "staging").address - length + 1
-    yield f"map_hash, 0x{table.map.map_hash:08X}, once a connection", False, table.at("map_hash", "proof").address, 2
+    yield f"map_hash, 0x{table.map.map_hash:08X}, per connection", False, table.at("map_hash", "proof").address, 2
     yield "status", False, status, status_words
-    yield "byte_order_echo, 1234.5 once a connection", True, table.at("byte_order_echo", "proof").address, 2
-    yield "command, when its control word has changed", True, command, words
+    yield "byte_order_echo, 1234.5 per connection", True, table.at("byte_order_echo", "proof").address, 2
+    yield "command, when control_word has changed", True, command, words
     yield "command without it, when the rest has", True, command + table.values_first, words - table.values_first
     yield "heartbeat alone", True, table.at("heartbeat", "command").address, 1
     test, test_words = span_of(table.self_test)
-    yield "what a self-test has found, behind its end", False, test, test_words
+    yield "what a self-test has found", False, test, test_words
     yield "model: order, rising branch", True, first, part_a
     yield "model: falling branch, force limits", True, first + part_a, part_b
     yield "model: reversal, response", True, table.at("slip_stops", "staging").address, part_c
@@ -141,40 +141,35 @@ def _short_of_a_plc(rig: Rig) -> str:
 
 
 def _s7_requests(table: ExchangeTable) -> Section:
-    rows: list[Row] = [
-        ("request", "MB_MODE", "MB_DATA_ADDR", "MB_DATA_LEN", "or MB_MODE", "with MB_DATA_ADDR", "function")
-    ]
+    rows: list[Row] = [("request", "MODE", "ADDR", "LEN", "or MODE", "ADDR", "FC")]
     for what, writes, address, words in _requests(table):
         function = 6 if writes and words == 1 else 16 if writes else 3
         numbers = (int(writes), holding_number(address), words, 100 + function, address)
         rows.append((what, *map(str, numbers), f"FC{function:02d}"))
     once = "One MB_CLIENT instance, one request at a time: REQ stays TRUE until DONE or ERROR, then FALSE for a call."
-    other = "The second pair of MB_MODE and MB_DATA_ADDR counts from 0, and needs an MB_CLIENT that has it (S7-1200: FW 4.2)."
-    return Section("Siemens S7-1200/1500: requests", (once, other), tuple(rows))
+    names = "MODE, ADDR and LEN: its inputs MB_MODE, MB_DATA_ADDR and MB_DATA_LEN."
+    other = "The second MODE and ADDR count from 0, and need an MB_CLIENT that has them (S7-1200: FW 4.2)."
+    return Section("Siemens S7-1200/1500: requests", (once, names, other), tuple(rows))
 
 
 def _codesys(rig: Rig, table: ExchangeTable) -> Section:
     where, (command, words), (status, status_words) = table.where, table.command_span, table.status_span
+    beckhoff = (
+        f"sIPAddr '{where.host}', nTCPPort {where.shown_port}, nUnitID {where.unit}, nMBWriteAddr {command}, "
+        f"nWriteQuantity {words}, nMBReadAddr {status}, nReadQuantity {status_words}"
+    )
+    codesys = (
+        f"aIPaddr, uiPort {where.shown_port}, uiUnitId {where.unit}, uiWriteStartItem {command}, "
+        f"uiWriteQuantity {words}, uiReadStartItem {status}, uiReadQuantity {status_words}"
+    )
+    call = f"fbGateway, then fbTransport, in a task of 10 ms: a heartbeat every 40 to 120 ms{_short_of_a_plc(rig)}"
     rows = (
-        ("what", "TwinCAT 3: FB_MBReadWriteRegs", "CODESYS V3: ClientRequestReadWriteMultipleRegisters"),
-        (
-            "address",
-            f"sIPAddr '{where.host}', nTCPPort {where.shown_port}",
-            f"ClientTCP: aIPaddr, uiPort {where.shown_port}",
-        ),
-        ("unit", f"nUnitID {where.unit}", f"uiUnitId {where.unit}"),
-        (
-            "write",
-            f"nMBWriteAddr {command}, nWriteQuantity {words}",
-            f"uiWriteStartItem {command}, uiWriteQuantity {words}",
-        ),
-        (
-            "read",
-            f"nMBReadAddr {status}, nReadQuantity {status_words}",
-            f"uiReadStartItem {status}, uiReadQuantity {status_words}",
-        ),
-        ("library", "Tc2_ModbusSrv, TF6250 on the controller", "ModbusFB"),
-        ("call", "fbGateway, then fbTransport: task of 10 ms", f"a heartbeat every 40 to 120 ms{_short_of_a_plc(rig)}"),
+        ("what", "value"),
+        ("TwinCAT 3", "FB_MBReadWriteRegs of Tc2_ModbusSrv, with TF6250 on the controller"),
+        ("TwinCAT 3, inputs", beckhoff),
+        ("CODESYS V3", "ClientTCP and ClientRequestReadWriteMultipleRegisters of ModbusFB"),
+        ("CODESYS V3, inputs", codesys),
+        ("call", call),
     )
     stop = "A controller goes on at an emergency stop: `bEnable` and `bSelfTest` have to fall with it (and guard, and robot)."
     return Section("TwinCAT 3 and CODESYS V3", (stop,), rows)
