@@ -15,6 +15,7 @@ import click
 from gateway import VERSION
 from gateway.cli import plain_spelling
 from gateway.cli.errors import translate_error
+from gateway.processes import exit_codes
 
 SECTIONS: Final = {
     "operation": ("Run it and command a force", ("run", "monitor", "hold", "read", "write", "sim")),
@@ -150,10 +151,10 @@ def main() -> None:
         use_our_bash()
     try:
         command(prog_name="force-gateway")
-    except SystemExit:
-        if not getattr(command, "is_interrupted", False):
+    except SystemExit as ended:
+        if ended.code != exit_codes.INTERRUPTED and not getattr(command, "is_interrupted", False):
             raise
-        sys.excepthook = lambda *_: None  # all is said: Aborted!
+        sys.excepthook = lambda *_: None  # all is said, such as Aborted!
         raise KeyboardInterrupt from None  # Python ends by the signal: a shell sees 130, and its loop over files ends, too
     except OSError as error:  # of the help itself, for which no verb runs: what it is printed to takes nothing
         refused = translate_error(error, "--help", debug=False)

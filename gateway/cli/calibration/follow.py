@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TaskProgre
 from gateway.cli.calibration.runs import ENDED, Run, RunStatus
 from gateway.cli.errors import CliError
 from gateway.cli.master.ending_signals import signals_as_ctrl_c, watch_to_the_end
+from gateway.processes import exit_codes
 
 _POLL_S: Final = 0.2
 _BEGIN_S: Final = 2.0
@@ -39,19 +40,21 @@ class RestartedError(CliError):
 
 
 def follow_run(run: Run) -> dict[str, Any]:
-    """Begin the run and wait for its end; how it ended."""
+    """Begin the run and wait for its end; return how it ended. exit_code: of a verb that a signal has ended."""
     with signals_as_ctrl_c():
-        if not watch_to_the_end(run.begin, lambda: _watch(run), run.stop):
-            _leave_fit(run)
-            _watch(run)  # on its way to 0
-    return run.end()
+        if not (number := watch_to_the_end(run.begin, lambda: _watch(run), run.stop)):
+            return run.end()
+        code = exit_codes.BY_SIGNAL + number
+        _leave_fit(run, code)
+        _watch(run)  # on its way to 0
+    return run.end() | {"exit_code": code}
 
 
-def _leave_fit(run: Run) -> None:
-    """Leave a run of which only the fit is left: nothing presses, and nobody is needed for it."""
+def _leave_fit(run: Run, code: int) -> None:
+    """Leave a run of which only the fit is left: nothing presses, and nobody is needed for it. code: the verb's, then."""
     if run.look().phase == "fitting":
         goes_on = "the ladder is done, nothing presses, and the gateway goes on fitting"
-        raise CliError(f"left: {goes_on}; force-gateway calibration list has the calibration then")
+        raise CliError(f"left: {goes_on}; force-gateway calibration list has the calibration then", code)
 
 
 def _watch(run: Run) -> None:

@@ -21,9 +21,10 @@ def signals_as_ctrl_c() -> Iterator[None]:
         yield
 
 
-def watch_to_the_end(begin: Callable[[], None], watch: Callable[[], None], stop: Callable[[], None]) -> bool:
-    """Begin what presses and watch it; False where something from outside has ended that before: it is stopped then. One end
-    may say its signal twice, and the second one, close behind the first, must not take the place of the stop."""
+def watch_to_the_end(begin: Callable[[], None], watch: Callable[[], None], stop: Callable[[], None]) -> int:
+    """Begin what presses and watch it; return 0 at its end, else the number of the signal that has ended it before: it is
+    stopped then. One end may say its signal twice, and the second one, close behind the first, must not take the place of the
+    stop."""
     ending = _FirstOfAll()
     with _handled_by(ending):
         try:
@@ -35,21 +36,24 @@ def watch_to_the_end(begin: Callable[[], None], watch: Callable[[], None], stop:
             stop()
             if ending.count > 1:
                 raise KeyboardInterrupt from None
-            return False
-    return True
+            return ending.number
+    return 0
 
 
 class _FirstOfAll:
-    """A handler that raises KeyboardInterrupt at the first signal and counts the others; at none while `is_raised` is false."""
+    """A handler that raises KeyboardInterrupt at the first signal and counts the others; at none while `is_raised` is false.
+    number: of the first signal; that of a closed terminal, which may come as an error alone, before there is one."""
 
     def __init__(self) -> None:
-        self.is_raised, self.count = False, 0
+        self.is_raised, self.count, self.number = False, 0, int(signal.SIGHUP)
         self._stops = StopSignals()
 
     def __call__(self, number: int, frame: object) -> None:
         if not self._stops.asks_anew(number):
             return
         self.count += 1
+        if self.count == 1:
+            self.number = number
         if self.is_raised and self.count == 1:
             raise KeyboardInterrupt
 

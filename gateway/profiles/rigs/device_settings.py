@@ -56,8 +56,8 @@ def find_unfit_settings(device: DeviceProfile, line: LineFile) -> Settings:
         for name in ("watchdog_s", "watchdog_tick_s"):
             if getattr(line, name) is not None:
                 yield name, f"{device.name} has no watchdog: leave this line out"
-    if isinstance(line, CellFile) and line.newton_per_count and _has_unit(device, line):
-        yield "newton_per_count", f"{device.name} says its unit, or `unit` does: raw counts have none, leave one out"
+    if isinstance(line, CellFile) and (name := _of_counts(line)) and _has_unit(device, line):
+        yield name, f"{device.name} says its unit, or `unit` does: raw counts have none, leave one out"
         return
     try:
         complaints = [sentence for _, sentence in rehearse(set_device(device, line))]
@@ -85,6 +85,11 @@ def _registers(device: DeviceProfile, channel: int) -> dict[str, Any]:
 
 def _has_unit(device: DeviceProfile, line: CellFile) -> bool:
     return bool(line.unit or device.reading.unit or device.reading.template.field(UNIT))
+
+
+def _of_counts(line: CellFile) -> str:
+    """Return the setting that is of raw counts, empty where none is given; a zero of 0 changes nothing."""
+    return next((name for name in ("newton_per_count", "zero_count") if getattr(line, name)), "")
 
 
 def _says_any(line: LineFile) -> bool:

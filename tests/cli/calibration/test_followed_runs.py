@@ -94,7 +94,7 @@ def test_a_run_that_was_stopped_is_followed_until_it_has_come_to_rest() -> None:
             return super().look()
 
     run = Interrupted("ladder", "ladder", "stopped")
-    assert follow_run(run) == {"phase": "stopped"} and run.stops == 1
+    assert follow_run(run) == {"phase": "stopped", "exit_code": 128 + signal.SIGHUP} and run.stops == 1
 
 
 def test_a_second_end_from_outside_waits_until_the_stop_is_said() -> None:

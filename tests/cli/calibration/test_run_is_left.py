@@ -29,4 +29,4 @@ def test_an_end_during_the_fit_is_not_kept_waiting_for_it(number: int, monkeypat
             follow_run(run)
     finally:
         signal.signal(number, before)
-    assert left.value.exit_code == 1 and "force-gateway calibration list" in left.value.message
+    assert left.value.exit_code == 128 + number and "force-gateway calibration list" in left.value.message

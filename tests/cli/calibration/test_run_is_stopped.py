@@ -63,7 +63,7 @@ def test_whatever_ends_the_terminal_stops_the_run(number: int, monkeypatch: pyte
     before = signal.signal(number, kill if number != signal.SIGINT else signal.default_int_handler)
     own = signal.getsignal(number)
     try:
-        assert follow_run(run) == {"phase": "stopped"}
+        assert follow_run(run) == {"phase": "stopped", "exit_code": 128 + number}
         assert run.did == ["begin", "look", "stop"]
         assert signal.getsignal(number) is own
     finally:
@@ -93,7 +93,7 @@ def test_an_end_while_the_run_begins_stops_it_too(number: int, when: str, monkey
     run = Beginning(lambda: None)
     before = signal.signal(number, signal.default_int_handler)
     try:
-        assert follow_run(run) == {"phase": "stopped"}
+        assert follow_run(run) == {"phase": "stopped", "exit_code": 128 + number}
     except KeyboardInterrupt:
         pytest.fail(f"left after {run.did}")
     finally:
@@ -108,7 +108,7 @@ def test_a_terminal_that_is_gone_without_a_signal_stops_the_run(monkeypatch: pyt
         raise BrokenPipeError
 
     run = Climbing(write_to_nobody)
-    assert follow_run(run) == {"phase": "stopped"}
+    assert follow_run(run) == {"phase": "stopped", "exit_code": 128 + signal.SIGHUP}
     assert run.did == ["begin", "look", "stop"]
 
 

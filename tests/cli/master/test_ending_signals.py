@@ -36,7 +36,7 @@ def test_a_request_that_is_under_way_is_ended_behind_it(number: signal.Signals) 
         signal.raise_signal(number)
         done.append("request")
 
-    assert not watch_to_the_end(begin, lambda: done.append("watched"), lambda: done.append("stopped"))
+    assert watch_to_the_end(begin, lambda: done.append("watched"), lambda: done.append("stopped")) == number
     assert done == ["request", "stopped"]
 
 
@@ -58,7 +58,7 @@ def test_a_signal_that_is_said_twice_does_not_take_the_place_of_the_stop(
         signal.raise_signal(number)
         return act(handled, handler)
 
-    assert not watch_to_the_end(lambda: None, watch, lambda: done.append("stopped"))
+    assert watch_to_the_end(lambda: None, watch, lambda: done.append("stopped")) == number
     assert done == ["stopped"]
 
 
@@ -72,7 +72,7 @@ def test_what_was_ignored_before_stays_so() -> None:
         done.append(what)
 
     with signals_as_ctrl_c():
-        assert watch_to_the_end(lambda: go_on("request"), lambda: go_on("watched"), lambda: done.append("stopped"))
+        assert not watch_to_the_end(lambda: go_on("request"), lambda: go_on("watched"), lambda: done.append("stopped"))
         go_on("what goes on")
     assert done == ["request", "watched", "what goes on"]
 
@@ -99,6 +99,6 @@ def test_a_terminal_that_is_gone_ends_what_presses_and_an_end_of_its_own_stops_n
     def watch() -> None:
         raise OSError
 
-    assert not watch_to_the_end(lambda: None, watch, lambda: done.append("stopped"))
-    assert watch_to_the_end(lambda: None, lambda: None, lambda: done.append("stopped again"))
+    assert watch_to_the_end(lambda: None, watch, lambda: done.append("stopped")) == signal.SIGHUP
+    assert not watch_to_the_end(lambda: None, lambda: None, lambda: done.append("stopped again"))
     assert done == ["stopped"]

@@ -125,6 +125,15 @@ def test_raw_counts_are_sized_by_the_rig(tmp_path: Path) -> None:
     assert sample.force_n == pytest.approx(10.0)  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize("cell", [("", "stream-st-gs"), (", unit: N", "mantracourt-dsc")])
+def test_a_zero_in_counts_beside_a_device_that_says_its_unit_is_refused(cell: tuple[str, str], tmp_path: Path) -> None:
+    """`zero_count: 84000` of another amplifier's file stayed in: -823 kN at rest, and `check` said that all fits."""
+    zero, amplifier = cell
+    (told,) = rig(tmp_path, cell=f"{zero}, zero_count: 84000", amplifier=amplifier).faults
+    assert f"load_cell.zero_count: {amplifier} says its unit, or `unit` does: raw counts have none" in str(told)
+    assert not rig(tmp_path, cell=f"{zero}, zero_count: 0", amplifier=amplifier).faults
+
+
 @pytest.mark.parametrize(
     ("output", "cell", "devices", "told"),
     [

@@ -218,7 +218,7 @@ def _tell(end: dict[str, Any], as_json: bool, *, resumes: bool) -> None:
     """The table and the number, or why there is none."""
     from gateway.cli.calibration.fit_table import print_fit
 
-    document = _document(end)
+    document, code = _document(end), end.pop("exit_code", exit_codes.FAILED)
     if as_json:
         click.echo(json.dumps(end | {"fit": document}))
     elif document:
@@ -238,7 +238,7 @@ def _tell(end: dict[str, Any], as_json: bool, *, resumes: bool) -> None:
     kept = f"\nthe data are kept in {end['recording']}{_GO_ON if resumes else ''}" if end.get("recording") else ""
     if end["phase"] == "refused":  # by the data, or by the verdict on a fit that is kept
         raise CliError(str(end.get("sentence") or "the fit was refused: see the gateway's log"), exit_codes.DATA)
-    raise CliError(f"{str(end.get('sentence') or 'calibration stopped').removeprefix('info ')}{kept}")
+    raise CliError(f"{str(end.get('sentence') or 'calibration stopped').removeprefix('info ')}{kept}", code)
 
 
 def _document(end: dict[str, Any]) -> dict[str, Any]:

@@ -58,13 +58,13 @@ def _run_to_its_end(run: "_SelfTest", *, shows: bool) -> None:
     from gateway.cli.master.ending_signals import watch_to_the_end
 
     try:
-        is_over = watch_to_the_end(run.begin, lambda: run.follow(shows=shows), run.stop)
+        ended_by = watch_to_the_end(run.begin, lambda: run.follow(shows=shows), run.stop)
     except CliError as error:
         if error.exit_code != exit_codes.DEVICE:
             raise
         raise CliError(f"{error.format_message()}\n  {_what_is_left(run)}", error.exit_code) from None
-    if not is_over:
-        raise CliError("self-test stopped; the force went to 0")
+    if ended_by:
+        raise CliError("self-test stopped; the force went to 0", exit_codes.BY_SIGNAL + ended_by)
 
 
 def _what_is_left(run: "_SelfTest") -> str:

@@ -112,7 +112,7 @@ def test_whatever_ends_the_verb_ends_the_test_even_while_it_begins(
         answer = call("self-test", "--gateway", address)
     finally:
         signal.signal(number, before)
-    assert answer.exit_code == 1 and "self-test stopped; the force went to 0" in answer.stderr
+    assert answer.exit_code == 128 + number and "self-test stopped; the force went to 0" in answer.stderr
     assert (rig.words[0], rig.words[-1]) == (int(ControlBit.START_SELF_TEST), 0)
 
 
