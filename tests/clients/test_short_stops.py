@@ -143,3 +143,14 @@ def test_a_block_that_is_called_rarely_but_steadily_loses_nothing(language: str,
     for _ in range(40):
         client.scan()
     assert client.enabled and client.in_band and not client.ended
+
+
+@pytest.mark.parametrize("language", BLOCKS)
+def test_an_enable_of_before_a_stop_is_not_done_behind_it(language: str, gateway: GatewayAtHand) -> None:
+    client: Plc = CONTROLLERS[language](TEXTS[language], gateway)
+    client.scan()
+    client.enable(12.0)
+    client.scan()
+    client.now_s += 5.0
+    client.cycle(3.0)
+    assert gateway.words == [] and client.ended and not client.enabled
