@@ -8,7 +8,9 @@ letter, and to answer one's own echo would never end. Decisions:
 - Once an answer of the other kind has come back, or has not, the line is known. What is heard before a master can have listened
   to an answer tells nothing of its echo.
 - Until then, a slow adapter could bring the echo later. Equal writes at once after each answer are a master's at first; behind
-  a row of them one is left out, which ends what an echo had begun and costs a master one request. The row grows each time.
+  a row of them one is left out, which ends what an echo had begun and costs a master one request. A master asks for that again:
+  the row grows. Where something else is asked next, it was an echo, and so is the next equal write at once, for a master that
+  only writes never shows more.
 - On a line that has an echo, or may have one, what is asked before it comes back was asked by a master that had given up. It is
   executed and not answered, and the echo behind it is one: an enable that came back behind a stop would undo that.
 """
@@ -24,8 +26,8 @@ class RtuEcho:
     """The answer that may come back, and whether this line gives answers back. may_echo: false where it cannot."""
 
     __slots__ = (
-        "_character_s", "_has_echo", "_is_like_request", "_may_echo", "_most_repeats", "_repeats", "_sent_s", "_silence_s",
-        "_until_s", "frame",
+        "_character_s", "_has_echo", "_is_like_request", "_is_presumed", "_left_out", "_may_echo", "_most_repeats",
+        "_repeats", "_sent_s", "_silence_s", "_until_s", "frame",
     )  # fmt: skip
 
     def __init__(self, character_s: float, silence_s: float, *, may_echo: bool) -> None:
@@ -35,6 +37,10 @@ class RtuEcho:
         self._is_like_request = False
         self._sent_s = self._until_s = 0.0  # the answer; the latest that its echo comes
         self._repeats, self._most_repeats = 0, _QUICK_REPEATS
+        self._is_presumed, self._left_out = (
+            False,
+            b"",
+        )  # an echo, by what was asked behind the last one that was left out
         self.frame = b""
 
     def expect(self, answer: bytes, now_s: float, *, is_like_request: bool) -> None:
@@ -45,6 +51,8 @@ class RtuEcho:
 
     def is_this(self, frame: bytes, heard_s: float) -> bool:
         """Decide whether a frame is our last answer come back."""
+        if self._left_out:
+            self._judge(is_asked_again=frame == self._left_out)
         if not self.frame or frame != self.frame:
             return False
         if not self._is_like_request:
@@ -53,6 +61,12 @@ class RtuEcho:
             return False
         self.frame = b""
         return True
+
+    def _judge(self, *, is_asked_again: bool) -> None:
+        """Learn from what is heard behind a write that was left out."""
+        if is_asked_again and not self._is_presumed:
+            self._most_repeats *= _DOUBT_GROWTH
+        self._is_presumed, self._left_out = not is_asked_again, b""
 
     def _heard_out_s(self, size: int) -> float:
         """The earliest that a request of so many bytes can be there, of a master that has listened to the answer."""
@@ -63,9 +77,9 @@ class RtuEcho:
         if heard_s < self._heard_out_s(len(self.frame)) + self._silence_s:
             return True
         self._repeats = self._repeats + 1 if heard_s <= self._until_s else 0
-        if self._repeats <= self._most_repeats:
+        if self._repeats <= (0 if self._is_presumed else self._most_repeats):
             return False
-        self._repeats, self._most_repeats = 0, self._most_repeats * _DOUBT_GROWTH
+        self._repeats, self._left_out = 0, self.frame
         return True
 
     def is_coming(self, size: int, heard_s: float) -> bool:
@@ -86,5 +100,6 @@ class RtuEcho:
 
     def forget(self) -> None:
         """Forget the answer; and what was learned, where there may be another adapter now."""
-        self.frame = b""
+        self.frame = self._left_out = b""
+        self._is_presumed = False
         self._has_echo = None if self._may_echo else False

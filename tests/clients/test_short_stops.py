@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.registers.words import ControlBit
 from gateway.registers.writes.proposed_write import EdgeRefusal
@@ -106,3 +107,53 @@ def test_a_reset_while_enabled_stops_with_the_next_request(language: str, scans:
     cycles(client)
     assert commands(gateway)[:2] == [command(1, 1200), command(0, 0)]
     assert client.ended and not client.enabled and gateway.bank.command.control_word == 0
+
+
+@pytest.mark.parametrize("language", BLOCKS)
+@pytest.mark.parametrize("scans", range(0, 12, 2))
+@pytest.mark.parametrize("has_lease", [True, False])
+def test_a_block_that_was_not_called_for_a_while_knows_nothing_of_before(
+    language: str, scans: int, has_lease: bool, gateway: GatewayAtHand
+) -> None:
+    """TwinCAT and CODESYS go on with their data behind a stop of the PLC, and a program may call the block in one mode only:
+    in band was what the gateway had held when it was called last, and without a lease that force went on by itself."""
+    client: Plc = CONTROLLERS[language](TEXTS[language], gateway)
+    client.enable(12.0)
+    cycles(client)
+    for _ in range(scans):
+        client.scan()
+    client.now_s += 5.0
+    if has_lease:
+        gateway.fail(FaultCode.MASTER_LOST)
+    client.scan()
+    assert client.ended and not client.enabled and not client.in_band and "was not called" in client.text
+    client.cycle(3.0)
+    assert gateway.bank.command.control_word == 0 and commands(gateway)[-1] == command(0, 0)
+    assert client.ended and not client.enabled
+    switch(client, on=False)
+    client.reset()
+    cycles(client)
+    switch(client, on=True)
+    cycles(client)
+    assert client.enabled and client.in_band and not client.ended
+
+
+@pytest.mark.parametrize("language", BLOCKS)
+def test_a_block_that_is_called_rarely_but_steadily_loses_nothing(language: str, gateway: GatewayAtHand) -> None:
+    client: Plc = CONTROLLERS[language](TEXTS[language], gateway)
+    client.CYCLE_S = 0.1 if language == "codesys" else 0.4  # ModbusFB is given 0.5 s to connect, in some calls
+    client.enable(12.0)
+    for _ in range(40):
+        client.scan()
+    assert client.enabled and client.in_band and not client.ended
+
+
+@pytest.mark.parametrize("language", BLOCKS)
+def test_an_enable_of_before_a_stop_is_not_done_behind_it(language: str, gateway: GatewayAtHand) -> None:
+    client: Plc = CONTROLLERS[language](TEXTS[language], gateway)
+    client.scan()
+    client.enable(12.0)
+    client.scan()
+    client.now_s += 5.0
+    client.cycle(3.0)
+    assert gateway.words == [] and client.ended and not client.enabled

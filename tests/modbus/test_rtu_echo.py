@@ -26,7 +26,7 @@ def exchange(bus: Bus, pdu: bytes, *, echo_s: float | None = None) -> int:
         ((_, heard),) = bus.heard
         bus.heard.clear()
         executed += 1
-        answer = encode_adu(1, ANSWERS[pdu])
+        answer = encode_adu(1, ANSWERS.get(pdu, pdu))
         bus.receiver.note_sent(heard, answer, bus.now_s)
         if echo_s is not None:
             bus.pause(echo_s).send(answer).pause(1.05 * silence_s)
@@ -68,6 +68,22 @@ def test_before_any_read_a_row_of_quick_equal_writes_loses_few() -> None:
 def test_a_late_echo_ends_on_a_slow_line_too() -> None:
     """What an adapter holds it up comes on top of the time that it takes on the wire."""
     assert 1 < exchange(Bus(baud=9600), WRITE, echo_s=8 * 11 / 9600 + 0.016) < 6
+
+
+def test_a_master_that_only_writes_is_heard_once_behind_a_late_echo() -> None:
+    """No read shows the echo: each write was answered up to 3, then 30, then 300 times, into what the master asked next."""
+    bus = Bus()
+    beats = [P.write_register_request(4, beat) for beat in range(300)]
+    executed = [exchange(bus, beat, echo_s=ANSWER_S + 0.016) for beat in beats]
+    assert 1 < executed[0] < 6 and executed[1:] == [1] * 299
+
+
+def test_a_write_that_was_taken_for_an_echo_is_a_master_s_where_it_is_asked_for_again() -> None:
+    bus, other = Bus(), P.write_register_request(4, 7)
+    quick, slow = AT_ONCE, 0.1
+    assert [exchange(bus.pause(quick), WRITE) for _ in range(5)] == [1, 1, 1, 1, 0]
+    assert exchange(bus.pause(quick), other) == 1, "so that was an echo"
+    assert [exchange(bus.pause(pause_s), WRITE) for pause_s in (slow, quick, slow, quick, quick)] == [1, 0, 1, 1, 1]
 
 
 def test_an_echo_in_two_pieces_is_one() -> None:

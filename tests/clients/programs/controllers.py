@@ -369,10 +369,11 @@ class Timer:
     """TON in virtual time."""
 
     def __init__(self, plc: "Plc") -> None:
-        self.plc, self.Q, self.since_s = plc, False, 0.0
+        self.plc, self.Q, self.since_s, self.was_in = plc, False, 0.0, False
 
     def call(self, given: dict[str, Any]) -> None:
-        if not given["IN"]:
+        rises, self.was_in = given["IN"] and not self.was_in, given["IN"]
+        if rises:
             self.since_s = self.plc.now_s
         self.Q = given["IN"] and self.plc.now_s - self.since_s >= given["PT"] - 1e-9
 
