@@ -74,7 +74,7 @@ def test_units_are_si() -> None:
     [
         ({"force_n": None}, "no column force_n; there: time_s, command_v"),
         ({"command_v": None}, "no column command_v (or pressure_kpa)"),
-        ({"force_n": None}, "Say which is which: --columns time_s=1:ms"),
+        ({"force_n": None}, "Say which is which: --columns time_s=1:s,"),
         (spoiled("time_s", 500, 7.1), "run.csv, row 501, column time_s: 7.1 after 9.495: time runs backwards"),
         (spoiled("time_s", slice(300, 700)), "row 301, column time_s: no number; so in 400 of 1000 rows"),
         (spoiled("force_n", slice(30, None)), "30 usable rows in 4.995 s: at least 50 usable rows over 1 s"),

@@ -19,7 +19,7 @@ from gateway.recording.foreign.unit_names import is_unit, unit_of
 from gateway.recording.tables.column_names import CONTRACT
 from gateway.units import LINEAR, linear_conversion
 
-EXAMPLE: Final = "--columns time_s=1:ms,command_v=2:mv,force_n=3:n"
+EXAMPLE: Final = "--columns time_s=1:s,command_v=2:v,force_n=3:n, or :ms, :mv, :kgf"
 _NUMBER: Final = r"[-+]?\d*\.?\d+"
 _RANGES: Final = re.compile(rf"({_NUMBER})\.\.({_NUMBER})\s*=\s*({_NUMBER})\.\.({_NUMBER})\s*([A-Za-z_]*)")
 

@@ -140,6 +140,10 @@ BOUNDS: tuple[tuple[Check, str, Parts, Parts], ...] = (
         (checks.check_times, f"supervision.{key}", supervision(**{key: 0.02}), supervision(**{key: 0.019}))
         for key in ("lease_s", "stall_s", "sample_timeout_s", "output_timeout_s")
     ),
+    *(
+        (checks.check_seconds, f"supervision.{key}", supervision(**{key: 10.0}), supervision(**{key: 10.1}))
+        for key in ("lease_s", "stall_s", "sample_timeout_s", "output_timeout_s")
+    ),
     (
         checks.check_rest_voltage,
         "limits.safe_voltage_v",

@@ -145,7 +145,7 @@ def test_columns_taken_by_their_headers_are_told(tmp_path: Path) -> None:
             "--columns force_n=2:0..10=0..100n,pressure_kpa=3:4..20=0..100kpa (column 2",
         ),
         ("Zeit (s),Kraft [MN],Spannung (V)", "force_n=2:0..10=0..100n (column 2 is in MN"),
-        ("a,b,c", "Say which is which: --columns time_s=1:ms,command_v=2:mv,force_n=3:n"),
+        ("a,b,c", "Say which is which: --columns time_s=1:s,command_v=2:v,force_n=3:n, or :ms, :mv, :kgf"),
     ],
 )
 def test_what_is_not_understood_is_refused_with_the_option_that_works(head: str, option: str, tmp_path: Path) -> None:

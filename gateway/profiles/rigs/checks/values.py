@@ -12,6 +12,8 @@ from gateway.profiles.rigs.rig import is_own
 from gateway.profiles.strict_yaml.fault_sentences import newton, number, second, volt
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
+_TIMES: Final = ("lease_s", "stall_s", "sample_timeout_s", "output_timeout_s")
+_LONGEST_UNWATCHED_S: Final = 10.0  # of a lease or a timeout: the slowest scale and master are faster
 _SATURATION_SHARE: Final = 0.98  # of the cell's range: what is suggested; an amplifier may clip a little below its end
 _SLOPES: Final = 50  # places of a curve at which its slope is looked at
 _LEAST_TICKS: Final = 2.0  # within a timeout, so that one late tick is no fault
@@ -149,7 +151,7 @@ def check_times(parts: Parts) -> Found:
     if (supervision := parts.supervision) is None or not parts.loop_hz:
         return
     ticks_s = _LEAST_TICKS / parts.loop_hz
-    for key in ("lease_s", "stall_s", "sample_timeout_s", "output_timeout_s"):
+    for key in _TIMES:
         value = getattr(supervision, key)
         if value is not None and value < ticks_s:
             two_ticks = f"two ticks of the loop: {second(ticks_s)} at {number(parts.loop_hz)} Hz"
@@ -172,6 +174,15 @@ def check_real_rig(parts: Parts) -> Found:
     if parts.calibration and parts.calibration.rig != parts.name:
         origin = f'was made on "{parts.calibration.rig}", not on {parts.name}'
         yield "calibration", f"{origin}: its forces are a guess until you run `force-gateway calibrate`"
+
+
+def check_seconds(parts: Parts) -> Found:
+    """Yield a warning for a time that was probably meant in milliseconds."""
+    for key in _TIMES:
+        time_s = getattr(parts.supervision, key, None)
+        if time_s is not None and time_s > _LONGEST_UNWATCHED_S:
+            unwatched = f"{second(time_s)}, so long a force stays with nobody watching it"
+            yield f"supervision.{key}", f"{unwatched}: {number(time_s)} ms are written {number(time_s / 1000.0)}"
 
 
 def check_rest_voltage(parts: Parts) -> Found:
@@ -275,6 +286,7 @@ FAULTS: Final[tuple[Check, ...]] = (
 )
 WARNINGS: Final[tuple[Check, ...]] = (
     check_real_rig,
+    check_seconds,
     check_rest_voltage,
     check_over_force_room,
     check_contact_threshold,
