@@ -37,10 +37,8 @@ class RtuEcho:
         self._is_like_request = False
         self._sent_s = self._until_s = 0.0  # the answer; the latest that its echo comes
         self._repeats, self._most_repeats = 0, _QUICK_REPEATS
-        self._is_presumed, self._left_out = (
-            False,
-            b"",
-        )  # an echo, by what was asked behind the last one that was left out
+        self._left_out = b""  # a write that was taken for an echo, until it is known what is asked behind it
+        self._is_presumed = False  # an echo, by that
         self.frame = b""
 
     def expect(self, answer: bytes, now_s: float, *, is_like_request: bool) -> None:
