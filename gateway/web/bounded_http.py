@@ -54,6 +54,10 @@ class BoundedHttpProtocol(H11Protocol):
         super().data_received(data)
         self._watch_request()
 
+    def _should_upgrade(self) -> bool:
+        """There is no other protocol: an offer may be passed over (RFC 9110, 7.8), and uvicorn would ask for a library."""
+        return False
+
     def _watch_request(self) -> None:
         """More of the same request does not begin the time anew."""
         if not self._is_waited_for:

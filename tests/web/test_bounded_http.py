@@ -170,3 +170,11 @@ def test_who_takes_nothing_of_an_answer_shuts_nobody_out_either() -> None:
         return heard
 
     assert b"here" in asyncio.run(asyncio.wait_for(scene(), 10.0))
+
+
+@pytest.mark.parametrize("upgrade", [b"websocket", b"h2c"])
+def test_who_offers_another_protocol_is_answered_in_this_one(upgrade: bytes, caplog: pytest.LogCaptureFixture) -> None:
+    """As some HTTP clients do in each request: the events told the gateway's owner to install a WebSocket library."""
+    offering = WHOLE[:-2] + b"Connection: Upgrade, close\r\nUpgrade: " + upgrade + b"\r\n\r\n"
+    assert b"here" in asyncio.run(heard(offering))
+    assert caplog.messages == []
