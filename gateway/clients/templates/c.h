@@ -541,7 +541,8 @@ static int fg_go_on(fg_client *client) {
     uint8_t frame[FG_FRAME];
     int was_on = client->good[FG_CONTROL_WORD] & FG_STARTS, stays_on = was_on & client->want[FG_CONTROL_WORD], result;
     if (!was_on) client->good[FG_FORCE_SETPOINT] = 0;
-    memcpy(client->want, client->good, sizeof client->want);
+    if (was_on || !(client->want[FG_CONTROL_WORD] || client->once)) memcpy(client->want, client->good, sizeof client->want);
+    else client->want[FG_CONTROL_WORD] = client->want[FG_FORCE_SETPOINT] = 0; /* of a bit: the words beside it go out alone */
     client->once = 0;
     if (was_on && stays_on) client->pulls = (client->good[FG_CONTROL_WORD] & FG_VALVE_PULL) != 0;
     if (!was_on || stays_on) return FG_OK;
