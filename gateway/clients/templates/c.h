@@ -60,6 +60,7 @@ enum {
 ${control_bits}
 };
 
+enum { FG_UNSIGNED = ${unsigned_words} }; /* a bit for each word of the command that has no sign */
 enum { FG_STARTS = ${starts} }; /* enable, and the bits of a ladder and a self-test, which press as well */
 
 /* status_word */
@@ -616,11 +617,13 @@ static void fg_leave_band(fg_client *client) {
 
 int fg_set(fg_client *client, int offset, float value, float counts_per_unit) {
     float counts = value * counts_per_unit;
-    if (offset < 0 || offset >= FG_COMMAND_WORDS || !(counts >= -32767.5f && counts < 32767.5f)) {
+    int is_unsigned = offset >= 0 && offset < FG_COMMAND_WORDS && FG_UNSIGNED >> offset & 1;
+    float least = is_unsigned ? -0.5f : -32767.5f, end = is_unsigned ? 65535.5f : 32767.5f;
+    if (offset < 0 || offset >= FG_COMMAND_WORDS || !(counts >= least && counts < end)) {
         snprintf(client->message, sizeof client->message, "%g does not fit into word %d of the command block", (double)value, offset);
         return FG_RANGE;
     }
-    client->want[offset] = (uint16_t)(int16_t)(counts < 0 ? counts - 0.5f : counts + 0.5f);
+    client->want[offset] = (uint16_t)(int32_t)(counts < 0 ? counts - 0.5f : counts + 0.5f);
     fg_leave_band(client);
     return FG_OK;
 }
