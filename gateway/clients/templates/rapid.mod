@@ -44,7 +44,7 @@ MODULE ForceGateway
   !
   ! Use in T_ROB1, both cases:
   !    fgForce:=12;                  ! N
-  !    fgInBand:=FALSE;              ! behind each new fgForce
+  !    fgInBand:=FALSE;              ! behind a new fgForce or fgCommand
   !    fgEnable:=TRUE;
   !    WaitUntil fgInBand\MaxTime:=3\TimeFlag:=bLate;
   !    IF bLate THEN
