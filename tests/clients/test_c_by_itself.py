@@ -11,7 +11,7 @@ from tests.clients.programs.c_program import OK, CProgram
 from tests.clients.scenes import TEXTS, commands, cycles
 from tests.clients.test_asked_for_while_lost import be_lost
 
-TILT_ANGLE = 6
+TILT_ANGLE, SEQUENCE = 6, 10
 
 
 @pytest.fixture
@@ -30,6 +30,18 @@ def test_a_word_below_0_is_the_nearest_count_too(
     program.enable(12.0)
     cycles(program)
     assert commands(gateway)[-1][TILT_ANGLE - 1] == word  # without the heartbeat
+
+
+@pytest.mark.parametrize(("number", "is_taken"), [(32768, True), (65535, True), (65536, False), (-1, False)])
+def test_a_word_without_a_sign_has_16_bits(
+    program: CProgram, gateway: GatewayAtHand, number: int, is_taken: bool
+) -> None:
+    """A program that counts command_sequence was refused from 32768 on, 18 minutes at 30 Hz."""
+    told = program._library.fg_set(program._client, SEQUENCE, ctypes.c_float(number), ctypes.c_float(1.0))
+    assert (told == OK) is is_taken
+    program.enable(12.0)
+    cycles(program)
+    assert gateway.bank.command.command_sequence == (number if is_taken else 0)
 
 
 def test_who_closes_and_connects_again_commands_nothing_until_it_asks(

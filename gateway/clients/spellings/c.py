@@ -11,6 +11,7 @@ def spell_c(table: ExchangeTable) -> dict[str, str]:
     first = table.command_span[0]
     return {
         "command_offsets": _enumerate({r.name: r.address - first for r in table.command}, "FG_"),
+        "unsigned_words": f"0x{sum(1 << r.address - first for r in table.command if r.type == 'uint16'):04X}",
         "control_bits": _enumerate(
             {name: 1 << bit for bit, name in table.map.find("control_word").bits.items()}, "FG_"
         ),

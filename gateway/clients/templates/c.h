@@ -60,6 +60,7 @@ enum {
 ${control_bits}
 };
 
+enum { FG_UNSIGNED = ${unsigned_words} }; /* a bit for each word of the command that has no sign */
 enum { FG_STARTS = ${starts} }; /* enable, and the bits of a ladder and a self-test, which press as well */
 
 /* status_word */
@@ -541,7 +542,8 @@ static int fg_go_on(fg_client *client) {
     uint8_t frame[FG_FRAME];
     int was_on = client->good[FG_CONTROL_WORD] & FG_STARTS, stays_on = was_on & client->want[FG_CONTROL_WORD], result;
     if (!was_on) client->good[FG_FORCE_SETPOINT] = 0;
-    memcpy(client->want, client->good, sizeof client->want);
+    if (was_on || !(client->want[FG_CONTROL_WORD] || client->once)) memcpy(client->want, client->good, sizeof client->want);
+    else client->want[FG_CONTROL_WORD] = client->want[FG_FORCE_SETPOINT] = 0; /* of a bit: the words beside it go out alone */
     client->once = 0;
     if (was_on && stays_on) client->pulls = (client->good[FG_CONTROL_WORD] & FG_VALVE_PULL) != 0;
     if (!was_on || stays_on) return FG_OK;
@@ -615,11 +617,13 @@ static void fg_leave_band(fg_client *client) {
 
 int fg_set(fg_client *client, int offset, float value, float counts_per_unit) {
     float counts = value * counts_per_unit;
-    if (offset < 0 || offset >= FG_COMMAND_WORDS || !(counts >= -32767.5f && counts < 32767.5f)) {
+    int is_unsigned = offset >= 0 && offset < FG_COMMAND_WORDS && FG_UNSIGNED >> offset & 1;
+    float least = is_unsigned ? -0.5f : -32767.5f, end = is_unsigned ? 65535.5f : 32767.5f;
+    if (offset < 0 || offset >= FG_COMMAND_WORDS || !(counts >= least && counts < end)) {
         snprintf(client->message, sizeof client->message, "%g does not fit into word %d of the command block", (double)value, offset);
         return FG_RANGE;
     }
-    client->want[offset] = (uint16_t)(int16_t)(counts < 0 ? counts - 0.5f : counts + 0.5f);
+    client->want[offset] = (uint16_t)(int32_t)(counts < 0 ? counts - 0.5f : counts + 0.5f);
     fg_leave_band(client);
     return FG_OK;
 }

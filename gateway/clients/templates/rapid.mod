@@ -44,7 +44,7 @@ MODULE ForceGateway
   !
   ! Use in T_ROB1, both cases:
   !    fgForce:=12;                  ! N
-  !    fgInBand:=FALSE;              ! behind each new fgForce
+  !    fgInBand:=FALSE;              ! behind a new fgForce or fgCommand
   !    fgEnable:=TRUE;
   !    WaitUntil fgInBand\MaxTime:=3\TimeFlag:=bLate;
   !    IF bLate THEN
@@ -536,6 +536,10 @@ ${crc_table}];
   LOCAL PROC FgGoOn()
     VAR bool bSent;
     VAR bool bPulls;
+    VAR bool bKeeps;
+    ! A bit was refused: the words beside it go out alone
+    bKeeps:=nWant{FG_C_CONTROL_WORD}<>0 OR nOnce<>0;
+    IF FgIsOn() bKeeps:=FALSE;
     nOnce:=0;
     ! Never to TRUE: T_ROB1 may have taken it back meanwhile
     IF NOT FgIsOn() THEN
@@ -551,10 +555,12 @@ ${crc_table}];
       IF bSent<>bPulls bPullDenied:=TRUE;
       IF fgPull=bSent fgPull:=bPulls;
     ENDIF
-    IF NOT FgAreTaken(nWant) bWordDenied:=TRUE;
-    FOR i FROM 1 TO COMMAND_WORDS DO
-      IF fgCommand{i}=nWant{i} fgCommand{i}:=nGood{i};
-    ENDFOR
+    IF NOT bKeeps THEN
+      IF NOT FgAreTaken(nWant) bWordDenied:=TRUE;
+      FOR i FROM 1 TO COMMAND_WORDS DO
+        IF fgCommand{i}=nWant{i} fgCommand{i}:=nGood{i};
+      ENDFOR
+    ENDIF
     nWant:=nGood;
   ENDPROC
 
