@@ -7,6 +7,7 @@ A fault in one file does not keep the others from being read: all are told toget
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, TypeVar
 
 from gateway.file_signature import JSON, SIGNATURE_BYTES, describe_signature
@@ -57,7 +58,7 @@ def open_profile(kind: str, reference: ProfileReference, findings: Findings) -> 
         return opened
     actual_kind = kind_of(opened[0].value, kind) if opened else None
     if opened and actual_kind and actual_kind != kind:
-        command = f"`force-gateway check {display(opened[1])}` takes it as one"
+        command = f"`force-gateway check {quote(display(opened[1]))}` takes it as one"
         mismatch = f"is {CALLED[actual_kind]}, {CALLED[kind]} is needed here: {command}"
         findings.faults.append(reference.place(mismatch))
         return None

@@ -169,6 +169,8 @@ def test_a_bare_name_means_the_int16_register(register_map):
         ("force_setpoint@float", "force_setpoint@float_abcd"),
         ("order", "order@staging or order@active"),
         ("xyzzy", "force-gateway registers lists them"),
+        ("voltage", "did you mean voltage_setpoint or output_voltage?"),
+        ("force", "force_ramp or precontact_force or force_measured or"),  # it was force_low, of the staging block
     ],
 )
 def test_an_unknown_name_is_answered_with_what_was_meant(register_map, name, meant):

@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from shlex import quote
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final, get_args
 
@@ -60,7 +61,7 @@ def ask_rig(name: str) -> str:
     """Ask a person for a rig at the terminal; return its file."""
     click.echo("Enter takes what stands in brackets. Nothing is moved: the probe asks only what changes nothing.")
     for file in faulty_devices():
-        click.echo(f"  {file} has faults and is not offered: force-gateway check {file}")
+        click.echo(f"  {file} has faults and is not offered: force-gateway check {quote(str(file))}")
     rig = GuidedRig(name)
     _ask_line(rig, "output", "output", "the DAC or pressure regulator")
     _ask_line(rig, "load_cell", "load cell", "the load-cell amplifier")

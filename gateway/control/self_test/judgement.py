@@ -219,12 +219,12 @@ def judge_leak(slope: Slope, force_n: float, hold_s: float, pressure_per_s: floa
     unsure_per_s = 3.0 * slope.error_n_per_s / force_n
     warns, fails = LEAK_WARNS + unsure_per_s, LEAK_FAILS + unsure_per_s
     verdict = above(lost_per_s, warns, fails)
-    text = f"{-slope.n_per_s:+.3f} N/s lost at {force_n:.1f} N over {hold_s:.0f} s, "
+    text = f"{-slope.n_per_s:+z.3f} N/s lost at {force_n:.1f} N over {hold_s:.0f} s, "
     text += bounds(warns * force_n, fails * force_n, "N/s", 3)
     if pressure_per_s == pressure_per_s:
         warns, fails = LEAK_WARNS + _PRESSURE_NOISE, LEAK_FAILS + _PRESSURE_NOISE
         verdict = max(verdict, above(pressure_per_s, warns, fails))
-        text += f"; pressure {100.0 * pressure_per_s:+.1f} % per second lost, " + bounds(
+        text += f"; pressure {100.0 * pressure_per_s:+z.1f} % per second lost, " + bounds(
             100 * warns, 100 * fails, "%", 1
         )
     return Finding(Item.LEAK, verdict, text)

@@ -216,10 +216,11 @@ class RegisterMap:
         if name.isdecimal() and (register := self._at_number(int(name))):
             what = "address" if register.address == int(name) else "number"
             return f" by name: {name} is the {what} of {register.name}, so use {register.name}"
-        near = get_close_matches(
+        plain = [register.name for register in self.registers if register.block in PLAIN_BLOCKS]
+        near = [one for one in plain if name.lower() in one.split("_")] or get_close_matches(
             name.lower(), [*self._by_name, *(register.name for register in self.registers)], 1, 0.6
         )
-        return f"; did you mean {near[0]}?" if near else "; force-gateway registers lists them"
+        return f"; did you mean {' or '.join(near)}?" if near else "; force-gateway registers lists them"
 
     def _at_number(self, number: int) -> Register | None:
         """Return the register of an address, or of the name that PLCs give it: 40103, 30103."""

@@ -107,6 +107,13 @@ def test_check_takes_plans(text: str, facts: str, here: Path, call) -> None:
     assert facts in answer.output
 
 
+def test_the_command_for_a_file_of_another_kind_can_be_pasted(here: Path) -> None:
+    """`force-gateway check cell left.yaml` asked for two files."""
+    shutil.copy(shipped_profiles_folder() / "calibrations" / "demo.yaml", here / "cell left.yaml")
+    with pytest.raises(ProfileError, match=r"`force-gateway check 'cell left.yaml'` takes it as one"):
+        load_rig("cell left.yaml")
+
+
 def test_a_file_of_another_kind_gets_one_sentence(here: Path, call) -> None:
     shutil.copy(shipped_profiles_folder() / "calibrations" / "demo.yaml", here / "c2.yaml")
     with pytest.raises(ProfileError) as refused:

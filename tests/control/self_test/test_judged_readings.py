@@ -85,7 +85,7 @@ def falling(n_per_s: float, from_n: float = 10.0, readings: int = 41) -> list[tu
 @pytest.mark.parametrize(
     ("held", "pressures", "verdict", "words"),
     [
-        (falling(0.0), [], PASSED, "0.000 N/s lost at 10.0 N over 4 s"),
+        (falling(0.0), [], PASSED, "+0.000 N/s lost at 10.0 N over 4 s"),
         (falling(-0.2), [], WARNED, "+0.200 N/s lost at 9.6 N over 4 s"),
         (falling(-0.5), [], FAILED, "+0.500 N/s lost at 9.0 N"),
         (falling(0.5), [], PASSED, "-0.500 N/s lost"),
