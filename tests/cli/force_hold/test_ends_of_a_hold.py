@@ -34,7 +34,7 @@ def slow_hand(apart_s: float = 1.0) -> Callable[[], float]:
 
 
 def test_under_nohup_the_end_of_the_terminal_ends_no_hold() -> None:
-    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event(), is_alive=lambda: True)
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     with _handle_signals(beat):
         os.kill(os.getpid(), signal.SIGHUP)
@@ -43,7 +43,7 @@ def test_under_nohup_the_end_of_the_terminal_ends_no_hold() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_first_signal_ramps_down_and_the_second_drops(number: int) -> None:
-    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event(), is_alive=lambda: True)
     with _handle_signals(beat, slow_hand()):
         os.kill(os.getpid(), number)
         assert beat.stopping.is_set() and not beat.dropping.is_set()
@@ -61,7 +61,7 @@ def test_the_first_signal_ramps_down_and_the_second_drops(number: int) -> None:
 )
 def test_what_is_said_more_than_once_by_one_end_drops_nothing(numbers: tuple[int, ...], apart_s: float) -> None:
     """A terminal that closes, a session that ends, `timeout`."""
-    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event(), is_alive=lambda: True)
     with _handle_signals(beat, slow_hand(apart_s)):
         for number in numbers:
             os.kill(os.getpid(), number)
@@ -69,7 +69,7 @@ def test_what_is_said_more_than_once_by_one_end_drops_nothing(numbers: tuple[int
 
 
 def test_a_terminal_that_closes_while_the_force_goes_down_by_itself_drops_nothing() -> None:
-    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event(), is_alive=lambda: True)
     beat.stopping.set()
     with _handle_signals(beat, slow_hand()):
         os.kill(os.getpid(), signal.SIGHUP)

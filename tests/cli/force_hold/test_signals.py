@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +15,7 @@ from gateway.cli.verbs.operation.hold import _handle_signals
 
 @pytest.mark.parametrize(("is_ignored", "stops"), [(False, True), (True, False)])
 def test_a_closed_terminal_ends_a_hold_unless_nohup_says_otherwise(is_ignored: bool, stops: bool) -> None:
-    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event(), is_alive=lambda: True)
     handler = signal.SIG_IGN if is_ignored else signal.SIG_DFL
     before = signal.signal(signal.SIGHUP, handler)
     try:
@@ -31,7 +33,7 @@ def test_a_closed_terminal_ends_a_hold_unless_nohup_says_otherwise(is_ignored: b
 @pytest.mark.parametrize(("is_ignored", "stops"), [(False, True), (True, False)])
 def test_a_hold_that_would_be_suspended_lets_go_instead(is_ignored: bool, stops: bool) -> None:
     """Behind Ctrl-Z the tool pressed on, where the rig has no lease, and nobody watched it; with one it was a fault A310."""
-    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event())
+    beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event(), is_alive=lambda: True)
     suspended = threading.Event()
     handler = signal.SIG_IGN if is_ignored else lambda number, frame: suspended.set()
     before = signal.signal(signal.SIGTSTP, handler)
@@ -42,3 +44,28 @@ def test_a_hold_that_would_be_suspended_lets_go_instead(is_ignored: bool, stops:
         assert signal.getsignal(signal.SIGTSTP) is handler
     finally:
         signal.signal(signal.SIGTSTP, before)
+
+
+SHOWING = """
+import os, threading
+from types import SimpleNamespace
+from gateway.cli.verbs.operation.hold import _handle_signals
+beat = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event(), is_alive=lambda: False)
+beat.stopping.set()
+reader, writer = os.pipe()
+with _handle_signals(beat):
+    print("here", flush=True)
+    while True:
+        os.write(writer, bytes(4096))
+"""
+
+
+def test_once_the_force_is_let_go_a_signal_ends_what_nobody_reads() -> None:
+    """A pipe whose reader is paused: neither Ctrl-C nor SIGTERM ended it any more. Takes half a second: a process."""
+    with subprocess.Popen([sys.executable, "-c", SHOWING], stdout=subprocess.PIPE) as holding:
+        try:
+            assert holding.stdout and holding.stdout.readline() == b"here\n"
+            holding.send_signal(signal.SIGTERM)
+            assert holding.wait(5.0) == -signal.SIGTERM
+        finally:
+            holding.kill()

@@ -1,6 +1,7 @@
 """`hold`: hold a force from this terminal: enable, heartbeat, one line of state, and a ramp to 0 when told to stop."""
 
 import json
+import os
 import re
 import signal
 import sys
@@ -153,13 +154,19 @@ def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bo
 @contextmanager
 def _handle_signals(beat: "HeartbeatThread", clock: Callable[[], float] = time.monotonic) -> Iterator[None]:
     """The first of Ctrl-C, Ctrl-Z, SIGTERM and a closed terminal (not with nohup) ramps down, a second one but that drops the
-    force at once. Suspended by Ctrl-Z nobody would watch a force that goes on, and its heartbeat would stand still."""
+    force at once; where none is held any more it ends us. Suspended by Ctrl-Z nobody would watch a force that goes on, and its
+    heartbeat would stand still."""
     from gateway.service.supervisor.event_wait import StopSignals
 
     stops = StopSignals(clock)
 
     def on_signal(number: int, frame: object) -> None:
-        if stops.asks_anew(number):
+        if not stops.asks_anew(number):
+            return
+        if beat.stopping.is_set() and not beat.is_alive():
+            signal.signal(number, signal.SIG_DFL)  # whoever does not read the last lines keeps us here
+            os.kill(os.getpid(), number)
+        else:
             (beat.dropping if beat.stopping.is_set() and number != signal.SIGHUP else beat.stopping).set()
 
     heard = [signal.SIGINT, signal.SIGTERM]
