@@ -40,7 +40,7 @@ class Happened:
         if self.pulled_s:
             words.append(f"pulled for {self.pulled_s:.3g} s")
         if self.residual_n is not None:
-            words.append(f"residual {self.residual_n:.2g} N")
+            words.append(f"residual {self.residual_n:.2g} N RMS, steps included")
         if self.calibrations:
             words.append(self.calibrations)
         return ", ".join([*words, *(f"fault {name}" for name in self.faults)])

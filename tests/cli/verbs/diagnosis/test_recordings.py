@@ -41,7 +41,7 @@ def test_a_list_is_whole_on_a_narrow_terminal(width: int, state: Path, call, mon
 def test_show_says_everything_that_is_known(state: Path, call) -> None:
     told = words_of(call("recordings", "show", "1", "--state", state).output)
     assert "name: before repair note: new seals tomorrow" in told
-    assert "residual 3 N" in told
+    assert "residual 3 N RMS" in told
     facts = json.loads(call("recordings", "show", "1", "--state", state, "--json").output)
     assert (facts["id"], facts["kept"], facts["setpoint_changes"]) == (1, False, 1)
 
