@@ -79,7 +79,10 @@ def _from_system(error: OSError) -> CliError:
     """Return what the operating system refused: permission, disk, a missing directory."""
     words = tell_place_and_refusal(error)
     if error.errno in (errno.EACCES, errno.EPERM):
-        return CliError(f"E105 {words}: this user may not", exit_codes.PERMISSION)
+        return CliError(
+            f"E105 {words}: this user may not; take another place, or chown it (force-gateway explain E105)",
+            exit_codes.PERMISSION,
+        )
     return CliError(f"E106 {words}")
 
 

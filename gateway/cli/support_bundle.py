@@ -23,7 +23,7 @@ from typing import Any, Final
 from gateway import VERSION
 from gateway.cli.errors import CliError
 from gateway.defaults import HOST
-from gateway.plain_file import replaced_by
+from gateway.plain_file import replaced_by, tell_place_and_refusal
 
 EVENT_LINES: Final = 2000
 _NOT_IN_IT: Final = "not in it: "
@@ -139,7 +139,9 @@ def _or_sentence(make: Callable[[], str]) -> str:
 
     try:
         return make()
-    except (CliError, ProfileError, OSError, ValueError) as error:
+    except OSError as error:
+        return f"{_NOT_IN_IT}{tell_place_and_refusal(error)}"
+    except (CliError, ProfileError, ValueError) as error:
         return f"{_NOT_IN_IT}{getattr(error, 'message', None) or error}"
 
 

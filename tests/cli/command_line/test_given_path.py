@@ -93,7 +93,8 @@ def test_what_may_not_be_read_or_written_is_told_by_its_own_name(
     monkeypatch.setattr(os, "access", lambda *_, **__: False)
     assert "is not readable" not in call("restore", "b.tar.gz", "--state", "new").stderr
     answer = call("backup", "c.tar.gz", "--state", "state")
-    assert answer.exit_code == 77 and answer.stderr == "E105 c.tar.gz: Permission denied: this user may not\n"
+    told = "E105 c.tar.gz: Permission denied: this user may not; take another place, or chown it (force-gateway explain E105)\n"
+    assert (answer.exit_code, answer.stderr) == (77, told)
 
 
 @pytest.mark.parametrize("words", [("run", "demo", "--sim", "--bind", "127.0.0.1:0"), ("events",), ("audit", "show")])

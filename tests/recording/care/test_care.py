@@ -46,13 +46,10 @@ def numbers(state: Path) -> list[int]:
 def test_a_summary_says_what_happened_by_name_and_number(tmp_path: Path) -> None:
     record(tmp_path, name="before repair", note="new seals", rig="demo")
     (summary,) = list_summaries(tmp_path)
-    assert (summary["name"], summary["note"], summary["rig"]) == ("before repair", "new seals", "demo")
-    assert (
-        summary["happened"]
-        == "run, 1 change of setpoint, up to 20 N, 20.0 to 29.0 N measured, residual 3 N RMS, steps included"
-    )
-    assert summary["facts"]["force_range_n"] == [20.0, 29.0]
-    assert summary["facts"]["residual_rms_n"] == pytest.approx(3.0)
+    assert [summary[key] for key in ("name", "note", "rig")] == ["before repair", "new seals", "demo"]
+    told = "run, 1 change of setpoint, up to 20 N, 20.0 to 29.0 N measured, residual 3 N RMS, steps included"
+    assert summary["happened"] == told
+    assert (summary["facts"]["force_range_n"], summary["facts"]["residual_rms_n"]) == ([20.0, 29.0], pytest.approx(3.0))
 
 
 def test_a_summary_says_how_long_the_tool_pulled(tmp_path: Path) -> None:

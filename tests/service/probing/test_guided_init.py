@@ -154,7 +154,8 @@ def test_a_folder_that_takes_no_file_is_told_before_anything_is_asked(
 ) -> None:
     monkeypatch.setattr("gateway.cli.verbs.setup.init.os.access", lambda path, mode: False)
     result = CliRunner().invoke(command, ["init", "own", guided], input="later\n")
-    assert result.exit_code == 77 and result.output == "E105 own.yaml: Permission denied: this user may not\n"
+    told = "E105 own.yaml: Permission denied: this user may not; take another place, or chown it (force-gateway explain E105)\n"
+    assert (result.exit_code, result.output) == (77, told)
     assert not any(folder.iterdir())
 
 
