@@ -19,13 +19,14 @@ _STRAY: Final = (
     signal.SIGPROF,
     signal.SIGPOLL,
     signal.SIGPWR,
+    signal.SIGXCPU,
     signal.SIGTSTP,
     signal.SIGTTIN,
     signal.SIGTTOU,
 )
-"""Mean nothing to us, come from tools that rotate logs or ask other programs to reload, and would end who does not ignore them,
-without the safe voltage; or stop him (Ctrl-Z, a word from the background): then the force goes on and nobody watches it.
-Children inherit it."""
+"""Mean nothing to us, come from tools that rotate logs, ask other programs to reload or count processor time, and would end who
+does not ignore them, without the safe voltage; or stop him (Ctrl-Z, a word from the background): then the force goes on and
+nobody watches it. Children inherit it."""
 _AT_ONCE_S: Final = 0.05
 """A hand that presses Ctrl-C twice takes longer."""
 _LONGEST_S: Final = 3600.0

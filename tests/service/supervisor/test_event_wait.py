@@ -12,7 +12,7 @@ import pytest
 
 from gateway.service.supervisor.event_wait import SignalPipe, wait_readable
 
-_STRAY = ("SIGUSR1", "SIGUSR2", "SIGALRM", "SIGVTALRM", "SIGPROF", "SIGPOLL", "SIGPWR")
+_STRAY = ("SIGUSR1", "SIGUSR2", "SIGALRM", "SIGVTALRM", "SIGPROF", "SIGPOLL", "SIGPWR", "SIGXCPU")
 _STOPS = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
 _SURVIVOR = "import os, signal, sys; os.kill(os.getpid(), int(sys.argv[1])); print('alive')"
 
