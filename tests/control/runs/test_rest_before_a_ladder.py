@@ -7,8 +7,10 @@ from statistics import stdev
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.control.runs.ladder_run import FEWEST_READINGS, LONGEST_REST_S, MOST_DWELL_S, LadderRun
 from gateway.control.sample_conditioning import Reading
+from gateway.registers.words import State
 from tests.control.bench import Bench, bsfm, settings
 from tests.control.runs.test_ladder_run import SHORT, begun
 
@@ -65,3 +67,22 @@ def test_what_a_run_says_of_its_rest_reaches_the_log_once() -> None:
     bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + 0.3 * bench.now_s)
     begun(bench).run(5.0)
     assert sum(event.startswith("the load cell has not come to rest in 3.5 s: ") for event in bench.events) == 1
+
+
+@pytest.mark.parametrize("runs_before", [0, 1])
+def test_what_comes_back_before_a_run_rises_is_no_rise_of_it_however_many_were_before(runs_before: int) -> None:
+    """The tool was lifted as it began, and 12 N of the cell come back while it waits for rest."""
+    bench = Bench(settings(stuck_n=30.0), seed=14)
+    for _ in range(runs_before):
+        begun(bench).run(4.0)
+        assert bench.last.voltage_v > 0.0
+        bench.controller.active_run.ask_stop("calibration stopped by a person")
+        bench.run(3.0)
+        assert bench.last.state is State.OFF
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n - 12.0)
+    begun(bench)
+    bench.alter_sample = lambda sample: sample
+    bench.history.clear()
+    bench.run(6.0)
+    assert (bench.last.state, bench.last.fault) == (State.CALIBRATING, FaultCode.NONE), bench.events[-1]
+    assert max(volts for _, volts in bench.voltages()) > 1.0
