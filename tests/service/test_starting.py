@@ -212,6 +212,7 @@ def test_a_port_that_is_away_or_held_ends_the_first_start_at_once(code: str) -> 
             "1:502: Address already in use; another program .*`ss -ltnp`",
         ),
         (OSError(errno.EADDRNOTAVAIL, "Cannot assign"), exit_codes.DEVICE, "is no address of this machine"),
+        (OSError(errno.EMFILE, "Too many open files"), exit_codes.DEVICE, "Too many open files; .*LimitNOFILE"),
     ],
 )
 def test_who_cannot_listen_ends_with_a_sentence_and_by_its_kind(error: OSError, code: int, words: str) -> None:

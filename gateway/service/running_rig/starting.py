@@ -157,5 +157,7 @@ async def listen(server: ModbusTcpServer, host: str, port: int, instead: str = "
             cure = f"{host} is no address of this machine, `ip address` lists them"
         elif error.errno == errno.EADDRINUSE:
             cure = f"another program listens there, `ss -ltnp` shows which; {cure}"
+        elif error.errno in (errno.EMFILE, errno.ENFILE):
+            cure = "allow more of them: `ulimit -n`, LimitNOFILE= of a service"
         sentence = f"E121 cannot listen on {host}:{port}: {error.strerror or error}; {cure}"
         raise StartError(sentence, exit_codes.DEVICE) from error
