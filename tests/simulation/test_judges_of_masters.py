@@ -19,6 +19,7 @@ from tests.simulation.judges.status_witness import StatusWitness
 from tests.simulation.masters.spelling import (
     BEAT,
     MODE,
+    coil_pdu,
     control_of,
     floats_pdu,
     mask_pdu,
@@ -107,6 +108,19 @@ def test_an_enable_and_a_run_at_the_machine_need_no_heartbeat_yet(observer: Obse
     judge.look(1.5)
     assert observer.broken == []
     judge.look(1.7)
+    assert observer.broken
+
+
+def test_an_enable_begins_a_lease_where_single_bits_have_only_been_cleared_before_and_a_second_does_not(
+    observer: Observer,
+) -> None:
+    judge = LeaseJudge(observer)
+    judge.note_write(coil_pdu(1, on=False), 1.0, is_answered=True)
+    judge.note_write(write_pdu(0, 1, 1200), 1.5, is_answered=True)
+    judge.look(1.7)
+    assert observer.broken == []
+    judge.note_write(write_pdu(0, 1, 1200), 1.7, is_answered=True)
+    judge.look(2.0)
     assert observer.broken
 
 

@@ -4,7 +4,7 @@ one and the same heartbeat, reads and refused writes renew nothing. No code of t
 from math import inf, isnan
 
 from tests.simulation.judges.observer import DOWN_S, Observer
-from tests.simulation.masters.spelling import BEAT, control_of, word_of
+from tests.simulation.masters.spelling import BEAT, ENABLE, control_of, word_of
 
 RUN_BITS = 32 | 64
 ON_WIRE_S = 0.04
@@ -18,14 +18,19 @@ class LeaseJudge:
         self._observer = observer
         self._beat: float | None = None
         """What the register holds; None where nobody knows."""
+        self._is_enabled = False
+        """Whether the last write of the control word has enabled; not where that cannot be told from its bits."""
         self._renewed_s = -inf
 
     def note_write(self, pdu: bytes, now_s: float, *, is_answered: bool) -> None:
         """A write was taken, or nobody knows whether it was."""
         beat, control = word_of(pdu, BEAT), control_of(pdu)
-        begins = control is not None and (control < 0 or control & RUN_BITS or self._observer.disabled_s is not None)
+        was_off = self._observer.disabled_s is not None or not self._is_enabled
+        begins = control is not None and (control < 0 or control & RUN_BITS or was_off)
         if begins or not is_answered or (beat is not None and (isnan(beat) or beat != self._beat)):
             self._renewed_s = max(self._renewed_s, now_s)
+        if control is not None:
+            self._is_enabled = is_answered and control > 0 and bool(control & ENABLE)
         if beat is not None:
             self._beat = beat if is_answered and not isnan(beat) else None
 

@@ -74,4 +74,16 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(1.7575, "world", "sim", data=b'{"do": "sim", "clear": ["cell.inverted"]}'),
         ],
     ),
+    (
+        40476,
+        [
+            Event(1.0043, "fool", "ask", (1,), data=b"\x05\x00\x01\x00\x00"),
+            Event(
+                1.4749,
+                "person",
+                "say",
+                data=b'{"do": "modbus", "via": "mqtt", "pdu": "100000000204000104b0", "unit": 1}',
+            ),
+        ],
+    ),
 ]
