@@ -104,6 +104,8 @@ class Surroundings:
             cable.cut()
             self._observer.note_cut(now_s)
             self._observer.output_lost_s, self._back_s = now_s, 0.0
+        elif cable.is_deaf and not on:
+            self._observer.note_mended()
         cable.is_deaf = on
 
     def push(self, line: str) -> None:

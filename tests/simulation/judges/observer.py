@@ -151,6 +151,11 @@ class Observer:
         self._is_cut = self._must_be_safe = True
         self._begun_s, self._dropped = until_s, b""
 
+    def note_mended(self) -> None:
+        """The wire is whole again on which a device heard nothing. It stands where it stood: where that is the safe voltage it
+        need not be said once more, for nobody may have noticed."""
+        self._must_be_safe = self._must_be_safe and not self.is_safe
+
     def _note_setting(self, voltage_v: float, now_s: float) -> None:
         if not self.bounds.voltage_min_v - 0.6 * COUNT_V <= voltage_v <= self.bounds.voltage_max_v + COUNT_V:
             self.complain("I1", f"{voltage_v:.3f} V", now_s)

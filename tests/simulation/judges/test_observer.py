@@ -78,6 +78,21 @@ def test_what_is_no_sentence_is_seen_but_where_its_sender_was_cut_off() -> None:
 
 
 @pytest.mark.parametrize(
+    ("stands", "is_mended", "laws"), [(0, True, []), (0, False, ["I6"]), (410, True, ["I6"]), (410, False, ["I6"])]
+)
+def test_the_safe_voltage_comes_first_behind_a_cut_but_where_it_stands_already(
+    stands: int, is_mended: bool, laws: list[str]
+) -> None:
+    observer = observer_of()
+    observer.hear(b"SET %d\r\n" % stands, 20.0)
+    observer.note_cut(20.1)
+    if is_mended:
+        observer.note_mended()
+    observer.hear(b"SET 420\r\n", 25.0)
+    assert broken_laws(observer) == laws
+
+
+@pytest.mark.parametrize(
     ("law", "what", "bound_s"),
     [
         ("I3 cell", "cell_lost_s", BOUNDS.sample_timeout_s),

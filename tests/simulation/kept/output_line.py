@@ -95,4 +95,17 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(11.9937, "output", "deaf", (0.0,)),
         ],
     ),
+    (
+        42158,
+        [
+            Event(
+                0.9747,
+                "person",
+                "say",
+                data=b'{"do": "calibrate", "plan": {"v_max_v": 1.5, "step_v": 0.5, "groups": 1, "minor_points": 0, '
+                b'"response_steps": 0, "tare": true}, "name": "60"}',
+            ),
+            Event(23.8204, "output", "deaf", (1.0,)),
+        ],
+    ),
 ]
