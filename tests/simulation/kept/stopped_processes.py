@@ -121,4 +121,13 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(18.0136, "world", "sim", data=b'{"do": "sim", "clear_all": true}'),
         ],
     ),
+    (
+        41769,
+        [
+            Event(2.9409, "worker", "take", (30.0,)),
+            Event(3.256, "machine", "stop", (0.12, 0.0)),
+            Event(3.6161, "machine", "freeze", (0.3,)),
+            Event(3.8452, "machine", "freeze", (0.3,)),
+        ],
+    ),
 ]

@@ -49,6 +49,7 @@ class SimulatedProcess(Child):
         read_in_memory(self.loop)
         self._on_death = on_death
         self.exit_code: int | None = None
+        self.thaws_s = 0.0  # until when it is stopped
         self.task: asyncio.Task[None] | None = None
         self.beat: int | None = None  # its own copy of the descriptor of that memory
 
@@ -189,11 +190,18 @@ class SimulatedService:
             self._processes[-1].kill()
 
     def stop_control(self, duration_s: float) -> None:
-        """SIGSTOP, or a machine that lets it wait: it does nothing for so long, or until the guardian has enough."""
-        process = self._processes[-1]
-        if self.inside and not process.loop.is_halted:
+        """SIGSTOP, or a machine that lets it wait: it does nothing for so long, or until the guardian has enough. One that
+        stands still already does so for the longer of both times."""
+        process, until_s = self._processes[-1], self._clock.now_s + duration_s
+        if self.inside:
             process.loop.halt()
-            self._outside.call_later(duration_s, lambda: process.exit_code is None and process.loop.go_on())
+            process.thaws_s = max(process.thaws_s, until_s)
+            self._outside.call_at(until_s, self._let_go_on, process, until_s)
+
+    @staticmethod
+    def _let_go_on(process: "SimulatedProcess", until_s: float) -> None:
+        if process.exit_code is None and until_s >= process.thaws_s:
+            process.loop.go_on()
 
     def stop_guardian(self, duration_s: float) -> None:
         """SIGSTOP: it does nothing for so long."""
