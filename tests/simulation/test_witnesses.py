@@ -133,6 +133,19 @@ def test_a_gateway_that_begins_has_no_owner(observer: Observer) -> None:
     assert observer.broken == []
 
 
+def test_the_end_of_an_owner_s_run_is_no_command_of_another(observer: Observer) -> None:
+    """As seed 41054 drew it: the owner's run stood as enable and its bit, and another's cyclic 1 ended it; its next is one."""
+    witness = StatusWitness(observer, lambda: inf)
+    look(witness, 1.9, owner=1)
+    witness.note_write(OWNER, write_one_pdu(0, 65), 1.93)
+    witness.note_write(OTHER, write_one_pdu(0, 1), 1.95)
+    look(witness, 2.0, owner=1)
+    assert observer.broken == []
+    witness.note_write(OTHER, write_one_pdu(0, 1), 2.05)
+    look(witness, 2.1, owner=1)
+    assert [line[:2] for line in observer.broken] == ["I4"]
+
+
 def test_an_enable_of_another_than_the_owner_is_seen_and_a_takeover_is_none(observer: Observer) -> None:
     witness = StatusWitness(observer, lambda: inf)
     look(witness, 1.9, owner=1)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from ipaddress import ip_address
 from math import inf
 
-from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Observer
+from tests.simulation.judges.observer import FAULT, RUN_BITS, STATUS_WORDS, Observer
 from tests.simulation.masters.spelling import BEAT, control_of, setpoints_of, word_of
 
 UNAVAILABLE = 0x8000
@@ -43,6 +43,7 @@ class StatusWitness:
         self._last_s, self._known = 0.0, 0
         self._asked_mv, self._asked_s = 0, 0.0
         self._owner, self._commands = 0, list[tuple[float, str, int]]()
+        self._last_control = 0
         self._requested: deque[tuple[float, int]] = deque()
         self._requested_s = 0.0
         self._written: deque[tuple[float, float]] = deque()
@@ -141,15 +142,20 @@ class StatusWitness:
         self._known = counts
 
     def _judge_owner(self, owner: int, at_s: float) -> None:
-        """Where one owns the setpoint before and after, and nobody has taken over or let go between, nobody else enables."""
+        """Where one owns the setpoint before and after, and nobody has taken over or let go between, nobody else enables. A run
+        may be ended by anybody, also by a word in which enable stands as before."""
         commands = [one for one in self._commands if one[0] <= at_s]
         self._commands = self._commands[len(commands) :]
         was, self._owner = self._owner, owner
+        before = [self._last_control, *(control for _, _, control in commands)]
+        self._last_control = before[-1]
         if not was == owner > LARGEST_PLACE or any(
             control & TAKE or not control & ENABLED_BIT for _, _, control in commands
         ):
             return
-        for command_s, host, control in commands:
+        for (command_s, host, control), stood in zip(commands, before, strict=False):
+            if stood & RUN_BITS and not control & RUN_BITS:
+                continue
             if host and int(ip_address(host)) != owner and self._last_s + MARGIN_S < command_s < at_s - MARGIN_S:
                 self._observer.complain("I4", f"{host} commands {control:#x}, owner is {ip_address(owner)}", at_s)
 
