@@ -3,10 +3,9 @@ one and the same heartbeat, reads and refused writes renew nothing. No code of t
 
 from math import inf, isnan
 
-from tests.simulation.judges.observer import DOWN_S, Observer
+from tests.simulation.judges.observer import DOWN_S, RUN_BITS, Observer
 from tests.simulation.masters.spelling import BEAT, ENABLE, control_of, word_of
 
-RUN_BITS = 32 | 64
 ON_WIRE_S = 0.04
 """20 ms, and two sentences at 9600 baud."""
 
