@@ -52,6 +52,7 @@ def test_an_upload_that_fails_says_why(client: Any, gateway: GatewayAtHand) -> N
     assert "not increasing" in client.text
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("change", "number"), [({"blend_span": 1e3}, "-1"), ({"rising_b": [0.0, 500.0, 600.0]}, "1")])
 def test_the_number_that_is_to_blame_is_told_by_its_place_and_none_as_minus_1(
     client: Any, gateway: GatewayAtHand, change: dict[str, Any], number: str

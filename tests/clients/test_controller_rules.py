@@ -269,6 +269,7 @@ def test_the_signals_of_a_robot_enable_by_the_bit_of_the_map() -> None:
     assert f'modbus_set_output_register("fg_control", {1 << bit}, False)' in text
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("kind", [S7, TwinCat, Codesys])
 @pytest.mark.parametrize("ramp_n_per_s", [7000.0, -4000.0, 1e38])
 def test_a_value_that_16_bits_cannot_hold_is_refused_instead_of_wrapped(kind: type[Plc], ramp_n_per_s: float) -> None:

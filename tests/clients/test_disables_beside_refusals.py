@@ -66,6 +66,7 @@ def test_who_may_not_even_disable_asks_for_it_no_more_than_twice(client: Any, ga
     assert 1 <= len(asked) <= 2
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("counts", [1200, None], ids=["enable", "heartbeat"])
 def test_an_answer_that_comes_too_late_is_a_loss_and_no_refusal(
     counts: int | None, client: Any, gateway: GatewayAtHand

@@ -238,6 +238,7 @@ def set_voltage(client: Any, millivolts: int) -> None:
         client.machine.start("fg_set_command", place, millivolts)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("language", ["scl", "twincat", "codesys", "rapid", "urscript"])
 @pytest.mark.parametrize("wrong", [20000, 70000])
 def test_a_word_that_was_refused_leaves_nothing_in_band_until_another_one_is_taken(

@@ -84,6 +84,7 @@ def lose_one(gateway: GatewayAtHand) -> list[bytes]:
     return lost
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("asks", ["heartbeat", "force"])
 def test_a_write_that_nobody_answers_is_a_loss_and_no_refusal(client: Any, gateway: GatewayAtHand, asks: str) -> None:
     """Taken for one the last accepted force went on, and the operator was told the reason of some earlier refusal."""

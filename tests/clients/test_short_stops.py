@@ -109,6 +109,7 @@ def test_a_reset_while_enabled_stops_with_the_next_request(language: str, scans:
     assert client.ended and not client.enabled and gateway.bank.command.control_word == 0
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("language", BLOCKS)
 @pytest.mark.parametrize("scans", range(0, 12, 2))
 @pytest.mark.parametrize("has_lease", [True, False])

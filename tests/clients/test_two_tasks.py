@@ -94,6 +94,7 @@ def stopped_by_another(client: Any, gateway: GatewayAtHand) -> None:
     gateway.stop_from_elsewhere()
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("language", "apart"), [("rapid", 1), ("rapid", 4), ("urscript", 1)])
 @pytest.mark.parametrize("prepare", [tare_that_is_refused, nobody_there, stopped_by_another])
 def test_an_enable_beside_an_exchange_holds_its_own_force_or_none(language: str, prepare: Any, apart: int) -> None:
@@ -135,6 +136,7 @@ def test_a_force_that_is_set_beside_a_refusal_of_another_is_the_one_that_holds()
         assert gateway.bank.command.force_setpoint_n == 5.0
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("force_n", [9.0, 7.0])
 @pytest.mark.parametrize("language", ["rapid", "urscript"])
 def test_a_disable_at_any_place_of_an_exchange_takes_the_force_off(language: str, force_n: float) -> None:
@@ -163,6 +165,7 @@ def test_what_a_robot_asks_for_while_its_gateway_is_being_lost_is_not_done_later
         assert asked == [] and not client.get("fg_is_on"), client.text
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("language", ["rapid", "urscript"])
 @pytest.mark.parametrize("prepare", [tare_that_is_refused, nobody_there, stopped_by_another])
 def test_a_self_test_asked_for_beside_an_exchange_is_begun_or_dropped(language: str, prepare: Any) -> None:
@@ -171,6 +174,7 @@ def test_a_self_test_asked_for_beside_an_exchange_is_begun_or_dropped(language: 
         assert gateway.is_testing or not client.found
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("language", ["rapid", "urscript"])
 @pytest.mark.parametrize("has_ended", [False, True])
 def test_a_self_test_that_is_let_go_at_any_place_of_an_exchange_ends(language: str, has_ended: bool) -> None:

@@ -54,6 +54,7 @@ def test_a_recording_that_begins_in_the_middle_of_work_gives_no_name(tmp_path: P
     assert_nothing_is_named(answer(read(kind, 1, tmp_path, 20.0)))
 
 
+@pytest.mark.long
 def test_half_of_a_clean_recording_has_no_drift(tmp_path: Path) -> None:
     """The base model had found half of the friction, and a drift of 0.02 N in all moved it to the other half: that gain was
     the drift's, with 93 %. Six seconds: the whole run is played, for its beginning belongs to it."""

@@ -105,6 +105,7 @@ QUIET: dict[str, Columns] = {
 }
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("what", QUIET)
 def test_nothing_is_found_where_nothing_can_be_seen(tmp_path: Path, what: str) -> None:
     code, _, document = answered(tmp_path, QUIET[what])

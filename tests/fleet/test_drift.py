@@ -43,6 +43,7 @@ def test_the_cell_that_leaks_more_each_day_is_named_with_leak_and_no_other() -> 
     assert headline(cells).startswith("1 of 20 cells drifts: cell 0 (leak, +0.")
 
 
+@pytest.mark.long
 def test_among_many_fleets_without_a_drift_hardly_one_is_accused() -> None:
     rng = np.random.default_rng(7)
     accused = 0

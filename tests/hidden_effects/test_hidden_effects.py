@@ -1,6 +1,6 @@
 """Effects are hidden in recordings of a rig that is not the twin, and must be found; nothing must be found in nothing.
 
-The push gate asks thirteen, drawn from a printed seed (another: HIDDEN_EFFECTS_SEED); --long asks for every effect twenty
+The push gate asks nine, drawn from a printed seed (another: HIDDEN_EFFECTS_SEED); --long asks for every effect twenty
 times, 300 nulls, and twos and threes, and leaves its lines in HIDDEN_EFFECTS_RESULTS (else beside the test's own files).
 Anybody gets the same answers from `tools/hidden_effects --gate`. The bars of a sample are wider than those of
 gateway/diagnosis/RATES.md, which --long holds.

@@ -101,7 +101,7 @@ def test_together_means_not_one_picture() -> None:
 
 def test_cases_come_from_the_seed_alone() -> None:
     assert gate_sample(7) == gate_sample(7) != gate_sample(8)
-    assert len(gate_sample(7)) == 13
+    assert len(gate_sample(7)) == 9
     asked = long_plan(20, 300, 1)
     assert sum(case.kind == "null" for case in asked) == 300
     assert all(sum(case.wish.effects == (name,) for case in asked) == 20 for name in NAMES)

@@ -53,6 +53,7 @@ def reference_of(seed: int, lasts_s: float, state: Path) -> Measurement:
     return room.reference_measurement(state, kept)
 
 
+@pytest.mark.long
 def test_a_machines_own_nature_is_never_searched_for_and_a_change_is(tmp_path):
     machine = read_machine(json.loads(DESCRIBED.read_text()), [reference_of(4103, 30.0, tmp_path)])
     comparison = CountingComparison(machine, "0001.fgr", DEFAULT_PLANT, LEAST_N)

@@ -92,6 +92,7 @@ def test_c_and_its_float32_model_agree_to_the_bit(library, name, level):
         assert bits(result) == bits(expected(name, function)), function
 
 
+@pytest.mark.sampled
 @needs_gcc
 @every_level
 @every_case

@@ -102,6 +102,7 @@ def run_on(plant: Plant, rate_hz: float = 100.0, noise_n: float = 0.1) -> Measur
     return measure_response(RecordedRun(table[:, 0], table[:, 1], table[:, 2]), model(bow_n=1.5))
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("dead_time_s", "lag_s", "second_lag_s", "rate_hz", "noise_n"),
     [

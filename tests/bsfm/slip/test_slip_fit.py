@@ -89,6 +89,7 @@ def test_the_joint_fit_finds_branches_that_no_staircase_shows() -> None:
     assert verdicts_of(result.branches, SLOPE_FLOOR_N_PER_V).usable
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("top", [1.0, 2.0])
 def test_the_searchs_gradient_is_that_of_its_residuals(order, top) -> None:

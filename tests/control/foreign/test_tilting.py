@@ -24,6 +24,7 @@ def tilted(stand: Stand, to_deg: float) -> float:
     return stand.slide.force_n + STANDARD_GRAVITY_M_PER_S2 * cos(radians(to_deg)) - HELD_N
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("gain", "most_off_n"), [(0.0, 1.0), (0.3, 0.5)], ids=["feedforward alone", "with the trim"])
 @pytest.mark.parametrize("seed", [1, 5])
 def test_there_and_back_the_contact_force_stays(seed: int, gain: float, most_off_n: float) -> None:

@@ -80,6 +80,7 @@ def test_a_zero_far_beyond_all_readings_is_no_machines(zero_n: float, doubts: in
     assert sum("same machine" in note for note in notes) == doubts
 
 
+@pytest.mark.long
 def test_a_machine_that_has_changed_is_not_doubted() -> None:
     old, _ = record(Wish(seed=103, duration_s=DURATION_S))
     new, _ = record(Wish(seed=3, effect="leak", size=2.0, duration_s=DURATION_S))

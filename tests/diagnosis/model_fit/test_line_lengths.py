@@ -37,6 +37,7 @@ def base_of(measurement: Measurement, plant: Plant) -> tuple[Bench, FittedModel,
     return bench, fit_base(bench, plant, base_parameters(bench, frozenset(), 0.035), whiten), whiten
 
 
+@pytest.mark.long
 def test_an_own_recording_shows_how_long_a_character_takes() -> None:
     _, fitted = fit_line_lengths(*base_of(*own_recording()), STEP_V)
     assert fitted.parameters.character_s == pytest.approx(AT_9600_BAUD_S, rel=0.3)  # one run is sure to about 0.1 ms

@@ -184,6 +184,7 @@ def test_a_constant_added_to_the_force_changes_nothing(plain: Diagnosis, constan
     assert_same(plain, diagnose([short(constant_n)]))
 
 
+@pytest.mark.long
 def test_the_order_of_covariates_changes_nothing() -> None:
     one = short(columns=("temperature_c", "supply_kpa", "feed_mm_s"))
     turned = dict(reversed(list(one.covariates.items())))
@@ -201,6 +202,7 @@ def test_a_shift_in_time_changes_nothing(plain: Diagnosis) -> None:
     assert_same(plain, diagnose([read]))
 
 
+@pytest.mark.long
 def test_recordings_with_their_own_offsets_share_one_model(plain: Diagnosis) -> None:
     two = [short(), short(-7.0, seed=5)]
     bench = bench_of(two)

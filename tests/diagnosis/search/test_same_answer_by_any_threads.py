@@ -33,6 +33,7 @@ def answer() -> dict[str, object]:
     return diagnosis_document(found, 0.0)
 
 
+@pytest.mark.long
 def test_neither_threads_of_products_nor_lanes_change_a_digit(threads: Callable[[], int]) -> None:
     """The gain on unseen blocks was another in its fifth digit: sums were added in another order."""
     by_two = answer()

@@ -32,9 +32,8 @@ def gain(extended: Plant, **options: object) -> ClosedLoopGain:
 
 
 # effect, its numbers, largest allowed ratio of the error after to before
-OF_EACH_KIND = [  # a told input, the cell, the command, the model, the timing
+OF_EACH_KIND = [  # a told input, the command, the model, the timing
     ("thermal-zero-drift", {"cell__zero_n_per_k": 0.15}, 0.3),
-    ("sensor-quadratic", {"cell__quadratic_per_n": 0.002}, 0.4),
     ("command-nonlinearity", {"regulator__command_bow": 0.06}, 0.5),
     ("coulomb-friction", {"friction__coulomb_n": 3.0}, 0.5),
     ("transport-delay", {"regulator__delay_s": 0.25}, 0.3),
@@ -43,6 +42,7 @@ ALL_OTHERS = [
     ("tilt-gravity", {"contact__tilt_n": 4.0}, 0.5),
     ("feed-drag", {"contact__feed_drag_n": 1.5}, 0.8),  # each turn of the feed is felt before the pressure can follow
     ("thermal-span-drift", {"cell__span_per_k": 0.005}, 0.4),
+    ("sensor-quadratic", {"cell__quadratic_per_n": 0.002}, 0.4),
     ("sensor-cubic", {"cell__cubic_per_n2": 5.0e-5}, 0.45),
     ("valve-crosstalk", {"cell__crosstalk_n_per_v": 0.4}, 0.4),
     ("command-nonlinearity", {"regulator__command_s": 0.05}, 0.65),
