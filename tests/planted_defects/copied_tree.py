@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Final
 
@@ -14,6 +15,9 @@ from tests.planted_defects.defects import Defect
 
 ROOT: Final = Path(__file__).parents[2]
 _COPIED: Final = ("gateway", "profiles", "tests", "tools", "pyproject.toml", "README.md")
+_AGES: Final = count(2)
+"""Seconds, others for each defect: a compiled file counts as the source's by whole seconds and size, and two defects of a file
+may have one size."""
 _FAILED: Final = re.compile(r"^FAILED (\S+)", re.M)
 
 
@@ -37,7 +41,7 @@ def planted(tree: Path, defect: Defect) -> Iterator[None]:
         f"{defect.file}: the place of {defect.name!r} is there {sound.count(defect.before)} times"
     )
     file.write_text(sound.replace(defect.before, defect.after), encoding="utf-8")
-    os.utime(file, ns=(found.st_atime_ns, found.st_mtime_ns + 2_000_000_000))  # a compiled file tells by whole seconds
+    os.utime(file, ns=(found.st_atime_ns, found.st_mtime_ns + next(_AGES) * 1_000_000_000))
     try:
         yield
     finally:

@@ -335,7 +335,7 @@ DEFECTS = (
     Defect("the right token is told from those that are not looked at", "web/security.py",
            "if self.guesses.wait_s(address, now_s):", "if False:", ("web/test_token_guesses.py",)),
     Defect("0.7 in control_word enables over MQTT", "telemetry/mqtt/register_commands.py",
-           "        register.check_meant(value)\n", "", ("telemetry/mqtt/test_json_topics.py",)),
+           "            register.check_meant(value)\n", "", ("telemetry/mqtt/test_json_topics.py",)),
     Defect("the page answers to any name", "web/security.py",
            "if not access.admits_host(headers.get(\"host\", \"\")):", "if False:", ("web/test_guard.py",)),
     Defect("commands over MQTT are heard unasked", "profiles/telemetry_sections.py",

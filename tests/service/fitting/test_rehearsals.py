@@ -32,13 +32,12 @@ def real() -> Rig:
     return load_rig("irc5-cell")
 
 
-@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("name", "simulated", "made_on"),
     [
         ("irc5-cell", True, "irc5-cell (simulated)"),
-        ("irc5-cell", False, "irc5-cell"),
-        ("demo", True, "demo"),  # which is never anything else
+        pytest.param("irc5-cell", False, "irc5-cell", marks=pytest.mark.long),
+        pytest.param("demo", True, "demo", marks=pytest.mark.long),  # which is never anything else
     ],
 )
 def test_a_calibration_says_whether_its_devices_were_simulated(
