@@ -75,8 +75,8 @@ def _shake(simulation: "Simulation", event: Event) -> None:
             _freeze(simulation, event.numbers[0])
         simulation.service.stop_control(event.numbers[0])
         simulation.observer.history.awoken.append(simulation.clock.now_s + event.numbers[0])
+        simulation.observer.history.frozen.append(simulation.clock.now_s - simulation.period_s)
         if event.numbers[0] > simulation.observer.bounds.stall_s:
-            simulation.observer.history.frozen.append(simulation.clock.now_s - simulation.period_s)
             simulation._lose_control()
     elif event.what == "stop_guardian":
         _stop_guardian(simulation, event.numbers[0])

@@ -57,6 +57,8 @@ RUN_BIT, SELF_TEST = RUNS.values()
 RECORDED_EVERY, RECORDED = 8, 1
 """Of so many gateways one records from its start."""
 LOOK_S, READ_S = 0.02, 0.1
+FIRST_LOOK_S = 0.5
+"""When the gateway serves, and nothing has happened yet: at which calibration it begins with."""
 COMMAND_EVERY, FLOATS_EVERY, MOST_UNHEARD = 6, 16, 4
 FLOAT_STATUS = 232
 COMMAND_BLOCK, FLOAT_BLOCK = bytes((3, 2 * WORDS)), bytes((3, 4 * len(SCALES)))
@@ -152,7 +154,7 @@ class Simulation:
             ({"reader": self.reader} | self.masters | self.integrators)[name].badge = badge
         self.outside.call_later(LOOK_S, self._look)
         self.outside.call_later(READ_S, self._read_status)
-        self.outside.call_later(READ_S, self.integrator.watch)
+        self.outside.call_later(FIRST_LOOK_S, self.integrator.watch)
 
     def run(self, events: Iterable[Event], duration_s: float) -> Outcome:
         """Run the events, then heal everything, reset, and see the force come back."""

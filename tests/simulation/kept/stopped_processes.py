@@ -130,4 +130,21 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(3.8452, "machine", "freeze", (0.3,)),
         ],
     ),
+    (
+        47441,
+        [
+            Event(1.5677, "machine", "disk_hung", (0.0082, -642159.3754316008)),
+            Event(7.4335, "world", "sign-inverted", (1.0,)),
+            Event(8.6401, "machine", "stop", (0.1899, -746898.5645329833)),
+            Event(9.0286, "machine", "stop", (0.086, 0.0)),
+        ],
+    ),
+    (
+        48565,
+        [
+            Event(0.0097, "machine", "kill", (0.0408, -651298.7717601978)),
+            Event(0.7304, "person", "say", data=b'{"do": "calibration", "use": 2, "force": false}'),
+            Event(7.8913, "person", "say", data=b'{"do": "calibration", "use": 3}'),
+        ],
+    ),
 ]
