@@ -134,7 +134,8 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   !    FgModelArray FG_M_RISING_B,nRisingB;
   ! with  CONST num nRisingB{3}:=[0,20.5,60];
   ! fgUpload:=TRUE sends it, a part per cycle, and goes FALSE when it
-  ! is done: fgUploaded, or fgText says why not.
+  ! is done: fgUploaded, or fgText says why not. FALSE for two cycles
+  ! gives it up, unless it is committed already.
   ! The sums of a part may take longer than a lease: upload while
   ! nothing is enabled.
   PERS num fgSet{${set_words}}:=[${set_zeros}];
@@ -292,6 +293,8 @@ ${crc_table}];
     ELSE
       FgReadStatus;
     ENDIF
+    ! Taken back: the next one begins at the first part
+    IF NOT fgUpload nUploadStep:=0;
     IF fgUpload FgUploadPart;
   ERROR
     IF ERRNO=ERR_SOCK_TIMEOUT THEN
