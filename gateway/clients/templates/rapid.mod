@@ -621,15 +621,10 @@ ${crc_table}];
     IF NOT fgFault fgText:="self-test "+FgResultText(fgTest{FG_T_RESULT});
   ENDPROC
 
-  ! Does T_ROB1 ask for just that? Not behind a new fgForce of since
-  LOCAL FUNC bool FgIsAsked()
-    VAR bool bPulls;
-    IF FgIsTesting() OR (NOT fgEnable) OR (NOT FgIsOn()) RETURN FALSE;
-    IF bPullDenied OR bWordDenied RETURN FALSE;
-    IF NOT FgAreTaken(fgCommand) RETURN FALSE;
-    bPulls:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
-    IF fgPull<>bPulls RETURN FALSE;
-    RETURN Round(fgForce*${force_counts})=nGood{FG_C_FORCE_SETPOINT};
+  ! Does the gateway hold a force, and was nothing beside it refused?
+  LOCAL FUNC bool FgIsHeld()
+    IF FgIsTesting() OR (NOT FgIsOn()) RETURN FALSE;
+    RETURN NOT (bPullDenied OR bWordDenied);
   ENDFUNC
 
   ! Does the gateway hold these words? Three are not of fgCommand
@@ -664,16 +659,19 @@ ${crc_table}];
 
   LOCAL PROC FgDecode()
     VAR num nStatus;
+    VAR bool bPulls;
     VAR bool bOwn;
 ${status_decoding}
     nStatus:=nWords{FG_S_STATUS_WORD};
     fgEnabled:=FgHasBit(nStatus,FG_IS_ENABLED);
     fgReady:=FgHasBit(nStatus,FG_IS_READY);
-    bOwn:=FgHasBit(nStatus,FG_IS_IN_BAND) AND FgIsOwn();
-    ! T_ROB1 may set another fgForce meanwhile: asked for comes last
-    fgInBand:=bOwn AND FgIsAsked();
-    ! ... of several words nothing can be the last: it looks once more
-    IF NOT FgAreTaken(fgCommand) fgInBand:=FALSE;
+    bPulls:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
+    bOwn:=FgHasBit(nStatus,FG_IS_IN_BAND) AND FgIsOwn() AND FgIsHeld();
+    ! Does T_ROB1 ask for just that? In one instruction, for it may ask
+    ! for something else between any two
+    fgInBand:=bOwn AND fgEnable AND fgPull=bPulls
+      AND Round(fgForce*${force_counts})=nGood{FG_C_FORCE_SETPOINT}
+${words_are_taken};
     fgFault:=FgHasBit(nStatus,FG_HAS_FAULT);
   ENDPROC
 
