@@ -51,7 +51,7 @@ def _words_are_taken(table: ExchangeTable) -> str:
     first, count = table.command_span
     others = {table.at(name, "command").address for name in ("control_word", "force_setpoint", "heartbeat")}
     places = [k + 1 for k in range(count) if first + k not in others]
-    return "\n".join(f"      AND fgCommand{{{place}}}=nGood{{{place}}}" for place in places)
+    return "\n".join(f"      AND Round(fgCommand{{{place}}})=nGood{{{place}}}" for place in places)
 
 
 def _rows(numbers: list[int]) -> str:

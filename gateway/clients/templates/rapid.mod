@@ -314,8 +314,8 @@ ${crc_table}];
   ! From the PERS data to the words of the next write
   LOCAL PROC FgCollect()
     VAR num nCounts;
-    FgCheckCommand;
     nWant:=fgCommand;
+    FgCheckWords;
     nWant{FG_C_CONTROL_WORD}:=0;
     nWant{FG_C_HEARTBEAT}:=0;
     nWant{FG_C_FORCE_SETPOINT}:=0;
@@ -418,17 +418,19 @@ ${crc_table}];
     RETURN FgMayEnable();
   ENDFUNC
 
-  ! PackRawBytes takes whole numbers of 16 bits only
-  LOCAL PROC FgCheckCommand()
+  ! PackRawBytes takes whole numbers of 16 bits only: of nWant, not of
+  ! fgCommand, where T_ROB1 may set the next one meanwhile
+  LOCAL PROC FgCheckWords()
     VAR num nCounts;
     FOR i FROM 1 TO COMMAND_WORDS DO
-      nCounts:=fgCommand{i};
+      nCounts:=nWant{i};
       IF nCounts<-32768 OR nCounts>65535 THEN
         fgText:="fgCommand, place "+NumToStr(i,0)+": allowed -32768 .. 65535";
         bWordDenied:=TRUE;
-        fgCommand{i}:=nGood{i};
-      ELSEIF nCounts<>Round(nCounts) THEN
-        fgCommand{i}:=Round(nCounts);
+        nWant{i}:=nGood{i};
+        IF fgCommand{i}=nCounts fgCommand{i}:=nGood{i};
+      ELSE
+        nWant{i}:=Round(nCounts);
       ENDIF
     ENDFOR
   ENDPROC
@@ -561,7 +563,7 @@ ${crc_table}];
     IF NOT bKeeps THEN
       IF NOT FgAreTaken(nWant) bWordDenied:=TRUE;
       FOR i FROM 1 TO COMMAND_WORDS DO
-        IF fgCommand{i}=nWant{i} fgCommand{i}:=nGood{i};
+        IF Round(fgCommand{i})=nWant{i} fgCommand{i}:=nGood{i};
       ENDFOR
     ENDIF
     nWant:=nGood;
