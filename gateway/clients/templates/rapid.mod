@@ -205,6 +205,9 @@ ${crc_table}];
   LOCAL VAR num nGood{${command_words}};
   LOCAL VAR num nWords{${status_words}};
   LOCAL VAR num nUploadStep:=0;
+  ! What is sent: fgSet and fgSlot as they were at its begin
+  LOCAL VAR num nSet{${set_words}};
+  LOCAL VAR num nSlot:=0;
   LOCAL VAR dnum dnCrc:=0;
 
   ! =================== how the cycle is driven =======================
@@ -853,15 +856,15 @@ ${words_are_taken};
     RETURN nCounts;
   ENDFUNC
 
-  ! FC16 of words nFrom .. nFrom+nCount-1 of fgSet
+  ! FC16 of words nFrom .. nFrom+nCount-1 of nSet
   LOCAL PROC FgFrameSet(num nFirst,num nFrom,num nCount)
     FgBegin 16,6+2*nCount;
     FgPutWord nFirst;
     FgPutWord nCount;
     FgPutByte 2*nCount;
     FOR i FROM nFrom TO nFrom+nCount-1 DO
-      FgPutWord fgSet{i};
-      FgCrcWord fgSet{i};
+      FgPutWord nSet{i};
+      FgCrcWord nSet{i};
     ENDFOR
   ENDPROC
 
@@ -877,7 +880,7 @@ ${words_are_taken};
     FgPutWord 0;
     FgPutWord DnumToNum(dnValue DIV 65536);
     FgPutWord DnumToNum(dnValue MOD 65536);
-    FgPutWord fgSlot;
+    FgPutWord nSlot;
   ENDPROC
 
   ! FC16 of the commit word: 1 commits
@@ -921,9 +924,13 @@ ${words_are_taken};
 
   ! A request per cycle, so that the heartbeat goes on meanwhile
   LOCAL PROC FgUploadPart()
-    IF nUploadStep<4 AND (NOT FgSetFits()) THEN
-      FgUploadEnd FALSE;
-      RETURN;
+    IF nUploadStep=0 THEN
+      nSet:=fgSet;
+      nSlot:=fgSlot;
+      IF NOT FgSetFits() THEN
+        FgUploadEnd FALSE;
+        RETURN;
+      ENDIF
     ENDIF
     TEST nUploadStep
     CASE 0:
@@ -954,13 +961,13 @@ ${words_are_taken};
   ! force with it
   LOCAL FUNC bool FgSetFits()
     FOR i FROM 1 TO ${set_words} DO
-      IF NOT FgIsWord(fgSet{i}) THEN
+      IF NOT FgIsWord(nSet{i}) THEN
         fgText:="fgSet, place "+NumToStr(i,0)+": allowed 0 .. 65535, whole";
         RETURN FALSE;
       ENDIF
     ENDFOR
-    IF NOT FgIsWord(fgSlot) fgText:="fgSlot: allowed 0 .. 7, whole";
-    RETURN FgIsWord(fgSlot);
+    IF NOT FgIsWord(nSlot) fgText:="fgSlot: allowed 0 .. 7, whole";
+    RETURN FgIsWord(nSlot);
   ENDFUNC
 
   LOCAL FUNC bool FgIsWord(num nValue)
