@@ -229,3 +229,21 @@ def test_a_block_shows_nothing_stale_behind_a_loss_and_tries_soon_each_time(
     count = len(gateway.requests)
     client.cycle(0.6)
     assert len(gateway.requests) > count, "the pause begins anew with each loss"
+
+
+@pytest.mark.parametrize("parts", range(1, 6))
+def test_an_upload_that_a_robot_s_program_took_back_is_no_part_of_its_next_one(
+    parts: int, gateway: GatewayAtHand
+) -> None:
+    """The next one went on where that had stopped: half of each set was committed, with a CRC-32 that was right, or none of
+    the second, and the program read that it was uploaded."""
+    robot = CONTROLLERS["rapid"](TEXTS["rapid"], gateway)
+    robot.begin_upload(MODEL | {"rising_b": [0.0, 25.0, 60.1]}, 2)
+    cycles(robot, parts)
+    robot.set(fgUpload=False)
+    cycles(robot, 1)
+    count = len(gateway.uploads)
+    assert count == parts and not robot.uploaded
+    robot.begin_upload(MODEL, 3)
+    cycles(robot, 8)
+    assert robot.uploaded and [address for address, _ in gateway.uploads[count:]] == [1000, 1070, 1150, 1140, 1145]

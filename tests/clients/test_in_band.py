@@ -275,7 +275,7 @@ def test_a_word_without_16_bits_beside_an_enable_is_told_and_not_in_band(languag
 
 @pytest.mark.parametrize("language", ["rapid", "urscript"])
 def test_a_new_word_beside_an_exchange_is_not_in_band_because_the_old_one_was(language: str) -> None:
-    """Whatever the other task is doing at that moment. RAPID has words but one by one: it may say so for some instructions."""
+    """Whatever the other task is doing at that moment."""
     seen: list[bool] = []
 
     def look(client: Any) -> None:
@@ -288,7 +288,7 @@ def test_a_new_word_beside_an_exchange_is_not_in_band_because_the_old_one_was(la
         answer = gateway.answer
         gateway.answer = lambda request: look(client) or answer(request)  # type: ignore[method-assign, func-returns-value]
 
-    acts = [lambda client: set_voltage(client, 3000), *[look] * (400 if language == "urscript" else 0)]
+    acts = [lambda client: set_voltage(client, 3000), *[look] * 400]
     for client, gateway in every_place(language, prepare, acts):
         assert in_band(client) and gateway.bank.command.voltage_setpoint_v == 3.0
     assert len(seen) > 100 and not any(seen)

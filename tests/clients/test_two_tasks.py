@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -227,3 +228,29 @@ def test_a_program_that_stands_right_behind_its_enable_begins_nothing_and_one_th
     client.serve(130, stand_but_from_the_60th_to_the_80th_pause)
     assert told[58] and told[-1]
     assert not any(held[:60]) and all(held[62:80]) and not any(held[95:]), held
+
+
+@pytest.mark.parametrize("before", [900, 900.4, 70000])
+@pytest.mark.parametrize("given", [600, 600.4, 70000])
+def test_a_word_that_is_set_beside_an_exchange_is_the_one_that_is_sent_and_costs_no_force(
+    before: float, given: float
+) -> None:
+    """A tilt angle of 123.4 counts, set ten times a second: one that came between the look at the words and their copy ended
+    the connection, and each one after it, for the OFF went out with that word. One that was set beside the rounding of the
+    last one was lost, and in band was said of that."""
+
+    def set_word(client: Any, counts: float) -> None:
+        client.get("fgCommand")[client.get("FG_C_TILT_ANGLE") - 1] = counts
+
+    def prepare(client: Any, _gateway: GatewayAtHand) -> None:
+        client.enable(12.0)
+        cycles(client, 2)
+        set_word(client, 300)
+        cycles(client, 2)
+        set_word(client, before)
+
+    for client, gateway in every_place("rapid", prepare, [lambda client: set_word(client, given)]):
+        assert client.enabled and not client.ended and not client.said, client.text
+        is_taken = gateway.bank.command.tilt_angle_rad == pytest.approx(math.radians(60))
+        assert is_taken or (max(before, given) > 65535 and "allowed -32768 .. 65535" in client.text)
+        assert client.get("fgInBand") is is_taken

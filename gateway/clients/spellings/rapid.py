@@ -23,6 +23,7 @@ def spell_rapid(table: ExchangeTable) -> dict[str, str]:
         "bit_constants": "\n".join(map(_constants, (control, shown, commit))),
         "crc_table": _rows(crc_table(4)),
         "status_decoding": "\n".join(_decode(register, status_first) for register in table.status),
+        "words_are_taken": _words_are_taken(table),
         "fault_cases": _cases(table.texts("fault_code")),
         "refusal_cases": _cases(table.texts("refusal_reason")),
         "warning_cases": _cases(table.texts("warning_word")),
@@ -43,6 +44,14 @@ def _zeros(count: int) -> str:
 
 def _constants(numbers: dict[str, int]) -> str:
     return "\n".join(f"  CONST num {name.upper()}:={number};" for name, number in numbers.items())
+
+
+def _words_are_taken(table: ExchangeTable) -> str:
+    """Return the rest of a condition: each word that T_ROB1 sets by its place is the one that the gateway holds."""
+    first, count = table.command_span
+    others = {table.at(name, "command").address for name in ("control_word", "force_setpoint", "heartbeat")}
+    places = [k + 1 for k in range(count) if first + k not in others]
+    return "\n".join(f"      AND Round(fgCommand{{{place}}})=nGood{{{place}}}" for place in places)
 
 
 def _rows(numbers: list[int]) -> str:

@@ -134,7 +134,8 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   !    FgModelArray FG_M_RISING_B,nRisingB;
   ! with  CONST num nRisingB{3}:=[0,20.5,60];
   ! fgUpload:=TRUE sends it, a part per cycle, and goes FALSE when it
-  ! is done: fgUploaded, or fgText says why not.
+  ! is done: fgUploaded, or fgText says why not. FALSE for two cycles
+  ! gives it up, unless it is committed already.
   ! The sums of a part may take longer than a lease: upload while
   ! nothing is enabled.
   PERS num fgSet{${set_words}}:=[${set_zeros}];
@@ -204,6 +205,9 @@ ${crc_table}];
   LOCAL VAR num nGood{${command_words}};
   LOCAL VAR num nWords{${status_words}};
   LOCAL VAR num nUploadStep:=0;
+  ! What is sent: fgSet and fgSlot as they were at its begin
+  LOCAL VAR num nSet{${set_words}};
+  LOCAL VAR num nSlot:=0;
   LOCAL VAR dnum dnCrc:=0;
 
   ! =================== how the cycle is driven =======================
@@ -292,6 +296,8 @@ ${crc_table}];
     ELSE
       FgReadStatus;
     ENDIF
+    ! Taken back: the next one begins at the first part
+    IF NOT fgUpload nUploadStep:=0;
     IF fgUpload FgUploadPart;
   ERROR
     IF ERRNO=ERR_SOCK_TIMEOUT THEN
@@ -311,8 +317,8 @@ ${crc_table}];
   ! From the PERS data to the words of the next write
   LOCAL PROC FgCollect()
     VAR num nCounts;
-    FgCheckCommand;
     nWant:=fgCommand;
+    FgCheckWords;
     nWant{FG_C_CONTROL_WORD}:=0;
     nWant{FG_C_HEARTBEAT}:=0;
     nWant{FG_C_FORCE_SETPOINT}:=0;
@@ -415,17 +421,19 @@ ${crc_table}];
     RETURN FgMayEnable();
   ENDFUNC
 
-  ! PackRawBytes takes whole numbers of 16 bits only
-  LOCAL PROC FgCheckCommand()
+  ! PackRawBytes takes whole numbers of 16 bits only: of nWant, not of
+  ! fgCommand, where T_ROB1 may set the next one meanwhile
+  LOCAL PROC FgCheckWords()
     VAR num nCounts;
     FOR i FROM 1 TO COMMAND_WORDS DO
-      nCounts:=fgCommand{i};
+      nCounts:=nWant{i};
       IF nCounts<-32768 OR nCounts>65535 THEN
         fgText:="fgCommand, place "+NumToStr(i,0)+": allowed -32768 .. 65535";
         bWordDenied:=TRUE;
-        fgCommand{i}:=nGood{i};
-      ELSEIF nCounts<>Round(nCounts) THEN
-        fgCommand{i}:=Round(nCounts);
+        nWant{i}:=nGood{i};
+        IF fgCommand{i}=nCounts fgCommand{i}:=nGood{i};
+      ELSE
+        nWant{i}:=Round(nCounts);
       ENDIF
     ENDFOR
   ENDPROC
@@ -558,7 +566,7 @@ ${crc_table}];
     IF NOT bKeeps THEN
       IF NOT FgAreTaken(nWant) bWordDenied:=TRUE;
       FOR i FROM 1 TO COMMAND_WORDS DO
-        IF fgCommand{i}=nWant{i} fgCommand{i}:=nGood{i};
+        IF Round(fgCommand{i})=nWant{i} fgCommand{i}:=nGood{i};
       ENDFOR
     ENDIF
     nWant:=nGood;
@@ -618,15 +626,10 @@ ${crc_table}];
     IF NOT fgFault fgText:="self-test "+FgResultText(fgTest{FG_T_RESULT});
   ENDPROC
 
-  ! Does T_ROB1 ask for just that? Not behind a new fgForce of since
-  LOCAL FUNC bool FgIsAsked()
-    VAR bool bPulls;
-    IF FgIsTesting() OR (NOT fgEnable) OR (NOT FgIsOn()) RETURN FALSE;
-    IF bPullDenied OR bWordDenied RETURN FALSE;
-    IF NOT FgAreTaken(fgCommand) RETURN FALSE;
-    bPulls:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
-    IF fgPull<>bPulls RETURN FALSE;
-    RETURN Round(fgForce*${force_counts})=nGood{FG_C_FORCE_SETPOINT};
+  ! Does the gateway hold a force, and was nothing beside it refused?
+  LOCAL FUNC bool FgIsHeld()
+    IF FgIsTesting() OR (NOT FgIsOn()) RETURN FALSE;
+    RETURN NOT (bPullDenied OR bWordDenied);
   ENDFUNC
 
   ! Does the gateway hold these words? Three are not of fgCommand
@@ -661,16 +664,19 @@ ${crc_table}];
 
   LOCAL PROC FgDecode()
     VAR num nStatus;
+    VAR bool bPulls;
     VAR bool bOwn;
 ${status_decoding}
     nStatus:=nWords{FG_S_STATUS_WORD};
     fgEnabled:=FgHasBit(nStatus,FG_IS_ENABLED);
     fgReady:=FgHasBit(nStatus,FG_IS_READY);
-    bOwn:=FgHasBit(nStatus,FG_IS_IN_BAND) AND FgIsOwn();
-    ! T_ROB1 may set another fgForce meanwhile: asked for comes last
-    fgInBand:=bOwn AND FgIsAsked();
-    ! ... of several words nothing can be the last: it looks once more
-    IF NOT FgAreTaken(fgCommand) fgInBand:=FALSE;
+    bPulls:=FgHasBit(nGood{FG_C_CONTROL_WORD},FG_VALVE_PULL);
+    bOwn:=FgHasBit(nStatus,FG_IS_IN_BAND) AND FgIsOwn() AND FgIsHeld();
+    ! Does T_ROB1 ask for just that? In one instruction, for it may ask
+    ! for something else between any two
+    fgInBand:=bOwn AND fgEnable AND fgPull=bPulls
+      AND Round(fgForce*${force_counts})=nGood{FG_C_FORCE_SETPOINT}
+${words_are_taken};
     fgFault:=FgHasBit(nStatus,FG_HAS_FAULT);
   ENDPROC
 
@@ -850,15 +856,15 @@ ${status_decoding}
     RETURN nCounts;
   ENDFUNC
 
-  ! FC16 of words nFrom .. nFrom+nCount-1 of fgSet
+  ! FC16 of words nFrom .. nFrom+nCount-1 of nSet
   LOCAL PROC FgFrameSet(num nFirst,num nFrom,num nCount)
     FgBegin 16,6+2*nCount;
     FgPutWord nFirst;
     FgPutWord nCount;
     FgPutByte 2*nCount;
     FOR i FROM nFrom TO nFrom+nCount-1 DO
-      FgPutWord fgSet{i};
-      FgCrcWord fgSet{i};
+      FgPutWord nSet{i};
+      FgCrcWord nSet{i};
     ENDFOR
   ENDPROC
 
@@ -874,7 +880,7 @@ ${status_decoding}
     FgPutWord 0;
     FgPutWord DnumToNum(dnValue DIV 65536);
     FgPutWord DnumToNum(dnValue MOD 65536);
-    FgPutWord fgSlot;
+    FgPutWord nSlot;
   ENDPROC
 
   ! FC16 of the commit word: 1 commits
@@ -918,9 +924,13 @@ ${status_decoding}
 
   ! A request per cycle, so that the heartbeat goes on meanwhile
   LOCAL PROC FgUploadPart()
-    IF nUploadStep<4 AND (NOT FgSetFits()) THEN
-      FgUploadEnd FALSE;
-      RETURN;
+    IF nUploadStep=0 THEN
+      nSet:=fgSet;
+      nSlot:=fgSlot;
+      IF NOT FgSetFits() THEN
+        FgUploadEnd FALSE;
+        RETURN;
+      ENDIF
     ENDIF
     TEST nUploadStep
     CASE 0:
@@ -951,13 +961,13 @@ ${status_decoding}
   ! force with it
   LOCAL FUNC bool FgSetFits()
     FOR i FROM 1 TO ${set_words} DO
-      IF NOT FgIsWord(fgSet{i}) THEN
+      IF NOT FgIsWord(nSet{i}) THEN
         fgText:="fgSet, place "+NumToStr(i,0)+": allowed 0 .. 65535, whole";
         RETURN FALSE;
       ENDIF
     ENDFOR
-    IF NOT FgIsWord(fgSlot) fgText:="fgSlot: allowed 0 .. 7, whole";
-    RETURN FgIsWord(fgSlot);
+    IF NOT FgIsWord(nSlot) fgText:="fgSlot: allowed 0 .. 7, whole";
+    RETURN FgIsWord(nSlot);
   ENDFUNC
 
   LOCAL FUNC bool FgIsWord(num nValue)
