@@ -8,13 +8,15 @@ samples finds a cell sooner without more false alarms. The first of the n was al
 (n - 1) / r after it has frozen, when the nth is read. Seconds until then, by this law and frozen_s = 0.5:
 
     noise in counts    0.3    0.4    0.5    0.7    0.86   1.0    1.5    3.0
-    at  10 samples/s   15     6.6    4.2    2.5    2.0    1.7    1.2    0.9
-    at  25 samples/s   6.3    2.8    1.8    1.1    0.84   0.72   0.52   0.5
+    at  10 samples/s          6.6    4.2    2.5    2.0    1.7    1.2    0.9
+    at  25 samples/s          2.8    1.8    1.1    0.84   0.72   0.52   0.5
     at  80 samples/s   2.1    0.94   0.6    0.5    0.5    0.5    0.5    0.5
     at 100 samples/s   1.7    0.76   0.5    0.5    0.5    0.5    0.5    0.5
 
-Below FEWEST_COUNTS nothing is concluded: the spread of such noise cannot be told from readings of one or two counts, and
-the cell is never found frozen while the force stands still. A finer count, a faster rate or a weaker filter is the cure.
+Below `fewest_counts` nothing is concluded: the spread of such noise cannot be told from readings of one or two counts, and
+the cell is never found frozen while the force stands still. (Of slow cells they are more: as many samples see more of a force
+that wanders, and behind an hour the noise of 0.3 counts looked large enough to make four false alarms of one.) A finer count,
+a faster rate or a weaker filter is the cure.
 repeated_readings learns s from samples, and is careful as long as they are few: from 0.4 counts up the law holds behind
 800 samples to one sample in ten; at 0.3 counts a cell is mostly not found.
 """
@@ -25,6 +27,8 @@ from typing import Final
 FALSE_ALARM_S: Final = 3.6e6  # 1000 h of holding
 FEWEST_EQUAL: Final = 10
 FEWEST_COUNTS: Final = 0.28
+FEWEST_COUNTS_OF_SLOW: Final = 0.32
+FAST_HZ: Final = 80.0
 _NEAR: Final = 1.01  # for a derivative
 MOST_COUNTS: Final = 50.0  # what is read of more noise no cell says twice
 LONGEST_RUNS: Final = 3  # of a run that the law does not explain
@@ -41,12 +45,17 @@ def stays(counts: float) -> float:
     return erf(0.5 / (sqrt(2.0) * counts)) if counts > 0.0 else 1.0
 
 
+def fewest_counts(rate_hz: float) -> float:
+    """Return the least noise, in counts, of which anything is concluded at so many samples/s."""
+    return FEWEST_COUNTS if rate_hz >= FAST_HZ else FEWEST_COUNTS_OF_SLOW
+
+
 def equal_samples(counts: float, rate_hz: float, independent: float = 1.0) -> float:
     """Return how many equal samples in a row are a false alarm once in FALSE_ALARM_S; inf where noise shows too seldom.
 
     independent: share of the samples that are new ones.
     """
-    if not counts >= FEWEST_COUNTS or independent <= 0.0:
+    if not counts >= fewest_counts(rate_hz) or independent <= 0.0:
         return inf
     stay = stays(counts)
     seldom = log(FALSE_ALARM_S * rate_hz * (1.0 - stay)) / -log(stay)
@@ -59,7 +68,7 @@ def careful_counts(counts: float, error: float, rate_hz: float) -> float:
     A limit of S / -ln(stay) samples, S the logarithm of the samples without a false alarm, makes exp((S g e)^2 / 2) times as
     many on average, g being how fast ln(stay) goes with the noise. Noise smaller by S g e^2 / 2 makes up for that.
     """
-    if not counts >= FEWEST_COUNTS:
+    if not counts >= fewest_counts(rate_hz):
         return counts
     slope = log(log(stays(counts / _NEAR)) / log(stays(counts * _NEAR))) / (-2.0 * log(_NEAR))
     return counts * max(0.0, 1.0 - 0.5 * log(FALSE_ALARM_S * rate_hz) * slope * error * error)
@@ -76,7 +85,7 @@ def counts_found_within(bound_s: float, rate_hz: float) -> float:
 
     A sample early by the law, because the noise is learned and not known.
     """
-    low, high, bound_s = FEWEST_COUNTS, MOST_COUNTS, bound_s - 1.0 / rate_hz
+    low, high, bound_s = fewest_counts(rate_hz), MOST_COUNTS, bound_s - 1.0 / rate_hz
     if seconds_to_find(high, rate_hz, 0.0) > bound_s:
         return inf
     for _ in range(40):

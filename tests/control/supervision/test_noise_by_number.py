@@ -113,7 +113,7 @@ def test_a_window_in_which_the_force_moved_is_left_out() -> None:
     assert pool.windows == 0
 
 
-@pytest.mark.parametrize(("counts", "rate_hz"), [(0.3, 10.0), (0.5, 100.0), (1.0, 25.0)])
+@pytest.mark.parametrize(("counts", "rate_hz"), [(0.3, 100.0), (0.4, 10.0), (0.5, 100.0), (1.0, 25.0)])
 def test_so_many_equal_samples_are_one_false_alarm_in_the_time_that_is_allowed(counts: float, rate_hz: float) -> None:
     stay, samples = stays(counts), equal_samples(counts, rate_hz)
     assert stay == pytest.approx(erf(0.5 / (sqrt(2.0) * counts)))
@@ -123,13 +123,14 @@ def test_so_many_equal_samples_are_one_false_alarm_in_the_time_that_is_allowed(c
 
 def test_a_noise_that_shows_too_seldom_proves_nothing_and_ten_samples_are_the_fewest() -> None:
     assert [equal_samples(counts, 10.0) for counts in (0.279, 0.0, nan)] == [inf] * 3
-    assert equal_samples(1.0, 10.0, 0.0) == inf and equal_samples(0.28, 10.0) < inf
+    assert equal_samples(1.0, 10.0, 0.0) == inf and equal_samples(0.28, 100.0) < inf
+    assert equal_samples(0.3, 25.0) == inf and equal_samples(0.32, 25.0) < inf
     assert equal_samples(40.0, 10.0) == 10.0 and stays(0.0) == 1.0
 
 
 @pytest.mark.parametrize(
     ("counts", "rate_hz", "seconds"),
-    [(0.3, 10, 15), (0.5, 10, 4.2), (1.0, 10, 1.7), (0.3, 25, 6.3), (0.7, 25, 1.1), (0.4, 80, 0.94), (3.0, 100, 0.5)],
+    [(0.3, 80, 2.1), (0.5, 10, 4.2), (1.0, 10, 1.7), (0.4, 25, 2.8), (0.7, 25, 1.1), (0.4, 80, 0.94), (3.0, 100, 0.5)],
 )
 def test_the_table_of_the_law_is_what_the_law_gives(counts: float, rate_hz: float, seconds: float) -> None:
     assert seconds_to_find(counts, rate_hz, 0.5) == pytest.approx(seconds, rel=0.05)
