@@ -279,9 +279,8 @@ class Controller:
             self._machine.fail(now_s, cause)
         elif self._goes_on_alone or not self._commands.is_lease_lost(now_s, line.owner_connected):
             self._machine.is_master_lost = self._machine.is_master_lost and self._machine.is_ramping_down
-        elif not self._machine.is_master_lost:
-            lost = self._commands.lost_sentence(now_s, line)
-            self._machine.lose_master(now_s, lost, self._settings.supervision.lease_action)
+        else:
+            self._machine.miss_master(now_s, line, self._settings.supervision.lease_action)
 
     @property
     def _goes_on_alone(self) -> bool:

@@ -57,6 +57,7 @@ class Transitions:
         self.is_ramping_down = False  # the force is on its way to 0, and then off
         self.is_stopping = False  # and it stays off then
         self.is_master_lost = False
+        self._unbeaten = 0  # number of the last command that came while no master beat
         self.is_restarted = is_restarted  # and nobody has acknowledged that
         self.outcome = StepOutcome()  # what the present step wants besides the voltage
         self.parts = parts
@@ -139,6 +140,16 @@ class Transitions:
         self.fire(StateEvent.RESET)
         self.tell(f"fault {self.fault.name} reset by {self.parts.commands.who}")
         self.fault, self.is_restarted = FaultCode.NONE, False
+
+    def miss_master(self, now_s: float, line: LineStatus, action: LeaseAction) -> None:
+        """Act where no master's heartbeat keeps the output on. Of a force that is held meanwhile nobody is the owner: who
+        writes without a beat, once or the same on and on, would keep out the master that comes back."""
+        commands, before = self.parts.commands, self._unbeaten
+        self._unbeaten = commands.command.number
+        if not self.is_master_lost:
+            self.lose_master(now_s, commands.lost_sentence(now_s, line), action)
+        elif before != self._unbeaten and not self.is_ramping_down:
+            self.outcome.release_owner = True
 
     def lose_master(self, now_s: float, observation: str, action: LeaseAction) -> None:
         """Act as the rig says where the lease is over. observation: how it was noticed."""

@@ -9,7 +9,7 @@ from gateway.control import LeaseAction
 from gateway.control.settings import SelfTestSettings
 from gateway.registers.words import State
 from tests.control.bench import settings
-from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, SmallRig
+from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, OWNER, SmallRig
 
 LEASE_S, CYCLE_S = 0.35, 0.1
 RESET, SELF_TEST = 1 << 1, 1 << 6
@@ -62,3 +62,21 @@ def test_a_fault_that_another_master_resets_lets_no_frame_of_before_press_again(
     assert all(volts == 0.0 for _, volts, _ in rig.trace[-200:])
     refused = rig.answer(0, *frame)
     assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+
+
+def test_of_a_force_that_is_held_for_a_lost_master_nobody_is_the_owner() -> None:
+    """Neither who stands still and sends its last frame on and on, nor who writes once and leaves: they kept the others out."""
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD))
+    frame = rig.block(ENABLE, 12.0, beat=7)
+    rig.write(0, *frame)
+    rig.beats = False
+    for _ in range(10):
+        rig.run(CYCLE_S).write(0, *frame)
+    assert rig.bank.owner is None
+    rig.write(1, 1300, peer=OTHER)
+    rig.run(1.0)
+    assert rig.state is State.HOLDING and rig.bank.owner is None
+    rig.write(0, *frame[:4], 8, *frame[5:])
+    assert rig.bank.owner == OWNER.host, "who beats owns"
+    refused = rig.answer(1, 1300, peer=OTHER)
+    assert refused and refused.reason is RefusalReason.NOT_OWNER
