@@ -1,12 +1,10 @@
-"""What registers and notes say of the two watchdogs below control, the guardian and the output device's own; and whether that
-one may be let go."""
+"""What registers and notes say of the two watchdogs below control: the guardian, and the output device's own."""
 
 from collections.abc import Callable
 from typing import Final
 
 from gateway.control.inputs import LineStatus
 from gateway.control.supervision.fault_detection import line_words
-from gateway.control.supervision.safe_voltage import NEAR_V
 from gateway.profiles import Rig
 from gateway.registers.words import WatchdogBit
 from gateway.service.running_rig.lines.cell_identity import CellIdentity
@@ -39,7 +37,7 @@ class WatchdogRegister:
     accepts that. show: writes the register."""
 
     def __init__(self, line: OutputExchange, show: Callable[[int], None], log: Callable[[str, str], None]) -> None:
-        self._line, self._checks, self._show, self._log = line, line.checks, show, log
+        self._checks, self._show, self._log = line.checks, show, log
         self._shown, self._told = -1, 0
         self._is_unarmed_told = False
 
@@ -55,12 +53,6 @@ class WatchdogRegister:
             self._log("device", f"{_UNARMED}: {self._checks.unarmed}")
         # a port that is opened again asks anew: told again only once it has been armed
         self._is_unarmed_told = (self._is_unarmed_told or bool(self._checks.unarmed)) and not self._checks.is_armed
-
-    def choose_last_frame(self, last_frame: bytes, rest_v: float) -> bytes:
-        """Return the last frame, which lets the device's watchdog go; none where the safe voltage rest_v does not surely stand:
-        were the safe frame lost then, nobody else would take away what presses."""
-        stands_v = self._line.standing_v
-        return last_frame if stands_v is not None and abs(stands_v - rest_v) <= NEAR_V else b""
 
 
 def device_fault_note(checks: DeviceChecks | CellIdentity) -> str:
