@@ -80,3 +80,28 @@ def test_of_a_force_that_is_held_for_a_lost_master_nobody_is_the_owner() -> None
     assert rig.bank.owner == OWNER.host, "who beats owns"
     refused = rig.answer(1, 1300, peer=OTHER)
     assert refused and refused.reason is RefusalReason.NOT_OWNER
+
+
+@pytest.mark.parametrize("lost", ["waiting for contact", "on a ramp", "and its contact behind it"])
+def test_a_force_that_is_held_for_a_lost_master_does_not_rise(lost: str) -> None:
+    """Who comes to see why the machine stands touched the tool, and it pressed with the setpoint of a master that was gone."""
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD), contact=not lost.startswith("waiting"))
+    frame = rig.block(ENABLE, 30.0, beat=7)
+    ramp = 100 if lost == "on a ramp" else 0  # 10 N/s
+    frame = (*frame[:2], ramp, *frame[3:])
+    rig.write(0, *frame)
+    rig.run(1.0)
+    rig.beats = False
+    rig.run(LEASE_S + 0.1)
+    if lost.startswith("and"):
+        assert rig.plant.force_n > 28.0, "what is held is held"
+        rig.plant.contact = False
+        rig.run(1.0)
+    held_n = 0.0 if not rig.plant.contact else rig.plant.force_n
+    rig.plant.contact = True
+    rig.run(2.0)
+    assert rig.plant.force_n < max(5.0, held_n + 1.0)
+    rig.write(0, *frame[:4], 4711, *frame[5:])
+    rig.beats = True
+    rig.run(4.0)
+    assert rig.plant.force_n > 28.0, "its master is back"
