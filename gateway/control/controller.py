@@ -279,9 +279,8 @@ class Controller:
             self._machine.fail(now_s, cause)
         elif self._goes_on_alone or not self._commands.is_lease_lost(now_s, line.owner_connected):
             self._machine.is_master_lost = self._machine.is_master_lost and self._machine.is_ramping_down
-        elif not self._machine.is_master_lost:
-            lost = self._commands.lost_sentence(now_s, line)
-            self._machine.lose_master(now_s, lost, self._settings.supervision.lease_action)
+        else:
+            self._machine.miss_master(now_s, line, self._settings.supervision.lease_action)
 
     @property
     def _goes_on_alone(self) -> bool:
@@ -291,7 +290,8 @@ class Controller:
     def _target(self) -> Demand:
         """What to go for now: the command's demand, or on a ramp down 0 N, within the time whatever the force is."""
         is_to_zero = self._machine.is_ramping_down or (self._valve is not None and self._valve.is_switching)
-        return ramp_down_demand(self._commands.demand, self._settings) if is_to_zero else self._commands.demand
+        demand = self._machine.hold(self._commands.demand)
+        return ramp_down_demand(demand, self._settings) if is_to_zero else demand
 
     def _move(self, now_s: float, dt_s: float) -> None:
         if self._machine.state is _RUNNING:

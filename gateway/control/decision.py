@@ -97,7 +97,7 @@ class OutputComposer:
         machine, run = self._machine, self._parts.run
         if not machine.is_enabled:
             return 0.0
-        return run.target_n or (0.0 if machine.is_ramping_down else self._parts.commands.demand.force_n)
+        return run.target_n or (0.0 if machine.is_ramping_down else machine.hold(self._parts.commands.demand).force_n)
 
     def _status(self, touching: bool, *, is_ready: bool, is_warning: bool) -> StatusBit:
         machine, loop = self._machine, self._parts.loop

@@ -166,6 +166,8 @@ class EdgeCheck:
         if at.state in ENABLED_STATES and (at.applied_n > 0.0 or not at.is_lowest):
             applied = f"{at.applied_n:.1f} N are applied, " if at.applied_n > 0.0 else ""
             return f"{applied}{at.voltage_v:.2f} V are out: disable the output or set the force to 0 first"
+        if at.stall_words:
+            return at.stall_words
         if not at.is_output_known:
             return f"{at.line_fault or 'the output does not answer'}: {_UNKNOWN}"
         if not at.reading.is_fresh:

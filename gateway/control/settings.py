@@ -92,7 +92,7 @@ class LeaseAction(StrEnum):
     """Action when the master is lost."""
 
     FAULT = "fault"  # safe voltage at once, latched
-    HOLD = "hold"  # keep the last setpoint, raise a warning
+    HOLD = "hold"  # keep what is applied of the last setpoint, raise a warning
     RAMP = "ramp"  # ramp to 0 N, then off
 
 

@@ -8,6 +8,7 @@ from math import inf
 
 from gateway.codes.faults import FaultCode
 from gateway.control.command_edges import CommandTracker
+from gateway.control.demand import Demand
 from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.inputs import LineStatus
 from gateway.control.messages import fault_sentence
@@ -57,6 +58,8 @@ class Transitions:
         self.is_ramping_down = False  # the force is on its way to 0, and then off
         self.is_stopping = False  # and it stays off then
         self.is_master_lost = False
+        self._unbeaten = 0  # number of the last command that came while no master beat
+        self._lost_setpoint_n = self._held_n = 0.0  # of a lost master, and how much of it is held
         self.is_restarted = is_restarted  # and nobody has acknowledged that
         self.outcome = StepOutcome()  # what the present step wants besides the voltage
         self.parts = parts
@@ -140,6 +143,26 @@ class Transitions:
         self.tell(f"fault {self.fault.name} reset by {self.parts.commands.who}")
         self.fault, self.is_restarted = FaultCode.NONE, False
 
+    def miss_master(self, now_s: float, line: LineStatus, action: LeaseAction) -> None:
+        """Act where no master's heartbeat keeps the output on. Of a force that is held meanwhile nobody is the owner: who
+        writes without a beat, once or the same on and on, would keep out the master that comes back."""
+        commands, before = self.parts.commands, self._unbeaten
+        self._unbeaten = commands.command.number
+        if not self.is_master_lost:
+            self._lost_setpoint_n, self._held_n = commands.demand.force_n, self.parts.loop.applied_n
+            self.lose_master(now_s, commands.lost_sentence(now_s, line), action)
+            return
+        self._held_n = min(self._held_n, self.parts.loop.applied_n)
+        if before != self._unbeaten and not self.is_ramping_down:
+            self.outcome.release_owner = True
+
+    def hold(self, demand: Demand) -> Demand:
+        """Return the demand, of a lost master's setpoint no more than has been applied since: what was waiting for contact, or
+        has lost it, must not press on whoever comes to see why the machine stands."""
+        if not self.is_master_lost or demand.force_n != self._lost_setpoint_n:
+            return demand
+        return demand._replace(force_n=min(demand.force_n, self._held_n))
+
     def lose_master(self, now_s: float, observation: str, action: LeaseAction) -> None:
         """Act as the rig says where the lease is over. observation: how it was noticed."""
         self.outcome.release_owner = True
@@ -149,7 +172,7 @@ class Transitions:
             return
         self.is_master_lost = True
         self.is_ramping_down = self.is_ramping_down or action is LeaseAction.RAMP or self.parts.run.running
-        words = "ramping to 0 N" if self.is_ramping_down else "holding the last setpoint"
+        words = "ramping to 0 N" if self.is_ramping_down else "holding the force"
         self.tell(fault_sentence(FaultCode.MASTER_LOST, f"{observation}, {words}"))
 
     def _latch(self, now_s: float, fault: FaultCode) -> None:

@@ -27,7 +27,7 @@ class Stand:
     def __init__(self) -> None:
         self.machine = SimpleNamespace(
             state=State.OFF, is_enabled=False, fault=FaultCode.NONE, is_restarted=False, is_master_lost=False,
-            is_ramping_down=False, outcome=StepOutcome(),
+            is_ramping_down=False, outcome=StepOutcome(), hold=lambda demand: demand,
         )  # fmt: skip
         self.loop = SimpleNamespace(
             voltage_v=1.5, feedforward_v=1.4, trim_v=0.1, limited_by=LimitedBy.NONE, in_band=False, unreachable=False,

@@ -173,7 +173,7 @@ class FaultDetector:
             return RefusalReason.CELL_SILENT
         if line.valve is not None and (line.valve.stands is None or line.valve.lost):
             return RefusalReason.VALVE_UNKNOWN
-        if self._stall_words(now_s, line):
+        if self.stall_words(now_s, line):
             return RefusalReason.NOT_READY
         if line.acknowledged_v is None or not reading.is_usable or self.is_stuck or self._over:
             return RefusalReason.NOT_READY
@@ -187,7 +187,7 @@ class FaultDetector:
         if block is RefusalReason.OUTPUT_FAULT and line.unanswered_since_s is not None and not line.fault:
             silent_s = now_s - line.unanswered_since_s
             return _unheard(cause_of_silence(FaultCode.OUTPUT_SILENT, silent_s, line.output_held, line.said)[1])
-        return self._stall_words(now_s, line) or self._rest_words(reading) if block is RefusalReason.NOT_READY else ""
+        return self.stall_words(now_s, line) or self._rest_words(reading) if block is RefusalReason.NOT_READY else ""
 
     def _rest_words(self, reading: Reading) -> str:
         """Which force at rest keeps an enable back, empty where there is none."""
@@ -198,9 +198,9 @@ class FaultDetector:
             return f"{shown_n:.1f} N measured, over-force is {self._limits.over_force_n:.1f} N: free the tool"
         return stuck_sentence(self.direction * reading.contact_n, self._bounds.stuck_n) if self.is_stuck else ""
 
-    def _stall_words(self, now_s: float, line: LineStatus) -> str:
-        """Why nothing begins right behind a stall, empty where there was none: what is asked for may have waited in a socket,
-        and a master that has given it up expects no force any more."""
+    def stall_words(self, now_s: float, line: LineStatus) -> str:
+        """Return why nothing begins right behind a stall, empty where there was none: what is asked for may have waited in a
+        socket, and a master that has given it up expects no force any more, nor a zero of later."""
         stall_s = self._bounds.stall_s
         if line.late_s > stall_s:
             late_s = line.late_s

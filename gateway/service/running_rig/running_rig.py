@@ -264,9 +264,9 @@ class RunningRig:
         self._tick.close()
         await self._ports.write_last(self._safe_frame)
         self._guardian.note_safe()
-        reply_s = self._rig.output.device.reply_timeout_s
+        reply_s, rest_v = self._rig.output.device.reply_timeout_s, self._rig.control.limits.safe_voltage_v
         # Nothing is decided any more, and what masters read grows old: they go while the device is let go.
-        await asyncio.gather(self._faces.close(), self._ports.let_go_output(self._last_frame, reply_s))
+        await asyncio.gather(self._faces.close(), self._ports.let_go_output(self._last_frame, reply_s, rest_v))
         for waiting in (self._control_socket, self._recordings, self._calibration_runs, self._audit):
             await waiting.close()
         for part in (self._ports, self._upload, self._plants, self._counters, self._lateness):

@@ -9,7 +9,7 @@ from gateway.control import LeaseAction
 from gateway.control.settings import SelfTestSettings
 from gateway.registers.words import State
 from tests.control.bench import settings
-from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, SmallRig
+from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, OWNER, SmallRig
 
 LEASE_S, CYCLE_S = 0.35, 0.1
 RESET, SELF_TEST = 1 << 1, 1 << 6
@@ -62,3 +62,46 @@ def test_a_fault_that_another_master_resets_lets_no_frame_of_before_press_again(
     assert all(volts == 0.0 for _, volts, _ in rig.trace[-200:])
     refused = rig.answer(0, *frame)
     assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+
+
+def test_of_a_force_that_is_held_for_a_lost_master_nobody_is_the_owner() -> None:
+    """Neither who stands still and sends its last frame on and on, nor who writes once and leaves: they kept the others out."""
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD))
+    frame = rig.block(ENABLE, 12.0, beat=7)
+    rig.write(0, *frame)
+    rig.beats = False
+    for _ in range(10):
+        rig.run(CYCLE_S).write(0, *frame)
+    assert rig.bank.owner is None
+    rig.write(1, 1300, peer=OTHER)
+    rig.run(1.0)
+    assert rig.state is State.HOLDING and rig.bank.owner is None
+    rig.write(0, *frame[:4], 8, *frame[5:])
+    assert rig.bank.owner == OWNER.host, "who beats owns"
+    refused = rig.answer(1, 1300, peer=OTHER)
+    assert refused and refused.reason is RefusalReason.NOT_OWNER
+
+
+@pytest.mark.parametrize("lost", ["waiting for contact", "on a ramp", "and its contact behind it"])
+def test_a_force_that_is_held_for_a_lost_master_does_not_rise(lost: str) -> None:
+    """Who comes to see why the machine stands touched the tool, and it pressed with the setpoint of a master that was gone."""
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD), contact=not lost.startswith("waiting"))
+    frame = rig.block(ENABLE, 30.0, beat=7)
+    ramp = 100 if lost == "on a ramp" else 0  # 10 N/s
+    frame = (*frame[:2], ramp, *frame[3:])
+    rig.write(0, *frame)
+    rig.run(1.0)
+    rig.beats = False
+    rig.run(LEASE_S + 0.1)
+    if lost.startswith("and"):
+        assert rig.plant.force_n > 28.0, "what is held is held"
+        rig.plant.contact = False
+        rig.run(1.0)
+    held_n = 0.0 if not rig.plant.contact else rig.plant.force_n
+    rig.plant.contact = True
+    rig.run(2.0)
+    assert rig.plant.force_n < max(5.0, held_n + 1.0)
+    rig.write(0, *frame[:4], 4711, *frame[5:])
+    rig.beats = True
+    rig.run(4.0)
+    assert rig.plant.force_n > 28.0, "its master is back"

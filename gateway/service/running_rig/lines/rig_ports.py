@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 from collections.abc import Callable
 
+from gateway.control.supervision.safe_voltage import NEAR_V
 from gateway.ports import PortError, PortEvents, SerialPort
 from gateway.profiles import Rig
 from gateway.service.running_rig.control_loop import ControlLoop, Log
@@ -94,11 +95,15 @@ class RigPorts:
         with contextlib.suppress(PortError):
             await self.output.write_last(frame)
 
-    async def let_go_output(self, last_frame: bytes, reply_s: float) -> None:
+    async def let_go_output(self, last_frame: bytes, reply_s: float, rest_v: float) -> None:
         """Write what disarms the output's watchdog, where it has one, once the safe voltage has been answered: on a bus of two
-        wires both would talk at once. reply_s: longest time of an answer."""
-        if last_frame:
-            await asyncio.sleep(reply_s)
+        wires both would talk at once. Not where even then the safe voltage rest_v does not surely stand: were its frame lost,
+        nobody else would take away what presses. reply_s: longest time of an answer."""
+        if not last_frame:
+            return
+        await asyncio.sleep(reply_s)
+        stands_v = self.loop.output.standing_v
+        if stands_v is not None and abs(stands_v - rest_v) <= NEAR_V:
             await self.write_last(last_frame)
 
     def close(self) -> None:

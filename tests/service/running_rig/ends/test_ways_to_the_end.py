@@ -121,6 +121,37 @@ def test_a_watchdog_is_let_go_once_the_safe_voltage_has_been_answered(
     assert off_s - safe_s >= timeout_s
 
 
+@pytest.mark.parametrize("end", ["while it presses", "at rest", "by a ramp", "by a ramp that is answered late"])
+def test_a_watchdog_is_not_let_go_where_what_pressed_may_press_still(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch, end: str
+) -> None:
+    """Without a guardian there is one safe frame, and nobody sees its answer: were it lost, the device alone would end it."""
+    written: list[bytes] = []
+    write_last = RigPorts.write_last
+
+    async def note_last(ports: RigPorts, frame: bytes) -> None:
+        written.append(frame)
+        await write_last(ports, frame)
+        if end.endswith("late"):
+            ports.loop.output.standing_v = 0.0  # the ramp's last setting is answered now
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        if end != "at rest":
+            await pressing(rig, devices)
+        rig._last_frame = b"~OFF"
+        monkeypatch.setattr(RigPorts, "write_last", note_last)
+        if end == "while it presses":
+            guardian.shutdown(socket.SHUT_RDWR)
+            while not rig._guardian.is_gone:
+                await asyncio.sleep(0.005)
+        await rig.ramp_down()
+        if end.endswith("late"):
+            rig._line.standing_v = None
+
+    with_running_rig(devices, scene)
+    assert (b"~OFF" in written) is (end != "while it presses")
+
+
 def test_each_tick_beats_and_hands_on_what_waits_for_a_disk(
     devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,6 +9,7 @@ from gateway.service.running_rig.last_tick import LastTick
 from tests.service.wired import ENABLE, Wired
 
 HOUR_S = 3600.0
+TARE = 4
 
 
 def test_a_force_goes_when_the_machine_wakes_whatever_comes_first() -> None:
@@ -40,6 +41,20 @@ def test_an_enable_that_the_network_kept_meanwhile_is_refused(later_s: float) ->
     wired.run(0.3)
     wired.write(0, ENABLE, 1500)
     wired.until(lambda: wired.state is State.HOLDING, 3.0)
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.05], ids=["at once", "behind ticks and samples"])
+def test_a_tare_that_the_network_kept_meanwhile_takes_no_zero(later_s: float) -> None:
+    """By readings of before the sleep, or of a tool that somebody has set down since: each force after it would be wrong."""
+    wired = Wired().ready()
+    wired.run(1.5)
+    wired.suspended_s = HOUR_S
+    wired.run(later_s)
+    with pytest.raises(Refusal, match=r"W303 .*stood still"):
+        wired.write(0, TARE)
+    wired.run(0.3)
+    wired.write(0, TARE)
+    assert wired.said("tare: zero")
 
 
 def test_a_machine_that_woke_long_ago_presses_as_ever() -> None:
