@@ -1,15 +1,19 @@
 """What the page's parts share: where the gateway keeps its state, which rig it runs, and the way to it."""
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from gateway.live.control_link import ControlLink
+from gateway.processes.json_socket.connection import SocketLimits
 from gateway.profiles import Rig
 from gateway.profiles.kept_rig import unchanged_rig
+
+_KEPT_S: Final = SocketLimits().idle_s / 3.0
 
 
 @dataclass
@@ -43,6 +47,15 @@ class WebContext:
         if self.fingerprint in (None, read_now):
             return ""
         return "W247 the rig's files have changed since the gateway's start: what stands here is in use from the next start on"
+
+    async def keep_ways_open(self) -> None:
+        """Ask by each way now and then, until it is cancelled: control closes what has been idle, and where somebody has
+        removed the state directory there is no other way for a Stop."""
+        while True:
+            for way in (self.control, self.questions):
+                with contextlib.suppress(OSError, ValueError):
+                    await way.ask({"do": "running"})
+            await asyncio.sleep(_KEPT_S)
 
     def begin(self, work: Any) -> "asyncio.Task[Any]":
         """Run a coroutine beside the requests, and keep it until it has ended."""
