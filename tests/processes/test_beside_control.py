@@ -106,8 +106,9 @@ def test_what_it_says_and_why_it_ends_are_events(tmp_path: Path) -> None:
 def test_callers_for_whom_no_descriptor_is_left_are_told_once_and_in_a_sentence(tmp_path: Path) -> None:
     """Each was a traceback of asyncio, a thousand in a few seconds."""
     _, lines = say(tmp_path, NO_DESCRIPTOR)
-    assert len(lines) == 1, lines
-    assert " warning library A411 " in lines[0] and "Too many open files" in lines[0] and "ulimit -n" in lines[0]
+    told = [line for line in lines if "E150 " not in line]  # nor is one left for the events' file, at times
+    assert len(told) == 1, lines
+    assert " warning library A411 " in told[0] and "Too many open files" in told[0] and "ulimit -n" in told[0]
 
 
 @pytest.mark.parametrize(
