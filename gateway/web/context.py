@@ -19,14 +19,16 @@ _KEPT_S: Final = SocketLimits().idle_s / 3.0
 @dataclass
 class WebContext:
     """state: directory; rig: name or file, as `run` was given it; simulated: its devices are; control: the way to control's
-    socket for commands and heartbeats; fingerprint: of the rig that runs, None: whatever it is. tasks: work that a tab has
-    begun, kept from being collected while it runs. viewers: how many pages are open, whatever tab they show."""
+    socket for commands and heartbeats; fingerprint: of the rig that runs, None: whatever it is; kept_rig: descriptor of the
+    memory that it is in. tasks: work that a tab has begun, kept from being collected while it runs. viewers: how many pages are
+    open, whatever tab they show."""
 
     state: Path
     rig: str
     simulated: bool
     control: ControlLink
     fingerprint: str | None = None
+    kept_rig: int | None = None
     tasks: set["asyncio.Task[Any]"] = field(default_factory=set)
     viewers: Callable[[], int] = lambda: 0
 
@@ -38,8 +40,9 @@ class WebContext:
 
     @cached_property
     def profile(self) -> Rig:
-        """The rig as its files say; read once, when it is first needed. ChangedRigError where they say another one by now."""
-        return unchanged_rig(self.rig, self.fingerprint, simulated=self.simulated)
+        """The rig that runs; read once, when it is first needed. ChangedRigError where it is not kept, and the files are
+        others by now."""
+        return unchanged_rig(self.rig, self.fingerprint, simulated=self.simulated, memory=self.kept_rig)
 
     def why_other(self, read_now: str) -> str:
         """Return the sentence to show with what the rig's files say, where that is not in use; empty where it is.
