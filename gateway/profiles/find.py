@@ -54,6 +54,8 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
     if other := _other_kind(path):
         cure = ": name the file in it" if other == DIRECTORY else f", and no {kind} file"
         raise FileNotFoundError(f"is {other}{cure}")
+    if target := _lost_target(path):
+        raise FileNotFoundError(f"is a link to {target}, where no file is")
     if "/" in name or name.endswith(_SUFFIXES):
         raise FileNotFoundError(f"is no file (looked for {display(path)}){_near(kind, path)}")
     near = closest(name, known)
@@ -71,6 +73,14 @@ def _is_file(path: Path) -> bool:
 def _other_kind(path: Path) -> str:
     try:
         return other_kind(path)
+    except (OSError, ValueError):
+        return ""
+
+
+def _lost_target(path: Path) -> str:
+    """Return where a link leads that stands there, empty where none does."""
+    try:
+        return str(path.readlink())
     except (OSError, ValueError):
         return ""
 

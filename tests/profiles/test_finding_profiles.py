@@ -122,3 +122,11 @@ def test_an_ending_that_is_spelt_is_told_so(ending: str, shown: str, tmp_path: P
     assert f"terminator: {shown} would be {len(shown) - 2} characters on the wire: between double quotes CR LF" in str(
         fault
     )
+
+
+def test_a_link_whose_file_is_gone_is_told_with_where_it_leads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It stands in the folder, and was said to be no file."""
+    (tmp_path / "rig.yaml").symlink_to("/mnt/usb/cell.yaml")
+    monkeypatch.chdir(tmp_path)
+    (fault,) = check_report("rig.yaml").faults
+    assert str(fault) == "rig.yaml: is a link to /mnt/usb/cell.yaml, where no file is"
