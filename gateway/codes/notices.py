@@ -119,7 +119,7 @@ NOTICES: Final = (
     Explanation(
         "W247",
         "the rig's files have changed",
-        "Control goes on with the rig as the gateway was started with it. What begins anew beside it, such as the page, waits.",
+        "Control goes on with the rig as the gateway was started with it. What begins anew and needs the files waits.",
         "Somebody has edited or removed them while the gateway ran.",
         "force-gateway check RIG; end the gateway and start it again when the change is meant.",
     ),

@@ -17,6 +17,15 @@ ANSWER_S: Final = 2.0
 when they wait (`until_s`), for it may still be carried out behind that."""
 
 
+class RemovedStateError(FileNotFoundError):
+    """The state directory was removed, and with it the way to control, which may be pressing; its text says what to do."""
+
+    def __init__(self, state: Path) -> None:
+        super().__init__(
+            f"E152 {state} is gone, and with it the way to the gateway: make it again (mkdir); until then stop by Modbus"
+        )
+
+
 class ControlLink:
     """A connection to the gateway that runs on this state directory; opened when it is needed, and anew after a loss."""
 
@@ -58,7 +67,7 @@ class ControlLink:
 
     async def _say(self, line: bytes) -> dict[str, Any]:
         if self._streams is None:
-            self._streams = await asyncio.open_unix_connection(str(self._path), limit=LONGEST_ANSWER)
+            self._streams = await self._open()
         reader, writer = self._streams
         writer.write(line)
         await writer.drain()
@@ -70,6 +79,14 @@ class ControlLink:
         if not isinstance(decoded, dict):
             raise ValueError("the gateway's answer is no object")
         return decoded
+
+    async def _open(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+        try:
+            return await asyncio.open_unix_connection(str(self._path), limit=LONGEST_ANSWER)
+        except FileNotFoundError:
+            if self._path.parent.is_dir():
+                raise
+            raise RemovedStateError(self._path.parent) from None
 
     async def _drop(self) -> None:
         if self._streams is None:

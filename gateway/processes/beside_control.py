@@ -2,9 +2,11 @@
 
 import asyncio
 import contextlib
+import errno
 import json
 import logging
 import os
+import resource
 import signal
 import socket
 import threading
@@ -22,6 +24,8 @@ Serve = Callable[[dict[str, Any], EventLog], Coroutine[Any, Any, None]]
 """Serves until the process ends; its first argument: the options that the guardian gives, `state` among them."""
 
 _FIRST_AMONG_THE_KILLED: Final = "900"
+_NO_DESCRIPTOR: Final = (errno.EMFILE, errno.ENFILE)
+_MORE_DESCRIPTORS: Final = "raise the limit (ulimit -n, LimitNOFILE= of a unit) and start again"
 
 
 def serve_behind_control() -> None:
@@ -76,6 +80,10 @@ def serve_until_guardian_ends(source: str, arguments: list[str], serve: Serve) -
             asyncio.run(serve(options, log))
         except* (MissingExtraError, OSError) as failed:
             log("start", str(_first_of(failed)))
+        except* (MemoryError, ImportError, SystemError) as failed:  # whatever a library makes of it
+            if not (sentence := _too_little_memory(_first_of(failed))):
+                raise
+            log("start", sentence)
     return exit_codes.DEVICE
 
 
@@ -83,10 +91,26 @@ def _hear_libraries(log: EventLog) -> None:
     """Have what libraries log told as events, within the bounds of those: a server that is flooded says a line per caller."""
 
     class Told(logging.Handler):
+        is_full = False
+
         def emit(self, record: logging.LogRecord) -> None:
-            log("library", f"{record.name}: {self.format(record)}")
+            error = record.exc_info[1] if record.exc_info else None
+            if not isinstance(error, OSError) or error.errno not in _NO_DESCRIPTOR:
+                log("library", f"{record.name}: {self.format(record)}")
+            elif not self.is_full:  # asyncio says it of each caller that it does not accept
+                self.is_full = True
+                log("library", f"A411 callers are not accepted here: {error.strerror}; {_MORE_DESCRIPTORS}")
 
     logging.basicConfig(handlers=[Told()], level=logging.WARNING, format="%(message)s", force=True)
+
+
+def _too_little_memory(error: BaseException) -> str:
+    """Return the sentence on an error for want of memory; empty where it is another one, as far as anybody can tell."""
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit == resource.RLIM_INFINITY:
+        return f"E106 no memory is left ({error})" if isinstance(error, MemoryError) else ""
+    room = f"this process may use {limit >> 20} MiB of addresses: raise that (ulimit -v, LimitAS= of a unit)"
+    return f"E106 it does not start ({type(error).__name__}: {error}); {room}"
 
 
 def _first_of(error: BaseException) -> BaseException:

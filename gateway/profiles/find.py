@@ -5,6 +5,7 @@ from typing import Final
 
 import gateway
 from gateway.plain_file import DIRECTORY, expand_home, other_kind
+from gateway.profiles.kinds.file_kind import is_foreign, keys_at_the_top, kind_of
 from gateway.profiles.strict_yaml.faults import closest, one_of
 
 FOLDERS: Final = {
@@ -18,6 +19,7 @@ FOLDERS: Final = {
 """Kind of profile -> its folder."""
 
 _SUFFIXES: Final = (".yaml", ".yml")
+_LOOK_BYTES: Final = 65536
 
 
 def shipped_profiles_folder() -> Path:
@@ -52,8 +54,10 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
     if other := _other_kind(path):
         cure = ": name the file in it" if other == DIRECTORY else f", and no {kind} file"
         raise FileNotFoundError(f"is {other}{cure}")
+    if target := _lost_target(path):
+        raise FileNotFoundError(f"is a link to {target}, where no file is")
     if "/" in name or name.endswith(_SUFFIXES):
-        raise FileNotFoundError(f"is no file (looked for {display(path)}){_near(path)}")
+        raise FileNotFoundError(f"is no file (looked for {display(path)}){_near(kind, path)}")
     near = closest(name, known)
     suggestion = f"; did you mean {near}?" if near else ""
     raise FileNotFoundError(f"is neither a shipped {kind} ({one_of(known) or 'there is none'}) nor a file{suggestion}")
@@ -73,13 +77,31 @@ def _other_kind(path: Path) -> str:
         return ""
 
 
-def _near(path: Path) -> str:
+def _lost_target(path: Path) -> str:
+    """Return where a link leads that stands there, empty where none does."""
     try:
-        here = [entry.name for entry in path.parent.iterdir() if entry.suffix in _SUFFIXES]
+        return str(path.readlink())
     except (OSError, ValueError):
         return ""
-    near = closest(path.name, here)
+
+
+def _near(kind: str, path: Path) -> str:
+    try:
+        here = [entry.name for entry in path.parent.iterdir() if entry.suffix in _SUFFIXES and _is_file(entry)]
+    except (OSError, ValueError):
+        return ""
+    near = closest(path.name, [name for name in here if _may_be(kind, path.with_name(name))])
     return f"; did you mean {near}?" if near else ""
+
+
+def _may_be(kind: str, path: Path) -> bool:
+    """Decide whether a file is of a kind, as far as its beginning says; one with a fault may be."""
+    try:
+        with path.open("rb") as file:
+            keys = keys_at_the_top(file.read(_LOOK_BYTES))
+    except OSError:
+        return False
+    return kind_of(keys, kind) in (kind, None) and not is_foreign(keys, kind)
 
 
 def display(path: Path) -> str:

@@ -1,8 +1,8 @@
 """A rig as it was when the gateway was started: what has become of its files meanwhile (an editor that is half done, another
 limit) is for the next start. Control has it from the process that it is forked from, which has read it once; where that one is
 gone, from memory that the guardian keeps: else its death would put other files to use, without a word, or end the gateway.
-A process beside control reads the files again, and does without where they are others by now: a page that went by another
-lease than control let each force that it asked for end in a fault.
+A process beside control takes it from there, too. Where nothing is kept it reads the files again, and does without where they
+are others by now: a page that went by another lease than control let each force that it asked for end in a fault.
 """
 
 import contextlib
@@ -55,9 +55,11 @@ class ChangedRigError(OSError):
     """The rig's files are others than those that the gateway was started with; its text is a sentence with its code."""
 
 
-def unchanged_rig(name: str, fingerprint: str | None, *, simulated: bool) -> Rig:
-    """Return the rig, read again. fingerprint: what it had at the start; None: whatever its files say. ChangedRigError where it
-    is another one, or has faults."""
+def unchanged_rig(name: str, fingerprint: str | None, *, simulated: bool, memory: int | None = None) -> Rig:
+    """Return the rig that runs. fingerprint: what it had at the start; None: whatever its files say. memory: as above; it is
+    read again where nothing is kept there. ChangedRigError where it is another one then, or has faults."""
+    if memory is not None and (rig := _recall(memory)) and rig.fingerprint == fingerprint:
+        return rig
     try:
         rig = load_rig(name, simulated=simulated)
     except ProfileError as error:

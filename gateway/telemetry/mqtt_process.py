@@ -72,7 +72,8 @@ async def publish(options: dict[str, Any], log: EventLog) -> None:
     """Publish until the process ends. options: as the guardian gives them."""
     from gateway.profiles.kept_rig import unchanged_rig
 
-    rig = unchanged_rig(options["rig"], options["fingerprint"], simulated=options["simulated"])
+    read = {"simulated": options["simulated"], "memory": options.get("kept_rig")}
+    rig = unchanged_rig(options["rig"], options["fingerprint"], **read)
     assert rig.mqtt is not None
     password = _password_in(rig.mqtt.password_file) if rig.mqtt.password_file else None
     tls = rig.mqtt.tls

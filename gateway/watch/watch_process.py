@@ -61,7 +61,8 @@ def make_watch(ring: "RingReader", options: dict[str, Any]) -> tuple["Watch", "F
     from gateway.watch.residual_watch import Watch, WatchSettings
 
     state = Path(options["state"])
-    as_started = unchanged_rig(options["rig"], options["fingerprint"], simulated=options["simulated"])
+    read = {"simulated": options["simulated"], "memory": options.get("kept_rig")}
+    as_started = unchanged_rig(options["rig"], options["fingerprint"], **read)
     rig, _ = with_selected_plant(as_started, state)
     setup = WatchSettings(options["window_s"], options["every_s"])
     watch = Watch(ring, make_comparison(rig, state), setup, time.monotonic)

@@ -19,7 +19,7 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import BaseRoute, Route
 
 from gateway import VERSION
-from gateway.live.control_link import ask_once
+from gateway.live.control_link import RemovedStateError, ask_once
 from gateway.live.ring_rows import RingRows
 from gateway.live.standstill import Standstill
 from gateway.processes.json_socket.messages import encode_answer, load_shallow
@@ -53,6 +53,7 @@ def make_app(context: WebContext, access: PageAccess, rows: RingRows | None) -> 
     @asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
         context.begin(standstill.keep_time())
+        context.begin(context.keep_ways_open())
         yield
         await events.close()
         await context.end_work()
@@ -205,6 +206,8 @@ def _told(handler: Callable[[Request], Awaitable[Response]]) -> Callable[[Reques
             return await handler(request)
         except RefusedCommand as refused:
             return refuse(409, str(refused), "refused")
+        except RemovedStateError as error:
+            return refuse(503, str(error), "gone")
         except (OSError, TimeoutError):
             return refuse(503, "the gateway does not answer: it is being restarted, or has ended", "gone")
         except (KeyError, TypeError) as error:

@@ -35,7 +35,8 @@ async def serve(options: dict[str, Any], _: EventLog) -> None:
             yield
 
     state = Path(options["state"])
-    context = WebContext(state, options["rig"], options["simulated"], ControlLink(state), options["fingerprint"])
+    rig = (options["rig"], options["simulated"])
+    context = WebContext(state, *rig, ControlLink(state), options["fingerprint"], options.get("kept_rig"))
     web = context.profile.web
     access = PageAccess(options["settings"]["host"], options["settings"]["port"], web.token if web else None)
     rows = None if options["ring"] is None else RingRows(options["ring"])

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from gateway.processes import exit_codes
 from gateway.processes.scheduling import priority
 
@@ -27,6 +29,35 @@ from gateway.processes.beside_control import serve_until_guardian_ends
 async def serve(options, log):
     for _ in range(5000):
         logging.getLogger("uvicorn.error").warning("Exceeded concurrency limit.")
+
+sys.exit(serve_until_guardian_ends("web", sys.argv[1:], serve))
+"""
+
+NO_DESCRIPTOR = """
+import asyncio, resource, socket, sys
+from gateway.processes.beside_control import serve_until_guardian_ends
+
+async def serve(options, log):
+    server = await asyncio.start_server(lambda *_: None, "127.0.0.1", 0)
+    calls = [socket.socket() for _ in range(8)]
+    for call in calls:
+        call.setblocking(False)
+        call.connect_ex(server.sockets[0].getsockname())
+    resource.setrlimit(resource.RLIMIT_NOFILE, (calls[-1].fileno() + 1, 4096))
+    for _ in range(20):
+        await asyncio.sleep(0)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (4096, 4096))
+
+sys.exit(serve_until_guardian_ends("web", sys.argv[1:], serve))
+"""
+
+NO_MEMORY = """
+import resource, sys
+from gateway.processes.beside_control import serve_until_guardian_ends
+
+async def serve(options, log):
+    resource.setrlimit(resource.RLIMIT_AS, (400 << 20, 400 << 20))
+    raise FAILURE
 
 sys.exit(serve_until_guardian_ends("web", sys.argv[1:], serve))
 """
@@ -70,6 +101,29 @@ def test_what_it_says_and_why_it_ends_are_events(tmp_path: Path) -> None:
         ("mqtt", "broker", "E181"),
         ("mqtt", "start", None),
     ]
+
+
+def test_callers_for_whom_no_descriptor_is_left_are_told_once_and_in_a_sentence(tmp_path: Path) -> None:
+    """Each was a traceback of asyncio, a thousand in a few seconds."""
+    _, lines = say(tmp_path, NO_DESCRIPTOR)
+    told = [line for line in lines if "E150 " not in line]  # nor is one left for the events' file, at times
+    assert len(told) == 1, lines
+    assert " warning library A411 " in told[0] and "Too many open files" in told[0] and "ulimit -n" in told[0]
+
+
+@pytest.mark.parametrize(
+    "failure", ["MemoryError", "ImportError('failed to map segment')", "SystemError('error return')"]
+)
+def test_too_little_memory_is_a_sentence_and_no_traceback(failure: str, tmp_path: Path) -> None:
+    code, lines = say(tmp_path, NO_MEMORY.replace("FAILURE", failure))
+    assert (code, len(lines)) == (exit_codes.DEVICE, 1), lines
+    assert " error   start E106 " in lines[0] and "400 MiB" in lines[0] and "ulimit -v" in lines[0]
+
+
+def test_a_defect_where_memory_is_not_limited_keeps_its_traceback(tmp_path: Path) -> None:
+    limit = "    resource.setrlimit(resource.RLIMIT_AS, (400 << 20, 400 << 20))\n"
+    code, lines = say(tmp_path, NO_MEMORY.replace("FAILURE", "ImportError('no such name')").replace(limit, ""))
+    assert code == 1 and any("Traceback" in line for line in lines)
 
 
 def test_it_gives_way_to_control_and_goes_first_when_memory_runs_out() -> None:

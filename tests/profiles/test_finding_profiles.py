@@ -46,6 +46,17 @@ def test_a_path_that_is_not_there_is_told_with_its_neighbour(tmp_path: Path, mon
     assert str(fault) == "./rigg.yaml: is no file (looked for rigg.yaml); did you mean rig.yaml?"
 
 
+def test_a_file_of_another_kind_is_no_neighbour_that_was_meant(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever did as was told was told then that a register map is no rig."""
+    (tmp_path / "rigs.yaml").write_text((PROFILES / "registers" / "force-v1.yaml").read_text(encoding="utf-8"))
+    (tmp_path / "rig-7.yaml").write_text(DEMO, encoding="utf-8")
+    (tmp_path / "half.yaml").write_text("name: [half", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    said = {name: str(check_report(name).faults[0]) for name in ("rig.yaml", "hal.yaml")}
+    assert said["rig.yaml"].endswith("did you mean rig-7.yaml?")
+    assert said["hal.yaml"].endswith("did you mean half.yaml?"), "one with a fault may be it"
+
+
 @pytest.mark.parametrize(
     "name", ["", ".", "/", "a\0b", "x" * 5000, "\n", "~", "/proc/self/mem", "no/such/folder/rig.yaml"]
 )
@@ -111,3 +122,11 @@ def test_an_ending_that_is_spelt_is_told_so(ending: str, shown: str, tmp_path: P
     assert f"terminator: {shown} would be {len(shown) - 2} characters on the wire: between double quotes CR LF" in str(
         fault
     )
+
+
+def test_a_link_whose_file_is_gone_is_told_with_where_it_leads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It stands in the folder, and was said to be no file."""
+    (tmp_path / "rig.yaml").symlink_to("/mnt/usb/cell.yaml")
+    monkeypatch.chdir(tmp_path)
+    (fault,) = check_report("rig.yaml").faults
+    assert str(fault) == "rig.yaml: is a link to /mnt/usb/cell.yaml, where no file is"

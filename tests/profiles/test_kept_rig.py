@@ -104,3 +104,18 @@ def test_a_rig_that_was_kept_for_a_simulation_is_not_the_real_one(file: Path, mo
     file.write_text(DEMO.replace("name: demo", "name: other"), encoding="utf-8")
     assert kept_rig(str(file), simulated=True).name == "demo"
     assert kept_rig(str(file), simulated=False).name == "other", "that one nobody has kept"
+
+
+@pytest.mark.parametrize("text", [DEMO.replace("lease_s: null", "lease_s: 0.5"), "name: [", None])
+def test_a_process_beside_control_goes_by_the_rig_that_runs_whatever_its_files_say(
+    file: Path, memory: int, text: str | None
+) -> None:
+    """A page that was killed beside a half edited file was gone until the file was whole again."""
+    first = kept_rig(str(file), simulated=True, memory=memory)
+    if text is None:
+        file.unlink()
+    else:
+        file.write_text(text, encoding="utf-8")
+    assert unchanged_rig(str(file), first.fingerprint, simulated=True, memory=memory) == first
+    with pytest.raises(ChangedRigError):
+        unchanged_rig(str(file), "another", simulated=True, memory=memory)

@@ -6,21 +6,24 @@ from gateway import defaults
 from gateway.cli.cards.card import Fact
 from gateway.cli.master.value_text import limits_of
 from gateway.profiles.rigs.rig import map_option
-from gateway.registers import Register, RegisterMap
+from gateway.registers import Register, RegisterMap, UnknownRegister
 from gateway.registers.values import WordOrder
 
 
 def find_registers(register_map: RegisterMap, name: str) -> list[Register]:
-    """Return the register of NAME or NAME@BLOCK, by its 4xxxx number or its address; none where there is none. Of a bare name
-    that several blocks have, the one in the plain block, or all."""
+    """Return the register of NAME or NAME@BLOCK, by its 4xxxx number or its address. Of a bare name that several blocks have,
+    the one in the plain block, or all. UnknownRegister, with what was probably meant, where there is none."""
     if name.isdecimal():
         number = int(name)
         address = number - 40001 if 40001 <= number < 50000 else number
-        return [one for one in register_map.registers if one.address <= address < one.address + one.words]
+        found = [one for one in register_map.registers if one.address <= address < one.address + one.words]
+        return found or [register_map.find(name)]
     try:
         return [register_map.find(name)]
-    except LookupError:
-        return [one for one in register_map.registers if one.name == name]
+    except UnknownRegister:
+        if several := [one for one in register_map.registers if one.name == name]:
+            return several
+        raise
 
 
 def register_facts(register_map: RegisterMap, register: Register) -> Iterator[Fact]:

@@ -9,7 +9,7 @@ _TIMES: Final = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "t": 10**12}
 _SIZE: Final = re.compile(r"(\d{1,18}(?:\.\d{0,9})?) ?([kmgt]?)b?", re.ASCII | re.IGNORECASE)
 
 
-class ByteCount(click.IntRange):
+class ByteCount(click.types.IntParamType):
     """A number of bytes, with or without a unit."""
 
     name = "size"

@@ -1,5 +1,6 @@
 """Numbers of the command line with bounds: a refusal says what is allowed, as the gateway's own refusals do."""
 
+import re
 from math import isfinite
 from typing import Any, Final
 
@@ -15,25 +16,33 @@ def describe_allowed(value: str, low: float | None, high: float | None, unit: st
     return f"{value}{unit}: allowed {low:.10g} .. {high:.10g}{unit}"
 
 
-def decimal_hint(text: str) -> str:
-    """Return what a number with a comma should have been, as the end of a sentence; empty for what is none either way."""
-    pointed = text.replace(",", ".")
+_WITH_UNIT: Final = re.compile(r"([+-]?[\d.,]+) ?[^\W\d_][\w/%]*")
+
+
+def number_hint(text: str) -> str:
+    """Return what a number with a comma, or with a unit behind it, should have been, as the end of a sentence; empty for what
+    is none either way."""
+    with_unit = _WITH_UNIT.fullmatch(text.strip())
+    bare = with_unit[1] if with_unit else text
+    pointed = bare.replace(",", ".")
     try:
         float(pointed)
     except ValueError:
         return ""
-    return f"; decimals take a point: {pointed}" if pointed != text else ""
+    if with_unit:
+        return f"; without its unit{', decimals with a point' if pointed != bare else ''}: {pointed}"
+    return f"; decimals take a point: {pointed}" if pointed != bare else ""
 
 
 class Number(click.types.FloatParamType):
-    """A number; one with a comma is told how it is written."""
+    """A number; one with a comma or a unit is told how it is written."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the number; BadParameter for what is none."""
         try:
             return float(value)
         except ValueError:
-            return self.fail(f"{value or 'nothing'} is not a number{decimal_hint(str(value))}", param, ctx)
+            return self.fail(f"{value or 'nothing'} is not a number{number_hint(str(value))}", param, ctx)
 
 
 NUMBER: Final = Number()

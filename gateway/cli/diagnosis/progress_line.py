@@ -4,6 +4,7 @@ the set-up shows itself by it before anything is installed.
 """
 
 import os
+import select
 import shutil
 import signal
 import sys
@@ -120,11 +121,24 @@ class ProgressLine:
         self.clear()
 
     def _write(self, text: str) -> None:
+        """Leave out what would have to wait for a reader: who ends this block waits for the writer."""
         try:
+            if not _takes_more(self._stream):
+                return
             self._stream.write(text)
             self._stream.flush()
         except (OSError, ValueError):  # nobody reads any more
             self._is_over.set()
+
+
+def _takes_more(stream: IO[str]) -> bool:
+    """Decide whether a line can be written at once: not to a full pipe, nor to a terminal that is held by Ctrl-S."""
+    try:
+        poll = select.poll()
+        poll.register(stream, select.POLLOUT)
+    except (OSError, ValueError, TypeError):  # no file: it is in memory, or closed, which writing tells
+        return True
+    return bool(poll.poll(0))
 
 
 class _AboveLine:

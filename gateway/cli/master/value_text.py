@@ -4,7 +4,7 @@ from difflib import get_close_matches
 from ipaddress import IPv4Address
 from math import inf, isnan
 
-from gateway.cli.command_line.numbers import decimal_hint, describe_allowed
+from gateway.cli.command_line.numbers import describe_allowed, number_hint
 from gateway.cli.master.client import RegisterReading
 from gateway.registers import Register
 from gateway.registers.values import RAW_LIMITS
@@ -116,7 +116,7 @@ def _number(text: str, expected: str, names: "dict[str, int] | tuple[()]" = ()) 
     except ValueError:
         near = get_close_matches(_plain(text), list(names), 1)
         meant = f"; did you mean {near[0]}?" if near else ""
-        raise ValueError(f"{text or 'nothing'} is not {expected}{meant}{decimal_hint(text)}") from None
+        raise ValueError(f"{text or 'nothing'} is not {expected}{meant}{number_hint(text)}") from None
 
 
 def _plain(name: str) -> str:

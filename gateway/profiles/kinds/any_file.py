@@ -1,6 +1,5 @@
 """`check` of any profile: what a file is, by its keys, and every fault of it."""
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any, Final
 from gateway.profiles.find import FOLDERS, list_shipped
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.kinds.devices import read_device
-from gateway.profiles.kinds.file_kind import kind_of
+from gateway.profiles.kinds.file_kind import keys_at_the_top, kind_of
 from gateway.profiles.kinds.plans import AnyPlan, read_plan
 from gateway.profiles.kinds.plants import read_plant
 from gateway.profiles.kinds.registers import read_registers
@@ -30,15 +29,12 @@ class Checked:
     warnings: tuple[ProfileFault, ...] = ()
 
 
-_KEY: Final = re.compile(rb"^([a-z_]+):", re.M)
-
-
 def check_file(name: str | Path) -> Checked:
     """Read and check a profile of any kind, by shipped name (a rig's first) or path. Never raises for what is in a file."""
     kind = next((kind for kind in FOLDERS if str(name) in list_shipped(kind)), "rig")
     findings = Findings()
     opened = open_file(kind, refer_to(name), findings)
-    kind = kind_of(opened[0].value if opened else _keys_at_the_top(findings.texts), kind) or kind
+    kind = kind_of(opened[0].value if opened else keys_at_the_top(b"".join(findings.texts.values())), kind) or kind
     if kind == "rig":
         report = check_report(name)
         return Checked("rig", report.rig, report.faults, report.warnings)
@@ -46,11 +42,6 @@ def check_file(name: str | Path) -> Checked:
         return Checked(kind, None, tuple(findings.faults))
     value, faults = _READ[kind](opened[0])
     return Checked(kind, None if faults else value, tuple(sorted(faults)))
-
-
-def _keys_at_the_top(texts: Mapping[str, bytes]) -> dict[str, None]:
-    """Return what look like keys in a file that is no YAML: of a tab or a key that stands twice nobody learns what it is."""
-    return {key.decode("ascii"): None for text in texts.values() for key in _KEY.findall(text)}
 
 
 def _plan(document: Document) -> tuple[AnyPlan | None, list[ProfileFault]]:

@@ -4,6 +4,7 @@ A file with no key but those of the kind that is wanted is of that kind, and the
 register map need not wait for the simulated world.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import fields
 from functools import cache
@@ -22,6 +23,7 @@ CALLED: Final = {
 """Kind of profile -> as people say it."""
 
 _ANYWHERE: Final = frozenset(("name", "description", "format", "version"))
+_KEY: Final = re.compile(rb"^([a-z_]+):", re.M)
 _MAP_KEYS: Final = frozenset(("blocks", "version", "text"))
 
 
@@ -53,6 +55,11 @@ def _types_of(kind: str) -> tuple[type, ...]:
     from gateway.control.runs.ladder_stairs import CalibrationPlan
 
     return (ExperimentPlan, CalibrationPlan)
+
+
+def keys_at_the_top(text: bytes) -> dict[str, None]:
+    """Return what look like keys in a file that may be no YAML: a tab or a key that stands twice hides not what it is."""
+    return {key.decode("ascii"): None for key in _KEY.findall(text)}
 
 
 def _keys_in(value: Any) -> set[str]:

@@ -29,6 +29,14 @@ _NEWTONS: Final = {"MN": "1000000", "kN": "1000", "daN": "10", "cN": "0.01", "mN
 """Units of force that no `unit` names, in N: near to one that it does, and a thousand times as large."""
 _DECIMAL: Final = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
+_WITH_UNIT: Final = re.compile(rf"({_DECIMAL.pattern}) ?(?P<unit>[^\W\d]\S*)")
+_FORMS: Final = {
+    "^[a-z0-9][a-z0-9._-]{0,62}$": "small letters a-z, digits and . _ -, at most 63, a letter or digit first",
+    "^/": "an absolute path, with / first",
+}
+"""Patterns of texts in words."""
+_SHORT: Final = 40  # characters of a value that is quoted whole
+
 _TYPES_ELSEWHERE: Final = dict.fromkeys(
     ("tcp", "modbus-tcp"), "; plain Modbus TCP has its keys under network: (bind, port, allow)"
 )
@@ -91,7 +99,7 @@ def quote_value(value: object) -> str:
     if isinstance(value, (int, float)):
         return number(value)
     if isinstance(value, str):
-        return f'"{value if len(value) <= 40 else value[:37] + "..."}"'
+        return f'"{value if len(value) <= _SHORT else value[:37] + "..."}"'
     return "a list" if isinstance(value, list) else "a group of keys"
 
 
@@ -134,21 +142,23 @@ def _other_unit(key: str, value: object, known: list[str]) -> tuple[str, str] | 
 
 def _describe_expected(what: str) -> Callable[[Any, dict[str, Any], str], str]:
     def sentence(value: Any, context: dict[str, Any], unit: str) -> str:
-        hint = _hint(value, what)
+        hint = _hint(value, what, unit)
         value_text = str(value) if isinstance(value, float) and hint else quote_value(value)
         return f"{value_text} is not {what}{hint}"
 
     return sentence
 
 
-def _hint(value: Any, what: str) -> str:
-    """Return why a value that looks right is not: quotes, decimal comma, YAML 1.1's booleans."""
+def _hint(value: Any, what: str, unit: str) -> str:
+    """Return why a value that looks right is not: quotes, decimal comma, a unit, YAML 1.1's booleans, a lone entry."""
     if isinstance(value, float) and value.is_integer() and what == "a whole number":
         return f": write {int(value)}"
     if isinstance(value, bool) and what == "text":
         return f': write "{str(value).lower()}" in quotes'
     if isinstance(value, (int, float)) and what == "text":
         return f': write "{number(value)}" in quotes'
+    if what == "a list" and isinstance(value, (int, str)) and len(str(value)) <= _SHORT:
+        return f": write [{quote_value(value)}]"
     if isinstance(value, _Secret) and what == "text":
         return ": write it in quotes"
     if not isinstance(value, str):
@@ -156,18 +166,33 @@ def _hint(value: Any, what: str) -> str:
     if what == "true or false" and value.lower() in ("yes", "on", "y", "no", "off", "n", "true", "false"):
         return f": write {'true' if value.lower() in ('yes', 'on', 'y', 'true') else 'false'}"
     if "number" in what:
-        return _number_hint(value)
+        return _number_hint(value, unit.strip())
     return ""
 
 
-def _number_hint(text: str) -> str:
+def _number_hint(text: str, unit: str) -> str:
     repairs = (
         (text, "take the quotes away"),
         (text.replace("_", ""), "digits are not grouped"),
         (text.replace(",", "."), "decimals take a point"),
-        (text.partition(" ")[0], "the unit stands in the key"),
+        _without_its_unit(text, unit),
     )
     return next((f": write {new} ({reason})" for new, reason in repairs if _DECIMAL.fullmatch(new)), "")
+
+
+def _without_its_unit(text: str, unit: str) -> tuple[str, str]:
+    """Return the number of `200 ms` as a key in this unit takes it, and why; an empty one where the two do not go together."""
+    if not (parts := _WITH_UNIT.fullmatch(text)):
+        return "", ""
+    amount, given, wanted = parts[1], parts["unit"].lower(), unit.lower()
+    if not unit or given == wanted:
+        return amount, "the unit stands in the key" if unit else "without a unit"
+    scale = next((scale for scale in _SCALES if given in scale and wanted in scale), None)
+    return (f"{float(amount) * scale[given] / scale[wanted]:.6g}", f"the key is in {unit}") if scale else ("", "")
+
+
+def _form(pattern: str) -> str:
+    return f": {_FORMS[pattern]}" if pattern in _FORMS else f" {pattern}"
 
 
 def _choices(listed: object) -> list[str]:
@@ -246,7 +271,7 @@ _BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {
         "is empty" if not v else f"{quote_value(v)} is shorter than {c['min_length']} characters"
     ),
     "string_too_long": lambda v, c, u: f"{quote_value(v)} is longer than {c['max_length']} characters",
-    "string_pattern_mismatch": lambda v, c, u: f"{quote_value(v)} does not have the form {c['pattern']}",
+    "string_pattern_mismatch": lambda v, c, u: f"{quote_value(v)} does not have the form{_form(c['pattern'])}",
     "value_error": lambda v, c, u: str(c["error"]),
     "finite_number": lambda v, c, u: f"{quote_value(v)} is not a finite number",
 }

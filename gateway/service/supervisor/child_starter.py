@@ -88,7 +88,8 @@ class ChildStarter:
 
     def optional(self, name: str, arguments: dict[str, Any]) -> Child:
         """Start a child that control can do without; it speaks to control through the control socket."""
-        shared = (arguments[key] for key in ("ring", "listen") if arguments.get(key) is not None)
+        arguments = {**arguments, "kept_rig": self._kept_rig}
+        shared = (arguments[key] for key in ("ring", "listen", "kept_rig") if arguments.get(key) is not None)
         return spawn_child(OPTIONAL[name], arguments, *shared)
 
     def on_born(self) -> None:

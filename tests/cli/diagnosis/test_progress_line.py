@@ -1,5 +1,6 @@
 """What a long calculation says while it lasts, and that Ctrl-C ends it and leaves nothing behind, whenever it comes."""
 
+import contextlib
 import ctypes
 import io
 import os
@@ -73,6 +74,37 @@ def test_a_pipe_gets_a_line_for_each_stage(at_once: None) -> None:
         line.tell(Progress("solving", 2, 2))
         assert not stream.was_written.acquire(timeout=0.02)
     assert [words.partition(": ")[2] for words in stream.getvalue().splitlines()] == ["loading", "solving: 1 of 2"]
+
+
+def test_a_full_pipe_that_nobody_reads_keeps_nobody_from_the_end(at_once: None) -> None:
+    """A Ctrl-C waited for the line to be written, and `record --for` went on."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writing, bytes(4096))
+    os.set_blocking(writing, True)
+    is_said = threading.Event()
+
+    class Line(ProgressLine):
+        def sentence(self, width: int = 1000) -> str:
+            is_said.set()
+            return "record"
+
+    def show() -> None:
+        with line.keep_writing():
+            line.tell(Progress("record"))
+            is_said.wait(10.0)
+
+    with os.fdopen(reading, "rb") as pipe, os.fdopen(writing, "w") as stream:
+        line = Line("record", stream)
+        shown = threading.Thread(target=show, daemon=True)
+        shown.start()
+        shown.join(10.0)
+        is_over = not shown.is_alive()
+        pipe.read(1 << 16)  # so that a writer that waits can end
+        shown.join()
+    assert is_said.is_set() and is_over
 
 
 def test_the_time_left_of_what_goes_on_steadily_never_grows() -> None:

@@ -103,6 +103,8 @@ def test_values_are_written_as_people_say_them(text: str, words: tuple[int, tupl
         ("force_setpoint", "is not NAME=VALUE"),
         ("force_setpoint=twelve", "twelve is not a number in N"),
         ("force_setpoint=12,5", "decimals take a point: 12.5"),
+        ("force_setpoint=12.5 N", "12.5 N is not a number in N; without its unit: 12.5"),
+        ("force_setpoint=12,5N", "without its unit, decimals with a point: 12.5"),
         ("force_setpoint=", "nothing is not a number in N"),
         ("force_measured=1", "force_measured is read only"),
         ("mode=volts", "did you mean voltage?"),

@@ -81,7 +81,8 @@ def test_the_lines_of_a_card_name_a_map_of_one_s_own(register_map: RegisterMap) 
         (("effects", "leek"), "did you mean leak?"),
         (("effects", "friction"), "coulomb-friction"),
         (("registers", "force_setpiont"), "did you mean force_setpoint"),
-        (("registers", "49999"), "`force-gateway registers` lists them all"),
+        (("registers", "force"), "did you mean force_setpoint or "),
+        (("registers", "49999"), "force-gateway registers lists them"),
         (("registers", "trim", "--format", "scl"), "of the whole map"),
     ],
 )

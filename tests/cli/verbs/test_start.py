@@ -176,6 +176,14 @@ def test_version_names_what_a_report_needs(call) -> None:
     assert set(facts) == {"force-gateway", "python", "system", "executable"}
 
 
+@pytest.mark.parametrize("verb", main.VERBS)
+def test_help_names_no_bound_where_there_is_none(verb: str, call) -> None:
+    """`recordings prune --bytes SIZE` ended with [x<=None]."""
+    subcommands = getattr(main.import_verb(verb).command, "commands", {})
+    shown = [call(verb, "--help").output, *(call(verb, one, "--help").output for one in subcommands)]
+    assert not any("None]" in text for text in shown)
+
+
 def test_an_alias_is_the_subcommand_and_no_verb_of_the_help(call) -> None:
     alias, meant = call("install-service", "--help"), call("service", "install", "--help")
     assert alias.exit_code == 0

@@ -216,3 +216,10 @@ def test_a_fault_of_type_does_not_hide_those_of_other_parts(tmp_path: Path) -> N
         "plant: paper-slyde is neither a shipped plant (paper-slide) nor a file; did you mean paper-slide?"
     )
     assert [fault.line for fault in found.faults] == sorted(fault.line for fault in found.faults)
+
+
+def test_an_over_force_that_is_a_fault_is_no_warning_as_well(tmp_path: Path) -> None:
+    """It was said to be -10 N above the largest force."""
+    found = report(tmp_path, DEMO, ("over_force_n: 75", "over_force_n: 50"))
+    assert [fault.path for fault in found.faults] == ["limits.over_force_n"]
+    assert not found.warnings

@@ -197,6 +197,16 @@ def test_a_face_holds_to_the_certificates_and_networks_of_its_own_section(
     assert settings.server.allow == face.allow
 
 
+def test_the_command_that_says_more_of_a_face_s_files_can_be_pasted(folder: Folder, tmp_path: Path) -> None:
+    rig, empty = rig_with(folder), tmp_path / "server key.pem"
+    empty.write_text("")
+    face = replace(rig.fieldbus[0], key=str(empty))
+    with pytest.raises(StartError) as caught:
+        unused = replace(rig, file=tmp_path / "left cell.yaml")
+        faces.make_tls_server(unused, face, None, lambda peer: None, lambda cause, text: None)  # type: ignore[arg-type]
+    assert f"force-gateway check '{tmp_path}/left cell.yaml' says more" in str(caught.value)
+
+
 def test_a_disk_that_keeps_a_face_s_files_waiting_does_not_stop_the_loop(
     folder: Folder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

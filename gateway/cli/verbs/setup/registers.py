@@ -73,14 +73,14 @@ def _show_card(register_map: "RegisterMap", name: str, form: str | None) -> None
 
     from rich.console import Console
 
-    from gateway.cli.cards.card import describe_unknown, render_card
+    from gateway.cli.cards.card import render_card
     from gateway.cli.cards.register_card import find_registers, register_facts
-    from gateway.registers import render_registers
+    from gateway.registers import UnknownRegister, render_registers
 
-    found = find_registers(register_map, name)
-    if not found:
-        known = [register.name for register in register_map.registers]
-        raise click.UsageError(describe_unknown(name, "a register", known, "registers"))
+    try:
+        found = find_registers(register_map, name)
+    except UnknownRegister as error:
+        raise click.UsageError(str(error)) from None
     if form not in (None, "json"):
         raise click.UsageError(f"--format {form} is of the whole map; of one register there is a card, or json")
     if form == "json":

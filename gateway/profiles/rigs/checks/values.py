@@ -198,7 +198,8 @@ def check_over_force_room(parts: Parts) -> Found:
     if parts.limits is None:
         return
     trip_n = parts.limits.over_force_n
-    if parts.defaults and (room_n := over_force_room_n(parts.limits, parts.defaults)) is not None:
+    room_n = over_force_room_n(parts.limits, parts.defaults) if parts.defaults else None
+    if room_n is not None and room_n > 0.0:  # else a fault
         reason = f"{newton(trip_n)} is {room_n:.2g} N above force_max_n = {newton(parts.limits.force_max_n)}"
         yield (
             "limits.over_force_n",

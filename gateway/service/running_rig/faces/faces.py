@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from shlex import quote
 from typing import Any
 
 from gateway.fieldbus import ModbusRtuServer, ModbusTcpServer, ModbusTlsServer, RtuSettings, TlsSettings
@@ -197,7 +198,7 @@ def make_tls_server(
 
 def _unusable(rig: Rig, face: TlsFace, error: OSError) -> StartError:
     what = f"E174 {face.certificate}, {face.key} or {face.ca} cannot be used: {error}"
-    return StartError(f"{what}; force-gateway check {rig.file} says more", exit_codes.CONFIGURATION)
+    return StartError(f"{what}; force-gateway check {quote(str(rig.file))} says more", exit_codes.CONFIGURATION)
 
 
 def _rtu_settings(rig: Rig, face: RtuFace, place: int) -> RtuSettings:

@@ -195,3 +195,16 @@ def test_a_child_that_control_can_do_without_shares_the_ring_and_the_socket(kept
     assert name in module.rpartition(".")[2]
     assert find_spec(module)
     assert [words[2:] for words in asked] == [(0, 7), (7,)]
+
+
+@pytest.mark.parametrize("name", child_starter.OPTIONAL)
+def test_a_child_that_control_can_do_without_has_the_rig_that_runs(kept, monkeypatch, name):
+    """Its files may be half edited when it is started again."""
+    one, _ = kept
+    asked: list[tuple[dict, tuple[int, ...]]] = []
+    monkeypatch.setattr(child_starter, "spawn_child", lambda _, given, *shared: asked.append((given, shared)))
+    one.control(ARGUMENTS).close()
+    one.optional(name, {"ring": None, "listen": 7, "rig": "demo"})
+    ((arguments, shared),) = asked
+    assert shared == (7, arguments["kept_rig"])
+    assert "memfd:force-gateway" in str(Path(f"/proc/self/fd/{arguments['kept_rig']}").readlink())
