@@ -108,7 +108,7 @@ def test_ctrl_c_keeps_what_is_finished_says_so_and_the_next_call_ends_with_the_s
                 running.send_signal(signal.SIGINT)
                 break
         said = running.stderr.read()
-    assert running.returncode == 1 and "of 6 rows are kept; the same command goes on" in said
+    assert running.returncode == -signal.SIGINT and "of 6 rows are kept; the same command goes on" in said
     assert sorted(each.name for each in out.iterdir()) == ["rows.jsonl"]
     done = subprocess.run([*words, "--json"], capture_output=True, text=True, check=True)
     assert json.loads(done.stdout)["taken_over"] >= 1
