@@ -89,6 +89,7 @@ def double(value):
 """
 
 
+@pytest.mark.long
 def test_what_another_version_has_compiled_is_left_alone(tmp_path: Path) -> None:
     """Its types may have other names now, and what was kept of them can then not be read."""
     room = copy_of_the_compiler(tmp_path)
@@ -109,6 +110,7 @@ def sixfold(value):
 """
 
 
+@pytest.mark.long
 def test_steps_of_a_module_that_comes_later_are_known_too_and_their_changes_seen(tmp_path: Path) -> None:
     """numba does not look at what a loop calls: a step that has changed in another file must not run as it was."""
     (copy_of_the_compiler(tmp_path) / "__pycache__").mkdir()

@@ -76,6 +76,7 @@ def test_a_drive_that_moves_where_no_reading_counts_shows_nothing() -> None:
     assert part.usable[300:].all()
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("first", [9000, 10000])
 def test_a_recording_that_begins_amid_motion_has_no_cause(first: int) -> None:
     """Friction remembers what nobody recorded; judged from the first second on, these got stribeck-friction and warm-up."""

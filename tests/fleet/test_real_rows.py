@@ -73,6 +73,7 @@ command()
 """
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("verb", ["diagnose", "fit"])
 def test_numpy_is_loaded_for_one_thread_as_in_workers(verb: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x")

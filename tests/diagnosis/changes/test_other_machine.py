@@ -43,11 +43,8 @@ def unrelated() -> Measurement:
     )
 
 
-@pytest.mark.parametrize(
-    "is_old",
-    [True, pytest.param(False, marks=pytest.mark.long)],
-    ids=["given as the old one", "given as the new one"],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("is_old", [True, False], ids=["given as the old one", "given as the new one"])
 def test_a_file_of_something_else_is_doubted(is_old: bool) -> None:
     """`Something has changed on this machine` was all that its answer said."""
     own, _ = record(Wish(seed=3, duration_s=DURATION_S))

@@ -121,7 +121,6 @@ def test_after_a_diagnosis_groups_come_first_and_then_what_the_gateway_can_show_
     assert plan_next(diagnosis(causes=(), not_identifiable=())) is None
 
 
-SLOW = ("load-dependent-friction", "dead-band")
 STRONG = {
     "transport-delay": {"regulator.delay_s": 0.06},
     "load-dependent-friction": {"friction.load_dependent_n_per_n": 0.06},
@@ -129,9 +128,8 @@ STRONG = {
 }
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.long] if name in SLOW else []) for name in STRONG]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", STRONG)
 def test_the_planned_experiment_shows_what_a_constant_force_could_not(name: str) -> None:
     plant = PLAIN
     for path, value in STRONG[name].items():

@@ -242,6 +242,7 @@ def test_a_diagnosis_needs_a_recording_and_a_known_name() -> None:
         diagnose([short()], None, Options(without="gremlins"))
 
 
+@pytest.mark.long
 def test_a_step_of_the_command_is_met_to_a_tenth_of_a_tooth() -> None:
     """Five volts hold 280 teeth of 18 mV: a step that is off by 0.1 % is off by a quarter of a tooth at the top."""
     found = diagnose([recorded({"regulator.command_step_v": 0.0179}, noise_n=0.05, seed=6)])

@@ -91,6 +91,7 @@ def test_the_same_plant_gives_the_same_error_twice():
     assert found.before_rms_n < 0.4
 
 
+@pytest.mark.long
 def test_an_input_that_nobody_gives_leaves_its_effect_and_says_so():
     extended = plant_with(cell__zero_n_per_k=0.15)
     without = gain(extended, inputs=("tilt_deg",))

@@ -61,6 +61,7 @@ def test_a_good_fit_is_offered_under_the_users_name_with_its_error_on_all_points
     assert "reversals included" in report
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("why", ["the band", "what is in use"])
 def test_what_is_out_of_band_or_worse_than_what_is_in_use_is_kept_and_not_offered(why: str, tmp_path: Path) -> None:
     if why == "the band":

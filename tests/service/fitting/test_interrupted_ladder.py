@@ -115,7 +115,7 @@ def test_wherever_a_run_is_cut_only_whole_groups_count_and_the_others_are_climbe
     path = written(tmp_path, runs.whole)
     rows, seen, top_v = runs.whole.rows, set(), runs.whole.header["ladder"]["top_v"]
     for cut in [
-        *range(1, rows, 197 if budget > 1 else 997),
+        *range(1, rows, 197 if budget > 1 else 2997),
         *(np.flatnonzero(np.diff(runs.whole.columns["group"])) + 1).tolist(),
         rows - 1,
     ]:
@@ -158,7 +158,8 @@ def stored_calibration(state: Path, result: dict[str, Any]) -> Calibration:
     return CalibrationStore(state, load_rig("demo").calibration).load(result["stored"])
 
 
-@pytest.mark.parametrize("groups", [pytest.param(1, marks=pytest.mark.long), 2])
+@pytest.mark.long
+@pytest.mark.parametrize("groups", [1, 2])
 def test_the_fit_of_a_resumed_run_is_offered_and_its_error_is_that_of_a_whole_one(
     runs, whole_fit, groups, tmp_path: Path
 ) -> None:
