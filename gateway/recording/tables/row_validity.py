@@ -137,9 +137,10 @@ def flag_clipped(force_n: Floats, usable: Flags) -> tuple[Flags, list[str]]:
     clipped = usable & (force_n == end_n)
     rows = int(clipped.sum())
     beside = force_n[usable & ~clipped]
-    if rows < max(_LEAST_CLIPPED, _CLIPPED_SHARE * known.size) or beside.size < _ENOUGH:
+    steps_n = np.diff(np.unique(beside))
+    if rows < max(_LEAST_CLIPPED, _CLIPPED_SHARE * known.size) or beside.size < _ENOUGH or not steps_n.size:
         return none, []
-    step_n = float(np.median(np.diff(np.unique(beside))))
+    step_n = float(np.median(steps_n))
     stretches = int(np.sum(np.diff(clipped.astype(np.int8)) == 1))
     if stretches < _LEAST_REPEATS or noise_from_second_differences(beside) < _NOISE_STEPS * step_n:
         return none, []

@@ -194,6 +194,7 @@ def test_readings_at_the_end_of_the_cell_s_range_are_no_witness(side: float) -> 
         pytest.param(lambda force_n: np.round(np.minimum(force_n, 30.0) / 0.5) * 0.5, id="coarser than its noise"),
         pytest.param(lambda force_n: np.where(np.arange(1200) // 100 == 5, 50.0, force_n), id="frozen for a while"),
         pytest.param(lambda force_n: np.zeros(force_n.size), id="dead"),
+        pytest.param(lambda force_n: 30.0 * (np.arange(force_n.size) // 200 % 2), id="two levels, which tell no step"),
     ],
 )
 def test_readings_that_rest_at_the_largest_for_another_reason_are_kept(made_n: Callable[[Floats], Floats]) -> None:
