@@ -8,7 +8,8 @@ are others by now: a page that went by another lease than control let each force
 import contextlib
 import os
 import pickle
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 from gateway.profiles.rigs.assembly import load_rig
 from gateway.profiles.rigs.rig import Rig
@@ -53,6 +54,12 @@ def _remember(memory: int, rig: Rig) -> None:
 
 class ChangedRigError(OSError):
     """The rig's files are others than those that the gateway was started with; its text is a sentence with its code."""
+
+
+def rig_as_started(options: Mapping[str, Any]) -> Rig:
+    """Return the rig that runs, in a process beside control. options: as the guardian gives them. ChangedRigError as below."""
+    memory = options.get("kept_rig")
+    return unchanged_rig(options["rig"], options["fingerprint"], simulated=options["simulated"], memory=memory)
 
 
 def unchanged_rig(name: str, fingerprint: str | None, *, simulated: bool, memory: int | None = None) -> Rig:

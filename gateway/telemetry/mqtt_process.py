@@ -70,10 +70,9 @@ class Announcer:
 
 async def publish(options: dict[str, Any], log: EventLog) -> None:
     """Publish until the process ends. options: as the guardian gives them."""
-    from gateway.profiles.kept_rig import unchanged_rig
+    from gateway.profiles.kept_rig import rig_as_started
 
-    read = {"simulated": options["simulated"], "memory": options.get("kept_rig")}
-    rig = unchanged_rig(options["rig"], options["fingerprint"], **read)
+    rig = rig_as_started(options)
     assert rig.mqtt is not None
     password = _password_in(rig.mqtt.password_file) if rig.mqtt.password_file else None
     tls = rig.mqtt.tls

@@ -56,14 +56,12 @@ def report_to_control(state: Path, message: dict[str, Any]) -> dict[str, Any]:
 def make_watch(ring: "RingReader", options: dict[str, Any]) -> tuple["Watch", "ForceWatch"]:
     """Return the watch over the rig, and that over the force. Everything heavy is imported here."""
     from gateway.plants.in_use import with_selected_plant
-    from gateway.profiles.kept_rig import unchanged_rig
+    from gateway.profiles.kept_rig import rig_as_started
     from gateway.watch.force_watch import ForceWatch
     from gateway.watch.residual_watch import Watch, WatchSettings
 
     state = Path(options["state"])
-    read = {"simulated": options["simulated"], "memory": options.get("kept_rig")}
-    as_started = unchanged_rig(options["rig"], options["fingerprint"], **read)
-    rig, _ = with_selected_plant(as_started, state)
+    rig, _ = with_selected_plant(rig_as_started(options), state)
     setup = WatchSettings(options["window_s"], options["every_s"])
     watch = Watch(ring, make_comparison(rig, state), setup, time.monotonic)
     return watch, ForceWatch(state, rig.control.defaults.in_band_tolerance_n)
