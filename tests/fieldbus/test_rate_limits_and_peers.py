@@ -154,3 +154,4 @@ def test_what_waits_in_a_socket_is_counted_and_of_one_that_is_closed_nobody_know
     ours.close()
     theirs.close()
     assert count_waiting(Transport()) == inf
+    assert count_waiting(asyncio.BaseTransport({})) == inf, "one without a socket"

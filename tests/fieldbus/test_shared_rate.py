@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from gateway.fieldbus import connection as connection_module
 from gateway.modbus import pdu
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
 from tests.fieldbus.conftest import HandClock, HandTimer
@@ -132,6 +133,22 @@ def test_what_waits_in_a_pile_is_known_as_asked_for_a_while_ago(stand: Any, deli
     assert all(piled[began:ended]), "as long as it lasts"
     assert began < 0.5 * 200 + 50 and len(piled) - ended < 50
     assert not any(pile_up(20)), "and no longer"
+
+
+def test_who_has_some_requests_under_way_and_takes_each_answer_is_not_late(
+    stand: Any, deliver: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What waits behind a full read is soon answered at the pace at which it is taken."""
+    monkeypatch.setattr(connection_module, "count_waiting", lambda _: 3000.0)
+    made = stand()
+    connection, far = made.connect()
+    write = framed(pdu.write_registers_request(0, bytes(26)))
+    stream = write * 8000
+    for _ in range(200):
+        stream = stream[deliver(connection, far, stream) :]
+        made.clock.advance(0.01)
+    assert len(made.bank.writes) > 1000 and made.log == []
+    assert not any(peer.is_behind for _, _, peer in made.bank.writes)
 
 
 def test_what_several_connections_of_one_machine_have_sent_for_more_than_a_second_has_waited(
