@@ -164,14 +164,15 @@ def _interruptible() -> Iterator[Callable[[], None]]:
 
     Python raises it where it happens to be, and where that is a callback of a library it is swallowed, with a traceback.
     """
-    pressed = threading.Event()
+    is_pressed = False  # no Event, whose lock a second Ctrl-C would wait for where it interrupts the first one
 
     def check() -> None:
-        if pressed.is_set():
+        if is_pressed:
             raise KeyboardInterrupt
 
     def on_interrupt(number: int, frame: FrameType | None) -> None:
-        pressed.set()
+        nonlocal is_pressed
+        is_pressed = True
         raise KeyboardInterrupt
 
     with handle_interrupt(on_interrupt), _silent_when_swallowed():
