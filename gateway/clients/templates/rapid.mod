@@ -23,7 +23,7 @@ MODULE ForceGateway
   !    A SemiStatic task runs on when T_ROB1 stops, whatever stops it.
   !    So T_ROB1 has to show that it runs: its timer, which stops with
   !    it (Stop, E-stop, an error, single steps), counts fgAlive on.
-  !    Where that stands for FG_QUIET cycles (0.5 s), the force goes
+  !    Where that stands for FG_QUIET (0.5 s), the force goes
   !    off; without it nothing is enabled. Call FgAliveStart first:
   !      PROC FgAliveStart()
   !        IDelete irAlive;
@@ -92,8 +92,8 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   CONST num FG_TIMEOUT:=0.5;
   CONST num FG_CYCLE:=0.04;
   CONST num FG_TIMER:=0.1;
-  ! Cycles that fgAlive may stand still (A)
-  CONST num FG_QUIET:=12;
+  ! Seconds that fgAlive may stand still (A)
+  CONST num FG_QUIET:=0.5;
 
   ! ---- what T_ROB1 sets ---------------------------------------------
   PERS bool fgEnable:=FALSE;
@@ -193,10 +193,11 @@ ${crc_table}];
   LOCAL VAR bool bOffRefused:=FALSE;
   ! Enable is on its way: without an answer nobody knows
   LOCAL VAR bool bAsking:=FALSE;
-  ! A: fgAlive is watched, its last value, cycles it has stood still
+  ! A: fgAlive is watched, its last value, seconds it has stood still
   LOCAL VAR bool bWatch:=FALSE;
   LOCAL VAR num nAlive:=0;
   LOCAL VAR num nQuiet:=0;
+  LOCAL VAR clock clWatch;
   ! byte_order_echo was written over this connection
   LOCAL VAR bool bProven:=FALSE;
   ! The status was read over this connection
@@ -393,14 +394,23 @@ ${crc_table}];
   ! T_ROB1 stands: this task must not keep its force up
   LOCAL PROC FgWatchProgram()
     VAR num nLongest;
+    VAR num nPassed;
+    ! Not in cycles: each takes as long as the gateway's answer
+    nPassed:=ClkRead(clWatch);
+    ClkReset clWatch;
+    ClkStart clWatch;
     nLongest:=FG_QUIET;
     ! An enable right behind a start waits for the timer of T_ROB1
     IF (fgEnable OR fgSelfTest) AND (NOT FgIsOn()) nLongest:=2*FG_QUIET;
     IF fgAlive<>nAlive THEN
       nAlive:=fgAlive;
       nQuiet:=0;
+    ELSEIF nQuiet<FG_QUIET THEN
+      nQuiet:=nQuiet+nPassed;
+      IF nQuiet>FG_QUIET nQuiet:=FG_QUIET;
     ELSEIF nQuiet<nLongest THEN
-      nQuiet:=nQuiet+1;
+      ! What has passed may have been before it was asked for
+      nQuiet:=nQuiet+FG_CYCLE;
     ELSEIF fgEnable OR fgSelfTest THEN
       nQuiet:=FG_QUIET;
       IF fgEnable fgEnded:=TRUE;
