@@ -135,7 +135,8 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   ! with  CONST num nRisingB{3}:=[0,20.5,60];
   ! fgUpload:=TRUE sends it, a part per cycle, and goes FALSE when it
   ! is done: fgUploaded, or fgText says why not. FALSE for two cycles
-  ! gives it up, unless it is committed already.
+  ! gives it up, unless it is committed already. Fill the next set when
+  ! it is FALSE: a change before that ends the upload as failed.
   ! The sums of a part may take longer than a lease: upload while
   ! nothing is enabled.
   PERS num fgSet{${set_words}}:=[${set_zeros}];
@@ -941,6 +942,12 @@ ${words_are_taken};
         FgUploadEnd FALSE;
         RETURN;
       ENDIF
+    ELSEIF nUploadStep<=4 AND (NOT FgSetStands()) THEN
+      ! FALSE and TRUE again within a cycle, for another set, is not
+      ! seen: to commit the one of before would tell that as uploaded
+      fgText:="fgSet or fgSlot has changed: set fgUpload again";
+      FgUploadEnd FALSE;
+      RETURN;
     ENDIF
     TEST nUploadStep
     CASE 0:
@@ -962,8 +969,9 @@ ${words_are_taken};
     FgAsk 16;
     nUploadStep:=nUploadStep+1;
     IF nException<>0 THEN
-      FgUploadEnd FALSE;
+      ! First: T_ROB1 reads it when fgUpload is FALSE
       FgExplain;
+      FgUploadEnd FALSE;
     ENDIF
   ENDPROC
 
@@ -980,17 +988,28 @@ ${words_are_taken};
     RETURN FgIsWord(nSlot);
   ENDFUNC
 
+  ! Are fgSet and fgSlot those that are sent?
+  LOCAL FUNC bool FgSetStands()
+    FOR i FROM 1 TO ${set_words} DO
+      IF fgSet{i}<>nSet{i} RETURN FALSE;
+    ENDFOR
+    RETURN fgSlot=nSlot;
+  ENDFUNC
+
   LOCAL FUNC bool FgIsWord(num nValue)
     RETURN nValue>=0 AND nValue<=65535 AND nValue=Round(nValue);
   ENDFUNC
 
   LOCAL PROC FgAskCommit()
+    VAR bool bStands;
     FgFrameRead ${stg_commit_status},3;
     FgAsk 3;
     IF nException<>0 RAISE ERR_FG_FRAME;
     FgTakeWords 3;
     IF nWords{1}=FG_COMMIT_COMMITTED THEN
-      FgUploadEnd TRUE;
+      bStands:=FgSetStands();
+      IF NOT bStands fgText:="committed; fgSet or fgSlot has changed since";
+      FgUploadEnd bStands;
     ELSEIF nWords{1}=FG_COMMIT_FAILED THEN
       fgText:="commit, number "+NumToStr(FgScaled(nWords{2},1),0);
       fgText:=fgText+": "+FgFailingText(nWords{3});
