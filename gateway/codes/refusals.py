@@ -232,9 +232,9 @@ class RefusalReason(IntEnum):
         Explanation(
             "W219",
             "busy",
-            "A write to staging while a commit is under way, or a commit or slot that has waited in a pile of requests.",
-            "The commit is answered at once and done a little later; or a master sends faster than it is answered.",
-            "Wait until commit_status is committed or failed, and for the answer to each request.",
+            "Staging during a commit; a commit or slot behind a pile of requests; once on a serial line: equal writes at once.",
+            "A commit is done a little behind its answer; a master does not wait; or its adapter may hear itself.",
+            "Wait until commit_status is committed or failed, and for each answer; on a serial line write once more.",
         ),
     )
     QUANTITY = (

@@ -172,6 +172,7 @@ class Refusals:
     __pydantic_config__ = STRICT
     unknown: str = ""  # to what it does not understand; empty: silence
     out_of_range: OutOfRange | None = None  # to a setting that it understands and cannot do
+    others: tuple[Annotated[str, MinLen(1)], ...] = ()  # further sentences: busy, operated by hand, checksum wrong
 
     def __post_init__(self) -> None:
         for text in self.texts():
@@ -181,5 +182,5 @@ class Refusals:
 
     def texts(self) -> tuple[str, ...]:
         """Return the texts by which the device refuses."""
-        texts = (self.unknown, self.out_of_range.text if self.out_of_range else "")
+        texts = (self.unknown, self.out_of_range.text if self.out_of_range else "", *self.others)
         return tuple(text for text in texts if text)

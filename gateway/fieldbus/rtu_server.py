@@ -24,7 +24,7 @@ from gateway.devices import SerialSettings
 from gateway.modbus.peer import Peer
 from gateway.modbus.rtu import BROADCAST_UNIT, LONGEST_ADU, encode_adu
 from gateway.modbus.rtu_receiver import RtuReceiver, RtuRequest
-from gateway.modbus.server import DataBank, answer
+from gateway.modbus.server import DataBank, answer, refuse_echo
 from gateway.ports import PacedPty, PortError, PortEvents, SerialPort
 from gateway.ports.port import monotonic_s
 
@@ -170,7 +170,8 @@ class ModbusRtuServer:
 
     def _execute(self, request: RtuRequest) -> None:
         has_waited = self._piles_since_s is not None and monotonic_s() - self._piles_since_s >= PILE_S
-        pdu = answer(request.pdu, self._bank, self._peer_behind if has_waited else self.settings.peer)
+        peer = self._peer_behind if has_waited else self.settings.peer
+        pdu = (refuse_echo if request.is_in_doubt else answer)(request.pdu, self._bank, peer)
         is_late = monotonic_s() < self._mute_until_s
         if not request.is_answered or is_late or self._backlog_bytes > LONGEST_ADU:
             return

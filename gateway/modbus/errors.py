@@ -43,6 +43,7 @@ class RequestFault(Enum):
     VALUE = "value", ILLEGAL_VALUE
     OBJECT = "object", ILLEGAL_ADDRESS  # of a device identification
     UNIT = "unit", TARGET_SILENT
+    ECHO = "echo", BUSY  # of a serial line: it may be our own answer that has come back
 
     @property
     def code(self) -> int:

@@ -8,17 +8,16 @@ letter, and to answer one's own echo would never end. Decisions:
 - Once an answer of the other kind has come back, or has not, the line is known. What is heard before a master can have listened
   to an answer tells nothing of its echo.
 - Until then, a slow adapter could bring the echo later. Equal writes at once after each answer are a master's at first; behind
-  a row of them one is left out, which ends what an echo had begun and costs a master one request. A master asks for that again:
-  the row grows. Where something else is asked next, it was an echo, and so is the next equal write at once, for a master that
-  only writes never shows more.
+  some of them one is in doubt. It is not executed but refused (06, busy), and that answer is no request: it comes back, or does
+  not, and the line is known from then on. So a master that only writes is refused once; to leave writes out without a word cost
+  it one of each row, and what it heard next told nothing.
 - On a line that has an echo, or may have one, what is asked before it comes back was asked by a master that had given up. It is
   executed and not answered, and the echo behind it is one: an enable that came back behind a stop would undo that.
 """
 
 from typing import Final
 
-_QUICK_REPEATS: Final = 3  # equal writes at once after each answer: more on a line that may have an echo are in doubt
-_DOUBT_GROWTH: Final = 10  # how many more are answered after each that was left out
+_QUICK_REPEATS: Final = 3  # equal writes at once after an answer: the next on a line that may have an echo is in doubt
 _ECHO_LATENCY_S: Final = 0.02  # from the last character of an answer to its echo, through the slowest adapter
 
 
@@ -26,8 +25,7 @@ class RtuEcho:
     """The answer that may come back, and whether this line gives answers back. may_echo: false where it cannot."""
 
     __slots__ = (
-        "_character_s", "_has_echo", "_is_like_request", "_is_presumed", "_left_out", "_may_echo", "_most_repeats",
-        "_repeats", "_sent_s", "_silence_s", "_until_s", "frame",
+        "_character_s", "_has_echo", "_is_like_request", "_may_echo", "_repeats", "_sent_s", "_silence_s", "_until_s", "frame",
     )  # fmt: skip
 
     def __init__(self, character_s: float, silence_s: float, *, may_echo: bool) -> None:
@@ -36,9 +34,7 @@ class RtuEcho:
         self._has_echo: bool | None = None if may_echo else False  # None: not known yet
         self._is_like_request = False
         self._sent_s = self._until_s = 0.0  # the answer; the latest that its echo comes
-        self._repeats, self._most_repeats = 0, _QUICK_REPEATS
-        self._left_out = b""  # a write that was taken for an echo, until it is known what is asked behind it
-        self._is_presumed = False  # an echo, by that
+        self._repeats = 0
         self.frame = b""
 
     def expect(self, answer: bytes, now_s: float, *, is_like_request: bool) -> None:
@@ -49,35 +45,28 @@ class RtuEcho:
 
     def is_this(self, frame: bytes, heard_s: float) -> bool:
         """Decide whether a frame is our last answer come back."""
-        if self._left_out:
-            self._judge(is_asked_again=frame == self._left_out)
         if not self.frame or frame != self.frame:
             return False
         if not self._is_like_request:
             self._has_echo = True
-        elif self._has_echo is None and not self._is_doubtful(heard_s):
+        elif self._has_echo is None and heard_s >= self._heard_out_s(len(self.frame)) + self._silence_s:
             return False
         self.frame = b""
         return True
-
-    def _judge(self, *, is_asked_again: bool) -> None:
-        """Learn from what is heard behind a write that was left out."""
-        if is_asked_again and not self._is_presumed:
-            self._most_repeats *= _DOUBT_GROWTH
-        self._is_presumed, self._left_out = not is_asked_again, b""
 
     def _heard_out_s(self, size: int) -> float:
         """The earliest that a request of so many bytes can be there, of a master that has listened to the answer."""
         return self._sent_s + (len(self.frame) + size) * self._character_s
 
-    def _is_doubtful(self, heard_s: float) -> bool:
-        """Decide whether a write that is equal to our answer is rather taken for it."""
-        if heard_s < self._heard_out_s(len(self.frame)) + self._silence_s:
-            return True
-        self._repeats = self._repeats + 1 if heard_s <= self._until_s else 0
-        if self._repeats <= (0 if self._is_presumed else self._most_repeats):
+    def is_in_doubt(self, frame: bytes, heard_s: float) -> bool:
+        """Decide whether a frame that is_this has let through may be our answer all the same, and none that a slow adapter
+        brings back has shown yet what the line does."""
+        if not self.frame or frame != self.frame or self._has_echo is not None:
             return False
-        self._repeats, self._left_out = 0, self.frame
+        self._repeats = self._repeats + 1 if heard_s <= self._until_s else 0
+        if self._repeats <= _QUICK_REPEATS:
+            return False
+        self._repeats = 0
         return True
 
     def is_coming(self, size: int, heard_s: float) -> bool:
@@ -98,6 +87,5 @@ class RtuEcho:
 
     def forget(self) -> None:
         """Forget the answer; and what was learned, where there may be another adapter now."""
-        self.frame = self._left_out = b""
-        self._is_presumed = False
+        self.frame = b""
         self._has_echo = None if self._may_echo else False

@@ -67,11 +67,13 @@ def silence_s(baud: int, character_s: float) -> float:
 
 
 class RtuRequest(NamedTuple):
-    """A request for this unit or for all. is_answered: false for a broadcast, and where others have spoken since."""
+    """A request for this unit or for all. is_answered: false for a broadcast, and where others have spoken since.
+    is_in_doubt: rather to be refused, for it may be our own answer that has come back (rtu_echo)."""
 
     unit: int
     pdu: bytes
     is_answered: bool
+    is_in_doubt: bool = False
 
 
 class RtuReceiver:
@@ -200,7 +202,9 @@ class RtuReceiver:
         heard = [one for one in ours if not self._echo.is_this(one[2], self._last_s)]
         for at, size, frame in heard:
             is_last = at == found[-1][0] and not self._echo.is_coming(size, self._last_s)
-            requests.append(RtuRequest(frame[0], frame[1:-2], is_last and frame[0] == self._unit))
+            is_answered = is_last and frame[0] == self._unit
+            is_in_doubt = is_answered and self._echo.is_in_doubt(frame, self._last_s)
+            requests.append(RtuRequest(frame[0], frame[1:-2], is_answered, is_in_doubt))
             self._echo.note_master(size, self._last_s)
         return requests
 

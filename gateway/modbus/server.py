@@ -80,6 +80,17 @@ def refuse_unit(request: tuple[int, bytes], served: Sequence[int], bank: DataBan
     return P.exception_pdu(pdu[0], refusal.code)
 
 
+def refuse_echo(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
+    """Return the answer to a write that may be the echo of the answer before it, and is not executed."""
+    sentence = (
+        "a fourth equal write at once after its answer, as an adapter that hears itself gives it back: write it again"
+    )
+    refusal = RequestError(RequestFault.ECHO, sentence, pdu[0], P.address_in(pdu))
+    refusal.is_write = True
+    bank.note_refusal(refusal, peer)
+    return P.exception_pdu(pdu[0], refusal.code)
+
+
 def _not_served(pdu: bytes, _bank: DataBank, _peer: Peer) -> bytes:
     function = pdu[0] if pdu else 0
     raise RequestError(RequestFault.FUNCTION, f"function {function} is not served", function)

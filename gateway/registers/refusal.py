@@ -18,6 +18,7 @@ _REQUEST_FAULTS: Final[dict[RequestFault, RefusalReason | SpecialRefusal]] = {
     RequestFault.VALUE: NOT_A_COIL_VALUE,
     RequestFault.OBJECT: NO_SUCH_OBJECT,
     RequestFault.UNIT: RefusalReason.UNIT,
+    RequestFault.ECHO: RefusalReason.BUSY,
 }
 
 

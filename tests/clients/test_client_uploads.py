@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.controllers import S7, Codesys, Irc5, Plc, UniversalRobot
 from tests.clients.scenes import MAP, MODEL, TEXTS, cycles
@@ -86,19 +85,3 @@ def test_a_robot_without_bit_casts_makes_float32_words(number: float) -> None:
     robot = UniversalRobot(TEXTS["urscript"], GatewayAtHand(MAP))
     robot.machine.start("fg_model_number", 2, number)
     assert struct.pack(">HH", *robot.get("fg_set_a")[2:4]) == struct.pack(">f", number)
-
-
-@pytest.mark.parametrize("parts", [1, 2, 3, 4])
-@pytest.mark.parametrize("language", ["rapid", "scl", "twincat", "codesys"])
-def test_a_set_that_is_filled_anew_while_one_is_sent_takes_no_part_in_that(
-    language: str, parts: int, gateway: GatewayAtHand
-) -> None:
-    """Of an IRC5 the parts that were not sent yet were of the new one: half of each was committed, its CRC-32 right."""
-    client: Any = CONTROLLERS[language](TEXTS[language], gateway)
-    client.begin_upload(MODEL, 3)
-    while len(gateway.uploads) < parts:
-        client.scan() if isinstance(client, Plc) else client.cycle()
-    client.begin_upload(MODEL | {"rising_b": [0.0, 25.0, 60.1], "falling_b": [0.5, 29.0, 60.3], "damping": 0.7}, 3)
-    cycles(client, 8)
-    staged = dict(gateway.uploads[:5])
-    assert client.uploaded and staged[1000] + staged[1070] + staged[1150] == words_of(MODEL)

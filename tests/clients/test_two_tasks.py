@@ -230,6 +230,31 @@ def test_a_program_that_stands_right_behind_its_enable_begins_nothing_and_one_th
     assert not any(held[:60]) and all(held[62:80]) and not any(held[95:]), held
 
 
+@pytest.mark.parametrize("answer_s", [0.0, 0.05, 0.2])
+def test_the_force_of_a_program_that_stands_ends_as_soon_at_a_gateway_that_answers_late(
+    answer_s: float, gateway: GatewayAtHand
+) -> None:
+    """The task counted its cycles, each as long as an answer: of 0.2 s each the force lasted for 3.2 s behind the stop."""
+    client = CONTROLLERS["rapid"](TEXTS["rapid"], gateway)
+    answer, ends_s = gateway.answer, list[float]()
+
+    def answer_late(request: bytes) -> bytes:
+        client.now_s += answer_s
+        return answer(request)
+
+    gateway.answer = answer_late  # type: ignore[method-assign]
+
+    def program_until_2_s() -> None:
+        if client.now_s < 2.0:
+            client.set(fgAlive=int(10 * client.now_s))
+            client.enable(12.0)
+        elif not gateway.bank.command.control_word:
+            ends_s.append(client.now_s - 2.0)
+
+    client.serve(100, program_until_2_s)
+    assert 0.4 < ends_s[0] < 0.6 + 3 * answer_s and client.ended and "fgAlive" in client.text
+
+
 @pytest.mark.parametrize("before", [900, 900.4, 70000])
 @pytest.mark.parametrize("given", [600, 600.4, 70000])
 def test_a_word_that_is_set_beside_an_exchange_is_the_one_that_is_sent_and_costs_no_force(

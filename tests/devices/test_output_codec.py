@@ -185,3 +185,12 @@ def test_a_setting_in_hexadecimal_counts_is_spelled_and_read_back(itv: DevicePro
     assert host.request(ReadVoltage()) == b":06800401210121\r\n"
     assert host.receive(b":06800201213E80\r\n", 0.0) == [Accepted(5.0)]
     assert host.resolution_v == pytest.approx(10.0 / 32000.0)
+
+
+def test_each_further_sentence_for_no_is_a_refusal_in_its_own_words(itv: DeviceProfile) -> None:
+    """Of two kinds a third one was noise, and a device that was busy or set to local one that is silent."""
+    profile = replace(itv, refusals=Refusals(unknown="?", others=("SYSTEM BUSY", "LOCAL MODE {lock:d}")))
+    for said in ("?", "SYSTEM BUSY", "LOCAL MODE 2"):
+        host = output_host(profile)
+        host.request(SetVoltage(5.0))
+        assert host.receive(f"{said}\r\n".encode(), 0.0) == [Refused(said)]

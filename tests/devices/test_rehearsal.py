@@ -58,6 +58,12 @@ PRESSURE = {"ask": "P?", "answer": "{p:d}", "range": {"device": [0, 10], "pressu
         ({"terminator": ";FF", "question_terminator": "*", "read_voltage__ask": "RE*Q"}, "has the terminator in its"),
         ({"terminator": ";FF", "question_terminator": "*", "refusals__unknown": "NO*"}, None),
         ({"refusals__unknown": "ERR {code:d}"}, None),
+        ({"refusals__others": ["LOCAL MODE", "BUSY {left:d} S"]}, None),
+        ({"refusals__others": ["LOCAL MODE", "512"]}, "the answer '512\\r\\n' to 'SET 512\\r\\n' is read as a refusal"),
+        (
+            {"refusals__others": ["BUSY", "NO\r\nWAY"]},
+            "refusals.others[1]: 'NO\\r\\nWAY' has the terminator in its middle",
+        ),
         (
             {"set_voltage__answer": "OK {counts:d}", "refusals__unknown": "{word:OK|NO} {code:d}"},
             "is read as a refusal",

@@ -14,6 +14,8 @@ from tests.devices.test_rehearsal import loaded
         ("waveshare-relay", {"set_valve__push__ask": "050000ff00"}, "set_valve.push.ask: '050000ff00' is no PDU"),
         ("waveshare-relay", {"read_valve__ask": "01 00000001"}, "read_valve.ask: '01 00000001' is no PDU"),
         ("waveshare-relay", {"set_valve__pull__ask": "01050000FF008C3A"}, "set_valve.pull.ask: '01050000FF008C3A' has its"),
+        ("waveshare-ao8b", {"read_voltage__modbus": {"function": 3, "register": 2}}, None),  # its request ends as a frame does
+        ("mcu-line", {"constants": {"who": 7}, "refusals__others": ["BUSY {who:d}"]}, None),
         ("waveshare-relay", {"constants": {"unit": 7}}, "constants.unit: no sentence has a field {unit:...}; a Modbus"),
         ("waveshare-relay", {"constants": {"address": 7}}, None),
         ("adam-4024", {"constants": {"address": 1, "channel": 0, "adress": 2}}, "constants.adress: no sentence has a field"),

@@ -869,5 +869,5 @@ DEFECTS = (
            "if (was_on || !(client->want[FG_CONTROL_WORD] || client->once)) memcpy", "if (1) memcpy",
            ("clients/test_words_beside_refusals.py",)),
     Defect("a late echo is answered three times for each write", "modbus/rtu_echo.py",
-           "(0 if self._is_presumed else self._most_repeats)", "self._most_repeats", ("modbus/test_rtu_echo.py",)),
+           "            self._has_echo = True\n", "            self._has_echo = None\n", ("modbus/test_rtu_echo.py",)),
 )  # fmt: skip

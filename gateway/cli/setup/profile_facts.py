@@ -56,9 +56,10 @@ def _device(device: "DeviceProfile") -> str:
 
 def _sentences(device: "DeviceProfile") -> dict[str, str]:
     """What goes over the wire, to lay beside the manual, and what of a reading is not listened to."""
-    from gateway.cli.setup.wire_example import example, read_over
+    from gateway.cli.setup.wire_example import example, manual_numbers, read_over
 
     told = {"on the wire": example(device), "read over": ", ".join(read_over(device))}
+    told["register"] = "; ".join(manual_numbers(device))
     return {name: words for name, words in told.items() if words}
 
 

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from gateway.devices.binary.weight_registers import WeightRegisters
 from gateway.devices.codecs import cell_device, cell_host, output_device, output_host
 from gateway.devices.fields import Choice
 from gateway.devices.force_reading import UNIT
@@ -12,6 +13,10 @@ from gateway.devices.valve import ValveDevice, ValveHost
 from gateway.devices.valve_profile import ValveDirection
 
 _SHOWN_N: Final = -20.0  # a pull, so that the place of the minus is seen; counts, where only a rig says what one is
+
+_MANUALS_FIRST: Final = (30001, 40001)
+"""Where manuals that count from 1 begin with input and with holding registers."""
+_MANUALS_COUNT: Final = 9999
 
 
 def example(profile: DeviceProfile) -> str:
@@ -27,6 +32,22 @@ def read_over(profile: DeviceProfile) -> list[str]:
         return []
     over = profile.reading.read_over(profile.constants)
     return [f"{one.name} ({', '.join(map(repr, one.words))})" if isinstance(one, Choice) else one.name for one in over]
+
+
+def manual_numbers(profile: DeviceProfile) -> list[str]:
+    """Return the registers that a manual counts from 1 in this way, and what each would be then: nobody answers the others, or
+    another register does."""
+    found = set[int]()
+    for name in ("identity", "set_voltage", "read_voltage", "read_pressure", "read_force"):
+        access = getattr(getattr(profile, name, None), "modbus", None)
+        if access is not None:
+            found.add(access.first if isinstance(access, WeightRegisters) else access.register)
+    return [
+        f"{one} goes out as it stands: if it is a manual's {one}, write {one - first}"
+        for one in sorted(found)
+        for first in _MANUALS_FIRST
+        if first <= one < first + _MANUALS_COUNT
+    ]
 
 
 def _output(profile: DeviceProfile) -> str:

@@ -23,7 +23,7 @@ MODULE ForceGateway
   !    A SemiStatic task runs on when T_ROB1 stops, whatever stops it.
   !    So T_ROB1 has to show that it runs: its timer, which stops with
   !    it (Stop, E-stop, an error, single steps), counts fgAlive on.
-  !    Where that stands for FG_QUIET cycles (0.5 s), the force goes
+  !    Where that stands for FG_QUIET (0.5 s), the force goes
   !    off; without it nothing is enabled. Call FgAliveStart first:
   !      PROC FgAliveStart()
   !        IDelete irAlive;
@@ -92,8 +92,8 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   CONST num FG_TIMEOUT:=0.5;
   CONST num FG_CYCLE:=0.04;
   CONST num FG_TIMER:=0.1;
-  ! Cycles that fgAlive may stand still (A)
-  CONST num FG_QUIET:=12;
+  ! Seconds that fgAlive may stand still (A)
+  CONST num FG_QUIET:=0.5;
 
   ! ---- what T_ROB1 sets ---------------------------------------------
   PERS bool fgEnable:=FALSE;
@@ -135,7 +135,8 @@ ${fill_in}  CONST string FG_HOST:="${host}";
   ! with  CONST num nRisingB{3}:=[0,20.5,60];
   ! fgUpload:=TRUE sends it, a part per cycle, and goes FALSE when it
   ! is done: fgUploaded, or fgText says why not. FALSE for two cycles
-  ! gives it up, unless it is committed already.
+  ! gives it up, unless it is committed already. Fill the next set when
+  ! it is FALSE: a change before that ends the upload as failed.
   ! The sums of a part may take longer than a lease: upload while
   ! nothing is enabled.
   PERS num fgSet{${set_words}}:=[${set_zeros}];
@@ -193,10 +194,11 @@ ${crc_table}];
   LOCAL VAR bool bOffRefused:=FALSE;
   ! Enable is on its way: without an answer nobody knows
   LOCAL VAR bool bAsking:=FALSE;
-  ! A: fgAlive is watched, its last value, cycles it has stood still
+  ! A: fgAlive is watched, its last value, seconds it has stood still
   LOCAL VAR bool bWatch:=FALSE;
   LOCAL VAR num nAlive:=0;
   LOCAL VAR num nQuiet:=0;
+  LOCAL VAR clock clWatch;
   ! byte_order_echo was written over this connection
   LOCAL VAR bool bProven:=FALSE;
   ! The status was read over this connection
@@ -393,14 +395,23 @@ ${crc_table}];
   ! T_ROB1 stands: this task must not keep its force up
   LOCAL PROC FgWatchProgram()
     VAR num nLongest;
+    VAR num nPassed;
+    ! Not in cycles: each takes as long as the gateway's answer
+    nPassed:=ClkRead(clWatch);
+    ClkReset clWatch;
+    ClkStart clWatch;
     nLongest:=FG_QUIET;
     ! An enable right behind a start waits for the timer of T_ROB1
     IF (fgEnable OR fgSelfTest) AND (NOT FgIsOn()) nLongest:=2*FG_QUIET;
     IF fgAlive<>nAlive THEN
       nAlive:=fgAlive;
       nQuiet:=0;
+    ELSEIF nQuiet<FG_QUIET THEN
+      nQuiet:=nQuiet+nPassed;
+      IF nQuiet>FG_QUIET nQuiet:=FG_QUIET;
     ELSEIF nQuiet<nLongest THEN
-      nQuiet:=nQuiet+1;
+      ! What has passed may have been before it was asked for
+      nQuiet:=nQuiet+FG_CYCLE;
     ELSEIF fgEnable OR fgSelfTest THEN
       nQuiet:=FG_QUIET;
       IF fgEnable fgEnded:=TRUE;
@@ -931,6 +942,12 @@ ${words_are_taken};
         FgUploadEnd FALSE;
         RETURN;
       ENDIF
+    ELSEIF nUploadStep<=4 AND (NOT FgSetStands()) THEN
+      ! FALSE and TRUE again within a cycle, for another set, is not
+      ! seen: to commit the one of before would tell that as uploaded
+      fgText:="fgSet or fgSlot has changed: set fgUpload again";
+      FgUploadEnd FALSE;
+      RETURN;
     ENDIF
     TEST nUploadStep
     CASE 0:
@@ -952,8 +969,9 @@ ${words_are_taken};
     FgAsk 16;
     nUploadStep:=nUploadStep+1;
     IF nException<>0 THEN
-      FgUploadEnd FALSE;
+      ! First: T_ROB1 reads it when fgUpload is FALSE
       FgExplain;
+      FgUploadEnd FALSE;
     ENDIF
   ENDPROC
 
@@ -970,17 +988,28 @@ ${words_are_taken};
     RETURN FgIsWord(nSlot);
   ENDFUNC
 
+  ! Are fgSet and fgSlot those that are sent?
+  LOCAL FUNC bool FgSetStands()
+    FOR i FROM 1 TO ${set_words} DO
+      IF fgSet{i}<>nSet{i} RETURN FALSE;
+    ENDFOR
+    RETURN fgSlot=nSlot;
+  ENDFUNC
+
   LOCAL FUNC bool FgIsWord(num nValue)
     RETURN nValue>=0 AND nValue<=65535 AND nValue=Round(nValue);
   ENDFUNC
 
   LOCAL PROC FgAskCommit()
+    VAR bool bStands;
     FgFrameRead ${stg_commit_status},3;
     FgAsk 3;
     IF nException<>0 RAISE ERR_FG_FRAME;
     FgTakeWords 3;
     IF nWords{1}=FG_COMMIT_COMMITTED THEN
-      FgUploadEnd TRUE;
+      bStands:=FgSetStands();
+      IF NOT bStands fgText:="committed; fgSet or fgSlot has changed since";
+      FgUploadEnd bStands;
     ELSEIF nWords{1}=FG_COMMIT_FAILED THEN
       fgText:="commit, number "+NumToStr(FgScaled(nWords{2},1),0);
       fgText:=fgText+": "+FgFailingText(nWords{3});

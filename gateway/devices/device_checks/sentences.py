@@ -10,6 +10,7 @@ from gateway.devices.grammar import Grammar
 from gateway.devices.profile import ADDRESS, TEMPLATE, DeviceProfile, DeviceRole
 from gateway.devices.template import compile_template, quote
 from gateway.modbus.crc import checksum_end
+from gateway.modbus.pdu import WRITE_REGISTER
 
 Place = tuple[str | int, ...]
 Found = Iterator[tuple[Place, str]]
@@ -25,6 +26,7 @@ _SAID: Final = (
     "frame",
     "text",
     "unknown",
+    "others",
     "refusal",
     "overload",
     "underload",
@@ -33,6 +35,7 @@ _SAID: Final = (
 _DIGITS: Final = frozenset("0123456789ABCDEF")
 _BITS_OF_A_BYTE: Final = 8
 _LEAST_FRAME: Final = 4  # bytes: unit, function, checksum
+_REQUEST_BYTES: Final = 5  # of functions 1 to 6: function, address, number or value
 
 
 def misspelt(profile: DeviceProfile) -> Found:
@@ -101,7 +104,10 @@ def _digit_count(piece: str | Field) -> int:
 
 
 def _is_whole_frame(digits: str) -> bool:
+    """A request of one register or coil is none, whatever its checksum: that of register 2 (03 0002 0001) ends with its own."""
     data = bytes.fromhex(digits)
+    if len(data) == _REQUEST_BYTES and data[0] <= WRITE_REGISTER:
+        return False
     return checksum_end(data, max(len(data), _LEAST_FRAME)) == len(data)
 
 

@@ -202,6 +202,25 @@ def test_check_shows_what_goes_over_the_wire_and_what_is_not_listened_to(name: s
     assert told in call("check", str(shipped_profiles_folder() / "devices" / f"{name}.yaml")).output.splitlines()
 
 
+@pytest.mark.parametrize(
+    ("register", "told"), [(0, False), (40004, True), (30004, True), (39999, True), (29999, False)]
+)
+def test_a_register_as_manuals_count_them_is_told_with_the_number_that_goes_over_the_wire(
+    register: int, told: bool, call, tmp_path: Path
+) -> None:
+    """40004 was taken as it stands, and the module was silent, or another register answered."""
+    text = (shipped_profiles_folder() / "devices" / "waveshare-ao8b.yaml").read_text()
+    changed = text.replace("register: 0}", f"register: {register}}}")
+    assert changed != text or not register
+    (tmp_path / "own.yaml").write_text(changed)
+    lines = call("check", str(tmp_path / "own.yaml")).output.splitlines()
+    first = 40001 if register > 40000 else 30001
+    sentence = (
+        f"register     {register} goes out as it stands: if it is a manual's {register}, write {register - first}"
+    )
+    assert (sentence in lines) is told and any(line.startswith("register ") for line in lines) is told
+
+
 def test_what_a_small_display_has_no_digits_for_is_shown_smaller() -> None:
     profile = cell(read_force=ForceReading(ask="SI", frame="S {force:6.3f} g", unit="g"))
     assert example(profile) == r"-0.05 N: 'SI\r\n' -> 'S -5.099 g\r\n'"

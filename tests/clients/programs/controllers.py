@@ -38,7 +38,9 @@ class Irc5:
 
     def __init__(self, text: str, gateway: GatewayAtHand) -> None:
         self.gateway, self.received, self.is_open = gateway, b"", False
-        self.now_s, self.counted_s, self.started_s = 0.0, 0.0, None
+        self.now_s = 0.0
+        self.counted_s: dict[str, float] = {}
+        self.started_s: dict[str, float] = {}  # of clocks that run
         self.sent: list[bytes] = []
         self.said: list[str] = []
         self.machine = Machine(parse(text, "rapid"), self.library())
@@ -49,7 +51,8 @@ class Irc5:
         """Run FgServe until so many of its pauses are over; `meanwhile` is what T_ROB1 does in each."""
         left = iter(range(waits - 1))
 
-        def pause(*_: Any) -> None:
+        def pause(machine: Machine, arguments: list[Node], frame: Frame) -> None:
+            self.now_s += machine.value(arguments[0], frame)
             meanwhile()
             if next(left, None) is None:
                 raise StopIteration
@@ -65,10 +68,10 @@ class Irc5:
             **dict.fromkeys(["UINT", "USINT", "ERR_SOCK_TIMEOUT", "ERR_SOCK_CLOSED"]),
             **{name: name for name in ("UINT", "USINT", "ERR_SOCK_TIMEOUT", "ERR_SOCK_CLOSED", "ERR_FG_FRAME")},
             **dict.fromkeys(["BOOKERRNO", "IDELETE", "CONNECT", "ITIMER"], nothing),
-            "CLKSTART": lambda machine, arguments, frame: self.start_clock(),
-            "CLKSTOP": lambda machine, arguments, frame: self.stop_clock(),
-            "CLKRESET": lambda machine, arguments, frame: self.reset_clock(),
-            "CLKREAD": lambda machine, arguments, frame: self.read_clock(),
+            "CLKSTART": lambda machine, arguments, frame: self.started_s.setdefault(arguments[0][1], self.now_s),
+            "CLKSTOP": lambda machine, arguments, frame: self.stop_clock(arguments[0][1]),
+            "CLKRESET": lambda machine, arguments, frame: self.reset_clock(arguments[0][1]),
+            "CLKREAD": lambda machine, arguments, frame: self.read_clock(arguments[0][1]),
             "WAITTIME": nothing,
             "ERRWRITE": self.error_write,
             "SOCKETCLOSE": self.close,
@@ -91,24 +94,21 @@ class Irc5:
             "DNUMTONUM": values(int),
         }
 
-    def read_clock(self) -> float:
+    def read_clock(self, name: str) -> float:
         """Raise what ClkRead and ClkStop do of a clock that has run for 49 days (RAPID instructions, ClkStop)."""
-        running_s = 0.0 if self.started_s is None else self.now_s - self.started_s
-        if self.counted_s + running_s >= 4_294_967:
+        total_s = self.counted_s.get(name, 0.0) + self.now_s - self.started_s.get(name, self.now_s)
+        if total_s >= 4_294_967:
             raise RapidError("ERR_OVERFLOW")
-        return self.counted_s + running_s
+        return total_s
 
-    def start_clock(self) -> None:
-        if self.started_s is None:
-            self.started_s = self.now_s
+    def stop_clock(self, name: str) -> None:
+        self.counted_s[name] = self.read_clock(name)
+        self.started_s.pop(name, None)
 
-    def stop_clock(self) -> None:
-        self.counted_s, self.started_s = self.read_clock(), None
-
-    def reset_clock(self) -> None:
-        self.counted_s = 0.0
-        if self.started_s is not None:
-            self.started_s = self.now_s
+    def reset_clock(self, name: str) -> None:
+        """A clock that runs is stopped first (RAPID instructions, ClkReset)."""
+        self.counted_s[name] = 0.0
+        self.started_s.pop(name, None)
 
     def options(self, machine: Machine, arguments: list[Node], frame: Frame) -> dict[str, Any]:
         return {each[1].upper(): machine.value(each[2], frame) for each in arguments if each[0] == "named"}
