@@ -19,7 +19,7 @@ from gateway.registers.command import Command
 from gateway.registers.map.register_map import Block
 from gateway.registers.refusal import Refusal
 from gateway.registers.rig_rules import BankRules
-from gateway.registers.words import RUN_BITS, ControlBit
+from gateway.registers.words import RUN_BITS, ControlBit, State
 from gateway.registers.writes.byte_order_echo import ByteOrderEcho
 from gateway.registers.writes.command_block import (
     CONTROL_WORD,
@@ -42,6 +42,7 @@ STARTS: Final = ENABLE | RUN_BITS
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
 ALL_BITS: Final = 0xFFFF
+_PRESSING: Final = (State.RAMPING, State.HOLDING)
 _BEFORE: Final = 2 * HEARTBEAT
 _BEHIND: Final = _BEFORE + 2
 _AT_HEARTBEAT: Final = Command._fields.index("heartbeat")
@@ -103,12 +104,12 @@ class _PermittedWrite(NamedTuple):
 
 
 class Admission:
-    """decide: what control says to a write. is_calibrating: a run has the output. lowered_from_n: of the setpoint in use,
-    what the master wrote, 0 where nothing was lowered."""
+    """decide: what control says to a write. is_calibrating: a run has the output; is_pressing: a setpoint has it.
+    lowered_from_n: of the setpoint in use, what the master wrote, 0 where nothing was lowered."""
 
     def __init__(self, commands: CommandBlock, ownership: Ownership, echo: ByteOrderEcho, rules: BankRules) -> None:
         self.decide: Decide = decide_nothing
-        self.is_calibrating = False
+        self.is_calibrating = self.is_pressing = False
         self.lowered_from_n = 0.0
         self.held_runs = HeldRuns()
         self._commands = commands
@@ -135,22 +136,28 @@ class Admission:
         values, written, is_stop = permitted
         if is_stop:
             values[FORCE_SETPOINT] = values[VOLTAGE_SETPOINT] = 0.0
+        is_taken_over = bool(written & TAKE)
+        is_begun_anew = is_taken_over and not self.is_pressing and self._ownership.owner != write.host
+        if is_begun_anew:
+            values = self._without_left_setpoints(write, values)
         command = commands.command(values, written, number, now_s, write.host)
         if is_stop:
             command = command._replace(stops=True)
-        elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write):
+        elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
             command = command._replace(lowered_from_n=self.lowered_from_n)
         if write.has_waited:
             command = command._replace(has_waited=True)
         word_at = commands.address(write.block, CONTROL_WORD)
-        self._ask(command, values, write)
+        self._ask(command, permitted.values, write)
         rises = written & ~int(before[CONTROL_WORD])
         if rises & STARTS:
             self._check_starts(write.host, rises, written, word_at)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
-        return AdmittedWrite(
-            values, edges_kept, command, is_stop, bool(written & TAKE), self._held_by(write, written, asked)
-        )
+        return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
+
+    def note_state(self, state: State) -> None:
+        """Note the state of control: what may be asked for, and left behind, depends on it."""
+        self.is_calibrating, self.is_pressing = state is State.CALIBRATING, state in _PRESSING
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered."""
@@ -188,6 +195,15 @@ class Admission:
         if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):
             return None
         raise self._not_owner(write.address, write.host)
+
+    def _without_left_setpoints(self, write: Write, values: Values) -> Values:
+        """What a former owner has left while nothing is pressed would be pressed by the next enable of who takes over, and it
+        never asked for that: only setpoints of its own write count. A force that is pressed stays, without a bump."""
+        written, without = self._offsets(write), values.copy()
+        for offset in (FORCE_SETPOINT, VOLTAGE_SETPOINT):
+            if offset not in written:
+                without[offset] = 0.0
+        return without
 
     def _is_named_stop(self, write: Write, written: int) -> bool:
         """A run has no enable that could fall, nor any bit of it where this machine has begun it. Then enable written as 0 by
