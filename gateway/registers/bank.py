@@ -34,7 +34,8 @@ from gateway.registers.self_test_words import SelfTestWords
 from gateway.registers.status_block import StatusBlock
 from gateway.registers.upload.staging_block import NO_SLOT, StagingBlock
 from gateway.registers.words import ControlBit, State, StatusBit
-from gateway.registers.writes.admission import ALL_BITS, Admission, AdmittedWrite, OnWrite, Write, accepted_sentence
+from gateway.registers.writes.accepted_sentence import accepted_sentence
+from gateway.registers.writes.admission import ALL_BITS, Admission, AdmittedWrite, OnWrite, Write
 from gateway.registers.writes.byte_order_echo import ByteOrderEcho
 from gateway.registers.writes.command_block import (
     CONTROL_WORD,

@@ -32,7 +32,7 @@ from gateway.registers.writes.command_block import (
     CommandBlock,
     Values,
 )
-from gateway.registers.writes.held_runs import HeldRuns
+from gateway.registers.writes.held_runs import HeldEnables, HeldRuns
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
 
@@ -82,19 +82,6 @@ OnWrite = Callable[[Peer, Values, AdmittedWrite, tuple[str | None, str | None]],
 """on_write(peer, values before, what was admitted, owner before and after) of each accepted write."""
 
 
-def accepted_sentence(changes: str, admitted: AdmittedWrite, owners: tuple[str | None, str | None]) -> str:
-    """Return what an accepted write changed; empty when nothing that people want to know. owners: before and after."""
-    edges = int(admitted.command.control_word) & EDGE_BITS & ~TAKE
-    edge_names = _names_of(edges) if edges else ""  # most writes have none
-    before, after = owners
-    change_of_owner = f"owner {before or 'nobody'} -> {after or 'nobody'}" if before != after else ""
-    return ", ".join(part for part in (changes, edge_names, change_of_owner) if part)
-
-
-def _names_of(edges: int) -> str:
-    return ", ".join(bit.name.lower() for bit in ControlBit if bit & edges and bit.name)
-
-
 class _PermittedWrite(NamedTuple):
     """What a write asks for, as far as its host may ask for it. written: its control word; is_stop: the output goes off."""
 
@@ -111,7 +98,7 @@ class Admission:
         self.decide: Decide = decide_nothing
         self.is_calibrating = self.is_pressing = False
         self.lowered_from_n = 0.0
-        self.held_runs = HeldRuns()
+        self.held_runs, self.held_enables = HeldRuns(), HeldEnables()
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
@@ -131,6 +118,7 @@ class Admission:
             return AdmittedWrite(values, asked, command, False, False, 0, True)
         permitted = self._permit(write, values)
         if permitted is None:
+            self._let_enable_go(write, asked)
             self.held_runs.keep(write.host, self._held_by(write, asked, asked))
             return None
         values, written, is_stop = permitted
@@ -151,7 +139,8 @@ class Admission:
         self._ask(command, permitted.values, write)
         rises = written & ~int(before[CONTROL_WORD])
         if rises & STARTS:
-            self._check_starts(write.host, rises, written, word_at)
+            self._check_starts(command, rises, written, word_at)
+        self._let_enable_go(write, asked)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
         return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
 
@@ -173,7 +162,8 @@ class Admission:
 
     def is_usual(self, host: str) -> bool:
         """Return whether nothing makes a host's writes special: no bit that it held, no lowered setpoint, no run."""
-        return not (self.lowered_from_n or self.is_calibrating or host in self.held_runs.by_host)
+        is_held = host in self.held_runs.by_host or host in self.held_enables.by_host
+        return not (self.lowered_from_n or self.is_calibrating or is_held)
 
     # -- what the write asks for
 
@@ -235,12 +225,18 @@ class Admission:
         stands = held | int(self._commands.values[CONTROL_WORD])
         return held & ~write.touched | stands & written & write.touched & RUN_BITS
 
+    def _let_enable_go(self, write: Write, asked: int) -> None:
+        if self.held_enables.by_host and write.touched & ENABLE & ~asked and CONTROL_WORD in self._offsets(write):
+            self.held_enables.let_go(write.host)
+
     # -- why not
 
     def _ask(self, command: Command, values: Values, write: Write) -> None:
         refused = self.decide(ProposedWrite(command, lambda: self._changes(values)))
         if not refused:
             return
+        if refused.reason is RefusalReason.FAULT_LATCHED and refused.bit & ENABLE:
+            self.held_enables.note(write.host, command.received_s)
         if not refused.bit:
             raise Refusal(refused.reason, write.address, refused.text)
         offsets = self._offsets(write)
@@ -262,7 +258,11 @@ class Admission:
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
-    def _check_starts(self, host: str, rises: int, written: int, word_at: int) -> None:
+    def _check_starts(self, command: Command, rises: int, written: int, word_at: int) -> None:
+        host = command.peer
+        if rises & ENABLE and self.held_enables.holds(host, command.received_s):
+            text = "enable was kept at 1 over the reset of a fault: write it as 0 once, then as 1"
+            raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
         if held := rises & self.held_runs.of(host):
             name = str(ControlBit(held & -held).name).lower()
             text = f"{name} was kept at 1 beyond the end of its run: write it as 0 once, then as 1"
