@@ -55,7 +55,7 @@ class Controller:
         self._valve = ValveSwitch(settings.valve) if settings.valve else None
         self._rig_settings = compensation.settings(settings)
         self._settings = settings = timing_of(calibration.response, self._rig_settings)
-        self._commands = CommandTracker(settings)
+        self._commands = CommandTracker(settings, lambda: self._loop.applied_n)
         self._commands.use(model)
         self.active_run = ActiveRun(settings, model, lambda: self._given_n)
         self._loop = ForceLoop(settings, model, compensation.timing)
