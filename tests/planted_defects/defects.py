@@ -130,7 +130,7 @@ DEFECTS = (
            "if before != self._unbeaten and not self.is_ramping_down:", "if False:",
            ("service/running_rig/test_hung_master.py",)),
     Defect("what is held for a lost master rises at its next contact", "control/transitions.py",
-           "if not self.is_master_lost or demand.force_n != self._lost_setpoint_n:", "if demand:",
+           "self.parts.commands.command.force_requested_n != self._lost_setpoint_n:", "demand:",
            ("service/running_rig/test_hung_master.py",)),
     Defect("a watchdog is let go while what pressed may press still", "service/running_rig/lines/rig_ports.py",
            "if stands_v is not None and abs(stands_v - rest_v) <= NEAR_V:", "if True:",

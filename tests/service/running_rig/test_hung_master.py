@@ -6,12 +6,13 @@ from dataclasses import replace
 import pytest
 
 from gateway.codes.refusals import RefusalReason
-from gateway.control import LeaseAction
+from gateway.control import CalibrationInUse, LeaseAction
 from gateway.control.settings import SelfTestSettings
+from gateway.profiles import load_calibration
 from gateway.registers import Refusal
 from gateway.registers.words import State
 from gateway.registers.writes.held_runs import HeldEnables
-from tests.control.bench import settings
+from tests.control.bench import bsfm, settings
 from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, OWNER, SmallRig
 
 LEASE_S, CYCLE_S = 0.35, 0.1
@@ -169,3 +170,21 @@ def test_the_hosts_whose_enables_stood_over_a_fault_are_sixty_four() -> None:
     for number in range(65):
         held.note(f"10.0.0.{number}", 1.0)
     assert [held.holds(f"10.0.0.{number}", 1.5) for number in (0, 1, 64)] == [False, True, True]
+
+
+@pytest.mark.parametrize("is_lowered", [False, True])
+def test_a_calibration_that_allows_less_lets_no_force_rise_that_is_held_for_a_lost_master(is_lowered: bool) -> None:
+    """Contact was lost, too: 2 N waited for it, and 20 N were pressed on whoever touched the tool behind the commit."""
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD)).holding(30.0)
+    rig.beats = rig.plant.contact = False
+    rig.run(3.0)
+    less = replace(load_calibration("demo"), number=17, force_limits_n=(1.0, 20.0))
+    if is_lowered:
+        assert rig.bank.set_active_model(less).startswith("W314")
+        rig.controller.use(CalibrationInUse(replace(bsfm(), limits_n=less.force_limits_n), 17))
+    rig.plant.contact = True
+    rig.run(2.0)
+    assert rig.plant.force_n < 3.0 and rig.word("force_setpoint") == (2000 if is_lowered else 3000)
+    rig.write(1, 500)
+    rig.run(2.0)
+    assert rig.plant.force_n == pytest.approx(5.0, abs=0.3), "a new setpoint counts"
