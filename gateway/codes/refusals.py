@@ -353,10 +353,10 @@ class RefusalReason(IntEnum):
         modbus.DEVICE_FAILURE,
         Explanation(
             "W313",
-            "bit 5 or 6 was held at 1",
-            "A run has ended, and the master that writes control_word in cycles still holds the bit that began it.",
-            "Another run would begin by itself, and the next after it.",
-            "Write control_word with the bit as 0 once; the next 1 begins a run.",
+            "bit 0, 5 or 6 was held at 1",
+            "A run has ended, or another master has reset a fault, and who writes control_word in cycles still holds the bit.",
+            "Another run would begin by itself, and the next after it; or a force, by a reset alone.",
+            "Write control_word with the bit as 0 once; the next 1 counts.",
         ),
     )
     # the force is on its way to 0, and then the output is off

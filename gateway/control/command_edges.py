@@ -1,6 +1,8 @@
 """The command block from write to write: which bits rose and fell, what is demanded, whether the heartbeat moved."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from math import copysign, inf
 from typing import Final, NamedTuple
 
 from gateway.bsfm import Bsfm
@@ -12,6 +14,7 @@ from gateway.control.settings import ControlSettings
 from gateway.control.supervision.lease import Lease
 from gateway.registers.command import Command
 from gateway.registers.words import RUN_BITS, ControlBit
+from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
 _ENABLE = int(ControlBit.ENABLE)
 _MOMENTARY: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
@@ -29,10 +32,13 @@ NO_EDGES: Final = Edges()
 
 
 class CommandTracker:
-    """`demand` is the last one that made sense; `not_finite` names the number that did not, or is empty."""
+    """`demand` is the last one that made sense; `not_finite` names the number that did not, or is empty. applied_n: force that
+    the output goes for at this moment, N."""
 
-    def __init__(self, settings: ControlSettings) -> None:
+    def __init__(self, settings: ControlSettings, applied_n: Callable[[], float] = lambda: 0.0) -> None:
         self.command = Command()
+        self._applied_n, self._taken_s = applied_n, 0.0
+        self._payload_kg = self._wanted_kg = settings.defaults.payload_kg
         self._manner: Manner | None = None  # of the command, where that is known
         self.demand: Demand = demand_of(self.command, settings)
         self.not_finite = ""
@@ -69,8 +75,12 @@ class CommandTracker:
         return Edges(rises, falls, command.stops or bool(falls & _ENABLE and not rises & RUN_BITS))
 
     def take(self, now_s: float, command: Command) -> Edges:
-        """Take this as the command from now on; none of its edges act twice."""
+        """Take this as the command from now on; none of its edges act twice. Ask at each step: a payload follows in time."""
+        dt_s, self._taken_s = now_s - self._taken_s, now_s
         if command is self.command:
+            if self._payload_kg != self._wanted_kg:
+                self._follow_payload(dt_s)
+                self._update_demand()
             return NO_EDGES
         edges = self.edges_of(command)
         self._word = 0 if edges.stops else int(command.control_word) & ~_MOMENTARY
@@ -85,8 +95,22 @@ class CommandTracker:
             self._lease.adopt(command.heartbeat)
         else:
             self._lease.observe(now_s, command.heartbeat, command.peer)
+        self._wanted_kg = command.payload_kg if command.payload_kg > 0.0 else self._settings.defaults.payload_kg
+        self._follow_payload(dt_s)
         self._update_demand()
         return edges
+
+    def _follow_payload(self, dt_s: float) -> None:
+        """Go on towards the payload of the command, under a force no faster than along the ramp: the slide follows its weight,
+        and 1 kg less would press 10 N more in the next moment. A tilt that is told is one that the robot goes through."""
+        missing_kg = self._wanted_kg - self._payload_kg
+        most_kg = self.demand.manner.ramp_n_per_s / STANDARD_GRAVITY_M_PER_S2 * max(0.0, dt_s)
+        if self._applied_n() > 0.0 and most_kg < abs(missing_kg) < inf:
+            self._payload_kg += copysign(most_kg, missing_kg)
+        else:
+            self._payload_kg = self._wanted_kg
+        if missing_kg:
+            self._manner = None
 
     def demand_by(self, command: Command) -> Demand:
         """Return what this command would demand. NotFiniteError as `demand_of`."""
@@ -98,9 +122,11 @@ class CommandTracker:
         return demand._replace(manner=demand.manner._replace(gravity_n=-demand.manner.gravity_n))
 
     def _update_demand(self) -> None:
+        is_on_its_way = self._payload_kg != self._wanted_kg
+        command = self.command._replace(payload_kg=self._payload_kg) if is_on_its_way else self.command
         try:
-            demand = demand_of(self.command, self._settings, self._manner)
-            self._manner = self._manner or manner_of(self.command, self._settings.defaults)
+            demand = demand_of(command, self._settings, self._manner)
+            self._manner = self._manner or manner_of(command, self._settings.defaults)
             self.demand, self.not_finite = self._turned(demand), ""
         except NotFiniteError as error:
             self.not_finite = str(error)

@@ -55,7 +55,7 @@ class Controller:
         self._valve = ValveSwitch(settings.valve) if settings.valve else None
         self._rig_settings = compensation.settings(settings)
         self._settings = settings = timing_of(calibration.response, self._rig_settings)
-        self._commands = CommandTracker(settings)
+        self._commands = CommandTracker(settings, lambda: self._loop.applied_n)
         self._commands.use(model)
         self.active_run = ActiveRun(settings, model, lambda: self._given_n)
         self._loop = ForceLoop(settings, model, compensation.timing)
@@ -221,12 +221,12 @@ class Controller:
         self._reading = reading = self._conditioner.read(now_s, sample, self._commands.gravity_n, around)
         if not reading.is_new:
             return
-        touching = self._contact.update(reading)
         self._loop.expected.note_around(self._outside_n, lacks_air=self._one_shot.lacks_air(self._loop.voltage_v))
-        self._faults.observe(reading, self._loop.expected, self._loop.branch_share, touching)
+        self._faults.observe(reading, self._loop.expected, self._loop.branch_share, self._contact.update(reading))
         if not self._machine.is_enabled:
             self._faults.observe_rest(reading)
-            self._machine.tell(self._one_shot.stuck_event(self._faults.is_stuck, reading))
+            stuck = self._one_shot.stuck_event(self._faults.is_stuck, reading)
+            self._machine.tell(stuck, self._conditioner.take_doubt())
 
     def _situation(self, now_s: float, line: LineStatus) -> Situation:
         later_s = now_s - (now_s if self._last_s is None else self._last_s)

@@ -27,6 +27,9 @@ class Reading(NamedTuple):
 
 
 NO_READING: Final = Reading()
+_DOUBTED_S: Final = (
+    0.5  # without a usable reading: an amplifier starts anew, or another cell is plugged, in less than that
+)
 _OVERLOAD: Final = Quality.OVERLOAD
 
 
@@ -52,7 +55,8 @@ class SampleConditioner:
         self._cell = cell
         self._saturation_n = supervision.saturation_n
         self._timeout_s = supervision.sample_timeout_s
-        self._last_s = nan
+        self._last_s = self._usable_s = nan
+        self._doubt = ""
         self.direction = 1.0
 
     def use(self, cell: CellMap | None) -> None:
@@ -87,6 +91,7 @@ class SampleConditioner:
         interval_s = self._interval_s(sample.time_s)
         if interval_s > 0.0 and usable:
             self._zero.observe(force_n, interval_s)
+            self._note_usable(sample.time_s)
         age_s = max(0.0, now_s - sample.time_s)
         cell_n = self.direction * (force_n - self._zero.zero_n) if usable else nan
         fresh = age_s <= self._timeout_s
@@ -113,6 +118,20 @@ class SampleConditioner:
     def why_no_zero(self, gravity_n: float) -> str:
         """Return why the recent samples are no zero, in numbers; empty where they are one."""
         return self._zero.unsteady(self.direction * gravity_n)
+
+    def take_doubt(self) -> str:
+        """Return W253 once where the cell's zero may have become another one while nothing was heard of it, else nothing.
+        The tare is kept: without it a cell that has only been unplugged would read its tool."""
+        doubt, self._doubt = self._doubt, ""
+        return doubt
+
+    def _note_usable(self, time_s: float) -> None:
+        silent_s, self._usable_s = time_s - self._usable_s, time_s
+        if silent_s >= _DOUBTED_S and self._zero.zero_n:
+            self._doubt = (
+                f"W253 no usable reading of the load cell for {silent_s:.1f} s: was it without power, or is it another one? "
+                f"Then the tare of before, {self._zero.zero_n:.2f} N, is not its zero: with nothing pressed, tare again"
+            )
 
     def _interval_s(self, time_s: float) -> float:
         """Time since the sample before, at most the time-out; 0 for the same one, or one from the past."""

@@ -149,7 +149,7 @@ class Transitions:
         commands, before = self.parts.commands, self._unbeaten
         self._unbeaten = commands.command.number
         if not self.is_master_lost:
-            self._lost_setpoint_n, self._held_n = commands.demand.force_n, self.parts.loop.applied_n
+            self._lost_setpoint_n, self._held_n = commands.command.force_requested_n, self.parts.loop.applied_n
             self.lose_master(now_s, commands.lost_sentence(now_s, line), action)
             return
         self._held_n = min(self._held_n, self.parts.loop.applied_n)
@@ -158,8 +158,9 @@ class Transitions:
 
     def hold(self, demand: Demand) -> Demand:
         """Return the demand, of a lost master's setpoint no more than has been applied since: what was waiting for contact, or
-        has lost it, must not press on whoever comes to see why the machine stands."""
-        if not self.is_master_lost or demand.force_n != self._lost_setpoint_n:
+        has lost it, must not press on whoever comes to see why the machine stands. A calibration that lowers it meanwhile
+        makes it nobody's new setpoint."""
+        if not self.is_master_lost or self.parts.commands.command.force_requested_n != self._lost_setpoint_n:
             return demand
         return demand._replace(force_n=min(demand.force_n, self._held_n))
 

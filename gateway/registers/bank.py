@@ -34,7 +34,8 @@ from gateway.registers.self_test_words import SelfTestWords
 from gateway.registers.status_block import StatusBlock
 from gateway.registers.upload.staging_block import NO_SLOT, StagingBlock
 from gateway.registers.words import ControlBit, State, StatusBit
-from gateway.registers.writes.admission import ALL_BITS, Admission, AdmittedWrite, OnWrite, Write, accepted_sentence
+from gateway.registers.writes.accepted_sentence import accepted_sentence
+from gateway.registers.writes.admission import ALL_BITS, Admission, AdmittedWrite, OnWrite, Write
 from gateway.registers.writes.byte_order_echo import ByteOrderEcho
 from gateway.registers.writes.command_block import (
     CONTROL_WORD,
@@ -193,7 +194,7 @@ class RegisterBank:
 
     def publish_when_read(self, state: State, tell: Callable[[], Status]) -> None:
         """Show what `tell` says when somebody reads next: most that is published, nobody reads. state: of control."""
-        self._admission.is_calibrating = state is State.CALIBRATING
+        self._admission.note_state(state)
         self._tell_status = tell
         self._image.fall_behind()
 

@@ -7,7 +7,8 @@ import pytest
 from gateway.control.command_edges import NO_EDGES, CommandTracker
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit
-from tests.control.bench import bsfm, settings
+from gateway.units import STANDARD_GRAVITY_M_PER_S2
+from tests.control.bench import Bench, bsfm, enabled, settings
 
 NONE, ENABLE, TARE, RUN = ControlBit(0), ControlBit.ENABLE, ControlBit.TARE, ControlBit.START_CALIBRATION
 
@@ -76,3 +77,42 @@ def test_who_commands_is_the_peer_where_one_is_known() -> None:
     assert commands.who == "a command"
     commands.take(1.0, Command(number=2, peer="10.0.0.5"))
     assert commands.who == "10.0.0.5"
+
+
+@pytest.mark.parametrize(("before_kg", "after_kg"), [(1.0, 0.0), (0.0, 1.0), (3.0, 0.2)])
+def test_a_payload_that_is_changed_under_a_force_takes_the_slide_along_the_ramp(
+    before_kg: float, after_kg: float
+) -> None:
+    """28 N more were pressed within a tenth of a second, by a register that says nothing of a force."""
+    bench = enabled()
+    bench.write(force_setpoint_n=30.0, payload_kg=before_kg, force_ramp_n_per_s=10.0)
+    bench.run(5.0)
+    assert bench.last.force_applied_n == 30.0
+    changed_n = STANDARD_GRAVITY_M_PER_S2 * (before_kg - after_kg)
+    from_n = bench.plant.force_n
+    bench.write(payload_kg=after_kg)
+    bench.run(0.5)
+    assert 1.0 < abs(bench.plant.force_n - from_n) < 6.0, "of 5 N by the ramp"
+    bench.run(3.5)
+    assert bench.plant.force_n - from_n == pytest.approx(changed_n, abs=0.5)
+    assert bench.last.force_measured_n == pytest.approx(30.0, abs=0.5)
+
+
+def test_a_payload_is_in_use_at_once_while_nothing_is_pressed_and_with_what_begins_the_force() -> None:
+    bench = Bench()
+    bench.run(0.3)
+    bench.write(payload_kg=2.0)
+    assert bench.last.force_measured_n == pytest.approx(2.0 * STANDARD_GRAVITY_M_PER_S2, abs=0.5)
+    bench.enable(30.0, payload_kg=1.0)
+    assert bench.last.force_measured_n == pytest.approx(STANDARD_GRAVITY_M_PER_S2, abs=0.5)
+
+
+def test_a_payload_on_its_way_arrives_at_once_where_the_force_ends() -> None:
+    bench = enabled()
+    bench.write(force_setpoint_n=30.0, payload_kg=2.0, force_ramp_n_per_s=5.0)
+    bench.run(6.0)
+    bench.write(payload_kg=0.0)
+    bench.run(0.5)
+    bench.disable()
+    bench.step()
+    assert bench.controller._commands.gravity_n == 0.0

@@ -1,5 +1,6 @@
 """What a zero is made of, by number."""
 
+from dataclasses import replace
 from math import nan
 
 import pytest
@@ -59,3 +60,34 @@ def test_what_an_unheard_output_has_pressed_is_waited_for_at_the_pace_of_the_cal
         if bench.refused is None:
             break
     assert 2.0 < 0.1 * tenth < 1.0 + LEAVING_LAGS * 1.3 and abs(bench.controller.zero_n) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("silent_s", "is_tared", "lost"),
+    [
+        (0.4, True, "silent"),
+        (0.6, True, "silent"),
+        (0.6, True, "saturated"),
+        (0.6, True, "under force"),
+        (0.6, False, "silent"),
+    ],
+)
+def test_a_tare_of_before_a_silence_of_the_cell_is_doubted_once(silent_s: float, is_tared: bool, lost: str) -> None:
+    """It came back with its own zero at 4 N less, an enable was taken, and nobody had been told."""
+    bench, cell_n = Bench(), 4.0
+    bench.alter_sample = lambda sample: replace(sample, force_n=sample.force_n + cell_n)
+    bench.run(0.5)
+    if is_tared:
+        bench.write(control_word=ControlBit.TARE)
+    if lost == "under force":
+        bench.enable(20.0)
+        bench.run(1.0)
+    bench.cell_silent = lost != "saturated"
+    cell_n = 99.0
+    bench.run(silent_s)
+    bench.cell_silent, cell_n = False, 0.0
+    bench.run(1.0)
+    assert bench.last.force_measured_n == pytest.approx(-4.0 if is_tared else 0.0, abs=0.5)
+    told = [line for line in bench.events if line.startswith("W253")]
+    assert len(told) == (1 if is_tared and silent_s > 0.5 else 0)
+    assert all("4.0" in line and f"{silent_s:.1f} s" in line for line in told)

@@ -163,6 +163,8 @@ class BankModel:
             changed, word, takes = self.values.copy(), 0, False
         if stops:
             changed[1] = changed[5] = 0.0
+        elif takes and self.owner != host:  # nothing is ever pressed here
+            changed[1], changed[5] = (changed[k] if k in covers else 0.0 for k in (1, 5))
         changed[0] = 0 if stops else word & ~MOMENTARY
         self.values = changed
         self._settle(host, takes, stops)

@@ -19,7 +19,7 @@ from gateway.registers.command import Command
 from gateway.registers.map.register_map import Block
 from gateway.registers.refusal import Refusal
 from gateway.registers.rig_rules import BankRules
-from gateway.registers.words import RUN_BITS, ControlBit
+from gateway.registers.words import RUN_BITS, ControlBit, State
 from gateway.registers.writes.byte_order_echo import ByteOrderEcho
 from gateway.registers.writes.command_block import (
     CONTROL_WORD,
@@ -32,7 +32,7 @@ from gateway.registers.writes.command_block import (
     CommandBlock,
     Values,
 )
-from gateway.registers.writes.held_runs import HeldRuns
+from gateway.registers.writes.held_runs import HeldEnables, HeldRuns
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
 
@@ -42,6 +42,7 @@ STARTS: Final = ENABLE | RUN_BITS
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
 ALL_BITS: Final = 0xFFFF
+_PRESSING: Final = (State.RAMPING, State.HOLDING)
 _BEFORE: Final = 2 * HEARTBEAT
 _BEHIND: Final = _BEFORE + 2
 _AT_HEARTBEAT: Final = Command._fields.index("heartbeat")
@@ -81,19 +82,6 @@ OnWrite = Callable[[Peer, Values, AdmittedWrite, tuple[str | None, str | None]],
 """on_write(peer, values before, what was admitted, owner before and after) of each accepted write."""
 
 
-def accepted_sentence(changes: str, admitted: AdmittedWrite, owners: tuple[str | None, str | None]) -> str:
-    """Return what an accepted write changed; empty when nothing that people want to know. owners: before and after."""
-    edges = int(admitted.command.control_word) & EDGE_BITS & ~TAKE
-    edge_names = _names_of(edges) if edges else ""  # most writes have none
-    before, after = owners
-    change_of_owner = f"owner {before or 'nobody'} -> {after or 'nobody'}" if before != after else ""
-    return ", ".join(part for part in (changes, edge_names, change_of_owner) if part)
-
-
-def _names_of(edges: int) -> str:
-    return ", ".join(bit.name.lower() for bit in ControlBit if bit & edges and bit.name)
-
-
 class _PermittedWrite(NamedTuple):
     """What a write asks for, as far as its host may ask for it. written: its control word; is_stop: the output goes off."""
 
@@ -103,14 +91,14 @@ class _PermittedWrite(NamedTuple):
 
 
 class Admission:
-    """decide: what control says to a write. is_calibrating: a run has the output. lowered_from_n: of the setpoint in use,
-    what the master wrote, 0 where nothing was lowered."""
+    """decide: what control says to a write. is_calibrating: a run has the output; is_pressing: a setpoint has it.
+    lowered_from_n: of the setpoint in use, what the master wrote, 0 where nothing was lowered."""
 
     def __init__(self, commands: CommandBlock, ownership: Ownership, echo: ByteOrderEcho, rules: BankRules) -> None:
         self.decide: Decide = decide_nothing
-        self.is_calibrating = False
+        self.is_calibrating = self.is_pressing = False
         self.lowered_from_n = 0.0
-        self.held_runs = HeldRuns()
+        self.held_runs, self.held_enables = HeldRuns(), HeldEnables()
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
@@ -130,27 +118,35 @@ class Admission:
             return AdmittedWrite(values, asked, command, False, False, 0, True)
         permitted = self._permit(write, values)
         if permitted is None:
+            self._let_enable_go(write, asked)
             self.held_runs.keep(write.host, self._held_by(write, asked, asked))
             return None
         values, written, is_stop = permitted
         if is_stop:
             values[FORCE_SETPOINT] = values[VOLTAGE_SETPOINT] = 0.0
+        is_taken_over = bool(written & TAKE)
+        is_begun_anew = is_taken_over and not self.is_pressing and self._ownership.owner != write.host
+        if is_begun_anew:
+            values = self._without_left_setpoints(write, values)
         command = commands.command(values, written, number, now_s, write.host)
         if is_stop:
             command = command._replace(stops=True)
-        elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write):
+        elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
             command = command._replace(lowered_from_n=self.lowered_from_n)
         if write.has_waited:
             command = command._replace(has_waited=True)
         word_at = commands.address(write.block, CONTROL_WORD)
-        self._ask(command, values, write)
+        self._ask(command, permitted.values, write)
         rises = written & ~int(before[CONTROL_WORD])
         if rises & STARTS:
-            self._check_starts(write.host, rises, written, word_at)
+            self._check_starts(command, rises, written, word_at)
+        self._let_enable_go(write, asked)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
-        return AdmittedWrite(
-            values, edges_kept, command, is_stop, bool(written & TAKE), self._held_by(write, written, asked)
-        )
+        return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
+
+    def note_state(self, state: State) -> None:
+        """Note the state of control: what may be asked for, and left behind, depends on it."""
+        self.is_calibrating, self.is_pressing = state is State.CALIBRATING, state in _PRESSING
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered."""
@@ -166,7 +162,8 @@ class Admission:
 
     def is_usual(self, host: str) -> bool:
         """Return whether nothing makes a host's writes special: no bit that it held, no lowered setpoint, no run."""
-        return not (self.lowered_from_n or self.is_calibrating or host in self.held_runs.by_host)
+        is_held = host in self.held_runs.by_host or host in self.held_enables.by_host
+        return not (self.lowered_from_n or self.is_calibrating or is_held)
 
     # -- what the write asks for
 
@@ -188,6 +185,15 @@ class Admission:
         if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):
             return None
         raise self._not_owner(write.address, write.host)
+
+    def _without_left_setpoints(self, write: Write, values: Values) -> Values:
+        """What a former owner has left while nothing is pressed would be pressed by the next enable of who takes over, and it
+        never asked for that: only setpoints of its own write count. A force that is pressed stays, without a bump."""
+        written, without = self._offsets(write), values.copy()
+        for offset in (FORCE_SETPOINT, VOLTAGE_SETPOINT):
+            if offset not in written:
+                without[offset] = 0.0
+        return without
 
     def _is_named_stop(self, write: Write, written: int) -> bool:
         """A run has no enable that could fall, nor any bit of it where this machine has begun it. Then enable written as 0 by
@@ -219,12 +225,18 @@ class Admission:
         stands = held | int(self._commands.values[CONTROL_WORD])
         return held & ~write.touched | stands & written & write.touched & RUN_BITS
 
+    def _let_enable_go(self, write: Write, asked: int) -> None:
+        if self.held_enables.by_host and write.touched & ENABLE & ~asked and CONTROL_WORD in self._offsets(write):
+            self.held_enables.let_go(write.host)
+
     # -- why not
 
     def _ask(self, command: Command, values: Values, write: Write) -> None:
         refused = self.decide(ProposedWrite(command, lambda: self._changes(values)))
         if not refused:
             return
+        if refused.reason is RefusalReason.FAULT_LATCHED and refused.bit & ENABLE:
+            self.held_enables.note(write.host, command.received_s)
         if not refused.bit:
             raise Refusal(refused.reason, write.address, refused.text)
         offsets = self._offsets(write)
@@ -246,7 +258,11 @@ class Admission:
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
-    def _check_starts(self, host: str, rises: int, written: int, word_at: int) -> None:
+    def _check_starts(self, command: Command, rises: int, written: int, word_at: int) -> None:
+        host = command.peer
+        if rises & ENABLE and self.held_enables.holds(host, command.received_s):
+            text = "enable was kept at 1 over the reset of a fault: write it as 0 once, then as 1"
+            raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
         if held := rises & self.held_runs.of(host):
             name = str(ControlBit(held & -held).name).lower()
             text = f"{name} was kept at 1 beyond the end of its run: write it as 0 once, then as 1"

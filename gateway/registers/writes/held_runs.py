@@ -1,12 +1,14 @@
-"""Bits of runs that masters that write in cycles keep at 1: only a master's own 0 lets its next 1 count.
+"""Bits that masters that write in cycles keep at 1: only a master's own 0 lets its next 1 count.
 
-They outlive the process: by a control that was started anew the holder's next cycle would begin another run.
+Those of runs outlive the process: by a control that was started anew the holder's next cycle would begin another run.
+An enable that is written on and on over a latched fault would press by another master's reset alone: a reset begins nothing.
 """
 
 from collections.abc import Callable, Mapping
 from typing import Final
 
 _MOST_HOLDERS: Final = 64  # memory stays bounded whoever writes
+_HELD_S: Final = 3.0  # longer than a cycle; who has waited for so long has looked, and decides anew
 
 
 class HeldRuns:
@@ -33,3 +35,29 @@ class HeldRuns:
     def restore(self, held: Mapping[str, int]) -> None:
         """Go on with what was held in the process before."""
         self.by_host.update(held)
+
+
+class HeldEnables:
+    """by_host: when each host that keeps enable at 1 over a latched fault has written it last, monotonic s."""
+
+    def __init__(self) -> None:
+        self.by_host: dict[str, float] = {}
+
+    def note(self, host: str, now_s: float) -> None:
+        """Note that a host has written enable as 1, and that this was refused because a fault is latched."""
+        self.let_go(host)
+        self.by_host[host] = now_s
+        if len(self.by_host) > _MOST_HOLDERS:
+            del self.by_host[next(iter(self.by_host))]
+
+    def holds(self, host: str, now_s: float) -> bool:
+        """Decide whether a 1 of this host is one that it has kept up since the fault; if so, it goes on being kept up."""
+        if now_s - self.by_host.get(host, -_HELD_S) >= _HELD_S:
+            self.let_go(host)
+            return False
+        self.note(host, now_s)
+        return True
+
+    def let_go(self, host: str) -> None:
+        """Note that a host has written enable as 0."""
+        self.by_host.pop(host, None)

@@ -3,9 +3,9 @@
 import pytest
 
 from gateway.codes.refusals import RefusalReason
-from gateway.registers import Refusal
+from gateway.registers import Refusal, Status
 from gateway.registers.rig_rules import BASIC_BITS
-from gateway.registers.words import ControlBit
+from gateway.registers.words import ControlBit, State
 from gateway.registers.writes.ownership import NOT_IPV4, ip_number
 
 TAKE = int(ControlBit.TAKE_OWNERSHIP)
@@ -134,6 +134,7 @@ def test_takeover_is_explicit_bumpless_and_visible(bank, master, other, commands
     told = []
     bank.on_accepted = lambda sentence, peer: told.append(sentence)
     master.write(0, 1, 1200)
+    bank.publish(Status(state=State.HOLDING))
     other.write(0, 1 | TAKE, 1300)
     assert (bank.owner, bank.read_registers(116, 2)) == ("10.0.0.2", bytes([10, 0, 0, 2]))
     assert (commands[-1].control_word, commands[-1].force_setpoint_n) == (1 | TAKE, 13.0)

@@ -1,14 +1,18 @@
 """A master whose program stands still while its last frame is sent on and on, as a PLC's communication module does."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
 
 from gateway.codes.refusals import RefusalReason
-from gateway.control import LeaseAction
+from gateway.control import CalibrationInUse, LeaseAction
 from gateway.control.settings import SelfTestSettings
+from gateway.profiles import load_calibration
+from gateway.registers import Refusal
 from gateway.registers.words import State
-from tests.control.bench import settings
+from gateway.registers.writes.held_runs import HeldEnables
+from tests.control.bench import bsfm, settings
 from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, OWNER, SmallRig
 
 LEASE_S, CYCLE_S = 0.35, 0.1
@@ -105,3 +109,82 @@ def test_a_force_that_is_held_for_a_lost_master_does_not_rise(lost: str) -> None
     rig.beats = True
     rig.run(4.0)
     assert rig.plant.force_n > 28.0, "its master is back"
+
+
+def _faulted_under_cycles(rig: SmallRig) -> Iterator[Refusal | None]:
+    """A living PLC that writes its whole block, enable in it, over a fault and beyond; the answers behind a reset by another
+    master, ten a second."""
+    rig.beats = False
+    for cycle in range(100):
+        rig.is_cell_silent = 10 <= cycle < 15
+        if cycle == 25:
+            rig.write(0, RESET, 0, 0, 0, 9000, peer=OTHER)
+            assert rig.state is State.OFF
+        refused = rig.answer(0, ENABLE, 1200, 0, 0, cycle)
+        rig.run(CYCLE_S)
+        if cycle >= 25:
+            yield refused
+
+
+@pytest.mark.parametrize("lease_s", [None, LEASE_S])
+def test_an_enable_that_stood_over_a_fault_presses_not_by_another_master_s_reset_alone(lease_s: float | None) -> None:
+    """It would begin a force in the moment in which somebody at the page wanted to see whether the fault is gone."""
+    rig = SmallRig(settings(lease_s=lease_s))
+    for refused in _faulted_under_cycles(rig):
+        assert refused is not None and refused.reason is RefusalReason.CALIBRATION_HELD
+        assert (rig.state, rig.wire.voltage_v) == (State.OFF, 0.0)
+    assert rig.bank.owner is None, "somebody else may take the machine"
+
+
+@pytest.mark.parametrize("by", ["its own 0", "its own coil", "its own reset", "a pause", "another master"])
+def test_behind_a_reset_an_enable_counts_again_that_was_0_or_of_who_has_waited(by: str) -> None:
+    rig = SmallRig()
+    refused = next(_faulted_under_cycles(rig))
+    assert refused is not None and refused.reason is RefusalReason.CALIBRATION_HELD
+    if by == "its own 0":
+        rig.write(0, 0, 1200)
+    elif by == "its own coil":
+        rig.bank.write_bits(0, [False], OWNER)
+    elif by == "its own reset":
+        rig.write(0, RESET)
+    elif by == "a pause":
+        rig.run(2.8)
+        assert rig.answer(0, ENABLE, 1200) is not None
+        rig.run(3.0)
+    rig.write(0, ENABLE, 1200, peer=OTHER if by == "another master" else OWNER)
+    rig.until(State.HOLDING)
+
+
+def test_a_heartbeat_or_another_coil_lets_no_enable_go_that_stood_over_a_fault() -> None:
+    rig = SmallRig()
+    assert next(_faulted_under_cycles(rig)) is not None
+    rig.write(4, 99)
+    rig.write(1, 0)
+    rig.bank.write_bits(2, [False], OWNER)
+    refused = rig.answer(0, ENABLE, 1200)
+    assert refused is not None and refused.reason is RefusalReason.CALIBRATION_HELD
+
+
+def test_the_hosts_whose_enables_stood_over_a_fault_are_sixty_four() -> None:
+    held = HeldEnables()
+    for number in range(65):
+        held.note(f"10.0.0.{number}", 1.0)
+    assert [held.holds(f"10.0.0.{number}", 1.5) for number in (0, 1, 64)] == [False, True, True]
+
+
+@pytest.mark.parametrize("is_lowered", [False, True])
+def test_a_calibration_that_allows_less_lets_no_force_rise_that_is_held_for_a_lost_master(is_lowered: bool) -> None:
+    """Contact was lost, too: 2 N waited for it, and 20 N were pressed on whoever touched the tool behind the commit."""
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD)).holding(30.0)
+    rig.beats = rig.plant.contact = False
+    rig.run(3.0)
+    less = replace(load_calibration("demo"), number=17, force_limits_n=(1.0, 20.0))
+    if is_lowered:
+        assert rig.bank.set_active_model(less).startswith("W314")
+        rig.controller.use(CalibrationInUse(replace(bsfm(), limits_n=less.force_limits_n), 17))
+    rig.plant.contact = True
+    rig.run(2.0)
+    assert rig.plant.force_n < 3.0 and rig.word("force_setpoint") == (2000 if is_lowered else 3000)
+    rig.write(1, 500)
+    rig.run(2.0)
+    assert rig.plant.force_n == pytest.approx(5.0, abs=0.3), "a new setpoint counts"

@@ -9,7 +9,8 @@ import pytest
 from gateway.codes.refusals import RefusalReason
 from gateway.control import CalibrationInUse
 from gateway.modbus import Peer
-from gateway.modbus.pdu import write_registers_request
+from gateway.modbus.pdu import is_exception, read_write_request, write_registers_request
+from gateway.modbus.server import answer
 from gateway.profiles import load_calibration
 from gateway.registers.words import ControlBit, State
 from tests.fieldbus.by_hand import framed
@@ -48,7 +49,9 @@ def test_bit_3_of_another_master_takes_over_alike_in_every_state(name: str) -> N
     stood = (rig.state, rig.word("control_word"), rig.word("force_setpoint"))
     rig.bank.write_bits(3, [True], OTHER)
     assert rig.bank.owner == OTHER.host
-    assert (rig.state, rig.word("control_word"), rig.word("force_setpoint")) == stood
+    state, word, setpoint = stood
+    assert (rig.state, rig.word("control_word")) == (state, word)
+    assert rig.word("force_setpoint") == (setpoint if state is State.HOLDING else 0)
     for words in ((4, 71), (4, 72), (0, *rig.block(rig.word("control_word"), beat=73))):
         rig.write(*words, peer=OTHER)
         rig.run(0.1)
@@ -62,6 +65,72 @@ def test_bit_3_of_another_master_takes_over_alike_in_every_state(name: str) -> N
     assert (refused.code, refused.reason) == (6, RefusalReason.NOT_OWNER)
     rig.bank.write_bits(3, [True], OWNER)
     assert rig.bank.owner == OWNER.host
+
+
+def _by_words(*words: int) -> Callable[[SmallRig], None]:
+    return lambda rig: rig.write(0, *words, peer=OTHER)
+
+
+def _by_float(address: int, data: bytes) -> Callable[[SmallRig], None]:
+    return lambda rig: rig.bank.write_registers(address, data, OTHER)
+
+
+def _ask(rig: SmallRig, pdu: bytes) -> None:
+    assert not is_exception(answer(pdu, rig.bank, OTHER))
+
+
+_NINE = pack(">f", float(ENABLE | TAKE))
+TAKEOVERS: dict[str, Callable[[SmallRig], None]] = {
+    "FC06": _by_words(ENABLE | TAKE),
+    "float ABCD": _by_float(200, _NINE),
+    "float CDAB": _by_float(300, _NINE[2:] + _NINE[:2]),
+    "coils": lambda rig: rig.bank.write_bits(0, [True, False, False, True], OTHER),
+    "FC22": lambda rig: rig.bank.mask_write(0, 0xFFF6, ENABLE | TAKE, OTHER),
+    "FC23": lambda rig: _ask(rig, read_write_request(100, 4, 0, pack(">H", ENABLE | TAKE))),
+}
+
+
+@pytest.mark.parametrize("by", TAKEOVERS)
+@pytest.mark.parametrize("left", [(1, 3000), (5, 4000)], ids=["force", "voltage"])
+def test_an_enable_of_who_takes_over_presses_nothing_that_another_has_left(by: str, left: tuple[int, int]) -> None:
+    rig = SmallRig()
+    rig.write(*left)
+    rig.run(0.1)
+    TAKEOVERS[by](rig)
+    rig.run(1.0)
+    rig.write(3, int(left[0] == 5), peer=OTHER)
+    rig.run(1.0)
+    assert (rig.state, rig.word("force_setpoint"), rig.word("voltage_setpoint")) == (State.READY, 0, 0)
+    assert max(voltage_v for _, voltage_v, _ in rig.trace) == 0.0
+
+
+def test_a_setpoint_that_the_takeover_itself_brings_counts_and_one_that_waits_for_contact_is_cleared() -> None:
+    rig = SmallRig()
+    rig.write(1, 3000)
+    rig.write(0, ENABLE | TAKE, 500, peer=OTHER)
+    assert rig.until(State.HOLDING).word("force_accepted") == 500
+    rig.plant.contact = False
+    waiting = rig.until(State.READY)
+    waiting.write(0, ENABLE | TAKE)
+    assert (rig.state, rig.word("force_setpoint"), rig.bank.owner) == (State.READY, 0, OWNER.host)
+    rig.plant.contact = True
+    assert rig.run(2.0).plant.force_n < 0.5
+
+
+def test_who_takes_over_may_reset_a_fault_beside_a_setpoint_that_another_has_left() -> None:
+    rig = SmallRig().faulted()
+    rig.write(1, 3000)
+    assert rig.answer(0, RESET) is not None
+    rig.write(0, RESET | TAKE, peer=OTHER)
+    assert (rig.state, rig.word("force_setpoint"), rig.bank.owner) == (State.OFF, 0, OTHER.host)
+
+
+def test_a_takeover_of_what_a_calibration_has_lowered_keeps_nothing_of_what_was_asked_for() -> None:
+    rig = SmallRig()
+    rig.write(1, 3000)
+    rig.bank.set_active_model(replace(load_calibration("demo"), number=17, force_limits_n=(1.0, 8.0)))
+    rig.write(0, TAKE, peer=OTHER)
+    assert (rig.word("force_setpoint"), rig.bank.command.force_requested_n) == (0, 0.0)
 
 
 def test_a_takeover_in_the_write_that_disables_holds_too() -> None:
