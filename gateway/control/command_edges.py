@@ -103,14 +103,15 @@ class CommandTracker:
     def _follow_payload(self, dt_s: float) -> None:
         """Go on towards the payload of the command, under a force no faster than along the ramp: the slide follows its weight,
         and 1 kg less would press 10 N more in the next moment. A tilt that is told is one that the robot goes through."""
+        if self._payload_kg == self._wanted_kg:
+            return
         missing_kg = self._wanted_kg - self._payload_kg
         most_kg = self.demand.manner.ramp_n_per_s / STANDARD_GRAVITY_M_PER_S2 * max(0.0, dt_s)
         if self._applied_n() > 0.0 and most_kg < abs(missing_kg) < inf:
             self._payload_kg += copysign(most_kg, missing_kg)
         else:
             self._payload_kg = self._wanted_kg
-        if missing_kg:
-            self._manner = None
+        self._manner = None
 
     def demand_by(self, command: Command) -> Demand:
         """Return what this command would demand. NotFiniteError as `demand_of`."""

@@ -27,9 +27,7 @@ class Reading(NamedTuple):
 
 
 NO_READING: Final = Reading()
-_DOUBTED_S: Final = (
-    0.5  # without a usable reading: an amplifier starts anew, or another cell is plugged, in less than that
-)
+_DOUBTED_S: Final = 0.5  # without a usable reading: in less, no amplifier starts anew, and no other cell is plugged in
 _OVERLOAD: Final = Quality.OVERLOAD
 
 
