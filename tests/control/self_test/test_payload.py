@@ -43,6 +43,7 @@ def test_a_zero_that_is_off_by_more_is_found_all_the_same(tilt_deg: float, off_n
     assert verdict_on(report, Item.ZERO) is SelfTestVerdict.FAILED
     (said,) = (one for one in report.sentences if "self-test zero failed" in one)
     assert "and the payload's 2.9 N" in said
+    assert "tilt and feed" not in said, "its weight is no force from outside"
 
 
 @pytest.mark.parametrize(("unit", "item"), [(-1.0, Item.SIGN), (4.0, Item.SCALE)])
