@@ -80,6 +80,15 @@ def test_it_shows_as_many_decimals_as_its_column_has_room_for(template: str, num
         compiled.encode({"x": -123456789.0})
 
 
+@pytest.mark.parametrize(
+    ("template", "largest", "step"), [("{x:g}", 5.0, 1e-4), ("{x:g}", 20_000.0, 0.1), ("{x:5g}", 1500.0, 1.0)]
+)
+def test_the_widest_gap_is_that_of_six_digits_or_of_what_the_column_has_room_for(
+    template: str, largest: float, step: float
+) -> None:
+    assert compile_template(template).fields[0].step_below(largest) == pytest.approx(step)  # type: ignore[attr-defined]
+
+
 def test_a_cell_whose_point_moves_is_a_profile_without_faults() -> None:
     profile = cell(stream=ForceReading(frame="S {status:S|D} {force:10g} g", unit="g", rate_hz=10.0,
                                        quality={"S": Quality.OK, "D": Quality.UNSTABLE}, overload=("S +",)))  # fmt: skip

@@ -201,3 +201,16 @@ def test_an_end_of_a_range_is_one_of_its_numbers_whatever_binary_fractions_make_
     assert scale.grid(decimals) == grid
     assert scale.on_grid(device[0] - 5.0, decimals) == grid[0] / 10**decimals
     assert scale.on_grid(device[1] + 5.0, decimals) == grid[1] / 10**decimals
+
+
+def test_the_registers_of_another_output_follow_those_of_the_first() -> None:
+    assert RegisterAccess(function=6, register=4).of_channel(2).register == 6
+    assert RegisterAccess(function=16, register=4, type="float32").of_channel(2).register == 8
+
+
+def test_of_two_numbers_in_a_sentence_nobody_knows_which_it_is_about() -> None:
+    profile = load_device("smc-itv-rc")
+    with pytest.raises(ValueError, match="must carry one number beside constants and words"):
+        profile.number_in("SET {a:d} {b:d}")
+    named = profile.number_in("SET {a:d} {value:d}")
+    assert named is not None and named.name == "value"

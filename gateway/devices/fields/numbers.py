@@ -195,8 +195,7 @@ class Plain:
 
     def step_below(self, largest: float) -> float:
         """Return the widest gap between two numbers up to this one, where a program prints six digits of each, as C's %g."""
-        digits = max(10.0**-self.decimals, _digit_below(largest) * 10.0**-_DECIMALS_OF_G)
-        return max(digits, 10.0 ** -self._decimals_of(largest))
+        return max(_digit_below(largest) * 10.0**-_DECIMALS_OF_G, 10.0 ** -self._decimals_of(largest))
 
     @property
     def is_open(self) -> bool:
