@@ -145,7 +145,10 @@ class Transitions:
 
     def miss_master(self, now_s: float, line: LineStatus, action: LeaseAction) -> None:
         """Act where no master's heartbeat keeps the output on. Of a force that is held meanwhile nobody is the owner: who
-        writes without a beat, once or the same on and on, would keep out the master that comes back."""
+        writes without a beat, once or the same on and on, would keep out the master that comes back. On the way to the end of
+        the gateway an owner that goes on writing forces is refused, and its beats with them: it is there, and 0 N are near."""
+        if self.is_stopping and line.owner_connected and line.owner_refused:
+            return
         commands, before = self.parts.commands, self._unbeaten
         self._unbeaten = commands.command.number
         if not self.is_master_lost:

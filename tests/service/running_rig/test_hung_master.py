@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.control import CalibrationInUse, LeaseAction
-from gateway.control.settings import SelfTestSettings
+from gateway.control.settings import Defaults, SelfTestSettings
 from gateway.profiles import load_calibration
 from gateway.registers import Refusal
 from gateway.registers.words import State
@@ -188,3 +189,36 @@ def test_a_calibration_that_allows_less_lets_no_force_rise_that_is_held_for_a_lo
     rig.write(1, 500)
     rig.run(2.0)
     assert rig.plant.force_n == pytest.approx(5.0, abs=0.3), "a new setpoint counts"
+
+
+@pytest.mark.parametrize(
+    ("writes", "ends"),
+    [
+        ("a path", State.OFF),
+        ("nothing", State.FAULT),
+        ("one frame", State.FAULT),
+        ("a path, then it leaves", State.FAULT),
+    ],
+)
+def test_the_way_to_the_end_is_no_fault_beside_an_owner_that_goes_on_with_its_path(writes: str, ends: State) -> None:
+    """Its setpoints were refused, its beats with them, and the force fell at once, as of a master that is gone."""
+    rig, written = (
+        SmallRig(replace(settings(lease_s=LEASE_S), defaults=Defaults(force_ramp_n_per_s=10.0))).holding(30.0),
+        0,
+    )
+    rig.beats = False
+    for cycle in range(80):
+        if cycle == 10:
+            rig.controller.stop()
+        elif writes.startswith("a path") or cycle < 10:
+            written = cycle
+        if cycle < 10 or writes != "nothing":
+            rig.answer(0, ENABLE, 3000 + written % 7, 0, 0, 1000 + written)
+        if cycle == 15 and writes.endswith("leaves"):
+            rig.loop.owner_connected = False
+            break
+        rig.run(0.05)
+    rig.until(ends, 3.0)
+    volts = [volts for _, volts, _ in rig.trace]
+    falls = [before_v - after_v for before_v, after_v in pairwise(volts)]
+    assert (max(falls) > 2.0) is (ends is State.FAULT)
