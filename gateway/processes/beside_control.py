@@ -11,6 +11,7 @@ import signal
 import socket
 import threading
 from collections.abc import Callable, Coroutine
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any, Final
 
@@ -107,10 +108,22 @@ def _hear_libraries(log: EventLog) -> None:
 def _too_little_memory(error: BaseException) -> str:
     """Return the sentence on an error for want of memory; empty where it is another one, as far as anybody can tell."""
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if isinstance(error, ImportError) and not _was_mapped(error):
+        return ""
     if limit == resource.RLIM_INFINITY:
         return f"E106 no memory is left ({error})" if isinstance(error, MemoryError) else ""
     room = f"this process may use {limit >> 20} MiB of addresses: raise that (ulimit -v, LimitAS= of a unit)"
-    return f"E106 it does not start ({type(error).__name__}: {error}); {room}"
+    return f"E106 it does not start ({type(error).__name__}: {error}); if memory is short: {room}"
+
+
+def _was_mapped(error: BaseException | None) -> bool:
+    """Return whether an import ended at a compiled library, which needs room in memory: a module that is not there, or lacks
+    a name, is missing or broken whatever the limit. Libraries give their own error for that of the part that did not load."""
+    while error is not None:
+        if isinstance(error, ImportError) and str(error.path or "").endswith(tuple(EXTENSION_SUFFIXES)):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _first_of(error: BaseException) -> BaseException:

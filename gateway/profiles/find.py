@@ -1,11 +1,12 @@
 """Where profiles are: the shipped ones, and those that people keep beside their rig file."""
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Final
 
 import gateway
 from gateway.plain_file import DIRECTORY, expand_home, other_kind
-from gateway.profiles.kinds.file_kind import is_foreign, keys_at_the_top, kind_of
+from gateway.profiles.kinds.file_kind import CALLED, is_foreign, keys_at_the_top, kind_of
 from gateway.profiles.strict_yaml.faults import closest, one_of
 
 FOLDERS: Final = {
@@ -34,10 +35,10 @@ def list_shipped(kind: str) -> list[str]:
     return sorted(path.stem for path in (shipped_profiles_folder() / FOLDERS[kind]).glob("*.yaml"))
 
 
-def locate(kind: str, name: str, beside: Path | None = None) -> Path:
+def locate(kind: str, name: str, beside: Path | None = None, *, of_any_kind: bool = False) -> Path:
     """Return the file of a profile: a shipped name, else a path (relative to the folder `beside`, or to the working
     directory), else the name of a file there or in its folder of that kind: `device: my-dac` is my-dac.yaml or
-    devices/my-dac.yaml.
+    devices/my-dac.yaml. of_any_kind: a profile of another kind may have been meant, too.
 
     FileNotFoundError with a sentence that follows the name: what is there, and what was probably meant.
     """
@@ -52,15 +53,24 @@ def locate(kind: str, name: str, beside: Path | None = None) -> Path:
         if _is_file(candidate):
             return candidate
     if other := _other_kind(path):
-        cure = ": name the file in it" if other == DIRECTORY else f", and no {kind} file"
+        cure = ": name the file in it" if other == DIRECTORY else f", and no {_called(kind)} file"
         raise FileNotFoundError(f"is {other}{cure}")
     if target := _lost_target(path):
         raise FileNotFoundError(f"is a link to {target}, where no file is")
+    kinds = tuple(FOLDERS) if of_any_kind else (kind,)
     if "/" in name or name.endswith(_SUFFIXES):
-        raise FileNotFoundError(f"is no file (looked for {display(path)}){_near(kind, path)}")
-    near = closest(name, known)
-    suggestion = f"; did you mean {near}?" if near else ""
-    raise FileNotFoundError(f"is neither a shipped {kind} ({one_of(known) or 'there is none'}) nor a file{suggestion}")
+        raise FileNotFoundError(
+            f"is no file (looked for {display(path)}){_meant(path.name, _files_in(path.parent, kinds))}"
+        )
+    names = [shipped for each in kinds for shipped in list_shipped(each)]
+    for place in (folder, *(folder / FOLDERS[each] for each in kinds)):
+        names += [Path(file).stem for file in _files_in(place, kinds)]
+    shipped = f"{_called(kind)} ({one_of(known) or 'there is none'})"
+    raise FileNotFoundError(f"is neither a shipped {shipped} nor a file{_meant(name, names)}")
+
+
+def _called(kind: str) -> str:
+    return CALLED[kind].partition(" ")[2]
 
 
 def _is_file(path: Path) -> bool:
@@ -85,13 +95,18 @@ def _lost_target(path: Path) -> str:
         return ""
 
 
-def _near(kind: str, path: Path) -> str:
-    try:
-        here = [entry.name for entry in path.parent.iterdir() if entry.suffix in _SUFFIXES and _is_file(entry)]
-    except (OSError, ValueError):
-        return ""
-    near = closest(path.name, [name for name in here if _may_be(kind, path.with_name(name))])
+def _meant(name: str, known: Collection[str]) -> str:
+    near = closest(name, known)
     return f"; did you mean {near}?" if near else ""
+
+
+def _files_in(folder: Path, kinds: Collection[str]) -> list[str]:
+    """Return the names of the profiles of these kinds in a folder; of none where it cannot be read."""
+    try:
+        here = [entry for entry in folder.iterdir() if entry.suffix in _SUFFIXES and _is_file(entry)]
+    except (OSError, ValueError):
+        return []
+    return [entry.name for entry in here if any(_may_be(kind, entry) for kind in kinds)]
 
 
 def _may_be(kind: str, path: Path) -> bool:

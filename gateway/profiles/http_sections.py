@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Protocol
 
 import yaml
 from annotated_types import MaxLen, MinLen
-from pydantic import AfterValidator
+from pydantic import AfterValidator, BeforeValidator
 
 from gateway import defaults
 from gateway.defaults import STRICT
@@ -24,7 +24,16 @@ _COMMENT: Final = re.compile(r"(?:^|(?<=\s))#[^\n]*", re.M)
 _SAID: Final = re.compile(rf"(?:{'|'.join(_SECRETS)})[\"']?\s*[:=]\s*(\S.*)", re.I)
 _LEAST: Final = 8  # characters of a secret that is looked for in comments: a shorter one stands in any word
 _NULL: Final = "tag:yaml.org,2002:null"
+_LAST_PORT: Final = 65535
 _BLANK: Final = "removed-from-this-copy"
+
+
+def _refuse_bare_port(value: object) -> object:
+    """Propose the address for a port alone, also in quotes and as `:8080`: the proposal must be one that is taken."""
+    port = str(value).removeprefix(":")
+    if port.isdecimal() and int(port) <= _LAST_PORT:
+        raise ValueError(f"{value} is a port alone: write {defaults.HOST}:{port}")
+    return value
 
 
 def _check_listen(text: str) -> str:
@@ -35,14 +44,14 @@ def _check_listen(text: str) -> str:
 def split_listen(text: str) -> tuple[str, int]:
     """Return HOST:PORT or [IPV6]:PORT as (host, port); ValueError for anything else."""
     host, _, port = text.rpartition(":")
-    if not port.isdecimal() or int(port) > 65535 or (":" in host and not host.startswith("[")):
+    if not port.isdecimal() or int(port) > _LAST_PORT or (":" in host and not host.startswith("[")):
         raise ValueError(f'"{text}" is not HOST:PORT such as {defaults.HOST}:{defaults.WEB_PORT}')
     bare: Any = host.removeprefix("[").removesuffix("]")
     address: str = adapter(Address).validate_python(bare)
     return address, int(port)
 
 
-Listen = Annotated[str, AfterValidator(_check_listen)]
+Listen = Annotated[str, AfterValidator(_check_listen), BeforeValidator(_refuse_bare_port)]
 
 
 def _check_fixed_port(listen: str) -> str:

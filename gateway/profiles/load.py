@@ -33,6 +33,7 @@ class ProfileReference:
     name: str
     place: Callable[[str], ProfileFault]
     beside: Path | None = None
+    is_of_any_kind: bool = False  # where it is not found, one of another kind may be proposed
 
 
 def refer_to(name: str | Path) -> ProfileReference:
@@ -78,7 +79,7 @@ def join_few(words: Iterable[str], most: int = 4) -> str:
 def open_file(kind: str, reference: ProfileReference, findings: Findings) -> tuple[Document, Path] | None:
     """Find, read and parse one file, whatever its kind turns out to be; None with the faults noted."""
     try:
-        path = locate(kind, reference.name, reference.beside)
+        path = locate(kind, reference.name, reference.beside, of_any_kind=reference.is_of_any_kind)
         data = path.read_bytes()
     except FileNotFoundError as error:
         findings.faults.append(reference.place(str(error)))

@@ -112,12 +112,29 @@ def test_callers_for_whom_no_descriptor_is_left_are_told_once_and_in_a_sentence(
 
 
 @pytest.mark.parametrize(
-    "failure", ["MemoryError", "ImportError('failed to map segment')", "SystemError('error return')"]
+    "failure",
+    [
+        "MemoryError",
+        "ImportError('failed to map segment', path='/usr/lib/x.abi3.so')",
+        "ImportError('read this first') from ImportError('failed to map segment', path='/usr/lib/x.so')",
+        "SystemError('error return')",
+    ],
 )
 def test_too_little_memory_is_a_sentence_and_no_traceback(failure: str, tmp_path: Path) -> None:
     code, lines = say(tmp_path, NO_MEMORY.replace("FAILURE", failure))
     assert (code, len(lines)) == (exit_codes.DEVICE, 1), lines
     assert " error   start E106 " in lines[0] and "400 MiB" in lines[0] and "ulimit -v" in lines[0]
+
+
+@pytest.mark.parametrize(
+    "failure",
+    ["ModuleNotFoundError('No module named uvicorn', name='uvicorn')", "ImportError('no such name', path='x.py')"],
+)
+def test_what_is_missing_or_broken_is_not_told_as_memory_where_that_is_limited(failure: str, tmp_path: Path) -> None:
+    """Whoever raised the limit as he was told found the same sentence again."""
+    code, lines = say(tmp_path, NO_MEMORY.replace("FAILURE", failure))
+    assert code == 1 and failure.partition("(")[0] in lines[-2] + lines[-1]
+    assert not any("ulimit" in line for line in lines)
 
 
 def test_a_defect_where_memory_is_not_limited_keeps_its_traceback(tmp_path: Path) -> None:

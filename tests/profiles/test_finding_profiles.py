@@ -57,6 +57,30 @@ def test_a_file_of_another_kind_is_no_neighbour_that_was_meant(tmp_path: Path, m
     assert said["hal.yaml"].endswith("did you mean half.yaml?"), "one with a fault may be it"
 
 
+def test_check_proposes_a_file_of_any_kind_a_rig_one_of_the_kind_that_it_needs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`check` takes every kind, so a device's file whose name was mistyped is among what was meant; so are names without an
+    ending, which rigs use."""
+    device = (PROFILES / "devices" / "smc-itv-rc.yaml").read_text(encoding="utf-8")
+    (tmp_path / "devices").mkdir()
+    for place in ("my-dac.yaml", "devices/my-other.yaml"):
+        (tmp_path / place).write_text(device, encoding="utf-8")
+    (tmp_path / "rig.yaml").write_text(
+        DEMO.replace("device: smc-itv-rc", "device: my-othr").replace("registers: force-v1", "registers: force_v1")
+    )
+    monkeypatch.chdir(tmp_path)
+    for name, meant in (("my-dacc.yaml", "my-dac.yaml"), ("my-dacc", "my-dac"), ("smc-itv-r", "smc-itv-rc")):
+        (fault,) = check_file(name).faults
+        assert fault.message.endswith(f"; did you mean {meant}?")
+    assert "did you mean" not in str(check_report("my-dacc.yaml").faults[0])
+    faults = {fault.path: fault.message for fault in check_file("rig.yaml").faults}
+    assert faults["output.device"].endswith("nor a file; did you mean my-other?")
+    assert faults["registers"] == (
+        "force_v1 is neither a shipped register map (force-v1) nor a file; did you mean force-v1?"
+    )
+
+
 @pytest.mark.parametrize(
     "name", ["", ".", "/", "a\0b", "x" * 5000, "\n", "~", "/proc/self/mem", "no/such/folder/rig.yaml"]
 )

@@ -41,6 +41,16 @@ def test_anything_else_is_refused_in_the_file(tmp_path: Path, text: str) -> None
         load_rig(rig_with(tmp_path, f'web: {{listen: "{text}"}}\n'))
 
 
+@pytest.mark.parametrize("text", ["8080", '"8080"', '":8080"'])
+def test_what_is_proposed_for_a_port_alone_is_taken(tmp_path: Path, text: str) -> None:
+    """It was "write it in quotes", and then no address."""
+    with pytest.raises(ProfileError, match=r"web\.listen: :?8080 is a port alone: write 127\.0\.0\.1:8080") as told:
+        load_rig(rig_with(tmp_path, f"web: {{listen: {text}}}\n"))
+    cure = str(told.value).rpartition("write ")[2]
+    rig = load_rig(rig_with(tmp_path, f"web: {{listen: {cure}}}\n"))
+    assert rig.web and rig.web.listen == "127.0.0.1:8080"
+
+
 def test_opc_ua_has_a_port_that_a_client_can_know(tmp_path: Path) -> None:
     """With any free one it would be another after each start, and nothing says which."""
     with pytest.raises(ProfileError, match=r"opcua\.listen"):

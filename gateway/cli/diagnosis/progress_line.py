@@ -123,7 +123,7 @@ class ProgressLine:
     def _write(self, text: str) -> None:
         """Leave out what would have to wait for a reader: who ends this block waits for the writer."""
         try:
-            if not _takes_more(self._stream):
+            if not takes_more(self._stream):
                 return
             self._stream.write(text)
             self._stream.flush()
@@ -131,14 +131,15 @@ class ProgressLine:
             self._is_over.set()
 
 
-def _takes_more(stream: IO[str]) -> bool:
-    """Decide whether a line can be written at once: not to a full pipe, nor to a terminal that is held by Ctrl-S."""
+def takes_more(stream: IO[str], within_s: float = 0.0) -> bool:
+    """Decide whether a line can be written at once, or within so many s: not to a full pipe, nor to a terminal that is held
+    by Ctrl-S."""
     try:
         poll = select.poll()
         poll.register(stream, select.POLLOUT)
     except (OSError, ValueError, TypeError):  # no file: it is in memory, or closed, which writing tells
         return True
-    return bool(poll.poll(0))
+    return bool(poll.poll(round(within_s * 1e3)))
 
 
 class _AboveLine:

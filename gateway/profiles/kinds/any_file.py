@@ -1,7 +1,7 @@
 """`check` of any profile: what a file is, by its keys, and every fault of it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -33,7 +33,9 @@ def check_file(name: str | Path) -> Checked:
     """Read and check a profile of any kind, by shipped name (a rig's first) or path. Never raises for what is in a file."""
     kind = next((kind for kind in FOLDERS if str(name) in list_shipped(kind)), "rig")
     findings = Findings()
-    opened = open_file(kind, refer_to(name), findings)
+    opened = open_file(kind, replace(refer_to(name), is_of_any_kind=True), findings)
+    if opened is None and not findings.texts:  # nothing was read: whoever mistypes a device's file wants that proposed
+        return Checked(kind, None, tuple(findings.faults))
     kind = kind_of(opened[0].value if opened else keys_at_the_top(b"".join(findings.texts.values())), kind) or kind
     if kind == "rig":
         report = check_report(name)

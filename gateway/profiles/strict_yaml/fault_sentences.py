@@ -42,6 +42,8 @@ _TYPES_ELSEWHERE: Final = dict.fromkeys(
 )
 """What is written as a `type` and has a place of its own."""
 _PLAIN: Final = re.compile(r"[\w.:/+ -]+")  # what reads well without quotes
+_SWITCHES: Final = dict.fromkeys(("yes", "on", "y", "true"), True) | dict.fromkeys(("no", "off", "n", "false"), False)
+"""What YAML 1.1 takes for a boolean, and what that means."""
 _MOST_KEYS: Final = 6  # of a group, in a sentence
 _ONLY_CHOICE: Final = ", the only choice"
 _SECRETS: Final = ("token", "password", "password_file")  # a password may stand in place of its file
@@ -163,8 +165,8 @@ def _hint(value: Any, what: str, unit: str) -> str:
         return ": write it in quotes"
     if not isinstance(value, str):
         return ""
-    if what == "true or false" and value.lower() in ("yes", "on", "y", "no", "off", "n", "true", "false"):
-        return f": write {'true' if value.lower() in ('yes', 'on', 'y', 'true') else 'false'}"
+    if what == "true or false" and value.lower() in _SWITCHES:
+        return f": write {str(_SWITCHES[value.lower()]).lower()}"
     if "number" in what:
         return _number_hint(value, unit.strip())
     return ""
@@ -232,8 +234,12 @@ def _nearest(value: Any, choices: list[str]) -> str | None:
     return min(near, key=lambda choice: abs(value - int(choice)), default=None)
 
 
-def tell_group(sentence: str, known: list[str]) -> str:
-    """Return a sentence about a value in whose place a group of keys may stand, with the first of these keys."""
+def tell_group(sentence: str, value: object, known: list[str]) -> str:
+    """Return a sentence about a value in whose place a group of keys may stand: what says the same in a group that is
+    switched on and off by a key, else the first of its keys."""
+    switch = str(_SWITCHES.get(str(value).lower(), "")).lower()
+    if switch and "enabled" in known:
+        return f"{sentence}: write {{enabled: {switch}}}"
     keys = one_of(known[:_MOST_KEYS]) + (" ..." if len(known) > _MOST_KEYS else "")
     word, is_word, _ = sentence.partition(_ONLY_CHOICE)
     return f"{word}, nor a group of keys: {keys}" if is_word else f"{sentence}: {keys}"

@@ -102,7 +102,7 @@ def _fault(kind: type, document: Document, path: Path, place: Path, finding: Map
     value, group = document.at(*place), kind_at(kind, place[len(path) :])
     sentence = type_sentence(finding, value, key)
     if finding["type"] in ("dataclass_type", "literal_error") and value is not None and is_dataclass(group):
-        sentence = tell_group(sentence, names(group))
+        sentence = tell_group(sentence, value, names(group))
     return document.fault(place, sentence)
 
 

@@ -125,6 +125,13 @@ def test_a_group_that_is_a_word_is_told_once() -> None:
     )
 
 
+@pytest.mark.parametrize(("word", "cure"), [("off", "false"), ("false", "false"), ("on", "true")])
+def test_a_word_in_place_of_a_group_with_a_switch_is_told_how_the_group_says_it(word: str, cure: str) -> None:
+    (fault,) = told(("registers: force-v1", f"residual_watch: {word}\nregisters: force-v1"))
+    assert fault.endswith(f"is not a group of keys: write {{enabled: {cure}}}")
+    assert told(("registers: force-v1", f"residual_watch: {{enabled: {cure}}}\nregisters: force-v1")) == []
+
+
 def test_whole_numbers_are_accepted_where_a_number_is_needed_and_become_floats() -> None:
     file, faults = build(RigFile, parse(DEMO.encode(), "rig.yaml"))
     assert not faults and file is not None

@@ -1,6 +1,7 @@
 """`record`: start and stop a recording in the gateway that runs; by its clock, too, so that it ends whatever becomes of us."""
 
 import json
+import sys
 import threading
 import time
 from pathlib import Path
@@ -16,6 +17,7 @@ from gateway.processes import exit_codes
 _ON = {"on": True, "off": False}
 _LOOK_S: Final = 0.2
 _MOST_LOOKS: Final = 25  # five seconds, in which control is started again
+_READER_S: Final = 1.0  # a reader that is merely slow has taken something by then
 _LONGEST_S: Final = 31 * 86400.0
 
 
@@ -68,9 +70,17 @@ def command(*, what: str | None, state: StateChoice, as_json: bool, for_s: float
     if starts or what in _ON:
         request["on"] = starts
     answer = _record(state.directory, request, for_s) if for_s else ask(state.directory, request)
-    click.echo(json.dumps(answer) if as_json else _sentence(answer))
+    if not answer.get("stopped") or _is_read():
+        click.echo(json.dumps(answer) if as_json else _sentence(answer))
     if for_s and answer["fault"]:
         raise CliError(f"{answer['fault']}: not the {for_s:g} s that were asked for")
+
+
+def _is_read() -> bool:
+    """Return whether a line on stdout has room; into a full pipe, whoever pressed Ctrl-C would have to press it again."""
+    from gateway.cli.diagnosis.progress_line import takes_more
+
+    return takes_more(sys.stdout, _READER_S)
 
 
 def _record(state: Path, request: dict[str, Any], for_s: float) -> dict[str, Any]:
