@@ -19,6 +19,9 @@ from typing import Final
 
 _QUICK_REPEATS: Final = 3  # equal writes at once after an answer: the next on a line that may have an echo is in doubt
 _ECHO_LATENCY_S: Final = 0.02  # from the last character of an answer to its echo, through the slowest adapter
+_LATEST_ECHO_S: Final = 0.1
+"""The same where this machine reads late, too. An equal write up to then may be one: counted to 20 ms only, echoes that came
+behind 21 ms were answered, heard and answered again without an end."""
 
 
 class RtuEcho:
@@ -63,7 +66,8 @@ class RtuEcho:
         brings back has shown yet what the line does."""
         if not self.frame or frame != self.frame or self._has_echo is not None:
             return False
-        self._repeats = self._repeats + 1 if heard_s <= self._until_s else 0
+        is_quick = heard_s <= self._until_s - _ECHO_LATENCY_S + _LATEST_ECHO_S
+        self._repeats = self._repeats + 1 if is_quick else 0
         if self._repeats <= _QUICK_REPEATS:
             return False
         self._repeats = 0
