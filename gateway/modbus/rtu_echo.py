@@ -22,6 +22,9 @@ from typing import Final
 
 _QUICK_REPEATS: Final = 3  # equal writes at once after an answer: the next on a line that may have an echo is in doubt
 _MOST_UNRETURNED: Final = 3  # refusals of what may be echoes: so many do not get lost one after the other
+_NOTHING_SET: Final = bytes(
+    2
+)  # the value of FC05 and FC06, the bits that FC22 sets: a stop is not refused behind an enable
 _ECHO_LATENCY_S: Final = 0.02  # from the last character of an answer to its echo, through the slowest adapter
 _LATEST_ECHO_S: Final = 0.1
 """The same where this machine reads late, too. An equal write up to then may be one: counted to 20 ms only, echoes that came
@@ -86,7 +89,9 @@ class RtuEcho:
             return False
         del self._answers[: place + 1]
         self._repeats += 1
-        return bool(self._answers) or self._is_refusal_out or self._repeats > _QUICK_REPEATS
+        if self._answers:  # something else was answered since: an echo on its second round, or a stop
+            return frame[-4:-2] != _NOTHING_SET
+        return self._is_refusal_out or self._repeats > _QUICK_REPEATS
 
     @property
     def _is_refusal_out(self) -> bool:

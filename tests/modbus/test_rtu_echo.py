@@ -90,6 +90,14 @@ def test_a_write_that_may_be_an_echo_behind_another_s_request_is_executed_and_te
     assert bus.requests() == [RtuRequest(1, WRITE, False)]
 
 
+def test_a_stop_right_behind_an_enable_is_executed_whatever_was_written_before() -> None:
+    """It equals an answer before the last, as an echo on its second round does."""
+    enable, stop = P.write_register_request(0, 1), P.write_register_request(0, 0)
+    bus = Bus(baud=115200)
+    row = (stop, enable, enable, enable, enable, stop, P.write_register_request(1, 500), stop)
+    assert [exchange(bus.pause(0.004), pdu) for pdu in row] == [1] * len(row)
+
+
 def executed_on_an_echoing_line(latency_s: float, writes: list[tuple[float, bytes]]) -> list[bytes]:
     """What is executed within two seconds, of writes at their times: all that is on the wire comes late, in its order."""
     bus, executed = Bus(), list[bytes]()
