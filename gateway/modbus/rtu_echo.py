@@ -9,8 +9,11 @@ letter, and to answer one's own echo would never end. Decisions:
   to an answer tells nothing of its echo.
 - Until then, a slow adapter could bring the echo later. Equal writes at once after each answer are a master's at first; behind
   some of them one is in doubt. It is not executed but refused (06, busy), and that answer is no request: it comes back, or does
-  not, and the line is known from then on. So a master that only writes is refused once; to leave writes out without a word cost
-  it one of each row, and what it heard next told nothing.
+  not, and the line is known from then on. So a master that only writes is refused a few times at most; to leave writes out
+  without a word cost it one of each row, and what it heard next told nothing.
+- A write that equals an earlier answer than the last is in doubt at once: two echoes that follow each other would go round, and
+  an enable come back behind each stop. Nobody waits for a refusal of an echo, so a master may speak before that comes back:
+  what is heard while that may still come tells that there is none the third time only.
 - On a line that has an echo, or may have one, what is asked before it comes back was asked by a master that had given up. It is
   executed and not answered, and the echo behind it is one: an enable that came back behind a stop would undo that.
 """
@@ -18,6 +21,10 @@ letter, and to answer one's own echo would never end. Decisions:
 from typing import Final
 
 _QUICK_REPEATS: Final = 3  # equal writes at once after an answer: the next on a line that may have an echo is in doubt
+_MOST_UNRETURNED: Final = 3  # refusals of what may be echoes: so many do not get lost one after the other
+_NOTHING_SET: Final = bytes(
+    2
+)  # the value of FC05 and FC06, the bits that FC22 sets: a stop is not refused behind an enable
 _ECHO_LATENCY_S: Final = 0.02  # from the last character of an answer to its echo, through the slowest adapter
 _LATEST_ECHO_S: Final = 0.1
 """The same where this machine reads late, too. An equal write up to then may be one: counted to 20 ms only, echoes that came
@@ -28,7 +35,8 @@ class RtuEcho:
     """The answer that may come back, and whether this line gives answers back. may_echo: false where it cannot."""
 
     __slots__ = (
-        "_character_s", "_has_echo", "_is_like_request", "_may_echo", "_repeats", "_sent_s", "_silence_s", "_until_s", "frame",
+        "_answers", "_character_s", "_has_echo", "_is_like_request", "_latest_s", "_may_echo", "_refusal", "_repeats",
+        "_sent_s", "_silence_s", "_unreturned", "_until_s", "frame",
     )  # fmt: skip
 
     def __init__(self, character_s: float, silence_s: float, *, may_echo: bool) -> None:
@@ -36,18 +44,28 @@ class RtuEcho:
         self._may_echo = may_echo
         self._has_echo: bool | None = None if may_echo else False  # None: not known yet
         self._is_like_request = False
-        self._sent_s = self._until_s = 0.0  # the answer; the latest that its echo comes
+        self._sent_s = 0.0  # the answer
+        self._until_s = self._latest_s = 0.0  # the latest that its echo comes, and that it is read here
         self._repeats = 0
+        self._answers: list[tuple[bytes, float]] = []  # like their requests, not heard again; until when they may be
+        self._refusal = b""  # of a write in doubt
+        self._unreturned = 0  # such refusals
         self.frame = b""
 
     def expect(self, answer: bytes, now_s: float, *, is_like_request: bool) -> None:
         """Expect this answer back, where the line may have an echo. is_like_request: it is its request once more."""
         self._is_like_request = is_like_request
+        self._sent_s, sent_out_s = now_s, now_s + len(answer) * self._character_s
+        self._until_s, self._latest_s = sent_out_s + _ECHO_LATENCY_S, sent_out_s + _LATEST_ECHO_S
+        if is_like_request and self._has_echo is None:
+            self._answers.append((answer, self._latest_s))
         self.frame = answer if not is_like_request or self._has_echo is not False else b""
-        self._sent_s, self._until_s = now_s, now_s + len(answer) * self._character_s + _ECHO_LATENCY_S
 
     def is_this(self, frame: bytes, heard_s: float) -> bool:
         """Decide whether a frame is our last answer come back."""
+        if self._refusal and frame == self._refusal != self.frame:
+            self._has_echo, self._refusal = True, b""  # behind an answer to a master who has not waited for it
+            return True
         if not self.frame or frame != self.frame:
             return False
         if not self._is_like_request:
@@ -62,16 +80,27 @@ class RtuEcho:
         return self._sent_s + (len(self.frame) + size) * self._character_s
 
     def is_in_doubt(self, frame: bytes, heard_s: float) -> bool:
-        """Decide whether a frame that is_this has let through may be our answer all the same, and none that a slow adapter
-        brings back has shown yet what the line does."""
-        if not self.frame or frame != self.frame or self._has_echo is not None:
+        """Decide whether a frame that is_this has let through may be an answer of ours all the same, while no answer of another
+        kind has shown yet what the line does. Those before it have come back as well then, or never do."""
+        self._answers = [one for one in self._answers if heard_s <= one[1]]
+        place = next((k for k, (answer, _) in enumerate(self._answers) if answer == frame), None)
+        if self._has_echo is not None or place is None:
+            self._repeats = 0
             return False
-        is_quick = heard_s <= self._until_s - _ECHO_LATENCY_S + _LATEST_ECHO_S
-        self._repeats = self._repeats + 1 if is_quick else 0
-        if self._repeats <= _QUICK_REPEATS:
-            return False
-        self._repeats = 0
-        return True
+        del self._answers[: place + 1]
+        self._repeats += 1
+        if self._answers:  # something else was answered since: an echo on its second round, or a stop
+            return frame[-4:-2] != _NOTHING_SET
+        return self._is_refusal_out or self._repeats > _QUICK_REPEATS
+
+    @property
+    def _is_refusal_out(self) -> bool:
+        """Decide whether the last answer was the refusal of a write in doubt."""
+        return bool(self.frame) and self.frame == self._refusal
+
+    def note_refused(self) -> None:
+        """Note that the answer expected last refuses a write in doubt: nobody waits for it, if that was an echo."""
+        self._refusal = self.frame
 
     def is_coming(self, size: int, heard_s: float) -> bool:
         """Decide whether our last answer may still come back behind a request of so many bytes."""
@@ -86,10 +115,13 @@ class RtuEcho:
         if self.is_coming(size, heard_s):
             return
         if self.frame and not self._is_like_request:
-            self._has_echo = False
+            self._unreturned += self._is_refusal_out
+            if not self._is_refusal_out or heard_s > self._latest_s or self._unreturned == _MOST_UNRETURNED:
+                self._has_echo = False
         self.frame = b""
 
     def forget(self) -> None:
         """Forget the answer; and what was learned, where there may be another adapter now."""
         self.frame = b""
+        self._answers, self._refusal, self._repeats, self._unreturned = [], b"", 0, 0
         self._has_echo = None if self._may_echo else False

@@ -141,6 +141,8 @@ class RtuReceiver:
     def note_sent(self, request: RtuRequest, answer: bytes, now_s: float) -> None:
         """Expect an answer (the whole frame) back on a line that hears itself."""
         self._echo.expect(answer, now_s, is_like_request=answer[1:-2] == request.pdu)
+        if request.is_in_doubt:
+            self._echo.note_refused()
 
     def forget(self) -> None:
         """Forget what has arrived: the port was lost."""
@@ -203,9 +205,10 @@ class RtuReceiver:
         for at, size, frame in heard:
             is_last = at == found[-1][0] and not self._echo.is_coming(size, self._last_s)
             is_answered = is_last and frame[0] == self._unit
-            is_in_doubt = is_answered and self._echo.is_in_doubt(frame, self._last_s)
-            requests.append(RtuRequest(frame[0], frame[1:-2], is_answered, is_in_doubt))
-            self._echo.note_master(size, self._last_s)
+            is_in_doubt = self._echo.is_in_doubt(frame, self._last_s)
+            requests.append(RtuRequest(frame[0], frame[1:-2], is_answered, is_in_doubt and is_answered))
+            if not is_in_doubt:
+                self._echo.note_master(size, self._last_s)
         return requests
 
     def _scan(self, *, is_final: bool) -> tuple[list[tuple[int, int]], int, int]:

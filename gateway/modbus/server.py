@@ -82,9 +82,7 @@ def refuse_unit(request: tuple[int, bytes], served: Sequence[int], bank: DataBan
 
 def refuse_echo(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
     """Return the answer to a write that may be the echo of the answer before it, and is not executed."""
-    sentence = (
-        "a fourth equal write at once after its answer, as an adapter that hears itself gives it back: write it again"
-    )
+    sentence = "a write like an answer just before it, as an adapter that hears itself gives one back: write it again"
     refusal = RequestError(RequestFault.ECHO, sentence, pdu[0], P.address_in(pdu))
     refusal.is_write = True
     bank.note_refusal(refusal, peer)
