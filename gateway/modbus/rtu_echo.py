@@ -22,9 +22,8 @@ from typing import Final
 
 _QUICK_REPEATS: Final = 3  # equal writes at once after an answer: the next on a line that may have an echo is in doubt
 _MOST_UNRETURNED: Final = 3  # refusals of what may be echoes: so many do not get lost one after the other
-_NOTHING_SET: Final = bytes(
-    2
-)  # the value of FC05 and FC06, the bits that FC22 sets: a stop is not refused behind an enable
+_NOTHING_SET: Final = bytes(2)
+"""The value of FC05 and FC06, the bits that FC22 sets: a stop is not refused behind an enable."""
 _ECHO_LATENCY_S: Final = 0.02  # from the last character of an answer to its echo, through the slowest adapter
 _LATEST_ECHO_S: Final = 0.1
 """The same where this machine reads late, too. An equal write up to then may be one: counted to 20 ms only, echoes that came
