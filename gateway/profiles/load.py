@@ -14,7 +14,7 @@ from gateway.file_signature import JSON, SIGNATURE_BYTES, describe_signature
 from gateway.profiles.find import display, locate
 from gateway.profiles.kinds.file_kind import CALLED, has_no_other_key, is_foreign, kind_of
 from gateway.profiles.strict_yaml.faults import Findings, ProfileError, ProfileFault, one_of
-from gateway.profiles.strict_yaml.text import Document, parse
+from gateway.profiles.strict_yaml.text import LARGEST_BYTES, Document, parse
 
 if TYPE_CHECKING:
     from gateway.bsfm.model import Calibration
@@ -80,7 +80,8 @@ def open_file(kind: str, reference: ProfileReference, findings: Findings) -> tup
     """Find, read and parse one file, whatever its kind turns out to be; None with the faults noted."""
     try:
         path = locate(kind, reference.name, reference.beside, of_any_kind=reference.is_of_any_kind)
-        data = path.read_bytes()
+        size = path.stat().st_size
+        data = path.read_bytes() if size <= LARGEST_BYTES else _beginning_of(path)
     except FileNotFoundError as error:
         findings.faults.append(reference.place(str(error)))
         return None
@@ -90,12 +91,21 @@ def open_file(kind: str, reference: ProfileReference, findings: Findings) -> tup
     if other := _other_kind(data):
         findings.faults.append(reference.place(f"is {other}; {CALLED[kind]} is needed here, a YAML file"))
         return None
+    if size > LARGEST_BYTES:
+        findings.faults.append(reference.place(f"is {size} bytes long: a profile has at most {LARGEST_BYTES}"))
+        return None
     findings.texts[display(path)] = data
     try:
         return parse(data, display(path)), path
     except ProfileError as error:
         findings.faults += error.faults
         return None
+
+
+def _beginning_of(path: Path) -> bytes:
+    """Return what tells the kind of a file that is too long for a profile: all of a recording may not fit into memory."""
+    with path.open("rb") as file:
+        return file.read(LARGEST_BYTES)
 
 
 def _other_kind(data: bytes) -> str:

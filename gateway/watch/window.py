@@ -4,7 +4,8 @@ The replay begins at rest without pressure; the machine does not, and its fricti
 are replayed too and not judged. They begin where both agree: at the last 0 V, or else at the highest command of the lead,
 for whoever comes up to that from below, the replay from 0 as well, has all friction elements turned the same way (what is
 within the largest loop has no memory of what was before it). Ten seconds of any lead left 0.4 N of wrong friction.
-A gap (control was restarted) ends what can be replayed; rows in and shortly after a fault are no witness of the plant.
+A gap (control was restarted) ends what can be replayed; rows in and shortly after a fault, or behind a standstill of this
+machine, are no witness of the plant.
 
 The pressure is left out: an output device measures it for its display, late and seldom, which is no second channel.
 """
@@ -19,6 +20,7 @@ from gateway.defaults import WATCH_SETTLED_S, WATCHED_SHARE
 from gateway.diagnosis.measurement import Flags, Floats, Measurement
 from gateway.recording import Recording, RecordingError
 from gateway.recording.measurement import measurement_of
+from gateway.recording.tables.time_axis import gaps_of, rows_after_gaps
 from gateway.watch.pushed_rows import pushed_rows
 
 LEAD_S: Final = 12.0
@@ -51,6 +53,9 @@ def window_of(data: bytes, columns: tuple[str, ...], window_s: float) -> Window 
     usable = window & ~_faulty(rows)
     if usable.sum() < WATCHED_SHARE * window.sum():
         return "a fault stood"
+    usable &= ~_after_standstills(rows["time_s"])
+    if usable.sum() < WATCHED_SHARE * window.sum():
+        return "this machine stood still, or readings were lost, for too much of the time (A342)"
     command_v = rows["command_v"][usable]
     if not np.any(command_v > _OFF_V):
         return "nothing was commanded"
@@ -108,6 +113,13 @@ def _faulty(rows: dict[str, Floats]) -> Flags:
     time_s = rows["time_s"]
     last_s = np.maximum.accumulate(np.where(faulty, time_s, -np.inf))
     return np.asarray(time_s - last_s < _AFTER_FAULT_S)
+
+
+def _after_standstills(time_s: Floats) -> Flags:
+    """Return rows shortly after others are missing: while control or the simulated rig stood still, what was sent came late,
+    and a busy machine was called another gain (A345)."""
+    ends, _ = gaps_of(time_s, is_own=True)
+    return rows_after_gaps(time_s, ends)
 
 
 def _excitation(command_v: Floats) -> tuple[float, int]:

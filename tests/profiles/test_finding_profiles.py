@@ -100,6 +100,24 @@ def test_a_file_that_may_not_be_read_is_told(tmp_path: Path, monkeypatch: pytest
     assert fault.message == "cannot be read: Permission denied"
 
 
+def test_a_file_that_is_far_too_long_is_refused_without_being_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """2 GB given to `check` or `upload` took minutes, and as much memory."""
+
+    def refuse(self: Path) -> bytes:
+        raise AssertionError(f"{self} was read as a whole")
+
+    path = tmp_path / "rig.yaml"
+    with path.open("wb") as file:
+        file.write(b"name: x\n")
+        file.truncate(2 << 30)
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    for report in (check_report(path), check_file(path)):
+        (fault,) = report.faults
+        assert fault.message == "is 2147483648 bytes long: a profile has at most 1048576"
+
+
 def test_a_rig_names_profiles_beside_itself_and_faults_in_them_point_into_them(tmp_path: Path) -> None:
     device = (PROFILES / "devices" / "smc-itv-rc.yaml").read_text(encoding="utf-8")
     (tmp_path / "devices").mkdir()

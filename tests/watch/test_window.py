@@ -71,6 +71,22 @@ def test_a_gap_ends_what_can_be_replayed():
     assert "younger" in window_from(rows)
 
 
+def standing_still(every_s: float, for_s: float = 0.07) -> dict[str, np.ndarray]:
+    """A run whose machine stands still so often, and makes no rows meanwhile."""
+    rows = run_of(120.0, steps)
+    lives = (rows["time_s"] - 1000.0) % every_s >= for_s
+    return {name: values[lives] for name, values in rows.items()}
+
+
+def test_behind_a_standstill_of_this_machine_nothing_is_judged():
+    """What was sent meanwhile came late: a busy machine was told as a gain that has changed."""
+    window = window_from(standing_still(100.0 + 10.0 / 3.0), 60.0)
+    aside = window_from(run_of(120.0, steps), 60.0).measurement.usable.sum() - window.measurement.usable.sum()
+    assert 48 <= aside <= 60, "half a second, and the standstill itself"
+    assert "stood still" in window_from(standing_still(2.0), 60.0)
+    assert isinstance(window_from(standing_still(2.0, for_s=0.03), 60.0), Window), "a reading that is late is none"
+
+
 def test_an_idle_machine_is_not_judged():
     assert window_from(run_of(120.0, lambda t: steps(t) if t < 60.0 else 0.0)) == "nothing was commanded"
 

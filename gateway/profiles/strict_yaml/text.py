@@ -19,7 +19,7 @@ from gateway.profiles.strict_yaml.scalars import plain_scalar
 from gateway.profiles.strict_yaml.syntax import TooDeepError, syntax_sentence
 
 _PARSER: Final[Any] = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
-_LARGEST_BYTES: Final = 1 << 20
+LARGEST_BYTES: Final = 1 << 20
 _DEEPEST: Final = 32
 _NO_KEY: Final = "a key must be a word or a whole number"
 _BLOCKS: Final = (">", "|")
@@ -86,8 +86,8 @@ def _kind(value: object) -> str:
 
 
 def _decode(data: bytes, file: str) -> str:
-    if len(data) > _LARGEST_BYTES:
-        raise ProfileError([ProfileFault(file, 0, 0, "", f"{len(data)} bytes: a profile has at most {_LARGEST_BYTES}")])
+    if len(data) > LARGEST_BYTES:
+        raise ProfileError([ProfileFault(file, 0, 0, "", f"{len(data)} bytes: a profile has at most {LARGEST_BYTES}")])
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise ProfileError([ProfileFault(file, 1, 1, "", "the file is UTF-16: save it as UTF-8")])
     try:

@@ -123,6 +123,17 @@ def test_behind_a_gap_half_a_second_is_not_judged() -> None:
     assert not check_time_axis(late).after_gap.any(), "a pause of less than ten rows is none"
 
 
+def test_behind_a_standstill_of_the_gateway_half_a_second_is_not_judged_and_it_is_named() -> None:
+    """What was sent meanwhile came late; another logger's rows tell nothing of that."""
+    times_s = np.concatenate([0.01 * np.arange(100), 1.06 + 0.01 * np.arange(100)])
+    theirs = timed(*times_s)
+    ours = replace(theirs, columns=theirs.columns | {name: np.zeros(200) for name in ("sent_v", "sent_age_s")})
+    assert not check_time_axis(theirs).after_gap.any()
+    axis = check_time_axis(ours)
+    assert np.flatnonzero(axis.after_gap).tolist() == list(range(100, 150))
+    assert "the gateway's machine stood still" in axis.notes[0]
+
+
 def test_gaps_are_told_with_their_number_length_and_place() -> None:
     times_s = np.concatenate([0.01 * np.arange(100), 2.0 + 0.01 * np.arange(100), 9.0 + 0.01 * np.arange(100)])
     (note,) = check_time_axis(timed(*times_s)).notes
