@@ -194,7 +194,7 @@ class RegisterBank:
 
     def publish_when_read(self, state: State, tell: Callable[[], Status]) -> None:
         """Show what `tell` says when somebody reads next: most that is published, nobody reads. state: of control."""
-        self._admission.note_state(state)
+        self._admission.note_state(state, tell)
         self._tell_status = tell
         self._image.fall_behind()
 

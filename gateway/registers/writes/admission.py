@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.modbus.peer import NOBODY
-from gateway.registers.command import Command
+from gateway.registers.command import Command, Status
 from gateway.registers.map.register_map import Block
 from gateway.registers.refusal import Refusal
 from gateway.registers.rig_rules import BankRules
@@ -91,12 +91,12 @@ class _PermittedWrite(NamedTuple):
 
 
 class Admission:
-    """decide: what control says to a write. is_calibrating: a run has the output; is_pressing: a setpoint has it.
+    """decide: what control says to a write. is_calibrating: a run has the output.
     lowered_from_n: of the setpoint in use, what the master wrote, 0 where nothing was lowered."""
 
     def __init__(self, commands: CommandBlock, ownership: Ownership, echo: ByteOrderEcho, rules: BankRules) -> None:
         self.decide: Decide = decide_nothing
-        self.is_calibrating = self.is_pressing = False
+        self.note_state(State.OFF, Status)
         self.lowered_from_n = 0.0
         self.held_runs, self.held_enables = HeldRuns(), HeldEnables()
         self._commands = commands
@@ -125,7 +125,7 @@ class Admission:
         if is_stop:
             values[FORCE_SETPOINT] = values[VOLTAGE_SETPOINT] = 0.0
         is_taken_over = bool(written & TAKE)
-        is_begun_anew = is_taken_over and not self.is_pressing and self._ownership.owner != write.host
+        is_begun_anew = is_taken_over and self._ownership.owner != write.host
         if is_begun_anew:
             values = self._without_left_setpoints(write, values)
         command = commands.command(values, written, number, now_s, write.host)
@@ -144,9 +144,9 @@ class Admission:
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
         return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
 
-    def note_state(self, state: State) -> None:
-        """Note the state of control: what may be asked for, and left behind, depends on it."""
-        self.is_calibrating, self.is_pressing = state is State.CALIBRATING, state in _PRESSING
+    def note_state(self, state: State, tell: Callable[[], Status]) -> None:
+        """Note the state of control, and who tells the rest: what may be asked for, and left behind, depends on it."""
+        self.is_calibrating, self._is_pressing, self._tell = state is State.CALIBRATING, state in _PRESSING, tell
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered."""
@@ -187,12 +187,14 @@ class Admission:
         raise self._not_owner(write.address, write.host)
 
     def _without_left_setpoints(self, write: Write, values: Values) -> Values:
-        """What a former owner has left while nothing is pressed would be pressed by the next enable of who takes over, and it
-        never asked for that: only setpoints of its own write count. A force that is pressed stays, without a bump."""
+        """Who takes over has asked for none of the setpoints that it does not bring. So of what a former owner has left the
+        next enable presses nothing, and a force that is pressed stays as it is held: for a lost master that may be less."""
         written, without = self._offsets(write), values.copy()
-        for offset in (FORCE_SETPOINT, VOLTAGE_SETPOINT):
-            if offset not in written:
-                without[offset] = 0.0
+        held_n = self._tell().force_accepted_n if self._is_pressing else 0.0  # 0 on the way to 0, which clears all
+        if FORCE_SETPOINT not in written and held_n < values[FORCE_SETPOINT] and (held_n or not self._is_pressing):
+            without[FORCE_SETPOINT] = self._commands.round_force(held_n)
+        if VOLTAGE_SETPOINT not in written and not self._is_pressing:
+            without[VOLTAGE_SETPOINT] = 0.0
         return without
 
     def _is_named_stop(self, write: Write, written: int) -> bool:

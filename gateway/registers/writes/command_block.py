@@ -82,9 +82,14 @@ class CommandBlock:
         if field is None or setpoint_n <= field.high:
             return None
         lowered = self.values.copy()
-        lowered[FORCE_SETPOINT] = floor(round(field.high * field.counts_per_unit, 6)) / field.counts_per_unit
+        lowered[FORCE_SETPOINT] = self.round_force(field.high)
         self.store(lowered, int(lowered[CONTROL_WORD]))
         return setpoint_n, lowered[FORCE_SETPOINT]
+
+    def round_force(self, force_n: float) -> float:
+        """Return the largest force, N, up to this one that a word can say, which may be written as it reads."""
+        counts_per_n = self._counts[FORCE_SETPOINT]
+        return floor(round(force_n * counts_per_n, 6)) / counts_per_n
 
     def _fields(self, rules: BankRules) -> tuple[CommandField | None, ...]:
         count, registers = len(self.values), self._registers

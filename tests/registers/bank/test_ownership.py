@@ -134,7 +134,7 @@ def test_takeover_is_explicit_bumpless_and_visible(bank, master, other, commands
     told = []
     bank.on_accepted = lambda sentence, peer: told.append(sentence)
     master.write(0, 1, 1200)
-    bank.publish(Status(state=State.HOLDING))
+    bank.publish(Status(state=State.HOLDING, force_accepted_n=13.0))
     other.write(0, 1 | TAKE, 1300)
     assert (bank.owner, bank.read_registers(116, 2)) == ("10.0.0.2", bytes([10, 0, 0, 2]))
     assert (commands[-1].control_word, commands[-1].force_setpoint_n) == (1 | TAKE, 13.0)

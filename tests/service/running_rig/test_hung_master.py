@@ -14,7 +14,7 @@ from gateway.registers import Refusal
 from gateway.registers.words import State
 from gateway.registers.writes.held_runs import HeldEnables
 from tests.control.bench import bsfm, settings
-from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, OWNER, SmallRig
+from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, OWNER, TAKE, SmallRig
 
 LEASE_S, CYCLE_S = 0.35, 0.1
 RESET, SELF_TEST = 1 << 1, 1 << 6
@@ -222,3 +222,22 @@ def test_the_way_to_the_end_is_no_fault_beside_an_owner_that_goes_on_with_its_pa
     volts = [volts for _, volts, _ in rig.trace]
     falls = [before_v - after_v for before_v, after_v in pairwise(volts)]
     assert (max(falls) > 2.0) is (ends is State.FAULT)
+
+
+@pytest.mark.parametrize(("brings_n", "then_n"), [(None, 12.0), (30.0, 30.0), (8.0, 8.0)])
+def test_who_takes_over_what_is_held_for_a_lost_master_holds_that_unless_it_brings_a_setpoint(
+    brings_n: float | None, then_n: float
+) -> None:
+    """The master was lost on the way to 30 N: a takeover and a beat of another one let the force go on to them."""
+    control = settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD)
+    rig = SmallRig(replace(control, defaults=Defaults(force_ramp_n_per_s=5.0)))
+    rig.write(0, ENABLE, 3000)
+    rig.run(2.0).beats = False
+    held_n = rig.run(1.5).plant.force_n
+    assert rig.state is State.HOLDING and held_n == pytest.approx(12.0, abs=0.5)
+    rig.write(0, ENABLE | TAKE, *([] if brings_n is None else [round(100 * brings_n)]), peer=OTHER)
+    for beat in range(50):
+        rig.write(4, 100 + beat, peer=OTHER)
+        rig.run(0.1)
+    assert rig.plant.force_n == pytest.approx(then_n, abs=0.5)
+    assert rig.word("force_setpoint") == rig.word("force_requested") == pytest.approx(100 * then_n, abs=50)
