@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Final
 
 from gateway.modbus import pdu as P  # noqa: N812  the names of function codes are constants
-from gateway.modbus.crc import crc_bytes
+from gateway.modbus.crc import crc16, crc_bytes
 from gateway.modbus.identification import MEI_TYPE
 
 SHORTEST_ADU: Final = 4
@@ -40,6 +40,16 @@ def decode_adu(adu: bytes) -> tuple[int, bytes]:
     if adu[-2:] != expected:
         raise RtuFault(f"checksum {adu[-2:].hex()}, expected {expected.hex()}")
     return adu[0], adu[1:-2]
+
+
+def is_whole(frame: bytes, size: int) -> bool:
+    """Decide whether the first bytes are a frame: a checksum that follows its own bytes leaves nothing."""
+    return SHORTEST_ADU <= size <= len(frame) and crc16(frame[:size]) == 0
+
+
+def silence_s(baud: int, character_s: float) -> float:
+    """Return the silence that ends a frame: 3.5 characters, above 19200 baud 1.75 ms."""
+    return 1.75e-3 if baud > 19200 else 3.5 * character_s
 
 
 def request_length(adu: bytes) -> int | None:

@@ -26,7 +26,7 @@ from bisect import bisect_right
 from math import inf
 from typing import Final, NamedTuple
 
-from gateway.modbus.crc import checksum_end, crc16
+from gateway.modbus.crc import checksum_end
 from gateway.modbus.pdu import DIAGNOSTICS
 from gateway.modbus.rtu import (
     BROADCAST_UNIT,
@@ -38,7 +38,9 @@ from gateway.modbus.rtu import (
     has_answer_length,
     has_request_length,
     is_broadcast_function,
+    is_whole,
     request_length,
+    silence_s,
 )
 from gateway.modbus.rtu_echo import RtuEcho
 
@@ -59,11 +61,6 @@ _FRAMED: Final = frozenset(
     function for function in range(256) if has_request_length(function) or has_answer_length(function)
 ) | {DIAGNOSTICS}
 """Functions of frames that end by what they say themselves; those of noise are others, nine times in ten."""
-
-
-def silence_s(baud: int, character_s: float) -> float:
-    """Return the silence that ends a frame: 3.5 characters, above 19200 baud 1.75 ms."""
-    return 1.75e-3 if baud > 19200 else 3.5 * character_s
 
 
 class RtuRequest(NamedTuple):
@@ -307,7 +304,7 @@ class RtuReceiver:
         if is_start and frame[0] != BROADCAST_UNIT and ends_in_silence(frame):
             silence_at = next((mark for mark in self._marks if mark > at), len(self._burst))
             lengths.append(checksum_end(frame[: silence_at - at], SHORTEST_ADU))
-        size = next((size for size in lengths if size and _is_whole(frame, size)), 0)
+        size = next((size for size in lengths if size and is_whole(frame, size)), 0)
         if not size:
             return 0
         end = at + size
@@ -329,8 +326,3 @@ class RtuReceiver:
         if unit not in (self._unit, BROADCAST_UNIT) and has_answer_length(frame[1]):
             lengths.append(answer_length(frame))
         return max((at + size if size else beyond for size in lengths), default=at)
-
-
-def _is_whole(frame: bytes, size: int) -> bool:
-    """Decide whether the first bytes are a frame: a checksum that follows its own bytes leaves nothing."""
-    return SHORTEST_ADU <= size <= len(frame) and crc16(frame[:size]) == 0

@@ -14,8 +14,8 @@ from gateway.devices import SerialSettings
 from gateway.fieldbus import ModbusRtuServer, RtuSettings, rtu_server
 from gateway.modbus import Peer
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.modbus.rtu import LONGEST_ADU, encode_adu
-from gateway.modbus.rtu_receiver import RtuRequest, silence_s
+from gateway.modbus.rtu import LONGEST_ADU, encode_adu, silence_s
+from gateway.modbus.rtu_receiver import RtuRequest
 from gateway.ports import PortError, Pty
 from gateway.ports.port import monotonic_s
 from tests.fieldbus.conftest import NotingBank

@@ -11,8 +11,8 @@ from gateway.fieldbus import ModbusRtuServer, RtuSettings, rtu_server
 from gateway.fieldbus.rtu_server import STANDSTILL_S
 from gateway.modbus import Peer, RequestError, RequestFault
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.modbus.rtu import BROADCAST_UNIT, encode_adu
-from gateway.modbus.rtu_receiver import RtuRequest, silence_s
+from gateway.modbus.rtu import BROADCAST_UNIT, encode_adu, silence_s
+from gateway.modbus.rtu_receiver import RtuRequest
 from tests.fieldbus.conftest import NotingBank
 
 LINE = SerialSettings(baud=115200)

@@ -3,8 +3,7 @@
 import pytest
 
 from gateway.modbus import pdu as P  # noqa: N812
-from gateway.modbus import rtu_receiver
-from gateway.modbus.rtu import encode_adu
+from gateway.modbus.rtu import encode_adu, silence_s
 from gateway.modbus.rtu_receiver import RtuRequest
 from tests.modbus.rtu_bus import CHARACTER_S, SILENCE_S, Bus
 
@@ -12,15 +11,13 @@ READ, READ_ANSWER = P.read_request(3, 100, 12), b"\x03\x18" + bytes(24)
 WRITE = P.write_register_request(1, 1200)
 ANSWERS = {READ: READ_ANSWER, WRITE: WRITE}
 ANSWER_S = 8 * CHARACTER_S
-AT_ONCE = (
-    2 * ANSWER_S + 1.1 * SILENCE_S
-)  # from our answer to the end of the next request of a master that does not wait
+AT_ONCE = 2 * ANSWER_S + 1.1 * SILENCE_S  # from our answer to the end of the next request of one that does not wait
 
 
 def exchange(bus: Bus, pdu: bytes, *, echo_s: float | None = None) -> int:
     """How often a request is executed that a master sends once; its answer comes back after echo_s, and so on."""
-    silence_s = rtu_receiver.silence_s(bus.baud, 11 / bus.baud)
-    bus.send(encode_adu(1, pdu)).pause(1.05 * silence_s)
+    ended_s = silence_s(bus.baud, 11 / bus.baud)
+    bus.send(encode_adu(1, pdu)).pause(1.05 * ended_s)
     executed = 0
     while bus.heard and executed < 50:
         ((_, heard),) = bus.heard
@@ -29,7 +26,7 @@ def exchange(bus: Bus, pdu: bytes, *, echo_s: float | None = None) -> int:
         answer = encode_adu(1, P.exception_pdu(pdu[0], 6) if heard.is_in_doubt else ANSWERS.get(pdu, pdu))
         bus.receiver.note_sent(heard, answer, bus.now_s)
         if echo_s is not None:
-            bus.pause(echo_s).send(answer).pause(1.05 * silence_s)
+            bus.pause(echo_s).send(answer).pause(1.05 * ended_s)
     return executed
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus import rtu_receiver
-from gateway.modbus.rtu import encode_adu
-from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuRequest, _is_whole
+from gateway.modbus.rtu import encode_adu, is_whole
+from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuRequest
 from tests.modbus.host_answers import loopback_request, report_request, write_coil_request
 from tests.modbus.rtu_bus import BAUD, CHARACTER_S, SILENCE_S, Bus
 from tests.modbus.test_rtu_receiver import COMMAND, INSIDE, OURS, READ, WRITE, answered
@@ -221,11 +221,11 @@ def test_frames_inside_of_frames_take_no_time_that_doubles_with_each(monkeypatch
         places = [0, *(place + 7 for place in places)]
     looked = list[int]()
 
-    def is_whole(data: bytes, size: int) -> bool:
+    def note_and_judge(data: bytes, size: int) -> bool:
         looked.append(size)
-        return _is_whole(data, size)
+        return is_whole(data, size)
 
-    monkeypatch.setattr(rtu_receiver, "_is_whole", is_whole)
+    monkeypatch.setattr(rtu_receiver, "is_whole", note_and_judge)
     bus = Bus()
     bus.send(*(frame[at:end] for at, end in pairwise([*places, len(frame)])), pause_s=1.5 * SILENCE_S)
     assert bus.send(OURS).requests() == answered()

@@ -6,7 +6,7 @@ from typing import Any
 from gateway import defaults
 from gateway.cli.force_hold.heartbeat import HeartbeatThread
 from gateway.cli.force_hold.sequence import HoldRun
-from gateway.modbus.rtu_receiver import silence_s
+from gateway.modbus.rtu import silence_s
 from gateway.registers import RegisterMap
 from gateway.registers.words import State
 from tests.cli.conftest import PlainBank
