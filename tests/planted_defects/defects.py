@@ -797,7 +797,7 @@ DEFECTS = (
     Defect("the owner that is shown is the connection before", "registers/bank.py",
            "        if peer is not self._owner_peer and peer.identity == self._ownership.owner:\n", "        if False:\n",
            ("registers/test_who_owns_what.py",)),
-    Defect("the end of a bit that was held is not told", "registers/writes/held_runs.py",
+    Defect("the end of a bit that was held is not told", "registers/writes/held_starts.py",
            "        if held != before:\n            self.on_change",
            "        if held and held != before:\n            self.on_change",
            ("registers/test_who_owns_what.py",)),

@@ -8,7 +8,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.registers import Status
 from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import ControlBit, State, StatusBit
-from gateway.registers.writes.held_runs import HeldRuns
+from gateway.registers.writes.held_starts import HeldRuns
 from gateway.registers.writes.ownership import (
     LARGEST_SERIAL_PLACE,
     NOT_IPV4,

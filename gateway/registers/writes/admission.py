@@ -32,7 +32,7 @@ from gateway.registers.writes.command_block import (
     CommandBlock,
     Values,
 )
-from gateway.registers.writes.held_runs import HeldEnables, HeldRuns
+from gateway.registers.writes.held_starts import HeldEnables, HeldRuns
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
 

@@ -12,7 +12,7 @@ from gateway.control.settings import Defaults, SelfTestSettings
 from gateway.profiles import load_calibration
 from gateway.registers import Refusal
 from gateway.registers.words import State
-from gateway.registers.writes.held_runs import HeldEnables
+from gateway.registers.writes.held_starts import HeldEnables
 from tests.control.bench import bsfm, settings
 from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, OWNER, TAKE, SmallRig
 
