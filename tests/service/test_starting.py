@@ -32,6 +32,7 @@ from gateway.service.running_rig.starting import (
     open_first,
     waiting_s,
     warning_notes,
+    why_silent,
 )
 from tests.service.rigs import demo
 
@@ -227,3 +228,13 @@ def test_who_cannot_listen_ends_with_a_sentence_and_by_its_kind(error: OSError, 
 
 def test_behind_a_restart_masters_wait_no_second_for_a_device_that_is_silent() -> None:
     assert waiting_s(is_restart=True) <= 1.0 < waiting_s(is_restart=False)
+
+
+@pytest.mark.parametrize(("is_restart", "words"), [(True, "0.5 s of the restart"), (False, "3 s of the start")])
+def test_where_the_machine_is_to_blame_no_port_is_closed_to_listen_at_other_speeds(
+    is_restart: bool, words: str
+) -> None:
+    """Nobody would hear the device meanwhile, which is silent for no reason of its own."""
+    port = HeldPort()
+    sentence = asyncio.run(why_silent(port, demo().output, "the machine slept", 0.0, is_restart=is_restart))  # type: ignore[arg-type]
+    assert sentence == f"E111 {port.path}: nothing heard within {words}; the machine slept"

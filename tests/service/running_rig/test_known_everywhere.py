@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from gateway import VERSION
 from gateway.audit.audit_reader import read_audit
 from gateway.plants.in_use import in_use_facts
 from gateway.ports import PortError
@@ -39,7 +40,9 @@ def test_another_calibration_or_plant_is_known_everywhere_at_once(devices: OwnDe
         assert rig._rig is other, "what comes next is judged by it"
 
     with_running_rig(devices, scene)
-    told = [record["what"] for record in read_audit(devices.directory / "state")]
+    records = list(read_audit(devices.directory / "state"))
+    assert (records[0]["rig"], records[0]["version"], records[0]["after"]) == ("own", VERSION, "")
+    told = [record["what"] for record in records]
     assert told == ["start", "calibration in use", "write", "plant in use", "end"]
 
 

@@ -205,9 +205,10 @@ def test_a_change_that_came_to_nothing_is_in_the_audit_as_that(devices: OwnDevic
         rig._plants.answer({"do": "plant", "use": 78})
         await until(lambda: not (rig._upload.status()["busy"] or rig._plants.status()["busy"]))
 
-    with_running_rig(devices, scene)
+    lines = with_running_rig(devices, scene)
     told = {record["what"]: record["result"] for record in read_audit(devices.directory / "state")}
     assert (told["calibration use 77"][:2], told["plant use 78"][:2]) == ("E4", "E4")
+    assert sum(f"plant use 78: {told['plant use 78']}" in line for line in lines) == 1
 
 
 def test_a_defect_in_the_step_is_a_fault_and_no_end(devices: OwnDevices, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -179,6 +179,18 @@ def test_a_disk_that_takes_no_header_has_no_recording_and_says_so(
     recordings.stop()
 
 
+def test_one_that_the_disk_ends_at_its_first_rows_waits_for_room(
+    recordings: Recordings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recordings.start().result()
+    recordings._current._gathered.append((0.0,) * len(RUN_COLUMNS))
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", lambda descriptor, data: 3)
+        recordings.flush(5.0)
+    assert recordings.status()["recording"] is None and "No space left" in recordings.status()["waits"]
+    recordings.stop()
+
+
 def test_one_that_a_full_disk_has_ended_goes_on_when_there_is_room(
     recordings: Recordings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
