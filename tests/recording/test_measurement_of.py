@@ -131,6 +131,16 @@ def test_of_rows_with_one_time_the_last_stays() -> None:
     assert noted(found, "1 rows repeat the time stamp before (the first: run.csv, row 501)")
 
 
+def test_a_time_that_runs_backwards_is_told_by_its_own_row() -> None:
+    """And not by one before it that stands still, which is repaired."""
+    time_s = columns()["time_s"]
+    time_s[100], time_s[500] = time_s[99], time_s[499] - 1.0
+    with pytest.raises(
+        RecordingError, match=r"run\.csv, row 501, column time_s: .* time runs backwards \(1 time in the file"
+    ):
+        measured(time_s=time_s)
+
+
 def test_blank_rows_are_left_out() -> None:
     found = measured(**{name: spoiled(name, 9)[name] for name in ("time_s", "command_v", "force_n")})
     assert found.rows == N - 1
@@ -148,6 +158,8 @@ def test_a_command_stands_until_the_next_one() -> None:
     assert found.command_v is not None
     assert found.command_v[[0, 1, 500]].tolist() == [command_v[2], command_v[2], command_v[499]]
     assert np.flatnonzero(~found.usable).tolist() == [0, 1]
+    assert noted(found, "3 rows without a command keep the one before")
+    assert not noted(measured(), "without a command")
 
 
 def test_rows_after_a_gap_wait_until_it_is_forgotten() -> None:
@@ -240,6 +252,8 @@ def test_overload_is_no_reading_and_unsteady_is_one() -> None:
     derived = {name: np.random.default_rng(k).normal(size=N) for k, name in enumerate(DERIVED)}
     assert np.flatnonzero(~measured(quality=quality, **derived).usable).tolist() == [0, 1, 2]
     assert np.flatnonzero(~measured(quality=quality).usable).tolist() == [0, 1, 2]
+    seldom = np.where(np.arange(N) == 4, 1.0, 0.0)
+    assert measured(quality=seldom, **derived).usable.all(), "of our own recorder it is one, however seldom"
 
 
 @pytest.mark.parametrize("good", [0.0, 1.0, 192.0])

@@ -170,8 +170,8 @@ def test_bytes_take_the_oldest_first_and_only_as_many_as_it_needs(tmp_path: Path
     size = (tmp_path / "recordings" / "0001.fgr").stat().st_size
     limit = Retention(bytes=3 * size)
     assert [one.path.stem for one in choose_prunable(recording_paths(tmp_path), limit, "", NOW_S)] == ["0003"]
-    gone = prune_recordings(tmp_path, Retention(bytes=2 * size), "")
-    assert [one.path.stem for one in gone] == ["0003", "0004"]
+    gone = prune_recordings(tmp_path, limit, "0003.fgr"), prune_recordings(tmp_path, Retention(bytes=2 * size), "")
+    assert [[one.path.stem for one in each] for each in gone] == [["0004"], ["0003"]]
     assert numbers(tmp_path) == [1, 2]
 
 

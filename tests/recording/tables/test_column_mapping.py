@@ -6,7 +6,7 @@ import pytest
 
 from gateway.recording import ColumnMapping, ColumnSource, RecordingError
 from gateway.recording.foreign.unit_names import unit_of
-from gateway.recording.tables.column_mapping import quantity_of, select_columns
+from gateway.recording.tables.column_mapping import join_names, quantity_of, select_columns
 from gateway.recording.tables.column_names import CONTRACT, DERIVED
 from gateway.recording.tables.mapping_file import column_mapping, read_mapping
 from gateway.twin.surroundings import COLUMNS
@@ -77,6 +77,12 @@ def test_unnamed_columns_stay_away_and_others_keep_their_names() -> None:
 def test_a_mapped_name_wins_over_the_same_header() -> None:
     found = select_columns(("time_s", "force_n", "better"), ColumnMapping.parse("force_n=better"), "x.csv")
     assert [(pick.index, pick.name) for pick in found] == [(2, "force_n"), (0, "time_s")]
+
+
+@pytest.mark.parametrize(("most", "words"), [(3, "a, b, c"), (2, "a, b and 1 more"), (1, "a and 2 more")])
+def test_of_many_names_the_first_are_told_and_how_many_more(most: int, words: str) -> None:
+    assert join_names(["a", "b", "c"], most) == words
+    assert join_names([]) == "none"
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,14 @@ def test_rows_are_even_and_the_force_is_that_of_their_times() -> None:
     assert 0.0003 < found.jitter_s < 0.002
 
 
+def test_it_does_not_matter_at_which_time_a_recording_begins() -> None:
+    volts, age_s = sent(TIME_S)
+    found = resample_evenly(MEASUREMENT, volts, age_s)
+    later = resample_evenly(replace(MEASUREMENT, time_s=TIME_S + 700.0), volts, age_s)
+    assert later.time_s == pytest.approx(found.time_s, abs=1.0e-6)
+    assert later.command_v == pytest.approx(found.command_v, abs=1.0e-3)
+
+
 def test_a_command_is_the_mean_of_what_stood_on_the_wire() -> None:
     """Its integral is kept, wherever between two rows a setting was sent."""
     found = resample_evenly(MEASUREMENT, *sent(TIME_S))
