@@ -33,6 +33,7 @@ from gateway.registers.writes.command_block import (
     Values,
 )
 from gateway.registers.writes.held_starts import HeldEnables, HeldRuns
+from gateway.registers.writes.left_setpoints import without_left_setpoints
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
 
@@ -42,7 +43,6 @@ STARTS: Final = ENABLE | RUN_BITS
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
 ALL_BITS: Final = 0xFFFF
-_PRESSING: Final = (State.RAMPING, State.HOLDING)
 _BEFORE: Final = 2 * HEARTBEAT
 _BEHIND: Final = _BEFORE + 2
 _AT_HEARTBEAT: Final = Command._fields.index("heartbeat")
@@ -127,7 +127,7 @@ class Admission:
         is_taken_over = bool(written & TAKE)
         is_begun_anew = is_taken_over and self._ownership.owner != write.host
         if is_begun_anew:
-            values = self._without_left_setpoints(write, values)
+            values = without_left_setpoints(commands, values, self._offsets(write), self._tell())
         command = commands.command(values, written, number, now_s, write.host)
         if is_stop:
             command = command._replace(stops=True)
@@ -146,7 +146,7 @@ class Admission:
 
     def note_state(self, state: State, tell: Callable[[], Status]) -> None:
         """Note the state of control, and who tells the rest: what may be asked for, and left behind, depends on it."""
-        self.is_calibrating, self._is_pressing, self._tell = state is State.CALIBRATING, state in _PRESSING, tell
+        self.is_calibrating, self._tell = state is State.CALIBRATING, tell
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered."""
@@ -185,17 +185,6 @@ class Admission:
         if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):
             return None
         raise self._not_owner(write.address, write.host)
-
-    def _without_left_setpoints(self, write: Write, values: Values) -> Values:
-        """Who takes over has asked for none of the setpoints that it does not bring. So of what a former owner has left the
-        next enable presses nothing, and a force that is pressed stays as it is held: for a lost master that may be less."""
-        written, without = self._offsets(write), values.copy()
-        held_n = self._tell().force_accepted_n if self._is_pressing else 0.0  # 0 on the way to 0, which clears all
-        if FORCE_SETPOINT not in written and held_n < values[FORCE_SETPOINT] and (held_n or not self._is_pressing):
-            without[FORCE_SETPOINT] = self._commands.round_force(held_n)
-        if VOLTAGE_SETPOINT not in written and not self._is_pressing:
-            without[VOLTAGE_SETPOINT] = 0.0
-        return without
 
     def _is_named_stop(self, write: Write, written: int) -> bool:
         """A run has no enable that could fall, nor any bit of it where this machine has begun it. Then enable written as 0 by
