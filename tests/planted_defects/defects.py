@@ -160,6 +160,8 @@ DEFECTS = (
            ("service/running_rig/test_hung_master.py",)),
     Defect("what was pulled is pushed by who takes over", "registers/writes/left_setpoints.py",
            "is_pulled is pulls and ", "", ("registers/bank/test_left_setpoints.py",)),
+    Defect("a beat lets another master's held force go on to its setpoint", "registers/writes/admission.py",
+           "return is_left or (", "return (", ("service/running_rig/test_hung_master.py",)),
     Defect("who takes over inherits a setpoint that waits", "registers/writes/admission.py",
            "if is_begun_anew:\n", "if False:\n", ("service/running_rig/test_takeovers.py",)),
     Defect("another master's stop is refused", "registers/writes/admission.py",

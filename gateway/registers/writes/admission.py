@@ -125,7 +125,7 @@ class Admission:
         if is_stop:
             values[FORCE_SETPOINT] = values[VOLTAGE_SETPOINT] = 0.0
         is_taken_over = bool(written & TAKE)
-        is_begun_anew = is_taken_over and self._ownership.owner != write.host
+        is_begun_anew = self._is_begun_anew(write.host, is_taken_over=is_taken_over)
         if is_begun_anew:
             values = without_left_setpoints(commands, values, self._offsets(write), self._tell())
         command = commands.command(values, written, number, now_s, write.host)
@@ -158,7 +158,7 @@ class Admission:
         """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, it held none, nothing
         was lowered, no run has the output, it has not waited. What the checks below would find is known."""
         is_usual = not (write.has_waited or word & RUN_BITS_OR_EDGES) and self.is_usual(write.host)
-        return is_usual and self._ownership.admits(write.host)
+        return is_usual and self._ownership.admits(write.host) and not self._is_begun_anew(write.host)
 
     def is_usual(self, host: str) -> bool:
         """Return whether nothing makes a host's writes special: no bit that it held, no lowered setpoint, no run."""
@@ -166,6 +166,13 @@ class Admission:
         return not (self.lowered_from_n or self.is_calibrating or is_held)
 
     # -- what the write asks for
+
+    def _is_begun_anew(self, host: str, *, is_taken_over: bool = False) -> bool:
+        """Whether a host goes on with what another one has left. Of a force that is held for a lost master nobody is the owner:
+        who beats becomes it, and has asked for nothing by that."""
+        owner, former = self._ownership.owner, self._ownership.former
+        is_left = owner is None and former != host and bool(self._commands.values[CONTROL_WORD])
+        return is_left or (is_taken_over and owner != host)
 
     def _permit(self, write: Write, values: Values) -> _PermittedWrite | None:
         """Return what the owner may ask for, or anybody: a stop, the end of a run. None: nothing to stop. Raises Refusal."""

@@ -241,3 +241,28 @@ def test_who_takes_over_what_is_held_for_a_lost_master_holds_that_unless_it_brin
         rig.run(0.1)
     assert rig.plant.force_n == pytest.approx(then_n, abs=0.5)
     assert rig.word("force_setpoint") == rig.word("force_requested") == pytest.approx(100 * then_n, abs=50)
+
+
+@pytest.mark.parametrize("has_contact", [True, False])
+def test_who_beats_beside_what_is_held_for_a_lost_master_holds_that(has_contact: bool) -> None:
+    """A heartbeat of another one, which never asked for a force: 12 N went on to 30 N, or 30 N waited for the next touch."""
+    control = settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD)
+    rig = SmallRig(replace(control, defaults=Defaults(force_ramp_n_per_s=5.0)), contact=has_contact)
+    rig.write(0, ENABLE, 3000)
+    rig.run(2.0).beats = False
+    rig.run(1.5)
+    held_n = rig.word("force_accepted") / 100 if has_contact else 0.0
+    for beat in range(20):
+        rig.write(4, 100 + beat, peer=OTHER)
+        rig.run(0.1)
+    rig.plant.contact = True
+    for beat in range(50):
+        rig.write(4, 200 + beat, peer=OTHER)
+        rig.run(0.1)
+    assert rig.bank.owner == OTHER.host and rig.word("force_setpoint") == pytest.approx(100 * held_n)
+    assert rig.plant.force_n == pytest.approx(held_n, abs=0.5)
+    rig.write(1, 2000, peer=OTHER)
+    for beat in range(60):
+        rig.write(4, 300 + beat, peer=OTHER)
+        rig.run(0.1)
+    assert rig.plant.force_n == pytest.approx(20.0, abs=0.5), "what it asks for counts"
