@@ -146,10 +146,11 @@ class Transitions:
     def miss_master(self, now_s: float, line: LineStatus, action: LeaseAction) -> None:
         """Act where no master's heartbeat keeps the output on. Of a force that is held meanwhile nobody is the owner: who
         writes without a beat, once or the same on and on, would keep out the master that comes back. On the way to the end of
-        the gateway an owner that goes on writing forces is refused, and its beats with them: it is there, and 0 N are near."""
-        if self.is_stopping and line.owner_connected and line.owner_refused:
-            return
+        the gateway an owner that goes on writing forces is refused, and its beats with them: it is there as long as it does,
+        and 0 N are near."""
         commands, before = self.parts.commands, self._unbeaten
+        if self.is_stopping and line.owner_connected and commands.is_within_lease(line.owner_refused_s, now_s):
+            return
         self._unbeaten = commands.command.number
         if not self.is_master_lost:
             self._lost_setpoint_n, self._held_n = commands.command.force_requested_n, self.parts.loop.applied_n

@@ -231,6 +231,7 @@ class ControlLoop:
             pressure_pa_per_v=self.pressure_pa_per_v,
             owner_connected=self.owner_connected,
             owner_refused=self.bank.owner_refused,
+            owner_refused_s=self.bank.owner_refused_s,
             late_s=late_s,
             waited_s=self._waited_since_tick(late_s),  # for which the machine is to blame
             suspended_s=suspended_s,

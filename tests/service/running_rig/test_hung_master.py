@@ -198,6 +198,7 @@ def test_a_calibration_that_allows_less_lets_no_force_rise_that_is_held_for_a_lo
         ("nothing", State.FAULT),
         ("one frame", State.FAULT),
         ("a path, then it leaves", State.FAULT),
+        ("a path, then its cable is cut", State.FAULT),
     ],
 )
 def test_the_way_to_the_end_is_no_fault_beside_an_owner_that_goes_on_with_its_path(writes: str, ends: State) -> None:
@@ -210,9 +211,9 @@ def test_the_way_to_the_end_is_no_fault_beside_an_owner_that_goes_on_with_its_pa
     for cycle in range(80):
         if cycle == 10:
             rig.controller.stop()
-        elif writes.startswith("a path") or cycle < 10:
+        elif writes.startswith("a path") or cycle < 10:  # a cut cable leaves the connection open
             written = cycle
-        if cycle < 10 or writes != "nothing":
+        if cycle < 10 or not (writes == "nothing" or (writes.endswith("cut") and cycle > 15)):
             rig.answer(0, ENABLE, 3000 + written % 7, 0, 0, 1000 + written)
         if cycle == 15 and writes.endswith("leaves"):
             rig.loop.owner_connected = False
