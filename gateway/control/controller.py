@@ -72,7 +72,7 @@ class Controller:
         parts = ControllerParts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)
         self._machine = Transitions(parts, is_restarted=unclean_restart)
         self._readiness = Readiness(parts, self._machine, self._valve)
-        self._composer = OutputComposer(parts, self._machine, self._readiness, self._valve)
+        self._composer = OutputComposer(parts, self._machine, self._readiness, self._conditioner, self._valve)
 
     # -- for the service
 
