@@ -79,7 +79,7 @@ class RegisterBank:
         self._echo = ByteOrderEcho(register_map.find("byte_order_echo"), self._image)
         self._admission = Admission(self._commands, self._ownership, self._echo, rules)
         self._repeated = self._admission.repeated
-        self.held_runs = self._admission.held_runs
+        self.held_runs, self.held_enables = self._admission.held_runs, self._admission.held_enables
         self.staging = StagingBlock(register_map, self._image)
         self._image.put(register_map.find("map_version"), register_map.version)
         self._image.put(register_map.find("map_hash"), register_map.map_hash)

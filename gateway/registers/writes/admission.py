@@ -259,7 +259,7 @@ class Admission:
     def _check_starts(self, command: Command, rises: int, written: int, word_at: int) -> None:
         host = command.peer
         if rises & ENABLE and self.held_enables.holds(host, command.received_s):
-            text = "enable was kept at 1 over the reset of a fault: write it as 0 once, then as 1"
+            text = "enable was kept at 1 over a fault: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
         if held := rises & self.held_runs.of(host):
             name = str(ControlBit(held & -held).name).lower()

@@ -3,13 +3,15 @@
 By itself a start knows only what it finds. By this:
 - the recording goes on;
 - a TLS face whose port is any free one (0) keeps it;
-- a master that keeps the bit of a run at 1 begins no other run by that;
+- a master that keeps the bit of a run at 1 begins no other run by that, and one that keeps enable at 1 over a latched fault
+  presses nothing, although the fault is forgotten;
 - a calibration or a plant that is another one now (their files are gone, say) is told, and so is a tare that is forgotten.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
+from gateway.registers import RegisterBank
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 
 _LEAST_TOLD_N: Final = 0.05
@@ -29,10 +31,12 @@ class Handover:
         """The port of each TLS face, by its place in `fieldbus`, as masters know it."""
         return dict(self._kept.get("tls_ports", {}))
 
-    @property
-    def held_runs(self) -> dict[str, int]:
-        """Bits of runs that masters kept at 1, by host."""
-        return dict(self._kept.get("held_runs", {}))
+    def restore_held(self, bank: RegisterBank, now_s: float, keep: Callable[..., None]) -> None:
+        """Let a bank go on with the bits that masters kept at 1, and leave those of its own time to the next process (keep)."""
+        bank.held_runs.restore(self._kept.get("held_runs", {}))
+        bank.held_enables.restore(self._kept.get("held_enables", {}), now_s)
+        bank.held_runs.on_change = lambda held: keep(held_runs=held)
+        bank.held_enables.on_change = lambda held: keep(held_enables=held)
 
     def recording(self, now_s: float) -> WantedRecording | None:
         """Return what is to be recorded; None: nothing, or its time is over by now_s (monotonic)."""

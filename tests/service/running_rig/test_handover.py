@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from gateway.recording import list_recordings
 from gateway.recording.label import RecordingLabel, label_of
 from gateway.registers import Refusal
 from gateway.registers.words import ControlBit, State
+from gateway.registers.writes.held_starts import HeldEnables
 from gateway.service.running_rig.handover import Handover
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
@@ -201,3 +203,51 @@ def test_behind_a_restart_that_bit_begins_no_other_run(devices: OwnDevices) -> N
 
     died = Ending(EndCause.DIED, "control process died")
     with_running_rig(devices, scene, died, {"held_runs": {"10.0.0.5": int(ControlBit.START_CALIBRATION)}})
+
+
+ENABLE_12_N = int(ControlBit.ENABLE).to_bytes(2, "big") + (1200).to_bytes(2, "big")
+
+
+def test_an_enable_that_a_master_keeps_at_1_over_a_fault_is_left_to_the_next_process(devices: OwnDevices) -> None:
+    kept: dict[str, Any] = {}
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        rig.controller.fail_internally(time.monotonic())
+        with pytest.raises(Refusal, match="W212"):
+            rig.bank.write_registers(0, ENABLE_12_N, ROBOT)
+        while "held_enables" not in kept and (message := message_link.receive(guardian)) is not None:
+            kept.update(message.body if message.tag == message_link.KEEP else {})
+            message.drop_descriptors()
+
+    with_running_rig(devices, scene)
+    assert kept["held_enables"]["10.0.0.5"] == pytest.approx(time.monotonic(), abs=30.0)
+
+
+@pytest.mark.parametrize(("ago_s", "is_held"), [(2.0, True), (60.0, False)])
+def test_behind_a_restart_an_enable_that_stood_over_a_fault_presses_not(
+    devices: OwnDevices, ago_s: float, is_held: bool
+) -> None:
+    """Control was killed behind A311, and 0.16 s later the robot's next cycle pressed 12 N: nobody had reset anything."""
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        for _ in range(2 if is_held else 0):
+            with pytest.raises(Refusal, match="enable was kept at 1 over a fault"):
+                rig.bank.write_registers(0, ENABLE_12_N, ROBOT)
+            assert rig.controller.state is State.OFF
+        if is_held:
+            rig.bank.write_registers(0, bytes(2), ROBOT)
+        rig.bank.write_registers(0, ENABLE_12_N, ROBOT)
+        assert rig.controller.state is not State.OFF, "its own 0 lets the next 1 count"
+
+    died = Ending(EndCause.DIED, "control process died")
+    with_running_rig(devices, scene, died, {"held_enables": {"10.0.0.5": time.monotonic() - ago_s}})
+
+
+def test_a_host_that_holds_enable_over_a_fault_is_told_once_a_second_and_its_end_at_once() -> None:
+    held, told = HeldEnables(), []
+    held.on_change = told.append
+    for tenth in range(25):
+        held.note("10.0.0.5", 100.0 + 0.1 * tenth)
+    held.let_go("10.0.0.5")
+    held.let_go("10.0.0.5")
+    assert [one.get("10.0.0.5") for one in told] == [100.0, pytest.approx(101.0), pytest.approx(102.0), None]
