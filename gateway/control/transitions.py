@@ -5,6 +5,7 @@ Where each event leads says gateway.control.state_table; whether a command may a
 
 from dataclasses import dataclass, field
 from math import inf
+from typing import Final
 
 from gateway.codes.faults import FaultCode
 from gateway.control.command_edges import CommandTracker
@@ -19,6 +20,8 @@ from gateway.control.supervision.fault_detection import FaultDetector, StopCause
 from gateway.control.supervision.one_shot_events import OneShotEvents
 from gateway.control.supervision.safe_voltage import SafeVoltageCheck
 from gateway.registers.words import State
+
+_ROUNDED_N: Final = 1e-3  # what is held, as a register says it, may be a bit more
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +160,9 @@ class Transitions:
             self.lose_master(now_s, commands.lost_sentence(now_s, line), action)
             return
         self._held_n = min(self._held_n, self.parts.loop.applied_n)
+        asked_n = commands.command.force_requested_n
+        if asked_n <= self._held_n + _ROUNDED_N:  # so it is held as what was lost is: less than that is no new force
+            self._lost_setpoint_n = asked_n
         if before != self._unbeaten and not self.is_ramping_down:
             self.outcome.release_owner = True
 

@@ -267,3 +267,16 @@ def test_who_beats_beside_what_is_held_for_a_lost_master_holds_that(has_contact:
         rig.write(4, 300 + beat, peer=OTHER)
         rig.run(0.1)
     assert rig.plant.force_n == pytest.approx(20.0, abs=0.5), "what it asks for counts"
+
+
+def test_a_write_without_a_beat_beside_what_is_held_lets_it_not_rise_at_the_next_contact() -> None:
+    """Another host's width of the band made 12 N its setpoint, and they were pressed on whoever touched the tool."""
+    control = settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD)
+    rig = SmallRig(replace(control, defaults=Defaults(force_ramp_n_per_s=5.0)))
+    rig.write(0, ENABLE, 3000)
+    rig.run(2.0).beats = False
+    rig.run(1.5).write(11, 100, peer=OTHER)
+    assert rig.run(0.5).plant.force_n == pytest.approx(12.0, abs=0.5), "what is held is held"
+    rig.plant.contact = False
+    rig.run(1.5).plant.contact = True
+    assert rig.run(3.0).plant.force_n < 5.0
