@@ -45,7 +45,8 @@ def turned(reading: Reading) -> Reading:
 
 class SampleConditioner:
     """Turns samples into readings; a sample given twice is not new the second time. direction: -1 where the tool pulls, so that
-    a pull is a positive force in all that follows. is_doubted: the tare in use is of before a silence of the cell."""
+    a pull is a positive force in all that follows. is_doubted: the zero in use may be another one than the cell's, until the
+    next tare."""
 
     def __init__(self, supervision: Supervision, cell: CellMap | None = None, *, is_behind_death: bool = False) -> None:
         """cell: its known defects; None: the reading is the force; is_behind_death: as of `Zero`."""
@@ -117,6 +118,10 @@ class SampleConditioner:
     def why_no_zero(self, gravity_n: float) -> str:
         """Return why the recent samples are no zero, in numbers; empty where they are one."""
         return self._zero.unsteady(self.direction * gravity_n)
+
+    def doubt_zero(self) -> None:
+        """Note that the cell's zero may be another one, until the next tare."""
+        self.is_doubted = True
 
     def take_doubt(self) -> str:
         """Return W253 once where the cell's zero may have become another one while nothing was heard of it, else nothing.

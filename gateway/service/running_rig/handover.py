@@ -46,6 +46,11 @@ class Handover:
         wanted = WantedRecording.from_facts(facts) if facts else None
         return None if wanted is None or wanted.is_over(now_s) else wanted
 
+    @property
+    def forgets_tare(self) -> bool:
+        """Decide whether a tare that counted before is none any more: control has to doubt its zero."""
+        return abs(float(self._kept.get("zero_n", 0.0))) >= _LEAST_TOLD_N
+
     def changes(self, **in_use: int) -> tuple[str, ...]:
         """Return W250 for each number in use that is not the one before, and for the zero of a tare. in_use: what is in use
         now, by its noun."""
@@ -54,8 +59,8 @@ class Handover:
             for noun, number in in_use.items()
             if (before := self._kept.get(noun, number)) != number
         )
-        zero_n = self._kept.get("zero_n", 0.0)
-        if abs(zero_n) < _LEAST_TOLD_N:
+        if not self.forgets_tare:
             return changed
+        zero_n = self._kept["zero_n"]
         off = f"the cell reads {abs(zero_n):.2f} N {'more' if zero_n > 0.0 else 'less'} than before it"
         return (*changed, f"W250 the tare before the restart is forgotten, and {off}: tare again before you press")

@@ -171,6 +171,8 @@ class RunningRig:
         self._tick.start()
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._spoke.wait(), starting.waiting_s(is_restart=bool(restarted)))
+        if handover.forgets_tare:
+            self.controller.doubt_zero()
         for change in handover.changes(**self._in_use()):
             self._log("start", change)
         self._guardian.keep(**self._in_use())

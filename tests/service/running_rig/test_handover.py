@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from gateway.codes.warning_bits import WarningBit
 from gateway.modbus import Peer
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
@@ -28,6 +29,7 @@ from tests.service.rigs import demo
 from tests.service.running_rig.begun_rig import OwnDevices, with_running_rig
 
 NAMED = RecordingLabel("the worn seal", "left cylinder")
+ROBOT = Peer("10.0.0.5")
 
 
 @pytest.fixture
@@ -145,6 +147,9 @@ def test_a_tare_that_a_restart_has_forgotten_is_told_once(devices: OwnDevices, z
         while kept["zero_n"] and (message := message_link.receive(guardian)) is not None:
             kept.update(message.body if message.tag == message_link.KEEP else {})
             message.drop_descriptors()
+        rig.loop.refresh()
+        assert rig.loop.decision
+        assert WarningBit.ZERO_DOUBTED in rig.loop.decision.warnings, "a PLC reads no log, and enables as before"
 
     lines = with_running_rig(devices, scene, Ending(EndCause.DIED, "control process died"), dict(kept))
     assert any(
@@ -173,7 +178,7 @@ def test_the_port_of_each_tls_face_is_left_to_the_next_process(devices: OwnDevic
     assert kept["tls_ports"] == ports
 
 
-RUN, ROBOT = int(ControlBit.START_CALIBRATION).to_bytes(2, "big"), Peer("10.0.0.5")
+RUN = int(ControlBit.START_CALIBRATION).to_bytes(2, "big")
 
 
 def test_the_bit_of_a_run_that_a_master_keeps_at_1_is_left_to_the_next_process(devices: OwnDevices) -> None:
