@@ -151,7 +151,7 @@ DEFECTS = (
            "            self.held_enables.note(write.host, command.received_s)\n", "            pass\n",
            ("service/running_rig/test_hung_master.py",)),
     Defect("an enable that stood over a fault presses behind a crash", "service/running_rig/handover.py",
-           "        bank.held_enables.restore(self._kept.get(\"held_enables\", {}), now_s)\n", "",
+           "        bank.held_enables.restore(held, lost, now_s)\n", "",
            ("service/running_rig/test_handover.py",)),
     Defect("a payload changed under a force is a step of the force", "control/command_edges.py",
            "if self._applied_n() > 0.0 and most_kg", "if False and most_kg", ("control/test_command_edges.py",)),

@@ -224,7 +224,11 @@ class Admission:
         return held & ~write.touched | stands & written & write.touched & RUN_BITS
 
     def _let_enable_go(self, write: Write, asked: int) -> None:
-        if self.held_enables.by_host and write.touched & ENABLE & ~asked and CONTROL_WORD in self._offsets(write):
+        if (
+            (self.held_enables.by_host or self.held_enables.lost)
+            and write.touched & ENABLE & ~asked
+            and CONTROL_WORD in self._offsets(write)
+        ):
             self.held_enables.let_go(write.host)
 
     # -- why not
@@ -258,8 +262,8 @@ class Admission:
 
     def _check_starts(self, command: Command, rises: int, written: int, word_at: int) -> None:
         host = command.peer
-        if rises & ENABLE and self.held_enables.holds(host, command.received_s):
-            text = "enable was kept at 1 over a fault: write it as 0 once, then as 1"
+        if rises & ENABLE and self.held_enables.holds(host, command.received_s, command.heartbeat):
+            text = "enable was kept at 1 over a fault or a loss: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
         if held := rises & self.held_runs.of(host):
             name = str(ControlBit(held & -held).name).lower()

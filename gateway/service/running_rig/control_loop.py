@@ -278,6 +278,8 @@ class ControlLoop:
         self.decision = decision
         if self.calibration_runs:
             self.calibration_runs.follow(decision)
+        if decision.release_owner:
+            self.bank.held_enables.note_lost(self.bank.owner, self.bank.command.heartbeat)
         if decision.clear_command:
             self.bank.clear_command()
         if decision.release_owner:

@@ -3,8 +3,8 @@
 By itself a start knows only what it finds. By this:
 - the recording goes on;
 - a TLS face whose port is any free one (0) keeps it;
-- a master that keeps the bit of a run at 1 begins no other run by that, and one that keeps enable at 1 over a latched fault
-  presses nothing, although the fault is forgotten;
+- a master that keeps the bit of a run at 1 begins no other run by that, and one that keeps enable at 1 over a latched fault, or
+  with the heartbeat with which it was lost, presses nothing, although fault and loss are forgotten;
 - a calibration or a plant that is another one now (their files are gone, say) is told, and so is a tare that is forgotten.
 """
 
@@ -34,7 +34,9 @@ class Handover:
     def restore_held(self, bank: RegisterBank, now_s: float, keep: Callable[..., None]) -> None:
         """Let a bank go on with the bits that masters kept at 1, and leave those of its own time to the next process (keep)."""
         bank.held_runs.restore(self._kept.get("held_runs", {}))
-        bank.held_enables.restore(self._kept.get("held_enables", {}), now_s)
+        held, lost = self._kept.get("held_enables", {}), self._kept.get("lost_beats", {})
+        bank.held_enables.restore(held, lost, now_s)
+        bank.held_enables.on_lost = lambda lost: keep(lost_beats=lost)
         bank.held_runs.on_change = lambda held: keep(held_runs=held)
         bank.held_enables.on_change = lambda held: keep(held_enables=held)
 
