@@ -167,14 +167,6 @@ NOTICES: Final = (
         "date shows the clock; sudo timedatectl set-ntp true has it set by a time server. recordings keep N keeps one.",
     ),
     Explanation(
-        "W253",
-        "the tare is of before a silence",
-        "No usable reading of the load cell came for half a second or longer, and the zero of a tare is in use: forces may be "
-        "off by what the cell's own zero has moved.",
-        "The amplifier was without power and zeroes itself when it starts; the cell was unplugged, replaced or overloaded.",
-        "Look at the force with nothing pressed: where it is not 0, tare again before you press.",
-    ),
-    Explanation(
         "W304",
         "force with the output disabled",
         "The output is disabled, told the safe voltage, and the load cell still measures a force.",

@@ -144,3 +144,15 @@ class WarningBit(IntFlag):
             "Write a wider in_band_tolerance, or set in_band_tolerance_n in the rig; a filter on the amplifier adds dead time.",
         ),
     )
+    # the cell was not heard for a while, or a crash has forgotten its tare: until the next one
+    ZERO_DOUBTED = (
+        1 << 11,
+        Explanation(
+            "W253",
+            "the load cell's zero is in doubt",
+            "The tare in use is of before half a second or more without a usable reading, or a crash of control has forgotten "
+            "it (W250): forces may be off by it.",
+            "The amplifier was without power and zeroes itself when it starts; the cell was unplugged, replaced or overloaded.",
+            "Look at the force with nothing pressed: where it is not 0, tare again before you press. A tare ends the warning.",
+        ),
+    )

@@ -145,6 +145,10 @@ class CommandTracker:
         """Return whether the master is lost: disconnected, or without a heartbeat for one length of the lease."""
         return self._lease.is_lost(now_s, owner_connected)
 
+    def is_within_lease(self, since_s: float, now_s: float) -> bool:
+        """Return whether no more than one length of the lease has passed since then."""
+        return self._lease.is_within(since_s, now_s)
+
     def lost_sentence(self, now_s: float, line: LineStatus) -> str:
         """Return how the loss of the master was seen."""
         return master_lost_sentence(line, self.lease_age_s(now_s), is_behind=self.command.has_waited)

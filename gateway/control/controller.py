@@ -58,10 +58,10 @@ class Controller:
         self._commands = CommandTracker(settings, lambda: self._loop.applied_n)
         self._commands.use(model)
         self.active_run = ActiveRun(settings, model, lambda: self._given_n)
-        self._loop = ForceLoop(settings, model, compensation.timing)
-        self._faults = FaultDetector(settings)
+        self._loop, self._faults = ForceLoop(settings, model, compensation.timing), FaultDetector(settings)
         self._take_measured(calibration)
         self._conditioner = SampleConditioner(settings.supervision, compensation.cell, is_behind_death=unclean_restart)
+        self.doubt_zero = self._conditioner.doubt_zero
         self._turning = Turning(self._valve, self._commands, self._conditioner, settings, model)
         self._checks = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self.most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
@@ -72,7 +72,7 @@ class Controller:
         parts = ControllerParts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)
         self._machine = Transitions(parts, is_restarted=unclean_restart)
         self._readiness = Readiness(parts, self._machine, self._valve)
-        self._composer = OutputComposer(parts, self._machine, self._readiness, self._valve)
+        self._composer = OutputComposer(parts, self._machine, self._readiness, self._conditioner, self._valve)
 
     # -- for the service
 

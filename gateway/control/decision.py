@@ -10,7 +10,7 @@ from gateway.codes.warning_bits import WarningBit
 from gateway.control.inputs import LineStatus, Output
 from gateway.control.messages import fault_sentence
 from gateway.control.readiness import Readiness
-from gateway.control.sample_conditioning import Reading
+from gateway.control.sample_conditioning import Reading, SampleConditioner
 from gateway.control.transitions import ControllerParts, Transitions
 from gateway.control.valve.valve_switch import ValveSwitch
 from gateway.registers.words import LimitedBy, Mode, State, StatusBit
@@ -21,7 +21,7 @@ _PULLING, _SWITCHING = 256, 512
 _STATUS_WORDS: Final = tuple(StatusBit(word) for word in range(1024))
 _RESTARTED, _MASTER_LOST = WarningBit.RESTARTED.value, WarningBit.MASTER_LOST.value
 _TARGET_UNREACHABLE, _TRIM_SATURATED = WarningBit.TARGET_UNREACHABLE.value, WarningBit.TRIM_SATURATED.value
-_FORCE_UNSTEADY = WarningBit.FORCE_UNSTEADY.value
+_FORCE_UNSTEADY, _ZERO_DOUBTED = WarningBit.FORCE_UNSTEADY.value, WarningBit.ZERO_DOUBTED.value
 _warning_word = lru_cache(WarningBit)  # to make a flag of an integer costs as much as all of its bits
 _FORCE, _NOT_LIMITED = Mode.FORCE, LimitedBy.NONE
 _IN_FAULT, _CALIBRATING = State.FAULT, State.CALIBRATING
@@ -45,9 +45,15 @@ class OutputComposer:
     """Reads the parts of control and changes nothing of them."""
 
     def __init__(
-        self, parts: ControllerParts, machine: Transitions, readiness: Readiness, valve: ValveSwitch | None
+        self,
+        parts: ControllerParts,
+        machine: Transitions,
+        readiness: Readiness,
+        conditioner: SampleConditioner,
+        valve: ValveSwitch | None,
     ) -> None:
         self._parts, self._machine, self._readiness, self._valve = parts, machine, readiness, valve
+        self._conditioner = conditioner
 
     def compose(self, now_s: float, reading: Reading, line: LineStatus, touching: bool, outside_n: float) -> Output:
         """Return the answer of a step. outside_n: contact force that neither slide nor payload gives.
@@ -123,5 +129,6 @@ class OutputComposer:
             | (_TARGET_UNREACHABLE if loop.unreachable else 0)
             | (_TRIM_SATURATED if loop.is_trim_at_limit else 0)
             | (_FORCE_UNSTEADY if loop.settling.is_noisy else 0)
+            | (_ZERO_DOUBTED if self._conditioner.is_doubted else 0)
             | (_MASTER_LOST if machine.is_master_lost else 0)
         )

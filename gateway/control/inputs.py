@@ -1,7 +1,7 @@
 """What control is told besides settings, command and sample, and what a step answers."""
 
 from dataclasses import dataclass
-from math import nan
+from math import inf, nan
 from typing import Final, NamedTuple
 
 from gateway.bsfm import Bsfm
@@ -84,6 +84,7 @@ class LineStatus(NamedTuple):
     suspended_s: float = 0.0  # so much of late_s the whole machine was suspended
     withheld: tuple[float, str] = 0.0, ""  # seconds kept from us from outside about then; by whom
     owner_refused: str = ""  # why the owner's last write was refused; empty where it was taken
+    owner_refused_s: float = -inf  # when one of them was, monotonic
 
 
 class LoopInputs(NamedTuple):

@@ -45,7 +45,8 @@ def turned(reading: Reading) -> Reading:
 
 class SampleConditioner:
     """Turns samples into readings; a sample given twice is not new the second time. direction: -1 where the tool pulls, so that
-    a pull is a positive force in all that follows."""
+    a pull is a positive force in all that follows. is_doubted: the zero in use may be another one than the cell's, until the
+    next tare."""
 
     def __init__(self, supervision: Supervision, cell: CellMap | None = None, *, is_behind_death: bool = False) -> None:
         """cell: its known defects; None: the reading is the force; is_behind_death: as of `Zero`."""
@@ -54,7 +55,7 @@ class SampleConditioner:
         self._saturation_n = supervision.saturation_n
         self._timeout_s = supervision.sample_timeout_s
         self._last_s = self._usable_s = nan
-        self._doubt = ""
+        self._doubt, self.is_doubted = "", False
         self.direction = 1.0
 
     def use(self, cell: CellMap | None) -> None:
@@ -111,11 +112,16 @@ class SampleConditioner:
         """Take the present force as zero (tare) and return by how much less a reading says from now on, N.
         gravity_n as in `demand`, along the tool's direction as readings are; the zero is the cell's own, whichever way the
         tool acts. Ask `why_no_zero` first."""
+        self.is_doubted = False
         return self.direction * self._zero.take(self.direction * gravity_n)
 
     def why_no_zero(self, gravity_n: float) -> str:
         """Return why the recent samples are no zero, in numbers; empty where they are one."""
         return self._zero.unsteady(self.direction * gravity_n)
+
+    def doubt_zero(self) -> None:
+        """Note that the cell's zero may be another one, until the next tare."""
+        self.is_doubted = True
 
     def take_doubt(self) -> str:
         """Return W253 once where the cell's zero may have become another one while nothing was heard of it, else nothing.
@@ -126,6 +132,7 @@ class SampleConditioner:
     def _note_usable(self, time_s: float) -> None:
         silent_s, self._usable_s = time_s - self._usable_s, time_s
         if silent_s >= _DOUBTED_S and self._zero.zero_n:
+            self.is_doubted = True
             self._doubt = (
                 f"W253 no usable reading of the load cell for {silent_s:.1f} s: was it without power, or is it another one? "
                 f"Then the tare of before, {self._zero.zero_n:.2f} N, is not its zero: with nothing pressed, tare again"

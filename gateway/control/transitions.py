@@ -5,6 +5,7 @@ Where each event leads says gateway.control.state_table; whether a command may a
 
 from dataclasses import dataclass, field
 from math import inf
+from typing import Final
 
 from gateway.codes.faults import FaultCode
 from gateway.control.command_edges import CommandTracker
@@ -19,6 +20,8 @@ from gateway.control.supervision.fault_detection import FaultDetector, StopCause
 from gateway.control.supervision.one_shot_events import OneShotEvents
 from gateway.control.supervision.safe_voltage import SafeVoltageCheck
 from gateway.registers.words import State
+
+_ROUNDED_N: Final = 1e-3  # what is held, as a register says it, may be a bit more
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,16 +149,20 @@ class Transitions:
     def miss_master(self, now_s: float, line: LineStatus, action: LeaseAction) -> None:
         """Act where no master's heartbeat keeps the output on. Of a force that is held meanwhile nobody is the owner: who
         writes without a beat, once or the same on and on, would keep out the master that comes back. On the way to the end of
-        the gateway an owner that goes on writing forces is refused, and its beats with them: it is there, and 0 N are near."""
-        if self.is_stopping and line.owner_connected and line.owner_refused:
-            return
+        the gateway an owner that goes on writing forces is refused, and its beats with them: it is there as long as it does,
+        and 0 N are near."""
         commands, before = self.parts.commands, self._unbeaten
+        if self.is_stopping and line.owner_connected and commands.is_within_lease(line.owner_refused_s, now_s):
+            return
         self._unbeaten = commands.command.number
         if not self.is_master_lost:
             self._lost_setpoint_n, self._held_n = commands.command.force_requested_n, self.parts.loop.applied_n
             self.lose_master(now_s, commands.lost_sentence(now_s, line), action)
             return
         self._held_n = min(self._held_n, self.parts.loop.applied_n)
+        asked_n = commands.command.force_requested_n
+        if asked_n <= self._held_n + _ROUNDED_N:  # so it is held as what was lost is: less than that is no new force
+            self._lost_setpoint_n = asked_n
         if before != self._unbeaten and not self.is_ramping_down:
             self.outcome.release_owner = True
 

@@ -75,11 +75,11 @@ class RegisterBank:
         self._tell_status: Callable[[], Status] | None = None
         self.self_test = SelfTestWords(register_map, self._image)
         self._ownership, self._owner_peer = Ownership(rules.owner), NOBODY
-        self.owner_refused = ""  # why the last write of who owns was, empty where it was taken
+        self.owner_refused, self.owner_refused_s = "", float("-inf")  # why the last was, empty: taken; when one was
         self._echo = ByteOrderEcho(register_map.find("byte_order_echo"), self._image)
         self._admission = Admission(self._commands, self._ownership, self._echo, rules)
         self._repeated = self._admission.repeated
-        self.held_runs = self._admission.held_runs
+        self.held_runs, self.held_enables = self._admission.held_runs, self._admission.held_enables
         self.staging = StagingBlock(register_map, self._image)
         self._image.put(register_map.find("map_version"), register_map.version)
         self._image.put(register_map.find("map_hash"), register_map.map_hash)
@@ -250,7 +250,8 @@ class RegisterBank:
         return refusal
 
     def _note_refused_write(self, refusal: Refusal, peer: Peer) -> Refusal:
-        self.owner_refused = refusal.sentence if peer.identity == self.owner else self.owner_refused
+        if peer.identity == self.owner:
+            self.owner_refused, self.owner_refused_s = refusal.sentence, self._now()
         self.on_refused_write(refusal, peer)
         return self._note_refusal(refusal, peer)
 

@@ -36,6 +36,7 @@ class Stand:
         self.run = SimpleNamespace(phase=CalibrationPhase.IDLE, progress=0.25, eta_s=7.0, target_n=0.0)
         self.command = Command(force_setpoint_n=30.0, heartbeat=5, command_sequence=6)
         self.valve: Any = None
+        self.conditioner: Any = SimpleNamespace(is_doubted=False)
         self.block = RefusalReason.NOT_READY
 
     def says(self, reading: Reading = READING, *, touching: bool = False, warns: int = 0) -> Output:
@@ -43,7 +44,7 @@ class Stand:
         parts: Any = SimpleNamespace(loop=self.loop, run=self.run, commands=commands)
         readiness: Any = SimpleNamespace(enable_block=lambda *_: self.block)
         machine: Any = self.machine
-        composer = OutputComposer(parts, machine, readiness, self.valve)
+        composer = OutputComposer(parts, machine, readiness, self.conditioner, self.valve)
         return composer.compose(1.0, reading, LineStatus(warnings=WarningBit(warns)), touching, 0.5)
 
 
@@ -82,6 +83,7 @@ WARNINGS = {
     WarningBit.TARGET_UNREACHABLE: ("loop", "unreachable"),
     WarningBit.TRIM_SATURATED: ("loop", "is_trim_at_limit"),
     WarningBit.FORCE_UNSTEADY: ("loop.settling", "is_noisy"),
+    WarningBit.ZERO_DOUBTED: ("conditioner", "is_doubted"),
 }
 
 

@@ -6,6 +6,7 @@ from math import nan
 import pytest
 
 from gateway.bsfm.model import Response
+from gateway.codes.warning_bits import WarningBit
 from gateway.control import CalibrationInUse, Controller
 from gateway.control.tare import LEAVING_LAGS, Zero
 from gateway.registers.words import ControlBit
@@ -91,3 +92,7 @@ def test_a_tare_of_before_a_silence_of_the_cell_is_doubted_once(silent_s: float,
     told = [line for line in bench.events if line.startswith("W253")]
     assert len(told) == (1 if is_tared and silent_s > 0.5 else 0)
     assert all("4.0" in line and f"{silent_s:.1f} s" in line for line in told)
+    assert (WarningBit.ZERO_DOUBTED in bench.last.warnings) is bool(told), "a master reads no log"
+    if lost != "under force":
+        bench.write(control_word=ControlBit.TARE)
+        assert bench.last.warnings == WarningBit(0), "the next tare ends it"

@@ -51,6 +51,10 @@ class Lease:
             return False
         return not owner_connected or self.age_s(now_s) > self._length_s
 
+    def is_within(self, since_s: float, now_s: float) -> bool:
+        """Return whether no more than one length has passed since then; always true without a lease."""
+        return self._length_s is None or now_s - since_s <= self._length_s
+
     def is_fresh_since(self, since_s: float, now_s: float) -> bool:
         """Return whether the heartbeat has changed after since_s, and within one length; always true without a lease."""
         if self._length_s is None:

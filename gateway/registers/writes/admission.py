@@ -33,6 +33,7 @@ from gateway.registers.writes.command_block import (
     Values,
 )
 from gateway.registers.writes.held_starts import HeldEnables, HeldRuns
+from gateway.registers.writes.left_setpoints import without_left_setpoints
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
 
@@ -42,7 +43,6 @@ STARTS: Final = ENABLE | RUN_BITS
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
 ALL_BITS: Final = 0xFFFF
-_PRESSING: Final = (State.RAMPING, State.HOLDING)
 _BEFORE: Final = 2 * HEARTBEAT
 _BEHIND: Final = _BEFORE + 2
 _AT_HEARTBEAT: Final = Command._fields.index("heartbeat")
@@ -125,9 +125,9 @@ class Admission:
         if is_stop:
             values[FORCE_SETPOINT] = values[VOLTAGE_SETPOINT] = 0.0
         is_taken_over = bool(written & TAKE)
-        is_begun_anew = is_taken_over and self._ownership.owner != write.host
+        is_begun_anew = self._is_begun_anew(write.host, is_taken_over=is_taken_over)
         if is_begun_anew:
-            values = self._without_left_setpoints(write, values)
+            values = without_left_setpoints(commands, values, self._offsets(write), self._tell())
         command = commands.command(values, written, number, now_s, write.host)
         if is_stop:
             command = command._replace(stops=True)
@@ -146,7 +146,7 @@ class Admission:
 
     def note_state(self, state: State, tell: Callable[[], Status]) -> None:
         """Note the state of control, and who tells the rest: what may be asked for, and left behind, depends on it."""
-        self.is_calibrating, self._is_pressing, self._tell = state is State.CALIBRATING, state in _PRESSING, tell
+        self.is_calibrating, self._tell = state is State.CALIBRATING, tell
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered."""
@@ -158,7 +158,7 @@ class Admission:
         """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, it held none, nothing
         was lowered, no run has the output, it has not waited. What the checks below would find is known."""
         is_usual = not (write.has_waited or word & RUN_BITS_OR_EDGES) and self.is_usual(write.host)
-        return is_usual and self._ownership.admits(write.host)
+        return is_usual and self._ownership.admits(write.host) and not self._is_begun_anew(write.host)
 
     def is_usual(self, host: str) -> bool:
         """Return whether nothing makes a host's writes special: no bit that it held, no lowered setpoint, no run."""
@@ -166,6 +166,13 @@ class Admission:
         return not (self.lowered_from_n or self.is_calibrating or is_held)
 
     # -- what the write asks for
+
+    def _is_begun_anew(self, host: str, *, is_taken_over: bool = False) -> bool:
+        """Whether a host goes on with what another one has left. Of a force that is held for a lost master nobody is the owner:
+        who beats becomes it, and has asked for nothing by that."""
+        owner, former = self._ownership.owner, self._ownership.former
+        is_left = owner is None and former != host and bool(self._commands.values[CONTROL_WORD])
+        return is_left or (is_taken_over and owner != host)
 
     def _permit(self, write: Write, values: Values) -> _PermittedWrite | None:
         """Return what the owner may ask for, or anybody: a stop, the end of a run. None: nothing to stop. Raises Refusal."""
@@ -185,17 +192,6 @@ class Admission:
         if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):
             return None
         raise self._not_owner(write.address, write.host)
-
-    def _without_left_setpoints(self, write: Write, values: Values) -> Values:
-        """Who takes over has asked for none of the setpoints that it does not bring. So of what a former owner has left the
-        next enable presses nothing, and a force that is pressed stays as it is held: for a lost master that may be less."""
-        written, without = self._offsets(write), values.copy()
-        held_n = self._tell().force_accepted_n if self._is_pressing else 0.0  # 0 on the way to 0, which clears all
-        if FORCE_SETPOINT not in written and held_n < values[FORCE_SETPOINT] and (held_n or not self._is_pressing):
-            without[FORCE_SETPOINT] = self._commands.round_force(held_n)
-        if VOLTAGE_SETPOINT not in written and not self._is_pressing:
-            without[VOLTAGE_SETPOINT] = 0.0
-        return without
 
     def _is_named_stop(self, write: Write, written: int) -> bool:
         """A run has no enable that could fall, nor any bit of it where this machine has begun it. Then enable written as 0 by
@@ -228,7 +224,11 @@ class Admission:
         return held & ~write.touched | stands & written & write.touched & RUN_BITS
 
     def _let_enable_go(self, write: Write, asked: int) -> None:
-        if self.held_enables.by_host and write.touched & ENABLE & ~asked and CONTROL_WORD in self._offsets(write):
+        if (
+            (self.held_enables.by_host or self.held_enables.lost)
+            and write.touched & ENABLE & ~asked
+            and CONTROL_WORD in self._offsets(write)
+        ):
             self.held_enables.let_go(write.host)
 
     # -- why not
@@ -262,8 +262,8 @@ class Admission:
 
     def _check_starts(self, command: Command, rises: int, written: int, word_at: int) -> None:
         host = command.peer
-        if rises & ENABLE and self.held_enables.holds(host, command.received_s):
-            text = "enable was kept at 1 over the reset of a fault: write it as 0 once, then as 1"
+        if rises & ENABLE and self.held_enables.holds(host, command.received_s, command.heartbeat):
+            text = "enable was kept at 1 over a fault or a loss: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
         if held := rises & self.held_runs.of(host):
             name = str(ControlBit(held & -held).name).lower()

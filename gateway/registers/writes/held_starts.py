@@ -1,7 +1,8 @@
 """Bits that masters that write in cycles keep at 1: only a master's own 0 lets its next 1 count.
 
-Those of runs outlive the process: by a control that was started anew the holder's next cycle would begin another run.
-An enable that is written on and on over a latched fault would press by another master's reset alone: a reset begins nothing.
+They outlive the process: by a control that was started anew the holder's next cycle would begin another run, or press over a
+fault that was latched, and that nobody has reset. An enable that is written on and on over a latched fault would press by
+another master's reset alone, too: a reset begins nothing.
 """
 
 from collections.abc import Callable, Mapping
@@ -9,6 +10,8 @@ from typing import Final
 
 _MOST_HOLDERS: Final = 64  # memory stays bounded whoever writes
 _HELD_S: Final = 3.0  # longer than a cycle; who has waited for so long has looked, and decides anew
+_TOLD_S: Final = 1.0  # from one time that the next process is told to another
+_DOWN_S: Final = 10.0  # that a start may take, in which nobody can write
 
 
 class HeldRuns:
@@ -38,20 +41,43 @@ class HeldRuns:
 
 
 class HeldEnables:
-    """by_host: when each host that keeps enable at 1 over a latched fault has written it last, monotonic s."""
+    """by_host: when each host that keeps enable at 1 over a latched fault has written it last, monotonic s; on_change: told of
+    all of them, of other times of the same ones once a second. lost: the heartbeat with which each master was lost in the
+    process before; on_lost: told of all of this one's."""
 
     def __init__(self) -> None:
+        self.on_change: Callable[[dict[str, float]], None] = lambda held: None
+        self.on_lost: Callable[[dict[str, int]], None] = lambda lost: None
         self.by_host: dict[str, float] = {}
+        self.lost: dict[str, int] = {}
+        self._lost_now: dict[str, int] = {}
+        self._told_s = 0.0
 
     def note(self, host: str, now_s: float) -> None:
         """Note that a host has written enable as 1, and that this was refused because a fault is latched."""
-        self.let_go(host)
+        is_new = self.by_host.pop(host, None) is None
         self.by_host[host] = now_s
         if len(self.by_host) > _MOST_HOLDERS:
             del self.by_host[next(iter(self.by_host))]
+        if is_new or now_s - self._told_s >= _TOLD_S:
+            self._told_s = now_s
+            self.on_change(dict(self.by_host))
 
-    def holds(self, host: str, now_s: float) -> bool:
-        """Decide whether a 1 of this host is one that it has kept up since the fault; if so, it goes on being kept up."""
+    def note_lost(self, host: str | None, heartbeat: int) -> None:
+        """Note that a master was lost: by its last frame, sent on and on, the next process would press."""
+        if host is None or self._lost_now.get(host) == heartbeat:
+            return
+        self._lost_now[host] = heartbeat
+        if len(self._lost_now) > _MOST_HOLDERS:
+            del self._lost_now[next(iter(self._lost_now))]
+        self.on_lost(dict(self._lost_now))
+
+    def holds(self, host: str, now_s: float, heartbeat: int | None = None) -> bool:
+        """Decide whether a 1 of this host is one that it has kept up since the fault, or since its loss in the process before.
+        If so, it goes on being kept up."""
+        if host in self.lost and self.lost[host] == heartbeat:
+            return True
+        self.lost.pop(host, None)
         if now_s - self.by_host.get(host, -_HELD_S) >= _HELD_S:
             self.let_go(host)
             return False
@@ -60,4 +86,11 @@ class HeldEnables:
 
     def let_go(self, host: str) -> None:
         """Note that a host has written enable as 0."""
-        self.by_host.pop(host, None)
+        self.lost.pop(host, None)
+        if self.by_host.pop(host, None) is not None:
+            self.on_change(dict(self.by_host))
+
+    def restore(self, held: Mapping[str, float], lost: Mapping[str, int], now_s: float) -> None:
+        """Go on with who was lost, and with what was held in the process before, as long as that can have been a moment ago."""
+        self.lost, self._lost_now = dict(lost), dict(lost)
+        self.by_host.update((host, now_s) for host, held_s in held.items() if now_s - held_s < _HELD_S + _DOWN_S)

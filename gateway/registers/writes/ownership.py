@@ -34,11 +34,13 @@ def serial_place(host: str) -> int | None:
 
 
 class Ownership:
-    """owner: the host that owns the setpoint, None for nobody; is_explicit: it has said so (bit 3)."""
+    """owner: the host that owns the setpoint, None for nobody; is_explicit: it has said so (bit 3); former: who owned
+    before, where nobody does."""
 
     def __init__(self, configured: str | None) -> None:
         self._configured = configured
         self.owner: str | None = configured
+        self.former: str | None = None
         self.is_explicit = False
 
     def admits(self, host: str) -> bool:
@@ -74,6 +76,7 @@ class Ownership:
     def release(self) -> None:
         """Make nobody the owner, after a disable or the lease's end, unless the rig configures one."""
         self.is_explicit = False
+        self.former = self.owner or self.former
         self.owner = self._configured
 
 

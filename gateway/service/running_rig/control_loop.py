@@ -231,6 +231,7 @@ class ControlLoop:
             pressure_pa_per_v=self.pressure_pa_per_v,
             owner_connected=self.owner_connected,
             owner_refused=self.bank.owner_refused,
+            owner_refused_s=self.bank.owner_refused_s,
             late_s=late_s,
             waited_s=self._waited_since_tick(late_s),  # for which the machine is to blame
             suspended_s=suspended_s,
@@ -277,6 +278,8 @@ class ControlLoop:
         self.decision = decision
         if self.calibration_runs:
             self.calibration_runs.follow(decision)
+        if decision.release_owner:
+            self.bank.held_enables.note_lost(self.bank.owner, self.bank.command.heartbeat)
         if decision.clear_command:
             self.bank.clear_command()
         if decision.release_owner:

@@ -3,13 +3,15 @@
 By itself a start knows only what it finds. By this:
 - the recording goes on;
 - a TLS face whose port is any free one (0) keeps it;
-- a master that keeps the bit of a run at 1 begins no other run by that;
+- a master that keeps the bit of a run at 1 begins no other run by that, and one that keeps enable at 1 over a latched fault, or
+  with the heartbeat with which it was lost, presses nothing, although fault and loss are forgotten;
 - a calibration or a plant that is another one now (their files are gone, say) is told, and so is a tare that is forgotten.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
+from gateway.registers import RegisterBank
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 
 _LEAST_TOLD_N: Final = 0.05
@@ -29,10 +31,14 @@ class Handover:
         """The port of each TLS face, by its place in `fieldbus`, as masters know it."""
         return dict(self._kept.get("tls_ports", {}))
 
-    @property
-    def held_runs(self) -> dict[str, int]:
-        """Bits of runs that masters kept at 1, by host."""
-        return dict(self._kept.get("held_runs", {}))
+    def restore_held(self, bank: RegisterBank, now_s: float, keep: Callable[..., None]) -> None:
+        """Let a bank go on with the bits that masters kept at 1, and leave those of its own time to the next process (keep)."""
+        bank.held_runs.restore(self._kept.get("held_runs", {}))
+        held, lost = self._kept.get("held_enables", {}), self._kept.get("lost_beats", {})
+        bank.held_enables.restore(held, lost, now_s)
+        bank.held_enables.on_lost = lambda lost: keep(lost_beats=lost)
+        bank.held_runs.on_change = lambda held: keep(held_runs=held)
+        bank.held_enables.on_change = lambda held: keep(held_enables=held)
 
     def recording(self, now_s: float) -> WantedRecording | None:
         """Return what is to be recorded; None: nothing, or its time is over by now_s (monotonic)."""
@@ -42,6 +48,11 @@ class Handover:
         wanted = WantedRecording.from_facts(facts) if facts else None
         return None if wanted is None or wanted.is_over(now_s) else wanted
 
+    @property
+    def forgets_tare(self) -> bool:
+        """Decide whether a tare that counted before is none any more: control has to doubt its zero."""
+        return abs(float(self._kept.get("zero_n", 0.0))) >= _LEAST_TOLD_N
+
     def changes(self, **in_use: int) -> tuple[str, ...]:
         """Return W250 for each number in use that is not the one before, and for the zero of a tare. in_use: what is in use
         now, by its noun."""
@@ -50,8 +61,8 @@ class Handover:
             for noun, number in in_use.items()
             if (before := self._kept.get(noun, number)) != number
         )
-        zero_n = self._kept.get("zero_n", 0.0)
-        if abs(zero_n) < _LEAST_TOLD_N:
+        if not self.forgets_tare:
             return changed
+        zero_n = self._kept["zero_n"]
         off = f"the cell reads {abs(zero_n):.2f} N {'more' if zero_n > 0.0 else 'less'} than before it"
         return (*changed, f"W250 the tare before the restart is forgotten, and {off}: tare again before you press")

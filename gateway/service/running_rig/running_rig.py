@@ -138,7 +138,6 @@ class RunningRig:
     def _wire_loop(self, cause: FaultCode) -> None:
         rig, log = self._rig, self._log
         self.bank = RegisterBank(rig.register_map, bank_rules(rig), now=time.monotonic)
-        self.bank.held_runs.on_change = lambda held: self._guardian.keep(held_runs=held)
         self._watchdogs = WatchdogRegister(self._line, self.bank.show_watchdogs, self._log)
         self._audit.watch(self.bank)
         self.bank.on_refusal = lambda refusal, peer: log(
@@ -167,11 +166,13 @@ class RunningRig:
     async def start(self, bind: list[Any] | None, handover: Handover, *, restarted: Ending | None) -> banner.Ready:
         """Open the ports, greet both devices, then serve Modbus: nobody is answered before there is an answer."""
         self._wire(starting.cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
-        self.bank.held_runs.restore(handover.held_runs)
+        handover.restore_held(self.bank, time.monotonic(), self._guardian.keep)
         await self._ports.open(is_restart=bool(restarted))
         self._tick.start()
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._spoke.wait(), starting.waiting_s(is_restart=bool(restarted)))
+        if handover.forgets_tare:
+            self.controller.doubt_zero()
         for change in handover.changes(**self._in_use()):
             self._log("start", change)
         self._guardian.keep(**self._in_use())

@@ -12,8 +12,9 @@ from types import SimpleNamespace
 
 from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse, Controller, ControlSettings
-from gateway.control.inputs import WireCounts
+from gateway.control.inputs import ValveStatus, WireCounts
 from gateway.devices.messages import ForceSample, Quality
+from gateway.devices.valve_profile import ValveDirection
 from gateway.modbus import Peer
 from gateway.profiles import load_register_map
 from gateway.registers import BankRules, Refusal, RegisterBank
@@ -22,6 +23,7 @@ from gateway.registers.words import ControlBit, State
 from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
 from gateway.service.running_rig.lines.output_line import LineState
 from tests.control.bench import SmallPlant, bsfm, settings
+from tests.control.valve.valve_bench import MOVES_S, SHARE
 
 OWNER, OTHER = Peer("10.0.0.5", 4001), Peer("10.0.0.6", 4002)
 TICK_S = 0.01
@@ -90,6 +92,32 @@ class Samples:
         """Nobody doubts what is behind the port."""
 
 
+class Relay:
+    """Stands for the valve's line: the valve stands a twentieth of a second later where it is told to, and the plant turns."""
+
+    lost, said = False, ""
+
+    def __init__(self, plant: SmallPlant) -> None:
+        self.stands, self._plant, self._push_n_per_v = ValveDirection.PUSH, plant, plant.gain_n_per_v
+        self._order: ValveDirection | None = None
+        self._told_s = 0.0
+
+    @property
+    def status(self) -> ValveStatus:
+        return ValveStatus(self.stands)
+
+    def set_direction(self, order: ValveDirection | None, now_s: float) -> None:
+        if order is not self._order:
+            self._order, self._told_s = order, now_s
+
+    def tick(self, now_s: float) -> None:
+        if self._order not in (None, self.stands) and now_s - self._told_s >= MOVES_S:
+            self.stands = self._order
+            is_pull = self.stands is ValveDirection.PULL
+            self._plant.sign = -1.0 if is_pull else 1.0
+            self._plant.gain_n_per_v = self._push_n_per_v * (SHARE if is_pull else 1.0)
+
+
 class SmallRig:
     """Times are virtual seconds. beats: the owner's heartbeat changes every tenth of a second, where there is a lease."""
 
@@ -120,6 +148,8 @@ class SmallRig:
             self.samples,
             LoopProcess(self.now, self.note),  # type: ignore[arg-type]
         )
+        if self.settings.valve:
+            self.loop.valve = Relay(self.plant)  # type: ignore[assignment]
         self.run(0.5)
 
     def now(self) -> float:

@@ -2,12 +2,15 @@
 
 import asyncio
 import socket
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from gateway.codes.warning_bits import WarningBit
+from gateway.control import LeaseAction
 from gateway.modbus import Peer
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
@@ -15,17 +18,21 @@ from gateway.recording import list_recordings
 from gateway.recording.label import RecordingLabel, label_of
 from gateway.registers import Refusal
 from gateway.registers.words import ControlBit, State
+from gateway.registers.writes.held_starts import HeldEnables
 from gateway.service.running_rig.handover import Handover
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.certificates import store_all
+from tests.control.bench import settings
 from tests.disk.at_once import AtOnce
 from tests.service.kept_log import Log
 from tests.service.rigs import demo
 from tests.service.running_rig.begun_rig import OwnDevices, with_running_rig
+from tests.service.running_rig.simulated_rig import ENABLE, OWNER, SmallRig
 
 NAMED = RecordingLabel("the worn seal", "left cylinder")
+ROBOT = Peer("10.0.0.5")
 
 
 @pytest.fixture
@@ -143,6 +150,9 @@ def test_a_tare_that_a_restart_has_forgotten_is_told_once(devices: OwnDevices, z
         while kept["zero_n"] and (message := message_link.receive(guardian)) is not None:
             kept.update(message.body if message.tag == message_link.KEEP else {})
             message.drop_descriptors()
+        rig.loop.refresh()
+        assert rig.loop.decision
+        assert WarningBit.ZERO_DOUBTED in rig.loop.decision.warnings, "a PLC reads no log, and enables as before"
 
     lines = with_running_rig(devices, scene, Ending(EndCause.DIED, "control process died"), dict(kept))
     assert any(
@@ -171,7 +181,7 @@ def test_the_port_of_each_tls_face_is_left_to_the_next_process(devices: OwnDevic
     assert kept["tls_ports"] == ports
 
 
-RUN, ROBOT = int(ControlBit.START_CALIBRATION).to_bytes(2, "big"), Peer("10.0.0.5")
+RUN = int(ControlBit.START_CALIBRATION).to_bytes(2, "big")
 
 
 def test_the_bit_of_a_run_that_a_master_keeps_at_1_is_left_to_the_next_process(devices: OwnDevices) -> None:
@@ -201,3 +211,81 @@ def test_behind_a_restart_that_bit_begins_no_other_run(devices: OwnDevices) -> N
 
     died = Ending(EndCause.DIED, "control process died")
     with_running_rig(devices, scene, died, {"held_runs": {"10.0.0.5": int(ControlBit.START_CALIBRATION)}})
+
+
+ENABLE_12_N = int(ControlBit.ENABLE).to_bytes(2, "big") + (1200).to_bytes(2, "big")
+
+
+def test_an_enable_that_a_master_keeps_at_1_over_a_fault_is_left_to_the_next_process(devices: OwnDevices) -> None:
+    kept: dict[str, Any] = {}
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        rig.controller.fail_internally(time.monotonic())
+        with pytest.raises(Refusal, match="W212"):
+            rig.bank.write_registers(0, ENABLE_12_N, ROBOT)
+        while "held_enables" not in kept and (message := message_link.receive(guardian)) is not None:
+            kept.update(message.body if message.tag == message_link.KEEP else {})
+            message.drop_descriptors()
+
+    with_running_rig(devices, scene)
+    assert kept["held_enables"]["10.0.0.5"] == pytest.approx(time.monotonic(), abs=30.0)
+
+
+@pytest.mark.parametrize(("ago_s", "is_held"), [(2.0, True), (60.0, False)])
+def test_behind_a_restart_an_enable_that_stood_over_a_fault_presses_not(
+    devices: OwnDevices, ago_s: float, is_held: bool
+) -> None:
+    """Control was killed behind A311, and 0.16 s later the robot's next cycle pressed 12 N: nobody had reset anything."""
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        for _ in range(2 if is_held else 0):
+            with pytest.raises(Refusal, match="enable was kept at 1 over a fault"):
+                rig.bank.write_registers(0, ENABLE_12_N, ROBOT)
+            assert rig.controller.state is State.OFF
+        if is_held:
+            rig.bank.write_registers(0, bytes(2), ROBOT)
+        rig.bank.write_registers(0, ENABLE_12_N, ROBOT)
+        assert rig.controller.state is not State.OFF, "its own 0 lets the next 1 count"
+
+    died = Ending(EndCause.DIED, "control process died")
+    with_running_rig(devices, scene, died, {"held_enables": {"10.0.0.5": time.monotonic() - ago_s}})
+
+
+def test_a_host_that_holds_enable_over_a_fault_is_told_once_a_second_and_its_end_at_once() -> None:
+    held, told = HeldEnables(), []
+    held.on_change = told.append
+    for tenth in range(25):
+        held.note("10.0.0.5", 100.0 + 0.1 * tenth)
+    held.let_go("10.0.0.5")
+    held.let_go("10.0.0.5")
+    assert [one.get("10.0.0.5") for one in told] == [100.0, pytest.approx(101.0), pytest.approx(102.0), None]
+
+
+@pytest.mark.parametrize("action", LeaseAction)
+@pytest.mark.parametrize("beat", [7, 8])
+def test_behind_a_crash_the_last_frame_of_a_program_that_hung_presses_not(action: LeaseAction, beat: int) -> None:
+    """The next process knew of no loss: 12 N for another lease, or held until somebody came. Its next beat counts."""
+    kept: dict[str, Any] = {}
+    rigs = [SmallRig(settings(lease_s=0.35, lease_action=action)) for _ in range(2)]
+    for rig in rigs:
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        frame = rig.block(ENABLE, 12.0, beat=7)
+        rig.beats = False
+        for _ in range(20):
+            rig.answer(0, *frame)
+            rig.run(0.1)
+    assert kept["lost_beats"] == {OWNER.host: 7}
+    assert max(voltage_v for _, voltage_v, _ in rigs[0].trace) > 1.0
+    assert max(voltage_v for _, voltage_v, _ in rigs[1].trace) == 0.0 and rigs[1].state is State.OFF
+    rigs[1].run(3.0).answer(0, *frame[:4], beat, *frame[5:])
+    assert (rigs[1].run(0.1).state is State.OFF) is (beat == 7)
+
+
+def test_the_masters_that_were_lost_are_sixty_four() -> None:
+    held, told = HeldEnables(), []
+    held.on_lost = told.append
+    for number in range(65):
+        for beat in (3, 3, 4):
+            held.note_lost(f"10.0.0.{number}", beat)
+    held.note_lost(None, 5)
+    assert len(told) == 130 and len(told[-1]) == 64 and told[-1]["10.0.0.64"] == 4

@@ -198,6 +198,7 @@ def test_a_calibration_that_allows_less_lets_no_force_rise_that_is_held_for_a_lo
         ("nothing", State.FAULT),
         ("one frame", State.FAULT),
         ("a path, then it leaves", State.FAULT),
+        ("a path, then its cable is cut", State.FAULT),
     ],
 )
 def test_the_way_to_the_end_is_no_fault_beside_an_owner_that_goes_on_with_its_path(writes: str, ends: State) -> None:
@@ -210,9 +211,9 @@ def test_the_way_to_the_end_is_no_fault_beside_an_owner_that_goes_on_with_its_pa
     for cycle in range(80):
         if cycle == 10:
             rig.controller.stop()
-        elif writes.startswith("a path") or cycle < 10:
+        elif writes.startswith("a path") or cycle < 10:  # a cut cable leaves the connection open
             written = cycle
-        if cycle < 10 or writes != "nothing":
+        if cycle < 10 or not (writes == "nothing" or (writes.endswith("cut") and cycle > 15)):
             rig.answer(0, ENABLE, 3000 + written % 7, 0, 0, 1000 + written)
         if cycle == 15 and writes.endswith("leaves"):
             rig.loop.owner_connected = False
@@ -241,3 +242,41 @@ def test_who_takes_over_what_is_held_for_a_lost_master_holds_that_unless_it_brin
         rig.run(0.1)
     assert rig.plant.force_n == pytest.approx(then_n, abs=0.5)
     assert rig.word("force_setpoint") == rig.word("force_requested") == pytest.approx(100 * then_n, abs=50)
+
+
+@pytest.mark.parametrize("has_contact", [True, False])
+def test_who_beats_beside_what_is_held_for_a_lost_master_holds_that(has_contact: bool) -> None:
+    """A heartbeat of another one, which never asked for a force: 12 N went on to 30 N, or 30 N waited for the next touch."""
+    control = settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD)
+    rig = SmallRig(replace(control, defaults=Defaults(force_ramp_n_per_s=5.0)), contact=has_contact)
+    rig.write(0, ENABLE, 3000)
+    rig.run(2.0).beats = False
+    rig.run(1.5)
+    held_n = rig.word("force_accepted") / 100 if has_contact else 0.0
+    for beat in range(20):
+        rig.write(4, 100 + beat, peer=OTHER)
+        rig.run(0.1)
+    rig.plant.contact = True
+    for beat in range(50):
+        rig.write(4, 200 + beat, peer=OTHER)
+        rig.run(0.1)
+    assert rig.bank.owner == OTHER.host and rig.word("force_setpoint") == pytest.approx(100 * held_n)
+    assert rig.plant.force_n == pytest.approx(held_n, abs=0.5)
+    rig.write(1, 2000, peer=OTHER)
+    for beat in range(60):
+        rig.write(4, 300 + beat, peer=OTHER)
+        rig.run(0.1)
+    assert rig.plant.force_n == pytest.approx(20.0, abs=0.5), "what it asks for counts"
+
+
+def test_a_write_without_a_beat_beside_what_is_held_lets_it_not_rise_at_the_next_contact() -> None:
+    """Another host's width of the band made 12 N its setpoint, and they were pressed on whoever touched the tool."""
+    control = settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD)
+    rig = SmallRig(replace(control, defaults=Defaults(force_ramp_n_per_s=5.0)))
+    rig.write(0, ENABLE, 3000)
+    rig.run(2.0).beats = False
+    rig.run(1.5).write(11, 100, peer=OTHER)
+    assert rig.run(0.5).plant.force_n == pytest.approx(12.0, abs=0.5), "what is held is held"
+    rig.plant.contact = False
+    rig.run(1.5).plant.contact = True
+    assert rig.run(3.0).plant.force_n < 5.0
