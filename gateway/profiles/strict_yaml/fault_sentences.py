@@ -33,6 +33,8 @@ _WITH_UNIT: Final = re.compile(rf"({_DECIMAL.pattern}) ?(?P<unit>[^\W\d]\S*)")
 _FORMS: Final = {
     "^[a-z0-9][a-z0-9._-]{0,62}$": "small letters a-z, digits and . _ -, at most 63, a letter or digit first",
     "^/": "an absolute path, with / first",
+    r"^[^/#+\x00]{1,100}$": "1 to 100 characters, none of them / # +",
+    r"^[^/#+\x00][^#+\x00]{0,199}$": "1 to 200 characters, none of them # +, and no / first",
 }
 """Patterns of texts in words."""
 _SHORT: Final = 40  # characters of a value that is quoted whole
@@ -161,6 +163,8 @@ def _hint(value: Any, what: str, unit: str) -> str:
         return f': write "{number(value)}" in quotes'
     if what == "a list" and isinstance(value, (int, str)) and len(str(value)) <= _SHORT:
         return f": write [{quote_value(value)}]"
+    if what == "a list" and isinstance(value, dict):
+        return ": write `- ` before its first key, and spaces before the others"
     if isinstance(value, _Secret) and what == "text":
         return ": write it in quotes"
     if not isinstance(value, str):
@@ -205,7 +209,8 @@ def _choices(listed: object) -> list[str]:
 def _kind_choice(value: Any, context: dict[str, Any], unit: str) -> str:
     """Return the sentence about a group whose `type` is not there, or none of the known."""
     if "tag" not in context or (isinstance(value, dict) and value.get("type") is None):
-        return "has no type: it says what this is"
+        types = context.get("types") or _choices(context["expected_tags"])
+        return f"has no type: it says what this is, one of {one_of(types)}"
     elsewhere = _TYPES_ELSEWHERE.get(str(context["tag"]), "")
     return f"type {_choice(context['tag'], {'expected': context['expected_tags']}, unit)}{elsewhere}"
 
@@ -234,12 +239,19 @@ def _nearest(value: Any, choices: list[str]) -> str | None:
     return min(near, key=lambda choice: abs(value - int(choice)), default=None)
 
 
-def tell_group(sentence: str, value: object, known: list[str]) -> str:
-    """Return a sentence about a value in whose place a group of keys may stand: what says the same in a group that is
-    switched on and off by a key, else the first of its keys."""
+def tell_group(sentence: str, value: object, known: list[str], *, without: bool, empty: bool) -> str:
+    """Return a sentence about a value in whose place a group of keys may stand: what says the same for a word that switches
+    the group on or off, else the first of its keys. without: a file that leaves the group out has none; empty: every key
+    has a default."""
     switch = str(_SWITCHES.get(str(value).lower(), "")).lower()
     if switch and "enabled" in known:
         return f"{sentence}: write {{enabled: {switch}}}"
+    if switch == "false" and without:
+        return f"{sentence}: leave it out, and there is none"
+    if switch == "true" and without and empty:
+        return f"{sentence}: write {{}}, or its keys: {one_of(known)}"
+    if isinstance(value, list) and value and all(isinstance(entry, dict) for entry in value):
+        return f"{sentence}: write its keys without `- ` before them"
     keys = one_of(known[:_MOST_KEYS]) + (" ..." if len(known) > _MOST_KEYS else "")
     word, is_word, _ = sentence.partition(_ONLY_CHOICE)
     return f"{word}, nor a group of keys: {keys}" if is_word else f"{sentence}: {keys}"
@@ -283,11 +295,12 @@ _BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {
 }
 
 
-def type_sentence(error: Mapping[str, Any], value: Any, key: object) -> str:
-    """Return the sentence for one pydantic error about a value that is there; value as the file has it."""
+def type_sentence(error: Mapping[str, Any], value: Any, key: object, *, optional: bool = False) -> str:
+    """Return the sentence for one pydantic error about a value that is there; value as the file has it. optional: the key may
+    be left out."""
     context: dict[str, Any] = error.get("ctx") or {}
     if value is None and error["type"] != "value_error":
-        return "has no value"
+        return "has no value: write one, or leave this line out" if optional else "has no value"
     if key in _SECRETS and isinstance(value, (str, int, float)) and not isinstance(value, bool):
         value = _Secret(value)
     words = _BY_TYPE.get(error["type"])
