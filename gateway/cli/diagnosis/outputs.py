@@ -3,8 +3,7 @@
 import contextlib
 import errno
 import os
-import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -56,12 +55,12 @@ def write_all(texts: Mapping[Path, str]) -> None:
     A device (/dev/null, a terminal) is written to in the end: nobody wants it replaced by a file. Ctrl-C before the first
     is renamed: KeyboardInterrupt, and no file has changed either; later it comes too late.
     """
-    pressed = threading.Event()
-    with handle_interrupt(lambda number, frame: pressed.set()):
+    pressed: list[int] = []  # no Event: its lock may be held where the handler comes in
+    with handle_interrupt(lambda number, frame: pressed.append(number)):
         _write_all(texts, pressed)
 
 
-def _write_all(texts: Mapping[Path, str], pressed: threading.Event) -> None:
+def _write_all(texts: Mapping[Path, str], pressed: Sequence[int]) -> None:
     for path in texts:
         _refuse_place(path)
     devices = [path for path in texts if path.exists() and not path.is_file()]
@@ -70,7 +69,7 @@ def _write_all(texts: Mapping[Path, str], pressed: threading.Event) -> None:
     try:
         for path, fresh in beside.items():
             fresh.write_text(texts[path], encoding="utf-8")
-        if pressed.is_set():
+        if pressed:
             raise KeyboardInterrupt
         for path, fresh in beside.items():
             fresh.replace(places[path])
