@@ -25,6 +25,8 @@ class GivenPath(click.Path):
         """Return the path; BadParameter where it breaks a rule of click.Path, or names nothing."""
         if not os.fspath(value):
             self.fail(EMPTY, param, ctx)
+        if (self.exists or not self.file_okay) and (target := lost_target(expand_home(value))):
+            self.fail(f"{os.fspath(value)!r} is a link to {target}, and there is nothing", param, ctx)
         path = super().convert(expand_home(value), param, ctx)
         with suppress(OSError):  # not there yet, or not for us to look at; click refuses files alone, a device is none
             is_folder = S_ISDIR(Path(os.fsdecode(path)).stat().st_mode)
@@ -33,8 +35,16 @@ class GivenPath(click.Path):
         return path
 
 
-def named_rig(context: click.Context, parameter: click.Parameter, value: str) -> str:
-    """Return the name of a rig that is to run, for an argument's callback."""
+def lost_target(path: Path) -> str:
+    """Return where a link leads behind which nothing is, or a ring of links; empty for any other path."""
+    with suppress(OSError, ValueError):
+        if not path.exists():
+            return str(path.readlink())
+    return ""
+
+
+def refuse_empty(context: click.Context, parameter: click.Parameter, value: str) -> str:
+    """Return the name of a rig or a port, for an argument's callback; BadParameter for an empty one."""
     if not value:
         raise click.BadParameter(EMPTY)
     return value
