@@ -14,6 +14,7 @@ import click
 
 from gateway import VERSION
 from gateway.cli import plain_spelling
+from gateway.cli.command_line.given_path import refuse_empty_words
 from gateway.cli.errors import translate_error
 from gateway.processes import exit_codes
 
@@ -84,6 +85,12 @@ class VerbGroup(click.Group):
         for one in command.commands.values() if isinstance(command, click.Group) else ():
             one.short_help = one.get_short_help_str(_WHOLE)  # click itself cuts it at the width of the terminal
         return command
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Refuse a command line with an empty word in it, whichever argument or option it is."""
+        if not ctx.resilient_parsing:
+            refuse_empty_words(args)
+        return super().parse_args(ctx, args)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

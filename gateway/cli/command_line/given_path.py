@@ -1,6 +1,7 @@
 """Paths of the command line as people mean them, and an empty name, which a variable of the shell that is not set leaves."""
 
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from stat import S_ISDIR
@@ -11,6 +12,7 @@ import click
 from gateway.plain_file import expand_home
 
 EMPTY: Final = "an empty name: is a variable of the shell not set?"
+_MAY_BE_EMPTY: Final = ("--name", "--note")  # words for people
 
 
 class GivenPath(click.Path):
@@ -43,8 +45,12 @@ def lost_target(path: Path) -> str:
     return ""
 
 
-def refuse_empty(context: click.Context, parameter: click.Parameter, value: str) -> str:
-    """Return the name of a rig or a port, for an argument's callback; BadParameter for an empty one."""
-    if not value:
-        raise click.BadParameter(EMPTY)
-    return value
+def refuse_empty_words(words: Sequence[str]) -> None:
+    """Raise UsageError for a command line with an empty word in it: as a recording it was an internal error, and as --rig it
+    was demo's."""
+    for before, word in zip(("", *words), words, strict=False):
+        option = before if before.startswith("-") else ""
+        if word.startswith("--") and word.endswith("="):
+            option, word = word[:-1], ""
+        if not word and option not in _MAY_BE_EMPTY:
+            raise click.UsageError(f"{option}: {EMPTY}" if option else EMPTY)

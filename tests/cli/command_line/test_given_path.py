@@ -3,8 +3,10 @@
 import os
 from pathlib import Path
 
+import click
 import pytest
 
+from gateway.cli.command_line.given_path import refuse_empty_words
 from gateway.profiles import ProfileError, load_rig
 from gateway.profiles.rigs.faces import TlsFace
 
@@ -17,6 +19,11 @@ WRITES = (
     ("report", ""),
     ("certs", ""),
     ("ports", ""),
+    ("fit", ""),
+    ("diagnose", "--json", "-", ""),
+    ("recordings", "list", "--rig", ""),
+    ("recordings", "list", "--rig="),
+    ("read", "state", "--gateway", ""),
 )
 
 
@@ -46,6 +53,12 @@ def test_a_tilde_that_no_shell_has_replaced_is_the_home_directory(here: Path, ca
     answer = call("backup", "~/cell.tar.gz", "--state=~/cell")
     assert answer.exit_code == 0, answer.output
     assert (here / "home" / "cell.tar.gz").is_file() and not list(Path().iterdir())
+
+
+def test_words_for_people_may_be_empty() -> None:
+    refuse_empty_words(["record", "on", "--name", "", "--note="])
+    with pytest.raises(click.UsageError, match="--state: an empty name"):
+        refuse_empty_words(["record", "on", "--name", "", "--state="])
 
 
 @pytest.mark.parametrize("words", [("check", "~nobody-here/x.yaml"), ("recordings", "list", "--rig", "~nobody-here/x")])

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gateway.cli.command_line.given_path import refuse_empty
 from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.errors import CliError
 from gateway.cli.options import json_option
@@ -18,12 +17,8 @@ if TYPE_CHECKING:
 EXAMPLES = ("ports", "ports --json")
 
 
-def _named_ports(context: click.Context, parameter: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(refuse_empty(context, parameter, value) for value in values)
-
-
 @click.command()
-@click.argument("paths", metavar="[PORT]...", nargs=-1, callback=_named_ports)
+@click.argument("paths", metavar="[PORT]...", nargs=-1)
 @click.option("--listen", is_flag=True, help="Listen at each port, without sending a byte: what comes, at which speed.")
 @click.option(
     "--seconds", type=Quantity(0.1, 60.0), default=0.5, show_default=True, help="Listen so long at each speed."
