@@ -3,7 +3,7 @@
 import contextlib
 import errno
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -68,7 +68,8 @@ def _write_all(texts: Mapping[Path, str], pressed: Sequence[int]) -> None:
     beside = {path: place.with_name(f".{place.name}.{os.getpid()}") for path, place in places.items()}
     try:
         for path, fresh in beside.items():
-            fresh.write_text(texts[path], encoding="utf-8")
+            with _told_by(path):
+                fresh.write_text(texts[path], encoding="utf-8")
         if pressed:
             raise KeyboardInterrupt
         for path, fresh in beside.items():
@@ -77,7 +78,17 @@ def _write_all(texts: Mapping[Path, str], pressed: Sequence[int]) -> None:
         for fresh in beside.values():
             fresh.unlink(missing_ok=True)
     for path in devices:
-        path.write_text(texts[path], encoding="utf-8")
+        with _told_by(path):
+            path.write_text(texts[path], encoding="utf-8")
+
+
+@contextlib.contextmanager
+def _told_by(path: Path) -> Iterator[None]:
+    """Have an OSError name the file that was asked for: that of a full disk names none, others the one beside it."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
 
 
 def _refuse_place(target: Path) -> None:
