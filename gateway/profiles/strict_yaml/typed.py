@@ -81,9 +81,8 @@ def _place_findings(document: Document, path: Path, findings: list[Any]) -> list
     """Return one finding for each place of the document. Where a word or a group of keys may stand and a group does, what
     keeps it from being the word is no finding beside what is wrong with the group."""
     placed = [(_place(document, path, finding), finding) for finding in findings]
-    inside = {
-        place[:end] for place, finding in placed if finding["type"] not in _WORDS for end in range(len(place) + 1)
-    }
+    inside = {place[:end] for place, _ in placed for end in range(len(place))}
+    inside |= {place for place, finding in placed if finding["type"] not in _WORDS}
     kept: dict[Path, Any] = {}
     for place, finding in placed:
         if not (finding["type"] in _WORDS and place in inside and isinstance(document.at(*place), dict)):
@@ -104,7 +103,15 @@ def _fault(kind: type, document: Document, path: Path, place: Path, finding: Map
         elsewhere |= getattr(holder, "KEPT_ELSEWHERE", {})
         sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, elsewhere)
         return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=suggestion)
+    if written := getattr((finding.get("ctx") or {}).get("error"), "written", ""):
+        place = _place_of(written, document, place)
     return document.fault(place, _sentence(kind, document, path, place, finding))
+
+
+def _place_of(text: str, document: Document, group: Path) -> Path:
+    """Return where a text stands in a group whose rule has refused it; the group where it stands there more than once."""
+    found = [place for place in document.marks if place[: len(group)] == group and document.at(*place) == text]
+    return found[0] if len(found) == 1 else group
 
 
 def _sentence(kind: type, document: Document, path: Path, place: Path, finding: Mapping[str, Any]) -> str:
