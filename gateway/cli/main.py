@@ -1,6 +1,7 @@
 """The command `force-gateway`. A verb's module is imported when that verb is called, so `--help` and `check` start fast
 and a verb's libraries cost only those who use it."""
 
+import codecs
 import io
 import os
 import sys
@@ -144,8 +145,14 @@ def _print_what_the_terminal_can() -> None:
     of a stray byte: a verb that has done its work ended on it."""
     plain_spelling.register()
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+        if isinstance(stream, io.TextIOWrapper) and _refuses_characters(stream):
             stream.reconfigure(errors=plain_spelling.ERRORS)
+
+
+def _refuses_characters(stream: io.TextIOWrapper) -> bool:
+    """Decide whether a character may end a verb; of a C locale's stream Python lets stray bytes through, and no character."""
+    is_utf_8 = codecs.lookup(stream.encoding).name == "utf-8"
+    return stream.errors == "strict" or (stream.errors == "surrogateescape" and not is_utf_8)
 
 
 def main() -> None:
