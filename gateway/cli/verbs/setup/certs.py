@@ -14,6 +14,7 @@ from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import CliError
 from gateway.modbus import Role
 from gateway.modbus.certificate import ROLES
+from gateway.plain_file import tell_place_and_refusal
 from gateway.processes import exit_codes
 
 _HOSTS: Final = ("localhost", "127.0.0.1")
@@ -116,7 +117,8 @@ def _make(folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: 
         try:
             ca = certificates.load_ca(folder)
         except (OSError, ValueError) as error:
-            sentence = f"E174 the CA in {folder} cannot be used: {error}; another DIR makes a new one"
+            why = tell_place_and_refusal(error) if isinstance(error, OSError) else str(error)
+            sentence = f"E174 the CA in {folder} cannot be used: {why}; another DIR makes a new one"
             raise CliError(sentence, exit_codes.DATA) from None
         _say_earlier_end(folder, ca.certificate.not_valid_after_utc, days)
     else:
