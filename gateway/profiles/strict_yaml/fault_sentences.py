@@ -11,7 +11,9 @@ _UNITS: Final = {
     "n": "N", "v": "V", "s": "s", "ms": "ms", "us": "us", "hz": "Hz", "kg": "kg", "g": "g", "pa": "Pa", "kpa": "kPa",
     "mpa": "MPa", "bar": "bar", "m": "m", "mm": "mm", "m2": "m2", "mm2": "mm2", "n_per_v": "N/V", "n_per_s": "N/s",
     "v_per_s": "V/s", "n_per_m": "N/m", "v_per_n_s": "V/(N s)", "pa_per_v": "Pa/V", "n_s_per_m": "N s/m", "mv": "mV",
-    "kn": "kN", "kgf": "kgf", "khz": "kHz", "min": "min",
+    "kn": "kN", "kgf": "kgf", "khz": "kHz", "min": "min", "n_per_n": "N/N", "n_per_mm": "N/mm", "n_per_mm2": "N/mm2",
+    "n_s_per_mm": "N s/mm", "pa_per_s": "Pa/s", "pa_per_pa": "Pa/Pa", "m_per_s": "m/s", "per_s": "1/s", "per_n": "1/N",
+    "per_m": "1/m", "per_pa": "1/Pa",
 }  # fmt: skip
 _SCALES: Final = (
     {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
@@ -139,7 +141,9 @@ def _other_unit(key: str, value: object, known: list[str]) -> tuple[str, str] | 
         for other in scale:
             if other != unit and f"{stem}_{other}" in known:
                 is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-                amount = f": {float(value) * scale[unit] / scale[other]:.6g}" if is_number else ""  # type: ignore[arg-type]
+                factor = scale[unit] / scale[other]
+                factor = 1.0 / factor if stem.endswith("_per") else factor  # 0.05 V/ms are 50 V/s
+                amount = f": {float(value) * factor:.6g}" if is_number else ""  # type: ignore[arg-type]
                 return f"{stem}_{other}", amount
     return None
 
