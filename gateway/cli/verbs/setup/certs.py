@@ -11,6 +11,7 @@ from typing import Final
 import click
 
 from gateway.cli.command_line.given_path import GivenPath
+from gateway.cli.command_line.numbers import Whole
 from gateway.cli.errors import CliError
 from gateway.modbus import Role
 from gateway.modbus.certificate import ROLES
@@ -84,7 +85,7 @@ EXAMPLES = (
     metavar="NAME:ROLE",
     help=f"A client and its role: {', '.join(ROLES)}  [default: {', '.join(_CLIENTS)}]",
 )
-@click.option("--days", type=click.IntRange(1, 7300), default=825, show_default=True, help="How long they are valid.")
+@click.option("--days", type=Whole(1, 7300), default=825, show_default=True, help="How long they are valid.")
 def command(*, folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: int) -> None:
     """Make certificates for Modbus/TCP Security.
 
