@@ -89,7 +89,7 @@ _WIRE_OPTIONS: Final = (
     click.option(
         "--parity", type=click.Choice(_PARITIES), help=f"Of the serial line  [default: {defaults.RTU_PARITY}]"
     ),
-    click.option("--baud", type=Whole(1), help=f"Of the serial line  [default: {defaults.RTU_BAUD}]"),
+    click.option("--baud", type=Whole(0), help=f"Of the serial line  [default: {defaults.RTU_BAUD}]"),
     click.option("--key", type=_FILE, help="Of the client's certificate, PEM."),
     click.option("--cert", type=_FILE, help="The client's certificate, PEM."),
     click.option("--tls", type=_FILE, metavar="CA", help="By TLS: the CA of the gateway's certificate, PEM."),

@@ -7,7 +7,7 @@ OPTIONS = (
     ("certs here --days", "1 .. 7300"),
     ("upload demo --slot", "0 .. 7"),
     ("read state --unit", "0 .. 255"),
-    ("read state --baud", "at least 1"),
+    ("read state --baud", "at least 0"),
     ("calibrate --groups", "1 .. 100"),
 )
 
