@@ -20,6 +20,7 @@ from gateway.profiles.strict_yaml.text import Document
 
 T = TypeVar("T")
 _MOST_FINDINGS: Final = 50
+_MOST_NODES: Final = 3000
 _PROPOSED: Final[Mapping[str, Callable[[Any], Any]]] = {
     "string_type": lambda value: str(value).lower() if isinstance(value, bool) else f"{value}",
     "tuple_type": lambda value: [value],
@@ -144,7 +145,10 @@ def _refusal(kind: type, inside: Path, value: Any, proposed: Any, again: Mapping
 
 
 def _finding_with(kind: type, document: Document, path: Path, place: Path, value: Any) -> Mapping[str, Any] | None:
-    """Return the first finding at a place if this value stood there, None where it would be taken."""
+    """Return the first finding at a place if this value stood there, None where it would be taken. Not asked of a document that
+    is longer than people write: each answer reads all of it."""
+    if len(document.marks) > _MOST_NODES:
+        return None
     holder, kept = document.at(*place[:-1]), document.at(*place)
     holder[place[-1]] = value
     try:
