@@ -1,6 +1,7 @@
 """The command `force-gateway`. A verb's module is imported when that verb is called, so `--help` and `check` start fast
 and a verb's libraries cost only those who use it."""
 
+import codecs
 import io
 import os
 import sys
@@ -14,6 +15,7 @@ import click
 
 from gateway import VERSION
 from gateway.cli import plain_spelling
+from gateway.cli.command_line.given_path import refuse_empty_words
 from gateway.cli.errors import translate_error
 from gateway.processes import exit_codes
 
@@ -85,6 +87,12 @@ class VerbGroup(click.Group):
             one.short_help = one.get_short_help_str(_WHOLE)  # click itself cuts it at the width of the terminal
         return command
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Refuse a command line with an empty word in it, whichever argument or option it is."""
+        if not ctx.resilient_parsing:
+            refuse_empty_words(args)
+        return super().parse_args(ctx, args)
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -137,8 +145,14 @@ def _print_what_the_terminal_can() -> None:
     of a stray byte: a verb that has done its work ended on it."""
     plain_spelling.register()
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+        if isinstance(stream, io.TextIOWrapper) and _refuses_characters(stream):
             stream.reconfigure(errors=plain_spelling.ERRORS)
+
+
+def _refuses_characters(stream: io.TextIOWrapper) -> bool:
+    """Decide whether a character may end a verb; of a C locale's stream Python lets stray bytes through, and no character."""
+    is_utf_8 = codecs.lookup(stream.encoding).name == "utf-8"
+    return stream.errors == "strict" or (stream.errors == "surrogateescape" and not is_utf_8)
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ import click
 
 from gateway import defaults
 from gateway.cli.command_line.given_path import GivenPath
+from gateway.cli.command_line.numbers import Whole
 
 if TYPE_CHECKING:
     from gateway.cli.master.wires import Wire
@@ -83,14 +84,12 @@ def serial_port(context: click.Context, parameter: click.Parameter, value: str |
 
 
 _WIRE_OPTIONS: Final = (
-    click.option(
-        "--unit", type=click.IntRange(0, 255), default=defaults.UNIT_ID, show_default=True, help="Modbus unit id."
-    ),
+    click.option("--unit", type=Whole(0, 255), default=defaults.UNIT_ID, show_default=True, help="Modbus unit id."),
     click.option("--stop-bits", type=click.Choice(["1", "2"]), help="Of the serial line  [default: 1]"),
     click.option(
         "--parity", type=click.Choice(_PARITIES), help=f"Of the serial line  [default: {defaults.RTU_PARITY}]"
     ),
-    click.option("--baud", type=int, help=f"Of the serial line  [default: {defaults.RTU_BAUD}]"),
+    click.option("--baud", type=Whole(0), help=f"Of the serial line  [default: {defaults.RTU_BAUD}]"),
     click.option("--key", type=_FILE, help="Of the client's certificate, PEM."),
     click.option("--cert", type=_FILE, help="The client's certificate, PEM."),
     click.option("--tls", type=_FILE, metavar="CA", help="By TLS: the CA of the gateway's certificate, PEM."),

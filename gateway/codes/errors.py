@@ -119,11 +119,13 @@ ERRORS: Final = (
     ),
     Explanation(
         "E160",
-        "an extra is not installed",
-        "A library that this verb needs is not there, or does not load; holding a force does not need it.",
-        "The gateway was installed without the extra `analysis`: numba (simulates recordings: diagnose, simulate, watch) "
-        "and pyarrow (Parquet).",
-        "pip install 'force-gateway[analysis]' into the environment of the gateway; 250 MB more. CSV needs no extra.",
+        "a library is not installed, or broken",
+        "A library that this verb, the page, MQTT or OPC UA needs is not there, or does not load; holding a force does not "
+        "need it.",
+        "The gateway was installed without the extra `analysis`: numba (diagnose, simulate, watch), pyarrow (Parquet). Or an "
+        "installation was cut.",
+        "pip install 'force-gateway[analysis]' into the gateway's environment (250 MB more). What is broken: install it anew; "
+        "its process starts again by itself.",
     ),
     Explanation(
         "E170",

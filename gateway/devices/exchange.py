@@ -57,7 +57,8 @@ class Scale:
 
 def _scale(device: Span, physical: Span) -> Scale:
     if device[0] >= device[1] or physical[0] >= physical[1]:
-        raise ValueError(f"range {device} <-> {physical} must rise on both sides")
+        sides = " and ".join(f"{low:g} .. {high:g}" for low, high in (device, physical))
+        raise ValueError(f"{sides} must rise on both sides: the lower end comes first, and the ends differ")
     return Scale(device, physical)
 
 

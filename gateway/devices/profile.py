@@ -177,7 +177,8 @@ class DeviceProfile:
         numbers = [one for one in numbers if one.name == VALUE] or numbers
         if len(numbers) > 1 or any(not isinstance(one, NUMBERS) for one in numbers):
             raise TemplateError(
-                f"{quote(template_text)} must carry one number beside constants and words; of several, call one {{value:...}}"
+                f"{quote(template_text)} must carry one number beside constants and words; of several, call one {{value:...}}",
+                written=template_text,
             )
         return numbers[0] if numbers else None
 
@@ -251,17 +252,19 @@ def _check_output(profile: DeviceProfile) -> None:
         if exchange and profile.number_in(exchange.ask) is not None:
             raise TemplateError(f"{quote(exchange.ask)} asks for a number and must not carry one but under `constants`")
         if exchange and (not exchange.answer or profile.number_in(exchange.answer) is None):
-            raise TemplateError(f"{quote(exchange.answer)} carries no number")
+            raise TemplateError(f"{quote(exchange.answer)} carries no number", written=exchange.answer)
 
 
 def _check_setting(profile: DeviceProfile, ask: str) -> None:
     """A setting carries one number; whatever else changes in it is known beforehand."""
     number = profile.number_in(ask)
     if number is None:
-        raise TemplateError(f"{quote(ask)} carries no number")
+        raise TemplateError(f"{quote(ask)} carries no number", written=ask)
     for one in compile_template(ask).fields:
         if one != number and one.name not in profile.constants and not isinstance(one, Choice):
-            raise TemplateError(f"{quote(ask)}: {{{one.name}:...}} would go out as nothing: say it under `constants`")
+            raise TemplateError(
+                f"{quote(ask)}: {{{one.name}:...}} would go out as nothing: say it under `constants`", written=ask
+            )
 
 
 def _check_echo(profile: DeviceProfile, setting: VoltageExchange) -> None:

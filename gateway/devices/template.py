@@ -127,12 +127,15 @@ def _pieces(text: str) -> list[str | Field]:
                 pieces.append(literal)
             if name is not None:
                 if not name.isidentifier() or conversion:
-                    raise TemplateError(f"{quote(text)}: a field is {{name:shape}}")
+                    raise TemplateError(f"{quote(text)}: a field is {{name:shape}}", written=text)
                 pieces.append(field_from(name, spec or ""))
-    except TemplateError:
-        raise
-    except ValueError as error:  # a lone brace
-        raise TemplateError(f"{quote(text)}: {error}") from error
+    except TemplateError as error:
+        raise TemplateError(str(error), written=text) from error
+    except ValueError:  # a lone brace
+        raise TemplateError(
+            f"{quote(text)}: a field is {{name:shape}}; a brace that is sent itself is doubled, {{{{ or }}}}",
+            written=text,
+        ) from None
     return pieces
 
 
@@ -140,19 +143,23 @@ def _check(text: str, pieces: list[str | Field]) -> None:
     if not _TEXT.fullmatch(text):
         raise TemplateError(
             f"{text!r} is not printable text, SOH, STX, ETX, EOT, ENQ, ACK, NAK, ESC or tab (CR and LF at its end belong to "
-            '`terminator`, ahead of an ETX too: "\\r\\x03")'
+            '`terminator`, ahead of an ETX too: "\\r\\x03")',
+            written=text,
         )
     if spelt := _SPELT.search(text):
         raise TemplateError(
             f"{quote(text)}: {spelt[0]} would be {len(spelt[0])} characters on the wire. Between double quotes STX is "
-            '"\\x02", ETX "\\x03", ENQ "\\x05", ACK "\\x06", ESC "\\x1b", a tab "\\t"; CR and LF at the end are the terminator'
+            '"\\x02", ETX "\\x03", ENQ "\\x05", ACK "\\x06", ESC "\\x1b", a tab "\\t"; CR and LF at the end are the terminator',
+            written=text,
         )
     names = [piece.name for piece in pieces if not isinstance(piece, str)]
     if len(set(names)) != len(names):
-        raise TemplateError(f"{quote(text)} uses a field twice")
+        raise TemplateError(f"{quote(text)} uses a field twice", written=text)
     for piece, following in pairwise(pieces):
         if not isinstance(piece, str) and piece.is_open and _runs_on(piece, following):
-            raise TemplateError(f"{quote(text)}: nothing marks the end of {{{piece.name}}}; give it a width")
+            raise TemplateError(
+                f"{quote(text)}: nothing marks the end of {{{piece.name}}}; give it a width", written=text
+            )
 
 
 def _runs_on(piece: Field, following: str | Field) -> bool:

@@ -12,6 +12,7 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.plain_file import tell_refusal
 from gateway.recording.errors import RecordingError
 
 Row = dict[str, Any]
@@ -60,7 +61,8 @@ def _task_of(path: str) -> Task:
 
 def error_row(task: Task, error: BaseException | str) -> Row:
     """Return the row of a recording that has no answer."""
-    text = str(error) or type(error).__name__
+    told = tell_refusal(error) if isinstance(error, OSError) else str(error)
+    text = told or type(error).__name__
     match = _CODED.match(text)
     known = isinstance(error, (OSError, ValueError, RecordingError, str))
     code, sentence = match.groups() if match else (UNREADABLE if known else INTERNAL, text)

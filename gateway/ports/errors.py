@@ -73,7 +73,7 @@ def explain_open_failure(path: str, error: Exception, present: Sequence[str]) ->
         return PortError("E102", f"{path} does not open: {_SHORTAGES[number]}")
     if number in _NO_PORT:
         return PortError("E102", f"{path} is no serial port: `force-gateway ports` lists those of this machine")
-    return PortError("E102", f"{path} does not open as a serial port: {error}")
+    return PortError("E102", f"{path} does not open as a serial port: {os.strerror(number) if number else error}")
 
 
 def classify_open_failure(error: Exception) -> PortCode:

@@ -15,7 +15,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.extras import MissingExtraError
+from gateway.extras import MissingExtraError, tell_broken_import
 from gateway.processes import exit_codes
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
@@ -81,8 +81,9 @@ def serve_until_guardian_ends(source: str, arguments: list[str], serve: Serve) -
             asyncio.run(serve(options, log))
         except* (MissingExtraError, OSError) as failed:
             log("start", str(_first_of(failed)))
-        except* (MemoryError, ImportError, SystemError) as failed:  # whatever a library makes of it
-            if not (sentence := _too_little_memory(_first_of(failed))):
+        except* Exception as failed:
+            first = _first_of(failed)
+            if not (sentence := _too_little_memory(first) or tell_broken_import(first)):
                 raise
             log("start", sentence)
     return exit_codes.DEVICE
@@ -108,6 +109,8 @@ def _hear_libraries(log: EventLog) -> None:
 def _too_little_memory(error: BaseException) -> str:
     """Return the sentence on an error for want of memory; empty where it is another one, as far as anybody can tell."""
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if not isinstance(error, (MemoryError, ImportError, SystemError)):  # whatever a library makes of it
+        return ""
     if isinstance(error, ImportError) and not _was_mapped(error):
         return ""
     if limit == resource.RLIM_INFINITY:

@@ -52,6 +52,8 @@ def locate(kind: str, name: str, beside: Path | None = None, *, of_any_kind: boo
     for candidate in (path, folder / f"{name}.yaml", folder / FOLDERS[kind] / f"{name}.yaml"):
         if _is_file(candidate):
             return candidate
+    if refusal := _refusal_of(path):
+        raise FileNotFoundError(f"cannot be looked for: {refusal}")
     if other := _other_kind(path):
         cure = ": name the file in it" if other == DIRECTORY else f", and no {_called(kind)} file"
         raise FileNotFoundError(f"is {other}{cure}")
@@ -78,6 +80,17 @@ def _is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):  # a name that is too long, or holds what no file name may
         return False
+
+
+def _refusal_of(path: Path) -> str:
+    """Return why this user may not look whether a file is there; empty where he may."""
+    try:
+        path.stat()
+    except PermissionError as error:
+        return str(error.strerror)
+    except (OSError, ValueError):
+        return ""
+    return ""
 
 
 def _other_kind(path: Path) -> str:

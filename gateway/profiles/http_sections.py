@@ -25,6 +25,7 @@ _SAID: Final = re.compile(rf"(?:{'|'.join(_SECRETS)})[\"']?\s*[:=]\s*(\S.*)", re
 _LEAST: Final = 8  # characters of a secret that is looked for in comments: a shorter one stands in any word
 _NULL: Final = "tag:yaml.org,2002:null"
 _LAST_PORT: Final = 65535
+_OPCUA_PORT: Final = 4840  # IANA's for OPC UA
 _BLANK: Final = "removed-from-this-copy"
 
 
@@ -54,9 +55,16 @@ def split_listen(text: str) -> tuple[str, int]:
 Listen = Annotated[str, AfterValidator(_check_listen), BeforeValidator(_refuse_bare_port)]
 
 
+def _refuse_any_port(value: object) -> object:
+    """Propose no port 0 in the place of a 0 alone, as elsewhere: it is refused here."""
+    if str(value).removeprefix(":") == "0":
+        raise ValueError(f"{value} is no port that a client could know: write {defaults.HOST}:{_OPCUA_PORT}")
+    return value
+
+
 def _check_fixed_port(listen: str) -> str:
     if split_listen(listen)[1] == 0:
-        raise ValueError(f'"{listen}" has no port that a client could know; 4840 is usual')
+        raise ValueError(f'"{listen}" has no port that a client could know; {_OPCUA_PORT} is usual')
     return listen
 
 
@@ -89,8 +97,8 @@ class OpcUa:
     """The gateway's figures for clients of OPC UA, read only."""
 
     __pydantic_config__ = STRICT
-    listen: Annotated[Listen, AfterValidator(_check_fixed_port)] = (
-        f"{defaults.HOST}:4840"  # HOST:PORT of opc.tcp://HOST:PORT/
+    listen: Annotated[Listen, BeforeValidator(_refuse_any_port), AfterValidator(_check_fixed_port)] = (
+        f"{defaults.HOST}:{_OPCUA_PORT}"  # HOST:PORT of opc.tcp://HOST:PORT/
     )
 
 

@@ -109,11 +109,16 @@ def of_another_kind(folder: Path) -> None:
     (folder / "ca.key").write_bytes(key.private_bytes(*form))
 
 
+def without_key(folder: Path) -> None:
+    (folder / "ca.key").unlink()
+
+
 @pytest.mark.parametrize(
     ("days", "spoil", "sentence"),
     [
         (-1, None, "it expired on 20"),
         (30, with_password, "ca.key has a password: openssl pkey -in ca.key -out NEW.key takes it off"),
+        (30, without_key, "{folder}/ca.key: No such file or directory; another DIR makes a new one"),
         (30, of_another_kind, "ca.key is none over an elliptic curve, as certs makes them"),
     ],
 )
@@ -126,7 +131,7 @@ def test_a_ca_that_cannot_sign_is_told_apart(
         spoil(tmp_path)
     said = CliRunner().invoke(command, ["certs", str(tmp_path), "--client", "robot:setpoint"])
     assert said.exit_code == exit_codes.DATA and not (tmp_path / "robot.crt").exists()
-    assert said.output.startswith(f"E174 the CA in {tmp_path} cannot be used: {sentence}")
+    assert said.output.startswith(f"E174 the CA in {tmp_path} cannot be used: {sentence.format(folder=tmp_path)}")
 
 
 def test_it_is_said_when_a_client_is_shut_out(tmp_path: Path) -> None:

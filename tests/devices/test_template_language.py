@@ -202,7 +202,7 @@ def test_blanks_are_a_value_only_where_they_may_be() -> None:
         ("{x:N}", "one word alone is text: write it without braces"),
         ("{x:.0f}", "none of"),
         ("{x:d", "'{x:d'"),
-        ("x}", "Single '}'"),
+        ("x}", "a brace that is sent itself is doubled"),
         ("{:d}", "{name:shape}"),
         ("{x!r:d}", "{name:shape}"),
         ("{x:d}{y:d}", "nothing marks the end of {x}"),

@@ -10,3 +10,8 @@ def test_an_error_row_does_not_say_its_file_twice() -> None:
     row = error_row(task, RecordingError("recordings/bad.csv: no column time_s"))
     assert (row["file"], row["error_code"], row["error"]) == ("recordings/bad.csv", "E403", "no column time_s")
     assert error_row(task, RecordingError("recordings/bad.csv:3: 2 cells"))["error"] == "recordings/bad.csv:3: 2 cells"
+
+
+def test_a_file_that_may_not_be_read_is_told_without_a_number_and_its_name_once() -> None:
+    error = PermissionError(13, "Permission denied", "recordings/bad.fgr")
+    assert error_row(Task("recordings/bad.fgr", "7", "", ""), error)["error"] == "Permission denied"

@@ -89,6 +89,14 @@ def test_no_port_at_all_asks_for_the_adapter(ear: Any, monkeypatch: pytest.Monke
     assert str(told) == "E102 /dev/ttyUSB7 is not there, nor is any other serial port: is the adapter plugged in?"
 
 
+def test_a_ring_of_links_is_told_once_and_without_a_number(ear: Any, tmp_path: Path) -> None:
+    """'[Errno 40] could not open port X: [Errno 40] Too many levels of symbolic links: X' was."""
+    ring = tmp_path / "ring"
+    ring.symlink_to("ring")
+    told = asyncio.run(told_by_opening(ear, str(ring)))
+    assert told.sentence == f"{ring} does not open as a serial port: Too many levels of symbolic links"
+
+
 def test_a_file_is_no_serial_port(ear: Any, tmp_path: Path) -> None:
     file = tmp_path / "port"
     file.write_text("")

@@ -1,6 +1,7 @@
 """Profiles are found by shipped name or path, and what is not found is told with what is there."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -98,6 +99,20 @@ def test_a_file_that_may_not_be_read_is_told(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(Path, "read_bytes", refuse)
     (fault,) = check_report(path).faults
     assert fault.message == "cannot be read: Permission denied"
+
+
+def test_a_folder_that_may_not_be_looked_into_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """'is no file' had its owner look for a mistyped name."""
+    path, stat = tmp_path / "shut" / "rig.yaml", Path.stat
+
+    def refuse(self: Path, **how: Any) -> Any:
+        if self == path:
+            raise PermissionError(13, "Permission denied")
+        return stat(self, **how)
+
+    monkeypatch.setattr(Path, "stat", refuse)
+    (fault,) = check_report(path).faults
+    assert fault.message == "cannot be looked for: Permission denied"
 
 
 def test_a_file_that_is_far_too_long_is_refused_without_being_read(

@@ -1,6 +1,7 @@
 """Paths of the command line as people mean them, and an empty name, which a variable of the shell that is not set leaves."""
 
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from stat import S_ISDIR
@@ -11,6 +12,7 @@ import click
 from gateway.plain_file import expand_home
 
 EMPTY: Final = "an empty name: is a variable of the shell not set?"
+_MAY_BE_EMPTY: Final = ("--name", "--note")  # words for people
 
 
 class GivenPath(click.Path):
@@ -25,6 +27,8 @@ class GivenPath(click.Path):
         """Return the path; BadParameter where it breaks a rule of click.Path, or names nothing."""
         if not os.fspath(value):
             self.fail(EMPTY, param, ctx)
+        if (self.exists or not self.file_okay) and (target := lost_target(expand_home(value))):
+            self.fail(f"{os.fspath(value)!r} is a link to {target}, and there is nothing", param, ctx)
         path = super().convert(expand_home(value), param, ctx)
         with suppress(OSError):  # not there yet, or not for us to look at; click refuses files alone, a device is none
             is_folder = S_ISDIR(Path(os.fsdecode(path)).stat().st_mode)
@@ -33,8 +37,20 @@ class GivenPath(click.Path):
         return path
 
 
-def named_rig(context: click.Context, parameter: click.Parameter, value: str) -> str:
-    """Return the name of a rig that is to run, for an argument's callback."""
-    if not value:
-        raise click.BadParameter(EMPTY)
-    return value
+def lost_target(path: Path) -> str:
+    """Return where a link leads behind which nothing is, or a ring of links; empty for any other path."""
+    with suppress(OSError, ValueError):
+        if not path.exists():
+            return str(path.readlink())
+    return ""
+
+
+def refuse_empty_words(words: Sequence[str]) -> None:
+    """Raise UsageError for a command line with an empty word in it: as a recording it was an internal error, and as --rig it
+    was demo's."""
+    for before, word in zip(("", *words), words, strict=False):
+        option = before if before.startswith("-") else ""
+        if word.startswith("--") and word.endswith("="):
+            option, word = word[:-1], ""
+        if not word and option not in _MAY_BE_EMPTY:
+            raise click.UsageError(f"{option}: {EMPTY}" if option else EMPTY)

@@ -5,6 +5,7 @@ given alone it is the one whose gateway runs on it, else the one whose recording
 calibration, limits and retention would be another rig's.
 """
 
+import os
 from pathlib import Path
 
 import click
@@ -59,6 +60,8 @@ def check_rig(name: str) -> None:
     path = expand_home(name)
     if name in known_rigs() or _has_state(name) or path.is_file() or path.with_name(f"{path.name}.yaml").is_file():
         return
+    if os.path.lexists(path):
+        raise click.UsageError(f"rig {name} {_what_is_there(name)}")
     from difflib import get_close_matches
 
     near = get_close_matches(name, known_rigs(), n=1)
@@ -69,6 +72,16 @@ def check_rig(name: str) -> None:
     raise click.UsageError(
         f"rig {name} {what}{meant} Shipped: {', '.join(_shipped())}.{here} Or a file, such as my-cell.yaml."
     )
+
+
+def _what_is_there(name: str) -> str:
+    """Return what keeps a name that is there from being a rig's file: a pipe, a link to nothing."""
+    from gateway.profiles.find import locate
+
+    try:
+        return f"is {locate('rig', name)}"  # it has become a file meanwhile
+    except FileNotFoundError as error:
+        return str(error)
 
 
 def _shipped() -> list[str]:

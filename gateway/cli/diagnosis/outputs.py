@@ -3,8 +3,7 @@
 import contextlib
 import errno
 import os
-import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -56,12 +55,12 @@ def write_all(texts: Mapping[Path, str]) -> None:
     A device (/dev/null, a terminal) is written to in the end: nobody wants it replaced by a file. Ctrl-C before the first
     is renamed: KeyboardInterrupt, and no file has changed either; later it comes too late.
     """
-    pressed = threading.Event()
-    with handle_interrupt(lambda number, frame: pressed.set()):
+    pressed: list[int] = []  # no Event: its lock may be held where the handler comes in
+    with handle_interrupt(lambda number, frame: pressed.append(number)):
         _write_all(texts, pressed)
 
 
-def _write_all(texts: Mapping[Path, str], pressed: threading.Event) -> None:
+def _write_all(texts: Mapping[Path, str], pressed: Sequence[int]) -> None:
     for path in texts:
         _refuse_place(path)
     devices = [path for path in texts if path.exists() and not path.is_file()]
@@ -69,8 +68,9 @@ def _write_all(texts: Mapping[Path, str], pressed: threading.Event) -> None:
     beside = {path: place.with_name(f".{place.name}.{os.getpid()}") for path, place in places.items()}
     try:
         for path, fresh in beside.items():
-            fresh.write_text(texts[path], encoding="utf-8")
-        if pressed.is_set():
+            with _told_by(path):
+                fresh.write_text(texts[path], encoding="utf-8")
+        if pressed:
             raise KeyboardInterrupt
         for path, fresh in beside.items():
             fresh.replace(places[path])
@@ -78,7 +78,17 @@ def _write_all(texts: Mapping[Path, str], pressed: threading.Event) -> None:
         for fresh in beside.values():
             fresh.unlink(missing_ok=True)
     for path in devices:
-        path.write_text(texts[path], encoding="utf-8")
+        with _told_by(path):
+            path.write_text(texts[path], encoding="utf-8")
+
+
+@contextlib.contextmanager
+def _told_by(path: Path) -> Iterator[None]:
+    """Have an OSError name the file that was asked for: that of a full disk names none, others the one beside it."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
 
 
 def _refuse_place(target: Path) -> None:

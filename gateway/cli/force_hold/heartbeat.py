@@ -13,6 +13,7 @@ from typing import Final
 from gateway import defaults
 from gateway.cli.errors import CliError
 from gateway.cli.force_hold.sequence import STATUS_NAMES, HoldEnd, HoldRun, HoldWrite, StatusReading, status_reading_of
+from gateway.cli.force_hold.signal_flag import SignalFlag
 from gateway.cli.master.byte_order_proof import write_with_proof
 from gateway.cli.master.client import Assignment, GatewayClient
 from gateway.cli.master.refusal_text import explain_refusals
@@ -60,8 +61,8 @@ class HeartbeatThread(threading.Thread):
         self.status: StatusReading | None = None
         self.warned = WarningBit(0)  # every warning that there was
         self.failure: Exception | None = None
-        self.stopping = threading.Event()
-        self.dropping = threading.Event()
+        self.stopping = SignalFlag()
+        self.dropping = SignalFlag()
         self.ends_s = inf
         self._pause = threading.Event()  # nobody ends it
         self._client = client

@@ -79,7 +79,10 @@ class TlsWire(TcpWire):
         if reason in _WEAK:
             why = reason.lower().replace("_", " ")
             return f"E174 {certificate} is refused by this machine's OpenSSL ({why}): make one with a stronger key"
-        return f"E174 {ca}, {certificate} or {key} is no PEM file of its kind"
+        for file in (ca, certificate):
+            if not _has_certificates(file):
+                return f"E174 {file} is no PEM file with a certificate"
+        return f"E174 {key} is no PEM file with a private key"
 
     def _shake_hands(self, context: "ssl.SSLContext", plain: "socket.socket") -> "socket.socket":
         import ssl
@@ -112,3 +115,14 @@ class TlsWire(TcpWire):
             text = f"E176 {self.where} {cause}: it probably refuses {self.files.certificate} ({why}); {_ASK_LOG}"
             return CliError(text, exit_codes.DEVICE)
         return CliError(f"E131 {self.where} {cause}", exit_codes.DEVICE)
+
+
+def _has_certificates(file: Path) -> bool:
+    """Return whether OpenSSL finds a certificate in a PEM file."""
+    import ssl
+
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_verify_locations(file)
+    except OSError:  # what OpenSSL says, too
+        return False
+    return True

@@ -108,8 +108,11 @@ def install_service(plan: Installation, root: Path) -> tuple[list[Path], bool]:
             beside.write_text(text, encoding="utf-8")
             beside.replace(path)
         except PermissionError:
+            again = shlex.join(
+                [str(_own_command()), *sys.argv[1:]]
+            )  # `python -m gateway` has no name that sudo could run
             raise CliError(
-                f"E107 {path}: only root may write there; sudo {shlex.join(sys.argv)}, or --root DIR for an image",
+                f"E107 {path}: only root may write there; sudo {again}, or --root DIR for an image",
                 exit_codes.PERMISSION,
             ) from None
         written.append(path)

@@ -9,7 +9,12 @@ LONGEST_NUMBER: Final = 10  # digits of an open number: more is not a reading bu
 
 
 class TemplateError(ValueError):
-    """The profile's author wrote a template that means nothing; the sentence quotes it."""
+    """The profile's author wrote a template that means nothing; the sentence quotes it. written: the template, where it is
+    known: a reader of the file finds its line by that."""
+
+    def __init__(self, sentence: str, *, written: str = "") -> None:
+        super().__init__(sentence)
+        self.written = written
 
 
 class ValueRefused(ValueError):  # noqa: N818 - says what happened, as Refused does

@@ -21,7 +21,7 @@ from gateway.control.settings import (
 )
 from gateway.devices import DeviceProfile
 from gateway.profiles.find import display, shipped_profiles_folder
-from gateway.profiles.http_sections import Web, without_secrets
+from gateway.profiles.http_sections import Metrics, OpcUa, Web, without_secrets
 from gateway.profiles.kinds.calibrations import read_calibration
 from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.kinds.plants import PlantProfile, read_plant
@@ -179,6 +179,8 @@ def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
         self_test=_optional_part(document, "self_test", SelfTestSettings),
         network=_part(document, "network", Network),
         web=_optional_part(document, "web", Web),
+        metrics=_optional_part(document, "metrics", Metrics),
+        opcua=_optional_part(document, "opcua", OpcUa),
         fieldbus=_faces(document, folder),
         calibration=read_part("calibration", ("calibration",), read_calibration),
         output_device=_as_set(output_device, output),

@@ -3,9 +3,10 @@
 A further kind is one more dataclass here and one more member of `Face`, with its own word as `type`.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
 from annotated_types import Ge, Le, MinLen
 from pydantic import AfterValidator, Field, WithJsonSchema
@@ -16,6 +17,9 @@ from gateway.devices.line_settings import Baud, Parity, SerialSettings
 from gateway.modbus.rtu import LARGEST_UNIT
 from gateway.plain_file import expand_home
 from gateway.profiles.rigs.addresses import Address, Network4Or6
+
+_OF_TLS: Final = ("bind", "certificate", "key", "ca", "allow", "revoked")
+_OF_RTU: Final = ("baud", "parity", "stop_bits", "unit", "role")
 
 
 def _rtu_unit(unit: int) -> int:
@@ -38,6 +42,7 @@ RtuUnit = Annotated[
 class RtuFace:
     """Modbus RTU on a serial port, RS-485 or RS-232: a server with one unit id."""
 
+    KEPT_ELSEWHERE: ClassVar[Mapping[str, str]] = dict.fromkeys(_OF_TLS, "to a face of `type: tls`")
     __pydantic_config__ = STRICT
     type: Literal["rtu"]  # Modbus RTU on a serial port
     port: Annotated[str, MinLen(1)] | None = None  # /dev/serial/by-id/...; absent in a simulated rig: a pseudo-terminal
@@ -71,6 +76,7 @@ FilePath = Annotated[str, MinLen(1)]
 class TlsFace:
     """Modbus/TCP Security: Modbus TCP by TLS 1.2 or 1.3, both sides with certificates, the role out of the client's."""
 
+    KEPT_ELSEWHERE: ClassVar[Mapping[str, str]] = dict.fromkeys(_OF_RTU, "to a face of `type: rtu`")
     __pydantic_config__ = STRICT
     type: Literal["tls"]  # Modbus TCP by TLS
     bind: Address = defaults.HOST  # the gateway's own address; any but loopback needs `allow`

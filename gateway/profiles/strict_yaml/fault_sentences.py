@@ -11,7 +11,9 @@ _UNITS: Final = {
     "n": "N", "v": "V", "s": "s", "ms": "ms", "us": "us", "hz": "Hz", "kg": "kg", "g": "g", "pa": "Pa", "kpa": "kPa",
     "mpa": "MPa", "bar": "bar", "m": "m", "mm": "mm", "m2": "m2", "mm2": "mm2", "n_per_v": "N/V", "n_per_s": "N/s",
     "v_per_s": "V/s", "n_per_m": "N/m", "v_per_n_s": "V/(N s)", "pa_per_v": "Pa/V", "n_s_per_m": "N s/m", "mv": "mV",
-    "kn": "kN", "kgf": "kgf", "khz": "kHz", "min": "min",
+    "kn": "kN", "kgf": "kgf", "khz": "kHz", "min": "min", "n_per_n": "N/N", "n_per_mm": "N/mm", "n_per_mm2": "N/mm2",
+    "n_s_per_mm": "N s/mm", "pa_per_s": "Pa/s", "pa_per_pa": "Pa/Pa", "m_per_s": "m/s", "per_s": "1/s", "per_n": "1/N",
+    "per_m": "1/m", "per_pa": "1/Pa",
 }  # fmt: skip
 _SCALES: Final = (
     {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
@@ -33,6 +35,8 @@ _WITH_UNIT: Final = re.compile(rf"({_DECIMAL.pattern}) ?(?P<unit>[^\W\d]\S*)")
 _FORMS: Final = {
     "^[a-z0-9][a-z0-9._-]{0,62}$": "small letters a-z, digits and . _ -, at most 63, a letter or digit first",
     "^/": "an absolute path, with / first",
+    r"^[^/#+\x00]{1,100}$": "1 to 100 characters, none of them / # +",
+    r"^[^/#+\x00][^#+\x00]{0,199}$": "1 to 200 characters, none of them # +, and no / first",
 }
 """Patterns of texts in words."""
 _SHORT: Final = 40  # characters of a value that is quoted whole
@@ -137,7 +141,9 @@ def _other_unit(key: str, value: object, known: list[str]) -> tuple[str, str] | 
         for other in scale:
             if other != unit and f"{stem}_{other}" in known:
                 is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-                amount = f": {float(value) * scale[unit] / scale[other]:.6g}" if is_number else ""  # type: ignore[arg-type]
+                factor = scale[unit] / scale[other]
+                factor = 1.0 / factor if stem.endswith("_per") else factor  # 0.05 V/ms are 50 V/s
+                amount = f": {float(value) * factor:.6g}" if is_number else ""  # type: ignore[arg-type]
                 return f"{stem}_{other}", amount
     return None
 
@@ -161,6 +167,8 @@ def _hint(value: Any, what: str, unit: str) -> str:
         return f': write "{number(value)}" in quotes'
     if what == "a list" and isinstance(value, (int, str)) and len(str(value)) <= _SHORT:
         return f": write [{quote_value(value)}]"
+    if what == "a list" and isinstance(value, dict):
+        return ": write `- ` before its first key, and spaces before the others"
     if isinstance(value, _Secret) and what == "text":
         return ": write it in quotes"
     if not isinstance(value, str):
@@ -205,7 +213,8 @@ def _choices(listed: object) -> list[str]:
 def _kind_choice(value: Any, context: dict[str, Any], unit: str) -> str:
     """Return the sentence about a group whose `type` is not there, or none of the known."""
     if "tag" not in context or (isinstance(value, dict) and value.get("type") is None):
-        return "has no type: it says what this is"
+        types = context.get("types") or _choices(context["expected_tags"])
+        return f"has no type: it says what this is, one of {one_of(types)}"
     elsewhere = _TYPES_ELSEWHERE.get(str(context["tag"]), "")
     return f"type {_choice(context['tag'], {'expected': context['expected_tags']}, unit)}{elsewhere}"
 
@@ -234,12 +243,19 @@ def _nearest(value: Any, choices: list[str]) -> str | None:
     return min(near, key=lambda choice: abs(value - int(choice)), default=None)
 
 
-def tell_group(sentence: str, value: object, known: list[str]) -> str:
-    """Return a sentence about a value in whose place a group of keys may stand: what says the same in a group that is
-    switched on and off by a key, else the first of its keys."""
+def tell_group(sentence: str, value: object, known: list[str], *, without: bool, empty: bool) -> str:
+    """Return a sentence about a value in whose place a group of keys may stand: what says the same for a word that switches
+    the group on or off, else the first of its keys. without: a file that leaves the group out has none; empty: every key
+    has a default."""
     switch = str(_SWITCHES.get(str(value).lower(), "")).lower()
     if switch and "enabled" in known:
         return f"{sentence}: write {{enabled: {switch}}}"
+    if switch == "false" and without:
+        return f"{sentence}: leave it out, and there is none"
+    if switch == "true" and without and empty:
+        return f"{sentence}: write {{}}, or its keys: {one_of(known)}"
+    if isinstance(value, list) and value and all(isinstance(entry, dict) for entry in value):
+        return f"{sentence}: write its keys without `- ` before them"
     keys = one_of(known[:_MOST_KEYS]) + (" ..." if len(known) > _MOST_KEYS else "")
     word, is_word, _ = sentence.partition(_ONLY_CHOICE)
     return f"{word}, nor a group of keys: {keys}" if is_word else f"{sentence}: {keys}"
@@ -283,11 +299,12 @@ _BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {
 }
 
 
-def type_sentence(error: Mapping[str, Any], value: Any, key: object) -> str:
-    """Return the sentence for one pydantic error about a value that is there; value as the file has it."""
+def type_sentence(error: Mapping[str, Any], value: Any, key: object, *, optional: bool = False) -> str:
+    """Return the sentence for one pydantic error about a value that is there; value as the file has it. optional: the key may
+    be left out."""
     context: dict[str, Any] = error.get("ctx") or {}
     if value is None and error["type"] != "value_error":
-        return "has no value"
+        return "has no value: write one, or leave this line out" if optional else "has no value"
     if key in _SECRETS and isinstance(value, (str, int, float)) and not isinstance(value, bool):
         value = _Secret(value)
     words = _BY_TYPE.get(error["type"])

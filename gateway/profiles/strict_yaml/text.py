@@ -156,6 +156,8 @@ class _Reader:
         if event.style in _BLOCKS and not event.value:
             sentence = "begins text on the lines below it, and none is there: quote it where it is meant itself"
             return self._fault(event, path, f"`{event.style}` {sentence}")
+        if "\0" in event.value:  # ends a name for the operating system, whose calls refuse it in their own words
+            return self._fault(event, path, "`\\0` may stand in no text: leave it out")
         if not event.implicit[0]:  # quoted, a block, or `!!str`; both parsers say it here, not in `style`
             return event.value
         try:

@@ -6,20 +6,26 @@ dataclasses themselves (`Annotated[float, Gt(0)]`, `__pydantic_config__ = {"extr
 """
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from functools import cache
 from types import UnionType
 from typing import Any, Final, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from gateway.profiles.strict_yaml.fault_sentences import tell_group, type_sentence, unit_of, unknown_key
-from gateway.profiles.strict_yaml.faults import FaultKind, Path, ProfileFault, path_text
+from gateway.profiles.strict_yaml.fault_sentences import quote_value, tell_group, type_sentence, unit_of, unknown_key
+from gateway.profiles.strict_yaml.faults import FaultKind, Path, ProfileFault, one_of, path_text
 from gateway.profiles.strict_yaml.text import Document
 
 T = TypeVar("T")
 _MOST_FINDINGS: Final = 50
+_MOST_NODES: Final = 3000
+_PROPOSED: Final[Mapping[str, Callable[[Any], Any]]] = {
+    "string_type": lambda value: str(value).lower() if isinstance(value, bool) else f"{value}",
+    "tuple_type": lambda value: [value],
+}
+"""Kind of a finding -> what its sentence proposes for a word or a number."""
 _WORDS: Final = ("literal_error", "string_type", "int_type", "float_type", "bool_type")  # what is no word, no number
 
 
@@ -76,9 +82,8 @@ def _place_findings(document: Document, path: Path, findings: list[Any]) -> list
     """Return one finding for each place of the document. Where a word or a group of keys may stand and a group does, what
     keeps it from being the word is no finding beside what is wrong with the group."""
     placed = [(_place(document, path, finding), finding) for finding in findings]
-    inside = {
-        place[:end] for place, finding in placed if finding["type"] not in _WORDS for end in range(len(place) + 1)
-    }
+    inside = {place[:end] for place, _ in placed for end in range(len(place))}
+    inside |= {place for place, finding in placed if finding["type"] not in _WORDS}
     kept: dict[Path, Any] = {}
     for place, finding in placed:
         if not (finding["type"] in _WORDS and place in inside and isinstance(document.at(*place), dict)):
@@ -99,11 +104,78 @@ def _fault(kind: type, document: Document, path: Path, place: Path, finding: Map
         elsewhere |= getattr(holder, "KEPT_ELSEWHERE", {})
         sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, elsewhere)
         return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=suggestion)
-    value, group = document.at(*place), kind_at(kind, place[len(path) :])
-    sentence = type_sentence(finding, value, key)
-    if finding["type"] in ("dataclass_type", "literal_error") and value is not None and is_dataclass(group):
-        sentence = tell_group(sentence, value, names(group))
-    return document.fault(place, sentence)
+    if written := getattr((finding.get("ctx") or {}).get("error"), "written", ""):
+        place = _place_of(written, document, place)
+    return document.fault(place, _sentence(kind, document, path, place, finding))
+
+
+def _place_of(text: str, document: Document, group: Path) -> Path:
+    """Return where a text stands in a group whose rule has refused it; the group where it stands there more than once."""
+    found = [place for place in document.marks if place[: len(group)] == group and document.at(*place) == text]
+    return found[0] if len(found) == 1 else group
+
+
+def _sentence(kind: type, document: Document, path: Path, place: Path, finding: Mapping[str, Any]) -> str:
+    """Return what is wrong with a value that is there, and what may stand in its place."""
+    value, inside, key = document.at(*place), place[len(path) :], place[-1] if place else ""
+    if finding["type"] in _PROPOSED and isinstance(value, (str, int, float)):
+        proposed = _PROPOSED[finding["type"]](value)
+        if again := _finding_with(kind, document, path, place, proposed):
+            return _refusal(kind, inside, value, proposed, again)
+    types = _types(kind, inside)
+    if finding["type"] == "union_tag_not_found":
+        finding = {**finding, "ctx": {"types": types}}
+    field = _field(kind_at(kind, inside[:-1], document.at(*place[:-1])), key)
+    sentence = type_sentence(finding, value, key, optional=field is not None and _has_default(field))
+    if finding["type"] == "dict_type" and types:
+        return f"{sentence} with a type: {one_of(types)}"
+    group = kind_at(kind, inside)
+    if finding["type"] not in ("dataclass_type", "literal_error") or value is None or not is_dataclass(group):
+        return sentence
+    without = field is not None and field.default is None
+    return tell_group(sentence, value, names(group), without=without, empty=all(map(_has_default, fields(group))))
+
+
+def _refusal(kind: type, inside: Path, value: Any, proposed: Any, again: Mapping[str, Any]) -> str:
+    """Return why what a sentence would propose is refused, too: `bind: true` was told to go in quotes, and refused there."""
+    if not isinstance(proposed, list):
+        return type_sentence(again, proposed, inside[-1])
+    types = f" with a type: {one_of(_types(kind, inside))}" if again["type"] == "dict_type" else ""
+    return f"{quote_value(value)} is not a list, and {type_sentence(again, value, inside[-1])}{types}"
+
+
+def _finding_with(kind: type, document: Document, path: Path, place: Path, value: Any) -> Mapping[str, Any] | None:
+    """Return the first finding at a place if this value stood there, None where it would be taken. Not asked of a document that
+    is longer than people write: each answer reads all of it."""
+    if len(document.marks) > _MOST_NODES:
+        return None
+    holder, kept = document.at(*place[:-1]), document.at(*place)
+    holder[place[-1]] = value
+    try:
+        adapter(cast("Any", kind)).validate_json(json.dumps(document.at(*path)), strict=True)
+    except ValidationError as error:
+        findings = _keep_first_findings(error)
+        return next((one for one in findings if _place(document, path, one)[: len(place)] == place), None)
+    finally:
+        holder[place[-1]] = kept
+    return None
+
+
+def _types(kind: type, path: Path) -> list[str]:
+    """Return the words that the `type` of a group of several kinds may be."""
+    steps = [step for step in path if isinstance(step, str)]
+    holder = kind_at(kind, tuple(steps[:-1]))
+    kinds = [inner for name, inner in groups(holder) if name == steps[-1]] if holder and steps else []
+    return [word for inner in kinds for word in get_args(get_type_hints(inner).get("type"))]
+
+
+def _field(kind: type | None, key: object) -> Field[Any] | None:
+    known = fields(kind) if kind is not None and is_dataclass(kind) else ()
+    return next((field for field in known if field.name == key), None)
+
+
+def _has_default(field: Field[Any]) -> bool:
+    return not (field.default is MISSING and field.default_factory is MISSING)
 
 
 def _place(document: Document, path: Path, finding: Mapping[str, Any]) -> Path:

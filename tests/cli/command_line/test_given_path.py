@@ -3,8 +3,10 @@
 import os
 from pathlib import Path
 
+import click
 import pytest
 
+from gateway.cli.command_line.given_path import refuse_empty_words
 from gateway.profiles import ProfileError, load_rig
 from gateway.profiles.rigs.faces import TlsFace
 
@@ -16,6 +18,12 @@ WRITES = (
     ("events", "--state", ""),
     ("report", ""),
     ("certs", ""),
+    ("ports", ""),
+    ("fit", ""),
+    ("diagnose", "--json", "-", ""),
+    ("recordings", "list", "--rig", ""),
+    ("recordings", "list", "--rig="),
+    ("read", "state", "--gateway", ""),
 )
 
 
@@ -45,6 +53,12 @@ def test_a_tilde_that_no_shell_has_replaced_is_the_home_directory(here: Path, ca
     answer = call("backup", "~/cell.tar.gz", "--state=~/cell")
     assert answer.exit_code == 0, answer.output
     assert (here / "home" / "cell.tar.gz").is_file() and not list(Path().iterdir())
+
+
+def test_words_for_people_may_be_empty() -> None:
+    refuse_empty_words(["record", "on", "--name", "", "--note="])
+    with pytest.raises(click.UsageError, match="--state: an empty name"):
+        refuse_empty_words(["record", "on", "--name", "", "--state="])
 
 
 @pytest.mark.parametrize("words", [("check", "~nobody-here/x.yaml"), ("recordings", "list", "--rig", "~nobody-here/x")])
@@ -118,3 +132,29 @@ def test_a_slip_in_state_is_told_by_each_verb_and_makes_no_directory(line: str, 
     assert answer.exit_code == 65, answer.output
     assert answer.stderr == "E106 typo: there is no such state directory; --state DIR names another\n"
     assert not Path("typo").exists() and not Path("for-support.tar.gz").exists()
+
+
+@pytest.mark.parametrize("target", ["nowhere", "link"])
+@pytest.mark.parametrize(
+    "words",
+    [("certs", "link"), ("events", "--state", "link"), ("run", "demo", "--sim", "--state", "link")],
+    ids=" ".join,
+)
+def test_a_link_that_leads_to_nothing_is_told_as_one(words: tuple[str, ...], target: str, here: Path, call) -> None:
+    """A folder was to be made there, and 'File exists' came of it."""
+    Path("link").symlink_to(target)
+    answer = call(*words)
+    assert (answer.exit_code, "'link' is a link to " + target in answer.stderr) == (2, True), answer.output
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [("pipe", "is a pipe, and no rig file"), ("folder", "is a directory: name the file in it"),
+     ("link", "is a link to nowhere, where no file is")],
+)  # fmt: skip
+def test_what_is_there_and_is_no_file_is_not_said_to_be_an_unknown_rig(kind: str, told: str, here: Path, call) -> None:
+    os.mkfifo("pipe")
+    Path("folder").mkdir()
+    Path("link").symlink_to("nowhere")
+    answer = call("registers", "--rig", f"./{kind}")
+    assert answer.exit_code == 2 and answer.stderr.endswith(f"rig ./{kind} {told}\n")

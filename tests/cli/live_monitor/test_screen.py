@@ -24,6 +24,7 @@ from gateway.cli.master.client import GatewayClient
 from gateway.cli.master.local_gateways import find_state_behind
 from gateway.cli.master.value_text import format_value
 from gateway.cli.master.wires import TcpWire
+from gateway.cli.verbs.operation import monitor
 from gateway.codes.all_codes import CATALOGUE
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
@@ -143,3 +144,12 @@ def test_q_and_ctrl_c_leave_the_live_page_cleanly(fake, key: bytes) -> None:
     plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
     assert "measured N" in plain
     assert "q quits" in plain
+
+
+@pytest.mark.parametrize(("term", "draws"), [("xterm", True), ("dumb", False)])
+def test_a_dumb_terminal_gets_one_frame_as_a_pipe_does(term: str, draws: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It showed `[?1049h` and the like, and each frame below the last."""
+    monkeypatch.setenv("TERM", term)
+    with StringIO() as pipe, StringIO() as terminal:
+        monkeypatch.setattr(terminal, "isatty", lambda: True)
+        assert (monitor._draws_anew(terminal), monitor._draws_anew(pipe)) == (draws, False)

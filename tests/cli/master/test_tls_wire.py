@@ -145,6 +145,18 @@ def test_a_key_with_a_password_and_a_weak_one_are_pem_files(folder: Folder, call
     assert told.startswith(f"E174 {weak.certificate} is refused by this machine's OpenSSL (ee key too small): ")
 
 
+@pytest.mark.parametrize(("broken", "told"), [(0, "a certificate"), (1, "a certificate"), (2, "a private key")])
+def test_of_three_files_the_one_that_is_none_is_named(
+    folder: Folder, call: Any, tmp_path: Path, broken: int, told: str
+) -> None:
+    """'A, B or C is no PEM file of its kind' left it to be found."""
+    (tmp_path / "x.pem").write_text("-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n")
+    files = [folder.crt("ca"), folder.crt("setpoint"), folder.key("setpoint")]
+    files[broken] = str(tmp_path / "x.pem")
+    done = call("read", "state", "--tls", files[0], "--cert", files[1], "--key", files[2])
+    assert (done.exit_code, done.stderr) == (65, f"E174 {tmp_path / 'x.pem'} is no PEM file with {told}\n")
+
+
 def test_certs_makes_what_a_rig_and_a_client_need_and_overwrites_nothing(tmp_path: Path, call: Any) -> None:
     made = call("certs", tmp_path / "c", "--host", "192.168.125.20", "--client", "robot:setpoint")
     assert made.exit_code == 0 and "fieldbus:" in made.output
@@ -162,7 +174,7 @@ def test_certs_makes_what_a_rig_and_a_client_need_and_overwrites_nothing(tmp_pat
     assert twice.exit_code == 2 and "robot is there twice" in " ".join(twice.stderr.split())
     nobody = call("certs", tmp_path / "c")
     assert nobody.exit_code == 2 and "whom it shall sign for" in " ".join(nobody.stderr.split())
-    for bad in ("not a host!", "cell3:8802", "192.168.1", "192.168.125.320", "-x", "a..b", ""):
+    for bad in ("not a host!", "cell3:8802", "192.168.1", "192.168.125.320", "-x", "a..b"):
         answer = call("certs", tmp_path / "d", "--host", bad)
         assert answer.exit_code == 2 and "neither a host name" in " ".join(answer.stderr.split())
     assert call("certs", tmp_path / "e", "--host", "cell-3.local", "--host", "fe80::1").exit_code == 0

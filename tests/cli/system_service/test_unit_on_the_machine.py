@@ -3,6 +3,7 @@
 import os
 import re
 import resource
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from gateway import profiles
+from gateway.cli.errors import CliError
 from gateway.cli.main import command
 from gateway.cli.system_service import installation
 from gateway.cli.system_service.installation import plan_installation
@@ -140,3 +142,21 @@ def test_a_systemctl_without_systemd_is_told_as_none_is(
     assert ("Host is down" in done.stderr) is is_booted
     assert done.stderr.startswith("E108 systemd does not run on this machine: without systemd") is not is_booted
     assert done.exit_code == (exit_codes.FAILED if is_booted else exit_codes.DEVICE)
+
+
+def test_the_command_that_root_is_told_to_give_is_one_that_can_be_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By `python -m gateway` it was 'sudo .../gateway/__main__.py', which no shell runs."""
+
+    def refuse(self: Path, *arguments: Any, **named: Any) -> None:
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(sys, "argv", ["/clone/gateway/__main__.py", "service", "install", "irc5-cell"])
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    (tmp_path / "force-gateway").touch()
+    monkeypatch.setattr(Path, "write_text", refuse)
+    plan = installation.Installation("force-gateway-x", {"etc/x.service": "[Unit]"}, (), (), (), None)
+    with pytest.raises(CliError) as caught:
+        installation.install_service(plan, tmp_path)
+    assert f"; sudo {tmp_path}/force-gateway service install irc5-cell, or " in caught.value.message

@@ -2,6 +2,7 @@
 
 Not tried with a device: where the program is at fault root would lose it."""
 
+import errno
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -105,3 +106,10 @@ def test_a_page_under_the_name_of_a_picture_is_refused(
     answer = call(*words, "--plot", name, "--state", "state")
     assert answer.exit_code == 2 and f"{name}: an HTML file ends in .html" in answer.output, answer.output
     assert not (state.parent / name).exists()
+
+
+def test_a_disk_that_is_full_is_told_with_the_file_that_was_asked_for() -> None:
+    """'No space left on device' named none."""
+    with pytest.raises(OSError) as caught:
+        write_all({Path("/dev/full"): "a page"})
+    assert (caught.value.errno, caught.value.filename) == (errno.ENOSPC, "/dev/full")

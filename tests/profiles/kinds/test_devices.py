@@ -51,6 +51,8 @@ def test_the_file_itself_is_right() -> None:
         ("tick_s: 0.001", "tick_ms: 1", "13:3 watchdog.tick_ms: is not a known key; this quantity is given as tick_s: 0.001"),
         ("{address: 3}", "{address: {a: 3}}", "9:22 constants.address: a group of keys is not a whole number"),
         ("{address: 3}", "{address: 1.5}", "9:22 constants.address: 1.5 is not a whole number"),
+        ('identity: {ask: "@{address:d} ID"', "identity: {ask: 5", '10:17 identity.ask: 5 is not text: write "5" in quotes'),
+        ("models: [DAC12]", "models: DAC12", '10:81 identity.models: "DAC12" is not a list: write ["DAC12"]'),
     ],
 )  # fmt: skip
 def test_a_slip_where_a_word_or_a_group_may_stand_is_told_once(old: str, new: str, sentence: str) -> None:
@@ -61,6 +63,24 @@ def test_a_slip_where_a_word_or_a_group_may_stand_is_told_once(old: str, new: st
 def test_what_the_whole_group_lacks_is_told_at_the_group() -> None:
     (fault,) = told(('  verify: {ask: "@{address:d} W?", answer: "@{address:d} W{time:d}"}\n', ""))
     assert fault.startswith("12:3 watchdog: a watchdog needs verify or status")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('ask: "@{address:d} V{counts:d}"', "ask: V", "18:8 set_voltage.ask: 'V' carries no number"),
+        ('ask: "@{address:d} V{counts:d}"', 'ask: "@{address:d} V{counts:d"',
+         "18:8 set_voltage.ask: '@{address:d} V{counts:d': a field is {name:shape}; a brace that is sent itself "),
+        ("disarm: {", 'feed: "W{"\n  disarm: {',
+         "15:9 watchdog.feed: 'W{': a field is {name:shape}; a brace that is sent itself "),
+        ("device: [0, 4095]", "device: [4095, 0]",
+         "20:10 set_voltage.range: 4095 .. 0 and 0 .. 10 must rise on both sides: "),
+    ],
+)  # fmt: skip
+def test_what_a_rule_of_the_whole_profile_refuses_is_told_at_its_line(old: str, new: str, sentence: str) -> None:
+    """'1:1: V carries no number' named no key, and a brace was told in the words of a library."""
+    (fault,) = told((old, new))
+    assert fault.startswith(sentence)
 
 
 @pytest.mark.parametrize(
@@ -125,10 +145,10 @@ read_valve: {ask: "0100000008", answer: "0101{state:00|01}", words: {"00": push,
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ('answer: "050000FF00"', 'answer: "05{"', "12:9 set_valve.pull: '05{': Single '{' encountered"),
-        ('answer: "050000FF00"', 'answer: "050000{relay}FF00"', "12:9 set_valve.pull: {relay:} is none of d, 04d, 02X"),
-        ('ask: "0500000000"', 'ask: "05{address:d}00"', "11:9 set_valve.push: '05{address:d}00': nothing marks the end"),
-        ('ask: "0100000008"', 'ask: "01{a!r}"', "13:13 read_valve: '01{a!r}': a field is {name:shape}"),
+        ('answer: "050000FF00"', 'answer: "05{"', "12:37 set_valve.pull.answer: '05{': a field is {name:shape}; a brace "),
+        ('answer: "050000FF00"', 'answer: "050000{relay}FF00"', "12:37 set_valve.pull.answer: {relay:} is none of d, 04d, 02X"),
+        ('ask: "0500000000"', 'ask: "05{address:d}00"', "11:15 set_valve.push.ask: '05{address:d}00': nothing marks the end"),
+        ('ask: "0100000008"', 'ask: "01{a!r}"', "13:19 read_valve.ask: '01{a!r}': a field is {name:shape}"),
         ('answer: "050000FF00"', 'answer: "050000{x:kg|lb}FF00"', "set_valve.pull.answer: '050000{x:kg|lb}FF00' is no PDU"),
         ('answer: "050000FF00"', 'answer: "050000FF0"', "'050000FF0' is no PDU: hexadecimal digits in capitals, two for a"),
         ('ask: "0100000008"', 'ask: "{address:04x}"', "13:19 read_valve.ask: '{address:04x}' is no PDU"),

@@ -48,7 +48,7 @@ def test_a_face_is_read_with_modbus_own_defaults(tmp_path: Path) -> None:
         ("[{type: null, port: /dev/ttyS9}]", "fieldbus[0]: has no type"),
         (
             "[{type: rtu, port: /dev/ttyS9, ca: a}]",
-            "fieldbus[0].ca: is not a known key; known are type, port, baud, parity",
+            "fieldbus[0].ca: is not a known key here; it belongs to a face of `type: tls`",
         ),
         (
             f"[{', '.join(f'{{type: rtu, port: /dev/ttyS{k}}}' for k in range(256))}]",

@@ -192,3 +192,9 @@ def test_no_yaml_whatever_ends_in_anything_but_a_document_or_faults(source: str)
         text.parse(source.encode(), "rig.yaml")
     except ProfileError as error:
         assert all(1 <= fault.line <= lines + 1 and fault.column >= 1 for fault in error.faults)
+
+
+def test_no_text_has_a_nul_in_it(parse: Parse) -> None:
+    """A port of "\\0" ended check with a ValueError of the operating system's call."""
+    fault = fault_of(parse, b'name: a\noutput: {port: "/dev/\\0"}')
+    assert fault == "rig.yaml:2:16 output.port: `\\0` may stand in no text: leave it out"

@@ -194,6 +194,18 @@ def test_an_unreadable_recording_has_no_time_and_no_duration(page, state, chromi
     window.close()
 
 
+def test_a_table_that_is_wider_than_a_tablet_scrolls_within_itself(page, state, chromium) -> None:
+    """The page was 43 px too wide beside the calibrations: the unseen head of their buttons stood beyond its edge."""
+    window = open_tab(chromium, page.address, "calibrations")
+    window.set_viewport_size({"width": 768, "height": 900})
+    window.locator("#tab-calibrations tbody tr").first.wait_for()
+    window.add_style_tag(content="#tab-calibrations td { min-width: 12rem; }")
+    seen = window.locator("#tab-calibrations .wide").first.evaluate("box => [box.scrollWidth, box.clientWidth]")
+    assert seen[0] > seen[1], "the table fits, and proves nothing"
+    assert window.evaluate("document.documentElement.scrollWidth") <= 768
+    window.close()
+
+
 @pytest.mark.parametrize("width", [360, 640, 768])
 def test_no_value_of_the_configuration_stands_in_a_column_of_single_letters(page, state, chromium, width: int) -> None:
     """On a telephone, a tablet and at 200 % it did; 640: 1280 at 200 %."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway.cli.command_line.completion_words import complete_calibration_files
+from gateway.cli.command_line.numbers import Whole
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, json_option
 from gateway.processes import exit_codes
@@ -30,7 +31,7 @@ EXAMPLES = ("upload demo --dry-run", "upload demo --print-frames --dry-run")
 
 @click.command()
 @click.argument("file", metavar="FILE", shell_complete=complete_calibration_files)
-@click.option("--slot", type=click.IntRange(0, 7), default=0, show_default=True, help="Recipe slot that it fills.")
+@click.option("--slot", type=Whole(0, 7), default=0, show_default=True, help="Recipe slot that it fills.")
 @click.option("--print-frames", is_flag=True, help="Print every Modbus request, for those who program a PLC.")
 @click.option("--dry-run", is_flag=True, help="Check only, store nothing. With --print-frames: send nothing.")
 @click.option("--fc06", is_flag=True, help="Write single words, as masters do that have FC06 only.")

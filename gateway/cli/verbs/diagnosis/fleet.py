@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gateway.cli.command_line.given_path import GivenPath
+from gateway.cli.command_line.numbers import Whole
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.errors import CliError, already_exists
@@ -39,9 +40,7 @@ def _fleet_options(function: Function) -> Function:
             metavar="serial|processes|tcp://HOST:PORT",
             help="Who computes; tcp: a Dask scheduler.",
         ),
-        click.option(
-            "--workers", type=click.IntRange(1, 256), default=os.cpu_count() or 1, help="Processes  [default: cores]"
-        ),
+        click.option("--workers", type=Whole(1, 256), default=os.cpu_count() or 1, help="Processes  [default: cores]"),
         click.option("--output", "-o", type=GivenPath(file_okay=False), help="Folder  [default: fleet-VERB]"),
         click.option("--fresh", is_flag=True, help="Compute everything anew, also what is kept from an earlier run."),
         table_options,

@@ -2,7 +2,6 @@
 
 import json
 import sys
-import threading
 import time
 from pathlib import Path
 from typing import Any, Final
@@ -90,12 +89,12 @@ def _record(state: Path, request: dict[str, Any], for_s: float) -> dict[str, Any
     from gateway.cli.control_socket import ask
     from gateway.cli.diagnosis.progress_line import handle_interrupt, show_progress
 
-    pressed = threading.Event()
-    with handle_interrupt(lambda number, frame: pressed.set()):
+    pressed: list[int] = []  # no Event: its lock may be held where the handler comes in
+    with handle_interrupt(lambda number, frame: pressed.append(number)):
         recording: str = ask(state, request)["recording"]
     is_stopped, fault, files = False, "", [recording]
     try:
-        if pressed.is_set():
+        if pressed:
             raise KeyboardInterrupt
         with show_progress("record"):
             fault = _wait(state, for_s, files)

@@ -1,8 +1,9 @@
 """`monitor`: what the gateway does, live in a terminal, by Modbus; or one frame as text or picture."""
 
+import os
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TextIO
 
 import click
 
@@ -47,13 +48,18 @@ def command(*, svg: Path | None, seconds: float | None, wire: "Wire", **options:
         poller = Poller(client, WriterSource(lambda: _find_state(wire, options["state"])), time.monotonic)
         with explain_refusals(client):
             poller.poll()  # the first one fails loudly: a wrong address is no reason to wait
-        if svg or options["once"] or not sys.stdout.isatty():
+        if svg or options["once"] or not _draws_anew(sys.stdout):
             _watch(poller, seconds or 0.0)
             _picture(poller, svg) if svg else _text(poller)
             if poller.trouble:  # it stands in the frame, too; who asks for one frame may look at the exit code alone
                 raise CliError(poller.trouble, exit_codes.DEVICE)
         else:
             _live(poller, seconds)
+
+
+def _draws_anew(stream: TextIO) -> bool:
+    """Decide whether a frame can be drawn over the one before it: a dumb terminal (in Emacs) shows the orders to do so."""
+    return stream.isatty() and os.environ.get("TERM") != "dumb"
 
 
 def _find_state(wire: "Wire", given: Path | None) -> tuple[Path | None, str]:

@@ -6,14 +6,13 @@ import click
 
 from gateway import defaults
 from gateway.cli.command_line.completion_words import complete_rigs
-from gateway.cli.command_line.given_path import named_rig
 from gateway.cli.options import bind_endpoint, http_endpoint, serial_port, state_option
 
 EXAMPLES = ("run demo --sim", "run irc5-cell --sim --bind 127.0.0.1:0 --record")
 
 
 @click.command()
-@click.argument("rig", default=defaults.RIG, callback=named_rig, shell_complete=complete_rigs)
+@click.argument("rig", default=defaults.RIG, shell_complete=complete_rigs)
 @click.option("--sim", "simulate", is_flag=True, help="Simulate the rig's devices, whatever its file says.")
 @click.option(
     "--bind",

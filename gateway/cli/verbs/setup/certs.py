@@ -11,9 +11,11 @@ from typing import Final
 import click
 
 from gateway.cli.command_line.given_path import GivenPath
+from gateway.cli.command_line.numbers import Whole
 from gateway.cli.errors import CliError
 from gateway.modbus import Role
 from gateway.modbus.certificate import ROLES
+from gateway.plain_file import tell_place_and_refusal
 from gateway.processes import exit_codes
 
 _HOSTS: Final = ("localhost", "127.0.0.1")
@@ -83,7 +85,7 @@ EXAMPLES = (
     metavar="NAME:ROLE",
     help=f"A client and its role: {', '.join(ROLES)}  [default: {', '.join(_CLIENTS)}]",
 )
-@click.option("--days", type=click.IntRange(1, 7300), default=825, show_default=True, help="How long they are valid.")
+@click.option("--days", type=Whole(1, 7300), default=825, show_default=True, help="How long they are valid.")
 def command(*, folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: int) -> None:
     """Make certificates for Modbus/TCP Security.
 
@@ -116,7 +118,8 @@ def _make(folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: 
         try:
             ca = certificates.load_ca(folder)
         except (OSError, ValueError) as error:
-            sentence = f"E174 the CA in {folder} cannot be used: {error}; another DIR makes a new one"
+            why = tell_place_and_refusal(error) if isinstance(error, OSError) else str(error)
+            sentence = f"E174 the CA in {folder} cannot be used: {why}; another DIR makes a new one"
             raise CliError(sentence, exit_codes.DATA) from None
         _say_earlier_end(folder, ca.certificate.not_valid_after_utc, days)
     else:

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from gateway.profiles.rigs.checks import faces, lines, network, tls, values, valve, wires
+from gateway.profiles.rigs.checks import faces, lines, listeners, network, tls, values, valve, wires
 
 FAULTS: Final = (
     *values.FAULTS,
@@ -12,6 +12,7 @@ FAULTS: Final = (
     *network.FAULTS,
     *faces.FAULTS,
     *tls.FAULTS,
+    *listeners.FAULTS,
 )
 WARNINGS: Final = (
     *values.WARNINGS,
@@ -20,5 +21,6 @@ WARNINGS: Final = (
     *network.WARNINGS,
     *faces.WARNINGS,
     *tls.WARNINGS,
+    *listeners.WARNINGS,
 )
 HARDWARE: Final = (*lines.HARDWARE, *valve.HARDWARE, *faces.HARDWARE)

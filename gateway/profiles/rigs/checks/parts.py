@@ -11,7 +11,7 @@ from gateway.bsfm.model import Calibration
 from gateway.control.compensation.compensation import Compensation
 from gateway.control.settings import Defaults, LeadSettings, Limits, SelfTestSettings, Supervision, Trim
 from gateway.devices import DeviceProfile
-from gateway.profiles.http_sections import Web
+from gateway.profiles.http_sections import Metrics, OpcUa, Web
 from gateway.profiles.kinds.plants import PlantProfile
 from gateway.profiles.rigs.faces import Face
 from gateway.profiles.rigs.rig_file import CellFile, Network, OutputFile, ValveFile
@@ -52,6 +52,8 @@ class Parts:
     extended: PlantProfile | None = None
     compensation: Compensation | None = None
     web: Web | None = None
+    metrics: Metrics | None = None
+    opcua: OpcUa | None = None
     mqtt: Mqtt | None = None
     register_map: RegisterMap | None = None
 
