@@ -2,7 +2,6 @@
 
 import asyncio
 import socket
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +22,11 @@ from tests.certificates import store_all
 from tests.disk.at_once import AtOnce
 from tests.service.kept_log import Log
 from tests.service.rigs import demo
-from tests.service.running_rig.begun_rig import OwnDevices, with_running_rig
+from tests.service.running_rig.begun_rig import OwnDevices, devices, with_running_rig
+
+__all__ = ["devices"]
 
 NAMED = RecordingLabel("the worn seal", "left cylinder")
-
-
-@pytest.fixture
-def devices(tmp_path: Path) -> Iterator[OwnDevices]:
-    """On a rig whose loop may come late: a machine that others use as well would end the run that a scene begins (A319)."""
-    with OwnDevices(tmp_path, stall_s=5.0) as devices:
-        yield devices
 
 
 class Process:
