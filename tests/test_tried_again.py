@@ -44,6 +44,33 @@ def test_next(machine):
 """
 
 
+LEAVING = """
+import gc
+import socket
+
+import pytest
+
+tries = []
+
+@pytest.mark.parametrize("place", [1, 2])
+def test_real(place):
+    tries.append(place)
+    left = [socket.socket()]
+    left.append(left)
+    assert tries.count(place) > 1
+    left[0].close()
+
+def test_pure_next():
+    gc.collect()
+"""
+
+
+def run_in(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    words = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", *options, "."]
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": ""}
+    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
 @pytest.mark.parametrize("scope", ["function", "module"])
 @pytest.mark.parametrize(
     ("each_s", "name", "passes_at", "end"),
@@ -61,13 +88,20 @@ def test_only_what_has_failed_in_lost_time_is_tried_again(
 ) -> None:
     (tmp_path / "conftest.py").write_text(CONFTEST.format(each_s=each_s))
     (tmp_path / "test_it.py").write_text(TESTS.format(name=name, passes_at=passes_at, scope=scope))
-    words = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "."]
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": ""}
-    done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    done = run_in(tmp_path)
     assert end in done.stdout
     assert ("tried again, for this machine stood still" in done.stdout) is (
         each_s == 0.1 and name == "real" and passes_at > 1
     )
+
+
+def test_what_a_failed_try_has_left_open_fails_no_other_test_and_not_the_run(tmp_path: Path) -> None:
+    """Each is named, and passed; the run had failed all the same."""
+    (tmp_path / "conftest.py").write_text(CONFTEST.format(each_s=0.1))
+    (tmp_path / "test_it.py").write_text(LEAVING)
+    done = run_in(tmp_path, "-W", "error")
+    assert (done.returncode, done.stderr) == (0, "") and "3 passed" in done.stdout
+    assert done.stdout.count("100 ms; ") == 2, "nor the next try"
 
 
 @pytest.fixture

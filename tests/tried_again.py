@@ -5,7 +5,10 @@ measured during each try decides, by the kernel (`steal`) and by a witness besid
 failed; a failure without, or a third, counts. Each is told at the end.
 """
 
+import gc
+import sys
 import time
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -20,6 +23,16 @@ STOLEN_S = 0.05
 """Less breaks no bound: the shortest is twice as long."""
 TRIES = 3
 TOLD_AS = "tried again"
+
+
+def forget_what_failed() -> None:
+    """Let nothing be left of a try, in silence: its traceback holds sockets and files open, which would be found at any later
+    test, and fail that, or the whole run at its end."""
+    for name in ("last_type", "last_value", "last_traceback", "last_exc"):  # where pytest keeps it for debuggers
+        vars(sys).pop(name, None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        gc.collect()
 
 
 class TriedAgain:
@@ -69,6 +82,7 @@ class TriedAgain:
         end = item.session._setupstate.teardown_exact
         pytest.CallInfo.from_call(lambda: end(BetweenGroups(item.session)), "teardown")
         item._initrequest()  # as pytest does before the first time
+        forget_what_failed()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         why = dict(report.user_properties).get(TOLD_AS)
