@@ -70,7 +70,8 @@ class TriedAgain:
             why += f"{1e3 * lost_s:.0f} ms; {failed[0]} "
             self._begin_anew(item)
         for report in reports:
-            report.user_properties.append((TOLD_AS, why))
+            if why:  # a worker sends on what has any, also of the thousands that were made and ended at once
+                report.user_properties.append((TOLD_AS, why))
             item.ihook.pytest_runtest_logreport(report=report)
         item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
         return True
