@@ -24,7 +24,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosi
 def pytest_configure(config: pytest.Config) -> None:
     """A shell's background job inherits an ignored SIGINT, and so would every process under test."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    config.pluginmanager.register(TriedAgain(lambda nodeid: "tests/web/" in nodeid or group_of(nodeid) in IN_REAL_TIME))
+    config.pluginmanager.register(TriedAgain(lambda nodeid: nodeid.removeprefix("tests/").startswith(WITH_A_CLOCK)))
     draw_examples(at_random=config.getoption("--long"))
     if workers := config.getoption("--workers"):
         config.pluginmanager.register(ForkedWorkers(workers, group_of))
@@ -135,6 +135,16 @@ LONG_WAITS = ("end_to_end/first_hour/test_calibrate.py", "end_to_end/first_hour/
 """Of these, what waits for minutes while a plan is run, and is held to no second: another worker does that meanwhile."""
 
 IN_REAL_TIME = ("real time", "long waits")
+
+WITH_A_CLOCK = (
+    *(
+        f"{room}/"
+        for room in "audit calibrations cli clients disk end_to_end fieldbus fleet live ports processes".split()
+    ),
+    *(f"{room}/" for room in "recording reports service telemetry watch web".split()),
+)
+"""Rooms in which some test waits for the machine's own clock, for a thread, a process or a browser: a machine that stands still
+is no fault of theirs (`tried_again`)."""
 
 SLOW = (
     "service/closed_loop/test_study.py",

@@ -13,7 +13,17 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import LONG_WAITS, REAL_TIME, SLOW, SPREAD, begun_at, find_leaks, group_of, leave_out_long
+from tests.conftest import (
+    LONG_WAITS,
+    REAL_TIME,
+    SLOW,
+    SPREAD,
+    WITH_A_CLOCK,
+    begun_at,
+    find_leaks,
+    group_of,
+    leave_out_long,
+)
 from tests.workers import OneCompiler, is_needed
 
 TESTS = Path(__file__).parent
@@ -74,7 +84,8 @@ def test_slow_files_begin_before_others() -> None:
 
 
 def test_every_place_that_the_lists_name_is_there() -> None:
-    assert all((TESTS / place).exists() for place in (*REAL_TIME, *LONG_WAITS, *SLOW))
+    assert all((TESTS / place).exists() for place in (*REAL_TIME, *LONG_WAITS, *SLOW, *WITH_A_CLOCK))
+    assert all(place.startswith(WITH_A_CLOCK) for place in (*REAL_TIME, *LONG_WAITS))
     for prefix in SPREAD:
         file, _, name = prefix.partition("::")
         assert f"def {name.removesuffix('[')}(" in (TESTS / file).read_text(encoding="utf-8")

@@ -25,7 +25,7 @@ output: {{device: smc-itv-rc, port: {output}, baud: 9600}}
 load_cell: {{device: stream-st-gs, port: {cell}, baud: 115200}}
 limits: {{force_max_n: 60, over_force_n: 90, voltage_max_v: 8}}
 defaults: {{force_ramp_n_per_s: 15}}
-supervision: {{sample_timeout_s: 0.4, output_timeout_s: 0.4, stall_s: {stall_s}}}
+supervision: {{sample_timeout_s: {timeout_s}, output_timeout_s: {timeout_s}, stall_s: {stall_s}}}
 accept_no_device_watchdog: true
 """
 NEWTON_PER_VOLT, LAG_S, PERIOD_S = 7.5, 0.05, 0.01
@@ -73,6 +73,7 @@ class OwnDevices:
     setting_v: float = 0.0
     force_n: float = 0.0
     stall_s: float = 0.1
+    timeout_s: float = 0.4
     is_silent: bool = False
 
     def __post_init__(self) -> None:
@@ -81,7 +82,8 @@ class OwnDevices:
         self._wires = threading.Lock()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self.rig = self.directory / "own.yaml"
-        self.rig.write_text(RIG.format(output=self.output.link, cell=self.cell.link, stall_s=self.stall_s))
+        links = {"output": self.output.link, "cell": self.cell.link}
+        self.rig.write_text(RIG.format(**links, stall_s=self.stall_s, timeout_s=self.timeout_s))
 
     def __enter__(self) -> "OwnDevices":
         self.output.plug()

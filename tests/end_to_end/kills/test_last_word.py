@@ -131,29 +131,29 @@ def test_a_silent_device_is_told_three_times_and_the_gateway_goes_on(real, devic
     assert {heard.voltage_v for heard in zeros} == {0.0}
 
 
-def test_an_unplugged_regulator_is_a_fault_and_its_successor_hears_the_safe_voltage_first(real, devices):
-    pressing(real)
-    devices.pull_output()
-    real.wait_until(lambda status: status["state"] == FAULT)
-    assert real.words(110, 1) == [10], "output_lost"
-    assert "unplugged" in real.said("E102")
-    pids = real.ready["pids"].values()  # control lets go of the port at once, the guardian as soon as it hears of it
-    real.wait_until(lambda status: not [held for pid in pids for held in deleted_terminals(pid)])
-    assert real.words(110, 1) == [10], "still lost"
+def test_an_unplugged_regulator_is_a_fault_and_its_successor_hears_the_safe_voltage_first(patient, patient_devices):
+    pressing(patient)
+    patient_devices.pull_output()
+    patient.wait_until(lambda status: status["state"] == FAULT)
+    assert patient.words(110, 1) == [10], "output_lost"
+    assert "unplugged" in patient.said("E102")
+    pids = patient.ready["pids"].values()  # control lets go of the port at once, the guardian as soon as it hears of it
+    patient.wait_until(lambda status: not [held for pid in pids for held in deleted_terminals(pid)])
+    assert patient.words(110, 1) == [10], "still lost"
     plugged_at_s = time.monotonic()
-    devices.plug_output()
+    patient_devices.plug_output()
     deadline_s = time.monotonic() + 6
-    while not devices.settings_since(plugged_at_s):
+    while not patient_devices.settings_since(plugged_at_s):
         assert time.monotonic() < deadline_s
         time.sleep(0.01)
-    assert devices.settings_since(plugged_at_s)[0].voltage_v == 0.0
-    assert real.status()["state"] == FAULT, "latched"
-    real.wait_until(lambda status: not real.write(0, 2, 0).isError() and real.status()["state"] == OFF)
-    pressing(real)  # and the new line has been handed to the guardian as well:
+    assert patient_devices.settings_since(plugged_at_s)[0].voltage_v == 0.0
+    assert patient.status()["state"] == FAULT, "latched"
+    patient.wait_until(lambda status: not patient.write(0, 2, 0).isError() and patient.status()["state"] == OFF)
+    pressing(patient)  # and the new line has been handed to the guardian as well:
     killed_at_s = time.monotonic()
-    os.kill(real.ready["pids"]["control"], signal.SIGKILL)
-    assert devices.until_safe(killed_at_s) < 0.5
-    restarted(real)
+    os.kill(patient.ready["pids"]["control"], signal.SIGKILL)
+    assert patient_devices.until_safe(killed_at_s) < 0.5
+    restarted(patient)
 
 
 def deleted_terminals(pid: int) -> list[str]:
@@ -211,23 +211,23 @@ def test_control_that_stands_still_on_the_last_ramp_is_answered_as_at_any_time(p
     assert "without a tick" in stop_words
 
 
-def test_what_a_careless_hand_sends_to_a_process_does_not_drop_the_force(real, devices):
+def test_what_a_careless_hand_sends_to_a_process_does_not_drop_the_force(patient, patient_devices):
     """`systemctl kill -s HUP`, `pkill -USR1`, `killall -INT`: as they come from log rotation and habit. What is meant for the
     gateway is the guardian's to answer."""
-    pressing(real)
-    began_s, pids = time.monotonic(), real.ready["pids"]
+    pressing(patient)
+    began_s, pids = time.monotonic(), patient.ready["pids"]
     assert len(pids) >= 3
     for name, pid in pids.items():
         os.kill(pid, signal.SIGUSR1)
         if name != "guardian":
             os.kill(pid, signal.SIGHUP)
             os.kill(pid, signal.SIGINT)
-    assert real.status()["state"] == HOLDING
-    time.sleep(3 * STALL_S)  # a process that has died of it would be missed by now
-    assert real.status()["state"] == HOLDING
+    assert patient.status()["state"] == HOLDING
+    time.sleep(3 * STALL_S)  # the guardian hears of one that has died of it at once
+    assert patient.status()["state"] == HOLDING
     assert all(psutil.pid_exists(pid) for pid in pids.values())
-    assert {heard.voltage_v for heard in devices.settings_since(began_s)} <= {devices.setting_v}
-    assert devices.setting_v > 3.9
+    assert {heard.voltage_v for heard in patient_devices.settings_since(began_s)} <= {patient_devices.setting_v}
+    assert patient_devices.setting_v > 3.9
 
 
 def test_five_restarts_in_a_minute_end_the_gateway_with_the_safe_voltage_held(tmp_path: Path):

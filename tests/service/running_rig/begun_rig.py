@@ -20,9 +20,16 @@ from tests.end_to_end.own_devices import OwnDevices
 Scene = Callable[[RunningRig, socket.socket], Awaitable[None]]
 
 
+STANDSTILL_S = 5.0
+"""Of loop, devices and all: a machine that others use stands still for 100 ms and more, of which a rig makes the fault that it
+has to make; scenes that wait for a force would wait for ever. None of them is about these times, which have tests of their
+own in virtual time (`wired`)."""
+
+
 @pytest.fixture
 def devices(tmp_path: Path) -> Iterator[OwnDevices]:
-    with OwnDevices(tmp_path) as devices:
+    """On a rig that allows such a pause."""
+    with OwnDevices(tmp_path, stall_s=STANDSTILL_S, timeout_s=STANDSTILL_S) as devices:
         yield devices
 
 

@@ -3,7 +3,6 @@
 import asyncio
 import socket
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,18 +27,13 @@ from tests.control.bench import settings
 from tests.disk.at_once import AtOnce
 from tests.service.kept_log import Log
 from tests.service.rigs import demo
-from tests.service.running_rig.begun_rig import OwnDevices, with_running_rig
+from tests.service.running_rig.begun_rig import OwnDevices, devices, with_running_rig
 from tests.service.running_rig.simulated_rig import ENABLE, OWNER, SmallRig
+
+__all__ = ["devices"]
 
 NAMED = RecordingLabel("the worn seal", "left cylinder")
 ROBOT = Peer("10.0.0.5")
-
-
-@pytest.fixture
-def devices(tmp_path: Path) -> Iterator[OwnDevices]:
-    """On a rig whose loop may come late: a machine that others use as well would end the run that a scene begins (A319)."""
-    with OwnDevices(tmp_path, stall_s=5.0) as devices:
-        yield devices
 
 
 class Process:

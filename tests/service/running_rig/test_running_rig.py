@@ -24,10 +24,11 @@ from gateway.service.guardian_line import GuardianLine
 from gateway.service.running_rig import running_rig
 from gateway.service.running_rig.faces.faces import Faces
 from gateway.service.running_rig.lines.load_cell_line import CellExchange
+from gateway.service.running_rig.lines.output_line import OutputExchange
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.end_to_end.own_devices import OwnDevices
-from tests.service.running_rig.begun_rig import devices, with_running_rig
+from tests.service.running_rig.begun_rig import STANDSTILL_S, devices, with_running_rig
 
 __all__ = ["devices"]
 
@@ -45,11 +46,15 @@ def test_the_port_drops_what_it_has_not_sent_of_each_question_that_is_given_up(
 ) -> None:
     """A line that stood still kept three older voltages, and sent them before the safe one when it went on."""
     dropped: list[str] = []
+    given_up: list[object] = []
+    give_up = OutputExchange._give_up
     monkeypatch.setattr(SerialPort, "drop_unsent", lambda port: dropped.append(port.path))
+    monkeypatch.setattr(OutputExchange, "_give_up", lambda *told: (given_up.append(told), give_up(*told))[1])
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         await pressing(rig, devices)
-        assert not dropped
+        assert len(dropped) <= len(given_up), "where the machine stands still an answer may come too late"
+        dropped.clear()
         devices.is_silent = True
         rig.bank.write_registers(0, struct.pack(">6H", 1, 0, 0, 1, 0, 5000), MASTER)
         while len(dropped) < 2:
@@ -70,7 +75,7 @@ def test_a_pause_that_the_rig_allows_makes_no_reading_old(devices: OwnDevices, m
         assert bounds_s == [0.3]
 
     monkeypatch.setattr(running_rig, "CellExchange", note)
-    devices.rig.write_text(devices.rig.read_text().replace("stall_s: 0.1", "stall_s: 0.3"))
+    devices.rig.write_text(devices.rig.read_text().replace(f"stall_s: {STANDSTILL_S}", "stall_s: 0.3"))
     with_running_rig(devices, scene)
 
 
@@ -259,11 +264,10 @@ def test_the_heartbeat_comes_from_the_loop_itself(devices: OwnDevices) -> None:
 
         guardian.setblocking(False)
         beats()
-        ticks = rig.loop.health.ticks
-        await asyncio.sleep(0.2)
-        heard, ticked = beats(), rig.loop.health.ticks - ticks
-        assert heard >= 10
-        assert heard <= ticked
+        health = rig.loop.health
+        came = health.ticks - health.missed_ticks
+        await until(lambda: health.ticks - health.missed_ticks >= came + 10)
+        assert beats() == health.ticks - health.missed_ticks - came, "one at each tick, also of a late loop"
         time.sleep(0.15)  # the loop does not come by
         assert beats() == 0
         guardian.setblocking(True)
