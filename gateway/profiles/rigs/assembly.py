@@ -50,6 +50,7 @@ from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.words import ControlBit
 
 T = TypeVar("T")
+Reader = Callable[[Document], tuple[T | None, list[ProfileFault]]]
 
 FALLBACK_PLANT: Final = defaults.PLANT
 """What `run --sim` simulates for a real rig that names no plant."""
@@ -150,9 +151,7 @@ def _steps(path: str) -> tuple[str | int, ...]:
 def _parts(document: Document, folder: Path, findings: Findings) -> Parts:
     """Return what can be checked together: every part that has no fault of its own."""
 
-    def read_part(
-        kind: str, path: tuple[str, ...], read: Callable[[Document], tuple[T | None, list[ProfileFault]]]
-    ) -> T | None:
+    def read_part(kind: str, path: tuple[str, ...], read: Reader[T]) -> T | None:
         return read_named(kind, refer_at(document, path, folder), read, findings)
 
     output, load_cell = _part(document, "output", OutputFile), _part(document, "load_cell", CellFile)
