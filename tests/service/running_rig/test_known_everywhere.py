@@ -7,11 +7,15 @@ import pytest
 
 from gateway import VERSION
 from gateway.audit.audit_reader import read_audit
+from gateway.devices import cell_host
 from gateway.plants.in_use import in_use_facts
 from gateway.ports import PortError
+from gateway.profiles import Rig, load_rig
 from gateway.registers.refusal import Refusal
+from gateway.service.running_rig import running_rig
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.end_to_end.own_devices import OwnDevices
+from tests.service.running_rig import begun_rig
 from tests.service.running_rig.test_running_rig import MASTER, devices, with_running_rig
 
 __all__ = ["devices"]
@@ -55,5 +59,25 @@ def test_a_port_that_is_gone_is_known_to_be_gone(devices: OwnDevices) -> None:
         rig._ports.cell._on_lost(gone)
         rig._ports.output._on_lost(gone)
         assert rig.loop.cell_lost and not rig._ports.is_guarded
+
+    with_running_rig(devices, scene)
+
+
+@pytest.mark.parametrize(("sign", "unit"), [(1, None), (-1, "kg")])
+def test_the_cell_is_read_in_the_unit_and_direction_of_the_rigs_file(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch, sign: int, unit: str | None
+) -> None:
+    """An amplifier that sends bare numbers, read in another unit, is off by ten and nobody sees it before a force."""
+    asked: list[tuple[object, ...]] = []
+
+    def read_rig(name: str) -> Rig:
+        rig = load_rig(name)
+        return replace(rig, load_cell=replace(rig.load_cell, sign=sign, unit=unit))
+
+    monkeypatch.setattr(begun_rig, "load_rig", read_rig)
+    monkeypatch.setattr(running_rig, "cell_host", lambda *given: (asked.append(given[1:]), cell_host(*given[:2]))[1])
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        assert asked == [(sign, unit)]
 
     with_running_rig(devices, scene)
