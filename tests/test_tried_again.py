@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -142,8 +143,21 @@ def test_a_standstill_is_counted_by_what_it_took(witness: StandstillWitness) -> 
         witness.process.send_signal(signal.SIGSTOP)
         time.sleep(0.2)
         witness.process.send_signal(signal.SIGCONT)
-        time.sleep(0.1)
+        witness.settle()
     assert STOLEN_S <= LATE_S <= witness.lost_s() < time.monotonic() - began_s
+
+
+def test_who_asks_behind_a_standstill_waits_for_the_witness_to_wake(witness: StandstillWitness) -> None:
+    """On a busy machine it woke 20 ms behind a test that had failed by it, which was not tried again."""
+    witness.settle()
+    witness.process.send_signal(signal.SIGSTOP)
+    stopped_s, waking = time.monotonic(), threading.Timer(0.2, witness.process.send_signal, [signal.SIGCONT])
+    waking.start()
+    time.sleep(0.05)  # so that it has stopped
+    witness.settle()
+    assert time.monotonic() - stopped_s >= 0.2
+    waking.join()
+    assert witness.lost_s() >= LATE_S
 
 
 def test_a_witness_does_not_outlive_who_has_begun_it() -> None:

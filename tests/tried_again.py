@@ -8,7 +8,6 @@ gateway that both share may have come to a fault, which the next one finds.
 
 import gc
 import sys
-import time
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -17,7 +16,7 @@ import pytest
 from _pytest.runner import runtestprotocol
 
 from gateway.processes.scheduling.withheld_time import most_growth, read_stolen_s
-from tests.standstill import LOOK_S, StandstillWitness
+from tests.standstill import StandstillWitness
 from tests.workers import BetweenGroups
 
 STOLEN_S = 0.05
@@ -64,8 +63,8 @@ class TriedAgain:
         for left in reversed(range(TRIES)):
             reports = runtestprotocol(item, nextitem=nextitem, log=False)
             failed = [report.longreprtext[-200:] for report in reports if report.failed]
-            if failed:
-                time.sleep(2 * LOOK_S)  # the witness may wake behind us
+            if failed and self._witness:
+                self._witness.settle()
             lost_s = most_growth(self._lost_s(), before)
             if not failed or lost_s < STOLEN_S or not left:
                 break
