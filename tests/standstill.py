@@ -16,7 +16,7 @@ import time
 LOOK_S = 0.01
 LATE_S = 0.05
 """What is shorter breaks no bound of a test, and a busy processor may make anybody wait for it."""
-_NOTE = struct.Struct("d")
+_NOTE = struct.Struct("dd")  # lost, and when it last looked
 
 
 class StandstillWitness:
@@ -30,6 +30,12 @@ class StandstillWitness:
         # a session of its own: Ctrl-C in a terminal is for who runs the tests
         self.process = subprocess.Popen(words, pass_fds=[descriptor], start_new_session=True)
         os.close(descriptor)
+
+    def settle(self) -> None:
+        """Wait until it has looked after now: behind a standstill it may wake behind us. At most a second, if it has ended."""
+        now_s = time.monotonic()
+        while _NOTE.unpack_from(self._note)[1] < now_s and time.monotonic() < now_s + 1.0:
+            time.sleep(LOOK_S)
 
     def lost_s(self) -> float:
         """Return for how long the machine has stood still since the beginning, s: pauses of LATE_S and longer."""
@@ -49,7 +55,7 @@ def _watch(descriptor: int, parent: int) -> None:
         before_s, woke_s = woke_s, time.monotonic()
         if (late_s := woke_s - before_s - LOOK_S) >= LATE_S:
             lost_s += late_s
-            _NOTE.pack_into(note, 0, lost_s)
+        _NOTE.pack_into(note, 0, lost_s, woke_s)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,7 +22,7 @@ from tests.tried_again import TriedAgain
 
 readings = count()
 def lost_s():
-    return {{"cpu0": 1.0, "cpu1": 5.0 + {each_s} * next(readings)}}
+    return {{"cpu0": 1.0, "cpu1": 5.0 + {each_s} * min(next(readings), {most})}}
 
 def pytest_configure(config):
     config.pluginmanager.register(TriedAgain(lambda nodeid: "pure" not in nodeid, lost_s))
@@ -86,7 +87,7 @@ def run_in(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
 def test_only_what_has_failed_in_lost_time_is_tried_again(
     tmp_path: Path, scope: str, each_s: float, name: str, passes_at: int, end: str
 ) -> None:
-    (tmp_path / "conftest.py").write_text(CONFTEST.format(each_s=each_s))
+    (tmp_path / "conftest.py").write_text(CONFTEST.format(each_s=each_s, most=99))
     (tmp_path / "test_it.py").write_text(TESTS.format(name=name, passes_at=passes_at, scope=scope))
     done = run_in(tmp_path)
     assert end in done.stdout
@@ -95,13 +96,36 @@ def test_only_what_has_failed_in_lost_time_is_tried_again(
     )
 
 
+BEHIND = """
+tries = []
+
+def test_real_before():
+    pass
+
+def test_pure():
+    pass
+
+def test_real():
+    tries.append(1)
+    assert len(tries) > {failing}
+"""
+
+
+@pytest.mark.parametrize(("failing", "end"), [(1, "3 passed"), (2, "1 failed, 2 passed")])
+def test_what_stood_still_in_the_test_before_excuses_one_try(tmp_path: Path, failing: int, end: str) -> None:
+    """A gateway that a module shares had its fault at the end of one test, which passed, and the next one found it."""
+    (tmp_path / "conftest.py").write_text(CONFTEST.format(each_s=0.1, most=1))
+    (tmp_path / "test_it.py").write_text(BEHIND.format(failing=failing))
+    assert end in run_in(tmp_path).stdout
+
+
 def test_what_a_failed_try_has_left_open_fails_no_other_test_and_not_the_run(tmp_path: Path) -> None:
     """Each is named, and passed; the run had failed all the same."""
-    (tmp_path / "conftest.py").write_text(CONFTEST.format(each_s=0.1))
+    (tmp_path / "conftest.py").write_text(CONFTEST.format(each_s=0.1, most=99))
     (tmp_path / "test_it.py").write_text(LEAVING)
     done = run_in(tmp_path, "-W", "error")
     assert (done.returncode, done.stderr) == (0, "") and "3 passed" in done.stdout
-    assert done.stdout.count("100 ms; ") == 2, "nor the next try"
+    assert done.stdout.count(" ms; ") == 2, "nor the next try"
 
 
 @pytest.fixture
@@ -119,8 +143,21 @@ def test_a_standstill_is_counted_by_what_it_took(witness: StandstillWitness) -> 
         witness.process.send_signal(signal.SIGSTOP)
         time.sleep(0.2)
         witness.process.send_signal(signal.SIGCONT)
-        time.sleep(0.1)
+        witness.settle()
     assert STOLEN_S <= LATE_S <= witness.lost_s() < time.monotonic() - began_s
+
+
+def test_who_asks_behind_a_standstill_waits_for_the_witness_to_wake(witness: StandstillWitness) -> None:
+    """On a busy machine it woke 20 ms behind a test that had failed by it, which was not tried again."""
+    witness.settle()
+    witness.process.send_signal(signal.SIGSTOP)
+    stopped_s, waking = time.monotonic(), threading.Timer(0.2, witness.process.send_signal, [signal.SIGCONT])
+    waking.start()
+    time.sleep(0.05)  # so that it has stopped
+    witness.settle()
+    assert time.monotonic() - stopped_s >= 0.2
+    waking.join()
+    assert witness.lost_s() >= LATE_S
 
 
 def test_a_witness_does_not_outlive_who_has_begun_it() -> None:

@@ -2,12 +2,12 @@
 
 Such a test holds the gateway to bounds of 100 ms, and a host that gives shares takes a processor for as long. What has been
 measured during each try decides, by the kernel (`steal`) and by a witness beside the tests (`standstill`), not how the test
-failed; a failure without, or a third, counts. Each is told at the end.
+failed; a failure without, or a third, counts. Each is told at the end. To the first try the test before belongs: at its end a
+gateway that both share may have come to a fault, which the next one finds.
 """
 
 import gc
 import sys
-import time
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -16,7 +16,7 @@ import pytest
 from _pytest.runner import runtestprotocol
 
 from gateway.processes.scheduling.withheld_time import most_growth, read_stolen_s
-from tests.standstill import LOOK_S, StandstillWitness
+from tests.standstill import StandstillWitness
 from tests.workers import BetweenGroups
 
 STOLEN_S = 0.05
@@ -43,6 +43,7 @@ class TriedAgain:
     ) -> None:
         self._witness = None if lost_s else StandstillWitness()
         self._is_concerned, self._lost_s = is_concerned, lost_s or self._measured_s
+        self._began: dict[str, float] = {}  # of the test before
         self._told: list[str] = []
 
     def _measured_s(self) -> dict[str, float]:
@@ -57,18 +58,19 @@ class TriedAgain:
         if not self._is_concerned(item.nodeid):
             return None
         item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
-        why = ""
+        why, began = "", self._lost_s()
+        before, self._began = self._began or began, began
         for left in reversed(range(TRIES)):
-            before = self._lost_s()
             reports = runtestprotocol(item, nextitem=nextitem, log=False)
             failed = [report.longreprtext[-200:] for report in reports if report.failed]
-            if failed:
-                time.sleep(2 * LOOK_S)  # the witness may wake behind us
+            if failed and self._witness:
+                self._witness.settle()
             lost_s = most_growth(self._lost_s(), before)
             if not failed or lost_s < STOLEN_S or not left:
                 break
             why += f"{1e3 * lost_s:.0f} ms; {failed[0]} "
             self._begin_anew(item)
+            before = self._lost_s()
         for report in reports:
             if why:  # a worker sends on what has any, also of the thousands that were made and ended at once
                 report.user_properties.append((TOLD_AS, why))
