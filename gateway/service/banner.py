@@ -30,13 +30,13 @@ class ServedFace:
 def tcp_face(host: str, port: int, units: tuple[int, ...]) -> ServedFace:
     """Return plain Modbus TCP as it is told of."""
     note = f"units {', '.join(map(str, units))}      register table: force-gateway registers"
-    return ServedFace("tcp", f"{host}:{port}", note, {"host": host, "port": port})
+    return ServedFace("tcp", f"{_in_url(host)}:{port}", note, {"host": host, "port": port})
 
 
 def tls_face(host: str, port: int, units: tuple[int, ...]) -> ServedFace:
     """Return Modbus/TCP Security as it is told of."""
     note = f"units {', '.join(map(str, units))}      by certificate, which names the role: force-gateway certs"
-    return ServedFace("tls", f"{host}:{port}", note, {"host": host, "port": port})
+    return ServedFace("tls", f"{_in_url(host)}:{port}", note, {"host": host, "port": port})
 
 
 @dataclass(frozen=True, slots=True)

@@ -224,3 +224,9 @@ def test_opc_ua_and_the_broker_are_told_as_the_page_is(monkeypatch: pytest.Monke
     told = format_banner(ready(rig=rig))
     assert "  opcua        E160 opcua is off: asyncua is not installed" in told
     assert "  mqtt         E160 mqtt is off: aiomqtt is not installed" in told
+
+
+def test_an_ipv6_address_stands_in_brackets_before_its_port() -> None:
+    """`modbus tcp ::1:5020` is another address."""
+    assert [face("::1", 5020, (1,)).where for face in (banner.tcp_face, banner.tls_face)] == ["[::1]:5020"] * 2
+    assert banner.tcp_face("127.0.0.1", 5020, (1,)).where == "127.0.0.1:5020"

@@ -65,8 +65,9 @@ class TcpWire:
 
     @property
     def where(self) -> str:
-        """Host and port."""
-        return f"{self.host}:{self.port}"
+        """Host and port, as --gateway takes them: `::1:1` would be another address."""
+        bare = self.host.strip("[]")
+        return f"[{bare}]:{self.port}" if ":" in bare else f"{self.host}:{self.port}"
 
     @property
     def is_near(self) -> bool:

@@ -209,7 +209,7 @@ def test_rows_without_numbers_are_left_out_with_the_first_one_named() -> None:
     checked = check_table(table)
     assert len(checked.ladder) == 3 * 41
     assert checked.notes == (
-        "3 of 2480 rows without a number in time, command or force, the first is data row 41: left out",
+        "3 of 2480 rows without a usable number in time, command or force, the first is data row 41: left out",
     )
 
 

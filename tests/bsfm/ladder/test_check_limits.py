@@ -115,3 +115,10 @@ def test_rows_of_our_own_run_that_have_no_number_take_no_other_row_s_stair() -> 
         gaps["force_n"][first : first + count] = np.nan
         assert check_table(gaps).ladder.force_n == pytest.approx(whole.force_n, abs=0.2)
         assert list(check_table(gaps).ladder.group) == list(whole.group)
+
+
+@pytest.mark.parametrize("force_n", [1e300, -1e200, 1e61])
+def test_a_force_that_no_square_can_hold_is_no_number(force_n: float) -> None:
+    """`fit` of such a table ended with an internal error: no order was better than another."""
+    error = refuse_table(with_force(lambda force: np.where(force > 10.0, force_n, force)))
+    assert error.flaw is LadderFlaw.NOT_FINITE

@@ -3,11 +3,13 @@
 import json
 import socket
 import threading
+from typing import Any
 
 import pytest
 
 from gateway.cli.master.client import Assignment, GatewayClient
 from gateway.cli.master.wires import TcpWire
+from gateway.cli.options import endpoint
 from gateway.codes.refusals import RefusalReason
 from gateway.registers.writes.ownership import NOT_IPV4
 
@@ -245,3 +247,11 @@ def test_an_owner_without_an_ipv4_address_is_told_as_such(fake, call) -> None:
     fake.bank.set("owner_ip", NOT_IPV4)
     answer = call("read", "owner_ip", "--gateway", fake.address)
     assert "somebody without an IPv4 address" in answer.output and "255.255" not in answer.output
+
+
+@pytest.mark.parametrize("given", ["::1", "[::1]", "[::1]:5020"])
+def test_an_ipv6_address_is_told_as_it_is_given(given: str) -> None:
+    """'no gateway at ::1:5020' named another address: so it was asked for where it was pasted."""
+    context: Any = None
+    asked = endpoint(context, context, given)
+    assert asked and TcpWire(*asked).where == "[::1]:5020"
