@@ -216,7 +216,7 @@ def test_a_gateway_that_is_gone_is_told_with_what_happens_now(bank: PlainBank, s
         ),
         (
             TcpWire("::1", 5020),
-            "E130 no gateway at ::1:5020: Connection refused; not running",
+            "E130 no gateway at [::1]:5020: Connection refused; not running",
             "E130 Connection refused",
         ),
         (

@@ -141,7 +141,7 @@ def test_semicolons_with_decimal_commas_and_kgf_are_understood(tmp_path: Path, c
         (lambda rows: [(t, v, f / 9.80665) for t, v, f in rows], "kgf"),
         (lambda rows: [(t, v, min(f, 15.0)) for t, v, f in rows], "saturated"),
         (lambda rows: rows[:100], "cut short"),
-        (lambda rows: [(t, v, float("nan")) for t, v, f in rows], "without a number"),
+        (lambda rows: [(t, v, float("nan")) for t, v, f in rows], "without a usable number"),
         (lambda rows: [(t, v, f - 9.0 * (2.9 < v < 4.1)) for t, v, f in rows], "no inverse"),
     ],
 )
