@@ -12,7 +12,7 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.plain_file import tell_refusal
+from gateway.plain_file import tell_place_and_refusal
 from gateway.recording.errors import RecordingError
 
 Row = dict[str, Any]
@@ -61,7 +61,7 @@ def _task_of(path: str) -> Task:
 
 def error_row(task: Task, error: BaseException | str) -> Row:
     """Return the row of a recording that has no answer."""
-    told = tell_refusal(error) if isinstance(error, OSError) else str(error)
+    told = tell_place_and_refusal(error) if isinstance(error, OSError) else str(error)
     text = told or type(error).__name__
     match = _CODED.match(text)
     known = isinstance(error, (OSError, ValueError, RecordingError, str))

@@ -41,7 +41,8 @@ def test_a_link_that_leads_nowhere_is_a_recording_that_cannot_be_read(tmp_path: 
     (away, there) = find_tasks([f"{tmp_path}/cell=*/date=*/*.csv"])
     assert there == tasks[0] and (Path(away.path).name, away.sha256) == ("away.csv", "")
     (row,) = rows_of(run_serially, count_bytes, [away])
-    assert row["error_code"] == "E403" and "away.csv" in row["error"]
+    assert (Path(row["file"]).name, row["error_code"]) == ("away.csv", "E403")
+    assert "No such file" in row["error"]
 
 
 def test_processes_give_the_rows_of_one_and_a_death_costs_none(tmp_path: Path) -> None:
