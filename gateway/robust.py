@@ -1,4 +1,5 @@
-"""Robust statistics that more than one room uses: the scale of noise from medians, and where Huber's weights begin."""
+"""Robust statistics that more than one room uses: the scale of noise from medians, where Huber's weights begin, and what is no
+value."""
 
 from typing import Final
 
@@ -9,6 +10,8 @@ SIGMA_PER_MAD: Final = 1.4826
 """Standard deviation of normal noise over its median absolute deviation: 1 / 0.6745 (Huber 1981)."""
 HUBER_AT: Final = 1.345
 """Standard deviations beyond which Huber's weights fall: 95 % efficiency on normal noise (Huber 1981)."""
+LARGEST_VALUE: Final = 1.0e60
+"""Beyond, squares and products of columns overflow: what a logger writes for no value."""
 
 
 def noise_from_second_differences(values: NDArray[np.float64]) -> float:

@@ -18,12 +18,12 @@ import numpy as np
 
 from gateway.diagnosis.measurement import Flags, Floats
 from gateway.registers.words import State
+from gateway.robust import LARGEST_VALUE
 
 SETTLED_S: Final = 0.6
 """From a change of the force that is asked until a rig of this kind has arrived: README, "How well it holds"."""
 LONGEST_BLOCK_S: Final = 5.0
 _SAME_N: Final = 0.005  # half a count of the setpoint register: less is no change
-_LARGEST_N: Final = 1.0e60
 _LEVELS: Final = 8
 _RESAMPLES: Final = 2000
 FEWEST_BLOCKS: Final = 6
@@ -111,7 +111,7 @@ def _hold(setpoint_n: Floats) -> tuple[Floats, Flags]:
 
 def _without_absurd(values: Floats) -> Floats:
     """Return the column with NaN for what no force is, and whose square overflows."""
-    return np.where(np.abs(values) < _LARGEST_N, values, nan)
+    return np.where(np.abs(values) <= LARGEST_VALUE, values, nan)
 
 
 def error_blocks(run: CommandedForce) -> tuple[ErrorBlock, ...]:

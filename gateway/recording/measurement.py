@@ -27,6 +27,7 @@ from gateway.recording.tables.row_validity import (
     valid_by_quality,
 )
 from gateway.recording.tables.time_axis import TimeAxis, check_time_axis
+from gateway.robust import LARGEST_VALUE
 from gateway.units import linear_conversion
 
 FEWEST_ROWS: Final = 50
@@ -34,7 +35,6 @@ SHORTEST_S: Final = 1.0
 _DRIVES: Final = ("command_v", "pressure_kpa")
 _NEEDED: Final = f"at least {FEWEST_ROWS} usable rows over {SHORTEST_S:g} s are needed, 60 s at 200 Hz are good"
 _HIGHEST_COMMAND_V: Final = 50.0
-_LARGEST: Final = 1.0e60  # beyond, squares and products of columns overflow: what a logger writes for "no value"
 _RANGES: Final = {
     "command_v": (-_HIGHEST_COMMAND_V, _HIGHEST_COMMAND_V),
     "temperature_c": (-273.15, 5000.0),  # nothing is colder
@@ -107,7 +107,7 @@ def _replace_absurd(recording: Recording, axis: TimeAxis) -> tuple[dict[str, Flo
     for name, values in recording.columns.items():
         column, (low, high) = values[axis.kept], _RANGES.get(name, (-inf, inf))
         for least, most, what, share in (
-            (-_LARGEST, _LARGEST, f"beyond {_LARGEST:.0e}", 1.0),
+            (-LARGEST_VALUE, LARGEST_VALUE, f"beyond {LARGEST_VALUE:.0e}", 1.0),
             (low, high, f"below {low:g} or above {high:g}, which none is", _RARE_SHARE),
         ):
             strange = np.isfinite(column) & ((column < least) | (column > most))

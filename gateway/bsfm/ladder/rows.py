@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gateway.bsfm.fit.projected_problem import Floats
 from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
+from gateway.robust import LARGEST_VALUE
 from gateway.units import NEWTON_PER_UNIT
 
 FORCE_UNITS: Final = {unit.lower(): factor for unit, factor in NEWTON_PER_UNIT.items()} | {
@@ -26,7 +27,6 @@ LARGEST_BAD_SHARE: Final = 0.2
 OVERLOADED: Final = 1.5  # quality 2 is an overload, 1 an unsteady reading
 LARGEST_COMMAND_V: Final = 10.5
 REGULAR_SHARE: Final = 0.5  # values seen before, as those of a staircase are
-LARGEST_FORCE_N: Final = 1.0e60  # squares overflow beyond: what a logger writes for no value
 NO_COMMAND_V: Final = 50.0  # here and there, that stands for no value (-9999, 32767); in many rows it is another unit
 FAR: Final = 5.0  # times the largest force that a command usually makes
 FAR_SHARE: Final = 0.2  # of the rows of one command: more of them are the force of that command
@@ -106,9 +106,7 @@ def _select_rows(
     columns: Mapping[str, Floats], time_s: Floats, command_v: Floats, force: Floats
 ) -> tuple[NDArray[np.bool_], list[str]]:
     """Which rows are readings, and a sentence for each kind that is not."""
-    finite = (
-        np.isfinite(time_s) & np.isfinite(command_v) & (np.abs(force) <= LARGEST_FORCE_N)
-    )  # nan and inf are not, either
+    finite = np.isfinite(time_s) & np.isfinite(command_v) & (np.abs(force) <= LARGEST_VALUE)
     latest = np.maximum.accumulate(np.where(finite, time_s, -np.inf))
     forward = np.append(True, time_s[1:] > latest[:-1])
     overloaded = columns["quality"] >= OVERLOADED if "quality" in columns else np.zeros(len(finite), dtype=bool)
