@@ -6,8 +6,8 @@ from gateway.modbus.certificate import PeerCertificate
 from gateway.modbus.expiry import end_of
 
 
-def shown(name: str, ends: str, signed_by: str = "") -> PeerCertificate:
-    return PeerCertificate(name, None, "01", "2020", ends, name.encode(), (signed_by or name).encode())
+def shown(name: str, ends: str, signed_by: str = "", number: str = "01") -> PeerCertificate:
+    return PeerCertificate(name, None, number, "2020", ends, name.encode(), (signed_by or name).encode())
 
 
 @pytest.mark.parametrize(
@@ -23,6 +23,11 @@ def shown(name: str, ends: str, signed_by: str = "") -> PeerCertificate:
         ([shown("root", "2030"), shown("root", "2040"), shown("cells", "2036", "root")], "2036"),
         ([shown("cells", "2030", "a root elsewhere")], "2030"),
         ([shown("a", "2030", "b"), shown("b", "2029", "a")], "2029"),
+        ([shown("other", "2040"), shown("root", "2035"), shown("cells", "2030", "root")], "2040"),
+        (
+            [shown("root", "2040", number="01"), shown("root", "2030", number="02"), shown("cells", "2036", "root")],
+            "2036",
+        ),
     ],
 )
 def test_a_ca_that_another_of_its_file_has_signed_ends_with_the_chain(ca: list[PeerCertificate], ends: str) -> None:
