@@ -14,9 +14,9 @@ from typing import Any
 import hypothesis
 import pytest
 
-from tests.budgets import leave_out_long
-from tests.tried_again import TriedAgain
-from tests.workers import ForkedWorkers, OneCompiler
+from tests.gate.budgets import leave_out_long
+from tests.gate.tried_again import TriedAgain
+from tests.gate.workers import ForkedWorkers, OneCompiler
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosis' matrices are small
 
@@ -127,7 +127,7 @@ DESCRIPTORS = "/proc/self/fd/"
 BEHIND_REAL_TIME = 5
 """Nice value of the workers that run what waits for no clock."""
 
-REAL_TIME = ("end_to_end/", "ports/", "service/probing/", "service/running_rig/lines/test_baud_probe.py")
+REAL_TIME = ("end_to_end/", "ports/", "service/probing/", "service/running_rig/lines/load_cell/test_baud_probe.py")
 """What starts processes or waits for real lines: one worker runs it one after the other, so that bounds in seconds do
 not compete with each other, and no worker that has something to calculate waits."""
 
@@ -155,10 +155,10 @@ SLOW = (
     "paper/test_paper_report.py",
     "control/foreign/test_foreign_machines.py",
     "test_compiled_folder.py",
-    "web/tabs/test_away_in_chromium.py",
-    "web/tabs/test_steering_in_chromium.py",
-    "web/tabs/test_tabs_in_chromium.py",
-    "web/tabs/test_many_tabs_in_chromium.py",
+    "web/tabs/in_chromium/test_away_in_chromium.py",
+    "web/tabs/in_chromium/test_steering_in_chromium.py",
+    "web/tabs/in_chromium/test_tabs_in_chromium.py",
+    "web/tabs/in_chromium/test_many_tabs_in_chromium.py",
     "web/tabs/test_calibrations_tab.py",
 )
 """Files of more than ten seconds of processor, or that wait as long for a browser: begun first, so that none is left to one

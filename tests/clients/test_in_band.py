@@ -13,14 +13,14 @@ from gateway.registers.words import ControlBit, State, StatusBit
 from tests.calibrations.coefficients import calibration
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.losses.test_edges_and_losses import control_word_of
+from tests.clients.one_language.test_two_tasks import every_place
 from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
 from tests.clients.programs.python_program import PythonProgram
+from tests.clients.refusals.test_guests import set_ramp
 from tests.clients.scenes import TEXTS, WHERE, cycles
-from tests.clients.test_controller_rules import own_map
-from tests.clients.test_edges_and_losses import control_word_of
-from tests.clients.test_guests import set_ramp
-from tests.clients.test_two_tasks import every_place
+from tests.clients.texts.test_controller_rules import own_map
 
 
 def ramp_above(gateway: GatewayAtHand, force_n: float) -> None:

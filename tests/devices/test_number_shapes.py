@@ -8,7 +8,7 @@ from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample, Quality
 from gateway.devices.rehearsal import rehearse
 from gateway.devices.template import compile_template
-from tests.dialogues.test_overload_dialogue import cell
+from tests.dialogues.cells.test_overload_dialogue import cell
 
 
 @pytest.mark.parametrize("sent", ["+5.0000E+00", "5.0000E+00", "+5.0000e+000", "+5.0000E0", "50.0000E-1"])

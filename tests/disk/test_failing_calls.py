@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from tests.disk.acts import Act
-from tests.disk.all_acts import REFUSED
+from tests.disk.acts.acts import Act
+from tests.disk.acts.all_acts import REFUSED
+from tests.disk.acts.file_acts import Restored
 from tests.disk.failing_disks import FailingDisk, describe
-from tests.disk.file_acts import Restored
 from tests.disk.watched_disk import watching
 
 STRIDE = 19

@@ -6,8 +6,8 @@ from random import Random
 
 import pytest
 
-from tests.disk.acts import Act, AuditedWrites
-from tests.disk.all_acts import SYNCED
+from tests.disk.acts.acts import Act, AuditedWrites
+from tests.disk.acts.all_acts import SYNCED
 from tests.disk.power_cut import JournaledDisk
 from tests.disk.test_failing_calls import try_once
 from tests.disk.watched_disk import watching

@@ -23,7 +23,7 @@ many samples as tell that, some 30, take 3 s. Where the noise is as expected, fa
 that has become half as noisy since costs one in some 3000 starts, for nobody can know that before so many samples.
 
 repeat_law says which noise is found within 2 s at which rate, and which never; measured in
-tests/control/supervision/test_stuck_sensor.py.
+tests/control/supervision/readings/test_stuck_sensor.py.
 """
 
 from collections import deque

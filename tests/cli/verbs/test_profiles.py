@@ -16,7 +16,7 @@ from gateway.ports import PortInfo
 from gateway.processes import exit_codes
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.registers import RegisterMap
-from tests.dialogues.test_overload_dialogue import cell
+from tests.dialogues.cells.test_overload_dialogue import cell
 
 
 @pytest.fixture(autouse=True)

@@ -19,8 +19,8 @@ import psutil
 import pytest
 
 from gateway.audit.audit_reader import read_audit, verify_audit
+from tests.end_to_end.disks.small_disks import FailingExt4, mounted
 from tests.end_to_end.kills.test_upload_kill import Uploads, active_mark, uploads
-from tests.end_to_end.small_disks import FailingExt4, mounted
 
 pytestmark = pytest.mark.long
 FREEZES = 40

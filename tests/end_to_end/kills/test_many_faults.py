@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.tried_again import STOLEN_S
+from tests.gate.tried_again import STOLEN_S
 from tools.bench.faults.process_faults import Fault, faults, p99, run, undisturbed
 
 ROUNDS = 200

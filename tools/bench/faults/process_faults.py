@@ -25,7 +25,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from gateway.processes.scheduling.withheld_time import most_growth, read_stolen_s
-from tests.tried_again import STOLEN_S
+from tests.gate.tried_again import STOLEN_S
 from tools.bench.harness.pressing_gateway import (
     Scene,
     Times,

@@ -6,7 +6,7 @@ import pytest
 
 from gateway.registers.words import State
 from tests.service.rigs import strict
-from tests.service.running_rig.lines.played_output import Wire, wire
+from tests.service.running_rig.lines.output.played_output import Wire, wire
 from tests.service.wired import RESET, Wired
 
 __all__ = ["wire"]

@@ -1,0 +1,77 @@
+"""What the client of C alone does: words below 0, a close that forgets, a band that ends with the demand, how long it waits."""
+
+from __future__ import annotations
+
+import ctypes
+
+import pytest
+
+from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.losses.test_asked_for_while_lost import be_lost
+from tests.clients.programs.c_program import OK, CProgram
+from tests.clients.scenes import TEXTS, commands, cycles
+
+TILT_ANGLE, SEQUENCE = 6, 10
+
+
+@pytest.fixture
+def program(gateway: GatewayAtHand) -> CProgram:
+    return CProgram(TEXTS["c"], gateway)
+
+
+@pytest.mark.parametrize(
+    ("counts", "word"), [(-200.0, 65336), (-200.4, 65336), (-200.6, 65335), (-0.4, 0), (0.4, 0), (200.6, 201)]
+)
+def test_a_word_below_0_is_the_nearest_count_too(
+    program: CProgram, gateway: GatewayAtHand, counts: float, word: int
+) -> None:
+    set_word = program._library.fg_set
+    assert set_word(program._client, TILT_ANGLE, ctypes.c_float(counts), ctypes.c_float(1.0)) == OK
+    program.enable(12.0)
+    cycles(program)
+    assert commands(gateway)[-1][TILT_ANGLE - 1] == word  # without the heartbeat
+
+
+@pytest.mark.parametrize(("number", "is_taken"), [(32768, True), (65535, True), (65536, False), (-1, False)])
+def test_a_word_without_a_sign_has_16_bits(
+    program: CProgram, gateway: GatewayAtHand, number: int, is_taken: bool
+) -> None:
+    """A program that counts command_sequence was refused from 32768 on, 18 minutes at 30 Hz."""
+    told = program._library.fg_set(program._client, SEQUENCE, ctypes.c_float(number), ctypes.c_float(1.0))
+    assert (told == OK) is is_taken
+    program.enable(12.0)
+    cycles(program)
+    assert gateway.bank.command.command_sequence == (number if is_taken else 0)
+
+
+def test_who_closes_and_connects_again_commands_nothing_until_it_asks(
+    program: CProgram, gateway: GatewayAtHand
+) -> None:
+    """A program that closes at its end and goes on would have pressed at once."""
+    program.enable(12.0)
+    cycles(program)
+    program._library.fg_close(program._client)
+    assert program.ended
+    cycles(program)
+    assert [words[:2] for words in commands(gateway)] == [(1, 1200), (0, 0)]
+    program.enable(7.0)
+    cycles(program)
+    assert gateway.bank.command.force_setpoint_n == 7.0
+
+
+def test_a_force_that_is_let_go_is_in_band_no_more(program: CProgram) -> None:
+    program.enable(12.0)
+    cycles(program)
+    assert program.in_band
+    program.disable()
+    assert not program.in_band
+
+
+def test_the_pause_before_another_attempt_has_an_end(program: CProgram, gateway: GatewayAtHand) -> None:
+    """Behind a night without power the gateway would be there for hours before its client."""
+    be_lost(program, gateway)
+    for _ in range(20):
+        program.cycle(60.0)
+    gateway.is_cut, before = False, len(gateway.requests)
+    program.cycle(4.1)
+    assert len(gateway.requests) > before, "4 s are the longest"

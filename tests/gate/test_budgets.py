@@ -1,0 +1,53 @@
+"""What the push gate leaves to the long run."""
+
+import itertools
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from tests.gate.budgets import leave_out_long
+
+
+class Item(SimpleNamespace):
+    """As much of pytest's as is asked for."""
+
+    __hash__ = object.__hash__
+
+    def add_marker(self, mark: Any) -> None:
+        self.skipped = mark.name == "skip"
+
+
+def table(name: str, cases: int, *marks: str) -> list[Any]:
+    return [Item(nodeid=f"{name}[{case}]", keywords=set(marks), skipped=False) for case in range(cases)]
+
+
+def run_of(items: list[Any]) -> list[str]:
+    leave_out_long(items, in_silence=False)
+    return [item.nodeid for item in items if not item.skipped]
+
+
+@pytest.mark.parametrize(("cases", "run"), [(1, 1), (3, 1), (4, 2), (72, 24)])
+def test_of_a_sampled_table_one_case_in_three_is_run_and_one_always(cases: int, run: int) -> None:
+    assert len(run_of(table("test_a", cases, "sampled"))) == run
+
+
+def test_each_table_has_its_sample_and_other_tests_are_all_run() -> None:
+    items = (
+        table("test_a", 6, "sampled") + table("test_b", 3, "sampled") + table("test_c", 4) + table("test_d", 2, "long")
+    )
+    names = [name[:6] for name in run_of(items)]
+    assert [names.count(name) for name in ("test_a", "test_b", "test_c", "test_d")] == [2, 1, 4, 0]
+
+
+def test_it_is_the_same_sample_in_any_order_and_no_stripe_of_the_table() -> None:
+    found = run_of(table("test_a", 60, "sampled"))
+    assert set(found) == set(run_of(table("test_a", 60, "sampled")[::-1]))
+    places = [int(name[7:-1]) for name in found]
+    assert len({after - before for before, after in itertools.pairwise(places)}) > 2
+
+
+def test_in_silence_what_is_left_out_is_gone() -> None:
+    items = table("test_a", 6, "sampled")
+    leave_out_long(items, in_silence=True)
+    assert len(items) == 2
