@@ -25,6 +25,7 @@ from gateway.diagnosis.model_fit.base_fit import DEFAULT_PLANT, base_parameters,
 from gateway.diagnosis.model_fit.initial_state import drop_unfelt_starts, settle_known_rests
 from gateway.diagnosis.model_fit.levenberg_marquardt import FittedModel
 from gateway.diagnosis.model_fit.line_lengths import fit_line_lengths
+from gateway.diagnosis.model_fit.refit_effect import measure_refit
 from gateway.diagnosis.noise.whitening import Whitener, fast_noise_n, timing_weights, white_whitener
 from gateway.diagnosis.notes import (
     implausible_area,
@@ -118,6 +119,8 @@ def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options
     left = find_dependences(found.bench, found.fitted, found.whiten, found.unnamed)
     findings = SearchFindings(start.bench, found, start.evidence, left, start.effects)
     result = compose_diagnosis(findings, options.noise_floor_n, options.calibration_noise_n)
+    if options.is_own and not options.without:
+        result = replace(result, refit=measure_refit(start.bench, start.base, given))
     return _without_aside(result, start) if start.aside.any() else result
 
 

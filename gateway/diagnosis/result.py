@@ -53,6 +53,28 @@ class Estimate:
 
 
 @dataclass(frozen=True, slots=True)
+class RefittedNumber:
+    """A number of the plant before and after the refit. costs_n: error that it alone makes as it stood, N RMS."""
+
+    section: str
+    name: str
+    unit: str
+    before: float
+    value: float
+    costs_n: float
+
+
+@dataclass(frozen=True, slots=True)
+class Refit:
+    """What the refit of the base model has changed in the rig's plant. as_given_rms_n: error of the plant as it stands, N RMS,
+    beside an offset of each recording; gain_n: the part of it that the refit takes away, N RMS."""
+
+    as_given_rms_n: float
+    gain_n: float
+    numbers: tuple[RefittedNumber, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Gain:
     """What the effect is worth on blocks that the fit did not see; ci95 is that of before minus after, N.
 
@@ -157,7 +179,8 @@ class Diagnosis:
     """The whole answer. base and plant: the refitted base model and the extended one (its intervals in `causes`).
 
     suspects: columns that are probably not what their names say: before anything else is believed. machine: what belongs to the
-    machine, where its older recordings were given: then causes are changes since, and base is the plant as it was.
+    machine, where its older recordings were given: then causes are changes since, and base is the plant as it was. refit: what
+    has changed in the plant of the recordings' own rig, None where it is another one's.
     """
 
     verdict: Verdict
@@ -175,3 +198,4 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     suspects: tuple[Suspect, ...] = ()
     machine: Machine | None = None
+    refit: Refit | None = None

@@ -41,6 +41,8 @@ def render_diagnosis(
     yield Text(headline.answer_sentence(diagnosis), style=f"bold {colour}")
     if lack := headline.lack_sentence(diagnosis):
         yield Text(lack)
+    if refit := headline.refit_sentence(diagnosis):
+        yield Text(refit)
     yield Text()
     yield _line("off by", _initial_error(diagnosis))
     if diagnosis.machine is not None:

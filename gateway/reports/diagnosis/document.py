@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from gateway.diagnosis.input_checks import Suspect
 from gateway.diagnosis.notes import why_blind
-from gateway.diagnosis.result import Baseline, Cause, Diagnosis, Estimate, Interval, Leftover
+from gateway.diagnosis.result import Baseline, Cause, Diagnosis, Estimate, Interval, Leftover, Machine, Refit
 from gateway.reports.diagnosis.wording import all_notes
 from gateway.reports.json_numbers import finite_or_none
 
@@ -17,7 +17,8 @@ def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
     """Return plain values. Forces in N, times in s, ci95 is [low, high], confidence and shares 0..1; not finite: null.
 
     suspects (columns that are not what they say) and notes stand beside the contract's fields; where older recordings of the
-    machine were given also machine, and what each cause's parameters were before.
+    machine were given also machine, and what each cause's parameters were before; with the plant of the recordings' own rig
+    also refit: the error of that plant as it stands, and what of its numbers the refit has changed.
     """
     return {
         "format": FORMAT,
@@ -37,7 +38,11 @@ def diagnosis_document(diagnosis: Diagnosis, runtime_s: float) -> Document:
         "runtime_s": finite_or_none(runtime_s),
         "suspects": [_suspect(each) for each in diagnosis.suspects],
         "notes": [*filter(None, [why_blind(diagnosis)]), *all_notes(diagnosis)],
-    } | ({"machine": _machine(diagnosis)} if diagnosis.machine else {})
+    } | {
+        name: value
+        for name, value in (("machine", _machine(diagnosis.machine)), ("refit", _refit(diagnosis.refit)))
+        if value is not None
+    }
 
 
 def _baseline(baseline: Baseline) -> Document:
@@ -47,6 +52,23 @@ def _baseline(baseline: Baseline) -> Document:
         "noise_floor_source": str(baseline.noise_floor_source),
         "samples": int(baseline.samples),
         "duration_s": finite_or_none(baseline.duration_s),
+    }
+
+
+def _refit(refit: Refit | None) -> Document | None:
+    if refit is None:
+        return None
+    return {
+        "as_given_rms_n": finite_or_none(refit.as_given_rms_n),
+        "parameters": {
+            each.name: {
+                "value": finite_or_none(each.value),
+                "before": finite_or_none(each.before),
+                "unit": each.unit,
+                "costs_n": finite_or_none(each.costs_n),
+            }
+            for each in refit.numbers
+        },
     }
 
 
@@ -118,10 +140,10 @@ def _before(diagnosis: Diagnosis, cause: Cause) -> Document:
     }
 
 
-def _machine(diagnosis: Diagnosis) -> Document:
+def _machine(machine: Machine | None) -> Document | None:
     """What belongs to the machine, by its older recordings: no finding."""
-    assert diagnosis.machine is not None
-    machine = diagnosis.machine
+    if machine is None:
+        return None
     return {
         "against": list(machine.recordings),
         "effects": [{"name": each.name, "parameters": _parameters(each.parameters)} for each in machine.effects],

@@ -18,6 +18,8 @@ _FIX_COLUMNS: Final = "No cause was looked for. Fix this first, then run it agai
 _NOTHING_LEFT: Final = "Nothing is left above the noise floor."
 _CONFIRM: Final = "To confirm it, record rests, repeat a cycle or give the noise floor (--noise-floor-n)."
 _TELL_APART: Final = "They look alike in this recording; what to record next tells them apart."
+_KEEP_REFIT: Final = "--save keeps the plant as it was refitted, for plant use."
+_COSTLY_SHARE: Final = 0.3  # of what the refit takes away: three numbers that share it evenly have 0.58 of it each
 _DEPENDS_ON_NOTHING: Final = "What is left is more than the noise, and depends on nothing that was recorded."
 
 
@@ -54,6 +56,18 @@ def lack_sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict is Verdict.UNKNOWN or _leaves_more_than_noise(diagnosis):
         return _DEPENDS_ON_NOTHING
     return _TELL_APART if _has_group(diagnosis.causes) else _CONFIRM
+
+
+def refit_sentence(diagnosis: Diagnosis) -> str:
+    """Return what the rig's plant gets wrong as it stands; empty where refitting it takes away no more than the noise."""
+    refit = diagnosis.refit
+    if refit is None or not refit.gain_n > diagnosis.baseline.noise_floor_n:
+        return ""
+    costly = [each for each in refit.numbers if each.costs_n > _COSTLY_SHARE * refit.gain_n] or refit.numbers
+    numbers = words.join_words(words.refitted_number(each) for each in costly)
+    return (
+        f"As it stands, the rig's plant is off by {words.force(refit.as_given_rms_n)} N RMS: {numbers}. {_KEEP_REFIT}"
+    )
 
 
 def _describe_finding(diagnosis: Diagnosis) -> str:

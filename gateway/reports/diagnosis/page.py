@@ -63,7 +63,11 @@ def _head(diagnosis: Diagnosis, circumstances: ReportContext) -> Head:
         kind="Diagnosis",
         answer=headline.answer_sentence(diagnosis),
         badge=headline.badge(diagnosis),
-        sentences=(headline.lack_sentence(diagnosis), machine[:1].upper() + machine[1:]),
+        sentences=(
+            headline.lack_sentence(diagnosis),
+            headline.refit_sentence(diagnosis),
+            machine[:1].upper() + machine[1:],
+        ),
         facts=(listed, rig, plant, _extent(baseline.samples, baseline.duration_s)),
     )
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from math import floor, isfinite, log10, sqrt
 from typing import Final
 
-from gateway.diagnosis.result import Cause, Diagnosis, Estimate, FloorSource, Interval, Leftover
+from gateway.diagnosis.result import Cause, Diagnosis, Estimate, FloorSource, Interval, Leftover, RefittedNumber
 from gateway.twin.plant import Plant
 
 _FLOOR_SOURCES: Final = {
@@ -95,6 +95,13 @@ def previous_value(diagnosis: Diagnosis, name: str, value: Estimate) -> str:
     before = getattr(getattr(diagnosis.base, value.section), name) if value.section else 0.0
     null = getattr(getattr(Plant(), value.section), name) if value.section else 0.0
     return "" if before == null else f" ({number(before)} before)"
+
+
+def refitted_number(refitted: RefittedNumber) -> str:
+    """Return `friction.coulomb_n is 4.63 N here, 2 N in the plant`."""
+    unit = f" {refitted.unit}" if refitted.unit not in ("", "1") else ""
+    here, before = number(refitted.value), number(refitted.before)
+    return f"{refitted.section}.{refitted.name} is {here}{unit} here, {before}{unit} in the plant"
 
 
 def gain_text(cause: Cause) -> str:

@@ -7,7 +7,17 @@ import jsonschema
 import pytest
 
 from gateway.diagnosis.input_checks import Suspect
-from gateway.diagnosis.result import Estimate, Extended, Gain, Leftover, Machine, OwnEffect, Verdict
+from gateway.diagnosis.result import (
+    Estimate,
+    Extended,
+    Gain,
+    Leftover,
+    Machine,
+    OwnEffect,
+    Refit,
+    RefittedNumber,
+    Verdict,
+)
 from gateway.reports.diagnosis.document import diagnosis_document
 from tests.reports.fake_diagnosis import FRICTION, WARMTH, diagnosis
 
@@ -100,7 +110,10 @@ def test_each_number_of_the_answer_stands_under_its_own_name() -> None:
     rest = Leftover("time_s", "wanders", 0.4, ("time_s",), 2.0, 3.0, 4.0, "a.csv", "a rest")
     size = {"zero_n": Estimate("cell", 0.5, "N", (0.4, 0.6))}
     machine = Machine(("old.fgr",), (OwnEffect("creep", size),), 0.3, 0.2)
-    answer = diagnosis(suspects=(suspect,), leftover=(rest,), machine=machine, extended=Extended(0.25, True))
+    refit = Refit(1.4, 1.3, (RefittedNumber("friction", "coulomb_n", "N", 1.0, 3.0, 1.2),))
+    answer = diagnosis(
+        suspects=(suspect,), leftover=(rest,), machine=machine, extended=Extended(0.25, True), refit=refit
+    )
     document = diagnosis_document(answer, 1.5)
     assert document["suspects"] == [{
         "code": "E521", "recording": "a.csv", "column": "command_v", "swapped_with": "force_n", "unit": None, "factor": 1.5,
@@ -112,6 +125,8 @@ def test_each_number_of_the_answer_stands_under_its_own_name() -> None:
     }]  # fmt: skip
     own = [{"name": "creep", "parameters": {"zero_n": {"value": 0.5, "unit": "N", "ci95": [0.4, 0.6]}}}]
     assert document["machine"] == {"against": ["old.fgr"], "effects": own, "common_error_n": 0.3, "left_n": 0.2}
+    numbers = {"coulomb_n": {"value": 3.0, "before": 1.0, "unit": "N", "costs_n": 1.2}}
+    assert document["refit"] == {"as_given_rms_n": 1.4, "parameters": numbers}
     (cause,) = document["causes"]
     assert cause["before"] == {"load_dependent_n_per_n": answer.base.friction.load_dependent_n_per_n}
     assert cause["gain"] == {
