@@ -135,8 +135,9 @@ def complete_codes(context: click.Context, incomplete: str) -> Items:
 
 @_completes(files=True)
 def complete_recordings(context: click.Context, incomplete: str) -> Items:
-    """Offer the numbers of recordings in the state directory that is meant, and files."""
-    return _items(_numbers_in(_directory(context) / RECORDINGS, "*.fgr"))
+    """Offer the numbers of recordings in the state directory that is meant, the last one, and files."""
+    numbers = _numbers_in(_directory(context) / RECORDINGS, "*.fgr")
+    return _items([*numbers, "last"] if numbers else [])
 
 
 @_completes()

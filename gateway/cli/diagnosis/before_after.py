@@ -10,8 +10,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.cli.diagnosis.inputs import recording_path
 from gateway.cli.errors import CliError
+from gateway.cli.recordings.named_recording import recording_path
 from gateway.control.compensation.cell_map import CellMap
 from gateway.diagnosis.force_error import ForceChange, GainVerdict, compare_runs
 from gateway.plants.recorded_force import RecordedForce, read_recorded_force

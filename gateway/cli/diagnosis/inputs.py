@@ -11,14 +11,15 @@ import click
 import numpy as np
 
 from gateway import defaults
-from gateway.cli.errors import CliError, no_such_recording
+from gateway.cli.errors import CliError
 from gateway.cli.options import state_directory
+from gateway.cli.recordings.named_recording import recording_path
 from gateway.diagnosis.measurement import Measurement
 from gateway.diagnosis.model_fit.base_fit import without_effects
 from gateway.plants.recorded_number import header_in_use
 from gateway.processes import exit_codes
 from gateway.profiles.kinds.plants import PlantProfile, load_shipped_plant
-from gateway.recording import Recording, find_recording, read_table
+from gateway.recording import Recording, read_table
 from gateway.recording.calibrations_used import tell_changes
 from gateway.recording.measurement import measurement_of
 from gateway.recording.tables.column_names import SENT
@@ -30,9 +31,7 @@ if TYPE_CHECKING:
     from gateway.profiles import Rig
 
 _WIRE_S: Final = 0.035  # a frame at 9600 baud, the amplifier's own period, and the sampling
-REFERENCE: Final = "reference"
 _LEAST_MOVE_V: Final = 0.2  # the trim of a force that is held moves less
-"""What stands for the rig's reference recording where a recording is named."""
 START_PLANT: Final = defaults.PLANT
 _ANY_STATE: Final = defaults.RIG  # whose state directory is meant where neither --state nor --rig says one
 
@@ -187,29 +186,6 @@ def _quantum_n(rig: "Rig | None") -> float:
 
     line = rig.load_cell
     return cell_host(line.device, line.sign, line.unit).resolution_n
-
-
-def recording_path(name: str, rig: str | None, state: Path | None) -> Path:
-    """Return the file of a recording: a number, a path, or the rig's `reference`. CliError (65) where there is none."""
-    path = Path(name)
-    if name == REFERENCE and not path.exists():
-        return reference_file(state_directory(state, rig))
-    if name.isdecimal() and not path.exists():
-        return find_recording(state_directory(state, rig), int(name))
-    if not path.exists():
-        raise no_such_recording(path)
-    return path
-
-
-def reference_file(directory: Path) -> Path:
-    """Return the rig's reference recording. CliError (65) where none was kept."""
-    from gateway.watch.reference_recording import read_reference_recording, reference_path
-
-    known = read_reference_recording(directory)
-    if known is None:
-        cure = "force-gateway recordings reference RECORDING makes one, of the machine as it should be"
-        raise CliError(f"E403 no reference recording in {directory}: {cure}", exit_codes.DATA)
-    return reference_path(directory, known)
 
 
 def _of_rig(rig: "Rig") -> tuple[str, PlantProfile, tuple[str, ...]]:

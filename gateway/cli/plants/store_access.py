@@ -183,7 +183,7 @@ def _keep_reference(state: StateChoice, number: int, before: str | None) -> dict
 
 
 def _reference(state: StateChoice, number: int, cell: "CellMap | None", before: str | None) -> "ForceReference | None":
-    from gateway.cli.diagnosis.inputs import recording_path
+    from gateway.cli.recordings.named_recording import recording_path
     from gateway.plants.force_reference import find_reference, reference_of
     from gateway.recording import read_table
 

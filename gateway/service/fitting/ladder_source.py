@@ -19,7 +19,6 @@ from gateway.recording import (
     ColumnMapping,
     Recording,
     RecordingError,
-    find_recording,
     read_header,
     read_recording,
     read_table,
@@ -81,11 +80,6 @@ def in_unit(recording: Recording, force_unit: str | None) -> Recording:
         )
         raise LadderError(LadderFlaw.UNIT, sentence)
     return replace(recording, header=recording.header | {"force_unit": "N"})
-
-
-def find_source(name: str, state: Path) -> Path:
-    """Return the file of a recording's number, or the path itself. RecordingError for a number that is not there."""
-    return find_recording(state, int(name)) if name.isdecimal() and not Path(name).exists() else Path(name)
 
 
 def read_resumed(recording: Recording) -> list[Recording]:

@@ -1,5 +1,6 @@
 """What a diagnosis loads before it begins: of seconds, imports are the largest part that nobody sees. And what it refuses."""
 
+import contextlib
 import shutil
 import subprocess
 import sys
@@ -11,8 +12,10 @@ import pytest
 from click.testing import CliRunner
 
 from gateway.cli.diagnosis.inputs import read_sources
+from gateway.cli.errors import CliError
 from gateway.cli.main import command
-from gateway.recording import Recording
+from gateway.cli.recordings.named_recording import recording_path
+from gateway.recording import Recording, RecordingError
 from gateway.recording.export import export_csv
 
 _ONLY_FOR_RIGS = ("gateway.control.controller", "gateway.profiles.rigs.rig_file", "gateway.devices.codecs")
@@ -52,6 +55,23 @@ def test_a_recording_is_no_evidence_for_itself(words: tuple[str, ...], why: str,
     refused = CliRunner().invoke(command, ["diagnose", *(word.format(*files) for word in words), "--rig", "demo"])
     assert refused.exit_code == 2
     assert f"{why.format(*files)}: a recording is no evidence for itself" in refused.stderr
+
+
+def test_a_recording_is_meant_by_its_file_its_number_or_as_the_last_one(tmp_path: Path) -> None:
+    """Whoever has just recorded knows no number; a file of such a name is that file."""
+    with pytest.raises(CliError, match=f"E403 no recording in {tmp_path}: "):
+        recording_path("last", None, tmp_path)
+    (tmp_path / "recordings").mkdir()
+    for number in (9, 10):
+        (tmp_path / f"recordings/{number:04d}.fgr").touch()
+    assert recording_path("last", None, tmp_path) == tmp_path / "recordings/0010.fgr"
+    assert recording_path("9", None, tmp_path) == tmp_path / "recordings/0009.fgr"
+    with pytest.raises(RecordingError, match=r"no recording 8 in .*; there: 9, 10"):
+        recording_path("8", None, tmp_path)
+    with contextlib.chdir(tmp_path):
+        for name in ("last", "9"):
+            Path(name).touch()
+            assert recording_path(name, None, tmp_path) == Path(name)
 
 
 @pytest.mark.parametrize("old", [("still.csv",), ("still.csv", "moves.csv")], ids=["alone", "beside one that does"])

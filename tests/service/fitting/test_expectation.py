@@ -11,14 +11,13 @@ import pytest
 
 from gateway.calibrations.store import CalibrationStore
 from gateway.profiles import load_rig, shipped_profiles_folder
-from gateway.recording import ColumnMapping, Recorder, Recording, RecordingError
+from gateway.recording import ColumnMapping, Recorder, Recording
 from gateway.service.fitting import measured_response
 from gateway.service.fitting.ladder_source import (
     RigContext,
     acceptance_bounds,
     expectation,
     find_rig,
-    find_source,
     read_source,
     rig_of_state,
 )
@@ -71,14 +70,6 @@ def test_a_rig_file_that_has_become_another_s_is_not_taken_for_it(tmp_path: Path
     assert found is not None and found.name == "cell-3" and notes == []
     found, notes = find_rig("cell-4", str(file))
     assert found is None and "rig cell-4 is not known here" in notes[0]
-
-
-def test_a_file_whose_name_is_a_number_is_that_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "7").touch()
-    assert find_source("7", tmp_path) == Path("7")
-    with pytest.raises(RecordingError):
-        find_source("8", tmp_path)
 
 
 def test_a_unit_that_the_mapping_says_is_known_from_then_on(tmp_path: Path) -> None:

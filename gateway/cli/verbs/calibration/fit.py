@@ -11,7 +11,7 @@ from gateway.cli.command_line.completion_words import complete_recordings
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
-from gateway.cli.errors import CliError, no_such_recording
+from gateway.cli.errors import CliError
 from gateway.cli.options import check_state, json_option, name_option, state_directory, state_option
 from gateway.processes import exit_codes
 from gateway.processes.state_directory import RECORDINGS
@@ -77,16 +77,17 @@ EXAMPLES = ("fit ladder.csv --models bsfm --orders 1-3", "fit ladder.csv --model
 def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> None:
     """Fit the four models to a ladder, and say which to use.
 
-    RECORDING is a number of `recordings list`, a .fgr file, or a CSV or Parquet table with time_s, command_v, force_n.
+    RECORDING is a number of `recordings list`, `last`, a .fgr file, or a CSV or Parquet table with time_s, command_v, force_n.
     """
     from gateway.cli.diagnosis.outputs import check_targets
     from gateway.cli.diagnosis.progress_line import show_progress
+    from gateway.cli.recordings.named_recording import recording_path
 
     if options["report"] and options["no_report"]:
         raise click.UsageError("--report or --no-report, not both")
     if not store:
         check_state(options["state"])
-    path = _source(recording, options)
+    path = recording_path(recording, options["rig"], options["state"])
     target = None if options["no_report"] else options["report"] or _beside(path)
     named = [Path(options[name]) for name in ("rig", "columns") if options[name]]
     check_targets([target] if target else [], [path, *named])
@@ -106,16 +107,6 @@ def command(*, recording: str, as_json: bool, store: bool, **options: Any) -> No
         from gateway.service.fitting.fit_process import rejected_sentence
 
         raise CliError(rejected_sentence(fit.document["calibration"], fit.verdict.rejected), exit_codes.DATA)
-
-
-def _source(name: str, options: dict[str, Any]) -> Path:
-    """Return the file of the recording. RecordingError or CliError (65) where there is none."""
-    from gateway.service.fitting.ladder_source import find_source
-
-    path = find_source(name, state_directory(options["state"], options["rig"]))
-    if not path.exists():
-        raise no_such_recording(path)
-    return path
 
 
 def _write_report(fit: "LadderFit", target: Path) -> None:

@@ -108,7 +108,7 @@ def _not_an_option(context: click.Context, parameter: click.Parameter, value: Pa
 def command(**options: Any) -> None:
     """Say what the simulation gets wrong on a recording, and why.
 
-    RECORDING is a number of `recordings list`, a .fgr file, CSV or Parquet with time_s, force_n and command_v or
+    RECORDING is a number of `recordings list`, `last`, a .fgr file, CSV or Parquet with time_s, force_n and command_v or
     pressure_kpa. Several are explained by one model.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads would only wait for each other
@@ -186,8 +186,8 @@ def _show_before_after(options: dict[str, Any]) -> None:
     if not (options["before"] and options["after"]):
         raise click.UsageError("--before A and --after B go together: the run before a change and the one after it")
     from gateway.cli.diagnosis import before_after
-    from gateway.cli.diagnosis.inputs import recording_path
     from gateway.cli.diagnosis.outputs import STDOUT, check_targets, write_all
+    from gateway.cli.recordings.named_recording import recording_path
 
     runs = [recording_path(options[name], options["rig"], options["state"]) for name in ("before", "after")]
     named = [Path(options[name]) for name in ("rig", "columns") if options[name]]
@@ -220,7 +220,8 @@ def _check_effect(name: str | None) -> None:
 def _read_old(options: dict[str, Any], rig: str) -> "Sources | None":
     """The recordings that the new ones are compared with; None where --against names none. rig: of the new ones, whose
     reference is meant."""
-    from gateway.cli.diagnosis.inputs import REFERENCE, read_sources, reference_file, refuse_still
+    from gateway.cli.diagnosis.inputs import read_sources, refuse_still
+    from gateway.cli.recordings.named_recording import REFERENCE, reference_file
 
     if not options["against"]:
         return None

@@ -226,7 +226,7 @@ def reference_command(*, recording: str | None, no_reference: bool, state: State
 
 def _keep_reference(state: StateChoice, name: str) -> None:
     """Make this recording the reference. CliError (65) for one that cannot describe a machine."""
-    from gateway.cli.diagnosis.inputs import recording_path
+    from gateway.cli.recordings.named_recording import recording_path
     from gateway.watch import reference_recording as reference
 
     path = recording_path(name, state.rig, state.path)

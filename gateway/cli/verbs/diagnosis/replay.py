@@ -28,13 +28,13 @@ EXAMPLES = ("replay 1", "replay 1 --against demo --json")
 @state_options
 @json_option
 def command(*, recording: str, against: str | None, state: StateChoice, as_json: bool) -> None:
-    """Play RECORDING (a number or a file) through control again.
+    """Play RECORDING (a number, `last` or a file) through control again.
 
     Without --against its decisions are compared with the recorded ones, with --against those of two set-ups over the same
     readings. Readings stay as they were recorded: it shows what control would have wanted, not where the force would have gone.
     """
-    from gateway.cli.diagnosis.inputs import recording_path
     from gateway.cli.diagnosis.progress_line import show_progress
+    from gateway.cli.recordings.named_recording import recording_path
     from gateway.cli.recordings.setups import other_setup, own_setup
     from gateway.recording import read_table
     from gateway.service.replayed_control import compare_decisions, replay_control, tell_missing_rows
