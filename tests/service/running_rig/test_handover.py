@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from gateway.codes.warning_bits import WarningBit
-from gateway.control import LeaseAction
 from gateway.modbus import Peer
 from gateway.processes import message_link
 from gateway.processes.exit_cause import EndCause, Ending
@@ -23,12 +22,10 @@ from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 from gateway.service.running_rig.running_rig import RunningRig
 from tests.certificates import store_all
-from tests.control.bench import settings
 from tests.disk.at_once import AtOnce
 from tests.service.kept_log import Log
 from tests.service.rigs import demo
 from tests.service.running_rig.begun_rig import OwnDevices, devices, with_running_rig
-from tests.service.running_rig.simulated_rig import ENABLE, OWNER, SmallRig
 
 __all__ = ["devices"]
 
@@ -253,33 +250,3 @@ def test_a_host_that_holds_enable_over_a_fault_is_told_once_a_second_and_its_end
     held.let_go("10.0.0.5")
     held.let_go("10.0.0.5")
     assert [one.get("10.0.0.5") for one in told] == [100.0, pytest.approx(101.0), pytest.approx(102.0), None]
-
-
-@pytest.mark.parametrize("action", LeaseAction)
-@pytest.mark.parametrize("beat", [7, 8])
-def test_behind_a_crash_the_last_frame_of_a_program_that_hung_presses_not(action: LeaseAction, beat: int) -> None:
-    """The next process knew of no loss: 12 N for another lease, or held until somebody came. Its next beat counts."""
-    kept: dict[str, Any] = {}
-    rigs = [SmallRig(settings(lease_s=0.35, lease_action=action)) for _ in range(2)]
-    for rig in rigs:
-        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
-        frame = rig.block(ENABLE, 12.0, beat=7)
-        rig.beats = False
-        for _ in range(20):
-            rig.answer(0, *frame)
-            rig.run(0.1)
-    assert kept["lost_beats"] == {OWNER.host: 7}
-    assert max(voltage_v for _, voltage_v, _ in rigs[0].trace) > 1.0
-    assert max(voltage_v for _, voltage_v, _ in rigs[1].trace) == 0.0 and rigs[1].state is State.OFF
-    rigs[1].run(3.0).answer(0, *frame[:4], beat, *frame[5:])
-    assert (rigs[1].run(0.1).state is State.OFF) is (beat == 7)
-
-
-def test_the_masters_that_were_lost_are_sixty_four() -> None:
-    held, told = HeldEnables(), []
-    held.on_lost = told.append
-    for number in range(65):
-        for beat in (3, 3, 4):
-            held.note_lost(f"10.0.0.{number}", beat)
-    held.note_lost(None, 5)
-    assert len(told) == 130 and len(told[-1]) == 64 and told[-1]["10.0.0.64"] == 4
