@@ -1,15 +1,17 @@
-"""Masters that were lost before a crash: what hangs presses nothing in the next process either, what goes on may enable."""
+"""Who is lost, and when: behind a takeover, and behind a crash, where what hangs presses nothing, and what goes on may."""
 
 from typing import Any
 
 import pytest
 
 from gateway.control import LeaseAction
+from gateway.modbus import Peer
 from gateway.registers.words import State
 from gateway.registers.writes.held_starts import HeldEnables
 from gateway.service.running_rig.handover import Handover
 from tests.control.bench import settings
-from tests.service.running_rig.simulated_rig import ENABLE, OWNER, SmallRig
+from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S, leased
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, SmallRig
 
 
 @pytest.mark.parametrize("action", LeaseAction)
@@ -78,6 +80,30 @@ def test_a_lost_master_is_there_again_with_its_own_0_or_another_heartbeat(
     assert kept["lost_beats"] == ({} if is_found else {OWNER.host: 7})
     refused = handed_over(SmallRig(rig.settings)).answer(0, ENABLE, 1200, 0, 0, 7)
     assert (refused is None) is is_found
+
+
+@pytest.mark.parametrize("ago_s", [0.0, 0.2, 0.34])
+def test_who_takes_over_has_one_whole_length_of_the_lease_to_beat(ago_s: float) -> None:
+    """What was left of the former owner's was 10 ms: the force fell before the new one could write a second time."""
+    rig = leased().holding()
+    rig.write(4, 4711)
+    rig.beats = False
+    rig.run(ago_s).write(0, ENABLE | TAKE, peer=OTHER)
+    assert rig.run(LEASE_S - 0.02).state is State.HOLDING
+    assert rig.until(State.FAULT, 0.05).bank.owner is None
+
+
+@pytest.mark.parametrize("masters", [(OWNER,), (OWNER, OTHER), (OWNER, OTHER, Peer("10.0.0.7"))])
+def test_programs_that_hang_keep_no_force_by_taking_over_with_each_frame(masters: tuple[Peer, ...]) -> None:
+    rig = leased()
+    for number, peer in enumerate(masters):
+        rig.write(0, ENABLE | TAKE, 1200, 0, 0, 7 + number, peer=peer)
+    rig.beats, pressed = False, 0
+    for cycle in range(100):
+        rig.answer(0, ENABLE | TAKE, 1200, 0, 0, 7 + cycle % len(masters), peer=masters[cycle % len(masters)])
+        pressed += rig.run(0.05).state in (State.RAMPING, State.HOLDING)
+    assert pressed * 0.05 <= len(masters) * LEASE_S + 0.1
+    assert rig.state is State.FAULT
 
 
 def test_the_masters_that_were_lost_are_sixty_four() -> None:
