@@ -163,6 +163,10 @@ class CommandTracker:
         """Return whether the heartbeat has changed since then, however long ago, were this command taken now."""
         return self._lease.would_have_beaten_since(since_s, command.heartbeat, command.peer)
 
+    def would_start_lease(self, command: Command) -> bool:
+        """Return whether this command is a takeover with a lease of its own, were it taken now."""
+        return bool(command.control_word & _TAKE) and self._lease.would_start_for(command.peer)
+
     def would_beat_since(self, since_s: float, now_s: float, command: Command) -> bool:
         """Return whether the heartbeat has changed since then and within one length of the lease, were this command taken
         now."""

@@ -145,7 +145,7 @@ class Controller:
 
     def takes_at_once(self, proposal: ProposedWrite) -> bool:
         """Decide whether nothing about a command has to be asked. Most writes are so: a setpoint, a heartbeat."""
-        if self._machine.state is _RUNNING or self._machine.is_ramping_down or self._machine.is_stopping:
+        if not self._machine.takes_any_setpoint:
             return False
         asks_pull = self._valve is not None and proposal.command.control_word & _PULL
         return not asks_pull and not self._commands.edges_of(proposal.command).rises

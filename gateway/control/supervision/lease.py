@@ -47,12 +47,16 @@ class Lease:
 
     def take_over(self, now_s: float, who: str) -> None:
         """Start another master's lease, once until it beats: two that hang, and take over in turn, would keep it up."""
-        if who not in (self._master, *self._unbeaten):
+        if self.would_start_for(who):
             self.start(now_s, who)
         self._master = who
         self._unbeaten[who] = None
         if len(self._unbeaten) > _MOST_MASTERS:
             del self._unbeaten[next(iter(self._unbeaten))]
+
+    def would_start_for(self, who: str) -> bool:
+        """Return whether a takeover by this master would start its lease."""
+        return who not in (self._master, *self._unbeaten)
 
     def age_s(self, now_s: float) -> float:
         """Return the time since the lease was renewed, s."""

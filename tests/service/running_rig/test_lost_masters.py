@@ -1,11 +1,15 @@
 """Who is lost, and when: behind a takeover, and behind a crash, where what hangs presses nothing, and what goes on may."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from gateway.codes.refusals import RefusalReason
 from gateway.control import LeaseAction
+from gateway.control.settings import Defaults
 from gateway.modbus import Peer
+from gateway.registers import Refusal
 from gateway.registers.words import State
 from gateway.registers.writes.held_starts import HeldEnables
 from gateway.service.running_rig.handover import Handover
@@ -104,6 +108,65 @@ def test_programs_that_hang_keep_no_force_by_taking_over_with_each_frame(masters
         pressed += rig.run(0.05).state in (State.RAMPING, State.HOLDING)
     assert pressed * 0.05 <= len(masters) * LEASE_S + 0.1
     assert rig.state is State.FAULT
+
+
+class Held(SmallRig):
+    """12 N of 30 N are held for a master whose program hangs while its frame flows; some have taken over with it."""
+
+    def __init__(self, word: int = ENABLE) -> None:
+        control = settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD)
+        super().__init__(replace(control, defaults=Defaults(force_ramp_n_per_s=5.0)))
+        self.write(0, *self.block(word, 30.0, beat=7))
+        self.frame = self.block(word, 30.0, beat=8)
+        self.write(0, *self.frame)
+        self.run(2.0).beats = False
+        for beat in range(9, 15):
+            self.frame = self.block(word, 30.0, beat=beat)
+            self.write(0, *self.frame)
+            self.run(0.1)
+        self.flow(1.0)
+        assert self.state is State.HOLDING and 12.0 < self.plant.force_n < 16.0
+
+    def flow(self, seconds: float) -> list[Refusal | None]:
+        """The frame goes on, ten times a second; the answers."""
+        return [self.run(0.1) and self.answer(0, *self.frame) for _ in range(round(seconds / 0.1))]
+
+
+@pytest.mark.parametrize("word", [ENABLE, ENABLE | TAKE])
+def test_what_somebody_has_lowered_beside_a_lost_master_its_frames_do_not_raise(word: int) -> None:
+    """12 N were held, a person at the page wrote 5 N, and the next frame of the program that hung pressed 30 N."""
+    rig = Held(word)
+    rig.write(1, 500, peer=OTHER)
+    refused = rig.flow(6.0)[-1]
+    assert rig.plant.force_n == pytest.approx(5.0, abs=0.5)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    rig.write(0, *rig.frame[:4], 4711)
+    rig.beats = True
+    assert rig.run(6.0).plant.force_n == pytest.approx(30.0, abs=0.5), "it goes on"
+
+
+def test_what_another_master_has_pressed_and_left_the_frames_of_one_that_hung_before_do_not_raise() -> None:
+    """Another one had taken over, and pressed 8 N until it was lost: the first one's frames, refused so far, pressed 30 N."""
+    rig = Held()
+    rig.write(0, ENABLE | TAKE, 800, 0, 0, 100, peer=OTHER)
+    for beat in range(101, 120):
+        rig.write(4, beat, peer=OTHER)
+        assert rig.answer(0, *rig.frame), "not the owner"
+        rig.run(0.1)
+    rig.flow(6.0)
+    assert rig.state is State.HOLDING and rig.plant.force_n == pytest.approx(8.0, abs=0.5)
+
+
+@pytest.mark.parametrize("words", [(3, 1), (1, 2000), (1, 3100, 0, 0)])
+def test_nothing_rises_beside_a_lost_master_without_a_beat(words: tuple[int, ...]) -> None:
+    rig = Held()
+    held_n = rig.plant.force_n
+    rig.write(1, 1100)
+    rig.write(5, 4000)
+    for peer in (OWNER, OTHER) if words != (3, 1) else (OWNER,):  # of another one the voltage is cleared
+        refused = rig.answer(*words, peer=peer)
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    assert rig.run(2.0).plant.force_n < held_n
 
 
 def test_the_masters_that_were_lost_are_sixty_four() -> None:
