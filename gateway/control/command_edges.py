@@ -16,7 +16,7 @@ from gateway.registers.command import Command
 from gateway.registers.words import RUN_BITS, ControlBit
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
-_ENABLE = int(ControlBit.ENABLE)
+_ENABLE, _TAKE = int(ControlBit.ENABLE), int(ControlBit.TAKE_OWNERSHIP)
 _MOMENTARY: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 
 
@@ -95,6 +95,8 @@ class CommandTracker:
             self._lease.adopt(command.heartbeat)
         else:
             self._lease.observe(now_s, command.heartbeat, command.peer)
+        if edges.rises & _TAKE:
+            self._lease.take_over(now_s, command.peer)
         self._wanted_kg = command.payload_kg if command.payload_kg > 0.0 else self._settings.defaults.payload_kg
         self._follow_payload(dt_s)
         self._update_demand()
@@ -139,7 +141,7 @@ class CommandTracker:
 
     def start_lease(self, now_s: float) -> None:
         """Start the lease at enable: the master has one length of the lease to beat."""
-        self._lease.start(now_s)
+        self._lease.start(now_s, self.command.peer)
 
     def is_lease_lost(self, now_s: float, owner_connected: bool) -> bool:
         """Return whether the master is lost: disconnected, or without a heartbeat for one length of the lease."""
@@ -160,6 +162,10 @@ class CommandTracker:
     def would_have_beaten_since(self, since_s: float, command: Command) -> bool:
         """Return whether the heartbeat has changed since then, however long ago, were this command taken now."""
         return self._lease.would_have_beaten_since(since_s, command.heartbeat, command.peer)
+
+    def would_start_lease(self, command: Command) -> bool:
+        """Return whether this command is a takeover with a lease of its own, were it taken now."""
+        return bool(command.control_word & _TAKE) and self._lease.would_start_for(command.peer)
 
     def would_beat_since(self, since_s: float, now_s: float, command: Command) -> bool:
         """Return whether the heartbeat has changed since then and within one length of the lease, were this command taken

@@ -61,7 +61,7 @@ class Controller:
         self._loop, self._faults = ForceLoop(settings, model, compensation.timing), FaultDetector(settings)
         self._take_measured(calibration)
         self._conditioner = SampleConditioner(settings.supervision, compensation.cell, is_behind_death=unclean_restart)
-        self.doubt_zero = self._conditioner.doubt_zero
+        self.forget_tare, self.zero_to_tell_n = self._conditioner.forget_tare, self._conditioner.zero_to_tell_n
         self._turning = Turning(self._valve, self._commands, self._conditioner, settings, model)
         self._checks = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self.most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
@@ -145,7 +145,7 @@ class Controller:
 
     def takes_at_once(self, proposal: ProposedWrite) -> bool:
         """Decide whether nothing about a command has to be asked. Most writes are so: a setpoint, a heartbeat."""
-        if self._machine.state is _RUNNING or self._machine.is_ramping_down or self._machine.is_stopping:
+        if not self._machine.takes_any_setpoint:
             return False
         asks_pull = self._valve is not None and proposal.command.control_word & _PULL
         return not asks_pull and not self._commands.edges_of(proposal.command).rises

@@ -22,12 +22,13 @@ from gateway.control.self_test.items import SelfTestPlan
 from gateway.control.state_table import ENABLED_STATES
 from gateway.control.valve.valve_switch import ValveSwitch
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit, State
+from gateway.registers.words import ControlBit, Mode, State
 from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
 _TAKE = int(ControlBit.TAKE_OWNERSHIP)
 _WHOLE: Final = ControlBit(0)
+_ROUNDED_N: Final = 1e-3  # what is held, as a register says it, may be a bit more
 _PUSHING: Final = (
     "and a run is made pushing (bit 4 0, enable, wait until status bits 8, 9 are 0: `force-gateway hold 0`)"
 )
@@ -53,7 +54,11 @@ class EdgeCheck:
     def refusal(self, proposal: ProposedWrite, at: Situation) -> EdgeRefusal | None:
         """Return why this write cannot be taken now; None takes it."""
         edges = self._commands.edges_of(proposal.command)
-        if not edges.stops and (busy := self._busy(proposal, edges, at) or _old(proposal.command, edges)):
+        if not edges.stops and (
+            busy := self._busy(proposal, edges, at)
+            or _old(proposal.command, edges)
+            or self._rises_unbeaten(proposal.command, at)
+        ):
             return busy
         return next(self._refusals(proposal.command, edges, at), None)
 
@@ -84,6 +89,24 @@ class EdgeCheck:
             return EdgeRefusal(RefusalReason.CALIBRATING, _WHOLE, f"{asks} refused: {self._running()}")
         situation_text = f"{at.applied_n:.1f} N on the way to 0 N, then the output is off"
         return EdgeRefusal(RefusalReason.STOPPING, _WHOLE, f"{asks} refused: {situation_text}; enable again then")
+
+    def _rises_unbeaten(self, command: Command, at: Situation) -> EdgeRefusal | None:
+        """What is held for a lost master rises with a beat alone, as nothing is enabled without one: the frame of a program
+        that stands still asks for its own force for ever, also behind somebody who has lowered it, or has taken over."""
+        commands, before = self._commands, self._commands.command
+        if (
+            at.held_n is None
+            or commands.would_have_beaten_since(at.lost_s, command)
+            or commands.would_start_lease(command)
+        ):
+            return None
+        force_n, voltage_v = command.force_setpoint_n, command.voltage_setpoint_v
+        asks_force = force_n != before.force_setpoint_n and force_n > at.held_n + _ROUNDED_N
+        stood_v = before.voltage_setpoint_v if before.mode is Mode.VOLTAGE else 0.0
+        if not asks_force and not (command.mode is Mode.VOLTAGE and voltage_v > stood_v):
+            return None
+        held = f"{at.held_n:.2f} N are held for a lost master and heartbeat = {command.heartbeat} is no new one"
+        return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, _WHOLE, f"refused: {held}: write another value with it")
 
     def _running(self) -> str:
         """What has the output, how long still, and how it is ended."""

@@ -38,6 +38,7 @@ class Situation:
     applied_n: float
     leaving_n: float  # of voltages of late, or that the output may have kept; by the model
     repeats: str  # the load cell seems to be frozen, in words; empty where it does not
+    held_n: float | None  # force that is held for a lost master, None where none is
     ramps_down: bool  # the force goes to 0, and then the output off
     stall_words: str  # why nothing is taken that may have waited while the loop stood still; empty where it did not
 
@@ -73,6 +74,7 @@ class Readiness:
             applied_n=loop.applied_n,
             leaving_n=max(loop.expected.leaving_n(loop.branch_share), loop.left.rise_n),
             repeats=self._parts.faults.repeats,
+            held_n=machine.held_n if machine.is_master_lost else None,
             ramps_down=machine.is_ramping_down or machine.is_stopping,
             stall_words=self._parts.faults.stall_words(now_s, line),
         )

@@ -55,7 +55,7 @@ class SampleConditioner:
         self._saturation_n = supervision.saturation_n
         self._timeout_s = supervision.sample_timeout_s
         self._last_s = self._usable_s = nan
-        self._doubt, self.is_doubted = "", False
+        self._doubt, self.is_doubted, self._forgotten_n = "", False, 0.0
         self.direction = 1.0
 
     def use(self, cell: CellMap | None) -> None:
@@ -112,16 +112,20 @@ class SampleConditioner:
         """Take the present force as zero (tare) and return by how much less a reading says from now on, N.
         gravity_n as in `demand`, along the tool's direction as readings are; the zero is the cell's own, whichever way the
         tool acts. Ask `why_no_zero` first."""
-        self.is_doubted = False
+        self.is_doubted, self._forgotten_n = False, 0.0
         return self.direction * self._zero.take(self.direction * gravity_n)
 
     def why_no_zero(self, gravity_n: float) -> str:
         """Return why the recent samples are no zero, in numbers; empty where they are one."""
         return self._zero.unsteady(self.direction * gravity_n)
 
-    def doubt_zero(self) -> None:
-        """Note that the cell's zero may be another one, until the next tare."""
-        self.is_doubted = True
+    def forget_tare(self, zero_n: float) -> None:
+        """Note the zero of a tare that died with the process before, N, 0 for none: that of now is doubted until the next."""
+        self.is_doubted, self._forgotten_n = bool(zero_n), zero_n
+
+    def zero_to_tell_n(self) -> float:
+        """Return the zero that a process behind this one lacks, N: a tare that is forgotten already is missing there too."""
+        return self.zero_n or self._forgotten_n
 
     def take_doubt(self) -> str:
         """Return W253 once where the cell's zero may have become another one while nothing was heard of it, else nothing.

@@ -5,7 +5,6 @@ Where each event leads says gateway.control.state_table; whether a command may a
 
 from dataclasses import dataclass, field
 from math import inf
-from typing import Final
 
 from gateway.codes.faults import FaultCode
 from gateway.control.command_edges import CommandTracker
@@ -20,8 +19,6 @@ from gateway.control.supervision.fault_detection import FaultDetector, StopCause
 from gateway.control.supervision.one_shot_events import OneShotEvents
 from gateway.control.supervision.safe_voltage import SafeVoltageCheck
 from gateway.registers.words import State
-
-_ROUNDED_N: Final = 1e-3  # what is held, as a register says it, may be a bit more
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +59,17 @@ class Transitions:
         self.is_stopping = False  # and it stays off then
         self.is_master_lost = False
         self._unbeaten = 0  # number of the last command that came while no master beat
-        self._lost_setpoint_n = self._held_n = 0.0  # of a lost master, and how much of it is held
+        self.held_n = 0.0  # for a lost master
         self.is_restarted = is_restarted  # and nobody has acknowledged that
         self.outcome = StepOutcome()  # what the present step wants besides the voltage
         self.parts = parts
         self._safe_voltage = SafeVoltageCheck(parts.faults)
+
+    @property
+    def takes_any_setpoint(self) -> bool:
+        """Decide whether no setpoint has to be asked about: the output is no run's, on no way to 0, and held for nobody."""
+        is_kept = self.is_ramping_down or self.is_stopping or self.is_master_lost
+        return self.state is not State.CALIBRATING and not is_kept
 
     def begin_step(self) -> None:
         """Begin a step with an empty outcome."""
@@ -156,23 +159,17 @@ class Transitions:
             return
         self._unbeaten = commands.command.number
         if not self.is_master_lost:
-            self._lost_setpoint_n, self._held_n = commands.command.force_requested_n, self.parts.loop.applied_n
+            self.held_n = self.parts.loop.applied_n
             self.lose_master(now_s, commands.lost_sentence(now_s, line), action)
             return
-        self._held_n = min(self._held_n, self.parts.loop.applied_n)
-        asked_n = commands.command.force_requested_n
-        if asked_n <= self._held_n + _ROUNDED_N:  # so it is held as what was lost is: less than that is no new force
-            self._lost_setpoint_n = asked_n
+        self.held_n = min(self.held_n, self.parts.loop.applied_n)
         if before != self._unbeaten and not self.is_ramping_down:
             self.outcome.release_owner = True
 
     def hold(self, demand: Demand) -> Demand:
-        """Return the demand, of a lost master's setpoint no more than has been applied since: what was waiting for contact, or
-        has lost it, must not press on whoever comes to see why the machine stands. A calibration that lowers it meanwhile
-        makes it nobody's new setpoint."""
-        if not self.is_master_lost or self.parts.commands.command.force_requested_n != self._lost_setpoint_n:
-            return demand
-        return demand._replace(force_n=min(demand.force_n, self._held_n))
+        """Return the demand, for a lost master no more than has been applied since: what was waiting for contact, or has lost
+        it, must not press on whoever comes to see why the machine stands."""
+        return demand._replace(force_n=min(demand.force_n, self.held_n)) if self.is_master_lost else demand
 
     def lose_master(self, now_s: float, observation: str, action: LeaseAction) -> None:
         """Act as the rig says where the lease is over. observation: how it was noticed."""

@@ -217,7 +217,7 @@ class Simulation:
         self.explained.note_write(host, self.clock.now_s)
         self.target.note_write(host, pdu, self._done_s(is_answered))
         self.cell.note_mode(word_of(pdu, MODE))
-        self.lease.note_write(pdu, self._done_s(is_answered), is_answered=is_answered)
+        self.lease.note_write(pdu, self._done_s(is_answered), is_answered=is_answered, host=host)
         self.commands.note_write(pdu, self._done_s(is_answered))
         if (control := control_of(pdu)) is not None and control & TARE:
             self._note_tare()

@@ -111,6 +111,15 @@ def test_an_enable_and_a_run_at_the_machine_need_no_heartbeat_yet(observer: Obse
     assert observer.broken
 
 
+@pytest.mark.parametrize(("hosts", "is_seen"), [("ab", False), ("abab", True)])
+def test_a_takeover_begins_a_lease_once_until_its_master_beats(observer: Observer, hosts: str, is_seen: bool) -> None:
+    judge = LeaseJudge(observer)
+    for number, host in enumerate(hosts):
+        judge.note_write(write_pdu(0, 9, 1200), 1.0 + 0.2 * number, is_answered=True, host=host)
+        judge.look(1.19 + 0.2 * number)
+    assert [line.partition(" at ")[0] for line in observer.broken] == ["I3 heartbeat"] * is_seen
+
+
 def test_an_enable_begins_a_lease_where_single_bits_have_only_been_cleared_before_and_a_second_does_not(
     observer: Observer,
 ) -> None:

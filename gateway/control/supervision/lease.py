@@ -1,5 +1,6 @@
 """A command that expires: only a changing heartbeat value renews it; reads and repeated frames do not. Of a master whose last
-frame is sent on and on it does not change, whatever another one has written meanwhile.
+frame is sent on and on it does not change, whatever another one has written meanwhile. Who takes over has one whole length to
+beat, not what the one before has left of its own.
 
 A closed connection of the owner counts as loss only where a lease is set; without a lease a command lasts until the
 next one.
@@ -20,6 +21,8 @@ class Lease:
         self._changed_s = -inf
         self._beats: dict[str, tuple[int, float]] = {}  # of each master its last, and when it came
         self._started_s = -inf
+        self._master = ""  # who has the lease
+        self._unbeaten: dict[str, None] = {}  # who has taken over, and not beaten since
 
     def adopt(self, heartbeat: int) -> None:
         """Take over a value without counting it as a beat: the bank itself zeroed the command block."""
@@ -28,7 +31,8 @@ class Lease:
     def observe(self, now_s: float, heartbeat: int, who: str = "") -> None:
         """Note the time of a heartbeat that this master has changed."""
         if self._is_beat(heartbeat, who):
-            self._changed_s = now_s
+            self._changed_s, self._master = now_s, who
+            self._unbeaten.pop(who, None)
             self._beats[who] = heartbeat, now_s
             if len(self._beats) > _MOST_MASTERS:
                 del self._beats[next(iter(self._beats))]
@@ -37,9 +41,22 @@ class Lease:
     def _is_beat(self, heartbeat: int, who: str) -> bool:
         return heartbeat != self._heartbeat and (who not in self._beats or heartbeat != self._beats[who][0])
 
-    def start(self, now_s: float) -> None:
+    def start(self, now_s: float, who: str = "") -> None:
         """Start the lease at an enable: the master has one length to beat."""
-        self._started_s = now_s
+        self._started_s, self._master = now_s, who
+
+    def take_over(self, now_s: float, who: str) -> None:
+        """Start another master's lease, once until it beats: two that hang, and take over in turn, would keep it up."""
+        if self.would_start_for(who):
+            self.start(now_s, who)
+        self._master = who
+        self._unbeaten[who] = None
+        if len(self._unbeaten) > _MOST_MASTERS:
+            del self._unbeaten[next(iter(self._unbeaten))]
+
+    def would_start_for(self, who: str) -> bool:
+        """Return whether a takeover by this master would start its lease."""
+        return who not in (self._master, *self._unbeaten)
 
     def age_s(self, now_s: float) -> float:
         """Return the time since the lease was renewed, s."""

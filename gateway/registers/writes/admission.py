@@ -109,7 +109,7 @@ class Admission:
         """Return what a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
         commands, before = self._commands, self._commands.values
         values = commands.decode(write.block, write.address, write.data)
-        asked = int(values[CONTROL_WORD])
+        asked, heartbeat = int(values[CONTROL_WORD]), int(values[HEARTBEAT])
         if asked != before[CONTROL_WORD] or values[MODE] != before[MODE]:  # else they have been found good
             commands.check_known(values, write.block)
         if asked == before[CONTROL_WORD] and self._is_plain(write, asked):
@@ -118,7 +118,7 @@ class Admission:
             return AdmittedWrite(values, asked, command, False, False, 0, True)
         permitted = self._permit(write, values)
         if permitted is None:
-            self._let_enable_go(write, asked)
+            self._hear(write, asked, heartbeat)
             self.held_runs.keep(write.host, self._held_by(write, asked, asked))
             return None
         values, written, is_stop = permitted
@@ -135,12 +135,11 @@ class Admission:
             command = command._replace(lowered_from_n=self.lowered_from_n)
         if write.has_waited:
             command = command._replace(has_waited=True)
-        word_at = commands.address(write.block, CONTROL_WORD)
         self._ask(command, permitted.values, write)
         rises = written & ~int(before[CONTROL_WORD])
         if rises & STARTS:
-            self._check_starts(command, rises, written, word_at)
-        self._let_enable_go(write, asked)
+            self._check_starts(command, rises, written, write)
+        self._hear(write, asked, heartbeat)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
         return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
 
@@ -162,7 +161,7 @@ class Admission:
 
     def is_usual(self, host: str) -> bool:
         """Return whether nothing makes a host's writes special: no bit that it held, no lowered setpoint, no run."""
-        is_held = host in self.held_runs.by_host or host in self.held_enables.by_host
+        is_held = host in self.held_runs.by_host or self.held_enables.knows(host)
         return not (self.lowered_from_n or self.is_calibrating or is_held)
 
     # -- what the write asks for
@@ -223,12 +222,11 @@ class Admission:
         stands = held | int(self._commands.values[CONTROL_WORD])
         return held & ~write.touched | stands & written & write.touched & RUN_BITS
 
-    def _let_enable_go(self, write: Write, asked: int) -> None:
-        if (
-            (self.held_enables.by_host or self.held_enables.lost)
-            and write.touched & ENABLE & ~asked
-            and CONTROL_WORD in self._offsets(write)
-        ):
+    def _hear(self, write: Write, asked: int, heartbeat: int) -> None:
+        offsets = self._offsets(write) if self.held_enables.knows(write.host) else ()
+        if HEARTBEAT in offsets:
+            self.held_enables.hear(write.host, heartbeat)
+        if CONTROL_WORD in offsets and write.touched & ENABLE & ~asked:
             self.held_enables.let_go(write.host)
 
     # -- why not
@@ -260,9 +258,10 @@ class Admission:
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
-    def _check_starts(self, command: Command, rises: int, written: int, word_at: int) -> None:
-        host = command.peer
-        if rises & ENABLE and self.held_enables.holds(host, command.received_s, command.heartbeat):
+    def _check_starts(self, command: Command, rises: int, written: int, write: Write) -> None:
+        host, word_at = command.peer, self._commands.address(write.block, CONTROL_WORD)
+        beat = command.heartbeat if HEARTBEAT in self._offsets(write) else None
+        if rises & ENABLE and self.held_enables.holds(host, command.received_s, beat):
             text = "enable was kept at 1 over a fault or a loss: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
         if held := rises & self.held_runs.of(host):

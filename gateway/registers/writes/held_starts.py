@@ -72,21 +72,39 @@ class HeldEnables:
             del self._lost_now[next(iter(self._lost_now))]
         self.on_lost(dict(self._lost_now))
 
+    def knows(self, host: str) -> bool:
+        """Decide whether this host keeps up an enable, or was lost and has not been heard since."""
+        return host in self.by_host or host in self.lost or host in self._lost_now
+
     def holds(self, host: str, now_s: float, heartbeat: int | None = None) -> bool:
         """Decide whether a 1 of this host is one that it has kept up since the fault, or since its loss in the process before.
-        If so, it goes on being kept up."""
-        if host in self.lost and self.lost[host] == heartbeat:
+        If so, it goes on being kept up. heartbeat: what it writes beside it, None where it writes none: the one that stands
+        may be nobody's."""
+        if host in self.lost and heartbeat in (None, self.lost[host]):
             return True
-        self.lost.pop(host, None)
         if now_s - self.by_host.get(host, -_HELD_S) >= _HELD_S:
-            self.let_go(host)
+            self._forget(host)
             return False
         self.note(host, now_s)
         return True
 
+    def hear(self, host: str, heartbeat: int) -> None:
+        """Note what a host has written as its heartbeat: where it is another one than when it was lost, its program goes on."""
+        if self._lost_now.get(host, heartbeat) != heartbeat:
+            self._find(host)
+
     def let_go(self, host: str) -> None:
         """Note that a host has written enable as 0."""
+        self._find(host)
+        self._forget(host)
+
+    def _find(self, host: str) -> None:
+        """A lost master is there again: the next process must not refuse what a program that goes on writes."""
         self.lost.pop(host, None)
+        if self._lost_now.pop(host, None) is not None:
+            self.on_lost(dict(self._lost_now))
+
+    def _forget(self, host: str) -> None:
         if self.by_host.pop(host, None) is not None:
             self.on_change(dict(self.by_host))
 

@@ -5,7 +5,8 @@ By itself a start knows only what it finds. By this:
 - a TLS face whose port is any free one (0) keeps it;
 - a master that keeps the bit of a run at 1 begins no other run by that, and one that keeps enable at 1 over a latched fault, or
   with the heartbeat with which it was lost, presses nothing, although fault and loss are forgotten;
-- a calibration or a plant that is another one now (their files are gone, say) is told, and so is a tare that is forgotten.
+- a calibration or a plant that is another one now (their files are gone, say) is told, and so is a tare that is forgotten,
+  until the next one: behind a second death it is missing as well.
 """
 
 from collections.abc import Callable, Mapping
@@ -49,9 +50,10 @@ class Handover:
         return None if wanted is None or wanted.is_over(now_s) else wanted
 
     @property
-    def forgets_tare(self) -> bool:
-        """Decide whether a tare that counted before is none any more: control has to doubt its zero."""
-        return abs(float(self._kept.get("zero_n", 0.0))) >= _LEAST_TOLD_N
+    def forgotten_zero_n(self) -> float:
+        """Zero of a tare that counted before and is none any more, N: control has to doubt its own. 0 where there was none."""
+        zero_n = float(self._kept.get("zero_n", 0.0))
+        return zero_n if abs(zero_n) >= _LEAST_TOLD_N else 0.0
 
     def changes(self, **in_use: int) -> tuple[str, ...]:
         """Return W250 for each number in use that is not the one before, and for the zero of a tare. in_use: what is in use
@@ -61,8 +63,7 @@ class Handover:
             for noun, number in in_use.items()
             if (before := self._kept.get(noun, number)) != number
         )
-        if not self.forgets_tare:
+        if not (zero_n := self.forgotten_zero_n):
             return changed
-        zero_n = self._kept["zero_n"]
         off = f"the cell reads {abs(zero_n):.2f} N {'more' if zero_n > 0.0 else 'less'} than before it"
         return (*changed, f"W250 the tare before the restart is forgotten, and {off}: tare again before you press")

@@ -167,12 +167,11 @@ class RunningRig:
         """Open the ports, greet both devices, then serve Modbus: nobody is answered before there is an answer."""
         self._wire(starting.cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
         handover.restore_held(self.bank, time.monotonic(), self._guardian.keep)
+        self.controller.forget_tare(handover.forgotten_zero_n)
         await self._ports.open(is_restart=bool(restarted))
         self._tick.start()
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._spoke.wait(), starting.waiting_s(is_restart=bool(restarted)))
-        if handover.forgets_tare:
-            self.controller.doubt_zero()
         for change in handover.changes(**self._in_use()):
             self._log("start", change)
         self._guardian.keep(**self._in_use())
@@ -292,7 +291,7 @@ class RunningRig:
         self._recordings.flush(now_s)
         self._calibration_runs.flush(now_s)
         self._plants.take_waiting()
-        self._guardian.keep(zero_n=self.controller.zero_n, hears_itself=self._host.hears_itself)
+        self._guardian.keep(zero_n=self.controller.zero_to_tell_n(), hears_itself=self._host.hears_itself)
         self._audit.flush()
         self._tick.follow(self.loop.streamed_s)
         if starting.have_spoken(self._line, self.loop.sample, self._valve_line):

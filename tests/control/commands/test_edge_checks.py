@@ -23,7 +23,7 @@ TARE, ENABLE = ControlBit.TARE, ControlBit.ENABLE
 REST = Situation(
     now_s=1.0, state=State.OFF, faulted_s=-inf, lost_s=-inf, reading=Reading(0.0, 0.0, 0.0, 0.01, True, True, True),
     block=RefusalReason.NONE, excuse="", line_fault="", is_output_known=True, is_output_heard=True, voltage_v=0.0,
-    is_lowest=True, applied_n=0.0, leaving_n=0.0, repeats="", ramps_down=False,
+    is_lowest=True, applied_n=0.0, leaving_n=0.0, repeats="", held_n=None, ramps_down=False,
     stall_words="",
 )  # fmt: skip
 

@@ -116,7 +116,7 @@ PLACES: Final = (
     Place("ramping to 30 N", slow, State.RAMPING, ENABLE, 30.0, presses=True),
     Place("holding 12 N", lambda leased: rig(leased).holding(), State.HOLDING, ENABLE, 12.0, presses=True),
     Place("holding, master lost", lambda leased: abandoned(LeaseAction.HOLD), State.HOLDING, ENABLE, 12.0, presses=True,
-          leases=(True,)),
+          is_given_up=True, leases=(True,)),
     Place("ramping to 0, master lost", lambda leased: abandoned(LeaseAction.RAMP), State.RAMPING, ENABLE, 12.0,
           presses=True, is_going=True, leases=(True,)),
     Place("ramping to 0, gateway stopping", stopping, State.RAMPING, ENABLE, 30.0, presses=True, is_going=True),

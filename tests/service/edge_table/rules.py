@@ -68,6 +68,8 @@ class Verdict:
             moves = self._asked.changes or self.force_n != place.force_n
             if self._rises & ~TAKE or moves:
                 return Reason.CALIBRATING if place.runs else Reason.STOPPING
+        if place.is_given_up and self._is_stale and not self.stops and self.force_n > place.force_n > 0.0:
+            return Reason.HEARTBEAT_STALE
         reasons = (self._of_reset(), self._of_tare(), self._of_enable(), *self._of_runs())
         return next((one for one in reasons if one), Reason.NONE)
 

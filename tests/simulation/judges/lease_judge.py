@@ -1,10 +1,12 @@
-"""Whether a master's lease is renewed by what renews it: a heartbeat that changes, or an enable's rise. Frames that flow with
-one and the same heartbeat, reads and refused writes renew nothing. No code of the gateway is used here."""
+"""Whether a master's lease is renewed by what renews it: a heartbeat that changes, an enable's rise, or a takeover, once until
+its master beats. Frames that flow with one and the same heartbeat, reads and refused writes renew nothing. No code of the
+gateway is used here."""
 
 from math import inf, isnan
 
 from tests.simulation.judges.observer import DOWN_S, RUN_BITS, Observer
 from tests.simulation.masters.spelling import BEAT, ENABLE, control_of, word_of
+from tests.simulation.masters.tcp_master import TAKE
 
 ON_WIRE_S = 0.04
 """20 ms, and two sentences at 9600 baud."""
@@ -20,14 +22,24 @@ class LeaseJudge:
         self._is_enabled = False
         """Whether the last write of the control word has enabled; not where that cannot be told from its bits."""
         self._renewed_s = -inf
+        self._took: set[str] = set()
+        """Who has taken over, and has not beaten since."""
 
-    def note_write(self, pdu: bytes, now_s: float, *, is_answered: bool) -> None:
-        """A write was taken, or nobody knows whether it was."""
+    def note_write(self, pdu: bytes, now_s: float, *, is_answered: bool, host: str = "") -> None:
+        """A write was taken, or nobody knows whether it was. host: of its master."""
         beat, control = word_of(pdu, BEAT), control_of(pdu)
         was_off = self._observer.disabled_s is not None or not self._is_enabled
-        begins = control is not None and (control < 0 or control & RUN_BITS or was_off)
-        if begins or not is_answered or (beat is not None and (isnan(beat) or beat != self._beat)):
+        takes = control is not None and bool(control & TAKE)
+        begins = control is not None and (
+            control < 0 or control & RUN_BITS or was_off or (takes and host not in self._took)
+        )
+        beats = beat is not None and (isnan(beat) or beat != self._beat)
+        if begins or not is_answered or beats:
             self._renewed_s = max(self._renewed_s, now_s)
+        if beats:
+            self._took.discard(host)
+        if takes:
+            self._took.add(host)
         if control is not None:
             self._is_enabled = is_answered and control > 0 and bool(control & ENABLE)
         if beat is not None:

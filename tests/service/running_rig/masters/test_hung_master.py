@@ -78,12 +78,12 @@ def test_of_a_force_that_is_held_for_a_lost_master_nobody_is_the_owner() -> None
     for _ in range(10):
         rig.run(CYCLE_S).write(0, *frame)
     assert rig.bank.owner is None
-    rig.write(1, 1300, peer=OTHER)
+    rig.write(1, 1100, peer=OTHER)
     rig.run(1.0)
     assert rig.state is State.HOLDING and rig.bank.owner is None
     rig.write(0, *frame[:4], 8, *frame[5:])
     assert rig.bank.owner == OWNER.host, "who beats owns"
-    refused = rig.answer(1, 1300, peer=OTHER)
+    refused = rig.answer(1, 1100, peer=OTHER)
     assert refused and refused.reason is RefusalReason.NOT_OWNER
 
 
@@ -186,9 +186,12 @@ def test_a_calibration_that_allows_less_lets_no_force_rise_that_is_held_for_a_lo
     rig.plant.contact = True
     rig.run(2.0)
     assert rig.plant.force_n < 3.0 and rig.word("force_setpoint") == (2000 if is_lowered else 3000)
-    rig.write(1, 500)
+    refused = rig.answer(1, 500)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    rig.write(1, 500, 0, 0, 4711)
+    rig.beats = True
     rig.run(2.0)
-    assert rig.plant.force_n == pytest.approx(5.0, abs=0.3), "a new setpoint counts"
+    assert rig.plant.force_n == pytest.approx(5.0, abs=0.3), "a new setpoint with a beat counts"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,179 @@
+"""Who is lost, and when: behind a takeover, and behind a crash, where what hangs presses nothing, and what goes on may."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from gateway.codes.refusals import RefusalReason
+from gateway.control import LeaseAction
+from gateway.control.settings import Defaults
+from gateway.modbus import Peer
+from gateway.registers import Refusal
+from gateway.registers.words import State
+from gateway.registers.writes.held_starts import HeldEnables
+from gateway.service.running_rig.handover import Handover
+from tests.control.bench import settings
+from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S, leased
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, SmallRig
+
+
+@pytest.mark.parametrize("action", LeaseAction)
+@pytest.mark.parametrize("beat", [7, 8])
+def test_behind_a_crash_the_last_frame_of_a_program_that_hung_presses_not(action: LeaseAction, beat: int) -> None:
+    """The next process knew of no loss: 12 N for another lease, or held until somebody came. Its next beat counts."""
+    kept: dict[str, Any] = {}
+    rigs = [SmallRig(settings(lease_s=0.35, lease_action=action)) for _ in range(2)]
+    for rig in rigs:
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        frame = rig.block(ENABLE, 12.0, beat=7)
+        rig.beats = False
+        for _ in range(20):
+            rig.answer(0, *frame)
+            rig.run(0.1)
+    assert kept["lost_beats"] == {OWNER.host: 7}
+    assert max(voltage_v for _, voltage_v, _ in rigs[0].trace) > 1.0
+    assert max(voltage_v for _, voltage_v, _ in rigs[1].trace) == 0.0 and rigs[1].state is State.OFF
+    rigs[1].run(3.0).answer(0, *frame[:4], beat, *frame[5:])
+    assert (rigs[1].run(0.1).state is State.OFF) is (beat == 7)
+
+
+@pytest.mark.parametrize("action", LeaseAction)
+def test_behind_a_crash_the_frames_of_a_hung_program_press_not_whichever_comes_first(action: LeaseAction) -> None:
+    """Setpoint and heartbeat came in two frames: the next process judged the first by a heartbeat that nobody had written, and
+    12 N were held until somebody came."""
+    kept: dict[str, Any] = {}
+    rigs = [SmallRig(settings(lease_s=0.35, lease_action=action)) for _ in range(2)]
+    for rig in rigs:
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        rig.beats = False
+        for _ in range(20):
+            rig.answer(0, ENABLE, 1200)
+            rig.answer(4, 7)
+            rig.run(0.1)
+    assert kept["lost_beats"] == {OWNER.host: 7}
+    assert max(voltage_v for _, voltage_v, _ in rigs[0].trace) > 1.0
+    assert max(voltage_v for _, voltage_v, _ in rigs[1].trace) == 0.0 and rigs[1].state is State.OFF
+    rigs[1].write(4, 8)
+    rigs[1].run(3.0).write(0, ENABLE, 1200)
+    assert rigs[1].run(0.1).state is not State.OFF, "its program goes on"
+
+
+@pytest.mark.parametrize(
+    ("writes", "is_found"),
+    [((0, ENABLE, 1200, 0, 0, 7), False), ((4, 7), False), ((1, 0), False), ((0, 0), True), ((4, 8), True)],
+)
+@pytest.mark.parametrize("behind_a_crash", [False, True])
+def test_a_lost_master_is_there_again_with_its_own_0_or_another_heartbeat(
+    writes: tuple[int, ...], is_found: bool, behind_a_crash: bool
+) -> None:
+    """A day later a crash came: its first enable with the heartbeat of that loss was refused, and writing 0 did not help."""
+    kept: dict[str, Any] = {}
+    rig = SmallRig(settings(lease_s=0.35))
+
+    def handed_over(rig: SmallRig) -> SmallRig:
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        return rig
+
+    handed_over(rig).write(0, ENABLE, 1200, 0, 0, 7)
+    rig.beats = False
+    rig.until(State.FAULT).run(1.0)
+    if behind_a_crash:
+        rig = handed_over(SmallRig(rig.settings))
+    rig.answer(*writes)
+    assert kept["lost_beats"] == ({} if is_found else {OWNER.host: 7})
+    refused = handed_over(SmallRig(rig.settings)).answer(0, ENABLE, 1200, 0, 0, 7)
+    assert (refused is None) is is_found
+
+
+@pytest.mark.parametrize("ago_s", [0.0, 0.2, 0.34])
+def test_who_takes_over_has_one_whole_length_of_the_lease_to_beat(ago_s: float) -> None:
+    """What was left of the former owner's was 10 ms: the force fell before the new one could write a second time."""
+    rig = leased().holding()
+    rig.write(4, 4711)
+    rig.beats = False
+    rig.run(ago_s).write(0, ENABLE | TAKE, peer=OTHER)
+    assert rig.run(LEASE_S - 0.02).state is State.HOLDING
+    assert rig.until(State.FAULT, 0.05).bank.owner is None
+
+
+@pytest.mark.parametrize("masters", [(OWNER,), (OWNER, OTHER), (OWNER, OTHER, Peer("10.0.0.7"))])
+def test_programs_that_hang_keep_no_force_by_taking_over_with_each_frame(masters: tuple[Peer, ...]) -> None:
+    rig = leased()
+    for number, peer in enumerate(masters):
+        rig.write(0, ENABLE | TAKE, 1200, 0, 0, 7 + number, peer=peer)
+    rig.beats, pressed = False, 0
+    for cycle in range(100):
+        rig.answer(0, ENABLE | TAKE, 1200, 0, 0, 7 + cycle % len(masters), peer=masters[cycle % len(masters)])
+        pressed += rig.run(0.05).state in (State.RAMPING, State.HOLDING)
+    assert pressed * 0.05 <= len(masters) * LEASE_S + 0.1
+    assert rig.state is State.FAULT
+
+
+class Held(SmallRig):
+    """12 N of 30 N are held for a master whose program hangs while its frame flows; some have taken over with it."""
+
+    def __init__(self, word: int = ENABLE) -> None:
+        control = settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD)
+        super().__init__(replace(control, defaults=Defaults(force_ramp_n_per_s=5.0)))
+        self.write(0, *self.block(word, 30.0, beat=7))
+        self.frame = self.block(word, 30.0, beat=8)
+        self.write(0, *self.frame)
+        self.run(2.0).beats = False
+        for beat in range(9, 15):
+            self.frame = self.block(word, 30.0, beat=beat)
+            self.write(0, *self.frame)
+            self.run(0.1)
+        self.flow(1.0)
+        assert self.state is State.HOLDING and 12.0 < self.plant.force_n < 16.0
+
+    def flow(self, seconds: float) -> list[Refusal | None]:
+        """The frame goes on, ten times a second; the answers."""
+        return [self.run(0.1) and self.answer(0, *self.frame) for _ in range(round(seconds / 0.1))]
+
+
+@pytest.mark.parametrize("word", [ENABLE, ENABLE | TAKE])
+def test_what_somebody_has_lowered_beside_a_lost_master_its_frames_do_not_raise(word: int) -> None:
+    """12 N were held, a person at the page wrote 5 N, and the next frame of the program that hung pressed 30 N."""
+    rig = Held(word)
+    rig.write(1, 500, peer=OTHER)
+    refused = rig.flow(6.0)[-1]
+    assert rig.plant.force_n == pytest.approx(5.0, abs=0.5)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    rig.write(0, *rig.frame[:4], 4711)
+    rig.beats = True
+    assert rig.run(6.0).plant.force_n == pytest.approx(30.0, abs=0.5), "it goes on"
+
+
+def test_what_another_master_has_pressed_and_left_the_frames_of_one_that_hung_before_do_not_raise() -> None:
+    """Another one had taken over, and pressed 8 N until it was lost: the first one's frames, refused so far, pressed 30 N."""
+    rig = Held()
+    rig.write(0, ENABLE | TAKE, 800, 0, 0, 100, peer=OTHER)
+    for beat in range(101, 120):
+        rig.write(4, beat, peer=OTHER)
+        assert rig.answer(0, *rig.frame), "not the owner"
+        rig.run(0.1)
+    rig.flow(6.0)
+    assert rig.state is State.HOLDING and rig.plant.force_n == pytest.approx(8.0, abs=0.5)
+
+
+@pytest.mark.parametrize("words", [(3, 1), (1, 2000), (1, 3100, 0, 0)])
+def test_nothing_rises_beside_a_lost_master_without_a_beat(words: tuple[int, ...]) -> None:
+    rig = Held()
+    held_n = rig.plant.force_n
+    rig.write(1, 1100)
+    rig.write(5, 4000)
+    for peer in (OWNER, OTHER) if words != (3, 1) else (OWNER,):  # of another one the voltage is cleared
+        refused = rig.answer(*words, peer=peer)
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    assert rig.run(2.0).plant.force_n < held_n
+
+
+def test_the_masters_that_were_lost_are_sixty_four() -> None:
+    held, told = HeldEnables(), []
+    held.on_lost = told.append
+    for number in range(65):
+        for beat in (3, 3, 4):
+            held.note_lost(f"10.0.0.{number}", beat)
+    held.note_lost(None, 5)
+    assert len(told) == 130 and len(told[-1]) == 64 and told[-1]["10.0.0.64"] == 4
