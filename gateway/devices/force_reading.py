@@ -248,6 +248,30 @@ def _check_units(template: Template, reading: ForceReading) -> None:
                 f"{quote(template.text)}: the words of {{{one.name}:...}} are units, and would be read over: call it "
                 f"{{{UNIT}:...}}"
             )
+        if isinstance(one, Choice) and not unit:
+            _check_said_unit(template, one, reading)
+
+
+def _check_said_unit(template: Template, words: Choice, reading: ForceReading) -> None:
+    """A unit that goes while the weight moves is a word beside blanks: not read, but believed to be `unit`."""
+    said = _units_beside_blanks(words)
+    told = f"{quote(template.text)}: the words of {{{words.name}:...}} say {' and '.join(said)}"
+    if len(said) > 1:
+        raise TemplateError(f"{told}, and are not read as units: leave those out that the device is not set to")
+    if said and not reading.newton_per_count and reading.unit not in said:
+        cure = f"unit: {said[0]}" if said[0] in NEWTON_PER_UNIT else "leave unit out and say newton_per_count"
+        raise TemplateError(f"{told}, which is not {f'unit: {reading.unit}' if reading.unit else 'said yet'}; {cure}")
+
+
+def _units_beside_blanks(field: Choice) -> list[str]:
+    """Return the units among a field's words, each once; of other words than the status only where all are units. A lone letter
+    is one beside another unit only: N may be net, and g gross."""
+    words = [word.strip() for word in field.words if word.strip()]
+    known = [word for word in words if word in _SPELT_UNITS]
+    all_are = len(known) == len(words)
+    if not (all_are or field.name == STATUS):
+        return []
+    return list(dict.fromkeys(_SPELT_UNITS[word] for word in known if word[1:] or (all_are and len(words) > 1)))
 
 
 def _check_spelt_unit(template: Template, reading: ForceReading) -> None:

@@ -14,8 +14,8 @@ from gateway.modbus.peer import Role
 ROLE_OID: Final = "1.3.6.1.4.1.50316.802.1"
 ROLES: Final = {role.name.lower(): role for role in Role}
 """What the extension may say."""
-KEY_MISMATCH: Final = "KEY_VALUES_MISMATCH"
-"""What OpenSSL says of a private key that is another certificate's."""
+KEY_MISMATCHES: Final = ("KEY_VALUES_MISMATCH", "KEY_TYPE_MISMATCH", "NO_CERTIFICATE_ASSIGNED")
+"""What OpenSSL says of a private key that is another certificate's, the last one of RSA beside EC: each has its own place."""
 NO_ISSUER, NOT_YET_VALID, HAS_EXPIRED, WRONG_PURPOSE = 2, 9, 10, 26
 """What OpenSSL finds when it verifies: X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT, X509_V_ERR_CERT_NOT_YET_VALID,
 X509_V_ERR_CERT_HAS_EXPIRED, X509_V_ERR_INVALID_PURPOSE. Python has no names for them."""

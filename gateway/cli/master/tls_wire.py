@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from gateway.cli.errors import CliError
 from gateway.cli.master.wires import NETWORK_CUT, TIMEOUT_S, TcpWire
-from gateway.modbus.certificate import HAS_EXPIRED, KEY_MISMATCH, NOT_YET_VALID
+from gateway.modbus.certificate import HAS_EXPIRED, KEY_MISMATCHES, NOT_YET_VALID
 from gateway.plain_file import check_plain
 from gateway.processes import exit_codes
 
@@ -72,7 +72,7 @@ class TlsWire(TcpWire):
     def _unfit(self, reason: str) -> str:
         """Return what is wrong with the files. reason: OpenSSL's."""
         ca, certificate, key = self.files.ca, self.files.certificate, self.files.key
-        if reason == KEY_MISMATCH:
+        if reason in KEY_MISMATCHES:
             return f"E172 {key} does not fit {certificate}: take the two made together"
         if b"ENCRYPTED" in key.read_bytes():
             return f"E174 {key} has a password, and nobody is asked for it: openssl pkey -in {key} -out NEW.key takes it off"

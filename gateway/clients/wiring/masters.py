@@ -180,7 +180,8 @@ def _universal_robot(rig: Rig, table: ExchangeTable) -> Section:
     rate_hz = max(_USUAL_HZ, ceil(_BEATS_OF_A_LEASE / lease_s)) if lease_s else _USUAL_HZ
     slave = 255 if 255 in rig.network.units else where.unit
     by_script = (
-        "By script (recommended: all words and reasons): a Script node in BeforeStart with the file made below, then"
+        "By script (recommended: all words and reasons; PolyScope 3.8 on a CB3, 5.2 on an e-Series, or newer): a Script "
+        "node in BeforeStart with the file made below, then"
     )
     own = "By the robot's own Modbus client: Installation, Fieldbus, Modbus; one 16-bit register per signal, slave address"
     thread = f"`fg_run = run fg_thread()`, which exchanges every 0.04 s{_short_of_a_cycle(lease_s)}"

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric import rsa
 
 from gateway.cli.errors import CliError
 from gateway.cli.master import wires
@@ -92,6 +93,21 @@ def test_what_does_not_fit_is_told(
     assert (done.exit_code, done.stderr[: len(words.format(port=server.port))]) == (
         code,
         words.format(port=server.port),
+    )
+
+
+def test_a_key_of_another_kind_than_the_certificate_s_is_one_all_the_same(
+    folder: Folder, call: Any, tmp_path: Path
+) -> None:
+    """An RSA key beside a certificate of P-256 was 'no PEM file with a private key'."""
+    form = (serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
+    other = tmp_path / "rsa.key"
+    other.write_bytes(rsa.generate_private_key(public_exponent=65537, key_size=2048).private_bytes(*form))
+    given = ["--tls", folder.crt("ca"), "--cert", folder.crt("setpoint"), "--key", other]
+    done = call("read", "state", *given)
+    assert (done.exit_code, done.stderr.startswith(f"E172 {other} does not fit {folder.crt('setpoint')}: ")) == (
+        65,
+        True,
     )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.x509.oid import NameOID
 
 from gateway.cli.setup.certificates import Signed, make_ca, make_server, store
@@ -35,7 +36,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     locked = serialization.BestAvailableEncryption(b"secret")
     form = (serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8)
     (folder / "locked.key").write_bytes(key.private_bytes(*form, locked))
-    for name in ("no.key", "cut.crt", "locked.key"):
+    of_rsa = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+    (folder / "rsa.key").write_bytes(of_rsa.private_bytes(*form, serialization.NoEncryption()))
+    for name in ("no.key", "cut.crt", "locked.key", "rsa.key"):
         (folder / name).chmod(0o600)
     return folder
 
@@ -87,6 +90,11 @@ FAULTS = [
         files(key="admin.key"),
         "fieldbus[0].key",
         "E172 {folder}/admin.key does not fit {folder}/gateway.crt: take the two",
+    ),
+    (
+        files(key="rsa.key"),  # of another kind than the certificate's: "no certificate assigned" was all that was said
+        "fieldbus[0].key",
+        "E172 {folder}/rsa.key does not fit {folder}/gateway.crt: take the two",
     ),
     (files("no.crt"), "fieldbus[0].certificate", "E174 {folder}/no.crt holds no certificate in PEM form"),
     (files(key="no.key"), "fieldbus[0].key", "E174 {folder}/no.key holds no private key in PEM form"),

@@ -17,7 +17,7 @@ from typing import Final
 
 from gateway.modbus.certificate import (
     HAS_EXPIRED,
-    KEY_MISMATCH,
+    KEY_MISMATCHES,
     NO_ISSUER,
     NOT_YET_VALID,
     WRONG_PURPOSE,
@@ -213,7 +213,7 @@ def _client_of(face: TlsFace) -> ssl.SSLContext:
 
 
 def _unfit_key(path: str, face: TlsFace, error: Exception) -> tuple[str, str]:
-    if isinstance(error, ssl.SSLError) and error.reason == KEY_MISMATCH:
+    if isinstance(error, ssl.SSLError) and error.reason in KEY_MISMATCHES:
         return f"{path}.key", f"E172 {face.key} does not fit {face.certificate}: take the two that were made together"
     what = f"E174 {face.certificate} with {face.key} cannot be used: {_reason(error)}; {_MAKE}"
     return f"{path}.certificate", what
