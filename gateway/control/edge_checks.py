@@ -120,7 +120,7 @@ class EdgeCheck:
     # -- edge by edge
 
     def _refusals(self, command: Command, edges: Edges, at: Situation) -> Iterator[EdgeRefusal]:
-        state = State.OFF if edges.stops and at.state in ENABLED_STATES else at.state
+        state = at.state  # behind a stop no enable and no run rises, and a tare asks what is out
         yield from _some(self._pull(command, edges, at))
         if edges.rises & _RESET:
             yield from _some(self._reset(command, at))

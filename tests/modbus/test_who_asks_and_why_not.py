@@ -2,10 +2,12 @@
 
 import pytest
 
-from gateway.modbus import ModbusError, Peer, RequestError, answer
+from gateway.modbus import Adu, ModbusError, Peer, RequestError, answer
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.diagnostics import ServerId, report_answer
 from gateway.modbus.errors import NAMES
+from gateway.modbus.fast import whole_answer, whole_read_answer
+from gateway.modbus.mbap import encode
 from gateway.modbus.peer import NOBODY
 from gateway.modbus.server import refuse_unit
 from tests.modbus.memory_bank import MemoryBank
@@ -25,6 +27,23 @@ def test_the_bank_is_told_at_each_turn_who_asks() -> None:
         peers: list[Peer] = []
         answer(request, Asked(), PEER)
         assert set(peers) == {PEER}
+
+
+def test_the_bank_is_told_on_the_short_way_too_who_asks() -> None:
+    class Asked(MemoryBank):
+        def read_registers(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
+            peers.append(peer)
+            return bytes(2 * count)
+
+        def write_registers(self, address: int, data: bytes, peer: Peer) -> None:
+            peers.append(peer)
+
+    peers, bank = list[Peer](), Asked(words=10, bits=10, identity={})
+    read, write = (
+        encode(Adu(7, 1, pdu)) for pdu in (P.read_request(3, 0, 1), P.write_registers_request(0, b"\x12\x34"))
+    )
+    assert whole_read_answer(read, (1,), bank, PEER) and whole_answer(write, (1,), bank, PEER)
+    assert peers == [PEER, PEER]
 
 
 @pytest.mark.parametrize("code", [*NAMES, 99])

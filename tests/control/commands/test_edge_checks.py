@@ -111,6 +111,15 @@ def test_a_stop_is_taken_from_a_run_and_on_the_way_to_0_whatever_else_it_writes(
 
 
 @pytest.mark.parametrize(
+    "at", [replace(REST, state=State.CALIBRATING), replace(REST, state=State.HOLDING, ramps_down=True)]
+)
+def test_a_takeover_is_taken_from_a_run_and_on_the_way_to_0_and_a_tare_beside_it_is_not(at: Situation) -> None:
+    assert refusal(at, ControlBit.TAKE_OWNERSHIP) is None
+    refused = refusal(at, ControlBit.TAKE_OWNERSHIP | TARE)
+    assert refused and refused.text.startswith("tare refused")
+
+
+@pytest.mark.parametrize(
     ("line_fault", "words"), [("", "the output device does not answer"), ("A322 its port went away", "A322 its port")]
 )
 def test_a_fault_is_not_reset_behind_an_output_that_is_not_heard(line_fault: str, words: str) -> None:

@@ -12,6 +12,7 @@ from gateway.control.supervision.stuck_sensor import StuckSensorCheck
 from gateway.devices.messages import ForceSample
 from gateway.registers.words import State
 from tests.control.bench import Bench, bsfm, settings
+from tests.control.runs.test_ladder_run import SHORT
 
 STEEP = (8.0, 12.0, -12.0)
 
@@ -70,3 +71,21 @@ def test_a_force_that_stands_while_tool_and_weight_change_places_is_no_dead_cell
         response.outside_n = 20.0 - bsfm().force_n(volts, 0.0) if is_told else 0.0
         check.observe(reading, response, touching=True)
     assert bool(check.words) is not is_told
+
+
+def after_a_run(weight_n: float) -> list[float]:
+    """Voltages right behind the end of a run that was stopped on a stair."""
+    bench = Bench()
+    outside = Compensation(outside=OutsideForce(tilt_n=weight_n))
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1), compensation=outside)
+    bench.run(0.3)
+    bench.controller.active_run.ask(SHORT)
+    bench.seconds_until(lambda output: output.voltage_v >= 2.0, 60.0)
+    bench.run(0.5)
+    bench.controller.active_run.ask_stop("stopped")
+    return [bench.run(0.01).voltage_v for _ in range(3)]
+
+
+@pytest.mark.parametrize("weight_n", [5.0, -5.0])
+def test_the_way_down_behind_a_run_is_that_of_the_slide_whatever_presses_besides(weight_n: float) -> None:
+    assert after_a_run(weight_n) == pytest.approx(after_a_run(0.0), abs=1e-6)

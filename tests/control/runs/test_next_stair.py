@@ -143,3 +143,15 @@ def test_a_step_that_tells_the_response_is_made_at_once_where_other_stairs_are_r
         run.stairs = tuple(replace(one, is_step=is_step) for one in run.stairs)
         feed(run, 1.0, 0.1, 0.0)
         assert run.step(1.2, Reading()).voltage_v == pytest.approx(out_v, abs=1e-6)
+
+
+def test_of_a_slow_cell_no_reading_of_the_transient_is_in_its_stair() -> None:
+    """Six readings a window, of 10 a second: what noise would pass for rest had the force of before in its mean."""
+    run = run_of(stair(4.0))
+    begin_s, _ = feed(run, 0.0, 0.61, 0.0)
+    run.noise_n = 50.0
+    for k in range(1, 20):
+        force_n = 0.0 if 0.1 * k < UNKNOWN_BLIND_S - 0.05 else 21.0
+        if (row := run.step(begin_s + 0.1 * k, Reading(force_n, force_n, is_new=True, is_usable=True)).row) is not None:
+            break
+    assert row is not None and row.settled and row.force_n == pytest.approx(21.0)

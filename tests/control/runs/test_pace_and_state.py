@@ -124,6 +124,18 @@ def test_a_run_begins_with_its_zero_and_nothing_of_the_one_before() -> None:
     assert active.cell_n == 1.5
 
 
+def test_the_force_that_a_run_goes_for_is_told_by_the_model_that_it_began_with() -> None:
+    active, loop = begun(), SimpleNamespace(voltage_v=0.0, drive_run=lambda *_: None)
+    active.use(bsfm(2.0))
+    for k in range(200):
+        active.step(0.01 * k, READING, loop, LineStatus())  # type: ignore[arg-type]
+        if active.has_risen:
+            break
+    assert active.run is not None
+    volts = active.run.stairs[0].voltage_v  # type: ignore[union-attr]
+    assert active.target_n == pytest.approx(bsfm().force_n(volts, 1.0))
+
+
 def test_a_run_that_is_asked_for_is_taken_once_and_forgets_a_refusal() -> None:
     active = ActiveRun(RIG, bsfm())
     active.refused, active.phase = "W305 no", CalibrationPhase.STOPPED

@@ -6,6 +6,7 @@ from itertools import pairwise
 import pytest
 
 from gateway.bsfm import FALLING, RISING, Bsfm, InverseStatus
+from gateway.bsfm.slip.slip_stops import SlipStops
 from gateway.control import CalibrationInUse, Controller
 from gateway.control.demand import demand_of
 from gateway.control.force_loop.feedforward import Approach, Feedforward, ModelError
@@ -146,6 +147,16 @@ def test_a_path_ends_with_the_output_that_it_was_for() -> None:
     assert law.aimed_n == pytest.approx(goal_n)
 
 
+def test_a_path_ends_where_another_mode_drives() -> None:
+    law, goal_n = Feedforward(bsfm(), settings().limits, 0.1, ahead_s=0.15), 20.0
+    for _ in range(30):
+        goal_n += 0.1
+        law.advance(goal_n, 500.0, 0.01)
+    law.take_over(goal_n)
+    law.advance(goal_n, 1.0e4, 0.01)
+    assert law.aimed_n == pytest.approx(goal_n)
+
+
 def test_a_contact_that_is_lost_below_the_pre_contact_force_raises_nothing_at_once() -> None:
     law = Feedforward(bsfm(), settings().limits, 0.1)
     law.advance(40.0, 100.0, 0.01)
@@ -179,6 +190,22 @@ def test_a_swap_leaves_the_slide_on_its_branch() -> None:
     for _ in range(500):
         law.advance(20.0, 100.0, 0.01)
     assert law.compute_voltage(0.0)[0] == pytest.approx(bsfm(1.3).branches.falling.inverse(20.0)[0], abs=1e-3)
+
+
+def test_a_swap_to_a_set_that_reverses_otherwise_keeps_the_voltage_beside_a_correction() -> None:
+    law = pressing(20.0)
+    law.correct(1.5, 0.0)
+    before_v = law.compute_voltage(0.0)[0] + law.correction_v(0.0)
+    law.use(replace(bsfm(1.1), reversal=SlipStops((0.5, 1.0), (0.5, 0.5))), 0.0, is_corrected=True)
+    assert law.compute_voltage(0.0)[0] + law.correction_v(0.0) == pytest.approx(before_v)
+
+
+def test_the_payload_s_weight_is_no_correction() -> None:
+    law = Feedforward(bsfm(), settings().limits, 0.1)
+    for _ in range(200):
+        law.advance(30.0, 100.0, 0.01, gravity_n=8.0)
+        law.correct(0.0, 8.0)
+    assert law.correction_v(8.0) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_target_of_nothing_vents_the_slide_and_the_next_force_begins_there() -> None:

@@ -47,6 +47,20 @@ def test_a_cell_that_has_been_dead_for_long_is_found_two_seconds_behind_the_enab
     assert "repeated for 32 s, since before the enable" in told
 
 
+def test_a_short_enable_between_takes_nothing_away_of_what_was_seen_before_it() -> None:
+    bench = held_and_off()
+    freeze(bench)
+    bench.run(30.0)
+    bench.enable(20.0)
+    bench.run(0.5)
+    bench.disable()
+    bench.run(0.5)
+    bench.enable(20.0)
+    took_s = bench.seconds_until(lambda output: output.state is State.FAULT, 5.0)
+    assert bench.last.fault is FaultCode.SAMPLE_FROZEN
+    assert 1.9 <= took_s <= 2.2
+
+
 @pytest.mark.parametrize("force_n", [0.0, 20.0])
 def test_a_cell_that_has_only_been_quiet_is_given_the_time_to_show_that_it_lives(force_n: float) -> None:
     bench = held_and_off()
