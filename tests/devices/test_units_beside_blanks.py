@@ -6,7 +6,7 @@ from gateway.devices import TemplateError, cell_host
 from gateway.devices.force_reading import ForceReading, ForceUnit
 from gateway.devices.messages import ForceSample, Quality
 from gateway.units import NEWTON_PER_UNIT
-from tests.dialogues.test_overload_dialogue import cell
+from tests.dialogues.cells.test_overload_dialogue import cell
 
 RINSTRUM = "\x02{sign: |-}{force:7.2f}{status:G|N|U|O}{motion:M| }{range:-|1|2}{still: kg|   }"
 HEALTH = {"G": Quality.OK, "N": Quality.OK, "U": Quality.OVERLOAD, "O": Quality.OVERLOAD}
