@@ -37,7 +37,8 @@ def render_diagnosis(
     yield Text()
     for suspect in diagnosis.suspects:
         yield Text(suspect.sentence, style="bold red" if suspect.is_sure else "bold yellow")
-    colour = "yellow" if why_blind(diagnosis) else _COLOUR[diagnosis.verdict]
+    is_doubtful = why_blind(diagnosis) or headline.is_plant_off(diagnosis)
+    colour = "yellow" if is_doubtful else _COLOUR[diagnosis.verdict]
     yield Text(headline.answer_sentence(diagnosis), style=f"bold {colour}")
     if lack := headline.lack_sentence(diagnosis):
         yield Text(lack)

@@ -18,7 +18,7 @@ _FIX_COLUMNS: Final = "No cause was looked for. Fix this first, then run it agai
 _NOTHING_LEFT: Final = "Nothing is left above the noise floor."
 _CONFIRM: Final = "To confirm it, record rests, repeat a cycle or give the noise floor (--noise-floor-n)."
 _TELL_APART: Final = "They look alike in this recording; what to record next tells them apart."
-_KEEP_REFIT: Final = "--save keeps the plant as it was refitted, for plant use."
+_KEEP_REFIT: Final = "diagnose --save keeps the plant as it was refitted, for plant use."
 _COSTLY_SHARE: Final = 0.3  # of what the refit takes away: three numbers that share it evenly have 0.58 of it each
 _DEPENDS_ON_NOTHING: Final = "What is left is more than the noise, and depends on nothing that was recorded."
 
@@ -29,6 +29,8 @@ def badge(diagnosis: Diagnosis) -> tuple[str, str]:
         return "nothing can be told", "warn"
     if diagnosis.verdict is Verdict.PARTIAL and not _leaves_more_than_noise(diagnosis):
         return "explained, not confirmed", "warn"
+    if diagnosis.verdict is Verdict.NOTHING_FOUND and is_plant_off(diagnosis):
+        return "no effect, other numbers", "warn"
     return BADGES[diagnosis.verdict]
 
 
@@ -58,10 +60,15 @@ def lack_sentence(diagnosis: Diagnosis) -> str:
     return _TELL_APART if _has_group(diagnosis.causes) else _CONFIRM
 
 
+def is_plant_off(diagnosis: Diagnosis) -> bool:
+    """Decide whether the rig's plant is off by more than the noise as it stands, and not once it is refitted."""
+    return diagnosis.refit is not None and diagnosis.refit.gain_n > diagnosis.baseline.noise_floor_n
+
+
 def refit_sentence(diagnosis: Diagnosis) -> str:
     """Return what the rig's plant gets wrong as it stands; empty where refitting it takes away no more than the noise."""
     refit = diagnosis.refit
-    if refit is None or not refit.gain_n > diagnosis.baseline.noise_floor_n:
+    if refit is None or not is_plant_off(diagnosis):
         return ""
     costly = [each for each in refit.numbers if each.costs_n > _COSTLY_SHARE * refit.gain_n] or refit.numbers
     numbers = words.join_words(words.refitted_number(each) for each in costly)
@@ -107,7 +114,8 @@ def _describe_error(diagnosis: Diagnosis) -> str:
         )
     )
     if not diagnosis.causes:
-        return f"the simulation is off by {before_n}, the noise is {noise_n}"
+        refitted = ", refitted," if is_plant_off(diagnosis) else ""
+        return f"the simulation{refitted} is off by {before_n}, the noise is {noise_n}"
     return f"{before_n} before, {after_n} after, the noise is {noise_n}"
 
 

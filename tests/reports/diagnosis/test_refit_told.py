@@ -4,7 +4,7 @@ from html import escape
 
 import pytest
 
-from gateway.diagnosis.result import Refit, RefittedNumber
+from gateway.diagnosis.result import Refit, RefittedNumber, Verdict
 from gateway.reports.diagnosis import headline
 from tests.reports.diagnosis.test_page import page
 from tests.reports.fake_diagnosis import diagnosis
@@ -22,6 +22,9 @@ def test_it_is_told_from_the_noise_on(gain_n: float, is_told: bool) -> None:
     found = diagnosis(refit=Refit(1.2 * NOISE_N, gain_n, (STIFF,)))
     assert bool(headline.refit_sentence(found)) is is_told
     assert not headline.refit_sentence(diagnosis())
+    clean = diagnosis(causes=(), verdict=Verdict.NOTHING_FOUND, refit=found.refit)
+    assert headline.badge(clean) == (("no effect, other numbers", "warn") if is_told else ("nothing found", "good"))
+    assert ("the simulation, refitted, is off" in headline.answer_sentence(clean)) is is_told
 
 
 @pytest.mark.parametrize(
