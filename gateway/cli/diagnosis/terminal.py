@@ -37,9 +37,7 @@ def render_diagnosis(
     yield Text()
     for suspect in diagnosis.suspects:
         yield Text(suspect.sentence, style="bold red" if suspect.is_sure else "bold yellow")
-    is_doubtful = why_blind(diagnosis) or headline.is_plant_off(diagnosis)
-    colour = "yellow" if is_doubtful else _COLOUR[diagnosis.verdict]
-    yield Text(headline.answer_sentence(diagnosis), style=f"bold {colour}")
+    yield Text(headline.answer_sentence(diagnosis), style=f"bold {_colour(diagnosis)}")
     if lack := headline.lack_sentence(diagnosis):
         yield Text(lack)
     if refit := headline.refit_sentence(diagnosis):
@@ -62,6 +60,11 @@ def render_diagnosis(
     for note in (note for note in words.all_notes(diagnosis, notes) if note not in sentences):
         yield _line("note", note, "dim")
     yield from _next_lines(diagnosis, run)
+
+
+def _colour(diagnosis: Diagnosis) -> str:
+    is_off = diagnosis.verdict is not Verdict.UNKNOWN and headline.is_plant_off(diagnosis)
+    return "yellow" if why_blind(diagnosis) or is_off else _COLOUR[diagnosis.verdict]
 
 
 def _line(keyword: str, text: str, style: str = "") -> RenderableType:
