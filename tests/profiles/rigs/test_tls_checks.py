@@ -13,7 +13,7 @@ from cryptography.x509.oid import NameOID
 from gateway.cli.setup.certificates import Signed, make_ca, make_server, store
 from gateway.fieldbus.peers import address_of
 from gateway.modbus import Peer
-from gateway.modbus.certificate import read_certificate, read_certificates
+from gateway.modbus.certificate import read_certificate
 from gateway.profiles import Report, check_report
 from gateway.profiles.rigs.checks import tls as tls_checks
 from gateway.profiles.rigs.faces import TlsFace
@@ -243,22 +243,6 @@ def signed_by(root: Signed, ca: Signed) -> Signed:
     builder = builder.not_valid_before(now - timedelta(days=3)).not_valid_after(old.not_valid_after_utc)
     builder = builder.add_extension(x509.BasicConstraints(ca=True, path_length=None), critical=True)
     return Signed(builder.sign(root.key, hashes.SHA256()), ca.key)
-
-
-def test_a_ca_that_another_has_signed_wants_that_one_in_its_file(tmp_path: Path) -> None:
-    """It was said that the certificate is not signed by the CA of the face, which it is."""
-    root, ca = ending(make_ca(90), 90, path_length=None), make_ca(90)
-    ca = signed_by(root, ca)
-    store({"gateway": make_server(ca, ("127.0.0.1",), 60), "ca": ca}, tmp_path)
-    (fault,) = report(tmp_path, files()).faults
-    assert f"E175 {tmp_path}/gateway.crt is of a CA that another one has signed, which the file of `ca` lacks" in str(
-        fault
-    )
-    with (tmp_path / "ca.crt").open("ab") as file:
-        file.write(root.certificate.public_bytes(serialization.Encoding.PEM))
-    assert not report(tmp_path, files()).faults
-    shown = read_certificates((tmp_path / "ca.crt").read_bytes())
-    assert shown[0].issuer == shown[1].subject == shown[1].issuer != shown[0].subject
 
 
 def ending(ca: Signed, days: int, begins: int = -3, **constraints: int | None) -> Signed:
