@@ -119,8 +119,8 @@ def _diagnose_columns(measurements: Sequence[Measurement], given: Plant, options
     left = find_dependences(found.bench, found.fitted, found.whiten, found.unnamed)
     findings = SearchFindings(start.bench, found, start.evidence, left, start.effects)
     result = compose_diagnosis(findings, options.noise_floor_n, options.calibration_noise_n)
-    if options.is_own and not options.without:
-        result = replace(result, refit=measure_refit(start.bench, start.base, given))
+    if not options.without:
+        result = replace(result, refit=measure_refit(start.bench, start.base, given, is_own=options.is_own))
     return _without_aside(result, start) if start.aside.any() else result
 
 

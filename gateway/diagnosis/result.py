@@ -66,12 +66,14 @@ class RefittedNumber:
 
 @dataclass(frozen=True, slots=True)
 class Refit:
-    """What the refit of the base model has changed in the rig's plant. as_given_rms_n: error of the plant as it stands, N RMS,
-    beside an offset of each recording; gain_n: the part of it that the refit takes away, N RMS."""
+    """What the refit of the base model has changed in the plant. as_given_rms_n: error of the plant as it stands, N RMS, beside
+    an offset of each recording; gain_n: the part of it that the refit takes away, N RMS; is_own: it is the plant of the
+    recordings' own rig, of which it should be right."""
 
     as_given_rms_n: float
     gain_n: float
     numbers: tuple[RefittedNumber, ...]
+    is_own: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,8 +181,8 @@ class Diagnosis:
     """The whole answer. base and plant: the refitted base model and the extended one (its intervals in `causes`).
 
     suspects: columns that are probably not what their names say: before anything else is believed. machine: what belongs to the
-    machine, where its older recordings were given: then causes are changes since, and base is the plant as it was. refit: what
-    has changed in the plant of the recordings' own rig, None where it is another one's.
+    machine, where its older recordings were given: then causes are changes since, and base is the plant as it was. refit:
+    what it has changed in the plant that was given, None where one of its effects was switched off.
     """
 
     verdict: Verdict

@@ -7,6 +7,9 @@ alarm in the whole fleet at `ALPHA`. A drift that nobody would mind is none: ove
 `LEAST_N`.
 Why: the effect whose part of the excess has changed most in that cell, the way of the drift, by the same slope: a name that
 stands on one or two days moves no median. What no day that names it can tell from it is named beside it.
+A seal that stiffens is no effect that is missing, for the base model fits its friction anew on each day: so the numbers that it
+refits are watched, too, by the force that each makes up for, and judged as a second family beside the first. One of them is
+told where nothing else drifts in its cell.
 """
 
 from collections import defaultdict
@@ -29,7 +32,7 @@ LEAST_N: Final = 0.1
 class CellDrift:
     """days: since the cell's first one; values_n: of each day's recordings, the median; change_n: over all days, by the
     slope; cause: the effect that has changed most, empty for none; cause_n: by how much; group: effects that no day tells apart
-    from it, itself among them."""
+    from it, itself among them; is_refitted: values_n are the force that the refit of `cause` makes up for, and no error."""
 
     cell: str
     first_day: str
@@ -42,6 +45,7 @@ class CellDrift:
     cause_n: float
     group: tuple[str, ...]
     errors: int
+    is_refitted: bool = False
 
 
 def find_drifts(rows: Iterable[Row]) -> list[CellDrift]:
@@ -50,10 +54,13 @@ def find_drifts(rows: Iterable[Row]) -> list[CellDrift]:
     by_cell: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
         by_cell[row["cell"]].append(row)
-    cells = [_of_cell(cell, found) for cell, found in sorted(by_cell.items())]
-    proven = _holm({one.cell: one.trend.chance for one in cells if one.trend})
-    judged = [_judge(one, is_proven=one.cell in proven) for one in cells]
-    return sorted(judged, key=lambda one: (not one.drifts, -abs(one.change_n), one.cell))
+    ordered = sorted(by_cell.items())
+    cells = _judge([_of_cell(cell, found) for cell, found in ordered])
+    refits = _judge([one for cell, found in ordered for one in _refits_of(cell, found)])
+    steepest = sorted((one for one in refits if one.drifts), key=lambda one: abs(one.change_n))
+    refit_of = {one.cell: one for one in steepest}
+    told = [one if one.drifts else refit_of.get(one.cell, one) for one in cells]
+    return sorted(told, key=lambda one: (not one.drifts, -abs(one.change_n), one.cell))
 
 
 def _of_cell(cell: str, rows: Sequence[Row]) -> CellDrift:
@@ -70,8 +77,29 @@ def _of_cell(cell: str, rows: Sequence[Row]) -> CellDrift:
     return CellDrift(cell, first_day, since, values, trend, change_n, False, cause, cause_n, group, errors)
 
 
-def _judge(one: CellDrift, *, is_proven: bool) -> CellDrift:
-    return replace(one, drifts=is_proven and abs(one.change_n) >= LEAST_N)
+def _refits_of(cell: str, rows: Sequence[Row]) -> list[CellDrift]:
+    """The trend of each number that the base model has refitted, by the force that it makes up for."""
+    names = sorted({each["name"] for row in rows for each in row.get("refitted") or ()})
+    errors = sum(bool(row["error_code"]) for row in rows)
+    return [replace(_of_cell(cell, _rows_by(name, rows)), errors=errors, is_refitted=True) for name in names]
+
+
+def _rows_by(name: str, rows: Sequence[Row]) -> list[Row]:
+    """Rows whose value, and whose only cause, is what one refitted number makes up for."""
+    return [
+        {**row, "value_n": each["by_n"], "causes": [{"name": name, "gain_n": each["by_n"], "group": [name]}]}
+        for row in rows
+        for each in row.get("refitted") or ()
+        if each["name"] == name
+    ]
+
+
+def _judge(family: Sequence[CellDrift]) -> list[CellDrift]:
+    """Each with its verdict, as one of so many that were asked."""
+    proven = _holm({str(place): one.trend.chance for place, one in enumerate(family) if one.trend})
+    return [
+        replace(one, drifts=str(place) in proven and abs(one.change_n) >= LEAST_N) for place, one in enumerate(family)
+    ]
 
 
 def _grown(rows: Sequence[Row], days: Sequence[str], since: Sequence[float], change_n: float) -> tuple[str, float]:

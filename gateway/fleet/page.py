@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from html import escape
 from typing import Final
@@ -44,7 +45,7 @@ def describe_drift(one: CellDrift) -> str:
 def cause_in_words(one: CellDrift) -> str:
     """Return the cause, and those that its recordings do not tell from it: `leak or creep, warm-up`."""
     others = f" or {few(one.group[1:])}" if one.group[1:] else ""
-    return one.cause + others
+    return f"{one.cause}{others}{', refitted' if one.is_refitted else ''}"
 
 
 def fleet_page(rows: Sequence[Row], cells: Sequence[CellDrift], verb: str) -> str:
@@ -122,7 +123,8 @@ def _draw(one: CellDrift, axis: Axis, *, wide: bool) -> Drawing:
     if not one.days:
         return NOTHING
     days = Axis(0.0, max(one.days[-1], 1.0), f"days since {one.first_day}")
-    chart = Chart(days, axis, f"Cell {one.cell}: {axis.label} by day", height=170)
+    label = f"what refitting {one.cause} makes up for (N)" if one.is_refitted else axis.label
+    chart = Chart(days, replace(axis, label=label), f"Cell {one.cell}: {label} by day", height=170)
     if one.trend:
         level_n = level_of(one.trend, one.days, one.values_n)
         ends = [level_n + one.trend.slope_n_per_day * day for day in (one.days[0], one.days[-1])]

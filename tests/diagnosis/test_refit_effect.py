@@ -6,8 +6,9 @@ import pytest
 
 from gateway.diagnosis import Diagnosis, Options, diagnose
 from gateway.diagnosis.result import Refit
+from gateway.reports.diagnosis.document import diagnosis_document
 from gateway.twin.plant import Plant
-from tests.diagnosis.machine import MACHINE, NOISE_N, plant, recorded, times_s
+from tests.diagnosis.machine import MACHINE, NOISE_N, recorded, times_s
 
 OWN = Options(is_own=True)
 
@@ -44,7 +45,9 @@ def test_another_zero_of_the_cell_is_no_error_of_the_plant() -> None:
     assert refit_of({"cell.zero_n": 5.0}).gain_n < 0.3 * NOISE_N
 
 
-@pytest.mark.parametrize("options", [Options(), Options(is_own=True, without="coulomb-friction")])
-def test_of_another_machine_s_plant_nothing_is_told(options: Options) -> None:
+def test_of_a_plant_that_was_changed_before_nothing_is_told() -> None:
     measurement = recorded({"friction.coulomb_n": 3.1}, time_s=times_s(30.0))
-    assert diagnose([measurement], plant({}), options).refit is None
+    assert diagnose([measurement], MACHINE, Options(is_own=True, without="coulomb-friction")).refit is None
+    found = diagnose([measurement], MACHINE).refit
+    assert found is not None and not found.is_own
+    assert "refit" not in diagnosis_document(diagnose([measurement], MACHINE), 1.0)

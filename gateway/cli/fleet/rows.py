@@ -6,9 +6,10 @@ would differ from one computer to the next run.
 
 import os
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import copysign, isfinite, sqrt
 from typing import Any, Final
 
+from gateway.catalogue.all_effects import BY_NAME
 from gateway.fleet.tasks import Row, Task
 
 FIT_COLUMNS: Final = (
@@ -17,6 +18,7 @@ FIT_COLUMNS: Final = (
 )  # fmt: skip
 DIAGNOSE_COLUMNS: Final = (
     "verdict", "rms_before_n", "rms_after_n", "floor_n", "floor_source", "samples", "duration_s", "value_n", "causes",
+    "refitted",
 )  # fmt: skip
 
 
@@ -56,6 +58,7 @@ def diagnose_row(question: Question, task: Task) -> Row:
         "duration_s": _plain(found.baseline.duration_s),
         "value_n": sqrt(max(0.0, rms_n * rms_n - floor_n * floor_n)),
         "causes": [_cause(cause) for cause in found.causes],
+        "refitted": [_refitted(each) for each in found.refit.numbers] if found.refit else [],
         "error_code": "",
         "error": "",
     }
@@ -111,6 +114,17 @@ def _cause(cause: Any) -> dict[str, Any]:
         "sizes": [
             {"name": name, "value": _plain(size.value), "unit": size.unit} for name, size in cause.parameters.items()
         ],
+    }
+
+
+def _refitted(number: Any) -> dict[str, Any]:
+    """A number of the plant that the base model refits, by the effect that has it; by_n: what its change does to the force."""
+    names = [name for name, effect in BY_NAME.items() if any(each.name == number.name for each in effect.parameters)]
+    return {
+        "name": names[0] if names else number.name,
+        "value": _plain(number.value),
+        "unit": number.unit,
+        "by_n": copysign(number.costs_n, number.value - number.before),
     }
 
 

@@ -18,9 +18,9 @@ from gateway.diagnosis.result import Refit, RefittedNumber
 from gateway.twin.plant import Plant
 
 
-def measure_refit(bench: Bench, base: FittedModel, given: Plant) -> Refit:
+def measure_refit(bench: Bench, base: FittedModel, given: Plant, *, is_own: bool) -> Refit:
     """Return what of the recordings' error the refit of this plant has taken away. base: refitted from it; what fits how each
-    recording begins, and its offset, is no error of the plant."""
+    recording begins, and its offset, is no error of the plant. is_own: see Refit."""
     refitted = [each for each in (AREA, LAG, COULOMB) if any(each.path == free.path for free in base.free)]
     before = [float(getattr(getattr(given, each.section), each.name)) for each in refitted]
     as_given = base.parameters
@@ -32,7 +32,7 @@ def measure_refit(bench: Bench, base: FittedModel, given: Plant) -> Refit:
         RefittedNumber(each.section, each.name, each.unit, value, base.parameters.value(each), _excess_n(one_n, rms_n))
         for each, value, one_n in zip(refitted, before, alone_rms_n, strict=True)
     )
-    return Refit(given_rms_n, _excess_n(given_rms_n, rms_n), tuple(numbers))
+    return Refit(given_rms_n, _excess_n(given_rms_n, rms_n), tuple(numbers), is_own)
 
 
 def _errors_n(bench: Bench, models: list[ModelParameters]) -> list[float]:

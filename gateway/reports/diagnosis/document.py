@@ -56,7 +56,7 @@ def _baseline(baseline: Baseline) -> Document:
 
 
 def _refit(refit: Refit | None) -> Document | None:
-    if refit is None:
+    if refit is None or not refit.is_own:
         return None
     return {
         "as_given_rms_n": finite_or_none(refit.as_given_rms_n),

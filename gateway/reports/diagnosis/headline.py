@@ -62,7 +62,8 @@ def lack_sentence(diagnosis: Diagnosis) -> str:
 
 def is_plant_off(diagnosis: Diagnosis) -> bool:
     """Decide whether the rig's plant is off by more than the noise as it stands, and not once it is refitted."""
-    return diagnosis.refit is not None and diagnosis.refit.gain_n > diagnosis.baseline.noise_floor_n
+    refit = diagnosis.refit
+    return refit is not None and refit.is_own and refit.gain_n > diagnosis.baseline.noise_floor_n
 
 
 def refit_sentence(diagnosis: Diagnosis) -> str:

@@ -1,5 +1,6 @@
 """What the rig's plant gets wrong as it stands is told where refitting it takes away more than the noise, by what makes it."""
 
+from dataclasses import replace
 from html import escape
 
 import pytest
@@ -22,6 +23,7 @@ def test_it_is_told_from_the_noise_on(gain_n: float, is_told: bool) -> None:
     found = diagnosis(refit=Refit(1.2 * NOISE_N, gain_n, (STIFF,)))
     assert bool(headline.refit_sentence(found)) is is_told
     assert not headline.refit_sentence(diagnosis())
+    assert not headline.refit_sentence(diagnosis(refit=replace(found.refit, is_own=False))), "of nobody's plant"
     clean = diagnosis(causes=(), verdict=Verdict.NOTHING_FOUND, refit=found.refit)
     assert headline.badge(clean) == (("no effect, other numbers", "warn") if is_told else ("nothing found", "good"))
     assert ("the simulation, refitted, is off" in headline.answer_sentence(clean)) is is_told
