@@ -277,9 +277,9 @@ class RefusalReason(IntEnum):
         modbus.ILLEGAL_VALUE,
         Explanation(
             "W302",
-            "fault reset, enable, or more force, without a new heartbeat",
-            "On a rig with a lease: the heartbeat beside a reset, an enable, or more than is held for a lost master, is that "
-            "of the fault or loss.",
+            "fault reset, enable, takeover, or more force, without a new heartbeat",
+            "With a lease: the heartbeat beside a reset, enable, second takeover, or more than is held for a lost master, is "
+            "that of before.",
             "The master writes the bit without its heartbeat, or its program stands still and its last frame is repeated.",
             "Write the bit and another heartbeat value in one request; with a reset force_setpoint 0, too.",
         ),

@@ -167,6 +167,10 @@ class CommandTracker:
         """Return whether this command is a takeover with a lease of its own, were it taken now."""
         return bool(command.control_word & _TAKE) and self._lease.would_start_for(command.peer)
 
+    def is_taken_again(self, command: Command) -> bool:
+        """Return whether this takeover is one of a program that stands still: its second, without a beat between."""
+        return self._lease.is_taken_again(command.heartbeat, command.peer)
+
     def would_beat_since(self, since_s: float, now_s: float, command: Command) -> bool:
         """Return whether the heartbeat has changed since then and within one length of the lease, were this command taken
         now."""

@@ -122,6 +122,9 @@ class EdgeCheck:
     def _refusals(self, command: Command, edges: Edges, at: Situation) -> Iterator[EdgeRefusal]:
         state = at.state  # behind a stop no enable and no run rises, and a tare asks what is out
         yield from _some(self._pull(command, edges, at))
+        if edges.rises & _TAKE and self._commands.is_taken_again(command):
+            text = f"takeover refused: heartbeat = {command.heartbeat} as at its last one: write another value with it"
+            yield EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.TAKE_OWNERSHIP, text)
         if edges.rises & _RESET:
             yield from _some(self._reset(command, at))
             state = State.OFF

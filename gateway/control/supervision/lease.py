@@ -58,6 +58,12 @@ class Lease:
         """Return whether a takeover by this master would start its lease."""
         return who not in (self._master, *self._unbeaten)
 
+    def is_taken_again(self, heartbeat: int, who: str = "") -> bool:
+        """Return whether this master, from whom another one has the lease, has taken over before and not beaten since, were
+        this value observed now; never without a lease."""
+        is_again = who != self._master and who in self._unbeaten
+        return self._length_s is not None and is_again and not self._is_beat(heartbeat, who)
+
     def age_s(self, now_s: float) -> float:
         """Return the time since the lease was renewed, s."""
         return now_s - max(self._changed_s, self._started_s)

@@ -157,6 +157,33 @@ def test_what_another_master_has_pressed_and_left_the_frames_of_one_that_hung_be
     assert rig.state is State.HOLDING and rig.plant.force_n == pytest.approx(8.0, abs=0.5)
 
 
+@pytest.mark.parametrize("again", ["its frame", "another heartbeat", "its program"])
+def test_who_has_taken_over_takes_no_force_back_from_a_living_master_by_its_last_frame(again: str) -> None:
+    """Bit 3 stood in the last frame of a program that hung: 30 N for 8 N, and then none, for the beats of the other one were
+    refused."""
+    rig = leased()
+    rig.beats = False
+    frame = (ENABLE | TAKE, 3000, 0, 0, 7)
+    rig.write(0, *frame)
+    rig.write(0, ENABLE | TAKE, 800, 0, 0, 100, peer=OTHER)
+    rig.run(0.1).write(4, 101, peer=OTHER)
+    if again == "another heartbeat":
+        assert rig.answer(4, 8), "not the owner"
+        frame = (*frame[:4], 8)
+    elif again == "its program":
+        frame = (*frame[:4], 8)
+        rig.write(0, *frame)
+        rig.write(0, TAKE | ENABLE, 800, 0, 0, 102, peer=OTHER)
+    for beat in range(103, 123):
+        refused = rig.answer(0, *frame)
+        if again == "another heartbeat":
+            assert refused is None and rig.bank.owner == OWNER.host
+            return
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+        rig.run(0.1).write(4, beat, peer=OTHER)
+    assert rig.state is State.HOLDING and rig.plant.force_n == pytest.approx(8.0, abs=0.5)
+
+
 @pytest.mark.parametrize("words", [(3, 1), (1, 2000), (1, 3100, 0, 0)])
 def test_nothing_rises_beside_a_lost_master_without_a_beat(words: tuple[int, ...]) -> None:
     rig = Held()
