@@ -17,13 +17,16 @@ from gateway.service.supervisor.safe_line import REPLY_S
 
 _BEATS_PER_STALL: Final = 8  # at least so many fit into the silence that kills; each wakes the guardian
 
+_LONGEST_REPLY_S: Final = 0.5  # three times so long a start waits for a device that is off
+
 _LONGEST_CAUSE: Final = 2000  # characters: an exception may hold all that it could not read, and the line takes 64 KiB
 
 
 def told_of_reply(host: OutputHost, profile: DeviceProfile) -> dict[str, Any]:
     """Return what `hand_over` tells of the reply that acknowledges the safe voltage. Told of its bytes alone, an Alicat
     acknowledged at a pressure of 0 only, and a device that takes 0.2 s never."""
-    more = {"form": host.safe_reply_form.hex(), "reply_timeout_s": max(REPLY_S, profile.reply_timeout_s)}
+    timeout_s = min(_LONGEST_REPLY_S, max(REPLY_S, profile.reply_timeout_s))
+    more = {"form": host.safe_reply_form.hex(), "reply_timeout_s": timeout_s}
     return {"safe_reply": host.safe_reply, "reply_end": profile.terminator_bytes, **more}
 
 
