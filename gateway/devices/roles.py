@@ -61,6 +61,10 @@ class OutputHost(Protocol):
     def safe_reply(self) -> bytes:
         """The whole line that acknowledges the last `safe_frame` (the least voltage before the first)."""
 
+    @property
+    def safe_reply_form(self) -> bytes:
+        """An expression of that line without its end, where a device may spell it otherwise; empty where it may not."""
+
     def request(self, message: OutputRequest) -> bytes:
         """Return the bytes to write; their answer is expected from now on. ValueRefused when the device cannot be told that."""
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 HEARTBEAT: Final = "h"  # control -> guardian, each tick of the loop
-LINE: Final = "l"  # control -> guardian: {"safe_frame": hex, "safe_reply": hex, "reply_end": hex} + descriptor
+LINE: Final = "l"  # control -> guardian: safe_frame, safe_reply, reply_end, form in hex, reply_timeout_s + descriptor
 LINE_LOST: Final = (
     "g"  # control -> guardian: the line's port is gone; who kept it open would keep its name from the next one
 )

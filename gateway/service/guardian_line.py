@@ -9,12 +9,25 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Final
 
+from gateway.devices import DeviceProfile
+from gateway.devices.roles import OutputHost
 from gateway.processes import message_link as guardian_link
 from gateway.service.heartbeat_memory import HeartbeatMemory
+from gateway.service.supervisor.safe_line import REPLY_S
 
 _BEATS_PER_STALL: Final = 8  # at least so many fit into the silence that kills; each wakes the guardian
 
+_LONGEST_REPLY_S: Final = 0.5  # three times so long a start waits for a device that is off
+
 _LONGEST_CAUSE: Final = 2000  # characters: an exception may hold all that it could not read, and the line takes 64 KiB
+
+
+def told_of_reply(host: OutputHost, profile: DeviceProfile) -> dict[str, Any]:
+    """Return what `hand_over` tells of the reply that acknowledges the safe voltage. Told of its bytes alone, an Alicat
+    acknowledged at a pressure of 0 only, and a device that takes 0.2 s never."""
+    timeout_s = min(_LONGEST_REPLY_S, max(REPLY_S, profile.reply_timeout_s))
+    more = {"form": host.safe_reply_form.hex(), "reply_timeout_s": timeout_s}
+    return {"safe_reply": host.safe_reply, "reply_end": profile.terminator_bytes, **more}
 
 
 class GuardianLine:
@@ -58,11 +71,11 @@ class GuardianLine:
         with contextlib.suppress(OSError):  # a guardian that is gone shows as the end of the line
             guardian_link.send(self._link, guardian_link.HEARTBEAT)
 
-    def hand_over(self, descriptor: int, safe_frame: bytes, safe_reply: bytes, reply_end: bytes) -> None:
+    def hand_over(self, descriptor: int, safe_frame: bytes, safe_reply: bytes, reply_end: bytes, **more: Any) -> None:
         """Give the guardian the line, before the first non-safe write and after each reopen: it can then do the final
-        safe-voltage write itself. reply_end: see SafeLine. OSError where there is no descriptor left for it: nobody would
-        guard the line."""
-        told = {"safe_frame": safe_frame.hex(), "safe_reply": safe_reply.hex(), "reply_end": reply_end.hex()}
+        safe-voltage write itself. reply_end, and more of the reply, as JSON: see SafeLine. OSError where there is no descriptor
+        left for it: nobody would guard the line."""
+        told = {"safe_frame": safe_frame.hex(), "safe_reply": safe_reply.hex(), "reply_end": reply_end.hex(), **more}
         self._waiting.append((guardian_link.LINE, told, (os.dup(descriptor),)))
         self._send_waiting()
 

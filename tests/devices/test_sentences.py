@@ -16,6 +16,8 @@ from tests.devices.test_rehearsal import loaded
         ("waveshare-relay", {"set_valve__pull__ask": "01050000FF008C3A"}, "set_valve.pull.ask: '01050000FF008C3A' has its"),
         ("waveshare-ao8b", {"read_voltage__modbus": {"function": 3, "register": 2}}, None),  # its request ends as a frame does
         ("mcu-line", {"constants": {"who": 7}, "refusals__others": ["BUSY {who:d}"]}, None),
+        ("adam-4016", {"constants": {"address": 300}, "read_over": ["#"]}, "answer: address = 12C: does not fit"),
+        ("adam-4016", {"constants": {"address": "07"}, "read_over": ["#"]}, "answer: address = 07: not a number"),
         ("waveshare-relay", {"constants": {"unit": 7}}, "constants.unit: no sentence has a field {unit:...}; a Modbus"),
         ("waveshare-relay", {"constants": {"address": 7}}, None),
         ("adam-4024", {"constants": {"address": 1, "channel": 0, "adress": 2}}, "constants.adress: no sentence has a field"),

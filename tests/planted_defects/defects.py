@@ -388,7 +388,7 @@ DEFECTS = (
            "if rejected and not force:", "if False:", ("calibrations", "cli/calibration", "service/fitting")),
     # -- processes
     Defect("the guardian believes half an acknowledgement", "service/supervisor/safe_line.py",
-           "split(self.end)[:-1] for", "split(self.end) for", ("service/supervisor/test_safe_line.py",)),
+           "split(self.end)[:-1])", "split(self.end))", ("service/supervisor/test_safe_line.py",)),
     Defect("the guardian says it once", "service/supervisor/safe_line.py",
            "for _ in range(_REPEATS):", "for _ in range(1):", ("service/supervisor/test_safe_line.py",)),
     Defect("a death is no reason for the safe voltage", "service/supervisor/guardian.py",

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Final
 
-from gateway.devices.fields import Choice, Field, HexNumber, RegisterNumber
+from gateway.devices.fields import Choice, Field, HexNumber, RegisterNumber, ValueRefused
 from gateway.devices.framing import no_terminator
 from gateway.devices.grammar import Grammar
 from gateway.devices.profile import ADDRESS, TEMPLATE, DeviceProfile, DeviceRole
@@ -123,12 +123,18 @@ def _unused_constants(profile: DeviceProfile) -> Found:
 def _hidden_answers(profile: DeviceProfile) -> Found:
     """What is read over must be no answer: one that noise has changed would be read over as well, and nobody told of it."""
     grammar = Grammar(profile)
-    answers = [text for place, text in _said(profile) if not {_BESIDE, *_SAID_BY_US} & set(place)]
+    answers: list[tuple[str, bytes]] = []
+    for place, text in _said(profile) if profile.read_over else ():
+        if {_BESIDE, *_SAID_BY_US} & set(place):
+            continue
+        try:
+            answers.append((text, grammar.encode_filled(text, dict(profile.constants))))
+        except ValueRefused as error:  # a constant that it has no room for
+            yield place, str(error)
+            return
     for index, over in enumerate(profile.read_over):
-        for text in answers:
-            if grammar.read(over, grammar.encode_filled(text, dict(profile.constants))) is not None:
-                yield (_BESIDE, index), f"{quote(text)} is read over, too, as {quote(over)}: narrow it"
-                break
+        if hidden := next((text for text, said in answers if grammar.read(over, said) is not None), None):
+            yield (_BESIDE, index), f"{quote(hidden)} is read over, too, as {quote(over)}: narrow it"
 
 
 def _cure(profile: DeviceProfile) -> str:

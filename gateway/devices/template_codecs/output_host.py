@@ -30,6 +30,7 @@ from gateway.devices.messages import (
     WatchdogTripped,
 )
 from gateway.devices.profile import DeviceProfile
+from gateway.devices.template_codecs.reply_form import reply_form
 from gateway.devices.template_codecs.voltage_sentence import VoltageSentence
 
 _PRESSURE_BEYOND: Final = 1 / 3
@@ -73,6 +74,11 @@ class TemplateOutputHost:
     def safe_reply(self) -> bytes:
         """Return the line that confirms the safe voltage."""
         return self._grammar.answer_line(self._confirmation, self._safe_v)
+
+    @property
+    def safe_reply_form(self) -> bytes:
+        """Return an expression of that line without its end, where it may be spelt in other bytes; else nothing."""
+        return reply_form(self._grammar, self._confirmation, self._safe_v).encode("ascii")
 
     def confirms(self, voltage_v: float, reply: Accepted, question: OutputRequest) -> bool:
         """Decide whether a reply repeats this voltage, within the device's rounding."""

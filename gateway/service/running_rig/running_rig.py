@@ -31,7 +31,7 @@ from gateway.registers import RegisterBank
 from gateway.service import banner
 from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.service.control_socket import ControlSocket, RunningParts
-from gateway.service.guardian_line import GuardianLine
+from gateway.service.guardian_line import GuardianLine, told_of_reply
 from gateway.service.running_rig import starting
 from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
@@ -80,8 +80,8 @@ class RunningRig:
         host, rest_v = output_host(rig.output.device), rig.control.limits.safe_voltage_v
         self._host = host
         self._safe_frame, self._last_frame = host.safe_frame(rest_v), host.last_frame
-        frame, reply, end = self._safe_frame, host.safe_reply, rig.output.device.terminator_bytes
-        handed = partial(guardian.hand_over, safe_frame=frame, safe_reply=reply, reply_end=end)
+        told = told_of_reply(host, rig.output.device)
+        handed = partial(guardian.hand_over, safe_frame=self._safe_frame, **told)
         self._ports = RigPorts(rig, ports, handed, log, guardian.take_back)
         checks = DeviceChecks(host, is_waived=rig.accept_no_device_watchdog)
         self._line = OutputExchange(host, self._ports.write_output, rig.output.device.reply_timeout_s, checks, rest_v)

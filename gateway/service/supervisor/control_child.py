@@ -4,6 +4,7 @@ The guardian decides when it is started, killed and started again. Standard libr
 """
 
 import contextlib
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import isnan
@@ -15,7 +16,7 @@ from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.supervisor.child_process import Child
 from gateway.service.supervisor.child_starter import ChildStarter
 from gateway.service.supervisor.heartbeat import Heartbeat
-from gateway.service.supervisor.safe_line import SafeLine
+from gateway.service.supervisor.safe_line import REPLY_S, SafeLine
 
 START_GRACE_S: Final = 30.0  # imports on a slow machine; nothing but the safe voltage is written before READY
 STOP_BOUND_S: Final = 5.0  # from the first signal; from the end of the line of a control process that never was ready
@@ -167,9 +168,12 @@ class ControlChild:
         if not message.descriptors:
             raise message_link.ProtocolError("a line without its port")
         frame, reply, end = (bytes.fromhex(message.body[name]) for name in ("safe_frame", "safe_reply", "reply_end"))
+        form = bytes.fromhex(message.body.get("form", ""))
+        is_reply = re.compile(form) if form else None  # here: one that is none must not wait for the last write
+        timeout_s = float(message.body.get("reply_timeout_s", REPLY_S))
         self._drop_line()
         self.is_line_lost = False
-        self.safe_line = SafeLine(message.descriptors.pop(0), frame, reply, end)
+        self.safe_line = SafeLine(message.descriptors.pop(0), frame, reply, end, is_reply, timeout_s)
 
     def _drop_line(self) -> None:
         if self.safe_line:

@@ -8,26 +8,32 @@ A call that fails, as an adapter's may once, ends one try and not the others. St
 
 import contextlib
 import os
+import re
 import select
 import termios
 import time
 from dataclasses import dataclass
 
+REPLY_S = 0.1
 _REPEATS = 3
 _NO_ROOM_S = 0.001  # between two tries to write where none was taken
 _MOST_READS = 32  # of what was said before: twice what a terminal keeps, for who talks without end is not waited for
 _READ_BYTES = 4096
+_LONGEST_LINE = 128  # that is looked at: who babbles is no reason to look for long
 
 
 @dataclass(frozen=True)
 class SafeLine:
     """One output port: its descriptor, the frame for the safe voltage and the reply that acknowledges it (may be empty).
-    end: of the reply, where lines have one; a Modbus frame has none. hears_itself: control has found that the adapter does."""
+    end: of the reply, where lines have one; a Modbus frame has none. form: of a reply that may be spelt in other bytes, its end
+    left out. reply_timeout_s: what the device may take. hears_itself: control has found that the adapter does."""
 
     descriptor: int
     frame: bytes
     reply: bytes
     end: bytes
+    form: re.Pattern[bytes] | None = None
+    reply_timeout_s: float = REPLY_S
     hears_itself: bool = False
 
     def close(self) -> None:
@@ -35,15 +41,17 @@ class SafeLine:
         with contextlib.suppress(OSError):
             os.close(self.descriptor)
 
-    def write_safe(self, reply_timeout_s: float = 0.1) -> bool:
-        """Put the safe voltage on the wire. True when acknowledged, False when the device is silent or the port gone."""
+    def write_safe(self, reply_timeout_s: float | None = None) -> bool:
+        """Put the safe voltage on the wire. True when acknowledged, False when the device is silent or the port gone.
+        reply_timeout_s: None for the line's own."""
+        patience_s = self.reply_timeout_s if reply_timeout_s is None else reply_timeout_s
         for _ in range(_REPEATS):
             with contextlib.suppress(termios.error):  # a program may have stopped it, and its stop outlasts it
                 termios.tcflow(self.descriptor, termios.TCOON)
             with contextlib.suppress(OSError):
                 _drop_input(self.descriptor)
-                _write_all(self.descriptor, self.frame, reply_timeout_s)
-                if not self.reply or self._wait_for_acknowledgement(reply_timeout_s):
+                _write_all(self.descriptor, self.frame, patience_s)
+                if not self.reply or self._wait_for_acknowledgement(patience_s):
                     return True
         return False
 
@@ -68,8 +76,13 @@ class SafeLine:
         same bytes, the first are ours."""
         if not self.end:
             return self.reply in (received.replace(self.frame, b"", 1) if self.hears_itself else received)
-        wanted, behind_echo = self.reply.removesuffix(self.end), received.removeprefix(self.frame)
-        return any(wanted in heard.split(self.end)[:-1] for heard in (received, behind_echo))
+        behind_echo = received.removeprefix(self.frame)
+        return any(self._is_reply(line) for heard in (received, behind_echo) for line in heard.split(self.end)[:-1])
+
+    def _is_reply(self, line: bytes) -> bool:
+        if line == self.reply.removesuffix(self.end):
+            return True
+        return bool(self.form and len(line) <= _LONGEST_LINE and self.form.fullmatch(line))
 
 
 def _drop_input(descriptor: int) -> None:

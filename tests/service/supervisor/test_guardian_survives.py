@@ -152,16 +152,20 @@ def test_a_control_process_that_talks_nonsense_is_replaced(scene, port, nonsense
     assert Ending.from_json(one.starter.arguments[1]["restarted"]).cause is EndCause.NONSENSE
 
 
-def test_a_port_that_comes_with_nonsense_is_not_kept(scene, port):
-    """Who keeps it open keeps its lock, too, and no other control process could open it."""
+@pytest.mark.parametrize("nonsense", [{"safe_frame": "zz"}, {"form": b"(".hex()}, {"reply_timeout_s": "soon"}])
+def test_a_port_that_comes_with_nonsense_is_not_kept(scene, port, nonsense):
+    """Who keeps it open keeps its lock, too, and no other control process could open it. What is no expression is found then,
+    and not by the guardian's last write."""
 
     def script(child: FakeChild) -> None:
         dies_after(8, port, None)(child)
-        child.say(message_link.LINE, {"safe_frame": "zz", "safe_reply": "", "reply_end": ""}, port.writer)
+        handed = {"safe_frame": SAFE_FRAME.hex(), "safe_reply": "", "reply_end": ""}
+        child.say(message_link.LINE, handed | nonsense, port.writer)
 
     one = scene(script, lives(port))
     assert one.run(lambda: len(one.starter.started) == 2) is None
     assert port.wrote() == SAFE_FRAME
+    assert Ending.from_json(one.starter.arguments[1]["restarted"]).cause is EndCause.NONSENSE
     assert_comes_up(one)  # and the scene counts descriptors
 
 

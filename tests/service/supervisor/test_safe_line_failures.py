@@ -1,15 +1,23 @@
 """The guardian's final safe-voltage write on a line whose calls fail: an adapter that says no once, or talks without end."""
 
+import asyncio
 import errno
 import os
+import socket
 import termios
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
+from gateway.devices import DeviceProfile, output_host
 from gateway.ports import Pty
-from gateway.service.supervisor.safe_line import SafeLine
+from gateway.processes import message_link
+from gateway.service.guardian_line import GuardianLine, told_of_reply
+from gateway.service.supervisor.control_child import ControlChild
+from gateway.service.supervisor.safe_line import REPLY_S, SafeLine
+from tests.profile_files import load_device
 from tests.service.supervisor.test_safe_line import END, FRAME, PATIENT_S, REPLY, SHORT_S, _heard
 
 
@@ -136,3 +144,72 @@ def test_a_line_that_has_no_room_for_a_moment_is_waited_for(monkeypatch: pytest.
     assert os.read(reader, 64) == FRAME
     os.close(reader)
     os.close(writer)
+
+
+ALICAT = load_device("alicat-pc")
+
+
+@pytest.mark.parametrize(
+    ("said", "is_acknowledged"),
+    [
+        (b"B +012.34 +000.00\r", True),
+        (b"A +012.34 +010.00\rA +011.02 +000.00\r", True),
+        (b"A +012.34 +010.00\r", False),
+        (b"A +012.34 +000.00", False),
+        (b"A +012.34 +000.00" + b" " * 200 + b"\r", False),
+    ],
+)
+def test_a_device_that_says_its_pressure_beside_the_setting_acknowledges_at_any_pressure(
+    pty: Pty, client: int, said: bytes, is_acknowledged: bool
+) -> None:
+    """As control hands it over: of a shipped Alicat, whose pressure falls behind the frame, each stop was not acknowledged."""
+    line, told = handed_over(ALICAT, client), list[bool]()
+    patient_s = PATIENT_S if is_acknowledged else SHORT_S
+    writer = threading.Thread(target=lambda: told.append(line.write_safe(patient_s)))
+    writer.start()
+    while writer.is_alive():
+        if _heard(pty):
+            os.write(pty.fd, said)
+        writer.join(0.001)
+    line.close()
+    assert told == [is_acknowledged]
+
+
+def test_a_device_that_takes_its_time_is_waited_for_as_its_profile_says(client: int) -> None:
+    """0.1 s were waited for whatever the profile said: a slow device heard its frame three times, and acknowledged none."""
+    lines = [handed_over(replace(ALICAT, reply_timeout_s=longest_s), client) for longest_s in (0.4, 0.05, 9.0)]
+    assert [line.reply_timeout_s for line in lines] == [0.4, REPLY_S, 0.5]
+    for line in lines:
+        line.close()
+
+
+def test_the_line_s_own_patience_is_what_counts(pty: Pty, client: int) -> None:
+    line, told, asked = SafeLine(client, FRAME, REPLY, END, reply_timeout_s=PATIENT_S), list[bool](), list[bytes]()
+    writer = threading.Thread(target=lambda: told.append(line.write_safe()))
+    writer.start()
+    while not asked:
+        asked += [said] if (said := _heard(pty)) else []
+    writer.join(2 * REPLY_S)  # no event: that it goes on waiting is what is asked
+    assert writer.is_alive() and not _heard(pty)
+    os.write(pty.fd, REPLY)
+    writer.join()
+    assert told == [True] and b"".join(asked) == FRAME
+
+
+def handed_over(profile: DeviceProfile, descriptor: int) -> SafeLine:
+    """The line as the guardian has it of control, both ends of their link at hand."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    host, child = output_host(profile), ControlChild.__new__(ControlChild)
+
+    async def hand_over() -> None:
+        theirs.setblocking(False)
+        guardian = GuardianLine(theirs)
+        guardian.hand_over(descriptor, safe_frame=host.safe_frame(0.0), **told_of_reply(host, profile))
+        guardian.close()
+
+    asyncio.run(hand_over())
+    message, child.safe_line = message_link.receive(ours), None
+    assert message
+    child._take_line(message)
+    ours.close()
+    return child.safe_line

@@ -188,6 +188,8 @@ class SimulatedSafeLine:
     frame: bytes
     reply: bytes
     end: bytes
+    form: object = None
+    reply_timeout_s: float = 0.1
     hears_itself: bool = False
 
     def close(self) -> None:

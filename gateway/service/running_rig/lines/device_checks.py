@@ -89,7 +89,12 @@ class DeviceChecks:
                 DeviceStep.CLEAR in self._known
             )  # lasts until that is answered; without it any setting ends it
             self._tries, self._is_said = 0, False
-            self._waiting = deque(self._known_of(DeviceStep.CLEAR, DeviceStep.STATUS, *self._arming))
+            cleared = (DeviceStep.CLEAR, DeviceStep.STATUS, *self._arming)
+            rearmed = (
+                *self._arming,
+                DeviceStep.STATUS,
+            )  # asked ahead, it would say tripped: some obey when they are armed anew
+            self._waiting = deque(self._known_of(*(cleared if self.is_tripped else rearmed)))
         elif self.fault in _ASKED_AGAIN:
             self.begin()
         self._settle()

@@ -207,3 +207,24 @@ def test_who_waives_a_watchdog_is_told_all_the_same_that_it_has_tripped() -> Non
     assert checks.is_done
     checks.trip()
     assert (checks.fault, checks.is_done, checks.is_tripped) == (FaultCode.WATCHDOG_TRIPPED, False, True)
+
+
+@pytest.mark.parametrize("ends_by_arming", [True, False])
+def test_a_trip_that_ends_when_it_is_armed_anew_ends_with_the_reset(ends_by_arming: bool) -> None:
+    """Asked for its state first it said tripped, and was never armed: each reset was followed by the same fault (WAGO 750)."""
+    profile = load_device(DEVICE)
+    watchdog = profile.own_watchdog
+    assert watchdog
+    checks = DeviceChecks(output_host(replace(profile, watchdog=replace(watchdog, clear=None))), is_waived=False)
+    answer_all(checks)
+    checks.trip()
+    checks.clear()
+    state, asked = "tripped", []
+    for _ in range(9):
+        if checks.is_done or (step := checks.next_step(0.0)) is None:
+            break
+        asked.append(step)
+        state = "armed" if step is ARM and ends_by_arming else state
+        checks.take(DeviceAnswer(step, is_right=True, text=state if step is STATUS else ""))
+    assert asked[0] is ARM and asked[-1] is STATUS
+    assert (checks.is_armed, checks.fault is FaultCode.WATCHDOG_TRIPPED) == (ends_by_arming, not ends_by_arming)
