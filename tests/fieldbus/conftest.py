@@ -135,8 +135,10 @@ class Stand:
         peers = Peers(self.settings, guarded=False)
         self.shared = ServerState(self.bank, self.settings, self.clock, gate, peers, self.closed.append)
 
-    def connect(self, host: str = "127.0.0.1", *, stuck: bool = False) -> tuple[Connection, HandTransport]:
-        connection, transport = Connection(self.shared), HandTransport(host, stuck=stuck)
+    def connect(
+        self, host: str = "127.0.0.1", *, port: int = 40000, stuck: bool = False
+    ) -> tuple[Connection, HandTransport]:
+        connection, transport = Connection(self.shared), HandTransport(host, port, stuck)
         transport.connection = connection
         connection.connection_made(transport)  # type: ignore[arg-type]
         return connection, transport

@@ -172,6 +172,16 @@ def test_a_master_that_takes_its_own_silent_place_was_never_away(stand: Any) -> 
     assert (made.connect(FAR)[1].ended, silent.ended, made.closed) == ("", "closed", [])
 
 
+def test_a_master_is_gone_with_the_last_of_its_connections_and_no_sooner(stand: Any) -> None:
+    """A program that reads on one and writes on the other keeps its force where the first one ends."""
+    made = stand()
+    one, other = (made.connect(FAR, port=port)[1] for port in (40001, 40002))
+    one.close()
+    assert made.closed == []
+    other.close()
+    assert [(peer.host, peer.port) for peer in made.closed] == [(FAR, 40002)]
+
+
 def test_who_is_not_allowed_takes_nobody_s_place(stand: Any) -> None:
     made = stand(connections=2, allow=(ip_network("192.0.2.0/24"),))
     made.shared.peers = Peers(made.settings, guarded=True)

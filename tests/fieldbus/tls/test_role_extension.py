@@ -1,4 +1,4 @@
-"""The role extension as a plant's own CA may have written it: what is not one UTF8String is no role, and is told as such."""
+"""Role and number as a plant's own CA may have written them: what is not one UTF8String is no role, and is told as such."""
 
 import pytest
 from cryptography import x509
@@ -6,21 +6,26 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 
 from gateway.fieldbus.tls_settings import certificate_refusal
-from gateway.modbus.certificate import ROLE_OID, read_certificate
+from gateway.modbus.certificate import ROLE_OID, PeerCertificate, read_certificate
 from tests.certificates import signed
 
 
-def refusal_of(*roles: bytes) -> str | None:
-    """Return what is said of a certificate with these values of the extension."""
+def shown_by(*roles: bytes, serial: int = 0x77) -> PeerCertificate:
+    """Return what is read of a certificate with these values of the extension."""
     key, ca = ec.generate_private_key(ec.SECP256R1()), signed()["ca"]
     name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "cell-7")])
-    builder = x509.CertificateBuilder(name, name, key.public_key(), x509.random_serial_number())
+    builder = x509.CertificateBuilder(name, name, key.public_key(), serial)
     builder = builder.not_valid_before(ca.certificate.not_valid_before_utc)
     builder = builder.not_valid_after(ca.certificate.not_valid_after_utc)
     oid = x509.ObjectIdentifier(ROLE_OID)
     values = [x509.Extension(oid, False, x509.UnrecognizedExtension(oid, role)) for role in roles]
     builder._extensions = values  # `add_extension` refuses a second one; other CAs do not
-    shown = read_certificate(builder.sign(key, hashes.SHA256()).public_bytes(serialization.Encoding.DER))
+    return read_certificate(builder.sign(key, hashes.SHA256()).public_bytes(serialization.Encoding.DER))
+
+
+def refusal_of(*roles: bytes) -> str | None:
+    """Return what is said of it."""
+    shown = shown_by(*roles)
     return certificate_refusal(shown, frozenset(), shown.ends)
 
 
@@ -51,3 +56,9 @@ def test_two_roles_or_one_in_another_encoding_are_told_as_such(values: tuple[byt
 def test_an_unknown_role_is_named() -> None:
     assert "names the role 'Admin'" in str(refusal_of(b"\x0c\x05Admin"))
     assert "names no role" in str(refusal_of())
+
+
+def test_a_number_that_openssl_prints_with_a_zero_ahead_is_revoked_as_it_stands_there() -> None:
+    shown = shown_by(b"\x0c\x08setpoint", serial=0xABC12)
+    assert shown.serial == "0ABC12"
+    assert "(serial 0ABC12) is revoked" in str(certificate_refusal(shown, frozenset(("0ABC12",)), shown.ends))

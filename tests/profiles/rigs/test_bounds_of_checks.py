@@ -52,6 +52,14 @@ def calibration(**changes: Any) -> Parts:
     return parts(calibration=replace(load_rig("demo").calibration, **changes), **others)
 
 
+def steep(force_max_n: float) -> Parts:
+    """A machine that is too steep for its trim, but only beyond 10 N."""
+    branch = {"handles_n": (0.0, 10.0, 60.0), "weights": (1.0, 1.0, 1.0)}
+    curves = {f"{way}_{name}": numbers for way in ("rising", "falling") for name, numbers in branch.items()}
+    own = calibration(order=2, x0_v=0.0, x1_v=8.0, slip_radii_v=(), slip_shares=(), **curves)
+    return replace(own, limits=replace(LIMITS, force_max_n=force_max_n), trim=Trim(gain_v_per_n_s=0.5, limit_v=0.6))
+
+
 SAFE_V = 3.0
 RESTS_N = load_rig("demo").calibration.model().force_n(SAFE_V, -1.0)
 """What a tool that has pressed is left with at this safe voltage: the falling branch, some newtons above the rising one."""
@@ -182,6 +190,7 @@ BOUNDS: tuple[tuple[Check, str, Parts, Parts], ...] = (
         replace(calibration(), limits=replace(LIMITS, safe_voltage_v=7.0)),
     ),
     (checks.check_calibration_against_cell, "supervision.stuck_n", resting(RESTS_N + 0.1), resting(RESTS_N - 0.1)),
+    (checks.check_pace, "trim.gain_v_per_n_s", steep(force_max_n=10.0), steep(force_max_n=50.0)),
     (
         checks.check_calibration_range,
         "limits.force_max_n",

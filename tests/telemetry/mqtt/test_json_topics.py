@@ -69,6 +69,15 @@ def test_events_wait_for_the_broker_and_forces_do_not() -> None:
     ]
 
 
+def test_an_event_that_a_lost_connection_has_not_taken_is_told_by_the_next_one_and_nothing_else_of_then() -> None:
+    session = JsonTopics("cell", None)
+    session.announce()
+    session.offer(holding(), 1.0)
+    session.offer(replace(holding(), state="fault"), 2.0)
+    session.lose()
+    assert drain(session) == [("events", {"time_unix_s": 2.0, "event": "state", "value": "fault"}, False)]
+
+
 def test_that_control_was_away_while_the_broker_was_is_no_news_behind_the_greeting() -> None:
     """`online` false of then was retained behind `online` true of now, until true came behind it."""
     session = JsonTopics("cell", None)
