@@ -8,7 +8,7 @@ from gateway.devices import DeviceProfile, output_host
 from gateway.devices.exchange import VoltageExchange, VoltageRange
 from gateway.devices.messages import Accepted, SetVoltage
 from tests.devices.test_shipped_devices import OUTPUTS
-from tests.dialogues.test_unshipped_outputs_dialogue import device
+from tests.dialogues.outputs.test_unshipped_outputs_dialogue import device
 from tests.profile_files import load_device
 
 ALICAT = load_device("alicat-pc")

@@ -913,7 +913,7 @@ DEFECTS = (
            ("control/force_loop/feedforward/test_feedforward.py",)),
     Defect("a second enable forgets how long a cell has been dead", "control/supervision/stuck_sensor.py",
            "        self._earlier += self._equal\n", "        self._earlier = self._equal\n",
-           ("control/supervision/test_dead_before_an_enable.py",)),
+           ("control/supervision/readings/test_dead_before_an_enable.py",)),
     Defect("a master is gone with the first of its connections", "fieldbus/connection.py",
            "if not any(other.peer.identity == self.peer.identity for other in self._shared.connections):",
            "if not any(other.peer == self.peer for other in self._shared.connections):",
