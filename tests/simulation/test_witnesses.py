@@ -27,7 +27,7 @@ def observer() -> Observer:
 
 
 def look(witness: StatusWitness, at_s: float, **registers: int) -> None:
-    places = {"status_word": 0, "state": 1, "requested": 3, "voltage": 6, "age": 12, "owner": 17}
+    places = {"status_word": 0, "state": 1, "requested": 3, "accepted": 4, "voltage": 6, "age": 12, "owner": 17}
     words = [0] * STATUS_WORDS
     words[16] = 0x0A00
     for name, value in registers.items():
@@ -121,6 +121,20 @@ def test_a_setpoint_that_nobody_has_written_is_seen(observer: Observer) -> None:
     for number in range(5):
         look(witness, 1.9 + 0.1 * number, requested=1200)
     assert observer.broken == ["I7 at 1.9000: 12.00 N are requested, which nobody has written"]
+
+
+@pytest.mark.parametrize(("owner", "requested", "is_broken"), [(2, 4000, False), (1, 4000, True), (2, 4001, True)])
+def test_who_takes_over_asks_for_what_is_pursued(
+    observer: Observer, owner: int, requested: int, is_broken: bool
+) -> None:
+    """As seed 75077 drew it: a calibration lowered 54.42 N to 40, and somebody else took over by bit 3 alone."""
+    witness = StatusWitness(observer, lambda: inf)
+    witness.note_write(OWNER, write_one_pdu(1, 5442), 1.85)
+    for number in range(5):
+        look(witness, 1.9 + 0.1 * number, requested=5442, accepted=4000, owner=1)
+    for number in range(5, 10):
+        look(witness, 1.9 + 0.1 * number, requested=requested, accepted=4000, owner=owner)
+    assert [line.partition(" at ")[0] for line in observer.broken if "requested" in line] == ["I7"] * is_broken
 
 
 def test_a_gateway_that_begins_has_no_owner(observer: Observer) -> None:

@@ -44,7 +44,8 @@ class StatusWitness:
         self._asked_mv, self._asked_s = 0, 0.0
         self._owner, self._commands = 0, list[tuple[float, str, int]]()
         self._last_control = 0
-        self._requested: deque[tuple[float, int]] = deque()
+        self._requested: deque[tuple[float, int, int, tuple[int, ...]]] = deque()
+        self._left: tuple[int, tuple[int, ...]] = (0, ())  # of the look before: what was pursued, and for whom
         self._requested_s = 0.0
         self._written: deque[tuple[float, float]] = deque()
         self._beats: deque[tuple[float, float]] = deque()
@@ -64,7 +65,7 @@ class StatusWitness:
         self._echoes.append((at_s, words[14]))
         if len(self._echoes) > LATE_LOOKS:
             self._judge_echo()
-        self._requested.append((at_s, words[3]))
+        self._requested.append((at_s, words[3], words[4], words[16:18]))
         if len(self._requested) > LATE_LOOKS:
             self._judge_requested()
         self._last_s = at_s
@@ -130,16 +131,20 @@ class StatusWitness:
 
     def _judge_requested(self) -> None:
         """A look of some time ago: who hears no answer tells so late. What was written since the look before it, which a
-        standstill may have made long, may be seen now for the first time."""
-        at_s, counts = self._requested.popleft()
+        standstill may have made long, may be seen now for the first time. Who takes over has asked for what is pursued: less
+        than was written, where a calibration has lowered it or a lost master's is held."""
+        at_s, counts, accepted, owner = self._requested.popleft()
         while self._written and self._written[0][0] < min(at_s, self._requested_s) - WRITTEN_S:
             self._written.popleft()
         self._requested_s = at_s
         signed = counts - 65536 if counts & UNAVAILABLE else counts
-        is_known = counts in (0, self._known) or any(not abs(signed - one) > 1.0 for _, one in self._written)
+        left, former = self._left
+        is_taken_over = owner != former and counts == left
+        is_written = any(not abs(signed - one) > 1.0 for _, one in self._written)
+        is_known = counts in (0, self._known) or is_written or is_taken_over
         if not is_known:
             self._observer.complain("I7", f"{0.01 * signed:.2f} N are requested, which nobody has written", at_s)
-        self._known = counts
+        self._known, self._left = counts, (accepted, owner)
 
     def _judge_owner(self, owner: int, at_s: float) -> None:
         """Where one owns the setpoint before and after, and nobody has taken over or let go between, nobody else enables. A run

@@ -26,6 +26,14 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(5.8719, "worker", "ask", (1,), b"\x10\x00\x08\x00\x02\x04\x00!l\x08"),
         ],
     ),
+    (
+        75077,
+        [
+            Event(2.3681, "rival", "hold", (54.42,), way="mask"),
+            Event(3.8444, "person", "say", (), b'{"do": "calibration", "use": 3}'),
+            Event(4.6642, "worker", "ask", (1,), b"\x10\x00\x00\x00\x01\x02\x00\t"),
+        ],
+    ),
     (32237, [Event(23.867, "rival", "take", (41.06,), way="floats")]),
     (864683, [Event(0.1336, "worker", "hold_on", (37.07,)), Event(3.7748, "worker", "hold_on", (8.61,))]),
     (
