@@ -184,7 +184,7 @@ class Admission:
             is_stop, written = True, written & ~RUN_BITS
         if self._ownership.admits(write.host) or (written & TAKE and self._ownership.may_take_over(write.host)):
             return _PermittedWrite(values, written, is_stop)
-        asks_for_more = written & (EDGE_BITS | ENABLE & ~before)  # than a stop or the end of a run, as anybody may
+        asks_for_more = written & (EDGE_BITS | STARTS & ~before)  # than a stop or the end of a run, as anybody may
         if is_stop and not asks_for_more:
             return _PermittedWrite(commands.values.copy(), 0, True)
         if falls & RUN_BITS and not asks_for_more:
