@@ -116,7 +116,7 @@ class Admission:
             command = commands.command(values, asked, number, now_s, write.host)
             self._ask(command, values, write)
             return AdmittedWrite(values, asked, command, False, False, 0, True)
-        permitted = self._permit(write, values)
+        permitted = self._permit(write, values, now_s)
         if permitted is None:
             self._hear(write, asked, heartbeat)
             self.held_runs.keep(write.host, self._held_by(write, asked, asked))
@@ -133,12 +133,13 @@ class Admission:
             command = command._replace(stops=True)
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
             command = command._replace(lowered_from_n=self.lowered_from_n)
-        if write.has_waited:
-            command = command._replace(has_waited=True)
+        beat = heartbeat if HEARTBEAT in self._offsets(write) else None
+        repeats = self.held_enables.repeats_refused(write.host, beat, now_s)
+        command = command._replace(has_waited=write.has_waited, repeats_refused=repeats)
         self._ask(command, permitted.values, write)
         rises = written & ~int(before[CONTROL_WORD])
         if rises & STARTS:
-            self._check_starts(command, rises, written, write)
+            self._check_starts(command, rises, commands.address(write.block, CONTROL_WORD), beat)
         self._hear(write, asked, heartbeat)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
         return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
@@ -173,7 +174,7 @@ class Admission:
         is_left = owner is None and former != host and bool(self._commands.values[CONTROL_WORD])
         return is_left or (is_taken_over and owner != host)
 
-    def _permit(self, write: Write, values: Values) -> _PermittedWrite | None:
+    def _permit(self, write: Write, values: Values, now_s: float) -> _PermittedWrite | None:
         """Return what the owner may ask for, or anybody: a stop, the end of a run. None: nothing to stop. Raises Refusal."""
         commands = self._commands
         written, before = int(values[CONTROL_WORD]), int(commands.values[CONTROL_WORD])
@@ -183,13 +184,15 @@ class Admission:
             is_stop, written = True, written & ~RUN_BITS
         if self._ownership.admits(write.host) or (written & TAKE and self._ownership.may_take_over(write.host)):
             return _PermittedWrite(values, written, is_stop)
-        asks_for_more = written & (EDGE_BITS | ENABLE & ~before)  # than a stop or the end of a run, as anybody may
+        asks_for_more = written & (EDGE_BITS | STARTS & ~before)  # than a stop or the end of a run, as anybody may
         if is_stop and not asks_for_more:
             return _PermittedWrite(commands.values.copy(), 0, True)
         if falls & RUN_BITS and not asks_for_more:
             return _PermittedWrite(commands.values.copy(), before & ~RUN_BITS, False)
         if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):
             return None
+        if HEARTBEAT in self._offsets(write):
+            self.held_enables.note_refused(write.host, int(values[HEARTBEAT]), now_s)
         raise self._not_owner(write.address, write.host)
 
     def _is_named_stop(self, write: Write, written: int) -> bool:
@@ -258,9 +261,8 @@ class Admission:
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
-    def _check_starts(self, command: Command, rises: int, written: int, write: Write) -> None:
-        host, word_at = command.peer, self._commands.address(write.block, CONTROL_WORD)
-        beat = command.heartbeat if HEARTBEAT in self._offsets(write) else None
+    def _check_starts(self, command: Command, rises: int, word_at: int, beat: int | None) -> None:
+        host, written = command.peer, int(command.control_word)
         if rises & ENABLE and self.held_enables.holds(host, command.received_s, beat):
             text = "enable was kept at 1 over a fault or a loss: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))

@@ -51,6 +51,9 @@ class HeldEnables:
         self.by_host: dict[str, float] = {}
         self.lost: dict[str, int] = {}
         self._lost_now: dict[str, int] = {}
+        self._refused: dict[
+            str, tuple[int, float]
+        ] = {}  # heartbeat of each that is no owner, and when it came, monotonic s
         self._told_s = 0.0
 
     def note(self, host: str, now_s: float) -> None:
@@ -72,9 +75,27 @@ class HeldEnables:
             del self._lost_now[next(iter(self._lost_now))]
         self.on_lost(dict(self._lost_now))
 
+    def note_refused(self, host: str, heartbeat: int, now_s: float) -> None:
+        """Note the heartbeat of a write that was refused because another host owns: the same one, on and on, is no beat."""
+        self._refused.pop(host, None)
+        self._refused[host] = heartbeat, now_s
+        if len(self._refused) > _MOST_HOLDERS:
+            del self._refused[next(iter(self._refused))]
+
+    def repeats_refused(self, host: str, heartbeat: int | None, now_s: float) -> bool:
+        """Decide whether a write brings no other heartbeat than the host's last refused one: by that of a program that hung
+        while another master owned, the machine would press when that one stops. heartbeat: None where it brings none."""
+        if host not in self._refused or heartbeat not in (None, self._refused[host][0]):
+            return False
+        refused, refused_s = self._refused.pop(host)
+        if now_s - refused_s >= _HELD_S:
+            return False
+        self.note_refused(host, refused, now_s)
+        return True
+
     def knows(self, host: str) -> bool:
-        """Decide whether this host keeps up an enable, or was lost and has not been heard since."""
-        return host in self.by_host or host in self.lost or host in self._lost_now
+        """Decide whether this host keeps up an enable, or was lost or refused and has not been heard since."""
+        return host in self.by_host or host in self.lost or host in self._lost_now or host in self._refused
 
     def holds(self, host: str, now_s: float, heartbeat: int | None = None) -> bool:
         """Decide whether a 1 of this host is one that it has kept up since the fault, or since its loss in the process before.
@@ -92,11 +113,14 @@ class HeldEnables:
         """Note what a host has written as its heartbeat: where it is another one than when it was lost, its program goes on."""
         if self._lost_now.get(host, heartbeat) != heartbeat:
             self._find(host)
+        if host in self._refused and self._refused[host][0] != heartbeat:
+            del self._refused[host]
 
     def let_go(self, host: str) -> None:
         """Note that a host has written enable as 0."""
         self._find(host)
         self._forget(host)
+        self._refused.pop(host, None)
 
     def _find(self, host: str) -> None:
         """A lost master is there again: the next process must not refuse what a program that goes on writes."""

@@ -110,6 +110,48 @@ def test_programs_that_hang_keep_no_force_by_taking_over_with_each_frame(masters
     assert rig.state is State.FAULT
 
 
+@pytest.mark.parametrize("action", LeaseAction)
+@pytest.mark.parametrize("is_split", [False, True])
+@pytest.mark.parametrize("ends", ["stops", "is lost"])
+def test_the_frames_of_a_program_that_hung_beside_another_owner_press_not_when_that_one_ends(
+    action: LeaseAction, is_split: bool, ends: str
+) -> None:
+    """They had been refused for hours: 30 N for a lease, or until somebody came, in the moment in which the owner stopped."""
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=action))
+    rig.beats = False
+
+    def flow(cycles: int, owner: bool) -> None:
+        for cycle in range(cycles):
+            if owner:
+                rig.write(0, ENABLE, 800, 0, 0, 1 + cycle)
+            for words in [(0, ENABLE, 3000), (4, 139)] if is_split else [(0, ENABLE, 3000, 0, 0, 139)]:
+                rig.answer(*words, peer=OTHER)
+            rig.run(0.1)
+
+    flow(20, owner=True)
+    if ends == "stops":
+        rig.write(0, 0, 0, 0, 0, 50)
+    flow(40, owner=False)
+    assert max(force_n for *_, force_n in rig.trace) < 9.0
+    if rig.state is State.OFF:
+        rig.write(0, ENABLE, 3000, 0, 0, 140, peer=OTHER)
+        assert rig.run(0.1).state is not State.OFF, "its program goes on"
+
+
+@pytest.mark.parametrize("by", ["a pause", "its own 0", "a takeover", "no lease"])
+def test_who_was_refused_beside_another_owner_enables_with_the_same_heartbeat(by: str) -> None:
+    rig = SmallRig(settings(lease_s=None if by == "no lease" else LEASE_S))
+    rig.write(0, ENABLE, 800, 0, 0, 1)
+    assert rig.answer(0, ENABLE, 900, 0, 0, 7, peer=OTHER)
+    rig.write(0, 0, 0, 0, 0, 2)
+    if by == "a pause":
+        rig.run(3.1)
+    elif by == "its own 0":
+        rig.write(0, 0, peer=OTHER)
+    rig.write(0, ENABLE | (TAKE if by == "a takeover" else 0), 900, 0, 0, 7, peer=OTHER)
+    assert rig.run(0.1).state is not State.OFF
+
+
 class Held(SmallRig):
     """12 N of 30 N are held for a master whose program hangs while its frame flows; some have taken over with it."""
 

@@ -8,11 +8,13 @@ import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.control import CalibrationInUse
+from gateway.control.settings import SelfTestSettings
 from gateway.modbus import Peer
 from gateway.modbus.pdu import is_exception, read_write_request, write_registers_request
 from gateway.modbus.server import answer
 from gateway.profiles import load_calibration
 from gateway.registers.words import ControlBit, State
+from tests.control.bench import settings
 from tests.fieldbus.by_hand import framed
 from tests.fieldbus.conftest import Stand, put
 from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S, leased, locally
@@ -22,6 +24,7 @@ from tests.service.running_rig.simulated_rig import (
     OTHER,
     OWNER,
     RESET,
+    SELF_TEST,
     TAKE,
     TARE,
     SmallRig,
@@ -167,6 +170,18 @@ def test_a_takeover_outlives_the_end_of_its_own_run() -> None:
     rig.run(2.5).write(0, 0)
     rig.until(State.OFF)
     assert rig.bank.owner == OWNER.host
+
+
+@pytest.mark.parametrize(("runs", "asks"), [(SELF_TEST, CALIBRATE), (CALIBRATE, SELF_TEST)])
+def test_a_guest_that_asks_for_another_run_is_refused_and_ends_none(runs: int, asks: int) -> None:
+    """It was answered that it had begun, and had ended the self-test of another master."""
+    rig = SmallRig(replace(settings(), self_test=SelfTestSettings())).calibrating(runs)
+    for words in ((0, asks), (0, asks, 0, 0, 0, 7)):
+        refused = rig.answer(*words, peer=OTHER)
+        assert refused and refused.reason is RefusalReason.NOT_OWNER
+        assert rig.run(0.1).state is State.CALIBRATING
+    rig.write(0, 0, peer=OTHER)
+    rig.until(State.OFF)
 
 
 def test_an_edge_bit_acts_each_time_it_is_written() -> None:
