@@ -54,6 +54,16 @@ def test_a_damaged_calibration_in_use_gives_way_to_the_one_before_it(used):
     assert active_mark(used) == 3
 
 
+def test_what_this_rig_cannot_take_is_not_gone_back_to_either(used):
+    """The limits of the rig file are others since the last start."""
+    for unusable, in_use in (({3}, 2), ({2, 3}, mark_of(OWN))):
+        selected = used.find_selected(
+            lambda own, unusable=unusable: "E401 beyond the cell" * (mark_of(own) in unusable)
+        )
+        assert selected.document is not None and mark_of(selected.document) == in_use
+        assert len(selected.notes) == len(unusable)
+
+
 def test_both_damaged_is_the_built_in_one(used):
     for name in ("0002.yaml", "0003.yaml"):
         (used.directory / name).write_bytes(b"number: 2\n")

@@ -52,6 +52,11 @@ def test_play_lags_half_a_width_behind_in_either_direction() -> None:
     assert found == pytest.approx([445500.0, 450000.0, 450000.0, 364500.0])
 
 
+def test_what_the_dead_band_passes_over_is_a_change_of_what_was_asked_for_not_of_what_came_of_it() -> None:
+    found = pressures(Regulator(hysteresis_pa=9000.0, dead_band_pa=1800.0), [5.0, 5.015, 5.025])
+    assert found == pytest.approx([445500.0, 445500.0, 447750.0])
+
+
 def test_the_supply_is_a_ceiling() -> None:
     assert pressures(Regulator(supply_pa=5.0e5), [4.0, 6.0, 10.0, 5.0]) == pytest.approx([3.6e5, 5.0e5, 5.0e5, 4.5e5])
 

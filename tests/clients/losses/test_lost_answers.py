@@ -174,8 +174,11 @@ def test_the_python_client_takes_an_enable_back_whose_answer_was_lost(gateway: G
     with pytest.raises(python["Lost"]):
         client.exchange()
     client._ask = answer
+    client.tare()
     client.exchange()
     assert commands(gateway) == [command(1, 1200), command(0, 0)] and client.ended
+    client.exchange()
+    assert commands(gateway)[2:] == [command(4, 0)], "what was asked for behind the loss waits for OFF, and goes then"
 
 
 @pytest.mark.parametrize("has_looked", [False, True])

@@ -1,5 +1,7 @@
 """What of a former master's setpoints counts on under who takes over: what is pressed, in its mode and its direction."""
 
+from dataclasses import replace
+
 import pytest
 
 from gateway.registers import Status
@@ -49,3 +51,11 @@ def test_a_takeover_that_chooses_the_mode_presses_no_voltage_that_another_has_le
     bank.publish(Status(State.HOLDING, PUSHES, force_accepted_n=12.0))
     other.write(0, ENABLE | TAKE, 1200, 0, int(Mode.VOLTAGE))
     assert (bank.command.mode, bank.command.voltage_setpoint_v) == (Mode.VOLTAGE, 0.0)
+
+
+def test_a_stop_that_has_waited_in_a_pile_stops_and_its_heartbeat_is_none(bank, master, commands):
+    """A reset wants a beat of behind the fault: one of a pile may be of long before."""
+    master.write(0, ENABLE, 1200)
+    master.peer = replace(master.peer, is_behind=True)
+    master.write(0, 0, 0, 0, 0, 77)
+    assert (commands[-1].stops, commands[-1].heartbeat, commands[-1].has_waited) == (True, 77, True)
