@@ -136,7 +136,7 @@ DEFECTS = (
            ("service/running_rig/masters/test_hung_master.py",)),
     Defect("a frame that was refused beside another owner presses when that one stops", "control/edge_checks.py",
            "            or self._repeats_refused(proposal.command, edges)\n", "",
-           ("service/running_rig/test_lost_masters.py",)),
+           ("service/running_rig/masters/test_lost_masters.py",)),
     Defect("what somebody has lowered beside a lost master rises by its frames", "control/edge_checks.py",
            "            or self._rises_unbeaten(proposal.command, at)\n", "",
            ("service/running_rig/masters/test_lost_masters.py",)),
