@@ -271,13 +271,13 @@ class RefusalReason(IntEnum):
             "Read failing_index and failing_reason; the active set is unchanged, so there is no hurry.",
         ),
     )
-    # a reset, or an enable behind a master that was lost, where there is a lease, without a new heartbeat
+    # a reset, or what presses more behind a master that was lost or refused, where there is a lease, without a new heartbeat
     HEARTBEAT_STALE = (
         22,
         modbus.ILLEGAL_VALUE,
         Explanation(
             "W302",
-            "fault reset, enable, takeover, or more force, without a new heartbeat",
+            "reset, enable or more without a new heartbeat",
             "With a lease: the heartbeat beside a reset, enable, second takeover, or more than is held for a lost master, is "
             "that of before.",
             "The master writes the bit without its heartbeat, or its program stands still and its last frame is repeated.",
