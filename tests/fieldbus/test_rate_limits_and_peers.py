@@ -140,6 +140,18 @@ def test_only_who_has_more_under_way_than_is_soon_answered_is_late(taken: int, w
     assert not backlog.is_late
 
 
+def test_a_pile_is_one_until_its_last_byte_is_taken() -> None:
+    """Its end has waited for as long as its beginning, though so little of it is left that it looks like a burst."""
+    backlog = Backlog()
+    for tick in range(60):
+        backlog.note(0.01 * tick, 12 * (tick + 1), 5000.0)
+    assert backlog.is_late
+    backlog.note(0.61, 5720, 12.0)
+    assert backlog.is_late
+    backlog.note(0.62, 5732, 0.0)
+    assert not backlog.is_late
+
+
 def test_what_waits_in_a_socket_is_counted_and_of_one_that_is_closed_nobody_knows() -> None:
     ours, theirs = socket.socketpair()
 

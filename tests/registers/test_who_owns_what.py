@@ -27,6 +27,15 @@ TEST, TAKE = int(ControlBit.START_SELF_TEST), int(ControlBit.TAKE_OWNERSHIP)
 TAKES_OVER = {"takes_over": True, "stops": False, "asks": True}
 
 
+def test_who_owned_before_is_remembered_however_often_nobody_is_made_the_owner() -> None:
+    """Of a force that is held for a lost master each step does so: the one that comes back goes on with its own."""
+    ownership = Ownership(None)
+    ownership.take("a")
+    for _ in range(2):
+        ownership.release()
+    assert (ownership.owner, ownership.former) == (None, "a")
+
+
 def test_who_took_over_owns_until_it_stops_and_who_only_commanded_until_it_commands_nothing() -> None:
     explicit, plain = Ownership(None), Ownership(None)
     explicit.settle("a", **TAKES_OVER)

@@ -34,9 +34,13 @@ def moderate_as_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(evaluation, "is_moderate", lambda branches: branches.is_moderate)
 
 
-def score(rms_n: float, *, usable: bool = True, moderate: bool = True, order: int = 2) -> Any:
+def score(
+    rms_n: float, *, usable: bool = True, moderate: bool = True, order: int = 2, trained_n: float | None = None
+) -> Any:
+    """rms_n: held out; trained_n: of the rows that it was fitted to, where that is another."""
     branches = SimpleNamespace(is_moderate=moderate, name=f"order {order}, {rms_n:g} N")
-    result = SimpleNamespace(verdicts=SimpleNamespace(usable=usable), branches=branches, order=order, rms_n=rms_n)
+    result = SimpleNamespace(verdicts=SimpleNamespace(usable=usable), branches=branches, order=order)
+    result.rms_n = rms_n if trained_n is None else trained_n
     return SimpleNamespace(result=result, heldout_n2=rms_n**2, heldout_rms_n=rms_n)
 
 
@@ -63,6 +67,13 @@ def test_a_choice_is_poor_where_it_may_not_drive_or_another_describes_the_data_m
     chosen: Any, best_n: float, poor: bool
 ) -> None:
     assert _is_poor(chosen, [chosen, score(5.0), score(best_n, usable=False)]) is poor
+
+
+def test_how_much_better_the_data_are_described_is_told_by_what_was_held_out() -> None:
+    """What was fitted to every wiggle of its own rows describes none of the others."""
+    chosen, wiggly = score(1.0), score(3.0, usable=False, trained_n=0.01)
+    assert not _is_poor(chosen, [chosen, wiggly])
+    assert _is_poor(chosen, [chosen, wiggly, score(0.5, usable=False)])
 
 
 def held(monkeypatch: pytest.MonkeyPatch, rms_n: dict[int, float], free: Any, orders: tuple[int, ...]) -> Any:

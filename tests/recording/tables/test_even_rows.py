@@ -41,6 +41,15 @@ def sent(time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.where(known, VOLTS[last], np.nan), np.where(known, time_s - SETTINGS_S[last], np.nan)
 
 
+def test_a_reading_that_is_no_witness_is_in_no_row() -> None:
+    overloaded = np.zeros(TIME_S.size, dtype=bool)
+    overloaded[500:600:3] = True
+    measured = replace(MEASUREMENT, force_n=np.where(overloaded, 980.0, force(TIME_S)), usable=~overloaded)
+    found, whole = (resample_evenly(one, *sent(TIME_S)) for one in (measured, MEASUREMENT))
+    assert float(np.max(found.force_n)) < 28.5
+    assert 25 < int(np.sum(whole.usable)) - int(np.sum(found.usable)) <= int(np.sum(overloaded))
+
+
 def test_rows_are_even_and_the_force_is_that_of_their_times() -> None:
     found = resample_evenly(MEASUREMENT, *sent(TIME_S))
     assert np.diff(found.time_s) == pytest.approx(found.even_s)

@@ -66,6 +66,17 @@ def test_where_each_sample_decides_no_tick_decides_beside_it() -> None:
     assert decided[0] <= 1.1 * (wired.loop.samples - samples)
 
 
+def test_a_voltage_is_on_its_way_before_its_reasons_are_put_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They cost more than the decision, and a lost master or an over-force would wait for them."""
+    wired = Wired().pressing(12.0)
+    acts: list[str] = []
+    for part, name in ((wired.loop.output, "set_voltage"), (wired.controller, "explain")):
+        done = getattr(part, name)
+        monkeypatch.setattr(part, name, lambda *given, done=done, name=name: (acts.append(name), done(*given))[1])
+    wired.run(0.1)
+    assert len(acts) > 4 and acts == ["set_voltage", "explain"] * (len(acts) // 2)
+
+
 def test_the_cause_of_a_restart_is_shown_until_there_is_a_fault_of_now() -> None:
     wired = Wired()
     wired.start(unclean=True)
