@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import isnan
 from typing import Any
 
 import pytest
@@ -100,3 +101,12 @@ def test_a_with_block_that_ends_well_says_that_its_off_did_not_get_out(
         client.exchange()
         gateway.is_cut = True
     assert gateway.bank.command.control_word == 1
+
+
+def test_what_the_gateway_has_no_value_for_is_no_number(program: PythonProgram) -> None:
+    """-327.68 N would be a pull that nobody sees."""
+    python = program.module
+    status = python["decode_status"]([0x8000] * python["STATUS_WORDS"])
+    for name, _, kind, counts in python["STATUS"]:
+        assert isnan(status[name]) if kind == "int16" else status[name] != -0x8000 / counts, name
+    assert isnan(status["force_measured"])

@@ -1,5 +1,7 @@
 """Role and number as a plant's own CA may have written them: what is not one UTF8String is no role, and is told as such."""
 
+from datetime import UTC, datetime
+
 import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
@@ -10,12 +12,12 @@ from gateway.modbus.certificate import ROLE_OID, PeerCertificate, read_certifica
 from tests.certificates import signed
 
 
-def shown_by(*roles: bytes, serial: int = 0x77) -> PeerCertificate:
+def shown_by(*roles: bytes, serial: int = 0x77, begins: datetime | None = None) -> PeerCertificate:
     """Return what is read of a certificate with these values of the extension."""
     key, ca = ec.generate_private_key(ec.SECP256R1()), signed()["ca"]
     name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "cell-7")])
     builder = x509.CertificateBuilder(name, name, key.public_key(), serial)
-    builder = builder.not_valid_before(ca.certificate.not_valid_before_utc)
+    builder = builder.not_valid_before(begins or ca.certificate.not_valid_before_utc)
     builder = builder.not_valid_after(ca.certificate.not_valid_after_utc)
     oid = x509.ObjectIdentifier(ROLE_OID)
     values = [x509.Extension(oid, False, x509.UnrecognizedExtension(oid, role)) for role in roles]
@@ -62,3 +64,8 @@ def test_a_number_that_openssl_prints_with_a_zero_ahead_is_revoked_as_it_stands_
     shown = shown_by(b"\x0c\x08setpoint", serial=0xABC12)
     assert shown.serial == "0ABC12"
     assert "(serial 0ABC12) is revoked" in str(certificate_refusal(shown, frozenset(("0ABC12",)), shown.ends))
+
+
+@pytest.mark.parametrize("year", [1950, 1999, 2000, 2020])
+def test_a_year_of_two_digits_is_of_the_century_that_the_standard_says(year: int) -> None:
+    assert shown_by(begins=datetime(year, 3, 1, tzinfo=UTC)).begins.startswith(f"{year}0301")
