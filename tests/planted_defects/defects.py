@@ -965,5 +965,5 @@ DEFECTS = (
            ("registers/test_who_owns_what.py",)),
     Defect("a value that is not there is a number of a Python program", "clients/templates/python.txt",
            "math.nan if kind == \"int16\" and number == -32768 else ", "",
-           ("clients/test_ends_of_a_python_program.py",)),
+           ("clients/one_language/test_ends_of_a_python_program.py",)),
 )  # fmt: skip
