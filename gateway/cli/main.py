@@ -15,7 +15,7 @@ import click
 
 from gateway import VERSION
 from gateway.cli import plain_spelling
-from gateway.cli.command_line.given_path import refuse_empty_words
+from gateway.cli.command_line.given_path import refuse_senseless_words
 from gateway.cli.errors import translate_error
 from gateway.processes import exit_codes
 
@@ -88,9 +88,9 @@ class VerbGroup(click.Group):
         return command
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Refuse a command line with an empty word in it, whichever argument or option it is."""
+        """Refuse a command line with an empty word in it, or an endless one, whichever argument or option it is."""
         if not ctx.resilient_parsing:
-            refuse_empty_words(args)
+            refuse_senseless_words(args)
         return super().parse_args(ctx, args)
 
     def resolve_command(

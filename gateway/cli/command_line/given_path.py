@@ -1,4 +1,5 @@
-"""Paths of the command line as people mean them, and an empty name, which a variable of the shell that is not set leaves."""
+"""Paths of the command line as people mean them, and words that mean nothing: an empty one, which a variable
+of the shell leaves that is not set, and one that is longer than any path or number."""
 
 import os
 from collections.abc import Sequence
@@ -13,6 +14,8 @@ from gateway.plain_file import expand_home
 
 EMPTY: Final = "an empty name: is a variable of the shell not set?"
 _MAY_BE_EMPTY: Final = ("--name", "--note")  # words for people
+_LONGEST: Final = 4096
+"""Characters of one word: as many as a path of Linux has. Python reads no number of more than 4300 digits."""
 
 
 class GivenPath(click.Path):
@@ -45,11 +48,14 @@ def lost_target(path: Path) -> str:
     return ""
 
 
-def refuse_empty_words(words: Sequence[str]) -> None:
-    """Raise UsageError for a command line with an empty word in it: as a recording it was an internal error, and as --rig it
-    was demo's."""
+def refuse_senseless_words(words: Sequence[str]) -> None:
+    """Raise UsageError for a command line with an empty word in it (as a recording it was an internal error, and as --rig it
+    was demo's), or with one that is too long for anything (as a register's number it was an internal error)."""
     for before, word in zip(("", *words), words, strict=False):
         option = before if before.startswith("-") else ""
+        if len(word) > _LONGEST:
+            start = f"{option} {word[:20]}".strip()
+            raise click.UsageError(f"{start}...: {len(word)} characters in one word; allowed up to {_LONGEST}")
         if word.startswith("--") and word.endswith("="):
             option, word = word[:-1], ""
         if not word and option not in _MAY_BE_EMPTY:

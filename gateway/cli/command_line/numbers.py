@@ -16,7 +16,6 @@ def describe_allowed(value: str, low: float | None, high: float | None, unit: st
     return f"{value}{unit}: allowed {low:.10g} .. {high:.10g}{unit}"
 
 
-_SHOWN: Final = 40  # characters of what was given
 _WITH_UNIT: Final = re.compile(r"([+-]?[\d.,]+) ?[^\W\d_][\w/%]*")
 
 
@@ -56,9 +55,9 @@ class Whole(click.IntRange):
         """Return the number; BadParameter with the bounds."""
         try:
             number = int(value)
-        except ValueError:  # also of one with thousands of digits
+        except ValueError:
             allowed = describe_allowed("", self.min, self.max) if self.min is not None or self.max is not None else ""
-            return self.fail(f"{str(value)[:_SHOWN]} is not a whole number{allowed}", param, ctx)
+            return self.fail(f"{value} is not a whole number{allowed}", param, ctx)
         if (self.min is not None and number < self.min) or (self.max is not None and number > self.max):
             self.fail(describe_allowed(str(value), self.min, self.max), param, ctx)
         return number

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 import pytest
 
-from gateway.cli.command_line.given_path import refuse_empty_words
+from gateway.cli.command_line.given_path import refuse_senseless_words
 from gateway.profiles import ProfileError, load_rig
 from gateway.profiles.rigs.faces import TlsFace
 
@@ -56,9 +56,21 @@ def test_a_tilde_that_no_shell_has_replaced_is_the_home_directory(here: Path, ca
 
 
 def test_words_for_people_may_be_empty() -> None:
-    refuse_empty_words(["record", "on", "--name", "", "--note="])
+    refuse_senseless_words(["record", "on", "--name", "", "--note="])
     with pytest.raises(click.UsageError, match="--state: an empty name"):
-        refuse_empty_words(["record", "on", "--name", "", "--state="])
+        refuse_senseless_words(["record", "on", "--name", "", "--state="])
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("read",), ("registers",), ("calibration", "show"), ("hold",), ("read", "--unit"), ("write", "force_setpoint=12")],
+    ids=" ".join,
+)
+def test_a_word_of_more_characters_than_any_name_or_number_has_is_told_as_such(words: tuple[str, ...], call) -> None:
+    """As a register's number, or a calibration's, it was an internal error."""
+    answer = call(*words, 5000 * "9")
+    assert answer.exit_code == 2, answer.output
+    assert answer.stderr.endswith(f"{20 * '9'}...: 5000 characters in one word; allowed up to 4096\n"), answer.stderr
 
 
 @pytest.mark.parametrize("words", [("check", "~nobody-here/x.yaml"), ("recordings", "list", "--rig", "~nobody-here/x")])
