@@ -7,7 +7,7 @@ sign or a unit that would be read over is refused, for it would make a number th
 import re
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import dropwhile, islice, pairwise
 from math import inf
 from typing import Annotated, Final, Literal
 
@@ -276,12 +276,26 @@ def _units_beside_blanks(field: Choice) -> list[str]:
 
 def _check_spelt_unit(template: Template, reading: ForceReading) -> None:
     """The word behind the force is that of `unit`: kilonewtons are not to be believed as newtons."""
-    behind = next((after for one, after in pairwise(template.pieces) if one is template.field(FORCE)), "")
-    word = re.match(r" *([A-Za-z]+)", behind) if isinstance(behind, str) else None
-    said = _SPELT_UNITS.get(word[1]) if word else None
-    if word and said and reading.unit and said != reading.unit:
+    word = _word_behind_force(template)
+    said = _SPELT_UNITS.get(word)
+    if said and reading.unit and said != reading.unit:
         cure = "leave unit out and say newton_per_count" if said not in NEWTON_PER_UNIT else f"unit: {said}"
-        raise TemplateError(f"{quote(template.text)} says {word[1]}, which is not unit: {reading.unit}; {cure}")
+        raise TemplateError(f"{quote(template.text)} says {word}, which is not unit: {reading.unit}; {cure}")
+
+
+def _word_behind_force(template: Template) -> str:
+    """Return the word that follows the number, empty where something else does. Behind a comma or a mark, such as that of
+    rest, a lone letter is no unit: N may be net, and g gross."""
+    behind = dropwhile(lambda one: one is not template.field(FORCE), template.pieces)
+    is_next = True
+    for one in islice(behind, 1, None):
+        if isinstance(one, str) and (word := re.match(r"([ ,;]*)([A-Za-z]+)", one)):
+            is_next &= not word[1].strip()
+            return word[2] if is_next or word[2][1:] else ""
+        if not (isinstance(one, Choice) or (isinstance(one, str) and not one.strip(" ,;"))):
+            return ""
+        is_next = False
+    return ""
 
 
 def _check_signs(template: Template, number: Field, reading: ForceReading) -> None:

@@ -226,12 +226,16 @@ def test_a_sign_a_unit_or_an_overload_that_would_be_read_over_is_refused(frame: 
     [
         ("{force:8.3f} kN", "N", "says kN, which is not unit: N; leave unit out and say newton_per_count"),
         ("{force:8.3f}kg", "N", "says kg, which is not unit: N; unit: kg"),
+        ("{force:8.3f}{moves: |M} kg", "N", "says kg, which is not unit: N; unit: kg"),
+        ("{force:8.3f},{moves:S|M}, lbs", "N", "says lbs, which is not unit: N; unit: lb"),
         ("{force:8.3f} lbF", "kg", "says lbF, which is not unit: kg; unit: lb"),
         ("{force:8.3f} ozF", "lb", "says ozF, which is not unit: lb; leave unit out"),
         ("{force:8.3f} lbF", "lb", ""),
         ("{force:8.3f}KG{mode:G|N}", "kg", ""),
         ("{force:8.3f}KN", "kg", ""),  # K for kilogram, N for net
         ("{force:8.3f} net", "kg", ""),
+        ("{force:8.3f},{moves:S|M},N", "kg", ""),  # N for net
+        ("{force:8.3f}{moves: |M}{tare:6.1f} lb", "kg", ""),  # of the other number
         ("kN {force:8.3f}", "N", ""),
     ],
 )
