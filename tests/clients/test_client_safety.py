@@ -8,7 +8,7 @@ import pytest
 
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
-from tests.clients.programs.controllers import Irc5
+from tests.clients.programs.controllers.irc5 import Irc5
 from tests.clients.scenes import TEXTS, command, commands, cycles
 
 OWN_SOCKETS = ["rapid", "urscript", "python", "c"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import struct
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -15,7 +14,10 @@ from gateway.codes.faults import FaultCode
 from gateway.registers import Status
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
-from tests.clients.programs.controllers import S7, Codesys, Irc5, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.s7 import S7
+from tests.clients.programs.controllers.structured_text import Codesys
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.scenes import MAP, TEXTS, WHERE, command, commands, cycles
 
 
@@ -261,40 +263,3 @@ def test_whole_frames_are_those_that_the_python_client_makes(
         else:
             address, words = gateway.writes[number - 3]
             assert frame == python["exchange_frame"](number, 1, address, words)
-
-
-def test_a_rig_that_wants_the_byte_order_first_is_enabled_and_shown_it_once_a_connection(language: str) -> None:
-    gateway = GatewayAtHand(MAP, wants_echo=True)
-    client = CONTROLLERS[language](TEXTS[language], gateway)
-    cycles(client)
-    assert gateway.echoes == 0, "who only watches writes nothing"
-    client.enable(12.0)
-    cycles(client, 12)
-    assert client.enabled and gateway.exceptions == []
-    assert gateway.echoes == 1
-    gateway.is_cut = True
-    cycles(client)
-    gateway.is_cut = False
-    cycles(client, 12)
-    client.cycle(4.0)
-    client.enable(12.0)
-    cycles(client, 12)
-    assert client.enabled and gateway.echoes == 2
-
-
-def test_a_refused_echo_leaves_the_reason_to_the_command(language: str) -> None:
-    gateway = GatewayAtHand(MAP)
-    client = CONTROLLERS[language](TEXTS[language].replace("20480", "20481").replace("16#5000", "16#5001"), gateway)
-    client.enable(12.0)
-    cycles(client, 12)
-    assert client.enabled and gateway.exceptions == [(16, 3)] and gateway.echoes == 1
-
-
-def test_a_gateway_that_answers_another_unit_than_1_is_asked_as_that_unit(language: str) -> None:
-    gateway = GatewayAtHand(MAP, units=(7,))
-    text = render_client(MAP, {"twincat": "st", "codesys": "st"}.get(language, language), replace(WHERE, unit=7))
-    client = CONTROLLERS[language](text, gateway)
-    client.enable(12.0)
-    cycles(client)
-    assert client.enabled and not gateway.exceptions
-    assert "255" not in "".join(line for line in text.splitlines() if "modbus_add_signal(" in line)

@@ -16,7 +16,9 @@ from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.losses.test_edges_and_losses import control_word_of
 from tests.clients.one_language.test_two_tasks import every_place
 from tests.clients.programs.c_program import CProgram
-from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.programs.python_program import PythonProgram
 from tests.clients.refusals.test_guests import set_ramp
 from tests.clients.scenes import TEXTS, WHERE, cycles

@@ -17,7 +17,10 @@ from gateway.clients import Endpoint, render_client
 from gateway.clients.wiring import wiring_page
 from gateway.profiles import load_register_map, load_rig
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.programs.controllers import S7, Codesys, Irc5, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.s7 import S7
+from tests.clients.programs.controllers.structured_text import Codesys
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 
 MAP = load_register_map("force-v1")
 MAIN = r"""

@@ -9,7 +9,9 @@ import pytest
 from gateway.codes.faults import FaultCode
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.c_program import CProgram
-from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import MODEL, TEXTS, cycles
 

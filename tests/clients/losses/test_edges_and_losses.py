@@ -8,7 +8,10 @@ import pytest
 
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.programs.controllers import S7, Codesys, Plc, TwinCat, UniversalRobot
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.s7 import S7
+from tests.clients.programs.controllers.structured_text import Codesys, TwinCat
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.scenes import MODEL, TEXTS, command, commands, cycles
 
 TARE = 4

@@ -12,7 +12,9 @@ from gateway.registers.words import ControlBit
 from gateway.registers.writes.proposed_write import EdgeRefusal
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged, refuse_commands
 from tests.clients.programs.c_program import CProgram
-from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.scenes import MAP, TEXTS, WHERE, command, commands, cycles
 
 

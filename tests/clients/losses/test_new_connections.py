@@ -11,7 +11,10 @@ from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
 from tests.clients.losses.test_edges_and_losses import OF_A_PROGRAM
 from tests.clients.programs.c_program import OK, CProgram
-from tests.clients.programs.controllers import Codesys, Irc5, Plc, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.structured_text import Codesys
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.scenes import TEXTS, command, commands, cycles
 
 RAMP = 2

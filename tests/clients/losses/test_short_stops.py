@@ -12,7 +12,8 @@ from gateway.registers.words import ControlBit
 from gateway.registers.writes.proposed_write import EdgeRefusal
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.programs.controllers import MbClient, Plc
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.s7 import MbClient
 from tests.clients.scenes import TEXTS, command, commands, cycles
 
 BLOCKS = ("scl", "twincat", "codesys")

@@ -9,7 +9,9 @@ import pytest
 from gateway.codes.faults import FaultCode
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.refusals.test_disables_beside_refusals import refuse_tares
 from tests.clients.scenes import TEXTS, cycles
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.programs.controllers import S7, MbClient
+from tests.clients.programs.controllers.s7 import S7, MbClient
 from tests.clients.scenes import MAP, MODEL, TEXTS, commands, cycles
 
 

@@ -14,7 +14,7 @@ from gateway.registers.words import SelfTestResult
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.losses.test_edges_and_losses import TARE
-from tests.clients.programs.syntax import Node
+from tests.clients.programs.syntax.parser import Node
 from tests.clients.refusals.test_disables_beside_refusals import refuse_tares
 from tests.clients.scenes import MAP, TEXTS, cycles
 

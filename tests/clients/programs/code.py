@@ -1,4 +1,4 @@
-"""Makes Python functions of what tests/clients/programs/syntax.py has parsed, once for each place of a text: a program is run
+"""Makes Python functions of what tests/clients/programs/syntax/ has parsed, once for each place of a text: a program is run
 thousands of times, by many machines, and what a name or an operator is does not change between them.
 
 An expression becomes a function of machine and frame that returns its value, a statement one that returns nothing.
@@ -11,7 +11,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from tests.clients.programs.kept import KEEPERS
-from tests.clients.programs.syntax import Node
+from tests.clients.programs.syntax.parser import Node
 
 if TYPE_CHECKING:
     from tests.clients.programs.machine import Frame, Machine

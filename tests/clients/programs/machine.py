@@ -1,4 +1,4 @@
-"""Runs what tests/clients/programs/syntax.py has parsed: values of a width, lists that are copied, routines, function blocks.
+"""Runs what tests/clients/programs/syntax/ has parsed: values of a width, lists that are copied, routines, function blocks.
 
 What a controller brings along (sockets, MB_CLIENT, timers, conversions) comes in as `library`: a name -> a Python function that
 gets the machine, the arguments as expressions and as values. A name that nobody has declared is a NameError: so a run of every
@@ -12,7 +12,7 @@ from typing import Any
 
 from tests.clients.programs.code import Given, RapidError, Returned, code_of, constant_code, keeper_code, key_of
 from tests.clients.programs.kept import FIRST_VALUES, KEEPERS, Keeps
-from tests.clients.programs.syntax import Node, Routine, Unit
+from tests.clients.programs.syntax.parser import Node, Routine, Unit
 
 
 class TaskStopped(Exception):  # noqa: N818

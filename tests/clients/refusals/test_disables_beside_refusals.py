@@ -10,7 +10,9 @@ from gateway.registers.words import CommitStatus
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged, refuse_commands
 from tests.clients.losses.test_edges_and_losses import TARE, control_word_of
 from tests.clients.programs.c_program import CProgram
-from tests.clients.programs.controllers import S7, Irc5, MbClient, TwinCat
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.s7 import S7, MbClient
+from tests.clients.programs.controllers.structured_text import TwinCat
 from tests.clients.programs.iec_libraries import TwinCatRequest
 from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import MODEL, TEXTS, command, commands, cycles

@@ -12,7 +12,9 @@ from gateway.modbus import Peer
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.c_program import CProgram
-from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.scenes import TEXTS, cycles
 
 OTHER = Peer("10.0.0.7", 40001)

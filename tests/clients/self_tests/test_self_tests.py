@@ -12,7 +12,10 @@ from gateway.registers.words import ControlBit, SelfTestResult, SelfTestVerdict,
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.c_program import CProgram
-from tests.clients.programs.controllers import S7, Irc5, Plc, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.s7 import S7
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import TEXTS, command, commands, cycles
 from tests.clients.test_in_band import in_band

@@ -11,7 +11,7 @@ from gateway.registers.words import ControlBit, SelfTestResult
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand, refuse_commands
 from tests.clients.losses.test_new_connections import set_ramp
-from tests.clients.programs.controllers import Plc
+from tests.clients.programs.controllers.plc import Plc
 from tests.clients.scenes import TEXTS, command, commands, cycles
 
 BEGUN, OFF = command(int(ControlBit.START_SELF_TEST), 0), command(0, 0)

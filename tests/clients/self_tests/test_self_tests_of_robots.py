@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.programs.controllers import Irc5, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.scenes import TEXTS, command, commands, cycles
 from tests.clients.self_tests.test_self_tests import BEGUN, OFF, begin
 

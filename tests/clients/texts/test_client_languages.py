@@ -14,9 +14,11 @@ from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers.words import SelfTestResult
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.programs.controllers import Irc5
+from tests.clients.programs.controllers.irc5 import Irc5
 from tests.clients.programs.machine import Machine
-from tests.clients.programs.syntax import PATTERNS, Unit, parse, tokenize
+from tests.clients.programs.syntax.languages import PATTERNS, parse
+from tests.clients.programs.syntax.parser import Unit
+from tests.clients.programs.syntax.tokens import tokenize
 from tests.clients.scenes import LANGUAGES, MAP, MODEL, TEXTS, cycles
 
 RESERVED = {

@@ -14,10 +14,14 @@ from gateway.clients import Endpoint, MissingRegisterError, render_client
 from gateway.profiles import load_register_map
 from gateway.registers import RegisterMap
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.programs.controllers import S7, Codesys, Irc5, MbClient, Plc, TwinCat, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.s7 import S7, MbClient
+from tests.clients.programs.controllers.structured_text import Codesys, TwinCat
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.programs.iec_libraries import TwinCatRequest
 from tests.clients.programs.machine import Machine, TaskStopped
-from tests.clients.programs.syntax import parse
+from tests.clients.programs.syntax.languages import parse
 from tests.clients.scenes import MAP, MODEL, TEXTS, WHERE, command, commands, cycles
 
 LANGUAGES = ("rapid", "scl", "st", "urscript", "c", "python")

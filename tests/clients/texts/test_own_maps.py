@@ -17,7 +17,9 @@ from gateway.profiles import load_register_map
 from gateway.registers import Status
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.programs.controllers import S7, Codesys, Irc5
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.s7 import S7
+from tests.clients.programs.controllers.structured_text import Codesys
 from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import MAP, WHERE, cycles
 from tests.clients.texts.test_controller_rules import LANGUAGES, PROFILES, own_map

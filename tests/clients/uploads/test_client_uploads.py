@@ -10,7 +10,11 @@ from typing import Any
 import pytest
 
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.programs.controllers import S7, Codesys, Irc5, Plc, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.s7 import S7
+from tests.clients.programs.controllers.structured_text import Codesys
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.scenes import MAP, MODEL, TEXTS, cycles
 
 

@@ -10,7 +10,9 @@ from gateway.registers.upload.coefficients import words_of_block
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.one_language.test_two_tasks import every_place
-from tests.clients.programs.controllers import Irc5, Plc, UniversalRobot
+from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.plc import Plc
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.scenes import MODEL, TEXTS, cycles
 from tests.clients.uploads.test_client_uploads import words_of
 

@@ -20,7 +20,7 @@ from gateway.profiles.rigs.faces import TlsFace
 from gateway.registers.words import SelfTestResult
 from tests.certificates import store_all
 from tests.clients.gateway_at_hand import GatewayAtHand
-from tests.clients.programs.controllers import S7, MbClient
+from tests.clients.programs.controllers.s7 import S7, MbClient
 
 PROFILES = Path(__file__).parents[3] / "profiles"
 MAP = load_register_map("force-v1")

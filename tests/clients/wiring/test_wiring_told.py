@@ -8,7 +8,7 @@ import pytest
 from gateway.clients import Endpoint, endpoint_of, render_client
 from gateway.clients.wiring import render_page, wiring_page
 from gateway.profiles import list_shipped, load_rig
-from tests.clients.programs.syntax import parse
+from tests.clients.programs.syntax.languages import parse
 from tests.clients.wiring.test_wiring import PROFILES, page_of, rows_of
 
 
