@@ -97,6 +97,8 @@ class CommandTracker:
             self._lease.observe(now_s, command.heartbeat, command.peer)
         if edges.rises & _TAKE:
             self._lease.take_over(now_s, command.peer)
+        if edges.stops:
+            self._lease.stop(now_s, command.peer)
         self._wanted_kg = command.payload_kg if command.payload_kg > 0.0 else self._settings.defaults.payload_kg
         self._follow_payload(dt_s)
         self._update_demand()

@@ -186,10 +186,10 @@ class EdgeCheck:
         return None
 
     def _repeated(self, command: Command, at: Situation) -> EdgeRefusal | None:
-        """A program that stands still, whose last frame is sent on and on, would press anew each time it is lost."""
+        """A program that stands still, whose last frame is sent on and on, would press anew each time it is lost or stopped."""
         if self._commands.would_have_beaten_since(at.lost_s, command):
             return None
-        beat = f"heartbeat = {command.heartbeat} as when the master was lost"
+        beat = f"heartbeat = {command.heartbeat} as when the master was lost, or another one switched it off"
         text = f"enable refused: {beat}: write another value with it"
         return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.ENABLE, text)
 

@@ -152,6 +152,47 @@ def test_who_was_refused_beside_another_owner_enables_with_the_same_heartbeat(by
     assert rig.run(0.1).state is not State.OFF
 
 
+@pytest.mark.parametrize("action", LeaseAction)
+@pytest.mark.parametrize("hangs_s", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("by", ["the page's stop", "a coil", "a takeover that stops"])
+def test_the_frames_of_a_program_that_has_just_hung_undo_no_stop_of_another_one(
+    action: LeaseAction, hangs_s: float, by: str
+) -> None:
+    """Within its lease it was no lost master: behind a stop its next frame pressed 12 N, for good where they are held."""
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=action))
+    rig.beats = False
+    for beat in range(1, 20):
+        rig.run(0.05).write(0, *(frame := (ENABLE, 1200, 0, 0, beat)))
+    for _ in range(round(hangs_s / 0.05)):
+        rig.run(0.05).write(0, *frame)
+    assert rig.state is State.HOLDING
+    if by == "a takeover that stops":
+        rig.write(0, TAKE | ENABLE, peer=OTHER)
+    rig.bank.write_bits(0, [False], OTHER) if by == "a coil" else rig.write(0, 0, peer=OTHER)
+    began = len(rig.run(0.05).trace)
+    for _ in range(20):
+        refused = rig.run(0.05).answer(0, *frame)
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    assert max(voltage_v for _, voltage_v, _ in rig.trace[began:]) == 0.0
+    rig.write(0, *frame[:4], 20)
+    assert rig.run(0.1).state is not State.OFF, "its program goes on"
+
+
+@pytest.mark.parametrize("by", ["its own stop", "another one that comes long behind"])
+def test_a_stop_asks_for_no_beat_of_who_has_stopped_or_has_been_away(by: str) -> None:
+    rig = leased().holding()
+    rig.write(4, 4711)
+    rig.beats = False
+    if by == "its own stop":
+        rig.write(0, 0)
+    else:
+        rig.write(0, 0)
+        rig.run(1.0).write(0, ENABLE, 800, 0, 0, 1, peer=OTHER)
+        rig.run(0.1).write(0, 0, peer=OTHER)
+    rig.write(0, ENABLE, 1200, 0, 0, 4711)
+    assert rig.run(0.1).state is not State.OFF
+
+
 class Held(SmallRig):
     """12 N of 30 N are held for a master whose program hangs while its frame flows; some have taken over with it."""
 
